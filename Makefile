@@ -58,7 +58,7 @@ lint: $(VENV)/.tested
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
-	$(BIN)/mypy examples/*.py benchmarks/*.py
+	$(BIN)/mypy examples/*.py benchmarks/*.py tests
 	$(BIN)/lint-imports --no-cache --no-logo
 	$(BIN)/proselint check --config docs/.proselintrc.json README.md docs
 

@@ -4,6 +4,9 @@ import json
 import os
 import shutil
 import socket
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -24,7 +27,7 @@ ADVICE = ("GL Driver Message", "Canvas2D: Multiple readback", "THREE.Clock")
 KEYS = {" ": ("Space", 32), "Escape": ("Escape", 27), "Enter": ("Enter", 13)}
 
 
-def chromium():
+def chromium() -> str:
     """Path of a browser; the test is skipped without one, in CI it fails."""
     found = next(filter(None, map(shutil.which, BROWSERS)), None)
     if found is None:
@@ -52,35 +55,41 @@ class Tab(Headless):
     ``answers`` the status of each answer.
     """
 
-    def __init__(self, folder, width=1400, height=900):
+    def __enter__(self) -> "Tab":
+        return self
+
+    def __init__(self, folder: Path, width: int = 1400, height: int = 900) -> None:
+        self.answers: dict[Any, Any]
+        self.asked: list[Any]
+        self.errors: list[Any]
         self.errors, self.asked, self.answers = [], [], {}
         super().__init__(chromium(), folder, width, height, FLAGS)
         for domain in ("Network", "Log"):
             self.call(f"{domain}.enable")
 
-    def visit(self, url):
+    def visit(self, url: Any) -> None:
         """Open a page of a server and wait until its scene is there."""
         self.call("Page.navigate", url=url)
         self.until("document.querySelector('canvas')")
 
-    def reload(self):
+    def reload(self) -> None:
         """Load the page again."""
         self.value("window.isOld = true")
         self.call("Page.reload")
         self.until("!window.isOld && document.querySelector('canvas')")
 
-    def shows(self, text, seconds=60):
+    def shows(self, text: Any, seconds: float = 60) -> None:
         """Wait until a text can be read on the page."""
         self.until(f"document.body.innerText.includes({json.dumps(text)})", seconds)
 
-    def click(self, text):
+    def click(self, text: Any) -> None:
         """Click what has this text: a button, a tab, a label."""
         self.shows(text)
         x, y = self.place(text)
         for kind in ("mouseMoved", "mousePressed", "mouseReleased"):
             self.mouse(kind, x, y)
 
-    def place(self, text):
+    def place(self, text: Any) -> Any:
         """Middle of the last visible element with a text, once it rests and nothing covers it [px].
 
         A click there reaches it, or the promise fails.
@@ -107,7 +116,7 @@ class Tab(Headless):
             throw new Error('nothing that can be clicked says ' + {json.dumps(text)});
         }})()""")
 
-    def fill(self, label, text):
+    def fill(self, label: Any, text: Any) -> None:
         """Write a text, in place of what stands there, into the field beside a label."""
         self.shows(label)
         self.value(f"""(() => {{
@@ -120,7 +129,7 @@ class Tab(Headless):
         }})()""")
         self.call("Input.insertText", text=text)
 
-    def key(self, name):
+    def key(self, name: Any) -> None:
         """Press and release a key."""
         code, number = KEYS.get(name, (f"Key{name.upper()}", ord(name.upper()[0])))
         text = {"text": name} if len(name) == 1 else {}
@@ -129,7 +138,7 @@ class Tab(Headless):
                       windowsVirtualKeyCode=number, **text)  # fmt: skip
             text = {}
 
-    def pull(self, begin, end, steps=20):
+    def pull(self, begin: Any, end: Any, steps: int = 20) -> None:
         """Drag slowly, as a hand does, from one point to another [px]; the button stays down."""
         self.mouse("mouseMoved", *begin)
         self.mouse("mousePressed", *begin)
@@ -137,7 +146,7 @@ class Tab(Headless):
             self.mouse("mouseMoved", *point)
             self.value("new Promise(requestAnimationFrame)")
 
-    def swipe(self, begin, end, steps=20):
+    def swipe(self, begin: Any, end: Any, steps: int = 20) -> None:
         """The same by a finger, which is lifted at the end."""
         points = np.linspace(begin, end, steps + 1)
         for kind, where in zip(["Start"] + ["Move"] * steps, points, strict=True):
@@ -146,7 +155,7 @@ class Tab(Headless):
             self.value("new Promise(requestAnimationFrame)")
         self.call("Input.dispatchTouchEvent", type="touchEnd", touchPoints=[])
 
-    def seen_at(self, node, point):
+    def seen_at(self, node: Any, point: Any) -> Any:
         """Pixel at which a point of a node of viser's scene is seen, both as they are drawn.
 
         Args:
@@ -166,22 +175,22 @@ class Tab(Headless):
                     box.y + box.height * (0.5 - 0.5 * y / w)];
         }})()""")
 
-    def place_of(self, node):
+    def place_of(self, node: Any) -> str:
         """Expression of the place of a node of viser's scene in its parent's frame [m]."""
         return f"{VIEWER}.nodeRefFromName[{json.dumps(node)}].position.toArray()"
 
-    def faults(self):
+    def faults(self) -> list[Any]:
         """Errors that mean something."""
         self.value("0")  # what was said before has been heard then
         return [line for line in self.errors if not any(advice in line for advice in ADVICE)]
 
-    def hosts(self):
+    def hosts(self) -> set[Any]:
         """All hosts that the page asked for anything."""
         self.value("0")
         addresses = [url for url in self.asked if not url.startswith(("data:", "blob:"))]
         return {url.split("/")[2] for url in addresses}
 
-    def _note(self, event):
+    def _note(self, event: Any) -> None:
         super()._note(event)
         method, told = event.get("method"), event.get("params", {})
         if method == "Runtime.exceptionThrown" or told.get("type") in {"error", "assert"}:
@@ -196,12 +205,12 @@ class Tab(Headless):
             self.answers[told["response"]["url"]] = told["response"]["status"]
 
 
-def until(condition, what, seconds=60.0):
+def until(condition: Callable[..., object], what: str, seconds: float = 60.0) -> bool:
     """Result of a condition as soon as it is true; for what happens outside of the browser."""
     return wait_until(condition, what, seconds)
 
 
-def handshake(port, path="/", **headers):
+def handshake(port: int, path: str = "/", **headers: Any) -> Any:
     """First line of the answer to the opening of a WebSocket, and the socket it came on."""
     opened = socket.create_connection(("127.0.0.1", port), timeout=20)
     told = {

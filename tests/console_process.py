@@ -5,6 +5,7 @@ import signal
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 from browser import until
 
@@ -25,7 +26,7 @@ class ConsoleProcess:
             self.process = subprocess.Popen(
                 [*command, "--port", "0", "--no-browser"], stdout=log, stderr=log, cwd=folder
             )
-        told = until(lambda: re.search(r"http://\S+?/(?=;)", self.text), "an address", STARTS)
+        told: Any = until(lambda: re.search(r"http://\S+?/(?=;)", self.text), "an address", STARTS)
         self.url = told[0]
 
     @property

@@ -2,14 +2,17 @@
 
 import threading
 import time
+from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import Any
 
 import numpy as np
 
 from teleop_core.console.app import Console
-from teleop_core.console.link import Arm, ArmView, View
+from teleop_core.console.link import Arm, ArmView, ParameterInfo, View
 from teleop_core.console.server import ConsoleServer
 from teleop_core.graph.topics import MASTER_MEASURED_CP, OPERATION
+from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot_set
 from teleop_core.slave.operation import Fault, State, operation_text
 
@@ -24,9 +27,11 @@ class Desk:
 
     title, is_live = "desk", True
 
-    def __init__(self, *, is_stoppable=False):
+    def __init__(self, *, is_stoppable: bool = False) -> None:
         self.is_stoppable = is_stoppable
         self.arms = (Arm("", load_robot_set("rcrt1", ())),)
+        self.asked: list[Any]
+        self.known: dict[Any, Any]
         self.asked, self.stops, self.known = [], 0, {}
         self.obeys = threading.Event()
         self.obeys.set()
@@ -34,12 +39,12 @@ class Desk:
         arm.operation |= {"state": float(State.ENABLED), "is_homed": 1.0, "fault_joint": -1.0}
         self._view = View(arms={"": arm}, is_fresh=True)
 
-    def view(self):
+    def view(self) -> View:
         self._view.time, arm = time.monotonic(), self._view.arms[""]
         arm.operation_text = operation_text(arm.operation)
         return self._view
 
-    def press(self, *, is_pressed):
+    def press(self, *, is_pressed: bool) -> None:
         if is_pressed:
             self.stops += 1
         else:
@@ -48,37 +53,37 @@ class Desk:
             fault = {"state": State.FAULT, "fault": Fault.STOP, "is_stopped": is_pressed}
             self.view().arms[""].operation |= {name: float(n) for name, n in fault.items()}
 
-    def command(self, word, arm=""):
+    def command(self, word: str, arm: str = "") -> tuple[bool, str]:
         self.obeys.wait(60)
         self.asked.append(word)
         return True, word
 
-    def hold(self, arm, pose):
+    def hold(self, arm: str, pose: Array) -> None:
         assert np.shape(pose) == (7,)
         self.asked.append("hold")
 
-    def let_go(self, arm):
+    def let_go(self, arm: str) -> None:
         pass
 
-    def press_button(self, arm, name):
+    def press_button(self, arm: Any, name: Any) -> None:
         self.asked.append(name)
 
-    def parameters(self):
+    def parameters(self) -> dict[tuple[str, str], ParameterInfo]:
         return self.known
 
-    def changes(self):
+    def changes(self) -> dict[str, object]:
         return {}
 
-    def change(self, node, name, value):
+    def change(self, node: Any, name: Any, value: Any) -> str:
         self.asked.append(name)
         return ""
 
-    def save(self, name):
+    def save(self, name: Any) -> None:
         self.asked.append("save")
 
 
 @contextmanager
-def shown(desk):
+def shown(desk: Any) -> Iterator[tuple[ConsoleServer, Desk]]:
     """Server of the page of a desk, drawn as the command draws it, and the desk."""
     ends = threading.Event()
     with ConsoleServer(0) as server:

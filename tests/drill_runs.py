@@ -3,9 +3,11 @@
 import json
 import subprocess
 import sys
+from pathlib import Path
+from typing import Any
 
 
-def run_drill(tmp_path, *arguments):
+def run_drill(tmp_path: Path, *arguments: Any) -> Any:
     """Exit code, output and outcomes by name of ``teleop drill``."""
     file = tmp_path / "drill.json"
     command = [sys.executable, "-m", "teleop_core.cli", "drill", *arguments, "--json", str(file)]

@@ -1,22 +1,27 @@
 """Free tool: a rigid tool with several points that is dragged or flies through an object."""
 
 import math
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from led_tip import DT, PIECES, needle
 from teleop_core.kernels import kernel, pointer
 from teleop_core.kernels.fields import record, record_array
+from teleop_core.kernels.geometry import Array
 from teleop_core.robots.drives import ACCELERATION
 from teleop_core.slave.joints import integrate
 from teleop_core.slave.simulation import SimulationNumbers, SimulationState
 from teleop_core.slave.world.contact import ContactState, add_push, touch
+from teleop_core.slave.world.hole import HoleParameters
 
 JOINTS = 6  # the tip's place along the base, and turns about the base's axes
 
 
 @kernel
-def free_acceleration(q, dq, net, dynamics, ddq):
+def free_acceleration(q: Any, dq: Any, net: Any, dynamics: Any, ddq: Any) -> None:
     """Of a body with mass [kg], inertia [kg·m²] about the tip in all directions, and gravity (3,).
 
     Its centre of mass is its tip.
@@ -30,7 +35,7 @@ FREE = pointer(free_acceleration, ACCELERATION)
 
 
 @kernel
-def _turn(axis, by):
+def _turn(axis: Array, by: Array) -> None:
     """Turn an axis (3,) by a rotation vector (3,) [rad]."""
     angle = math.sqrt(by[0] * by[0] + by[1] * by[1] + by[2] * by[2])
     if angle == 0.0:
@@ -48,13 +53,17 @@ def _turn(axis, by):
 
 
 @kernel
-def _place(arm, q, axis):
+def _place(
+    arm: Any,
+    q: Array,
+    axis: Array,
+) -> None:
     for k in range(3):
         arm.T[k, 3], arm.T[k, 2] = q[k], axis[k]
 
 
 @kernel
-def stored(p, contacts):
+def stored(p: Any, contacts: NDArray[np.void]) -> float:
     """Energy in the springs of all points that touch [J]."""
     energy = 0.0
     for point in range(contacts.shape[0]):
@@ -68,7 +77,16 @@ def stored(p, contacts):
 
 
 @kernel
-def _drag(p, contacts, arm, q, axis, steps, felt, account):
+def _drag(
+    p: Any,
+    contacts: NDArray[np.void],
+    arm: Any,
+    q: Array,
+    axis: Array,
+    steps: Array,
+    felt: Array,
+    account: Array,
+) -> None:
     push, speed, middle, energy, turned = np.empty(6), np.empty(6), np.empty(6), 0.0, 0.0
     for tick in range(len(steps)):
         _place(arm, q, axis)
@@ -92,7 +110,18 @@ def _drag(p, contacts, arm, q, axis, steps, felt, account):
 
 
 @kernel
-def _fly(p, s, contacts, arm, acceleration, dynamics, q, dq, axis, found):
+def _fly(
+    p: Any,
+    s: SimulationState,
+    contacts: NDArray[np.void],
+    arm: Any,
+    acceleration: Callable[..., object],
+    dynamics: Array,
+    q: Array,
+    dq: Array,
+    axis: Array,
+    found: Array,
+) -> None:
     effort, felt, before = np.zeros(6), np.zeros(6), np.empty(6)
     for tick in range(len(found)):
         _place(arm, q, axis)
@@ -107,7 +136,7 @@ def _fly(p, s, contacts, arm, acceleration, dynamics, q, dq, axis, found):
         _turn(axis, q[3:] - before[3:])
 
 
-def _records(points, numbers):
+def _records(points: int, numbers: dict[str, float]) -> tuple[object, NDArray[np.void]]:
     p, contacts = record(SimulationNumbers, JOINTS), record_array(ContactState, points, JOINTS)
     known = {"world_stiffness": 1000.0, "steps": 2, "friction_speed": 1.0, "tool_length": 0.02}
     for key, value in (known | numbers).items():
@@ -115,7 +144,15 @@ def _records(points, numbers):
     return p, contacts
 
 
-def drag(begin, axis, steps, name="plane", parameters=None, points=5, **numbers):
+def drag(
+    begin: ArrayLike,
+    axis: ArrayLike,
+    steps: Array,
+    name: str = "plane",
+    parameters: Any = None,
+    points: int = 5,
+    **numbers: float,
+) -> tuple[Array, Array, Array]:
     """Wrenches (ticks, 6) [N, N·m], energy lost (ticks,) and work turned over (ticks,) [J].
 
     Args:
@@ -135,8 +172,19 @@ def drag(begin, axis, steps, name="plane", parameters=None, points=5, **numbers)
     return felt, account[:, 0], account[:, 1]
 
 
-def fly(begin, speed, ticks, axis=(0.0, 0.0, -1.0), name="plane", parameters=None, points=1,
-        mass=1.0, inertia=1.0, gravity=(0.0, 0.0, -9.81), **numbers):  # fmt: skip
+def fly(
+    begin: tuple[float, float, float],
+    speed: Sequence[float] | Array,
+    ticks: int,
+    axis: Sequence[float] | Array = (0.0, 0.0, -1.0),
+    name: str = "plane",
+    parameters: HoleParameters | None = None,
+    points: int = 1,
+    mass: float = 1.0,
+    inertia: float = 1.0,
+    gravity: tuple[float, float, float] = (0.0, 0.0, -9.81),
+    **numbers: float,
+) -> Any:
     """Motion of a body that only the object and gravity push, a dict of arrays (ticks, ...).
 
     Its keys: ``place`` (3,) [m] and ``turn`` (3,) [rad] of the tip, ``speed`` (6,), ``felt`` (6,)
@@ -161,6 +209,8 @@ def fly(begin, speed, ticks, axis=(0.0, 0.0, -1.0), name="plane", parameters=Non
     thing, body = needle(name, parameters, JOINTS), np.array([mass, inertia, *gravity])
     state = record(SimulationState, JOINTS)
     _fly(p, state, contacts, thing, FREE, body, q, dq, np.array(axis, float), found)
-    keys = {"place": slice(3), "turn": slice(3, 6), "speed": slice(6, 12), "felt": slice(12, 18),
-            "stored": 18, "axis": slice(19, 22)}  # fmt: skip
+    keys: dict[str, Any] = {
+        "place": slice(3), "turn": slice(3, 6), "speed": slice(6, 12), "felt": slice(12, 18),
+        "stored": 18, "axis": slice(19, 22),
+    }  # fmt: skip
     return {key: found[:, part] for key, part in keys.items()} | {"time": DT * np.arange(ticks)}

@@ -23,6 +23,7 @@ import resource
 import signal
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from typing import Any
 
 from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
@@ -73,7 +74,7 @@ def cases(target: str, parts: int = 1) -> int:
 
 def fuzz(
     target: str, parts: int = 1, **strategies: st.SearchStrategy
-) -> Callable[[Callable], Callable]:
+) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
     """Test that tries a target on its cases, drawn from ``strategies`` by argument.
 
     Args:
@@ -82,7 +83,7 @@ def fuzz(
         **strategies: Where the arguments of the test come from.
     """
 
-    def decorate(test: Callable) -> Callable:
+    def decorate(test: Callable[..., Any]) -> Callable[..., Any]:
         @functools.wraps(test)
         def case(*arguments: object, **drawn: object) -> None:
             _untold.append(target)

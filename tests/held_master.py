@@ -1,5 +1,7 @@
 """Held master: a haptic master in the hand of an operator, tick by tick, without the slave."""
 
+from collections.abc import Callable
+
 from teleop_core.chain.master.haptic_master import HapticMaster, HapticMasterParameters
 from teleop_core.chain.master.operator import RunningOperator
 from teleop_core.chain.operators.parameters import OperatorParameters
@@ -20,34 +22,34 @@ class HeldMaster:
         )
         self.signals, self.state = self.device.signals, self.device.state
 
-    def prepare(self, ticks):
+    def prepare(self, ticks: int) -> None:
         """Draw what both need in the next ticks."""
         for stage in (self.operator, self.device):
             stage.prepare(ticks)
 
-    def step(self):
+    def step(self) -> None:
         """One tick of both; what the operator sees is what the device showed last."""
         self.operator.step()
         self._hand_over()
         self.device.step()
 
-    def load(self):
+    def load(self) -> Callable[[], None]:
         """Tick of what is prepared, without looking for more: faster."""
         move, feel = self.operator.load(), self.device.load()
 
-        def step():
+        def step() -> None:
             move()
             self._hand_over()
             feel()
 
         return step
 
-    def _hand_over(self):
+    def _hand_over(self) -> None:
         for name in _HAND:
             self.signals[name] = self.operator.signals[name]
         self.signals["hand_servo_cp_ns"] += 1
 
-    def reset(self):
+    def reset(self) -> None:
         """Back to before the first tick."""
         self.operator.reset()
         self.device.reset()

@@ -6,6 +6,7 @@ Each is done over a real WebSocket; none moves the arm, or keeps the stop from s
 import math
 import socket
 from contextlib import ExitStack, suppress
+from typing import Any
 
 import msgspec
 from websockets.frames import Frame, Opcode
@@ -18,21 +19,21 @@ HERE, LEVEL = [0.0, -0.06, -0.08], [1.0, 0.0, 0.0, 0.0]
 BUTTONS = ("Initialize", "Start", "Pause", "Home", "Release", "Save as")
 
 
-def every(page):
+def every(page: PageClient) -> list[str]:
     """All elements of a page."""
     return list(page.elements.values())
 
 
-def takes_the_callbacks_of_all_elements_away(watcher, driver):
+def takes_the_callbacks_of_all_elements_away(watcher: PageClient, driver: PageClient) -> None:
     for uuid in every(watcher):
         watcher.set(uuid, update_cb=[])
 
 
-def drags_to_a_place_of_one_number(watcher, driver):
+def drags_to_a_place_of_one_number(watcher: PageClient, driver: PageClient) -> None:
     watcher.drag(position=[1.0])
 
 
-def drags_what_another_page_drives(watcher, driver):
+def drags_what_another_page_drives(watcher: PageClient, driver: PageClient) -> None:
     name = watcher.gizmos[0]
     watcher.say({"type": "TransformControlsDragStartMessage", "name": name, "owner": ""})
     for _ in range(20):
@@ -40,36 +41,37 @@ def drags_what_another_page_drives(watcher, driver):
     watcher.say({"type": "TransformControlsDragEndMessage", "name": name, "owner": ""})
 
 
-def presses_the_buttons_of_the_driver(watcher, driver):
+def presses_the_buttons_of_the_driver(watcher: PageClient, driver: PageClient) -> None:
     for label in BUTTONS:
         watcher.click(label)
 
 
-def hides_disables_and_renames_elements(watcher, driver):
+def hides_disables_and_renames_elements(watcher: PageClient, driver: PageClient) -> None:
     for uuid in every(watcher)[:20]:
         watcher.set(uuid, disabled=True)
         watcher.set(uuid, visible=False)
         watcher.set(uuid, label="all is well", order=-100.0)
 
 
-def reaches_into_the_server(watcher, driver):
+def reaches_into_the_server(watcher: PageClient, driver: PageClient) -> None:
     for name in ("removed", "uuid", "gui_api", "props", "sync_cb", "__class__", "is_button"):
         watcher.set(watcher.elements["Take control"], **{name: None})
         watcher.set(watcher.elements["Take control"], value=True, **{name: "x"})
 
 
-def changes_what_is_shown_to_all(watcher, driver):
+def changes_what_is_shown_to_all(watcher: PageClient, driver: PageClient) -> None:
     for label in ("dark", "paths", "name", "show"):
         for value in (True, "x", 1):
             watcher.set(watcher.elements[label], value=value)
 
 
-def uses_the_keys_of_the_driver(watcher, driver):
+def uses_the_keys_of_the_driver(watcher: PageClient, driver: PageClient) -> None:
     for uuid in watcher.commands.values():
         watcher.say({"type": "CommandTriggerMessage", "uuid": uuid})
 
 
-def looks_from_nowhere(watcher, driver):
+def looks_from_nowhere(watcher: PageClient, driver: PageClient) -> None:
+    wrong: dict[str, Any]
     for wrong in (
         {"position": [NAN, 0, 0]}, {"position": [1.0]}, {"wxyz": [0, 0, 0, 0]}, {"fov": 0},
         {"image_height": 0}, {"image_width": -5}, {"look_at": [INF, 0, 0]}, {"near": "x"},
@@ -78,7 +80,8 @@ def looks_from_nowhere(watcher, driver):
         watcher.say(CAMERA | wrong)
 
 
-def gives_values_of_every_wrong_type(watcher, driver):
+def gives_values_of_every_wrong_type(watcher: PageClient, driver: PageClient) -> None:
+    wrong: Any
     wrong = ([], {}, [[1]], None, NAN, INF, 2**63, -(2**63), "x" * 5000, b"bytes", {"a": [1] * 100})
     for page in (watcher, driver):
         for label in ("dark", "name", "joint", "Take control"):
@@ -86,7 +89,8 @@ def gives_values_of_every_wrong_type(watcher, driver):
                 page.set(page.elements[label], value=value)
 
 
-def updates_what_does_not_exist(watcher, driver):
+def updates_what_does_not_exist(watcher: PageClient, driver: PageClient) -> None:
+    uuid: Any
     for uuid in ("", "nothing", "x" * 10_000, "../..", None, 7):
         watcher.set(uuid, value=True)
         driver.say({"type": "CommandTriggerMessage", "uuid": uuid})
@@ -94,7 +98,7 @@ def updates_what_does_not_exist(watcher, driver):
                     "wxyz": LEVEL})  # fmt: skip
 
 
-def uploads_files(watcher, driver):
+def uploads_files(watcher: PageClient, driver: PageClient) -> None:
     uuid = watcher.elements["name"]
     watcher.say({"type": "FileTransferStartUpload", "source_component_uuid": uuid,
                  "transfer_uuid": "t", "filename": "/etc/passwd", "mime_type": "x",
@@ -104,7 +108,7 @@ def uploads_files(watcher, driver):
                      "transfer_uuid": "t", "content": bytes(200_000)})  # fmt: skip
 
 
-def speaks_as_the_server(watcher, driver):
+def speaks_as_the_server(watcher: PageClient, driver: PageClient) -> None:
     for message in (
         {"type": "RunJavascriptMessage", "source": "alert(1)"}, {"type": "ResetGuiMessage"},
         {"type": "GuiRemoveMessage", "uuid": watcher.elements["Take control"]},
@@ -115,7 +119,7 @@ def speaks_as_the_server(watcher, driver):
         watcher.say(message)
 
 
-def uses_what_the_console_does_not(watcher, driver):
+def uses_what_the_console_does_not(watcher: PageClient, driver: PageClient) -> None:
     uuid = watcher.elements["Take control"]
     ray = {"ray_origin": [0, 0, 0], "ray_direction": [0, 0, 1], "modifier": None}
     for page in (watcher, driver):
@@ -131,7 +135,7 @@ def uses_what_the_console_does_not(watcher, driver):
             page.say(message)
 
 
-def sends_what_is_no_message(watcher, driver):
+def sends_what_is_no_message(watcher: PageClient, driver: PageClient) -> None:
     drag = msgspec.msgpack.encode({"type": "TransformControlsUpdateMessage", "position": HERE})
     for page in (watcher, driver):
         for data in (
@@ -143,12 +147,13 @@ def sends_what_is_no_message(watcher, driver):
             b"\xdf\xff\xff\xff\xff",
         ):
             page.raw(data)
+        value: Any
         for value in (None, [], 7, {}, {"type": 3}, {"type": ["x"]}, [[[[]]]]):
             page.say(value)
         page.raw("a text")
 
 
-def says_one_type_and_means_another(watcher, driver):
+def says_one_type_and_means_another(watcher: PageClient, driver: PageClient) -> None:
     # A map with the same key twice: parsers differ in which of them counts.
     items = [("type", "ViewerCameraMessage"), ("type", "GuiUpdateMessage"),
              ("uuid", watcher.elements["Start"]), ("updates", {"value": True})]  # fmt: skip
@@ -157,11 +162,11 @@ def says_one_type_and_means_another(watcher, driver):
         watcher.raw(bytes([0x80 + len(order)]) + b"".join(parts))
 
 
-def sends_one_message_that_is_too_large(watcher, driver):
+def sends_one_message_that_is_too_large(watcher: PageClient, driver: PageClient) -> None:
     watcher.raw(bytes(9_000_000))
 
 
-def floods_with_drags(watcher, driver):
+def floods_with_drags(watcher: PageClient, driver: PageClient) -> None:
     for _ in range(20_000):
         watcher.drag()
         if watcher.is_cut:
@@ -170,14 +175,14 @@ def floods_with_drags(watcher, driver):
     until(lambda: watcher.is_cut, "the flood of 20,000 messages is cut off")
 
 
-def floods_with_pings(watcher, driver):
+def floods_with_pings(watcher: PageClient, driver: PageClient) -> None:
     ping = Frame(Opcode.PING, b"x").serialize(mask=True)
     with suppress(OSError):
         for _ in range(100):
             watcher.socket.socket.sendall(ping * 1000)
 
 
-def begins_a_message_that_never_ends(watcher, driver):
+def begins_a_message_that_never_ends(watcher: PageClient, driver: PageClient) -> None:
     first = Frame(Opcode.BINARY, bytes(100_000), fin=False).serialize(mask=True)
     more = Frame(Opcode.CONT, bytes(100_000), fin=False).serialize(mask=True)
     with suppress(OSError):
@@ -185,7 +190,7 @@ def begins_a_message_that_never_ends(watcher, driver):
             watcher.socket.socket.sendall(part)
 
 
-def opens_sockets_and_says_nothing(watcher, driver):
+def opens_sockets_and_says_nothing(watcher: PageClient, driver: PageClient) -> None:
     with ExitStack() as stack:
         for begin in (b"", b"GET / HT", b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n"):
             for _ in range(60):
@@ -195,7 +200,7 @@ def opens_sockets_and_says_nothing(watcher, driver):
         assert driver.ask("/stop")[0] == 204
 
 
-def opens_pages_that_never_come_up(watcher, driver):
+def opens_pages_that_never_come_up(watcher: PageClient, driver: PageClient) -> None:
     pages = []
     for _ in range(40):
         with suppress(OSError, EOFError):
@@ -205,18 +210,18 @@ def opens_pages_that_never_come_up(watcher, driver):
         page.close()
 
 
-def comes_and_goes(watcher, driver):
+def comes_and_goes(watcher: PageClient, driver: PageClient) -> None:
     for _ in range(40):
         PageClient(watcher.port, comes_up=False).close()
 
 
-def leaves_in_the_middle_of_a_message(watcher, driver):
+def leaves_in_the_middle_of_a_message(watcher: PageClient, driver: PageClient) -> None:
     frame = Frame(Opcode.BINARY, bytes(1000)).serialize(mask=True)
     watcher.socket.socket.sendall(frame[:500])
     watcher.close()
 
 
-def keeps_another_page_alive(watcher, driver):
+def keeps_another_page_alive(watcher: PageClient, driver: PageClient) -> None:
     port = watcher.port
     assert ask(port, "/alive?page=0")[0] == 403
     assert ask(port, "/alive", Teleop_Page="guess")[1]["drives"] is False
@@ -227,24 +232,24 @@ def keeps_another_page_alive(watcher, driver):
         assert ask(port, "/stop", Teleop_Page="new", **told)[0] == 403
 
 
-def reads_files(watcher, driver):
+def reads_files(watcher: PageClient, driver: PageClient) -> None:
     for path in ("/../server.py", "/%2e%2e/%2e%2e/_viser.py", "/..\\..\\_viser.py", "//etc/passwd"):
         status, body = ask(watcher.port, path)
         assert status in {403, 404}, path
         assert b"import" not in body
 
 
-def drives_to_where_no_stylus_is(watcher, driver):
+def drives_to_where_no_stylus_is(watcher: PageClient, driver: PageClient) -> None:
     for position in ([NAN, 0, 0], [0, INF, 0], [1.0], [0] * 4, [1e308] * 3, [5, 0, 0], "xyz", None):
-        driver.drag(position=position)
+        driver.drag(position=position)  # type: ignore[arg-type]
     for turn in ([0, 0, 0, 0], [NAN, 0, 0, 0], [1, 0, 0], [2, 0, 0, 0], [1] * 5, {"w": 1}):
-        driver.drag(wxyz=turn)
+        driver.drag(wxyz=turn)  # type: ignore[arg-type]
     driver.drag(owner="another")
     driver.drag(owner=3)
     driver.drag(more=1)
 
 
-def occupies_the_server_with_presses(watcher, driver):
+def occupies_the_server_with_presses(watcher: Any, driver: Any) -> None:
     for _ in range(60):
         driver.click("Initialize")
 

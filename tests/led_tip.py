@@ -1,12 +1,13 @@
 """Led tip: a tip that is led along any way through an object, what it feels and what it loses."""
 
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from teleop_core.kernels import kernel, pointer
 from teleop_core.kernels.fields import fields_of, record, record_array
+from teleop_core.kernels.geometry import Array
 from teleop_core.robots.kinematics import FK
 from teleop_core.slave.simulation import SimulationNumbers
 from teleop_core.slave.world import WORLD_OBJECTS
@@ -18,7 +19,7 @@ PIECES = 16  # pieces of way in a tick, along each of which the push does its wo
 
 
 @kernel
-def straight(q, geometry, jacobian):
+def straight(q: Any, geometry: Any, jacobian: Any) -> None:
     """Jacobian of a tip whose joints are its place, and its turns about the base's axes if six."""
     jacobian[:] = 0.0
     for k in range(jacobian.shape[1]):
@@ -39,7 +40,7 @@ class Needle(NamedTuple):
     J: np.ndarray
 
 
-def needle(name, parameters=None, joints=3):
+def needle(name: str, parameters: Any = None, joints: int = 3) -> Needle:
     """A needle before an object, with the defaults of its parameters if there are no others."""
     part = WORLD_OBJECTS.find(name)
     return Needle(
@@ -50,7 +51,7 @@ def needle(name, parameters=None, joints=3):
 
 
 @kernel
-def _stored_in_button(p, s, depth):
+def _stored_in_button(p: SimulationNumbers, s: Any, depth: Any) -> Any:
     """Energy that a button can give back [J] by what moves along its normal."""
     rising, falling = min(depth, p.click_travel), min(depth, p.stroke) - p.click_travel
     energy = 0.5 * p.click_force * rising * rising / p.click_travel
@@ -64,7 +65,7 @@ def _stored_in_button(p, s, depth):
 
 
 @kernel
-def _stored(p, s):
+def _stored(p: SimulationNumbers, s: Any) -> Any:
     """Energy that the object can give back [J]: by its surface, or by springs of the channel."""
     stiffness, depth, square = p.world_stiffness, max(-s.gap, 0.0), 0.0
     for k in range(3):
@@ -80,7 +81,14 @@ def _stored(p, s):
 
 
 @kernel
-def _lead(p, contacts, arm, way, felt, lost):
+def _lead(
+    p: SimulationNumbers,
+    contacts: Any,
+    arm: Any,
+    way: Array,
+    felt: Array,
+    lost: Array,
+) -> None:
     """Lead the tip along ``way`` (N, 3), a tick each ``PIECES`` rows.
 
     Writes the force at the begin of each tick (ticks, 6), and the energy lost so far (ticks,): what
@@ -107,7 +115,7 @@ def _lead(p, contacts, arm, way, felt, lost):
                 energy -= push[k] * (way[i + 1, k] - way[i, k])
 
 
-def lead(way, name="plane", parameters=None, **numbers):
+def lead(way: Array, name: str = "plane", parameters: Any = None, **numbers: float) -> Any:
     """Forces (ticks, 3) [N], energy lost (ticks,) [J] and state of a tip led through places.
 
     Args:
@@ -131,7 +139,7 @@ def lead(way, name="plane", parameters=None, **numbers):
     return felt[:, :3], lost, contacts[0]
 
 
-def along_z(*heights, speed=0.02):
+def along_z(*heights: float, speed: float = 0.02) -> Array:
     """Straight way (N, 3) [m] through heights, at a speed [m/s]."""
     legs = [
         np.linspace(a, b, max(round(abs(b - a) / speed / DT), 200), endpoint=False)
@@ -141,7 +149,7 @@ def along_z(*heights, speed=0.02):
     return np.column_stack((np.zeros((len(z), 2)), z))
 
 
-def wandering(seed, ticks=3000):
+def wandering(seed: int, ticks: int = 3000) -> Array:
     """Way (N, 3) [m] that wanders through the surface at z = 0, and begins and ends above it."""
     rng, times = np.random.default_rng(seed), DT * np.arange(ticks)
     rates, phases = rng.uniform(0.3, 6.0, (6, 3)), rng.uniform(0.0, 2.0 * np.pi, (6, 3))

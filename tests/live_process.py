@@ -76,8 +76,8 @@ class LiveProcess:
 
     def nodes(self, name: str = "") -> list[psutil.Process]:
         """Processes of its nodes, or those of one."""
-        starter, *_ = [*psutil.Process(self.process.pid).children(), None]
-        found = starter.children() if starter else []
+        children: list[psutil.Process] = psutil.Process(self.process.pid).children()
+        found: list[psutil.Process] = children[0].children() if children else []
         return [process for process in found if not name or name in words(process)]
 
     def signal(self, number: int) -> list[psutil.Process]:

@@ -9,11 +9,13 @@ from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from teleop_core.bags.memory import MemoryBag
 from teleop_core.bags.series import Series
 from teleop_core.graph.topics import MASTER_BUTTONS, MASTER_MEASURED_CP
+from teleop_core.kernels.geometry import Array
 from teleop_core.session.recording import Recording
 
 _BEGIN_NS = 5_000_000_000
@@ -46,7 +48,7 @@ PEOPLE = {
 }
 
 
-def moves(person: Person, seconds: float, seed: int = 1):
+def moves(person: Person, seconds: float, seed: int = 1) -> tuple[NDArray[np.int64], Array]:
     """Stamps (N,) [ns] and poses (N, 7), position [m] and quaternion w, x, y, z."""
     rng = np.random.default_rng(seed)
     ends, places, attitudes = [0.0], [np.zeros(3)], [Rotation.identity()]
@@ -54,7 +56,8 @@ def moves(person: Person, seconds: float, seed: int = 1):
         place = rng.uniform(-0.5, 0.5, 3) * person.extent
         axis = rng.normal(size=3)
         turn = person.turn * np.sqrt(rng.uniform()) * axis / np.linalg.norm(axis)
-        time = max(0.3, np.linalg.norm(place - places[-1]) / person.speed * rng.uniform(0.7, 1.5))
+        way = float(np.linalg.norm(place - places[-1]))
+        time = max(0.3, way / person.speed * rng.uniform(0.7, 1.5))
         for wait, is_moving in ((time, True), (rng.uniform(0.0, 0.6), False)):
             ends.append(ends[-1] + wait)
             places.append(place if is_moving else places[-1])
@@ -74,7 +77,9 @@ def moves(person: Person, seconds: float, seed: int = 1):
     return np.round(times * 1e9).astype(np.int64) + _BEGIN_NS, np.ascontiguousarray(poses)
 
 
-def recorded(stamp_ns, poses, buttons=None, name: str = "person") -> Recording:
+def recorded(
+    stamp_ns: NDArray[np.int64], poses: Array, buttons: Array | None = None, name: str = "person"
+) -> Recording:
     """Recording of a master's poses and, if given, buttons (N, 3), as another program made it."""
     series = {MASTER_MEASURED_CP: Series(stamp_ns, stamp_ns, poses, (), "master_base")}
     if buttons is not None:

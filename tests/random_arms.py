@@ -1,15 +1,18 @@
 """Arms of each class with a closed form, as URDF texts: random axes and real arms."""
 
 import math
+from typing import Any
 
 import numpy as np
+
+from teleop_core.kernels.geometry import Array
 
 SHOULDERS = ("skew", "1 and 2 parallel", "2 and 3 parallel", "1 and 2 meet", "2 and 3 meet")
 PARALLEL = ("5 and 6 meet", "5 and 6 apart")
 WIDE = (-2.0 * math.pi, 2.0 * math.pi)
 
 
-def direction(rng, *beside):
+def direction(rng: np.random.Generator, *beside: Array) -> Array:
     """Unit vector that is at least 0.6 rad off other directions."""
     while True:
         w = rng.normal(size=3)
@@ -18,7 +21,7 @@ def direction(rng, *beside):
             return w
 
 
-def directions(rng, count):
+def directions(rng: np.random.Generator, count: int) -> list[Array]:
     """Unit vectors, each off the one before it."""
     found = [direction(rng)]
     while len(found) < count:
@@ -26,11 +29,11 @@ def directions(rng, count):
     return found
 
 
-def point(rng):
+def point(rng: np.random.Generator) -> Array:
     return rng.uniform(0.15, 0.4, 3) * rng.choice((-1, 1), 3)
 
 
-def wrist_axes(rng, kind):
+def wrist_axes(rng: np.random.Generator, kind: str) -> list[tuple[Array, Array]]:
     """Axes (direction, point) of an arm with a spherical wrist and a shoulder of a kind."""
     w, o = directions(rng, 6), [point(rng) for _ in range(3)]
     o += [o[2] + point(rng)] * 3
@@ -46,7 +49,7 @@ def wrist_axes(rng, kind):
     return list(zip(w, o, strict=True))
 
 
-def parallel_axes(rng, kind):
+def parallel_axes(rng: np.random.Generator, kind: str) -> list[tuple[Array, Array]]:
     """Axes of an arm whose axes 2, 3 and 4 are parallel."""
     w, o = directions(rng, 6), [point(rng)]
     while len(o) < 6:
@@ -58,7 +61,12 @@ def parallel_axes(rng, kind):
     return list(zip(w, o, strict=True))
 
 
-def urdf(axes, limits, tool=(0.1, -0.05, 0.12), name="random"):
+def urdf(
+    axes: list[tuple[Array, Array]],
+    limits: Any,
+    tool: tuple[float, float, float] = (0.1, -0.05, 0.12),
+    name: str = "random",
+) -> str:
     """Arm whose links are parallel to the base at zero; each frame somewhere on its axis."""
     rng, here = np.random.default_rng(9), np.zeros(3)
     lines = [f'<robot name="{name}"><link name="l0"/>']
@@ -77,11 +85,11 @@ def urdf(axes, limits, tool=(0.1, -0.05, 0.12), name="random"):
     )
 
 
-def row(values):
+def row(values: Any) -> str:
     return " ".join(repr(float(value)) for value in values)
 
 
-def axes_of_dh(rows):
+def axes_of_dh(rows: list[tuple[float, float, float]]) -> list[tuple[Array, Array]]:
     """Axes at zero of a standard Denavit-Hartenberg table of rows a, alpha, d."""
     T, axes = np.eye(4), []
     for a, alpha, d in rows:
@@ -99,7 +107,7 @@ UR5E = axes_of_dh(
 )  # fmt: skip
 
 
-def swivel_axes(rng, kind="7"):
+def swivel_axes(rng: np.random.Generator, kind: str = "7") -> list[tuple[Array, Array]]:
     """Axes of an arm of seven joints whose shoulder and wrist are spherical, the elbow aside."""
     w, shoulder = directions(rng, 7), point(rng)
     elbow = shoulder + point(rng)
@@ -118,7 +126,7 @@ IIWA14_LIMITS = [(-math.radians(a), math.radians(a)) for a in (170, 120, 170, 12
 KINDS = ("revolute", "continuous", "prismatic", "fixed")
 
 
-def random_urdf(seed, n):
+def random_urdf(seed: int, n: int) -> tuple[str, str]:
     """Chain of n moving joints and some fixed ones, every link with a branch that weighs."""
     rng, lines, link, moving = np.random.default_rng(seed), ['<link name="l0"/>'], 0, 0
     while moving < n:

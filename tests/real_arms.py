@@ -14,13 +14,14 @@ modules: they agree to 5e-12.
 
 import json
 from pathlib import Path
+from typing import Any
 
 from random_arms import row
 
 ARMS = json.loads((Path(__file__).parent / "data" / "arms.json").read_text(encoding="utf-8"))
 
 
-def urdf_of(name, effort=None):
+def urdf_of(name: str, effort: float | None = None) -> str:
     """URDF text of an arm, its links l0, l1, ... and tip; all efforts as given [N·m]."""
     arm = ARMS[name]
     lines = [f'<robot name="{name}"><link name="l0"/>']
@@ -43,7 +44,7 @@ def urdf_of(name, effort=None):
     )
 
 
-def _body(arm, i):
+def _body(arm: Any, i: int) -> str:
     if "bodies" not in arm:
         return ""
     mass, *numbers = arm["bodies"][i]

@@ -1,5 +1,8 @@
 """Recipes: recordings made for a test, of a slave at rest to which something is done."""
 
+from pathlib import Path
+from typing import Any
+
 import numpy as np
 from scipy.spatial.transform import Rotation
 
@@ -13,19 +16,26 @@ from teleop_core.graph.topics import (
     SLAVE_SERVO_CP,
     SLAVE_SETPOINT_CP,
     TELEOP_STATE,
+    Limit,
+    Topic,
 )
+from teleop_core.kernels.geometry import Array
 
 JOINTS = tuple(f"joint_{i}" for i in range(1, 7))
 START_NS = 1_700_000_000 * 1_000_000_000
 
 
-def pose_rows(count, position=(0.4, 0.0, -0.18), angles=(0.0, 66.6, 0.0)):
+def pose_rows(
+    count: int,
+    position: tuple[float, float, float] = (0.4, 0.0, -0.18),
+    angles: tuple[float, float, float] = (0.0, 66.6, 0.0),
+) -> Array:
     """Poses (count, 7) at rest; angles are roll, pitch, yaw in degrees."""
     x, y, z, w = Rotation.from_euler("ZYX", angles, degrees=True).as_quat()
     return np.tile([*position, w, x, y, z], (count, 1))
 
 
-def state(stamp_ns, described=None, **values):
+def state(stamp_ns: int, described: dict[str, str] | None = None, **values: float | Limit) -> bytes:
     """Message of teleop/state with everything else zero, but gain 1, of a slave that follows.
 
     ``described`` holds further names and texts, such as the kind of the fixture.
@@ -38,7 +48,7 @@ def state(stamp_ns, described=None, **values):
 class Recipe:
     """A recording of a slave at rest; entries of ``rows`` are (stamps, values, log times)."""
 
-    def __init__(self, count=3000):
+    def __init__(self, count: int = 3000) -> None:
         stamps = START_NS + np.arange(count) * TICK_NS
         poses = pose_rows(count)
         self.rows = {
@@ -50,18 +60,18 @@ class Recipe:
         self.metadata = {"scenario": "at_rest", "robot": "rcrt1", "seed": "7"}
         self.topics = list(ALL)
 
-    def values(self, topic):
+    def values(self, topic: Topic) -> Array:
         return self.rows[topic][1]
 
-    def drop(self, topic, lost):
+    def drop(self, topic: Any, lost: Any) -> None:
         kept = np.setdiff1d(np.arange(len(self.rows[topic][0])), lost)
         self.rows[topic] = tuple(column[kept] for column in self.rows[topic])
 
-    def delay(self, topic, delay_ns):
+    def delay(self, topic: Topic, delay_ns: int) -> None:
         stamps, values, logs = self.rows[topic]
         self.rows[topic] = (stamps, values, logs + delay_ns)
 
-    def write(self, path):
+    def write(self, path: Path) -> Bag:
         with BagWriter(
             path, self.topics, JOINTS, metadata=self.metadata, start_ns=START_NS
         ) as writer:
@@ -71,8 +81,8 @@ class Recipe:
             for i in range(0, longest, 1000):
                 writer.write_block(
                     {
-                        topic: tuple(column[i : i + 1000] for column in columns)
-                        for topic, columns in self.rows.items()
+                        topic: (a[i : i + 1000], b[i : i + 1000], c[i : i + 1000])
+                        for topic, (a, b, c) in self.rows.items()
                     }
                 )
         return Bag(path)

@@ -1,13 +1,20 @@
 """Motion scaling by itself: a hand to move, and a slave that stands where it was told to."""
 
+from typing import Any
+
 import numpy as np
 
 from teleop_core.chain.mapping.motion_scaling import MotionScaling
 from teleop_core.chain.mapping.parameters import MotionScalingParameters
 from teleop_core.chain.mapping.plausibility import PlausibilityParameters
-from teleop_core.chain.master.haptic_master import REST_POSITION
+from teleop_core.chain.operators.rest import REST_POSITION
 from teleop_core.graph.signals import STATE, TICK_NS
-from teleop_core.kernels.geometry import pose_from_transform, rotation_from_quaternion, transform
+from teleop_core.kernels.geometry import (
+    Array,
+    pose_from_transform,
+    rotation_from_quaternion,
+    transform,
+)
 from teleop_core.robots import load_robot
 
 ANY_HAND = PlausibilityParameters(
@@ -22,7 +29,7 @@ HOME = load_robot("rcrt1").fk(load_robot("rcrt1").home)
 class Desk:
     """Motion scaling with a hand to move and a slave that stands where it was told to."""
 
-    def __init__(self, **values):
+    def __init__(self, **values: Any) -> None:
         self.scaling = MotionScaling(MotionScalingParameters(**{"plausible": ANY_HAND} | values))
         self.row = self.scaling.signals
         self.hand, self.turn = np.array(REST_POSITION), np.eye(3)
@@ -30,7 +37,14 @@ class Desk:
         self.row["master_measured_cp_ns"] = self.row["slave_setpoint_cp_ns"] = TICK_NS
         pose_from_transform(HOME, self.row["slave_setpoint_cp"])
 
-    def step(self, move=(0, 0, 0), turn=None, *, stamp_step_ns=TICK_NS, does_follow=True):
+    def step(
+        self,
+        move: tuple[float, float, float] = (0, 0, 0),
+        turn: Any = None,
+        *,
+        stamp_step_ns: int = TICK_NS,
+        does_follow: bool = True,
+    ) -> Array:
         """One sample after the hand's step [m]; returns the slave command's place."""
         row, self.hand = self.row, self.hand + np.asarray(move, dtype=float)
         self.turn = self.turn if turn is None else turn @ self.turn
@@ -43,7 +57,7 @@ class Desk:
             row["slave_setpoint_cp_ns"] = row["master_measured_cp_ns"]
         return row["slave_servo_cp"][:3].copy()
 
-    def press(self, button):
+    def press(self, button: str) -> Array:
         """Sample with a button pressed, then one with it released; the hand rests."""
         index = ("clutch", "fixture", "mode").index(button)
         self.pressed[index] = 1.0
@@ -51,18 +65,18 @@ class Desk:
         self.pressed[index] = 0.0
         return self.step()
 
-    def hold(self, button, is_held=True):
+    def hold(self, button: str, is_held: bool = True) -> None:
         self.pressed[("clutch", "fixture", "mode").index(button)] = float(is_held)
 
-    def attitude(self):
+    def attitude(self) -> Array:
         out = np.empty((3, 3))
         rotation_from_quaternion(np.ascontiguousarray(self.row["slave_servo_cp"][3:]), out)
         return out
 
-    def state(self, name):
+    def state(self, name: str) -> float:
         return self.row["teleop_state"][STATE[name]]
 
-    def box(self):
+    def box(self) -> tuple[Array, Array]:
         start, size = STATE["fixture_center_x"], STATE["fixture_size_x"]
         state = self.row["teleop_state"]
         return state[start : start + 3].copy(), state[size : size + 3].copy()

@@ -13,7 +13,7 @@ _FULL = 32767
 class VirtualPad:
     """A virtual gamepad, there until :meth:`unplug`."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         self._sdl = Sdl()
         maps = Path("/proc/self/maps").read_text(encoding="utf-8").splitlines()
         path = next(line.split()[-1] for line in maps if "libSDL2-" in line)
@@ -28,15 +28,15 @@ class VirtualPad:
         for trigger in ("left trigger", "right trigger"):
             self.move(trigger, -1.0)  # released
 
-    def move(self, axis, share):
+    def move(self, axis: str, share: float) -> None:
         """Deflect a stick, -1 to 1."""
         assert self._lib.SDL_JoystickSetVirtualAxis(self._own, AXES[axis], int(_FULL * share)) == 0
 
-    def press(self, button, is_pressed=True):
+    def press(self, button: str, is_pressed: bool = True) -> None:
         """Press or release a button."""
         assert self._lib.SDL_JoystickSetVirtualButton(self._own, BUTTONS[button], is_pressed) == 0
 
-    def unplug(self):
+    def unplug(self) -> None:
         """Take it away, if it is there."""
         if self._own is not None:
             self._lib.SDL_JoystickClose(self._own)

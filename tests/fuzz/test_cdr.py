@@ -1,11 +1,14 @@
 """Bytes on every topic that is subscribed to: numbers of the right shape come out, or a reason."""
 
 import math
+from collections.abc import Callable
 
 import pytest
 from hypothesis import strategies as st
+from hypothesis.strategies import SearchStrategy
 
 from fuzzing import damaged, fuzz
+from present import present
 from teleop_core.bags.messages import (
     Refusal,
     check,
@@ -17,7 +20,7 @@ from teleop_core.bags.messages import (
     report,
 )
 from teleop_core.graph.stage import STAGES
-from teleop_core.graph.topics import DIAGNOSTICS, Kind
+from teleop_core.graph.topics import DIAGNOSTICS, Kind, Topic
 
 JOINTS = ("theta1", "theta2", "d3", "theta4", "theta5", "theta6")
 READ = {topic.name: topic for name in STAGES.names() for topic in STAGES.find(name).reads}
@@ -27,18 +30,18 @@ PARTS = len(STREAMS) + len(REPORTS) + 1
 STAMPS = st.one_of(st.none(), st.integers(0, 2**62))
 
 
-def broken(whole):
+def broken(whole: bytes) -> SearchStrategy:
     return st.one_of(st.binary(max_size=400), damaged(whole), st.just(whole))
 
 
-def streams(topic):
+def streams(topic: Topic) -> Callable[..., None]:
     """Test of what an input does with the bytes of a stream."""
     names, width = topic.names(JOINTS), topic.width(len(JOINTS))
     form = layout(topic, JOINTS)
-    whole = form.encode_one(7, form.decode_one(form.template.tobytes())[1])
+    whole = form.encode_one(7, present(form.decode_one(form.template.tobytes()))[1])
 
     @fuzz("CDR", PARTS, data=broken(whole), last_ns=STAMPS)
-    def case(data, last_ns):
+    def case(data: bytes, last_ns: int | None) -> None:
         found = form.decode_one(data) or read_any(topic.kind, data, names)
         if isinstance(found, Refusal):
             return
@@ -54,16 +57,16 @@ def streams(topic):
 
 
 @pytest.mark.parametrize("topic", STREAMS, ids=lambda topic: topic.name)
-def test_any_bytes_of_a_stream_give_sound_numbers_or_a_reason(topic):
+def test_any_bytes_of_a_stream_give_sound_numbers_or_a_reason(topic: Topic) -> None:
     streams(topic)()
 
 
-def reports(columns):
+def reports(columns: tuple[str, ...]) -> Callable[..., None]:
     """Test of what is made of the bytes of a report."""
     whole = report(5, "slave_sim", 1, "fine", dict.fromkeys(columns, "1.5"))
 
     @fuzz("CDR", PARTS, data=broken(whole))
-    def case(data):
+    def case(data: bytes) -> None:
         found = read_numbers(data, columns)
         assert isinstance(found, Refusal) or found[1].shape == (len(columns),)
         if found is Refusal.MALFORMED:
@@ -76,5 +79,5 @@ def reports(columns):
 
 
 @pytest.mark.parametrize("topic", [*REPORTS, DIAGNOSTICS], ids=lambda topic: topic.name)
-def test_any_bytes_of_a_report_give_numbers_or_a_reason(topic):
+def test_any_bytes_of_a_report_give_numbers_or_a_reason(topic: Topic) -> None:
     reports(topic.columns or ("rate_hz", "late"))()

@@ -8,8 +8,10 @@ of them do more than open their file, for minutes or for as long as somebody loo
 import io
 import shutil
 import warnings
+from collections.abc import Callable, Iterator
 from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -19,6 +21,7 @@ from rosbags.rosbag1 import Writer as Writer1
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
 from rosbags.rosbag2 import Writer as Writer2
 from rosbags.typesys import Stores, get_typestore
+from rosbags.typesys.store import Typestore
 
 import teleop_core as tc
 from fuzzing import NASTY, assert_one_line, damaged, fuzz
@@ -73,12 +76,12 @@ def _bytes(text: str) -> bytes:
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory) -> Path:
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return tmp_path_factory.mktemp("commands")
 
 
 @pytest.fixture(scope="module")
-def session(folder) -> bytes:
+def session(folder: Path) -> bytes:
     """A recording of ours, of 60 ms."""
     path = folder / "whole"
     tc.run("coarse_box", duration=0.06, out=path, settings={"recorder.compression": "none",
@@ -100,7 +103,7 @@ def hand() -> pd.DataFrame:
     return table
 
 
-def messages(store):
+def messages(store: Typestore) -> Iterator[Any]:
     """Poses and buttons, as the types of a version of ROS."""
     types = store.types
     more = {} if "rcl_interfaces/msg/Log" in types else {"seq": 0}
@@ -115,7 +118,7 @@ def messages(store):
         yield "/joy", stamp, types["sensor_msgs/msg/Joy"](head, axes, buttons)
 
 
-def bag1(path: Path, packing=None) -> bytes:
+def bag1(path: Path, packing: Writer1.CompressionFormat | None = None) -> bytes:
     store, writer = get_typestore(Stores.ROS1_NOETIC), Writer1(path)
     if packing is not None:
         writer.set_compression(packing)
@@ -123,7 +126,7 @@ def bag1(path: Path, packing=None) -> bytes:
     return path.read_bytes()
 
 
-def bag2(path: Path, storage: StoragePlugin, mode=None) -> bytes:
+def bag2(path: Path, storage: StoragePlugin, mode: Any = None) -> bytes:
     store = get_typestore(Stores.ROS2_JAZZY)
     writer = Writer2(path, version=9, storage_plugin=storage)
     if mode is not None:
@@ -132,7 +135,7 @@ def bag2(path: Path, storage: StoragePlugin, mode=None) -> bytes:
     return next(file for file in path.iterdir() if file.suffix != ".yaml").read_bytes()
 
 
-def _write(writer, store, serialise) -> None:
+def _write(writer: Writer1 | Writer2, store: Typestore, serialise: Callable[..., Any]) -> None:
     known = {}
     with writer:
         for topic, stamp, message in messages(store):
@@ -157,7 +160,7 @@ READERS = {
 
 
 @pytest.mark.parametrize("command", READERS)
-def test_any_recording_is_taken_or_refused(folder, session, command):
+def test_any_recording_is_taken_or_refused(folder: Path, session: bytes, command: str) -> None:
     file, out = folder / "broken.mcap", folder / command
     run = READERS[command]
 
@@ -189,7 +192,7 @@ MAKERS = {
 
 
 @pytest.mark.parametrize("name", MAKERS)
-def test_any_file_of_others_is_imported_or_refused(folder, name):
+def test_any_file_of_others_is_imported_or_refused(folder: Path, name: str) -> None:
     whole, out = MAKERS[name](folder / name), folder / f"{name}_imported"
     broken_file = folder / f"broken_{name}"
 
@@ -203,7 +206,7 @@ def test_any_file_of_others_is_imported_or_refused(folder, name):
 
 
 @pytest.mark.parametrize("mode", [CompressionMode.FILE, CompressionMode.MESSAGE])
-def test_any_compressed_recording_is_imported_or_refused(folder, mode):
+def test_any_compressed_recording_is_imported_or_refused(folder: Path, mode: Any) -> None:
     path, out = folder / f"packed_{mode.name}", folder / "unpacked"
     whole = bag2(path, StoragePlugin.MCAP, mode)
     file = next(file for file in path.iterdir() if file.suffix != ".yaml")
@@ -220,7 +223,7 @@ def test_any_compressed_recording_is_imported_or_refused(folder, mode):
 # -- tables --------------------------------------------------------------------------------------
 
 
-def poses_table(robot) -> bytes:
+def poses_table(robot: tc.Robot) -> bytes:
     """Tip positions at random joints."""
     joints = np.random.default_rng(1).uniform(-0.3, 0.3, (8, robot.n)) + robot.start
     joints = np.clip(joints, robot.lower, robot.upper)
@@ -229,7 +232,7 @@ def poses_table(robot) -> bytes:
     return table.to_csv(index=False).encode()
 
 
-def rests_table(robot) -> bytes:
+def rests_table(robot: tc.Robot) -> bytes:
     rng = np.random.default_rng(2)
     targets = np.repeat([robot.start, robot.home], 3, axis=0)
     columns = [*(f"target_{name}" for name in robot.joint_names), *robot.joint_names]
@@ -239,7 +242,7 @@ def rests_table(robot) -> bytes:
     return table.to_csv(index=False).encode()
 
 
-def test_any_table_of_measured_poses_is_taken_or_refused(folder):
+def test_any_table_of_measured_poses_is_taken_or_refused(folder: Path) -> None:
     file, whole = folder / "poses.csv", poses_table(load_robot("rcrt1"))
 
     def attempt(data: bytes) -> None:
@@ -250,7 +253,7 @@ def test_any_table_of_measured_poses_is_taken_or_refused(folder):
     fuzz("command calibrate", data=broken(whole))(attempt)()
 
 
-def test_any_table_of_rests_is_taken_or_refused(folder):
+def test_any_table_of_rests_is_taken_or_refused(folder: Path) -> None:
     robot = load_robot("rcrt1")
     file, whole = folder / "rests.csv", rests_table(robot)
 
@@ -262,7 +265,7 @@ def test_any_table_of_rests_is_taken_or_refused(folder):
     fuzz("table of rests", data=broken(whole))(attempt)()
 
 
-def test_any_table_of_a_robot_is_taken_or_refused(folder):
+def test_any_table_of_a_robot_is_taken_or_refused(folder: Path) -> None:
     file = folder / "robot.yaml"
     tables = [path.read_bytes() for path in sorted((config_folder() / "robots").glob("*.yaml"))]
     entries = st.sampled_from(
@@ -270,7 +273,7 @@ def test_any_table_of_a_robot_is_taken_or_refused(folder):
     )
 
     @st.composite
-    def texts(draw) -> bytes:
+    def texts(draw: st.DrawFn) -> bytes:
         whole = draw(st.sampled_from(tables))
         if draw(st.booleans()):
             return whole.replace(b"q", _bytes(draw(entries)), draw(st.integers(1, 4)))

@@ -1,5 +1,7 @@
 """Parameter files, settings and what recordings store of them, broken in many ways."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import strategies as st
@@ -48,7 +50,7 @@ ANY_KEY = st.one_of(
 @fuzz(
     "settings", key=ANY_KEY, value=TEXTS, equals=st.sampled_from(("=", "=", "=", "==", "", " = "))
 )
-def test_any_setting_is_taken_or_refused(key, value, equals):
+def test_any_setting_is_taken_or_refused(key: Any, value: Any, equals: Any) -> None:
     layer = parse_setting(key + equals + value)
     Configuration.from_layers([BASE, layer])
 
@@ -58,7 +60,7 @@ STAGES = st.one_of(st.sampled_from((*declared_groups(), "/**/slave_sim", "left/s
 
 
 @st.composite
-def parameter_files(draw) -> bytes:
+def parameter_files(draw: st.DrawFn) -> bytes:
     """A scenario with bytes or values that are not meant, or a file made of such values."""
     kind = draw(st.sampled_from(("bytes", "bytes", "values", "text")))
     if kind == "bytes":
@@ -77,7 +79,9 @@ def _encoded(text: str) -> bytes:
 
 
 @fuzz("configurations", content=parameter_files())
-def test_any_parameter_file_is_taken_or_refused(tmp_path_factory, content):
+def test_any_parameter_file_is_taken_or_refused(
+    tmp_path_factory: pytest.TempPathFactory, content: bytes
+) -> None:
     path = tmp_path_factory.getbasetemp() / "parameters.yaml"
     path.write_bytes(content)
     Configuration.from_layers([BASE, load_file(path)])
@@ -92,7 +96,7 @@ def bag_with(configuration: str) -> MemoryBag:
 
 
 @fuzz("stored configurations", content=st.one_of(damaged(STORED), TEXTS.map(_encoded)))
-def test_any_stored_configuration_can_be_scored_and_is_replayed_or_refused(content):
+def test_any_stored_configuration_can_be_scored_and_is_replayed_or_refused(content: bytes) -> None:
     bag = bag_with(content.decode("utf-8", "replace"))
     read_origin(bag)
     layer, scenario = recorded_configuration(bag)
@@ -100,7 +104,7 @@ def test_any_stored_configuration_can_be_scored_and_is_replayed_or_refused(conte
 
 
 @pytest.mark.parametrize("text", NASTY, ids=lambda text: repr(text[:20]))
-def test_every_text_of_the_corpus_is_taken_or_refused_by_every_kind_of_parameter(text):
+def test_every_text_of_the_corpus_is_taken_or_refused_by_every_kind_of_parameter(text: str) -> None:
     for key in ("coarse_scale", "duration", "seed", "robot", "stages", "delays", "slave.start"):
         with lawful():
             Configuration.from_layers([BASE, parse_setting(f"{key}={text}")])
@@ -110,7 +114,7 @@ REFUSED = ("!!int x", "!!timestamp 2021-13-45", "&a [*a]", "9" * 5000, "[" * 400
 
 
 @pytest.mark.parametrize("text", REFUSED, ids=lambda text: repr(text[:20]))
-def test_what_no_value_can_be_is_refused_and_told_why(text):
+def test_what_no_value_can_be_is_refused_and_told_why(text: str) -> None:
     with pytest.raises(UnreadableError) as told:
         parse(text)
     assert_one_line(str(told.value))

@@ -3,6 +3,7 @@
 import shutil
 import warnings
 from pathlib import Path
+from typing import Any
 
 import lz4.frame
 import numpy as np
@@ -38,7 +39,7 @@ def made(path: Path, packing: str) -> bytes:
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory) -> Path:
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return tmp_path_factory.mktemp("fuzz")
 
 
@@ -75,7 +76,7 @@ def unchecked(path: Path) -> bytes:
 
 
 @pytest.mark.parametrize("packing", ["none", "zstd", "lz4", "unchecked"])
-def test_any_recording_is_read_recovered_or_refused(folder, packing):
+def test_any_recording_is_read_recovered_or_refused(folder: Path, packing: str) -> None:
     path = folder / packing
     whole = unchecked(path) if packing == "unchecked" else made(path, packing)
     file, out = folder / "broken.mcap", folder / "recovered"
@@ -107,14 +108,14 @@ SIZES = st.one_of(st.sampled_from((0, 10, 3000, 5000, 2**31, 2**40, 2**63)), st.
 
 
 @st.composite
-def chunks(draw) -> tuple[str, bytes]:
+def chunks(draw: st.DrawFn) -> tuple[str, bytes]:
     name = draw(st.sampled_from(sorted(PACKED)))
     return name, draw(damaged(draw(st.sampled_from(PACKED[name])), most=2))
 
 
 @pytest.mark.slow
 @fuzz("chunks", chunk=chunks(), size=SIZES)
-def test_any_chunk_is_unpacked_to_its_size_or_refused(chunk, size):
+def test_any_chunk_is_unpacked_to_its_size_or_refused(chunk: Any, size: Any) -> None:
     name, data = chunk
     try:
         out = compression.decompress(name, data, size)
@@ -135,7 +136,7 @@ ENTRIES = ("relative_file_paths", "compression_mode", "version", "files", "stora
 
 
 @pytest.mark.slow
-def test_any_metadata_leads_to_the_file_beside_it_or_is_refused(folder):
+def test_any_metadata_leads_to_the_file_beside_it_or_is_refused(folder: Path) -> None:
     made(folder / "bag", "none")
     index = folder / "bag" / "metadata.yaml"
     content = yaml.safe_load(index.read_text())["rosbag2_bagfile_information"]
@@ -143,7 +144,7 @@ def test_any_metadata_leads_to_the_file_beside_it_or_is_refused(folder):
     plain = yaml.safe_dump({"rosbag2_bagfile_information": content}).encode()
 
     @st.composite
-    def texts(draw) -> bytes:
+    def texts(draw: st.DrawFn) -> bytes:
         kind = draw(st.sampled_from(("bytes", "entry", "whole")))
         if kind == "bytes":
             return draw(damaged(plain))

@@ -1,10 +1,13 @@
 """State commands in any order, beside ticks and faults: flags agree, and nothing moves unasked."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import strategies as st
 
 from fuzzing import fuzz
+from present import present
 from teleop_core.slave.operation import Fault, OperationParameters, State
 from teleop_core.slave.operation.states import COMMANDS
 from teleop_core.slave.pair import ArmParameters, SimulatedArm
@@ -16,7 +19,7 @@ WORDS = st.one_of(
 """A command, or what is none; a fault; the stop button; ticks; a place for all joints."""
 
 
-def arm(standstill):
+def arm(standstill: str) -> SimulatedArm:
     return SimulatedArm(ArmParameters(
         robot="planar_3r", starts_at_home=True,
         operation=OperationParameters(standstill=standstill, longest_outage=0.15),
@@ -26,10 +29,10 @@ def arm(standstill):
 ARMS = {standstill: arm(standstill) for standstill in ("hold", "brake")}
 
 
-def play(slave, words):
+def play(slave: SimulatedArm, words: Any) -> None:
     """Send words one by one; after each the flags must agree and the setpoint keep its limits."""
     row, ns = slave.signals, 10**9
-    reach = slave.robot.drives.speed_limit * 1e-3
+    reach = present(slave.robot.drives).speed_limit * 1e-3
     for word in words:
         ticks = word if isinstance(word, int) and not isinstance(word, bool | Fault) else 1
         if isinstance(word, str):
@@ -55,7 +58,9 @@ def play(slave, words):
 
 @pytest.mark.slow
 @fuzz("state commands", words=st.lists(WORDS, max_size=12), standstill=st.sampled_from(list(ARMS)))
-def test_any_words_leave_flags_that_agree_and_a_setpoint_within_its_limits(words, standstill):
+def test_any_words_leave_flags_that_agree_and_a_setpoint_within_its_limits(
+    words: Any, standstill: Any
+) -> None:
     slave = ARMS[standstill]
     slave.reset()
     play(slave, words)

@@ -1,11 +1,13 @@
 """A search of scipy's finds no assembly of legs that ours calls unassemblable."""
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
 from scipy.optimize import fsolve
 
+from teleop_core.kernels.geometry import Array
 from teleop_core.robots import FkStatus, load_robot
 from teleop_core.robots.stewart import PAIRED
 
@@ -14,7 +16,7 @@ FOUND = 1e-10
 STARTS = 16
 
 
-def turned(vector):
+def turned(vector: Any) -> Any:
     """Rotation of a rotation vector (Rodrigues)."""
     angle = np.linalg.norm(vector) + 1e-12
     x, y, z = vector / angle
@@ -22,23 +24,23 @@ def turned(vector):
     return np.eye(3) + math.sin(angle) * K + (1.0 - math.cos(angle)) * K @ K
 
 
-def platform_gaps(x, legs):
+def platform_gaps(x: Any, legs: Any) -> Any:
     ends = x[:3] + PAIRED.platform @ turned(x[3:]).T
     return np.linalg.norm(ends - PAIRED.base, axis=1) - legs
 
 
-def ball_joint_gaps(angles, legs, b=1.0, a=0.5):
+def ball_joint_gaps(angles: Any, legs: Any, b: float = 1.0, a: float = 0.5) -> Any:
     headings = 2.0 * math.pi / 3.0 * np.arange(3)
     out = b - legs * np.cos(angles)
     S = np.column_stack((out * np.cos(headings), out * np.sin(headings), legs * np.sin(angles)))
     return np.linalg.norm(np.roll(S, -1, axis=0) - S, axis=1) - math.sqrt(3.0) * a
 
 
-def any_platform(rng):
+def any_platform(rng: Any) -> Array:
     return np.concatenate((rng.uniform([-0.2, -0.2, 0.0], [0.2, 0.2, 0.35]), rng.normal(0, 1.2, 3)))
 
 
-def any_angles(rng):
+def any_angles(rng: Any) -> Any:
     return rng.uniform(-math.pi, math.pi, 3)
 
 
@@ -49,7 +51,7 @@ SEARCHES = {
 }
 
 
-def finds(name, legs, rng):
+def finds(name: str, legs: Any, rng: np.random.Generator) -> bool:
     """Whether Newton steps of MINPACK close the loops from some random start."""
     gaps, start, _ = SEARCHES[name]
     for _ in range(STARTS):
@@ -62,7 +64,7 @@ def finds(name, legs, rng):
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:The iteration is not making good progress")
 @pytest.mark.parametrize("name", SEARCHES)
-def test_what_is_called_open_is_closed_by_no_other_search(name):
+def test_what_is_called_open_is_closed_by_no_other_search(name: str) -> None:
     robot, rng = load_robot(name), np.random.default_rng(21)
     share = SEARCHES[name][2]
     lower = np.maximum(robot.home + share * (robot.lower - robot.home), 0.05)

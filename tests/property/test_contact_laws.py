@@ -2,7 +2,9 @@
 
 import math
 from collections import deque
+from collections.abc import Callable, Mapping
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,23 +14,30 @@ from teleop_core.base.parameters import build
 from teleop_core.chain.mapping.motion_scaling import MotionScaling
 from teleop_core.chain.mapping.parameters import FixtureParameters, MotionScalingParameters
 from teleop_core.chain.mapping.walls import passive_stiffness
-from teleop_core.chain.master.haptic_master import (
-    REST_POSITION,
-    DeviceParameters,
-    HandParameters,
-    HapticMasterParameters,
-)
+from teleop_core.chain.master.device import DeviceParameters
+from teleop_core.chain.master.hand_mechanics import HandParameters
+from teleop_core.chain.master.haptic_master import HapticMasterParameters
 from teleop_core.chain.operators import register_operator
 from teleop_core.chain.operators.parameters import ButtonParameters, OperatorParameters
+from teleop_core.chain.operators.rest import REST_POSITION
 from teleop_core.evaluation.metrics.contact import TOUCH_J
 from teleop_core.graph.signals import TICK_NS
+from teleop_core.kernels.geometry import Array
 
 HALF = 2e-3  # from the middle of the box to its walls [m]
 RENDERED = DeviceParameters().stiffness  # what the device can render on x, y, z [N/m]
 SLIVER = 5e-7  # a touch may give so much more than it took [J]: 0.1 N over 5 µm
 
 
-def session(motion, seconds, hand=None, device=None, seed=1, delay=0, **fixture):
+def session(
+    motion: Callable[[Array], Array],
+    seconds: float,
+    hand: dict[str, float] | None = None,
+    device: Mapping[str, Any] | None = None,
+    seed: int = 1,
+    delay: int = 0,
+    **fixture: str | float,
+) -> tuple[Array, Array]:
     """Places (N, 3) [m], forces (N, 3) [N] of a hand with a device in a box, without a slave.
 
     The wall's force comes ``delay`` ticks late.
@@ -66,7 +75,7 @@ def session(motion, seconds, hand=None, device=None, seed=1, delay=0, **fixture)
     return places, forces
 
 
-def energies(places, forces):
+def energies(places: Array, forces: Array) -> Array:
     """Taken, returned and friction's energy (N, 3) [J] of each stretch with a force."""
     step = np.diff(places, axis=0, prepend=places[:1])
     work, way = (forces * step).sum(axis=1), np.linalg.norm(step, axis=1)
@@ -77,7 +86,7 @@ def energies(places, forces):
     ]).reshape(-1, 3)  # fmt: skip
 
 
-def leaning(rng):
+def leaning(rng: np.random.Generator) -> tuple[Callable[[Array], Array], dict[str, float], float]:
     """A hand at random: motion, grip, and a wall no stiffer than the device renders there."""
     axis = int(rng.integers(3))
     direction = np.zeros(3)
@@ -93,7 +102,7 @@ def leaning(rng):
     fast, slow, phase = math.exp(rng.uniform(math.log(0.3), math.log(4.0))), rng.uniform(0.1, 4), 2
     share = rng.uniform(0.0, 0.3)
 
-    def motion(times):
+    def motion(times: Array) -> Array:
         swing = np.sin(2.0 * math.pi * fast * times)
         swing += share * np.sin(2.0 * math.pi * slow * times + phase)
         return reach * (swing * np.minimum(2.0 * times, 1.0))[:, None] * direction
@@ -104,7 +113,9 @@ def leaning(rng):
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_no_contact_with_a_damped_wall_gives_back_more_than_it_took(seed, own_parts):
+def test_no_contact_with_a_damped_wall_gives_back_more_than_it_took(
+    seed: int, own_parts: None
+) -> None:
     rng = np.random.default_rng(seed)
     found = []
     for number in range(5):
@@ -119,14 +130,16 @@ def test_no_contact_with_a_damped_wall_gives_back_more_than_it_took(seed, own_pa
     assert (returned <= taken + friction).all()
 
 
-def slow(times):
+def slow(times: Array) -> Array:
     """As the hand of coarse_box: slow, along and into walls, with tremor."""
     waves = ((1e-3, 0.13, 0.1), (1.5e-3, 0.21, 1.0), (1.2e-3, 0.17, 2.0))
     moved = [(HALF + a) * np.sin(2.0 * math.pi * f * times + p) for a, f, p in waves]
     return np.minimum(times, 1.0)[:, None] * np.stack(moved, axis=1)
 
 
-def test_an_undamped_wall_feeds_slow_contacts_of_a_trembling_hand_a_damped_one_not(own_parts):
+def test_an_undamped_wall_feeds_slow_contacts_of_a_trembling_hand_a_damped_one_not(
+    own_parts: None,
+) -> None:
     fed = {}
     for wall in ("soft", "damped"):
         taken, returned, _ = energies(*session(slow, 10.0, wall=wall)).T
@@ -148,8 +161,8 @@ def test_an_undamped_wall_feeds_slow_contacts_of_a_trembling_hand_a_damped_one_n
     ],
 )
 def test_a_wall_is_passive_within_its_bound_and_not_far_beyond_it(
-    stiffness, delay, feeds, own_parts
-):
+    stiffness: float, delay: int, feeds: bool, own_parts: None
+) -> None:
     bound = passive_stiffness(10.0, 1e-3, 1e-3 * delay, 0.26, 0.055e-3)
     assert (stiffness > bound * (1.0 + 1e-9)) is feeds
     taken, returned, _ = energies(*session(slow, 8.0, delay=delay, stiffness=stiffness)).T
@@ -160,8 +173,10 @@ def test_a_wall_is_passive_within_its_bound_and_not_far_beyond_it(
 
 @pytest.mark.parametrize("axis", [0, 1, 2])
 @pytest.mark.parametrize(("firmness", "damping"), [(50.0, 0.5), (300.0, 12.0), (2000.0, 5.0)])
-def test_leaning_on_a_hard_wall_hand_and_force_are_still(axis, firmness, damping, own_parts):
-    def motion(times):
+def test_leaning_on_a_hard_wall_hand_and_force_are_still(
+    axis: int, firmness: float, damping: float, own_parts: None
+) -> None:
+    def motion(times: Array) -> Array:
         reach = HALF + 1.5 / firmness
         return reach * np.minimum(times / 0.3, 1.0)[:, None] * (np.arange(3) == axis)
 
@@ -174,8 +189,8 @@ def test_leaning_on_a_hard_wall_hand_and_force_are_still(axis, firmness, damping
     assert np.ptp(places[late], axis=0).max() < 1e-9
 
 
-def test_a_step_of_force_buzzes(own_parts):
-    def motion(times):
+def test_a_step_of_force_buzzes(own_parts: None) -> None:
+    def motion(times: Array) -> Array:
         return (HALF + 1.5 / 300.0) * np.minimum(times / 0.3, 1.0)[:, None] * (1.0, 0.0, 0.0)
 
     _, forces = session(motion, 2.0, {"tremor_amplitude": 0.0}, wall="step")
@@ -183,8 +198,10 @@ def test_a_step_of_force_buzzes(own_parts):
 
 
 @pytest.mark.parametrize(("stiffness", "bound"), [(1000.0, 1e-3), (5000.0, 1e-3)])
-def test_a_loose_grip_is_not_thrown_about_by_a_stiff_wall(stiffness, bound, own_parts):
-    def motion(times):
+def test_a_loose_grip_is_not_thrown_about_by_a_stiff_wall(
+    stiffness: float, bound: float, own_parts: None
+) -> None:
+    def motion(times: Array) -> Array:
         return (HALF + 6e-3) * np.minimum(times / 0.5, 1.0)[:, None] * (1.0, 0.0, 0.0)
 
     hand = {"stiffness": 100.0, "damping": 0.5, "tremor_amplitude": 0.0}

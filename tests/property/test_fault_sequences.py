@@ -1,8 +1,12 @@
 """Random faults in virtual time: no joint ever steps farther than its drive can, nothing is NaN."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
+from present import present
+from teleop_core.kernels.geometry import Array
 from teleop_core.slave.operation import OperationParameters, State
 from teleop_core.slave.operation.faults import Fault
 from teleop_core.slave.operation.states import COMMANDS
@@ -19,7 +23,7 @@ LIMIT = 1.0 + 1e-9
 class Chaos:
     """A slave that is sent anything, at any time."""
 
-    def __init__(self, robot, seed):
+    def __init__(self, robot: str, seed: int) -> None:
         self.rng = np.random.default_rng(seed)
         self.slave = SimulatedArm(ArmParameters(
             robot=robot, starts_at_home=True,
@@ -28,14 +32,15 @@ class Chaos:
             ),
         ))  # fmt: skip
         self.row, self.ns = self.slave.signals, 10**9
-        drives = self.slave.robot.drives
+        drives = present(self.slave.robot.drives)
         self.reach = drives.speed_limit * 1e-3
         self.goal = self.slave.robot.home.copy()
         self.last = np.array(self.row["slave_setpoint_js"])
         self.worst = 0.0
+        self.states: set[Any]
         self.states = set()
 
-    def tick(self, command=None, stamp_ns=None):
+    def tick(self, command: Array | None = None, stamp_ns: int | None = None) -> None:
         """One tick; keeps the largest step over the drive's limit."""
         self.ns += TICK_NS
         self.row["now_ns"] = self.ns
@@ -48,7 +53,7 @@ class Chaos:
         self.last = now
         self.states.add(int(self.row["slave_operation"][0]))
 
-    def stream(self, ticks):
+    def stream(self, ticks: int) -> None:
         """A stream of sound commands that wander about."""
         robot = self.slave.robot
         speed = self.rng.uniform(-1.0, 1.0, robot.n)
@@ -57,7 +62,7 @@ class Chaos:
             self.goal = np.clip(self.goal + speed * self.reach, robot.lower, robot.upper)
             self.tick(self.goal)
 
-    def strike(self):
+    def strike(self) -> None:
         """One random fault."""
         rng, n = self.rng, self.slave.robot.n
         kind = rng.integers(9)
@@ -82,7 +87,7 @@ class Chaos:
         else:
             self.slave.simulated.arm.dq[:] += rng.normal(size=n) * self.reach * 100.0  # a blow
 
-    def recover(self):
+    def recover(self) -> None:
         """Do what a person does to go on."""
         self.slave.server.press(is_pressed=False, now_ns=self.ns)
         for word in ("reset", "enable", "resume", "home"):
@@ -93,7 +98,7 @@ class Chaos:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("robot", ROBOTS)
-def test_no_joint_steps_farther_than_its_drive_can_whatever_happens(robot):
+def test_no_joint_steps_farther_than_its_drive_can_whatever_happens(robot: str) -> None:
     count = SEQUENCES // len(ROBOTS)
     chaos = Chaos(robot, seed=ROBOTS.index(robot))
     for k in range(count):
@@ -110,7 +115,7 @@ def test_no_joint_steps_farther_than_its_drive_can_whatever_happens(robot):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("plant", list(PLANTS))
-def test_after_any_faults_the_arm_can_be_made_to_follow_again(plant):
+def test_after_any_faults_the_arm_can_be_made_to_follow_again(plant: Any) -> None:
     for seed in range(20):
         chaos = Chaos("rcrt1", seed)
         for _ in range(30):

@@ -1,9 +1,11 @@
 """Laws that every parallel and hybrid robot keeps, whatever it is asked."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
-from teleop_core.kernels.geometry import rotation, transform
+from teleop_core.kernels.geometry import Array, rotation, transform
 from teleop_core.robots import IkStatus, load_robot_set
 from teleop_core.session.configuration import configure
 from teleop_core.session.virtual import VirtualTime
@@ -23,11 +25,11 @@ ROBOTS = [
 ROUNDING = 1e-12
 
 
-def settings(geometry):
+def settings(geometry: str) -> list[str]:
     return [text for text in geometry.split(", ") if text]
 
 
-def any_pose(rng):
+def any_pose(rng: np.random.Generator) -> Array:
     R = np.eye(3)
     for axis in "xyz":
         R = R @ rotation(axis, rng.uniform(-3.2, 3.2))
@@ -36,7 +38,9 @@ def any_pose(rng):
 
 @pytest.mark.parametrize(("name", "geometry"), ROBOTS)
 @pytest.mark.parametrize("step", [np.inf, 1e-3])
-def test_any_pose_gives_finite_joints_inside_the_limits_and_the_step(name, geometry, step):
+def test_any_pose_gives_finite_joints_inside_the_limits_and_the_step(
+    name: str, geometry: str, step: float
+) -> None:
     robot, rng = load_robot_set(name, settings(geometry)), np.random.default_rng(1)
     limits = robot.limits()
     limits[2] = step
@@ -53,7 +57,7 @@ def test_any_pose_gives_finite_joints_inside_the_limits_and_the_step(name, geome
 
 
 @pytest.mark.parametrize(("name", "geometry"), ROBOTS)
-def test_residual_is_what_forward_kinematics_leaves(name, geometry):
+def test_residual_is_what_forward_kinematics_leaves(name: str, geometry: str) -> None:
     robot, rng = load_robot_set(name, settings(geometry)), np.random.default_rng(2)
     for _ in range(100):
         T = any_pose(rng)
@@ -65,10 +69,10 @@ def test_residual_is_what_forward_kinematics_leaves(name, geometry):
 
 
 @pytest.mark.parametrize(("name", "geometry"), ROBOTS)
-def test_a_batch_is_the_same_as_its_single_questions(name, geometry):
+def test_a_batch_is_the_same_as_its_single_questions(name: str, geometry: str) -> None:
     robot, rng = load_robot_set(name, settings(geometry)), np.random.default_rng(3)
     poses = np.array([any_pose(rng) for _ in range(20)])
-    batch = robot.ik(poses)
+    batch: Any = robot.ik(poses)
     reached = robot.solve_fk_batch(batch.q).T
     for k, T in enumerate(poses):
         single = robot.ik(T)
@@ -79,8 +83,10 @@ def test_a_batch_is_the_same_as_its_single_questions(name, geometry):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("name", "geometry"), ROBOTS)
-def test_every_robot_is_led_through_the_graph_with_all_its_actuators(name, geometry):
-    session = VirtualTime(configure(settings=[f"robot={name}", f"geometry=[{geometry}]"]))
+def test_every_robot_is_led_through_the_graph_with_all_its_actuators(
+    name: str, geometry: str
+) -> None:
+    session: Any = VirtualTime(configure(settings=[f"robot={name}", f"geometry=[{geometry}]"]))
     signals, robot = session.run(6000), session.stages["slave_sim"].robot
     measured = signals["slave_measured_cp"]
     assert np.isfinite(measured).all()

@@ -1,9 +1,11 @@
 """Laws of sessions that reach their limits, and of masters of any rate."""
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
+from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
 from teleop_core.bags.memory import MemoryBag
@@ -18,7 +20,7 @@ from teleop_core.chain.mapping.plausibility import PlausibilityParameters
 from teleop_core.chain.operators.shapes import minimum_jerk
 from teleop_core.graph.signals import STATE, TICK_NS
 from teleop_core.graph.topics import MASTER_MEASURED_CP, NO_COMMAND_NS, SLAVE_REACH, Limit
-from teleop_core.kernels.geometry import pose_from_transform
+from teleop_core.kernels.geometry import Array, pose_from_transform
 from teleop_core.robots import load_robot
 from teleop_core.session.api import configuration
 from teleop_core.session.runner import replayed_blocks
@@ -41,16 +43,17 @@ class Chain:
     How far a command could be followed is known ``delay`` samples later.
     """
 
-    def __init__(self, robot, delay=1, **values):
+    def __init__(self, robot: str, delay: int = 1, **values: Any) -> None:
         self.robot, self.delay = load_robot(robot), delay
         self.scaling = MotionScaling(MotionScalingParameters(**{"plausible": ANY_HAND} | values))
         self.ik = InverseKinematics(InverseKinematicsParameters(robot=robot))
         self.joints, self.stamp_ns = self.robot.start.copy(), 1_000_000_000
         self.hand, self.attitude, self.clutch = np.zeros(3), Rotation.identity(), 0.0
+        self.told: list[Any]
         self.told = []
         self.follow(2)
 
-    def step(self, move=(0.0, 0.0, 0.0), turn=(0.0, 0.0, 0.0)):
+    def step(self, move: ArrayLike = (0.0, 0.0, 0.0), turn: ArrayLike = (0.0, 0.0, 0.0)) -> Array:
         """One sample of the hand after a step [m] and a turn [rad]; returns the tip's place."""
         before_ns, self.stamp_ns = self.stamp_ns, self.stamp_ns + TICK_NS
         self.hand = self.hand + np.asarray(move)
@@ -71,12 +74,14 @@ class Chain:
         self.told.append((solver["slave_reach"].copy(), self.stamp_ns))
         return self.robot.fk(self.joints)[:3, 3]
 
-    def follow(self, samples, move=(0.0, 0.0, 0.0), turn=(0.0, 0.0, 0.0)):
+    def follow(
+        self, samples: int, move: ArrayLike = (0.0, 0.0, 0.0), turn: ArrayLike = (0.0, 0.0, 0.0)
+    ) -> Array:
         for _ in range(samples):
             place = self.step(move, turn)
         return place
 
-    def rest(self):
+    def rest(self) -> Array:
         """Wait with a still hand until the arm has caught up; returns the tip's place."""
         place = self.follow(self.delay + 40)
         for _ in range(20_000):
@@ -85,18 +90,18 @@ class Chain:
             place = self.step()
         raise AssertionError("the arm never comes to rest")
 
-    def reach(self, name):
+    def reach(self, name: str) -> float:
         return self.told[-1][0][REACH[name]]
 
-    def state(self, name):
+    def state(self, name: str) -> float:
         return self.scaling.signals["teleop_state"][STATE[name]]
 
     @property
-    def force(self):
+    def force(self) -> Array:
         return self.scaling.signals["master_servo_cf"][:3].copy()
 
 
-def wander(chain, rng):
+def wander(chain: Chain, rng: np.random.Generator) -> tuple[Array, Array]:
     """Legs of the hand in any direction, with turns and clutch strokes; the last leg's step."""
     for _ in range(rng.integers(1, 4)):
         way = rng.normal(size=3)
@@ -112,7 +117,9 @@ def wander(chain, rng):
 
 @pytest.mark.parametrize("seed", range(8))
 @pytest.mark.parametrize(("robot", "gain"), [("rcrt1", 1.0), ("rcrt1", 0.5), ("puma560", 1.0)])
-def test_a_hand_that_turns_back_from_beyond_reach_moves_the_slave_at_once(robot, gain, seed):
+def test_a_hand_that_turns_back_from_beyond_reach_moves_the_slave_at_once(
+    robot: str, gain: float, seed: int
+) -> None:
     rng = np.random.default_rng(seed)
     chain = Chain(robot, delay=int(rng.integers(1, 30)), coarse_gain=gain)
     move, turn = wander(chain, rng)
@@ -125,7 +132,7 @@ def test_a_hand_that_turns_back_from_beyond_reach_moves_the_slave_at_once(robot,
 
 
 @pytest.mark.slow
-def test_those_ways_lead_beyond_reach_through_joints_and_the_workspace():
+def test_those_ways_lead_beyond_reach_through_joints_and_the_workspace() -> None:
     limits = set()
     for robot in ("rcrt1", "puma560"):
         for seed in range(8):
@@ -135,7 +142,7 @@ def test_those_ways_lead_beyond_reach_through_joints_and_the_workspace():
     assert {Limit.NONE, Limit.JOINT, Limit.WORKSPACE} <= limits
 
 
-def beyond(**values):
+def beyond(**values: Any) -> tuple[Chain, Array]:
     """A chain whose hand has pushed 50 mm beyond the end of d3, outward along the arm."""
     chain = Chain("rcrt1", **values)
     tip, arm = chain.robot.fk(chain.robot.start)[:3, 3], chain.robot
@@ -146,7 +153,7 @@ def beyond(**values):
     return chain, step
 
 
-def test_the_state_names_the_joint_at_its_limit_until_the_hand_has_come_back():
+def test_the_state_names_the_joint_at_its_limit_until_the_hand_has_come_back() -> None:
     chain, step = beyond()
     assert chain.state("limit") == Limit.JOINT
     assert chain.state("limited_joint") == 2
@@ -158,10 +165,12 @@ def test_the_state_names_the_joint_at_its_limit_until_the_hand_has_come_back():
 
 
 @pytest.mark.parametrize(("stiffness", "largest"), [(500.0, 1.5), (2000.0, 0.5)])
-def test_the_hand_feels_the_limit_up_to_a_bound_and_nothing_when_it_is_back(stiffness, largest):
+def test_the_hand_feels_the_limit_up_to_a_bound_and_nothing_when_it_is_back(
+    stiffness: float, largest: float
+) -> None:
     force = {"is_on": True, "stiffness": stiffness, "max_force": largest}
-    values = MotionScalingParameters.__dataclass_fields__["reach_force"].default_factory()
-    chain, step = beyond(reach_force=type(values)(**force))
+    values = MotionScalingParameters().reach_force
+    chain, step = beyond(reach_force=type(values)(**dict[str, Any](force)))
     way = step / np.linalg.norm(step)
     assert np.allclose(chain.force, -largest * way, rtol=0, atol=0.02 * largest)
     depth = largest / stiffness
@@ -172,14 +181,14 @@ def test_the_hand_feels_the_limit_up_to_a_bound_and_nothing_when_it_is_back(stif
     assert not chain.force.any()
 
 
-def test_the_force_can_be_switched_off_and_the_limit_is_told_nevertheless():
-    values = MotionScalingParameters.__dataclass_fields__["reach_force"].default_factory()
+def test_the_force_can_be_switched_off_and_the_limit_is_told_nevertheless() -> None:
+    values = MotionScalingParameters().reach_force
     chain, _ = beyond(reach_force=type(values)(is_on=False))
     assert not chain.force.any()
     assert chain.state("limit") == Limit.JOINT
 
 
-def test_a_clutch_stroke_beyond_reach_takes_the_slave_no_further_out():
+def test_a_clutch_stroke_beyond_reach_takes_the_slave_no_further_out() -> None:
     chain, step = beyond()
     place = chain.rest()
     for _ in range(5):
@@ -197,7 +206,7 @@ def test_a_clutch_stroke_beyond_reach_takes_the_slave_no_further_out():
 SPEED = 30e-3 * 1.875 / 1.2  # largest of a minimum-jerk move by 30 mm in 1.2 s
 
 
-def master_bag(stamps_ns):
+def master_bag(stamps_ns: Any) -> MemoryBag:
     """Recording of a hand that rests, moves by 30 mm within 1.2 s, and rests."""
     share = minimum_jerk((stamps_ns * 1e-9 - 1.3) / 1.2)
     poses = np.zeros((len(stamps_ns), 7))
@@ -206,7 +215,7 @@ def master_bag(stamps_ns):
     return MemoryBag("hand", series, {}, {})
 
 
-def setpoints(stamps_ns, **values):
+def setpoints(stamps_ns: NDArray[np.int64], **values: Any) -> tuple[Array, Array]:
     """Times of the hand (N,) [s] and the tip's setpoint (N, 3) [m] in a replay.
 
     The reference filter, which lags behind any master, is off.
@@ -219,13 +228,15 @@ def setpoints(stamps_ns, **values):
     return (rows["now_ns"] - last) * 1e-9, rows["slave_setpoint_cp"][:, :3]
 
 
-def every(period_ns, end_ns=4_000_000_000):
+def every(period_ns: int, end_ns: int = 4_000_000_000) -> NDArray[np.int64]:
     return np.arange(1_000_000_000, end_ns, period_ns, dtype=np.int64)
 
 
 @pytest.mark.parametrize("interpolation", ["none", "linear", "minimum_jerk"])
 @pytest.mark.parametrize("rate_hz", [10, 30, 125, 250, 500])
-def test_a_slow_master_costs_one_of_its_periods_and_no_more(rate_hz, interpolation):
+def test_a_slow_master_costs_one_of_its_periods_and_no_more(
+    rate_hz: int, interpolation: str
+) -> None:
     times, fast = setpoints(every(TICK_NS))
     period = 1.0 / rate_hz
     kind = {"slave.interpolation": interpolation}
@@ -240,7 +251,7 @@ def test_a_slow_master_costs_one_of_its_periods_and_no_more(rate_hz, interpolati
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_irregular_stamps_and_losses_lose_none_of_the_motion(seed):
+def test_irregular_stamps_and_losses_lose_none_of_the_motion(seed: int) -> None:
     rng = np.random.default_rng(seed)
     stamps = np.cumsum(rng.integers(20_000_000, 130_000_000, 40)) + 900_000_000
     stamps = stamps[(rng.random(len(stamps)) > 0.15) | (stamps > 2_600_000_000)]
@@ -249,7 +260,7 @@ def test_irregular_stamps_and_losses_lose_none_of_the_motion(seed):
     assert np.linalg.norm(slave[-1] - slave[0]) == pytest.approx(30e-3, abs=2e-4)
 
 
-def test_after_a_pause_of_the_master_the_slave_does_not_jump_after_the_hand():
+def test_after_a_pause_of_the_master_the_slave_does_not_jump_after_the_hand() -> None:
     stamps = np.concatenate((every(10_000_000, 1_500_000_000), every(10_000_000) + 1_500_000_000))
     _, slave = setpoints(stamps)
     assert np.linalg.norm(np.diff(slave, axis=0), axis=1).max() < 1e-4

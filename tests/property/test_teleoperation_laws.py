@@ -1,17 +1,22 @@
 """Laws of teleoperation over random sequences of what operators and supervisors do."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from present import present
 from teleop_core.chain.mapping.motion_scaling import MotionScaling
 from teleop_core.chain.mapping.parameters import MotionScalingParameters, axis_map
 from teleop_core.chain.mapping.plausibility import PlausibilityParameters
 from teleop_core.graph.signals import STATE, TICK_NS
+from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot
 from teleop_core.session.configuration import configure
 from teleop_core.session.virtual import VirtualTime
@@ -31,7 +36,7 @@ R_SLAVE_MASTER = axis_map("axes", MotionScalingParameters().axes)
 HOME = load_robot("rcrt1").fk(load_robot("rcrt1").home)
 
 
-def turn_between(a, b):
+def turn_between(a: Array, b: Array) -> float:
     """Angle of the rotation between two quaternions [rad], without losing small ones."""
     w = a @ b
     x = a[0] * b[1:] - b[0] * a[1:] - np.cross(a[1:], b[1:])
@@ -52,7 +57,7 @@ class Sample:
 class Desk:
     """Motion scaling between a hand and a slave that stands where it was told to."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         self.scaling = MotionScaling(MotionScalingParameters(plausible=ANY_HAND))
         self.row = self.scaling.signals
         self.hand, self.attitude = np.zeros(3), Rotation.identity()
@@ -64,7 +69,7 @@ class Desk:
         self.row["master_measured_cp_ns"] = self.row["slave_setpoint_cp_ns"] = TICK_NS
         self.sample(np.zeros(3), np.zeros(3))
 
-    def sample(self, step, turn, gap_ns=TICK_NS):
+    def sample(self, step: Array, turn: Array, gap_ns: int = TICK_NS) -> Sample:
         row, before = self.row, self.row["slave_servo_cp"].copy()
         stylus_before = row["master_measured_cp"].copy()
         self.hand, self.attitude = self.hand + step, Rotation.from_rotvec(turn) * self.attitude
@@ -84,11 +89,11 @@ class Desk:
             row["teleop_state"][STATE["gain"]],
         )
 
-    def box(self):
+    def box(self) -> Array:
         start = STATE["fixture_center_x"]
         return self.row["teleop_state"][start : start + 6].copy()
 
-    def act(self, action, value):
+    def act(self, action: str, value: float) -> int:
         """Do something between two samples; returns the stamp step to the next sample [ns]."""
         if action in {"clutch", "fixture", "mode"}:
             index = ("clutch", "fixture", "mode").index(action)
@@ -117,7 +122,9 @@ events = st.lists(
 
 
 @given(events)
-def test_no_event_moves_the_command_further_than_gain_times_the_hand(happened):
+def test_no_event_moves_the_command_further_than_gain_times_the_hand(
+    happened: list[tuple[str, float, Array, Array]],
+) -> None:
     desk = Desk()
     for action, value, step, turn in happened:
         done = desk.sample(step, turn, desk.act(action, value))
@@ -127,7 +134,9 @@ def test_no_event_moves_the_command_further_than_gain_times_the_hand(happened):
 
 
 @given(events)
-def test_no_event_moves_the_command_while_the_hand_rests(happened):
+def test_no_event_moves_the_command_while_the_hand_rests(
+    happened: list[tuple[str, float, Array, Array]],
+) -> None:
     desk = Desk()
     for action, value, step, turn in happened:
         desk.sample(step, turn)
@@ -137,7 +146,9 @@ def test_no_event_moves_the_command_while_the_hand_rests(happened):
 
 
 @given(events)
-def test_clutching_resetting_and_pausing_hold_the_command_whatever_the_hand_does(happened):
+def test_clutching_resetting_and_pausing_hold_the_command_whatever_the_hand_does(
+    happened: list[tuple[str, float, Array, Array]],
+) -> None:
     desk = Desk()
     for action, value, step, turn in happened:
         was_clutched = desk.buttons[0] > 0.0
@@ -150,7 +161,9 @@ def test_clutching_resetting_and_pausing_hold_the_command_whatever_the_hand_does
 
 
 @given(events)
-def test_scaling_is_linear_between_the_events(happened):
+def test_scaling_is_linear_between_the_events(
+    happened: list[tuple[str, float, Array, Array]],
+) -> None:
     desk = Desk()
     for action, value, step, turn in happened:
         was_clutched = desk.buttons[0] > 0.0
@@ -162,7 +175,9 @@ def test_scaling_is_linear_between_the_events(happened):
 
 
 @given(events)
-def test_attitude_follows_the_stylus_in_its_own_frame_after_any_event(happened):
+def test_attitude_follows_the_stylus_in_its_own_frame_after_any_event(
+    happened: list[tuple[str, float, Array, Array]],
+) -> None:
     desk = Desk()
     for action, value, step, turn in happened:
         desk.sample(step, turn, desk.act(action, value))
@@ -181,7 +196,9 @@ def test_attitude_follows_the_stylus_in_its_own_frame_after_any_event(happened):
 
 
 @given(events, st.lists(st.tuples(triple, turns), min_size=1, max_size=10))
-def test_box_stays_at_the_slave_while_clutched(happened, clutched):
+def test_box_stays_at_the_slave_while_clutched(
+    happened: list[tuple[str, float, Array, Array]], clutched: list[tuple[Array, Array]]
+) -> None:
     desk = Desk()
     desk.act("fixture", 0.0)
     for action, value, step, turn in happened:
@@ -195,11 +212,13 @@ def test_box_stays_at_the_slave_while_clutched(happened, clutched):
         before = desk.box()
     desk.buttons[0] = 0.0
     desk.sample(np.full(3, 0.01), np.zeros(3))
-    assert np.abs(desk.box() - before).max() <= NANOMETRE
+    assert np.abs(desk.box() - present(before)).max() <= NANOMETRE
 
 
 @given(events)
-def test_box_stays_where_it_is_until_gain_box_or_slave_change(happened):
+def test_box_stays_where_it_is_until_gain_box_or_slave_change(
+    happened: list[tuple[str, float, Array, Array]],
+) -> None:
     desk = Desk()
     for action, value, step, turn in happened:
         before, was_on = desk.box(), desk.row["teleop_state"][STATE["is_fixture_on"]]
@@ -211,7 +230,9 @@ def test_box_stays_where_it_is_until_gain_box_or_slave_change(happened):
 
 
 @given(events)
-def test_the_same_hand_never_moves_the_slave_further_in_fine_mode(happened):
+def test_the_same_hand_never_moves_the_slave_further_in_fine_mode(
+    happened: list[tuple[str, float, Array, Array]],
+) -> None:
     coarse, fine = Desk(), Desk()
     fine.scaling.retune(MotionScalingParameters(plausible=ANY_HAND, mode="fine"))
     fine.sample(np.zeros(3), np.zeros(3))
@@ -223,7 +244,9 @@ def test_the_same_hand_never_moves_the_slave_further_in_fine_mode(happened):
 
 
 @given(triple, st.lists(st.floats(0.01, 1.0), min_size=1, max_size=20))
-def test_gain_does_not_depend_on_how_often_the_hand_is_sampled(end, spacing):
+def test_gain_does_not_depend_on_how_often_the_hand_is_sampled(
+    end: Array, spacing: list[float]
+) -> None:
     shares = np.cumsum(spacing) / np.sum(spacing)
     once, often = Desk(), Desk()
     once.sample(end, np.zeros(3))
@@ -235,7 +258,7 @@ def test_gain_does_not_depend_on_how_often_the_hand_is_sampled(end, spacing):
 
 @given(st.integers(0, 10_000))
 @settings(max_examples=10)
-def test_closing_the_loop_of_the_hand_closes_that_of_the_slave(seed):
+def test_closing_the_loop_of_the_hand_closes_that_of_the_slave(seed: int) -> None:
     rng = np.random.default_rng(seed)
     steps = rng.uniform(-0.01, 0.01, (50, 3))
     desk = Desk()
@@ -251,7 +274,13 @@ seconds = st.floats(0.0, 2.9).map(lambda t: round(t, 3))
 presses = st.lists(st.integers(0, 19).map(lambda k: round(0.15 * k, 3)), max_size=4, unique=True)
 
 
-def session_of(seed, clutch=(), fixture=(), mode=(), **settings_):
+def session_of(
+    seed: int,
+    clutch: Sequence[float] = (),
+    fixture: Sequence[float] = (),
+    mode: Sequence[float] = (),
+    **settings_: str | float | list[float],
+) -> VirtualTime:
     text = [f"{key}={value}" for key, value in settings_.items()]
     texts = [
         f"seed={seed}", "operator.approach_time=0.5", "operator.center=[0.01, 0.0, 0.03]",
@@ -263,7 +292,7 @@ def session_of(seed, clutch=(), fixture=(), mode=(), **settings_):
     return session
 
 
-def assert_command_moves_with_the_hand(block, first):
+def assert_command_moves_with_the_hand(block: NDArray[np.void], first: int) -> None:
     """No tick from ``first`` on moves the command further than gain times the hand."""
     command, hand = block["slave_servo_cp"][first:], block["master_measured_cp"][first:]
     gain = block["teleop_state"][first:][1:, STATE["gain"]]
@@ -284,7 +313,9 @@ def assert_command_moves_with_the_hand(block, first):
     presses, presses,
 )  # fmt: skip
 @settings(max_examples=25)
-def test_buttons_in_a_running_session_never_move_the_slave(seed, clutch, fixture, mode):
+def test_buttons_in_a_running_session_never_move_the_slave(
+    seed: int, clutch: list[float], fixture: list[float], mode: list[float]
+) -> None:
     block = session_of(seed, clutch, fixture, mode).run(3000)
     assert_command_moves_with_the_hand(block, 0)
     is_clutched = block["teleop_state"][:, STATE["is_clutched"]] > 0.0
@@ -296,7 +327,7 @@ def test_buttons_in_a_running_session_never_move_the_slave(seed, clutch, fixture
 
 @given(st.integers(0, 1000), st.integers(600, 2500))
 @settings(max_examples=10)
-def test_restarting_the_scaling_in_motion_holds_the_slave_where_it_is(seed, at):
+def test_restarting_the_scaling_in_motion_holds_the_slave_where_it_is(seed: int, at: int) -> None:
     session = session_of(seed)
     before = session.run(at)[-1]
     session.stages["motion_scaling"].reset()
@@ -311,8 +342,12 @@ def test_restarting_the_scaling_in_motion_holds_the_slave_where_it_is(seed, at):
 
 @given(st.integers(0, 1000), st.integers(600, 2500), st.sampled_from(["scaling", "ik", "both"]))
 @settings(max_examples=10)
-def test_restarting_at_rest_moves_nothing_at_all(seed, at, what):
-    rest = {"operator.kind": "hold", "operator.center": [0.0, 0.0, 0.0], "operator.rotation": 0.0}
+def test_restarting_at_rest_moves_nothing_at_all(seed: int, at: int, what: str) -> None:
+    rest: dict[str, Any] = {
+        "operator.kind": "hold",
+        "operator.center": [0.0, 0.0, 0.0],
+        "operator.rotation": 0.0,
+    }
     session = session_of(seed, **rest, gimbal_noise=0.0, tremor_amplitude=0.0)
     before = session.run(at)[-1]
     if what in {"scaling", "both"}:
@@ -327,7 +362,7 @@ def test_restarting_at_rest_moves_nothing_at_all(seed, at, what):
 
 @given(st.integers(0, 1000))
 @settings(max_examples=5)
-def test_parameters_changed_in_a_running_session_never_move_the_slave(seed):
+def test_parameters_changed_in_a_running_session_never_move_the_slave(seed: int) -> None:
     rng, session = np.random.default_rng(seed), session_of(seed)
     before = session.run(800)
     for _ in range(6):
@@ -343,7 +378,7 @@ def test_parameters_changed_in_a_running_session_never_move_the_slave(seed):
         before = block
 
 
-def test_quaternions_stay_unit_over_a_long_session_of_turning_and_clutching():
+def test_quaternions_stay_unit_over_a_long_session_of_turning_and_clutching() -> None:
     count = 60_000
     rng, session = np.random.default_rng(8), VirtualTime(configure(), played="haptic_master")
     turns = Rotation.from_rotvec(0.002 * rng.standard_normal((count, 3)))
@@ -359,7 +394,7 @@ def test_quaternions_stay_unit_over_a_long_session_of_turning_and_clutching():
     samples["now_ns"] = TICK_NS * np.arange(1, count + 1)
     for topic in session.played_topics:
         samples[f"{topic.field}_ns"] = samples["now_ns"]
-    block = session.replay(samples)
-    for topic in ("slave_servo_cp", "slave_setpoint_cp", "slave_measured_cp"):
-        norms = np.linalg.norm(block[topic][:, 3:], axis=1)
-        assert np.abs(norms - 1.0).max() < 1e-15, topic
+    block: Any = session.replay(samples)
+    for field in ("slave_servo_cp", "slave_setpoint_cp", "slave_measured_cp"):
+        norms = np.linalg.norm(block[field][:, 3:], axis=1)
+        assert np.abs(norms - 1.0).max() < 1e-15, field

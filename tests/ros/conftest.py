@@ -32,6 +32,7 @@ from rich.console import Console
 import patience
 from live_process import has_recorded
 from middleware_faults import MiddlewareLossError, check_end
+from present import present
 from teleop_core.bags.messages import discover, layout
 from teleop_core.bags.reader import Bag
 from teleop_core.base.parameters import specs
@@ -163,7 +164,7 @@ class NodeProcess:
             MiddlewareCrashError: That is how it ended.
         """
         wait_until(lambda: self.process.poll() is not None, f"end of {self.name}", timeout)
-        code = self.process.returncode
+        code = present(self.process.returncode)
         check_end(self.name, code, self.stderr.read_text(errors="replace"))
         return code
 
@@ -340,8 +341,8 @@ class Peer:
         data = layout(topic, JOINTS).encode_one(stamp_ns, np.asarray(values, np.float64))
         self.publisher(topic, readers).publish(data)
 
-    def spin(self) -> None:
-        """Serve what has come for the test's own node."""
+    def spin(self) -> Any:
+        """Serve what has come for the test's own node; returns nothing, in front of an ``or``."""
         self._executor.spin_once(0.01)
 
     def slave_holds(self) -> bool:
@@ -378,7 +379,7 @@ class Peer:
 
 
 @contextmanager
-def _made_peer() -> Iterator[Peer]:
+def _made_peer() -> Any:
     with tempfile.TemporaryDirectory() as folder:
         made = Peer(Path(folder))
         try:
@@ -388,7 +389,7 @@ def _made_peer() -> Iterator[Peer]:
 
 
 @pytest.fixture
-def peer() -> Iterator[Peer]:
+def peer() -> Any:
     """A peer on a ROS domain that nobody else uses; the nodes it started end with the test."""
     with _made_peer() as made:
         yield made
@@ -404,7 +405,7 @@ def common_peer() -> Iterator[Peer]:
 @contextmanager
 def _composed(
     peer: Peer, folder: Path, namespace: str, parameters: dict[str, dict[str, Any]]
-) -> Iterator["subprocess.Popen[bytes] | Started"]:
+) -> Any:
     common = {
         "recorder": {"out": str(folder / "bag")},
         "slave": {"start": load_robot("rcrt1").home.tolist()},  # follows at once
@@ -430,7 +431,7 @@ def _composed(
 
 
 @pytest.fixture
-def compose(peer, tmp_path):
+def compose(peer: Peer, tmp_path: Path) -> Iterator[Callable[..., object]]:
     """Starter of a composed session with parameters; all its nodes are active, its arm at home."""
     with ExitStack() as stack:
 
@@ -443,12 +444,12 @@ def compose(peer, tmp_path):
 
 
 @pytest.fixture(scope="module")
-def composed_session(tmp_path_factory):
+def composed_session(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., object]:
     """Composed session that tests of a file share, as a context: peer, process, recording."""
 
     @contextmanager
     def run(
-        **parameters: dict[str, Any],
+        **parameters: Any,
     ) -> Iterator[tuple[Peer, "subprocess.Popen[bytes]", Path]]:
         folder = tmp_path_factory.mktemp("session")
         with _made_peer() as peer, _composed(peer, folder, "", parameters) as process:
@@ -466,6 +467,7 @@ def run_until(
     On a busy machine nobody knows what a session comes to in a time: it lasts until it has come to
     what its test is about. The peer's domain must be that of the environment.
     """
+    show: Any
     show, interrupt = Console(file=io.StringIO(), width=200), Interrupt()
     with ThreadPoolExecutor() as pool:
         session = pool.submit(

@@ -3,16 +3,22 @@
 import math
 import subprocess
 import sys
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
 from std_msgs.msg import Float64MultiArray, String
 
 from teleop_core.graph.topics import SLAVE_MEASURED_JS, SLAVE_SETPOINT_JS
+from teleop_core.kernels.geometry import Array
 from teleop_core.nodes.children import environment
 from teleop_core.robots import load_robot
+
+if TYPE_CHECKING:
+    from ros.conftest import Peer
 
 pytestmark = [pytest.mark.ros, pytest.mark.slow]
 
@@ -21,7 +27,7 @@ KINDS = ("joint_state", "forward_command", "joint_trajectory", "crtk")
 ROBOT = load_robot("rcrt1")
 JOINTS = ("base", "shoulder", "slide", "roll", "pitch", "yaw")
 STANDS = np.array([0.1, 1.9, 0.4, 0.0, 0.1, 0.0])
-NAMED = {
+NAMED: dict[str, Any] = {
     "joints": [f"{ours}={theirs}" for ours, theirs in zip(ROBOT.joint_names, JOINTS, strict=True)],
     "signs": [1.0, -1.0, 1.0, 1.0, 1.0, 1.0],
     "order": list(reversed(JOINTS)),
@@ -31,57 +37,57 @@ NAMED = {
 class RealArm:
     """A controller, its bridge and the server that leads it."""
 
-    def __init__(self, peer, kind):
+    def __init__(self, peer: "Peer", kind: str) -> None:
         self.peer, self.kind = peer, kind
         self.measured, self.setpoint = map(peer.listen, (SLAVE_MEASURED_JS, SLAVE_SETPOINT_JS))
         self.witnessed = [math.nan, 0.0]
         peer.node.create_subscription(Float64MultiArray, "witness", self._see, 10)
         self._misbehave = peer.node.create_publisher(String, "misbehave", 10)
 
-    def _see(self, message):
+    def _see(self, message: Any) -> None:
         self.witnessed = list(message.data)
 
-    def misbehave(self, how):
+    def misbehave(self, how: str) -> None:
         self.peer.wait(self._misbehave.get_subscription_count, "the controller")
         self._misbehave.publish(String(data=how))
 
-    def witness(self):
+    def witness(self) -> list[float]:
         """First command's distance and largest step, in shares of a rated step of 2 ms."""
         self.peer.wait(lambda: self.peer.spin() or not math.isnan(self.witnessed[0]), "a witness")
         return self.witnessed
 
-    def where(self):
+    def where(self) -> Array | None:
         """Joints as the server hears them, or None."""
         return self.measured.values[-1][:6] if self.measured.take() else None
 
-    def is_at(self, goal, tolerance=1e-3):
+    def is_at(self, goal: Array, tolerance: float = 1e-3) -> bool:
         where = self.where()
         return where is not None and np.abs(where - goal).max() < tolerance
 
-    def goes_on(self):
+    def goes_on(self) -> None:
         self.measured.forget()
         self.peer.wait(lambda: self.measured.take() > 10, "samples that are passed on")
         self.peer.wait(lambda: not self.says("not believed") and not self.says("nothing"), "news")
 
-    def operation(self, text):
+    def operation(self, text: str) -> bool:
         return text in self.peer.status("slave").values["operation"]
 
-    def says(self, text):
+    def says(self, text: str) -> bool:
         status = self.peer.status("arm_bridge")
         return status is not None and text in status.message
 
-    def holds(self, text):
+    def holds(self, text: str) -> None:
         """Wait until the bridge says why, and the server that it holds."""
         self.peer.wait(lambda: self.says(text), f"the bridge to say {text!r}")
         self.peer.wait(self._server_holds, "a server that holds")
 
-    def _server_holds(self):
+    def _server_holds(self) -> bool:
         message = self.peer.status("slave").message
         return "no slave/measured_js" in message or "has not said where it is" in message
 
 
 @contextmanager
-def real_arm(peer, kind="joint_state", **parameters):
+def real_arm(peer: "Peer", kind: str = "joint_state", **parameters: Any) -> Iterator[RealArm]:
     """A real arm of a kind that stands off its home, led from there."""
     env = environment() | {"ROS_DOMAIN_ID": peer.domain}
     controller = subprocess.Popen([sys.executable, str(CONTROLLER), kind], env=env)
@@ -96,7 +102,7 @@ def real_arm(peer, kind="joint_state", **parameters):
         assert controller.wait(20) == 0
 
 
-def is_led_home_without_a_jump(arm):
+def is_led_home_without_a_jump(arm: RealArm) -> bool:
     peer = arm.peer
     peer.wait(lambda: arm.is_at(ROBOT.home), "an arm at home")
     first, largest = arm.witness()
@@ -109,7 +115,7 @@ def is_led_home_without_a_jump(arm):
 
 
 @pytest.mark.parametrize("kind", KINDS[1:])
-def test_an_arm_of_each_kind_is_led_home_without_a_jump(peer, kind):
+def test_an_arm_of_each_kind_is_led_home_without_a_jump(peer: "Peer", kind: str) -> None:
     with real_arm(peer, kind) as arm:
         assert is_led_home_without_a_jump(arm)
 
@@ -117,7 +123,7 @@ def test_an_arm_of_each_kind_is_led_home_without_a_jump(peer, kind):
 # Five processes share two cores here, and an arm that stands still for a tenth of a second in the
 # middle of a motion does not agree with its setpoint: CI tests the bridge and conformance apart.
 @pytest.mark.soak
-def test_conformance_passes_unchanged_through_the_bridge(peer):
+def test_conformance_passes_unchanged_through_the_bridge(peer: "Peer") -> None:
     pytest.importorskip("crtk_msgs")
     with real_arm(peer) as arm:
         peer.wait(lambda: arm.is_at(ROBOT.home), "an arm at home")
@@ -129,14 +135,16 @@ def test_conformance_passes_unchanged_through_the_bridge(peer):
     assert done.returncode == 0, done.stdout + done.stderr
 
 
-def test_an_arm_that_jumps_is_told_nothing_more_and_begins_anew_after_the_fault(peer):
+def test_an_arm_that_jumps_is_told_nothing_more_and_begins_anew_after_the_fault(
+    peer: "Peer",
+) -> None:
     with real_arm(peer) as arm:
         peer.wait(lambda: arm.is_at(ROBOT.home), "an arm at home")
         arm.misbehave("jump")
         arm.holds("base jumped by")
         count, sent = arm.measured.take(), set()
 
-        def is_at_fault():
+        def is_at_fault() -> bool:
             if arm.says("jumped"):
                 sent.add(peer.status("arm_bridge").number("commands"))
             return arm.operation("FAULT")
@@ -150,13 +158,13 @@ def test_an_arm_that_jumps_is_told_nothing_more_and_begins_anew_after_the_fault(
 
 
 @pytest.fixture(scope="module")
-def led_arm(common_peer):
+def led_arm(common_peer: "Peer") -> Iterator[RealArm]:
     """An arm that is led home."""
     with real_arm(common_peer) as arm:
         yield arm
 
 
-def test_an_arm_that_says_joint_states_is_led_home_without_a_jump_too(led_arm):
+def test_an_arm_that_says_joint_states_is_led_home_without_a_jump_too(led_arm: RealArm) -> None:
     assert is_led_home_without_a_jump(led_arm)
 
 
@@ -171,8 +179,8 @@ def test_an_arm_that_says_joint_states_is_led_home_without_a_jump_too(led_arm):
     ],
 )
 def test_an_answer_that_cannot_be_believed_holds_the_arm_until_it_is_sound_again(
-    led_arm, how, words
-):
+    led_arm: RealArm, how: str, words: str
+) -> None:
     arm = led_arm
     arm.misbehave(how)
     arm.holds(words)
@@ -183,7 +191,7 @@ def test_an_answer_that_cannot_be_believed_holds_the_arm_until_it_is_sound_again
     arm.goes_on()
 
 
-def test_another_order_of_names_changes_nothing(led_arm):
+def test_another_order_of_names_changes_nothing(led_arm: RealArm) -> None:
     led_arm.misbehave("order")
     led_arm.measured.forget()
     led_arm.peer.wait(lambda: led_arm.measured.take() > 100, "samples in another order")

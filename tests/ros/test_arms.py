@@ -1,5 +1,9 @@
 """Arms as nodes: namespaces keep parameters and topics apart; two arms make one recording."""
 
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
 import numpy as np
 import pytest
 from rcl_interfaces.srv import GetParameters
@@ -12,6 +16,9 @@ from teleop_core.graph import topics
 from teleop_core.robots import load_robot
 from teleop_core.session.configuration import configure
 
+if TYPE_CHECKING:
+    from ros.conftest import Listener, Peer
+
 pytestmark = pytest.mark.ros
 
 MS = 1_000_000
@@ -20,7 +27,9 @@ LEFT_JOINTS = topics.SLAVE_MEASURED_JS.of_arm("left")
 LEFT_MASTER = topics.MASTER_MEASURED_CP.of_arm("left")
 
 
-def test_a_node_in_a_namespace_keeps_the_parameters_that_a_file_gives_its_bare_name(peer):
+def test_a_node_in_a_namespace_keeps_the_parameters_that_a_file_gives_its_bare_name(
+    peer: "Peer",
+) -> None:
     peer.start("slave", arm="left", robot="puma560", command_timeout=0.25)
     request = GetParameters.Request(names=["robot", "command_timeout"])
     robot, timeout = peer.call(GetParameters, "/left/slave/get_parameters", request).values
@@ -28,7 +37,7 @@ def test_a_node_in_a_namespace_keeps_the_parameters_that_a_file_gives_its_bare_n
     assert timeout.double_value == 0.25
 
 
-def test_a_node_in_a_namespace_publishes_and_reports_below_it(peer):
+def test_a_node_in_a_namespace_publishes_and_reports_below_it(peer: "Peer") -> None:
     inside, outside = peer.listen(LEFT_JOINTS), peer.listen(topics.SLAVE_MEASURED_JS)
     peer.start("slave", arm="left", robot="puma560")
     peer.wait(lambda: inside.take() > 100, "left/slave/measured_js")
@@ -37,17 +46,19 @@ def test_a_node_in_a_namespace_publishes_and_reports_below_it(peer):
     assert set(peer.observer.statuses) == {"left/slave", "left/slave_sim"}
 
 
-def test_a_refused_parameter_of_a_node_in_a_namespace_is_named_with_it(peer):
+def test_a_refused_parameter_of_a_node_in_a_namespace_is_named_with_it(peer: "Peer") -> None:
     node = peer.start("slave", wait="", arm="left", command_timeout=50.0)
     assert node.wait() == 2
     assert "left/slave.command_timeout is 50.0" in node.stderr.read_text()
 
 
-def test_a_recorder_in_a_namespace_records_the_topics_of_its_arm(peer, tmp_path):
+def test_a_recorder_in_a_namespace_records_the_topics_of_its_arm(
+    peer: "Peer", tmp_path: Path
+) -> None:
     recorder = peer.start("recorder", arm="left", out=str(tmp_path / "bag"))
     stamp = 0
 
-    def heard():
+    def heard() -> Any:
         nonlocal stamp
         stamp += MS
         peer.send(LEFT_MASTER, stamp, REST)
@@ -74,7 +85,9 @@ def test_a_recorder_in_a_namespace_records_the_topics_of_its_arm(peer, tmp_path)
         pytest.param(True, id="composed"),
     ],
 )
-def test_two_arms_are_recorded_together_and_scored_one_by_one(peer, session_until, is_composed):
+def test_two_arms_are_recorded_together_and_scored_one_by_one(
+    peer: "Peer", session_until: Callable[..., tuple[Bag, str]], is_composed: bool
+) -> None:
     robots = {"": "rcrt1", "left": "puma560"}
     # In processes of their own, on two processors, an arm that hears too seldom of its hand holds.
     moving = topics.SLAVE_MEASURED_JS if is_composed else topics.MASTER_MEASURED_CP
@@ -88,11 +101,11 @@ def test_two_arms_are_recorded_together_and_scored_one_by_one(peer, session_unti
     configuration = configure("coarse_box", settings=[*settings, "teleop.duration=600.0"])
     enough = {topic.of_arm(arm).name: 100 for arm in robots for topic in topics.STREAMS}
 
-    def has_moved(listener):
+    def has_moved(listener: "Listener") -> bool:
         values = listener.values
         return listener.take() > 300 and np.abs(values[-1] - values[0])[:3].max() > 1e-3
 
-    def is_under_way():
+    def is_under_way() -> bool:
         moved = [has_moved(listener) for listener in listeners.values()]
         return all(moved) and peer.has_recorded(enough)
 

@@ -1,5 +1,8 @@
 """Hostile pages at a real session: its arm gets no other command, and the stop stops it."""
 
+from pathlib import Path
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -18,7 +21,7 @@ pytestmark = [pytest.mark.ros, pytest.mark.slow, pytest.mark.alone]
 SETTLES = 1e-6  # filters come to rest within nanometres; a drag moves millimetres [m]
 
 
-def saved(driver, console, name):
+def saved(driver: PageClient, console: Any, name: Any) -> tc.Recording:
     """What has been recorded until now, closed under a name."""
     driver.set(driver.elements["name"], value=name)
     driver.click("Save as")
@@ -27,7 +30,9 @@ def saved(driver, console, name):
     return tc.open_recording(folder)
 
 
-def test_arm_of_a_real_session_gets_no_other_command_and_stops_when_the_driver_says_so(tmp_path):
+def test_arm_of_a_real_session_gets_no_other_command_and_stops_when_the_driver_says_so(
+    tmp_path: Path,
+) -> None:
     console = ConsoleProcess(tmp_path, "--out", tmp_path / "session")
     port = int(console.url.split(":")[2].strip("/"))
     try:

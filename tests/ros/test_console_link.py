@@ -1,5 +1,9 @@
 """Link to a live session: what the page sees is what is recorded, what it asks for happens."""
 
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
 import numpy as np
 import pytest
 
@@ -15,15 +19,18 @@ from teleop_core.nodes.console_session import ConsoleSession
 from teleop_core.nodes.display import SEEN
 from teleop_core.session import api
 
+if TYPE_CHECKING:
+    from ros.conftest import Peer
+
 pytestmark = [pytest.mark.ros, pytest.mark.slow]
 
 
 @pytest.fixture(scope="module")
-def live(tmp_path_factory):
+def live(tmp_path_factory: pytest.TempPathFactory) -> Any:
     """A session behind a page, its link, and where it is recorded."""
     out = tmp_path_factory.mktemp("console") / "bag"
     texts = ["operator=remote", "teleop.duration=3600.0", "operator.patience=0.0", CALM]
-    said = []
+    said: list[Any] = []
     with ConsoleSession(api.configuration(None, texts=texts), out, said.append) as session:
         link = session.link()
         with link:
@@ -35,17 +42,17 @@ def live(tmp_path_factory):
             yield session, link, out
 
 
-def state(link):
+def state(link: LiveLink) -> Any:
     """State of the arm as the page sees it."""
     return link.view().arms[""].operation_text.split(",")[0].split(":")[0]
 
 
-def test_the_view_has_fresh_streams_of_the_arm_and_says_where_it_is_recorded(live):
+def test_the_view_has_fresh_streams_of_the_arm_and_says_where_it_is_recorded(live: Any) -> None:
     _, link, out = live
     first = dict(link.view().arms[""].stamp_ns)
     name = topics.SLAVE_MEASURED_JS.name
 
-    def fresh():
+    def fresh() -> Any:
         """View of an arm at rest, of which joints and tip are of one place."""
         view = link.view()
         arm = view.arms[""]
@@ -60,7 +67,7 @@ def test_the_view_has_fresh_streams_of_the_arm_and_says_where_it_is_recorded(liv
     np.testing.assert_allclose(link.arms[0].robot.fk(q)[:3, 3], tip, atol=1e-3)
 
 
-def test_commands_are_obeyed_and_answered(live):
+def test_commands_are_obeyed_and_answered(live: Any) -> None:
     _, link, _ = live
     wait_until(lambda: state(link) == "ENABLED", "enabled")
     assert link.command("pause")[0]
@@ -72,7 +79,7 @@ def test_commands_are_obeyed_and_answered(live):
     wait_until(lambda: state(link) == "ENABLED", "enabled again")
 
 
-def test_the_emergency_stop_is_latched_until_it_is_released_reset_and_enabled(live):
+def test_the_emergency_stop_is_latched_until_it_is_released_reset_and_enabled(live: Any) -> None:
     _, link, _ = live
     link.press(is_pressed=True)
     wait_until(lambda: state(link) == "FAULT", "stopped")
@@ -82,16 +89,18 @@ def test_the_emergency_stop_is_latched_until_it_is_released_reset_and_enabled(li
     wait_until(lambda: link.command("enable")[0], "enabled")
 
 
-def test_mode_that_the_button_of_the_stylus_changes_is_told_as_a_changed_parameter(live):
+def test_mode_that_the_button_of_the_stylus_changes_is_told_as_a_changed_parameter(
+    live: Any,
+) -> None:
     _, link, _ = live
     wait_until(lambda: state(link) == "ENABLED", "enabled")
     for mode in ("fine", "coarse"):
         link.changes()
         link.press_button("", "mode")
-        wait_until(lambda mode=mode: link.changes().get(("motion_scaling", "mode")) == mode, mode)
+        wait_until(lambda: link.changes().get(("motion_scaling", "mode")) == mode, mode)
 
 
-def test_parameters_come_with_bounds_and_meaning_and_a_refusal_with_its_reason(live):
+def test_parameters_come_with_bounds_and_meaning_and_a_refusal_with_its_reason(live: Any) -> None:
     _, link, _ = live
     known = link.parameters()
     gain = known["motion_scaling", "fine_gain"]
@@ -105,7 +114,7 @@ def test_parameters_come_with_bounds_and_meaning_and_a_refusal_with_its_reason(l
     assert link.change("nobody", "fine_gain", 0.3)
 
 
-def test_the_buttons_of_the_stylus_switch_mode_and_box(live):
+def test_the_buttons_of_the_stylus_switch_mode_and_box(live: Any) -> None:
     _, link, _ = live
     before = link.view().arms[""].state["is_fine"]
     link.press_button("", "mode")
@@ -117,7 +126,7 @@ def test_the_buttons_of_the_stylus_switch_mode_and_box(live):
     assert (found[1] > 0.0).all()
 
 
-def test_a_saved_recording_is_there_under_its_name_and_the_next_one_goes_on(live):
+def test_a_saved_recording_is_there_under_its_name_and_the_next_one_goes_on(live: Any) -> None:
     session, link, out = live
     for name in ("", "a/b", "..", "a b"):
         with pytest.raises(ParameterError):
@@ -132,13 +141,15 @@ def test_a_saved_recording_is_there_under_its_name_and_the_next_one_goes_on(live
     assert not session.is_over
 
 
-def test_without_a_session_there_is_one_clear_error():
+def test_without_a_session_there_is_one_clear_error() -> None:
     domain = free_domain()
     with pytest.raises(SessionError, match=f"no arm answers on ROS domain {domain};"):
         LiveLink(int(domain), patience=0.1)
 
 
-def test_of_a_session_in_a_namespace_the_link_knows_arm_and_recorder(compose, peer, tmp_path):
+def test_of_a_session_in_a_namespace_the_link_knows_arm_and_recorder(
+    compose: Callable[..., object], peer: "Peer", tmp_path: Path
+) -> None:
     compose("left")
     with LiveLink(int(peer.domain)) as link:
         assert [arm.name for arm in link.arms] == ["left"]
@@ -147,7 +158,9 @@ def test_of_a_session_in_a_namespace_the_link_knows_arm_and_recorder(compose, pe
         assert Bag(tmp_path / "kept").topics["left/slave/measured_cp"].count
 
 
-def test_a_second_session_of_the_process_is_alone_and_its_energies_are_seen(live, tmp_path):
+def test_a_second_session_of_the_process_is_alone_and_its_energies_are_seen(
+    live: Any, tmp_path: Path
+) -> None:
     first, *_ = live
     stages = ["teleop.stages=[network,passivity]", "reflection.passivity=tdpa"]
     texts = ["operator=remote", "teleop.duration=3600.0", "operator.patience=0.0", CALM, *stages]

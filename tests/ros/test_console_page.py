@@ -1,9 +1,14 @@
 """Console's page: in a real browser a person drives a live session, and its recordings prove it."""
 
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+
+from headless import Headless
+from present import present
 
 pytest.importorskip("viser")
 
@@ -31,7 +36,7 @@ SHARE, STILL = 0.15, 2e-4  # m
 
 
 @pytest.fixture(scope="module")
-def console(tmp_path_factory):
+def console(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ConsoleProcess]:
     folder = tmp_path_factory.mktemp("console")
     own = ("--parts", ROOT / "examples" / "own_control.py")
     started = ConsoleProcess(folder, *own, "--out", folder / "session", "--set", PATIENT)
@@ -42,7 +47,7 @@ def console(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def page(console, tmp_path_factory):
+def page(console: Any, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Headless]:
     """The page in a browser that drives."""
     with Tab(tmp_path_factory.mktemp("browser"), *SIZE) as tab:
         tab.visit(console.url)
@@ -51,7 +56,7 @@ def page(console, tmp_path_factory):
         yield tab
 
 
-def ready(tab):
+def ready(tab: Any) -> None:
     """Wait until the slave follows; where it paused because this machine stood still, resume.
 
     A session begins enabled, on its way to where it starts: it follows nobody until it is there.
@@ -62,14 +67,14 @@ def ready(tab):
     tab.shows("ENABLED, homed", 120)
 
 
-def arrow(tab, axis, way=PULLED):
+def arrow(tab: Any, axis: int, way: float = PULLED) -> Any:
     """Where an arrow of the stylus is seen, and where it would be a way farther [px]."""
     begin, end = np.zeros(3), np.zeros(3)
     begin[axis], end[axis] = ARROW, ARROW + way
     return tab.seen_at(GRIP, begin), tab.seen_at(GRIP, end)
 
 
-def pull(tab, axis, way=PULLED):
+def pull(tab: Any, axis: int, way: float = PULLED) -> Any:
     """Take an arrow of the stylus and pull it along itself; the button stays down."""
     grip, goal = arrow(tab, axis, way)
     tab.mouse("mouseMoved", *grip)
@@ -78,7 +83,7 @@ def pull(tab, axis, way=PULLED):
     return goal
 
 
-def rest(tab):
+def rest(tab: Any) -> None:
     """Wait until the slave is drawn in one place for half a second."""
     tab.value(f"""new Promise((done) => {{
         let last = [], since = 0;
@@ -92,7 +97,7 @@ def rest(tab):
     }})""")
 
 
-def saved(page, console, name):
+def saved(page: Any, console: Any, name: Any) -> Any:
     """What has been recorded until now, closed under a name."""
     page.fill("name", name)
     page.click("Save as")
@@ -101,24 +106,28 @@ def saved(page, console, name):
     return console.folder / name
 
 
-def way(stream):
+def way(stream: tc.Stream) -> Any:
     """Where a tip went from the begin to the end of a recording [m]."""
     return stream[["x", "y", "z"]][-1] - stream[["x", "y", "z"]][0]
 
 
-def test_page_of_a_session_opens_without_errors_and_asks_no_other_host(page, console):
+def test_page_of_a_session_opens_without_errors_and_asks_no_other_host(
+    page: Any, console: ConsoleProcess
+) -> None:
     assert not page.faults()
     assert page.hosts() == {console.url.split("/")[2]}
 
 
-def test_button_of_ones_own_acts_on_the_session_and_says_what_it_did(page):
+def test_button_of_ones_own_acts_on_the_session_and_says_what_it_did(page: Any) -> None:
     for told in ("at most 20 mm/s", "at most what its joints make"):
         page.click("Gentle")
         page.shows(told)
 
 
 @pytest.mark.parametrize(("axis", "by"), [(0, "mouse"), (1, "mouse"), (1, "finger")])
-def test_stylus_that_is_pulled_moves_the_slave_by_gain_and_axes(page, console, axis, by):
+def test_stylus_that_is_pulled_moves_the_slave_by_gain_and_axes(
+    page: Any, console: ConsoleProcess, axis: int, by: str
+) -> None:
     ready(page)
     saved(page, console, f"before_{axis}_{by}")
     if by == "mouse":
@@ -137,7 +146,9 @@ def test_stylus_that_is_pulled_moves_the_slave_by_gain_and_axes(page, console, a
 
 
 @pytest.mark.parametrize("way_in", ["button", "key"])
-def test_emergency_stop_stops_by_button_and_key_until_it_is_released(page, console, way_in):
+def test_emergency_stop_stops_by_button_and_key_until_it_is_released(
+    page: Any, console: ConsoleProcess, way_in: str
+) -> None:
     ready(page)
     if way_in == "button":
         page.click("EMERGENCY STOP")
@@ -153,7 +164,7 @@ def test_emergency_stop_stops_by_button_and_key_until_it_is_released(page, conso
     page.shows("ENABLED", 60)
 
 
-def test_page_that_is_loaded_again_goes_on_driving(page):
+def test_page_that_is_loaded_again_goes_on_driving(page: Any) -> None:
     page.reload()
     page.shows("drives", 60)
     ready(page)
@@ -163,7 +174,9 @@ def test_page_that_is_loaded_again_goes_on_driving(page):
     assert not page.faults()
 
 
-def test_browser_that_is_closed_in_motion_leaves_the_slave_still(page, console, tmp_path):
+def test_browser_that_is_closed_in_motion_leaves_the_slave_still(
+    page: Any, console: Any, tmp_path: Path
+) -> None:
     ready(page)
     begin = page.value(page.place_of(TIP))
     saved(page, console, "before_close")
@@ -189,7 +202,7 @@ def test_browser_that_is_closed_in_motion_leaves_the_slave_still(page, console, 
     assert after["teleop/state"]["is_clutched"][-1] == 1.0
 
 
-def test_recording_that_was_saved_is_scored_by_a_button(page, console):
+def test_recording_that_was_saved_is_scored_by_a_button(page: Any, console: ConsoleProcess) -> None:
     ready(page)
     page.mouse("mouseReleased", *pull(page, 0))
     saved(page, console, "to_score")
@@ -199,7 +212,9 @@ def test_recording_that_was_saved_is_scored_by_a_button(page, console):
     page.click("Drive")
 
 
-def test_fixed_setting_begins_a_new_session_and_an_impossible_one_is_refused(page, console):
+def test_fixed_setting_begins_a_new_session_and_an_impossible_one_is_refused(
+    page: Any, console: ConsoleProcess
+) -> None:
     ready(page)
     page.click("Settings")
     page.fill("delays", "[nowhere=0.02]")
@@ -211,6 +226,6 @@ def test_fixed_setting_begins_a_new_session_and_an_impossible_one_is_refused(pag
     page.click("New session with these")
     until((console.folder / "session_session2").exists, "a new session")
     page.shows("ENABLED", STARTS)
-    configuration = configuration_of(Bag(saved(page, console, "delayed")))
+    configuration = present(configuration_of(Bag(saved(page, console, "delayed"))))
     assert configuration.groups["teleop"].delays == ("slave/servo_jp=0.02",)
     assert not page.faults()

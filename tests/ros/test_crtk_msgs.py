@@ -4,6 +4,7 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -79,10 +80,10 @@ rclpy.shutdown()
 
 
 @pytest.fixture(scope="module")
-def env(tmp_path_factory):
+def env(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     """Environment in which the package is found that was built just now, wherever others are."""
     prefix = tmp_path_factory.mktemp("crtk") / "prefix"
-    script = [sys.executable, SOURCE / "build_without_ament.py", "--prefix", prefix]
+    script: Any = [sys.executable, SOURCE / "build_without_ament.py", "--prefix", prefix]
     done = subprocess.run(script, capture_output=True, text=True, timeout=300, check=False)
     assert done.returncode == 0, done.stderr
     (module,) = prefix.glob("lib/python*/site-packages")
@@ -91,9 +92,9 @@ def env(tmp_path_factory):
     return given | {"PYTHONPATH": str(module), "LD_LIBRARY_PATH": libraries}
 
 
-def run(env, *arguments):
+def run(env: Any, *arguments: object) -> Any:
     named = env | {"ROS_DOMAIN_ID": free_domain()}
-    command = [sys.executable, "-c", *arguments]
+    command: Any = [sys.executable, "-c", *arguments]
     done = subprocess.run(
         command, env=named, capture_output=True, text=True, timeout=100, check=False
     )
@@ -101,17 +102,17 @@ def run(env, *arguments):
     return done.stdout.splitlines()
 
 
-def test_every_field_has_the_name_type_and_place_that_crtk_gives_it(env):
+def test_every_field_has_the_name_type_and_place_that_crtk_gives_it(env: dict[str, str]) -> None:
     shown = dict(zip(FIELDS, run(env, SHOW_FIELDS, *FIELDS), strict=True))
     assert shown == FIELDS
 
 
-def test_built_messages_cross_the_middleware(env):
+def test_built_messages_cross_the_middleware(env: dict[str, str]) -> None:
     assert run(env, SEND_AND_TAKE) == ["ENABLED True False", "FAULT"]
 
 
-def test_without_a_compiler_one_line_says_what_to_install(tmp_path):
-    script = [sys.executable, SOURCE / "build_without_ament.py", "--prefix", tmp_path]
+def test_without_a_compiler_one_line_says_what_to_install(tmp_path: Path) -> None:
+    script: Any = [sys.executable, SOURCE / "build_without_ament.py", "--prefix", tmp_path]
     named = environment() | {"CC": "no-such-compiler"}
     done = subprocess.run(
         script, env=named, capture_output=True, text=True, timeout=100, check=False

@@ -2,7 +2,9 @@
 
 import signal
 import time
+from collections.abc import Iterator
 from types import SimpleNamespace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
@@ -13,13 +15,17 @@ from teleop_core.chain.operators import OPERATORS
 from teleop_core.chain.operators.remote import AHEAD, RemoteHand
 from teleop_core.graph.topics import HAND_BUTTONS
 from teleop_core.nodes.device_hand import DeviceHand
+from virtual_pad import VirtualPad
+
+if TYPE_CHECKING:
+    from ros.conftest import Peer
 
 pytestmark = pytest.mark.ros
 NODE = SimpleNamespace(get_logger=lambda: get_logger("devices"))
 
 
 @pytest.fixture
-def pad():
+def pad() -> Iterator[VirtualPad]:
     pytest.importorskip("pygame")
     from virtual_pad import VirtualPad
 
@@ -28,8 +34,8 @@ def pad():
     made.unplug()
 
 
-def opened(hand, force=0.0, **parameters):
-    operator = OPERATORS.find("gamepad")
+def opened(hand: RemoteHand, force: float = 0.0, **parameters: object) -> DeviceHand:
+    operator: Any = OPERATORS.find("gamepad")
     return DeviceHand(
         NODE, hand, operator.opens, operator.parameters(**parameters), lambda: force
     )  # fmt: skip
@@ -38,22 +44,24 @@ def opened(hand, force=0.0, **parameters):
 class Clock:
     """Asks the hand at 1000 Hz of real time, as the node does."""
 
-    def __init__(self, hand):
+    def __init__(self, hand: RemoteHand) -> None:
         self._hand, self._ticks, self._begin = hand, 0, time.monotonic()
         self.row = np.zeros(12)
 
-    def until(self, condition, what):
+    def until(self, condition: Any, what: str) -> None:
         deadline = time.monotonic() + 30.0
         while not condition():
             assert time.monotonic() < deadline, what
             while self._ticks * 1e-3 < time.monotonic() - self._begin:
-                times = (self._ticks + 1 + np.arange(AHEAD)) * 1e-3
+                times: Any = (self._ticks + 1 + np.arange(AHEAD)) * 1e-3
                 self._ticks += AHEAD
                 self.row = self._hand.motion(times)[-1]
             time.sleep(0.002)
 
 
-def test_a_gamepad_moves_the_hand_while_it_is_held_and_is_let_go_of_when_it_is_lost(pad):
+def test_a_gamepad_moves_the_hand_while_it_is_held_and_is_let_go_of_when_it_is_lost(
+    pad: VirtualPad,
+) -> None:
     hand = RemoteHand()
     clock, device = Clock(hand), opened(hand, force=0.5, speed=0.1)
     try:
@@ -75,7 +83,7 @@ def test_a_gamepad_moves_the_hand_while_it_is_held_and_is_let_go_of_when_it_is_l
         device.close()
 
 
-def test_a_gamepad_that_comes_back_is_taken_again(pad):
+def test_a_gamepad_that_comes_back_is_taken_again(pad: VirtualPad) -> None:
     from virtual_pad import VirtualPad
 
     hand = RemoteHand()
@@ -94,14 +102,14 @@ def test_a_gamepad_that_comes_back_is_taken_again(pad):
         device.close()
 
 
-def test_no_gamepad_is_an_error_of_whoever_opens_it():
+def test_no_gamepad_is_an_error_of_whoever_opens_it() -> None:
     pytest.importorskip("pygame")
     with pytest.raises(SessionError, match="no gamepad; found: none"):
         opened(RemoteHand())
 
 
 @pytest.mark.parametrize("name", ["gamepad", "spacemouse"])
-def test_a_node_without_its_device_says_so_in_one_line_and_ends(peer, name):
+def test_a_node_without_its_device_says_so_in_one_line_and_ends(peer: "Peer", name: str) -> None:
     node = peer.start("operator", wait="", kind=name, remote__delay=0.1)
     assert node.wait() == 2
     said = node.stderr.read_text()
@@ -110,7 +118,7 @@ def test_a_node_without_its_device_says_so_in_one_line_and_ends(peer, name):
     assert "Traceback" not in said
 
 
-def test_a_node_with_a_hand_ends_in_order(peer):
+def test_a_node_with_a_hand_ends_in_order(peer: "Peer") -> None:
     buttons = peer.listen(HAND_BUTTONS)
     node = peer.start("operator", kind="remote", patience=0.0)
     peer.wait(lambda: buttons.take() > 100, "samples")

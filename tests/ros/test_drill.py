@@ -3,6 +3,8 @@
 import shlex
 import subprocess
 import sys
+from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -21,14 +23,14 @@ SOAK = ("braking_weak", "second_publishers")
 @pytest.mark.parametrize(
     "name", [*QUICK, *(pytest.param(name, marks=pytest.mark.soak) for name in SOAK)]
 )
-def test_a_broken_safety_is_found(name):
+def test_a_broken_safety_is_found(name: Any) -> None:
     """The others, and both forms of each: make drill-mutants."""
     command = [sys.executable, str(ROOT / "tests/mutants.py"), name, "--composed"]
     done = subprocess.run(command, check=False, capture_output=True, text=True, timeout=400)
     assert done.returncode == 0, done.stdout + done.stderr
 
 
-def test_the_short_form_of_the_fault_matrix_holds_in_five_processes(tmp_path):
+def test_the_short_form_of_the_fault_matrix_holds_in_five_processes(tmp_path: Path) -> None:
     code, text, outcomes = run_drill(tmp_path, "--short", "--out", str(tmp_path / "bags"))
     assert set(outcomes) == set(SHORT)
     for one in outcomes.values():
@@ -42,7 +44,7 @@ def test_the_short_form_of_the_fault_matrix_holds_in_five_processes(tmp_path):
     assert {file.name for file in (tmp_path / "bags").rglob("metadata.yaml")} == {"metadata.yaml"}
 
 
-def test_a_composed_session_survives_a_hand_that_lies_and_is_stopped(tmp_path):
+def test_a_composed_session_survives_a_hand_that_lies_and_is_stopped(tmp_path: Path) -> None:
     names = ("stop_service", "nan", "infinite", "teleport")
     code, text, outcomes = run_drill(tmp_path, "--composed", *names)
     assert set(outcomes) == set(names)
@@ -53,7 +55,9 @@ def test_a_composed_session_survives_a_hand_that_lies_and_is_stopped(tmp_path):
     assert (code == 0) is all(one["is_passed"] for one in outcomes.values())
 
 
-def test_a_composed_session_stops_where_nobody_presses_and_pauses_where_it_stood_still(tmp_path):
+def test_a_composed_session_stops_where_nobody_presses_and_pauses_where_it_stood_still(
+    tmp_path: Path,
+) -> None:
     _, text, outcomes = run_drill(tmp_path, "--composed", "heartbeat", "freeze_session")
     found = {name: (one["state"], one["told"]) for name, one in outcomes.items()}
     assert found == {"heartbeat": ("FAULT", "heartbeat"), "freeze_session": ("PAUSED", "stall")}, (
@@ -61,12 +65,12 @@ def test_a_composed_session_stops_where_nobody_presses_and_pauses_where_it_stood
     )
 
 
-def test_joints_that_are_held_fast_are_told_in_a_process_of_their_own(tmp_path):
+def test_joints_that_are_held_fast_are_told_in_a_process_of_their_own(tmp_path: Path) -> None:
     _, text, outcomes = run_drill(tmp_path, "stuck_tip")
     assert (outcomes["stuck_tip"]["state"], outcomes["stuck_tip"]["told"]) == ("FAULT", "tip"), text
 
 
-def test_drives_that_end_are_named_with_what_they_wrote_last():
+def test_drives_that_end_are_named_with_what_they_wrote_last() -> None:
     drives = shlex.join([sys.executable, "-c", "import sys; sys.exit('no arm on this cable')"])
     command = [sys.executable, "-m", "teleop_core.cli", "drill", "--drives", drives, "stop_topic"]
     done = subprocess.run(command, check=False, capture_output=True, text=True, timeout=200)
@@ -75,7 +79,7 @@ def test_drives_that_end_are_named_with_what_they_wrote_last():
     assert "no arm on this cable" in done.stderr
 
 
-def test_a_fault_that_there_is_not_is_refused_in_one_line_before_anything_starts():
+def test_a_fault_that_there_is_not_is_refused_in_one_line_before_anything_starts() -> None:
     command = [sys.executable, "-m", "teleop_core.cli", "drill", "kill_motion_scalin"]
     done = subprocess.run(command, check=False, capture_output=True, text=True, timeout=60)
     assert done.returncode == 2

@@ -5,6 +5,9 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import pytest
 from lifecycle_msgs.msg import Transition
@@ -16,6 +19,9 @@ from teleop_core.graph import topics
 from teleop_core.graph.graph import BUILT_IN, RECORDER_NAME
 from teleop_core.nodes.children import free_domain
 from teleop_core.nodes.observer import Observer
+
+if TYPE_CHECKING:
+    from ros.conftest import Peer
 
 pytestmark = [pytest.mark.ros, pytest.mark.slow]
 NODES = [*BUILT_IN, RECORDER_NAME]
@@ -52,18 +58,18 @@ tc.register_stage(
 '''
 
 
-def change(peer, name, transition):
+def change(peer: "Peer", name: str, transition: Any) -> Any:
     """Whether a transition was made, asked for by service."""
     request = ChangeState.Request(transition=Transition(id=transition))
     return peer.call(ChangeState, f"/{name}/change_state", request).success
 
 
 @pytest.fixture
-def start(tmp_path):
+def start(tmp_path: Path) -> Iterator[Callable[..., object]]:
     """Starter of a live session."""
     started = []
 
-    def start(*arguments, **options):
+    def start(*arguments: Any, **options: Any) -> LiveProcess:
         started.append(LiveProcess(tmp_path, *arguments, **options))
         return started[-1]
 
@@ -73,14 +79,16 @@ def start(tmp_path):
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_a_node_that_was_shut_down_by_service_still_ends_well(peer, tmp_path, number):
+def test_a_node_that_was_shut_down_by_service_still_ends_well(
+    peer: "Peer", tmp_path: Path, number: Any
+) -> None:
     node = peer.start("recorder", out=str(tmp_path / "bag"))
     assert change(peer, "recorder", Transition.TRANSITION_ACTIVE_SHUTDOWN)
     assert (tmp_path / "bag" / "metadata.yaml").exists()
     assert node.end(number) == 0, node.stderr.read_text()
 
 
-def test_a_transition_that_there_is_not_is_refused_and_the_node_goes_on(peer):
+def test_a_transition_that_there_is_not_is_refused_and_the_node_goes_on(peer: "Peer") -> None:
     node = peer.start("slave")
     assert not change(peer, "slave", Transition.TRANSITION_ACTIVATE)
     assert not change(peer, "slave", Transition.TRANSITION_CONFIGURE)
@@ -90,13 +98,15 @@ def test_a_transition_that_there_is_not_is_refused_and_the_node_goes_on(peer):
 
 
 @pytest.fixture
-def composed(compose):
+def composed(compose: Callable[..., object]) -> Any:
     """Process of the composed session, all its nodes active."""
     return compose(operator={"approach_time": 1.0, "patience": 0.0})
 
 
 @pytest.mark.parametrize("name", ["slave", "recorder"])
-def test_a_composed_session_of_which_a_node_was_shut_down_ends_well(peer, composed, tmp_path, name):
+def test_a_composed_session_of_which_a_node_was_shut_down_ends_well(
+    peer: "Peer", composed: Any, tmp_path: Path, name: str
+) -> None:
     peer.wait_value("slave", "ticks", lambda ticks: ticks > 100)
     assert change(peer, name, Transition.TRANSITION_ACTIVE_SHUTDOWN)
     peer.wait_state(name, "finalized")
@@ -117,7 +127,9 @@ def test_a_composed_session_of_which_a_node_was_shut_down_ends_well(peer, compos
         pytest.param(signal.SIGKILL, ("--composed",), id="SIGKILL-composed"),
     ],
 )
-def test_no_node_outlives_the_command_and_the_recording_is_closed(start, number, composed_option):
+def test_no_node_outlives_the_command_and_the_recording_is_closed(
+    start: Callable[..., Any], number: Any, composed_option: tuple[str, ...]
+) -> None:
     session = start(*composed_option)
     session.wait_running()
     nodes = session.signal(number)
@@ -133,19 +145,28 @@ def test_no_node_outlives_the_command_and_the_recording_is_closed(start, number,
     assert left == (marks if number == signal.SIGKILL else [])
 
 
-def test_the_domain_that_others_need_and_the_place_of_the_recording_are_said_first(start):
+def test_the_domain_that_others_need_and_the_place_of_the_recording_are_said_first(
+    start: Callable[..., Any],
+) -> None:
     session = start("--composed")
     session.wait_running()
     lines = [line for line in session.text.splitlines() if not line.startswith("note: ")]
     assert lines[1] == f"recording to {session.bag}"
     with Observer(int(lines[0].rpartition("ROS_DOMAIN_ID=")[2])) as observer:
-        wait_until(lambda: observer.listen(0.1) or "slave" in observer.statuses, "its nodes there")
+
+        def is_heard() -> bool:
+            observer.listen(0.1)
+            return "slave" in observer.statuses
+
+        wait_until(is_heard, "its nodes there")
     session.signal(signal.SIGINT)
     assert session.wait() == 0
 
 
 @pytest.mark.parametrize("composed_option", [(), ("--composed",)], ids=["five", "composed"])
-def test_a_stage_that_never_comes_back_is_found_within_a_second(start, tmp_path, composed_option):
+def test_a_stage_that_never_comes_back_is_found_within_a_second(
+    start: Callable[..., Any], tmp_path: Path, composed_option: tuple[str, ...]
+) -> None:
     parts = tmp_path / "hangs.py"
     parts.write_text(HANGS)
     session = start(*composed_option, "--parts", str(parts), "--set", "teleop.stages=[hanging]")
@@ -166,8 +187,8 @@ def test_a_stage_that_never_comes_back_is_found_within_a_second(start, tmp_path,
 
 
 def test_a_second_session_in_the_same_domain_is_refused_though_another_user_started_it(
-    start, tmp_path
-):
+    start: Callable[..., Any], tmp_path: Path
+) -> None:
     domain = {"ROS_DOMAIN_ID": free_domain()}
     first = start("--composed", env=domain)
     first.wait_running()
@@ -180,7 +201,7 @@ def test_a_second_session_in_the_same_domain_is_refused_though_another_user_star
     assert first.wait() == 0, first.text
 
 
-def test_a_process_that_stands_still_ends_the_session(start):
+def test_a_process_that_stands_still_ends_the_session(start: Callable[..., Any]) -> None:
     session = start()
     session.wait_running()
     (node,) = session.nodes("inverse_kinematics")
@@ -190,7 +211,9 @@ def test_a_process_that_stands_still_ends_the_session(start):
     assert session.recorded().topics["slave/measured_js"].count > 100
 
 
-def test_a_session_starts_with_no_kernel_compiled_on_a_busy_machine(start, tmp_path):
+def test_a_session_starts_with_no_kernel_compiled_on_a_busy_machine(
+    start: Callable[..., Any], tmp_path: Path
+) -> None:
     busy = subprocess.Popen([sys.executable, "-c", "while True: pass"])
     try:
         session = start(
@@ -207,7 +230,9 @@ def test_a_session_starts_with_no_kernel_compiled_on_a_busy_machine(start, tmp_p
 
 @pytest.mark.soak
 @pytest.mark.parametrize("composed_option", [(), ("--composed",)], ids=["five", "composed"])
-def test_sessions_start_and_end_again_and_again(start, tmp_path, composed_option):
+def test_sessions_start_and_end_again_and_again(
+    start: Callable[..., object], tmp_path: Path, composed_option: tuple[str, ...]
+) -> None:
     for number in range(3):
         folder = tmp_path / str(number)
         folder.mkdir()
@@ -218,7 +243,9 @@ def test_sessions_start_and_end_again_and_again(start, tmp_path, composed_option
 
 
 @pytest.mark.parametrize("composed_option", [(), ("--composed",)], ids=["five", "composed"])
-def test_a_session_that_a_shell_started_in_the_background_ends_like_any(start, composed_option):
+def test_a_session_that_a_shell_started_in_the_background_ends_like_any(
+    start: Callable[..., Any], composed_option: tuple[str, ...]
+) -> None:
     session = start(*composed_option, duration=1.0, ignores=(signal.SIGINT, signal.SIGQUIT))
     for name in NODES:  # from then on nothing is started or compiled
         session.wait_text(f"{name} is ready")
@@ -228,7 +255,7 @@ def test_a_session_that_a_shell_started_in_the_background_ends_like_any(start, c
     session.recorded()
 
 
-def test_no_socket_is_lost_where_many_ask_for_a_free_domain_at_once():
+def test_no_socket_is_lost_where_many_ask_for_a_free_domain_at_once() -> None:
     program = (
         "import sys\n"
         "from concurrent.futures import ThreadPoolExecutor\n"

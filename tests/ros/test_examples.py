@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -13,7 +14,7 @@ from teleop_core.slave.operation import State
 pytestmark = [pytest.mark.ros, pytest.mark.slow]
 
 
-def test_plain_ros_node_leads_the_slave_in_place_of_the_simulated_master(tmp_path):
+def test_plain_ros_node_leads_the_slave_in_place_of_the_simulated_master(tmp_path: Path) -> None:
     env = environment() | {"ROS_DOMAIN_ID": free_domain()}
     nodes = [
         subprocess.Popen([sys.executable, "-m", "teleop_core.nodes", name], env=env)
@@ -33,7 +34,7 @@ def test_plain_ros_node_leads_the_slave_in_place_of_the_simulated_master(tmp_pat
 
 
 @pytest.mark.alone
-def test_a_session_is_broken_in_a_way_of_ones_own(tmp_path):
+def test_a_session_is_broken_in_a_way_of_ones_own(tmp_path: Path) -> None:
     text = run("own_exercise", tmp_path)
     assert "\u2713 shaken: ENABLED" in text
     assert numbers(r"went (\d+) mm", text)[0] > 50.0
@@ -46,7 +47,9 @@ DRIVES = {
 
 
 @pytest.mark.parametrize("drives", DRIVES)
-def test_a_crtk_client_moves_the_tip_and_comes_back_whatever_the_drives(tmp_path, drives):
+def test_a_crtk_client_moves_the_tip_and_comes_back_whatever_the_drives(
+    tmp_path: Path, drives: str
+) -> None:
     pytest.importorskip("crtk_msgs")
     env = environment() | {"ROS_DOMAIN_ID": free_domain()}
     commands = (["-m", "teleop_core.nodes", "slave"], DRIVES[drives])

@@ -3,8 +3,10 @@
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from contextlib import contextmanager
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import pytest
 from std_msgs.msg import Float64MultiArray
@@ -15,6 +17,9 @@ from teleop_core.graph.topics import (
     SLAVE_JAW_SETPOINT_JS,
 )
 from teleop_core.nodes.children import environment
+
+if TYPE_CHECKING:
+    from ros.conftest import Peer
 
 pytestmark = [pytest.mark.ros, pytest.mark.slow]
 
@@ -29,38 +34,38 @@ HELD = 0.1  # rad
 class Gripper:
     """A controller of a gripper, its bridge, and the servers of jaw and arm."""
 
-    def __init__(self, peer):
+    def __init__(self, peer: "Peer") -> None:
         self.peer, self.witnessed = peer, [0.0, 0.0]
         self.measured = peer.listen(SLAVE_JAW_MEASURED_JS)
         self.setpoint = peer.listen(SLAVE_JAW_SETPOINT_JS)
         peer.node.create_subscription(Float64MultiArray, "witness", self._see, 10)
 
-    def _see(self, message):
+    def _see(self, message: Any) -> None:
         self.witnessed = list(message.data)
 
-    def angle(self):
+    def angle(self) -> Any:
         return self.measured.values[-1][0] if self.measured.take() else None
 
-    def command(self, angle, until, what):
+    def command(self, angle: float, until: Callable[[], object], what: str) -> None:
         """Command an angle, as a hand does, until something is so."""
 
-        def goes_on():
+        def goes_on() -> object:
             self.peer.send(SLAVE_JAW_SERVO_JP, time.time_ns(), [angle])
             return until()
 
         self.peer.wait(goes_on, what)
 
-    def is_at(self, angle):
+    def is_at(self, angle: float) -> bool:
         found = self.angle()
         return found is not None and abs(found - angle) < 2e-3
 
-    def says(self, node, text):
+    def says(self, node: str, text: str) -> bool:
         status = self.peer.status(node)
         return status is not None and text in status.message
 
 
 @contextmanager
-def gripper(peer, kind):
+def gripper(peer: "Peer", kind: str) -> Any:
     env = environment() | {"ROS_DOMAIN_ID": peer.domain}
     controller = subprocess.Popen([sys.executable, str(CONTROLLER), kind, "gripper"], env=env)
     try:
@@ -77,7 +82,9 @@ def gripper(peer, kind):
 
 
 @pytest.mark.parametrize("kind", sorted(TOPICS))
-def test_a_gripper_that_holds_something_opens_only_once_the_hand_has_closed(peer, kind):
+def test_a_gripper_that_holds_something_opens_only_once_the_hand_has_closed(
+    peer: "Peer", kind: str
+) -> None:
     with gripper(peer, kind) as found:
         peer.wait(lambda: found.is_at(HELD), "where the gripper is")
         found.command(0.8, lambda: found.says("jaw", "close the hand first"), "a jaw that holds")

@@ -3,15 +3,24 @@
 import signal
 import textwrap
 import time
+from collections.abc import Callable
 from functools import reduce
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
+from _pytest.mark.structures import MarkDecorator
 
 from live_process import CALM, LiveProcess, wait_until
+from teleop_core.bags.reader import Bag
 from teleop_core.graph import topics
 from teleop_core.graph.topics import Kind, Topic
+from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot
+
+if TYPE_CHECKING:
+    from ros.conftest import Peer
 
 pytestmark = pytest.mark.ros
 
@@ -104,19 +113,19 @@ ENTRIES = """
 RAISED, TWICE = (Topic(name, Kind.POSE) for name in ("slave/raised_cp", "slave/plain_cp"))
 
 
-def both_ways(topic, is_enough, *settings):
+def both_ways(topic: Topic, is_enough: Callable[..., object], *settings: object) -> MarkDecorator:
     """A session of these settings, in processes and composed, until it has enough of a topic."""
     ways = [(topic, is_enough, settings, way) for way in ((), ("--composed",))]
     return pytest.mark.parametrize("recorded", ways, ids=["processes", "composed"], indirect=True)
 
 
-def is_led(setpoints):
+def is_led(setpoints: Any) -> bool:
     """Whether commands have been in force for a second and a half, and many different ones."""
     in_force = [stamp for stamp in setpoints.stamps if stamp > topics.NO_COMMAND_NS]
     return len(in_force) > 1500 and len(set(in_force)) > 300
 
 
-def is_free(reach):
+def is_free(reach: Any) -> Any:
     """Which answers (N,) of the inverse kinematics nothing keeps from what was asked for."""
     return np.array(reach)[:, topics.SLAVE_REACH.columns.index("limit")] == topics.Limit.NONE
 
@@ -132,7 +141,7 @@ in_between = both_ways(
 
 
 @pytest.fixture(scope="module")
-def site(tmp_path_factory):
+def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Folder of a user's installed package with four stages."""
     folder = tmp_path_factory.mktemp("links") / "site"
     about = folder / "my_stages-1.0.dist-info"
@@ -144,13 +153,18 @@ def site(tmp_path_factory):
 
 
 @pytest.fixture
-def package(site, monkeypatch):
+def package(site: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The package, found by what the test starts."""
     monkeypatch.setenv("PYTHONPATH", str(site))
 
 
 @pytest.fixture(scope="module")
-def recorded(request, site, common_peer, tmp_path_factory):
+def recorded(
+    request: pytest.FixtureRequest,
+    site: Array,
+    common_peer: "Peer",
+    tmp_path_factory: pytest.TempPathFactory,
+) -> Bag:
     """Recording of a session of the user; tests of the same session share it."""
     topic, is_enough, settings, way = request.param
     listener = common_peer.listen(topic)
@@ -160,7 +174,7 @@ def recorded(request, site, common_peer, tmp_path_factory):
         settings=(*settings, "operator.approach_time=1.0", CALM),
     )  # fmt: skip
 
-    def has_enough():
+    def has_enough() -> int:
         assert session.process.poll() is None, session.text
         return listener.take() and is_enough(listener)
 
@@ -174,7 +188,7 @@ def recorded(request, site, common_peer, tmp_path_factory):
         session.close()
 
 
-def common(*series):
+def common(*series: Any) -> list[Any]:
     """Values of some series at the stamps that all have."""
     stamps = reduce(np.intersect1d, (one.stamp_ns for one in series))
     assert len(stamps) > 500
@@ -185,7 +199,7 @@ def common(*series):
 
 @pytest.mark.slow
 @late_and_helped
-def test_a_delay_on_a_link_is_seen_in_the_latency_of_the_recording(recorded):
+def test_a_delay_on_a_link_is_seen_in_the_latency_of_the_recording(recorded: Bag) -> None:
     answers, setpoints = (
         recorded.read(topic) for topic in (topics.SLAVE_SERVO_JP, topics.SLAVE_SETPOINT_JS)
     )
@@ -204,7 +218,7 @@ def test_a_delay_on_a_link_is_seen_in_the_latency_of_the_recording(recorded):
 
 @pytest.mark.slow
 @late_and_helped
-def test_a_second_source_of_force_acts_beside_the_first(recorded):
+def test_a_second_source_of_force_acts_beside_the_first(recorded: Bag) -> None:
     helper = recorded.read(HELPER)
     assert len(helper) > 500
     # Without a fixture nothing else pushes.
@@ -217,7 +231,7 @@ def test_a_second_source_of_force_acts_beside_the_first(recorded):
 
 @pytest.mark.slow
 @in_between
-def test_stages_of_a_user_run_between_ours_compiled_and_plain(recorded):
+def test_stages_of_a_user_run_between_ours_compiled_and_plain(recorded: Bag) -> None:
     asked, raised, twice = (recorded.read(t) for t in (topics.SLAVE_SERVO_CP, RAISED, TWICE))
     for first, second, height in ((asked, raised, 0.002), (raised, twice, 0.003)):
         before, after = common(first, second)
@@ -234,7 +248,7 @@ def test_stages_of_a_user_run_between_ours_compiled_and_plain(recorded):
     assert off[is_free(limits)].max() < 1e-3 + 1e-9
 
 
-def push(peer, first, second):
+def push(peer: "Peer", first: Any, second: Any) -> None:
     """Send one sample of each source that is given."""
     now = time.time_ns()
     for topic, force in ((topics.MASTER_SERVO_CF, first), (HELPER, second)):
@@ -242,12 +256,12 @@ def push(peer, first, second):
             peer.send(topic, now, [force, 0.0, 0.0, 0.0, 0.0, 0.0])
 
 
-def test_the_master_feels_the_sum_of_all_sources_of_force(peer):
+def test_the_master_feels_the_sum_of_all_sources_of_force(peer: "Peer") -> None:
     felt = peer.listen(topics.MASTER_MEASURED_CF)
     peer.start("haptic_master", patience=0.0, links=FORCES)
 
-    def feels(wanted, *sources):
-        def is_felt():
+    def feels(wanted: float, *sources: object) -> None:
+        def is_felt() -> int:
             push(peer, *sources)
             return felt.take() and felt.values[-1][0] == wanted
 
@@ -259,12 +273,12 @@ def test_the_master_feels_the_sum_of_all_sources_of_force(peer):
 
 
 @pytest.mark.parametrize("silent", [0, 1])
-def test_a_source_of_force_that_falls_silent_acts_no_more(peer, silent):
+def test_a_source_of_force_that_falls_silent_acts_no_more(peer: "Peer", silent: int) -> None:
     felt = peer.listen(topics.MASTER_MEASURED_CF)
     peer.start("haptic_master", patience=0.0, links=FORCES)
-    sources = [0.5, 0.25]
+    sources: Any = [0.5, 0.25]
 
-    def is_felt():
+    def is_felt() -> int:
         push(peer, *sources)
         return felt.take() and felt.values[-1][0] == 0.75
 
@@ -272,18 +286,20 @@ def test_a_source_of_force_that_falls_silent_acts_no_more(peer, silent):
     sources[silent] = None
     left = 0.5 if silent else 0.25
 
-    def is_alone():
+    def is_alone() -> int:
         push(peer, *sources)
         return felt.take() and felt.values[-1][0] == left
 
     peer.wait(is_alone, "the other one alone")
 
 
-def test_an_answer_that_is_no_number_is_counted_and_told_but_not_sent(package, peer):
+def test_an_answer_that_is_no_number_is_counted_and_told_but_not_sent(
+    package: None, peer: "Peer"
+) -> None:
     answers = peer.listen(Topic("test/failing", Kind.POSE))
     peer.start("failing")
 
-    def ask(x):
+    def ask(x: float) -> int:
         peer.send(topics.MASTER_MEASURED_CP, time.time_ns(), [x, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
         return answers.take()
 

@@ -6,7 +6,10 @@ import re
 import signal
 import threading
 import time
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import psutil
@@ -22,29 +25,32 @@ from teleop_core.graph.graph import BUILT_IN, RECORDER_NAME
 from teleop_core.graph.topics import STREAMS
 from teleop_core.nodes.live import live
 from teleop_core.nodes.play import play
-from teleop_core.session.configuration import configure
+from teleop_core.session.configuration import Configuration, configure
+
+if TYPE_CHECKING:
+    from ros.conftest import Peer
 
 pytestmark = [pytest.mark.ros, pytest.mark.slow]
 SESSION_TIMEOUT = 300.0
 """Until a session runs, whose kernels may have to be compiled first [s]."""
 
 
-def quick(duration):
+def quick(duration: float) -> Configuration:
     return configure(
         "coarse_box", settings=[f"teleop.duration={duration}", "operator.approach_time=1.0"]
     )
 
 
-def console():
+def console() -> Any:
     return Console(file=io.StringIO(), width=200)
 
 
-def is_running(show):
+def is_running(show: Any) -> re.Match[str] | None:
     """Whether a line of progress was shown: of the first second, unless the machine was busy."""
     return re.search(r"\d/600 s  ", show.file.getvalue())
 
 
-def children(name=""):
+def children(name: str = "") -> list[Any]:
     """Processes of nodes that this test has started."""
     found = []
     for process in psutil.Process().children(recursive=True):
@@ -54,7 +60,9 @@ def children(name=""):
     return found
 
 
-def test_a_live_session_is_recorded_on_every_topic(peer, session_until, tmp_path):
+def test_a_live_session_is_recorded_on_every_topic(
+    peer: "Peer", session_until: Callable[..., tuple[Bag, str]], tmp_path: Path
+) -> None:
     enough = {topic.name: 1000 for topic in STREAMS}
     bag, text = session_until(quick(600.0), lambda: peer.has_recorded(enough))
     assert all(f"{name} is ready" in text for name in (*BUILT_IN, RECORDER_NAME))
@@ -79,17 +87,17 @@ def test_a_live_session_is_recorded_on_every_topic(peer, session_until, tmp_path
     assert counts["/slave/measured_js"] == len(measured)
 
 
-def test_an_existing_directory_is_refused_before_anything_starts(tmp_path):
+def test_an_existing_directory_is_refused_before_anything_starts(tmp_path: Path) -> None:
     with pytest.raises(RecordingError, match="exists already") as caught:
         live(quick(3.0), tmp_path, console())
     assert caught.value.path == tmp_path
     assert children() == []
 
 
-def test_a_node_that_dies_is_named_and_the_recording_is_closed(tmp_path):
+def test_a_node_that_dies_is_named_and_the_recording_is_closed(tmp_path: Path) -> None:
     show = console()
 
-    def kill_when_running():
+    def kill_when_running() -> None:
         wait_until(lambda: is_running(show), "the first second", SESSION_TIMEOUT)
         children("inverse_kinematics")[0].kill()
 
@@ -102,17 +110,17 @@ def test_a_node_that_dies_is_named_and_the_recording_is_closed(tmp_path):
     assert Bag(tmp_path / "bag").topics["slave/measured_js"].count > 0
 
 
-def test_a_node_that_cannot_start_is_named_with_its_reason(tmp_path):
+def test_a_node_that_cannot_start_is_named_with_its_reason(tmp_path: Path) -> None:
     wrong = configure("coarse_box", settings=["operator=bag", "operator.bag=/no/such/bag"])
     with pytest.raises(SessionError, match=r"(?s)operator ended with exit code 2.*no/such"):
         live(wrong, tmp_path / "bag", console())
     assert children() == []
 
 
-def test_ctrl_c_ends_a_session_with_a_closed_recording(tmp_path):
+def test_ctrl_c_ends_a_session_with_a_closed_recording(tmp_path: Path) -> None:
     show = console()
 
-    def press_when_running():
+    def press_when_running() -> None:
         wait_until(lambda: is_running(show), "the first second", SESSION_TIMEOUT)
         os.kill(os.getpid(), signal.SIGINT)
 
@@ -123,7 +131,9 @@ def test_ctrl_c_ends_a_session_with_a_closed_recording(tmp_path):
     assert Bag(tmp_path / "bag").topics["slave/measured_js"].count > 0
 
 
-def test_play_publishes_a_recording_as_it_was(peer, recording, monkeypatch):
+def test_play_publishes_a_recording_as_it_was(
+    peer: "Peer", recording: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setenv("ROS_DOMAIN_ID", peer.domain)
     bag = Bag(recording)
     pose, state = peer.listen(topics.MASTER_MEASURED_CP), peer.listen(topics.MASTER_BUTTONS)
@@ -145,7 +155,7 @@ def test_play_publishes_a_recording_as_it_was(peer, recording, monkeypatch):
     np.testing.assert_array_equal(series.values[where], np.array(pose.values))
 
 
-def test_play_refuses_what_is_not_there(recording):
+def test_play_refuses_what_is_not_there(recording: Path) -> None:
     with pytest.raises(RecordingError, match="lacks no/topic"):
         play(Bag(recording), ["no/topic"], 1.0, console())
     with pytest.raises(ParameterError) as caught:

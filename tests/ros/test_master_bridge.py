@@ -6,6 +6,9 @@ import select
 import subprocess
 import sys
 import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
@@ -14,6 +17,7 @@ from geometry_msgs.msg import Pose, PoseStamped, TransformStamped, WrenchStamped
 from rclpy.qos import qos_profile_sensor_data
 from sensor_msgs.msg import Joy
 
+from present import present
 from teleop_core.graph.topics import (
     MASTER_BUTTONS,
     MASTER_MEASURED_CP,
@@ -21,6 +25,9 @@ from teleop_core.graph.topics import (
     SLAVE_SERVO_CP,
 )
 from teleop_core.nodes.children import environment
+
+if TYPE_CHECKING:
+    from ros.conftest import Peer
 
 pytestmark = [pytest.mark.ros, pytest.mark.slow]
 
@@ -32,7 +39,7 @@ TYPES = {"PoseStamped": PoseStamped, "TransformStamped": TransformStamped, "Pose
 class Device:
     """A stylus of the test, in millimetres: it says where it is 500 times a second."""
 
-    def __init__(self, peer, kind="PoseStamped"):
+    def __init__(self, peer: "Peer", kind: str = "PoseStamped") -> None:
         self.node, self.place, self.buttons, self.force = (
             peer.node,
             np.zeros(3),
@@ -45,14 +52,14 @@ class Device:
         self.node.create_subscription(WrenchStamped, "touch/force", self._push, quality)
         self._timer = self.node.create_timer(0.002, self._tick)
 
-    def stop(self):
+    def stop(self) -> None:
         self.node.destroy_timer(self._timer)
 
-    def _push(self, message):
+    def _push(self, message: Any) -> None:
         force = message.wrench.force
         self.force = np.array([force.x, force.y, force.z])
 
-    def _tick(self):
+    def _tick(self) -> None:
         message, (x, y, z) = self._kind(), self.place.tolist()
         if self._kind is not Pose:
             message.header.stamp = self.node.get_clock().now().to_msg()
@@ -66,7 +73,7 @@ class Device:
         self._joy.publish(Joy(buttons=self.buttons))
 
 
-def started(peer, kind="PoseStamped"):
+def started(peer: "Peer", kind: str = "PoseStamped") -> Device:
     device = Device(peer, kind)
     peer.start(
         "master_bridge", pose_topic="/touch/pose", device_axes=AXES, unit=0.001,
@@ -76,19 +83,21 @@ def started(peer, kind="PoseStamped"):
     return device
 
 
-def turning(peer, condition):
+def turning(peer: "Peer", condition: Any) -> Callable[[], object]:
     """A condition, looked at once the test's own node had a turn."""
     return lambda: peer.spin() or condition()
 
 
 @pytest.mark.parametrize("kind", TYPES)
-def test_poses_of_each_type_arrive_in_the_axes_of_the_master_in_metres(peer, kind):
+def test_poses_of_each_type_arrive_in_the_axes_of_the_master_in_metres(
+    peer: "Peer", kind: str
+) -> None:
     measured, buttons = map(peer.listen, (MASTER_MEASURED_CP, MASTER_BUTTONS))
     device = started(peer, kind)
     device.place = np.array([10.0, 20.0, 30.0])
     expected = 1e-3 * ROWS @ device.place
 
-    def is_there():
+    def is_there() -> int | bool:
         return measured.take() and np.allclose(measured.values[-1][:3], expected, atol=1e-9)
 
     peer.wait(turning(peer, is_there), "the place")
@@ -99,7 +108,7 @@ def test_poses_of_each_type_arrive_in_the_axes_of_the_master_in_metres(peer, kin
     )
 
 
-def test_a_device_that_swings_leads_the_slave(peer):
+def test_a_device_that_swings_leads_the_slave(peer: "Peer") -> None:
     commands = peer.listen(SLAVE_SERVO_CP)
     device = started(peer)
     for name in ("motion_scaling", "inverse_kinematics"):
@@ -107,7 +116,7 @@ def test_a_device_that_swings_leads_the_slave(peer):
     peer.start("slave")
     begin = time.monotonic()
 
-    def swings():
+    def swings() -> int:
         turn = 2.0 * math.pi * 0.5 * (time.monotonic() - begin)
         device.place = np.array([0.0, 0.0, 10.0 * math.sin(turn)])  # mm; z is the master's y
         commands.take()
@@ -121,17 +130,19 @@ def test_a_device_that_swings_leads_the_slave(peer):
     peer.wait(lambda: "no master/measured_cp" in peer.status("motion_scaling").message, "silence")
 
 
-def test_a_device_is_given_forces_along_its_own_axes_and_none_once_it_is_silent(peer):
+def test_a_device_is_given_forces_along_its_own_axes_and_none_once_it_is_silent(
+    peer: "Peer",
+) -> None:
     device, asked = started(peer), np.array([0.5, -1.0, 0.3])
 
-    def is_pushed():
+    def is_pushed() -> bool:
         peer.send(MASTER_SERVO_CF, time.time_ns(), [*asked, 0.0, 0.0, 0.0])
         return np.allclose(device.force, ROWS.T @ asked, atol=1e-9)
 
     peer.wait(turning(peer, is_pushed), "the force")
     device.stop()
 
-    def is_free():
+    def is_free() -> bool:
         peer.send(MASTER_SERVO_CF, time.time_ns(), [*asked, 0.0, 0.0, 0.0])
         return not device.force.any()
 
@@ -141,7 +152,7 @@ def test_a_device_is_given_forces_along_its_own_axes_and_none_once_it_is_silent(
 # -- map-device ------------------------------------------------------------------------------------
 
 
-def command(peer, *arguments):
+def command(peer: "Peer", *arguments: object) -> Any:
     words = [sys.executable, "-m", "teleop_core.cli", "map-device", *map(str, arguments)]
     env = environment() | {"ROS_DOMAIN_ID": peer.domain, "PYTHONUNBUFFERED": "1"}
     return subprocess.Popen(
@@ -150,32 +161,32 @@ def command(peer, *arguments):
     )  # fmt: skip
 
 
-def test_three_motions_write_what_the_bridge_needs(peer, tmp_path):
+def test_three_motions_write_what_the_bridge_needs(peer: "Peer", tmp_path: Path) -> None:
     device, file, said = Device(peer), tmp_path / "mine.yaml", ""
     with command(peer, "touch/pose", "--out", file) as asking:
 
-        def asks(text, count):
+        def asks(text: str, count: Any) -> Any:
             """Whether the command has asked so often; what it says comes without an end of line."""
             nonlocal said
             peer.spin()
-            assert asking.poll() in {None, 0}, asking.stderr.read()
+            assert asking.poll() in {None, 0}, present(asking.stderr).read()
             if select.select([asking.stdout], [], [], 0.0)[0]:
-                said += os.read(asking.stdout.fileno(), 4096).decode()
+                said += os.read(present(asking.stdout).fileno(), 4096).decode()
             return said.count(text) > count
 
         # To the right, up and towards the person: the device's y, z and x, a decimetre each.
         for k, way in enumerate(100.0 * ROWS + 3.0):
-            peer.wait(lambda k=k: asks("hold the stylus still", k), "the begin of a motion")
-            asking.stdin.write("\n")
-            asking.stdin.flush()
-            peer.wait(lambda k=k: asks("hold it there", k), "the end of a motion")
+            peer.wait(lambda: asks("hold the stylus still", k), "the begin of a motion")
+            present(asking.stdin).write("\n")
+            present(asking.stdin).flush()
+            peer.wait(lambda: asks("hold it there", k), "the end of a motion")
             device.place = device.place + way
             for _ in range(50):  # messages of the place before are on the way
                 peer.spin()
-            asking.stdin.write("\n")
-            asking.stdin.flush()
+            present(asking.stdin).write("\n")
+            present(asking.stdin).flush()
         peer.wait(lambda: peer.spin() or asking.poll() is not None, "its end")
-        assert asking.returncode == 0, asking.stderr.read()
+        assert asking.returncode == 0, present(asking.stderr).read()
     found = yaml.safe_load(file.read_text())["master_bridge"]["ros__parameters"]
     assert found == {
         "pose_topic": "/touch/pose", "pose_message": "geometry_msgs/msg/PoseStamped",
@@ -183,11 +194,11 @@ def test_three_motions_write_what_the_bridge_needs(peer, tmp_path):
     }  # fmt: skip
 
 
-def test_a_topic_that_is_not_there_is_told_with_those_that_are(peer):
+def test_a_topic_that_is_not_there_is_told_with_those_that_are(peer: "Peer") -> None:
     Device(peer)
     with command(peer, "nowhere/pose") as asking:
         peer.wait(lambda: peer.spin() or asking.poll() is not None, "its end")
-        told = asking.stderr.read()
+        told = present(asking.stderr).read()
     assert asking.returncode == 2
     assert "/nowhere/pose is not there" in told
     assert "/touch/pose" in told

@@ -3,6 +3,9 @@
 import signal
 import subprocess
 import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import pytest
 import yaml
@@ -16,6 +19,9 @@ from teleop_core.nodes.children import environment
 from teleop_core.nodes.start import taken_names
 from teleop_core.robots import load_robot
 
+if TYPE_CHECKING:
+    from ros.conftest import Peer
+
 pytestmark = pytest.mark.ros
 
 PATIENCE = {"patience": 0.0, "approach_time": 1.0}
@@ -25,11 +31,11 @@ MEASURED = topics.SLAVE_MEASURED_CP.name
 
 
 @pytest.fixture
-def start(peer, tmp_path):
+def start(peer: "Peer", tmp_path: Path) -> Iterator[Callable[..., Any]]:
     """Starter of a composed session with a parameter file; it ends with the test."""
     started = []
 
-    def started_with(groups, *arguments):
+    def started_with(groups: Any, *arguments: Any) -> subprocess.Popen[bytes]:
         groups = {"recorder": {"out": str(tmp_path / "bag")}} | groups
         file = tmp_path / "session.yaml"
         content = {name: {"ros__parameters": values} for name, values in groups.items()}
@@ -48,12 +54,12 @@ def start(peer, tmp_path):
         process.wait()
 
 
-def parameter(peer, node, name):
+def parameter(peer: "Peer", node: str, name: str) -> Any:
     request = GetParameters.Request(names=[name])
     return peer.call(GetParameters, f"{node}/get_parameters", request).values[0]
 
 
-def recorded(peer, process, tmp_path, *slaves):
+def recorded(peer: "Peer", process: Any, tmp_path: Any, *slaves: Any) -> Bag:
     """Recording of a session, ended when these slaves have worked for two seconds."""
     for slave in slaves:
         peer.wait_value(slave, "ticks", lambda ticks: ticks > 2000)
@@ -64,14 +70,14 @@ def recorded(peer, process, tmp_path, *slaves):
 
 @pytest.mark.slow
 def test_a_composed_session_that_is_given_a_name_keeps_the_names_of_its_nodes(
-    peer, start, tmp_path
-):
+    peer: "Peer", start: Callable[..., Any], tmp_path: Path
+) -> None:
     groups = {"operator": PATIENCE, "slave": RCRT1 | {"command_timeout": 0.25}}
     process = start(groups, "-r", "__ns:=/left", "-r", "__node:=arm")
     peer.wait_state("left/slave", "active")
     assert parameter(peer, "/left/slave", "command_timeout").double_value == 0.25
 
-    def inside():
+    def inside() -> set[Any]:
         names = peer.node.get_node_names_and_namespaces()
         return {name for name, where in names if where == "/left"}
 
@@ -89,7 +95,9 @@ def test_a_composed_session_that_is_given_a_name_keeps_the_names_of_its_nodes(
 
 
 @pytest.mark.slow
-def test_arms_of_a_session_in_a_namespace_stay_apart_below_it(peer, start, tmp_path):
+def test_arms_of_a_session_in_a_namespace_stay_apart_below_it(
+    peer: "Peer", start: Callable[..., Any], tmp_path: Path
+) -> None:
     puma = {"robot": "puma560"}
     groups = {
         "teleop": {"arms": ["left", "right"]},
@@ -114,7 +122,7 @@ def test_arms_of_a_session_in_a_namespace_stay_apart_below_it(peer, start, tmp_p
     assert min(left.session.duration_s, right.session.duration_s) > 1.0
 
 
-def test_names_for_all_nodes_of_a_process_are_taken_out_and_others_are_kept():
+def test_names_for_all_nodes_of_a_process_are_taken_out_and_others_are_kept() -> None:
     given = ["node", "-r", "__ns:=/x", "--ros-args", "-r", "__ns:=/lab", "--remap", "__node:=arm",
              "-r", "slave:__node:=other", "-r", "a:=b", "--", "-r", "__ns:=/y"]  # fmt: skip
     kept = ["node", "-r", "__ns:=/x", "--ros-args", "-r", "slave:__node:=other", "-r", "a:=b",

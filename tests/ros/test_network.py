@@ -1,12 +1,15 @@
 """Network over real topics: a foreign publisher behind it, and a session across it."""
 
 import time
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import SetParameters
 
+from teleop_core.bags.reader import Bag
 from teleop_core.graph.topics import (
     NETWORK_SERVO_CP,
     NETWORK_SETPOINT_CP,
@@ -16,6 +19,9 @@ from teleop_core.graph.topics import (
 )
 from teleop_core.session.configuration import configure
 
+if TYPE_CHECKING:
+    from ros.conftest import Peer
+
 pytestmark = [pytest.mark.ros, pytest.mark.slow]
 MS = 1_000_000
 DELAY = 0.15
@@ -24,10 +30,11 @@ DELAY = 0.15
 class Sender:
     """A program that knows nothing of the network: commands, and where a slave is."""
 
-    def __init__(self, peer):
+    def __init__(self, peer: "Peer") -> None:
+        self.sent_ns: dict[Any, Any]
         self.peer, self.sent_ns = peer, {}
 
-    def send(self):
+    def send(self) -> None:
         stamp = (len(self.sent_ns) + 2) * MS
         pose = (1e-9 * stamp, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
         self.peer.send(SLAVE_SETPOINT_CP, stamp, (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0))
@@ -35,12 +42,15 @@ class Sender:
         self.peer.send(SLAVE_SERVO_CP, stamp, pose)
 
 
-def test_a_foreign_publisher_is_behind_the_network_and_nothing_comes_before_its_time(peer):
+def test_a_foreign_publisher_is_behind_the_network_and_nothing_comes_before_its_time(
+    peer: "Peer",
+) -> None:
     came, back = peer.listen(NETWORK_SERVO_CP), peer.listen(NETWORK_SETPOINT_CP)
     peer.start("network", there__least_delay=DELAY)
+    ages: list[Any]
     sender, ages = Sender(peer), []
 
-    def many():
+    def many() -> int:
         sender.send()
         before = len(came.stamps)
         came.take()
@@ -57,7 +67,7 @@ def test_a_foreign_publisher_is_behind_the_network_and_nothing_comes_before_its_
     assert peer.call(SetParameters, "/network/set_parameters", request).results[0].successful
     set_ns = time.monotonic_ns()
 
-    def quiet():
+    def quiet() -> bool:
         sender.send()
         came.take()
         return time.monotonic_ns() - set_ns > 3 * DELAY * 1e9
@@ -69,15 +79,15 @@ def test_a_foreign_publisher_is_behind_the_network_and_nothing_comes_before_its_
 
 @pytest.mark.parametrize("is_composed", [True, False], ids=["composed", "processes"])
 def test_a_slave_is_led_across_a_network_and_the_recording_tells_the_age(
-    peer, session_until, is_composed
-):
+    peer: "Peer", session_until: Callable[..., tuple[Bag, str]], is_composed: bool
+) -> None:
     settings = [
         "teleop.stages=[network]", "network.there.least_delay=0.2", "network.back.least_delay=0.2",
         "slave.starts_at_home=true", "slave.operation.longest_outage=0", "duration=600",
     ]  # fmt: skip
     setpoints = peer.listen(SLAVE_SETPOINT_JS)
 
-    def is_led():
+    def is_led() -> bool:
         setpoints.take()
         q = setpoints.values
         return len(q) > 1000 and np.abs(q[-1] - q[0]).max() > 2e-3

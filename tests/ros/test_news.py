@@ -1,20 +1,25 @@
 """What nodes say in their logs, once, for people who look on."""
 
+from typing import TYPE_CHECKING, Any
+
 import pytest
 
 from teleop_core.graph import topics
 from teleop_core.robots import load_robot
+
+if TYPE_CHECKING:
+    from ros.conftest import NodeProcess, Peer
 
 pytestmark = pytest.mark.ros
 
 HOME = load_robot("rcrt1").home
 
 
-def said(node, text):
+def said(node: "NodeProcess", text: str) -> list[Any]:
     return [line for line in node.stderr.read_text().splitlines() if text in line]
 
 
-def test_a_node_says_once_what_it_is_reads_and_writes(peer):
+def test_a_node_says_once_what_it_is_reads_and_writes(peer: "Peer") -> None:
     node = peer.start("slave", arm="left")
     (line,) = said(node, "at work")
     assert "left.slave" in line
@@ -23,7 +28,7 @@ def test_a_node_says_once_what_it_is_reads_and_writes(peer):
 
 
 @pytest.mark.slow
-def test_a_node_says_who_commands_it_when_that_changes(peer):
+def test_a_node_says_who_commands_it_when_that_changes(peer: "Peer") -> None:
     node = peer.start("slave")
     assert said(node, "comes from") == []
     peer.send(topics.SLAVE_SERVO_JP, 1, HOME)

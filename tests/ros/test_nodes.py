@@ -5,6 +5,8 @@ import resource
 import signal
 import subprocess
 import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
@@ -15,9 +17,13 @@ from rcl_interfaces.srv import DescribeParameters, GetParameters
 from teleop_core.bags.reader import Bag
 from teleop_core.graph import topics
 from teleop_core.graph.stage import STAGES
+from teleop_core.kernels.geometry import Array
 from teleop_core.nodes.children import environment
 from teleop_core.nodes.start import main
 from teleop_core.robots import load_robot
+
+if TYPE_CHECKING:
+    from ros.conftest import Peer
 
 pytestmark = pytest.mark.ros
 
@@ -26,11 +32,11 @@ REST = [0.0, -0.06, -0.08, 1.0, 0.0, 0.0, 0.0]
 MS = 1_000_000
 
 
-def test_haptic_master_sends_one_sample_per_millisecond_on_all_its_topics(peer):
+def test_haptic_master_sends_one_sample_per_millisecond_on_all_its_topics(peer: "Peer") -> None:
     listeners = {topic: peer.listen(topic) for topic in STAGES.find("haptic_master").writes}
     peer.start("haptic_master")
 
-    def common():
+    def common() -> set[Any]:
         """Stamps that came on all topics, each of which is found at another moment."""
         for listener in listeners.values():
             listener.take()
@@ -43,12 +49,12 @@ def test_haptic_master_sends_one_sample_per_millisecond_on_all_its_topics(peer):
     assert (steps % MS == 0).all()
 
 
-def test_motion_scaling_is_silent_until_it_knows_where_the_slave_is(peer):
+def test_motion_scaling_is_silent_until_it_knows_where_the_slave_is(peer: "Peer") -> None:
     answers = peer.listen(topics.SLAVE_SERVO_CP)
     forces = peer.listen(topics.MASTER_SERVO_CF)
     peer.start("motion_scaling")
 
-    def received():
+    def received() -> Any:
         peer.send(topics.MASTER_MEASURED_CP, 1 * MS, REST)
         status = peer.status("motion_scaling")
         return status and status.number("received.master/measured_cp") > 0
@@ -59,7 +65,7 @@ def test_motion_scaling_is_silent_until_it_knows_where_the_slave_is(peer):
     where = [0.4, 0.0, -0.2, 1.0, 0.0, 0.0, 0.0]
     stamp = 2 * MS
 
-    def answered():
+    def answered() -> int:
         nonlocal stamp
         peer.send(topics.SLAVE_SETPOINT_CP, 0, where)
         peer.send(topics.MASTER_MEASURED_CP, stamp, REST)
@@ -72,11 +78,13 @@ def test_motion_scaling_is_silent_until_it_knows_where_the_slave_is(peer):
     np.testing.assert_array_equal(answers.values[0], where)
 
 
-def test_a_button_that_was_pressed_and_released_while_the_node_stood_still_was_pressed(peer):
+def test_a_button_that_was_pressed_and_released_while_the_node_stood_still_was_pressed(
+    peer: "Peer",
+) -> None:
     peer.start("motion_scaling")
     answers, stamp = peer.listen(topics.SLAVE_SERVO_CP), 0
 
-    def send(*pressed):
+    def send(*pressed: object) -> None:
         nonlocal stamp
         stamp += MS
         for topic, values in (
@@ -86,13 +94,17 @@ def test_a_button_that_was_pressed_and_released_while_the_node_stood_still_was_p
         ):
             peer.send(topic, stamp, values)
 
-    def is_fine():
+    def sent_and_answered() -> int:
+        send(0.0, 0.0, 0.0)
+        return answers.take()
+
+    def is_fine() -> Any:
         send(0.0, 0.0, 0.0)
         asked = GetParameters.Request(names=["mode"])
         answer = peer.call(GetParameters, "/motion_scaling/get_parameters", asked)
         return answer.values[0].string_value == "fine"
 
-    peer.wait(lambda: (send(0.0, 0.0, 0.0), answers.take())[1], "an answer")
+    peer.wait(sent_and_answered, "an answer")
     (node,) = peer.nodes
     node.process.send_signal(signal.SIGSTOP)
     for is_pressed in (0.0, 1.0, 0.0, 0.0):
@@ -101,7 +113,7 @@ def test_a_button_that_was_pressed_and_released_while_the_node_stood_still_was_p
     peer.wait(is_fine, "fine mode")
 
 
-def test_inverse_kinematics_answers_under_the_stamp_of_the_pose(peer):
+def test_inverse_kinematics_answers_under_the_stamp_of_the_pose(peer: "Peer") -> None:
     robot = load_robot("rcrt1")
     answers = peer.listen(topics.SLAVE_SERVO_JP)
     peer.start("inverse_kinematics")
@@ -110,7 +122,7 @@ def test_inverse_kinematics_answers_under_the_stamp_of_the_pose(peer):
     pose = np.array([*goal[:3, 3], *_quaternion(goal)])
     stamp = MS
 
-    def answered():
+    def answered() -> int:
         nonlocal stamp
         stamp += MS
         peer.send(topics.SLAVE_SETPOINT_JS, 0, HOME)
@@ -122,14 +134,14 @@ def test_inverse_kinematics_answers_under_the_stamp_of_the_pose(peer):
     np.testing.assert_allclose(answers.values[0], robot.ik(goal, HOME).q, atol=1e-12)
 
 
-def test_inverse_kinematics_warns_with_the_joint_that_holds_the_slave_back(peer):
+def test_inverse_kinematics_warns_with_the_joint_that_holds_the_slave_back(peer: "Peer") -> None:
     robot, reach = load_robot("rcrt1"), peer.listen(topics.SLAVE_REACH)
     peer.start("inverse_kinematics")
     goal = robot.fk(HOME)
     goal[:3, 3] += 0.01 * robot.jacobian(HOME)[:3, 2]  # 10 mm past the end of d3
     pose, stamp = np.array([*goal[:3, 3], *_quaternion(goal)]), MS
 
-    def warned():
+    def warned() -> bool:
         nonlocal stamp
         stamp += MS
         peer.send(topics.SLAVE_SETPOINT_JS, stamp - MS, HOME)
@@ -145,7 +157,7 @@ def test_inverse_kinematics_warns_with_the_joint_that_holds_the_slave_back(peer)
     np.testing.assert_allclose(cut, robot.fk(HOME)[:3, 3] - goal[:3, 3], atol=1e-9)
 
 
-def _quaternion(transform):
+def _quaternion(transform: Array) -> Array:
     from teleop_core.kernels.geometry import pose_from_transform
 
     pose = np.empty(7)
@@ -153,7 +165,7 @@ def _quaternion(transform):
     return pose[3:]
 
 
-def test_a_slave_sends_no_setpoint_before_its_arm_has_said_where_it_is(peer):
+def test_a_slave_sends_no_setpoint_before_its_arm_has_said_where_it_is(peer: "Peer") -> None:
     setpoints = peer.listen(topics.SLAVE_SETPOINT_JS)
     peer.start("slave", has_arm=False)
     peer.wait(lambda: "waits for slave/measured_js" in peer.status("slave").message, "concern")
@@ -164,7 +176,7 @@ def test_a_slave_sends_no_setpoint_before_its_arm_has_said_where_it_is(peer):
     np.testing.assert_allclose(setpoints.values[0], HOME, atol=1e-12)
 
 
-def test_slave_follows_and_passes_the_stamp_of_the_command_on(peer):
+def test_slave_follows_and_passes_the_stamp_of_the_command_on(peer: "Peer") -> None:
     setpoints = peer.listen(topics.SLAVE_SETPOINT_JS)
     measured = peer.listen(topics.SLAVE_MEASURED_JS)
     peer.start("slave")
@@ -172,7 +184,7 @@ def test_slave_follows_and_passes_the_stamp_of_the_command_on(peer):
     assert set(setpoints.stamps) <= {topics.NO_COMMAND_NS}
     wanted, stamp = HOME - 0.001 * np.eye(6)[0], 0
 
-    def passed_on():
+    def passed_on() -> int | bool:
         nonlocal stamp
         stamp += MS
         peer.send(topics.SLAVE_SERVO_JP, stamp, wanted)
@@ -180,7 +192,7 @@ def test_slave_follows_and_passes_the_stamp_of_the_command_on(peer):
 
     peer.wait(passed_on, "stamp passed on")
 
-    def arrived():
+    def arrived() -> bool:
         passed_on()
         return np.allclose(setpoints.values[-1], wanted, atol=1e-9)
 
@@ -190,7 +202,7 @@ def test_slave_follows_and_passes_the_stamp_of_the_command_on(peer):
     assert (steps % MS == 0).all()
 
 
-def heard_by_recorder(peer):
+def heard_by_recorder(peer: "Peer") -> int:
     """Send samples until one is recorded; returns the stamp of the last one.
 
     A best-effort writer may know its reader before the reader knows it: what it sends until then
@@ -198,7 +210,7 @@ def heard_by_recorder(peer):
     """
     stamp = 0
 
-    def heard():
+    def heard() -> Any:
         nonlocal stamp
         stamp += MS
         peer.send(topics.MASTER_MEASURED_CP, stamp, REST)
@@ -209,7 +221,7 @@ def heard_by_recorder(peer):
     return stamp
 
 
-def test_recorder_keeps_what_was_sent_and_the_configuration(peer, tmp_path):
+def test_recorder_keeps_what_was_sent_and_the_configuration(peer: "Peer", tmp_path: Path) -> None:
     recorder = peer.start("recorder", out=str(tmp_path / "bag"), scenario="mine")
     first = heard_by_recorder(peer) + MS
     sent = first + MS * np.arange(500)
@@ -225,7 +237,7 @@ def test_recorder_keeps_what_was_sent_and_the_configuration(peer, tmp_path):
     assert "haptic_master" in bag.metadata["configuration"]
 
 
-def test_what_arrived_just_before_the_signal_is_recorded(peer, tmp_path):
+def test_what_arrived_just_before_the_signal_is_recorded(peer: "Peer", tmp_path: Path) -> None:
     recorder = peer.start("recorder", out=str(tmp_path / "bag"))
     last = heard_by_recorder(peer) + MS * np.arange(1, 101)
     for number in last:
@@ -237,7 +249,9 @@ def test_what_arrived_just_before_the_signal_is_recorded(peer, tmp_path):
 
 
 @pytest.mark.slow
-def test_a_full_disk_ends_the_recorder_with_one_line_and_a_readable_bag(peer, tmp_path):
+def test_a_full_disk_ends_the_recorder_with_one_line_and_a_readable_bag(
+    peer: "Peer", tmp_path: Path
+) -> None:
     recorder = peer.start("recorder", out=str(tmp_path / "bag"))
     peer.start("haptic_master")
     # As on a full disk, no file of the recorder can grow beyond this.
@@ -256,9 +270,9 @@ def test_a_full_disk_ends_the_recorder_with_one_line_and_a_readable_bag(peer, tm
 
 @pytest.mark.slow
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_every_node_ends_with_0(peer, tmp_path, number):
+def test_every_node_ends_with_0(peer: "Peer", tmp_path: Path, number: Any) -> None:
     for name in STAGES:
-        parameters = {"out": str(tmp_path / "bag")} if name == "recorder" else {}
+        parameters: dict[str, Any] = {"out": str(tmp_path / "bag")} if name == "recorder" else {}
         peer.start(name, wait="", **parameters)
     for node in peer.nodes:
         peer.wait_state(node.name, "active")
@@ -269,7 +283,7 @@ def test_every_node_ends_with_0(peer, tmp_path, number):
     assert Bag(tmp_path / "bag").topics["slave/measured_js"].count > 0
 
 
-def test_parameters_are_described_with_unit_and_bounds(peer):
+def test_parameters_are_described_with_unit_and_bounds(peer: "Peer") -> None:
     peer.start("slave_sim", autostart=False, wait="unconfigured")
     names = ["viscous", "gravity_compensation", "robot", "controller.pid.kp", "integration_steps"]
     request = DescribeParameters.Request(names=names)
@@ -286,10 +300,10 @@ def test_parameters_are_described_with_unit_and_bounds(peer):
     assert answer.values[3].type == 8  # doubles, although empty
 
 
-def test_parameters_are_accepted_or_refused_with_the_reason(peer):
+def test_parameters_are_accepted_or_refused_with_the_reason(peer: "Peer") -> None:
     peer.start("slave")
     accepted, refused, wrong_type, read_only, length, unknown = (
-        peer.set(node, **{name: value})[0]
+        peer.set(node, False, **{name: value})[0]
         for node, name, value in (
             ("slave", "command_timeout", 0.2), ("slave", "command_timeout", 50.0),
             ("slave", "command_timeout", 1), ("slave", "robot", "scara"),
@@ -307,16 +321,16 @@ def test_parameters_are_accepted_or_refused_with_the_reason(peer):
     assert peer.set("slave_sim", viscous=[])[0].successful
 
 
-def test_relations_between_parameters_hold_and_can_be_changed_at_once(peer):
+def test_relations_between_parameters_hold_and_can_be_changed_at_once(peer: "Peer") -> None:
     peer.start("slave")
-    change = {"reference_filter__gain": 0.2, "reference_filter__zero": 50.0}
+    change: dict[str, Any] = {"reference_filter__gain": 0.2, "reference_filter__zero": 50.0}
     alone = peer.set("slave", **change)
     assert [entry.successful for entry in alone] == [False, False]
     assert "gain" in alone[0].reason
     assert peer.set("slave", at_once=True, **change)[0].successful
 
 
-def test_a_new_gain_is_used_from_the_next_sample_on(peer):
+def test_a_new_gain_is_used_from_the_next_sample_on(peer: "Peer") -> None:
     answers = peer.listen(topics.SLAVE_SERVO_CP)
     peer.start("motion_scaling", feedback_timeout=5.0)
     where, pose, stamp = [0.4, 0.0, -0.2, 1.0, 0.0, 0.0, 0.0], list(REST), 0
@@ -327,7 +341,7 @@ def test_a_new_gain_is_used_from_the_next_sample_on(peer):
         before, last = answers.values[-1], stamp
         pose[0] += 1e-3
 
-        def answered():
+        def answered() -> int | bool:
             nonlocal stamp
             stamp += MS
             peer.send(topics.MASTER_MEASURED_CP, stamp, pose)
@@ -336,7 +350,7 @@ def test_a_new_gain_is_used_from_the_next_sample_on(peer):
         peer.wait(answered, "answer")
         return float(np.linalg.norm(answers.values[-1][:3] - before[:3]))
 
-    def engaged():
+    def engaged() -> bool:
         nonlocal stamp
         stamp += MS
         peer.send(topics.SLAVE_SETPOINT_CP, stamp, where)
@@ -349,13 +363,15 @@ def test_a_new_gain_is_used_from_the_next_sample_on(peer):
     assert moved() == pytest.approx(0.25e-3, rel=1e-6)
 
 
-def change(peer, name, transition):
+def change(peer: "Peer", name: str, transition: Any) -> Any:
     request = ChangeState.Request(transition=Transition(id=transition))
     return peer.call(ChangeState, f"/{name}/change_state", request).success
 
 
 @pytest.mark.parametrize("name", list(STAGES))
-def test_a_supervisor_drives_the_lifecycle_twice(peer, tmp_path, monkeypatch, name):
+def test_a_supervisor_drives_the_lifecycle_twice(
+    peer: "Peer", tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: Any
+) -> None:
     monkeypatch.chdir(tmp_path)  # the recorder makes bags/ here
     node = peer.start(name, autostart=False, wait="unconfigured")
     watched = topics.SLAVE_MEASURED_JS if name == "slave_sim" else None
@@ -381,7 +397,9 @@ def test_a_supervisor_drives_the_lifecycle_twice(peer, tmp_path, monkeypatch, na
     assert node.end() == 0
 
 
-def test_a_refused_configure_leaves_the_node_usable_by_the_supervisor(peer, tmp_path):
+def test_a_refused_configure_leaves_the_node_usable_by_the_supervisor(
+    peer: "Peer", tmp_path: Path
+) -> None:
     (tmp_path / "taken").mkdir()
     node = peer.start("recorder", autostart=False, out=str(tmp_path / "taken"), wait="unconfigured")
     assert not change(peer, "recorder", Transition.TRANSITION_CONFIGURE)
@@ -402,10 +420,20 @@ def test_a_refused_configure_leaves_the_node_usable_by_the_supervisor(peer, tmp_
         ("slave", "bad: [1.0", "is not YAML"),
     ],
 )
-def test_wrong_parameter_files_end_with_one_line_and_2(tmp_path, name, content, needed):
+def test_wrong_parameter_files_end_with_one_line_and_2(
+    tmp_path: Path, name: str, content: str, needed: str
+) -> None:
     file = tmp_path / "parameters.yaml"
     file.write_text(f"{name}:\n  ros__parameters:\n    {content}\n")
-    command = [sys.executable, "-m", "teleop_core.nodes", name, "--ros-args", "--params-file", file]
+    command: Any = [
+        sys.executable,
+        "-m",
+        "teleop_core.nodes",
+        name,
+        "--ros-args",
+        "--params-file",
+        file,
+    ]
     done = subprocess.run(
         command, capture_output=True, text=True, timeout=90, env=environment(), check=False
     )
@@ -415,7 +443,9 @@ def test_wrong_parameter_files_end_with_one_line_and_2(tmp_path, name, content, 
 
 
 @pytest.mark.parametrize("name", [*STAGES, "teleop_session"])
-def test_help_of_an_executable_names_its_topics_and_starts_nothing(name, monkeypatch, capsys):
+def test_help_of_an_executable_names_its_topics_and_starts_nothing(
+    name: Any, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     monkeypatch.setattr(sys, "argv", [name, "--help"])
     assert main() == 0
     text = capsys.readouterr().out
@@ -425,7 +455,9 @@ def test_help_of_an_executable_names_its_topics_and_starts_nothing(name, monkeyp
     assert (name == "teleop_session") != (topics <= set(re.findall(r"[\w/]+", text)))
 
 
-def test_help_of_a_stage_that_there_is_not_names_those_there_are(monkeypatch, capsys):
+def test_help_of_a_stage_that_there_is_not_names_those_there_are(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     monkeypatch.setattr(sys, "argv", ["stage", "nosuch", "--help"])
     assert main() == 2
     assert "slave_sim" in capsys.readouterr().err

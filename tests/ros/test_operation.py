@@ -2,10 +2,13 @@
 
 import signal
 import time
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import psutil
 import pytest
+from rclpy.publisher import Publisher
 from std_msgs.msg import Bool
 from std_srvs.srv import Trigger
 
@@ -14,6 +17,9 @@ from teleop_core.nodes.operation import STOP_TOPIC, StopButton
 from teleop_core.robots import load_robot
 from teleop_core.slave.operation import State
 
+if TYPE_CHECKING:
+    from ros.conftest import Peer
+
 pytestmark = pytest.mark.ros
 HOME = load_robot("rcrt1").home
 
@@ -21,45 +27,49 @@ HOME = load_robot("rcrt1").home
 class Streamer:
     """Commands that swing joint 1, and what the slave makes of them."""
 
-    def __init__(self, peer):
+    def __init__(self, peer: "Peer") -> None:
         self.peer, self.begin = peer, time.monotonic()
         self.setpoints = peer.listen(SLAVE_SETPOINT_JS)
         peer.publisher(SLAVE_SERVO_JP)
 
-    def send(self):
+    def send(self) -> None:
         """One command of the swing."""
         goal = HOME.copy()
         goal[0] += 0.1 * np.sin(2.0 * np.pi * (time.monotonic() - self.begin))
         self.peer.send(SLAVE_SERVO_JP, time.time_ns(), goal)
         self.setpoints.take()
 
-    def until(self, condition, what):
+    def until(
+        self,
+        condition: Any,
+        what: str,
+    ) -> Any:
         """Send commands until something is so."""
 
-        def turn():
+        def turn() -> object:
             self.send()
             time.sleep(0.001)  # the rate of commands, not a wait
             return condition()
 
         return self.peer.wait(turn, what)
 
-    def moves(self):
+    def moves(self) -> bool:
         """Whether the last setpoints differ."""
         last = self.setpoints.values[-50:]
         return len(last) == 50 and np.ptp(np.array(last)[:, 0]) > 1e-3
 
-    def rests(self):
+    def rests(self) -> bool:
         """Whether the last setpoints are one and the same."""
         last = self.setpoints.values[-50:]
         return len(last) == 50 and np.ptp(np.array(last)[:, 0]) == 0.0
 
 
-def state(peer):
+def state(peer: "int | Peer") -> State | None:
     status = operation(peer)
     return None if status is None else State(int(float(status["state"])))
 
 
-def operation(peer):
+def operation(peer: Any) -> Any:
     """Newest report of the slave's operation, by name."""
     if not hasattr(peer, "operation"):
         from teleop_core.bags.reports import read_reports
@@ -73,12 +83,14 @@ def operation(peer):
     return peer.read or None
 
 
-def command(peer, name):
+def command(peer: "Peer", name: str) -> Any:
     answer = peer.call(Trigger, f"/slave/{name}", Trigger.Request())
     return answer.success, answer.message
 
 
-def test_a_stop_message_stops_the_setpoint_within_two_ticks_and_reset_and_enable_end_it(peer):
+def test_a_stop_message_stops_the_setpoint_within_two_ticks_and_reset_and_enable_end_it(
+    peer: "Peer",
+) -> None:
     peer.start("slave")
     streamer = Streamer(peer)
     streamer.until(streamer.moves, "motion")
@@ -101,7 +113,7 @@ def test_a_stop_message_stops_the_setpoint_within_two_ticks_and_reset_and_enable
     assert not command(peer, "reset")[0]  # still pressed
     button.publish(Bool(data=False))
 
-    def is_reset():
+    def is_reset() -> Any:
         return command(peer, "reset")[0]
 
     streamer.until(is_reset, "a reset after the release")
@@ -110,7 +122,7 @@ def test_a_stop_message_stops_the_setpoint_within_two_ticks_and_reset_and_enable
     assert abs(stopped_at - HOME[0]) <= 0.11
 
 
-def test_an_arm_that_waits_for_people_moves_when_it_is_enabled_and_homed(peer):
+def test_an_arm_that_waits_for_people_moves_when_it_is_enabled_and_homed(peer: "Peer") -> None:
     peer.start("slave", operation__starts_enabled=False)
     streamer = Streamer(peer)
     streamer.until(lambda: state(peer) is State.DISABLED, "DISABLED")
@@ -129,7 +141,7 @@ def test_an_arm_that_waits_for_people_moves_when_it_is_enabled_and_homed(peer):
     streamer.until(streamer.moves, "motion again")
 
 
-def test_every_arm_in_a_namespace_has_its_own_commands_and_one_stop_for_all(peer):
+def test_every_arm_in_a_namespace_has_its_own_commands_and_one_stop_for_all(peer: "Peer") -> None:
     peer.start("slave", arm="left")
     peer.start("slave", arm="right")
     for arm in ("left", "right"):
@@ -141,7 +153,7 @@ def test_every_arm_in_a_namespace_has_its_own_commands_and_one_stop_for_all(peer
     button.publish(Bool(data=True))
     for arm in ("left", "right"):
 
-        def is_stopped(arm=arm):
+        def is_stopped(arm: Any = arm) -> bool:
             answer = peer.call(Trigger, f"/{arm}/slave/resume", Trigger.Request())
             return not answer.success and "FAULT" in answer.message
 
@@ -149,7 +161,7 @@ def test_every_arm_in_a_namespace_has_its_own_commands_and_one_stop_for_all(peer
 
 
 @pytest.fixture
-def button(peer):
+def button(peer: "Peer") -> Publisher:
     """A stop button as anybody would write it, found by a slave that is enabled."""
     peer.start("slave")
     plain = peer.node.create_publisher(Bool, STOP_TOPIC, 10)
@@ -157,10 +169,10 @@ def button(peer):
     return plain
 
 
-def go_on(peer):
+def go_on(peer: "Peer") -> None:
     """Reset and enable the arm until it says that it is: what it said before is of another stop."""
 
-    def is_enabled():
+    def is_enabled() -> bool:
         if state(peer) is State.ENABLED:
             return True
         for name in ("reset", "enable"):  # what is refused is asked for again
@@ -170,13 +182,15 @@ def go_on(peer):
     peer.wait(is_enabled, "enabled again")
 
 
-def say(button, *, pressed, released):
+def say(button: Publisher, *, pressed: int, released: int) -> None:
     """So many presses, and so many releases, as fast as they go."""
     for is_pressed in (True,) * pressed + (False,) * released:
         button.publish(Bool(data=is_pressed))
 
 
-def test_a_press_that_releases_follow_at_once_stops_the_arm(peer, button):
+def test_a_press_that_releases_follow_at_once_stops_the_arm(
+    peer: "Peer", button: Publisher
+) -> None:
     button.publish(Bool(data=False))
     for released in (1, 12, 30, 100) * 3:
         say(button, pressed=1, released=released)
@@ -185,11 +199,11 @@ def test_a_press_that_releases_follow_at_once_stops_the_arm(peer, button):
 
 
 @pytest.fixture
-def still_slave(peer, button):
+def still_slave(peer: "Peer", button: Publisher) -> Callable[[], Any]:
     """Function that stops the process of a slave that knows the button, and returns it."""
     slave = psutil.Process(peer.nodes[0].process.pid)
 
-    def stand_still():
+    def stand_still() -> Any:
         slave.send_signal(signal.SIGSTOP)
         peer.wait(lambda: slave.status() == psutil.STATUS_STOPPED, "a slave that stands still")
         return slave
@@ -198,7 +212,9 @@ def still_slave(peer, button):
 
 
 @pytest.mark.parametrize("released", [35, 6000])
-def test_a_press_while_the_slave_stands_still_stops_the_arm(peer, button, still_slave, released):
+def test_a_press_while_the_slave_stands_still_stops_the_arm(
+    peer: "Peer", button: Publisher, still_slave: Callable[[], Any], released: int
+) -> None:
     say(button, pressed=0, released=1)
     slave = still_slave()
     say(button, pressed=5, released=released)
@@ -207,7 +223,7 @@ def test_a_press_while_the_slave_stands_still_stops_the_arm(peer, button, still_
     go_on(peer)
 
 
-def test_a_button_that_was_pressed_before_the_slave_began_stops_it(peer):
+def test_a_button_that_was_pressed_before_the_slave_began_stops_it(peer: "Peer") -> None:
     button = StopButton(peer.node)
     button.say(is_pressed=True)
     peer.start("slave")

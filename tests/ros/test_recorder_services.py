@@ -1,5 +1,8 @@
 """Start, stop, split and mark a recording by services: whatever is closed can be read."""
 
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
 import pytest
 from std_srvs.srv import Trigger
 
@@ -7,6 +10,9 @@ from teleop_core.bags.messages import report
 from teleop_core.bags.reader import Bag
 from teleop_core.bags.recording import MARKS
 from teleop_core.graph import topics
+
+if TYPE_CHECKING:
+    from ros.conftest import Peer
 
 pytestmark = pytest.mark.ros
 
@@ -18,20 +24,20 @@ MASTER = topics.MASTER_MEASURED_CP
 class Session:
     """A recorder and a master that sends to it."""
 
-    def __init__(self, peer, **parameters):
+    def __init__(self, peer: "Peer", **parameters: Any) -> None:
         self.peer, self._stamp = peer, 0
         self.node = peer.start("recorder", **parameters)
 
-    def ask(self, service):
+    def ask(self, service: str | int) -> Any:
         answer = self.peer.call(Trigger, f"/recorder/{service}", Trigger.Request())
         return answer.success, answer.message
 
-    def send(self, count=100):
+    def send(self, count: int = 100) -> None:
         """Send until the recorder has taken that many more."""
         key = f"received.{MASTER.name}"
         before = self.peer.status("recorder").number(key)
 
-        def heard():
+        def heard() -> Any:
             self._stamp += MS
             self.peer.send(MASTER, self._stamp, REST)
             return self.peer.status("recorder").number(key) >= before + count
@@ -39,12 +45,14 @@ class Session:
         self.peer.wait(heard, "samples at the recorder")
 
 
-def count(path, topic=MASTER):
+def count(path: Path, topic: Any = MASTER) -> int:
     return Bag(path).topics[topic.name].count
 
 
 @pytest.mark.slow
-def test_a_split_closes_the_recording_and_goes_on_in_the_next_directory(peer, tmp_path):
+def test_a_split_closes_the_recording_and_goes_on_in_the_next_directory(
+    peer: "Peer", tmp_path: Path
+) -> None:
     session = Session(peer, out=str(tmp_path / "bag"))
     session.send()
     assert session.ask("split") == (True, f"{tmp_path}/bag is closed; goes on in {tmp_path}/bag_1")
@@ -62,7 +70,7 @@ def test_a_split_closes_the_recording_and_goes_on_in_the_next_directory(peer, tm
 
 
 @pytest.mark.slow
-def test_nothing_is_recorded_between_stop_and_start(peer, tmp_path):
+def test_nothing_is_recorded_between_stop_and_start(peer: "Peer", tmp_path: Path) -> None:
     session = Session(peer, out=str(tmp_path / "bag"))
     session.send()
     assert session.ask("start") == (False, f"records already to {tmp_path}/bag")
@@ -80,7 +88,7 @@ def test_nothing_is_recorded_between_stop_and_start(peer, tmp_path):
     assert first.stamp_ns[0] - last.stamp_ns[-1] >= 100 * MS
 
 
-def test_a_new_recording_begins_with_the_last_state(peer, tmp_path):
+def test_a_new_recording_begins_with_the_last_state(peer: "Peer", tmp_path: Path) -> None:
     session = Session(peer, out=str(tmp_path / "bag"))
     state = report(7, "teleop", 0, "FOLLOWING", {"is_following": "1"})
     peer.publisher(topics.TELEOP_STATE).publish(state)
@@ -92,7 +100,7 @@ def test_a_new_recording_begins_with_the_last_state(peer, tmp_path):
         assert (found.stamp_ns, found.message) == (7, "FOLLOWING")
 
 
-def test_marks_keep_their_text_and_time(peer, tmp_path):
+def test_marks_keep_their_text_and_time(peer: "Peer", tmp_path: Path) -> None:
     session = Session(peer, out=str(tmp_path / "bag"))
     session.send()
     assert session.ask("mark") == (True, f"marked '1' in {tmp_path}/bag")
@@ -106,7 +114,7 @@ def test_marks_keep_their_text_and_time(peer, tmp_path):
     assert bag.start_ns < marks[0].stamp_ns < marks[1].stamp_ns < bag.end_ns
 
 
-def test_a_recorder_that_waits_begins_at_the_start_service(peer, tmp_path):
+def test_a_recorder_that_waits_begins_at_the_start_service(peer: "Peer", tmp_path: Path) -> None:
     session = Session(peer, wait="", out=str(tmp_path / "bag"), autostart=False)
     assert session.ask("split") == (False, "is not active, so that it does not record")
     assert not (tmp_path / "bag").exists()

@@ -3,6 +3,8 @@
 import signal
 import time
 from contextlib import ExitStack
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import pytest
 
@@ -10,13 +12,16 @@ from live_process import LiveProcess, WorkingTime
 from teleop_core.bags.reader import Bag, recover
 from teleop_core.graph import topics
 
+if TYPE_CHECKING:
+    from ros.conftest import NodeProcess, Peer
+
 pytestmark = pytest.mark.ros
 
 LOST = 0.2
 """What a recorder that is killed may lose of the time for which it and its master worked [s]."""
 
 
-def start(peer, tmp_path):
+def start(peer: Any, tmp_path: Path) -> "NodeProcess":
     """A recorder that hears a master at 1 kHz."""
     recorder = peer.start("recorder", out=str(tmp_path / "bag"))
     peer.wait_value("recorder", "received.master/measured_cp", lambda n: n >= 0)
@@ -26,7 +31,7 @@ def start(peer, tmp_path):
 
 
 @pytest.mark.slow
-def test_a_killed_recorder_loses_at_most_a_fifth_of_a_second(peer, tmp_path):
+def test_a_killed_recorder_loses_at_most_a_fifth_of_a_second(peer: "Peer", tmp_path: Path) -> None:
     recorder = start(peer, tmp_path)
     with ExitStack() as stack:
         working = [
@@ -46,7 +51,9 @@ def test_a_killed_recorder_loses_at_most_a_fifth_of_a_second(peer, tmp_path):
 
 
 @pytest.mark.slow
-def test_a_recorder_whose_directory_moved_keeps_everything_and_does_not_say_success(peer, tmp_path):
+def test_a_recorder_whose_directory_moved_keeps_everything_and_does_not_say_success(
+    peer: "Peer", tmp_path: Path
+) -> None:
     recorder = start(peer, tmp_path)
     (tmp_path / "bag").rename(tmp_path / "moved")
     assert recorder.end(signal.SIGTERM) == 1
@@ -55,7 +62,9 @@ def test_a_recorder_whose_directory_moved_keeps_everything_and_does_not_say_succ
 
 
 @pytest.mark.slow
-def test_a_recorder_that_cannot_write_metadata_keeps_everything_for_recover(peer, tmp_path):
+def test_a_recorder_that_cannot_write_metadata_keeps_everything_for_recover(
+    peer: "Peer", tmp_path: Path
+) -> None:
     recorder = start(peer, tmp_path)
     (tmp_path / "bag" / "metadata.yaml").mkdir()
     assert recorder.end(signal.SIGINT) == 1
@@ -72,7 +81,9 @@ def test_a_recorder_that_cannot_write_metadata_keeps_everything_for_recover(peer
         pytest.param(("--composed",), id="composed"),
     ],
 )
-def test_live_does_not_call_a_recording_that_moved_recorded(peer, tmp_path, way):
+def test_live_does_not_call_a_recording_that_moved_recorded(
+    peer: "Peer", tmp_path: Path, way: tuple[str, ...]
+) -> None:
     live = LiveProcess(tmp_path, *way, env={"ROS_DOMAIN_ID": peer.domain})
     try:
         peer.wait(lambda: list(live.bag.glob("*.mcap")), "a recording")

@@ -3,9 +3,13 @@
 import subprocess
 import sys
 import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
+from numpy.typing import ArrayLike
 
 import teleop_core as tc
 from teleop_core.chain.operators.rest import rest_pose
@@ -18,11 +22,15 @@ from teleop_core.graph.topics import (
     OPERATOR_SERVO_CP,
     SLAVE_MEASURED_CP,
 )
+from teleop_core.kernels.geometry import Array
 from teleop_core.nodes.children import environment
+
+if TYPE_CHECKING:
+    from ros.conftest import Listener, Peer
 
 pytestmark = pytest.mark.ros
 # A device without friction and noise goes where the hand is.
-EXACT = {"device__friction": 0.0, "device__gimbal_noise": 0.0}
+EXACT: dict[str, Any] = {"device__friction": 0.0, "device__gimbal_noise": 0.0}
 GAIN = 0.5
 PATIENT = 5.0
 """Silence that lets go [s], the longest there is: on a busy machine poses stay away for seconds."""
@@ -31,30 +39,35 @@ PATIENT = 5.0
 class Person:
     """Sends poses at 50 Hz, as a page does."""
 
-    def __init__(self, peer):
+    def __init__(self, peer: "Peer") -> None:
         self.peer = peer
         peer.publisher(OPERATOR_SERVO_CP)
 
-    def hold(self, place, until, what):
+    def hold(
+        self,
+        place: Sequence[float] | Array,
+        until: Callable[[], object] | Callable[[], bool],
+        what: str,
+    ) -> None:
         """Want the stylus at a place from the inkwell [m] until something is so."""
         pose = rest_pose()
         pose[:3] += place
 
-        def turn():
+        def turn() -> object:
             self.peer.send(OPERATOR_SERVO_CP, time.time_ns(), pose)
             time.sleep(0.02)  # the rate of poses, not a wait
             return until()
 
         self.peer.wait(turn, what)
 
-    def drag(self, begin, end, poses=25):
+    def drag(self, begin: ArrayLike, end: ArrayLike, poses: int = 25) -> None:
         """Want it along a straight line, over half a second."""
         for share in np.linspace(0.0, 1.0, poses):
             self.hold((1.0 - share) * np.array(begin) + share * np.array(end), lambda: True, "")
 
 
 @pytest.fixture
-def session(compose):
+def session(compose: Callable[..., object]) -> object:
     """Composed session whose hand is a person's; a machine that stands still is no outage here."""
     return compose(
         operator={"kind": "remote", "remote": {"timeout": PATIENT}},
@@ -64,14 +77,14 @@ def session(compose):
     )
 
 
-def is_held(peer):
+def is_held(peer: "Peer") -> Callable[[], object]:
     return lambda: peer.status("operator").values.get("hand.is_held") == "1"
 
 
-def at_rest(listener, count=1000):
+def at_rest(listener: "Listener", count: int = 1000) -> Callable[[], object]:
     """Whether the tip has been at rest for so many samples, but for steps of its encoders."""
 
-    def is_at_rest():
+    def is_at_rest() -> bool:
         if listener.take() < count:
             return False
         last = np.array(listener.values[-count:])[:, :3]
@@ -82,7 +95,9 @@ def at_rest(listener, count=1000):
 
 @pytest.mark.slow
 @pytest.mark.alone
-def test_the_slave_goes_with_a_person_holds_without_and_no_grip_makes_it_jump(peer, session):
+def test_the_slave_goes_with_a_person_holds_without_and_no_grip_makes_it_jump(
+    peer: "Peer", session: object
+) -> None:
     peer.wait(lambda: "nobody holds" in peer.status("operator").message, "a hand that waits")
     peer.wait_value("operator", "has_begun", lambda n: n == 1)
     tips, person = peer.listen(SLAVE_MEASURED_CP), Person(peer)
@@ -115,14 +130,14 @@ def test_the_slave_goes_with_a_person_holds_without_and_no_grip_makes_it_jump(pe
 
 
 @pytest.mark.slow
-def test_a_node_of_its_own_hears_buttons_and_refuses_what_is_no_pose(peer):
+def test_a_node_of_its_own_hears_buttons_and_refuses_what_is_no_pose(peer: "Peer") -> None:
     poses, buttons = peer.listen(MASTER_MEASURED_CP), peer.listen(MASTER_BUTTONS)
-    hand = {"operator__kind": "remote", "operator__remote__timeout": PATIENT}
+    hand: dict[str, Any] = {"operator__kind": "remote", "operator__remote__timeout": PATIENT}
     peer.start("haptic_master", patience=0.0, **hand, **EXACT)
     peer.wait(lambda: buttons.take() and buttons.values[-1][0] == 1.0, "a pressed clutch")
     person = Person(peer)
 
-    def follows():
+    def follows() -> Any:
         poses.take()
         return np.abs(poses.values[-1][:3] - rest_pose()[:3] - [0.01, 0.0, 0.0]).max() < 1e-4
 
@@ -140,7 +155,7 @@ def test_a_node_of_its_own_hears_buttons_and_refuses_what_is_no_pose(peer):
     for pressed in ([0.0, 1.0, 0.0], [0.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 0.0]):
         peer.send(OPERATOR_BUTTONS, time.time_ns(), pressed)
 
-    def presses():
+    def presses() -> bool:
         is_there = buttons.take() > 1
         return is_there and (np.diff(np.array(buttons.values)[:, 1]) > 0.0).sum() == 2
 
@@ -149,7 +164,9 @@ def test_a_node_of_its_own_hears_buttons_and_refuses_what_is_no_pose(peer):
 
 @pytest.mark.slow
 @pytest.mark.alone
-def test_a_recorded_hand_that_is_played_is_the_operator(peer, compose, tmp_path):
+def test_a_recorded_hand_that_is_played_is_the_operator(
+    peer: "Peer", compose: Callable[..., object], tmp_path: Path
+) -> None:
     bag = tmp_path / "hand"
     settings = {"operator.approach_time": 1.0, "tremor_amplitude": 0.0}
     tc.run("free_motion", duration=60.0, out=bag, settings=settings)
@@ -165,7 +182,7 @@ def test_a_recorded_hand_that_is_played_is_the_operator(peer, compose, tmp_path)
         command, stdout=subprocess.DEVNULL, env=environment() | {"ROS_DOMAIN_ID": peer.domain}
     )
 
-    def moves():
+    def moves() -> int:
         assert player.poll() is None, "the player ended"
         return tips.take() and np.ptp(np.array(tips.values)[:, :3], axis=0).max() > 5e-3
 

@@ -3,7 +3,9 @@
 import os
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -31,14 +33,22 @@ def abort_outside_python():
 
 
 @pytest.fixture
-def run(tmp_path):
+def run(tmp_path: Path) -> Callable[..., Any]:
     """Run a test of this body in a pytest of its own: its output, and how often the test ran."""
 
-    def result(body, *options):
+    def result(body: Any, *options: object) -> Any:
         file = tmp_path / "test_it.py"
         file.write_text(HEAD + body)
         (tmp_path / "pytest.ini").write_text("[pytest]\nmarkers = ros\n")
-        command = [sys.executable, "-m", "pytest", "-p", "middleware_faults", *options, str(file)]
+        command: Any = [
+            sys.executable,
+            "-m",
+            "pytest",
+            "-p",
+            "middleware_faults",
+            *options,
+            str(file),
+        ]
         done = subprocess.run(
             command, cwd=tmp_path, env=dict(os.environ) | {"PYTHONPATH": str(TESTS)},
             capture_output=True, text=True, timeout=120, check=False,
@@ -49,13 +59,13 @@ def run(tmp_path):
 
 
 @pytest.mark.parametrize("fault", ["assert False", "raise TimeoutError", "raise AssertionError"])
-def test_any_failure_of_ours_is_not_rerun(run, fault):
+def test_any_failure_of_ours_is_not_rerun(run: Callable[..., Any], fault: str) -> None:
     code, out, runs = run(f"def test_it():\n    count()\n    {fault}\n")
     assert (code, runs) == (1, 1)
     assert "reruns because of the middleware" not in out
 
 
-def test_a_proven_loss_is_rerun_counted_and_named(run):
+def test_a_proven_loss_is_rerun_counted_and_named(run: Callable[..., Any]) -> None:
     body = "def test_it():\n    if count() == 1:\n        raise MiddlewareLossError('3 of a/b')\n"
     code, out, runs = run(body)
     assert (code, runs) == (0, 2)
@@ -63,20 +73,22 @@ def test_a_proven_loss_is_rerun_counted_and_named(run):
     assert "test_it: middleware_faults.MiddlewareLossError: 3 of a/b" in out
 
 
-def test_a_loss_that_comes_every_time_is_a_failure(run):
+def test_a_loss_that_comes_every_time_is_a_failure(run: Callable[..., Any]) -> None:
     code, out, runs = run("def test_it():\n    count()\n    raise MiddlewareLossError('all')\n")
     assert (code, runs) == (1, 3)
     assert "MiddlewareLossError 2" in out
 
 
-def test_a_crash_in_a_thread_of_the_middleware_is_rerun_and_named(run):
+def test_a_crash_in_a_thread_of_the_middleware_is_rerun_and_named(
+    run: Callable[..., Any],
+) -> None:
     body = "def test_it():\n    if count() == 1:\n        abort_outside_python()\n"
     code, out, runs = run(body, "-n", "1")
     assert (code, runs) == (0, 2), out
     assert "reruns because of the middleware: MiddlewareCrashError 1" in out
 
 
-def test_a_crash_in_our_own_code_is_a_failure(run):
+def test_a_crash_in_our_own_code_is_a_failure(run: Callable[..., Any]) -> None:
     body = "def test_it():\n    if count() == 1:\n        ctypes.string_at(0)\n"
     code, out, _ = run(body, "-n", "1")
     assert code == 1

@@ -2,18 +2,27 @@
 
 import subprocess
 import sys
+from collections.abc import Callable, Collection, Iterator, Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
+from _pytest.compat import NotSetType
+from _pytest.mark.structures import Mark, MarkDecorator, _HiddenParam
 
 from live_process import CALM
 from teleop_core.bags.messages import layout
+from teleop_core.bags.reader import Bag
 from teleop_core.graph import topics
-from teleop_core.kernels.geometry import pose_from_transform, rotation, transform
+from teleop_core.kernels.geometry import Array, pose_from_transform, rotation, transform
 from teleop_core.nodes.children import environment
 from teleop_core.robots import list_robots, load_robot
+from teleop_core.robots.robot import Robot
 from teleop_core.session.configuration import configure
 from teleop_core.session.virtual import VirtualTime
+
+if TYPE_CHECKING:
+    from ros.conftest import Peer
 
 pytestmark = [pytest.mark.ros, pytest.mark.slow]
 SHORT = (
@@ -31,7 +40,9 @@ MS = 1_000_000
 
 
 @pytest.fixture
-def short_session(peer, session_until):
+def short_session(
+    peer: "Peer", session_until: Callable[..., tuple[Bag, str]]
+) -> Callable[..., Any]:
     """Recording of two seconds of a live session, and joints (n,) that moved less than in virtual
     time.
 
@@ -39,11 +50,11 @@ def short_session(peer, session_until):
     slave's own steps, of which a busy machine makes fewer.
     """
 
-    def run(setting):
+    def run(setting: Any) -> Any:
         configuration = configure("free_motion", settings=[*SHORT, setting])
         begin = None
 
-        def has_led():
+        def has_led() -> bool:
             nonlocal begin
             operator, slave = peer.status("operator"), peer.status("slave")
             if begin is None and operator and slave and operator.number("has_begun"):
@@ -64,33 +75,40 @@ def short_session(peer, session_until):
     return run
 
 
-def off_grid(bag):
+def off_grid(bag: Any) -> Any:
     """Largest distance of a master reading from the Phantom's grid, in its steps."""
     steps = bag.read(topics.MASTER_MEASURED_CP).values[:, :3] / GRID
     return np.abs(steps - np.rint(steps)).max()
 
 
 @pytest.mark.parametrize("name", SLAVES)
-def test_every_slave_follows_the_hand_through_a_live_session(short_session, name):
+def test_every_slave_follows_the_hand_through_a_live_session(
+    short_session: Callable[..., Any],
+    name: tuple[
+        Sequence[Any | NotSetType], Collection[MarkDecorator | Mark], str | _HiddenParam | None
+    ],
+) -> None:
     bag, is_short = short_session(f"robot={name}")
     assert not is_short.any()
     assert off_grid(bag) < 1e-6
 
 
-def test_the_mma_leads_a_live_session_with_its_own_encoders(short_session):
+def test_the_mma_leads_a_live_session_with_its_own_encoders(
+    short_session: Callable[..., Any],
+) -> None:
     bag, is_short = short_session("device.handle=mma")
     assert not is_short.any()
     assert off_grid(bag) > 0.1
 
 
-def send_pose(peer, stamp, T):
+def send_pose(peer: "Peer", stamp: int, T: Array) -> None:
     """Publish a pose of the slave's tip."""
     pose = np.empty(7)
     pose_from_transform(T, pose)
     peer.send(topics.SLAVE_SERVO_CP, stamp, pose)
 
 
-def beside_home(robot):
+def beside_home(robot: Robot) -> Array:
     """Pose some millimetres and degrees away from home: further than one tick reaches."""
     home = robot.fk(robot.home)
     turn = rotation("x", 0.02) @ rotation("y", -0.01) @ rotation("z", 0.03)
@@ -98,7 +116,7 @@ def beside_home(robot):
 
 
 @pytest.fixture
-def hybrid_node(peer):
+def hybrid_node(peer: "Peer") -> Iterator[subprocess.Popen[bytes]]:
     """Inverse kinematics of the hybrid as ``ros2 run ... -p robot:=scara_stewart`` starts it."""
     command = [sys.executable, "-m", "teleop_core.nodes", "inverse_kinematics"]
     process = subprocess.Popen(
@@ -117,13 +135,15 @@ def hybrid_node(peer):
             process.wait()
 
 
-def test_the_hybrids_node_answers_a_pose_with_joints_that_lead_there(peer, hybrid_node):
+def test_the_hybrids_node_answers_a_pose_with_joints_that_lead_there(
+    peer: "Peer", hybrid_node: subprocess.Popen[bytes]
+) -> None:
     robot = load_robot("scara_stewart")
     goal, answers = beside_home(robot), peer.listen(topics.SLAVE_SERVO_JP)
     written = layout(topics.SLAVE_SETPOINT_JS, robot.joint_names)
     setpoints, stamp = peer.publisher(topics.SLAVE_SETPOINT_JS), 0
 
-    def answered():
+    def answered() -> bool:
         """Send on as a slave that is always where it was told to be; 30 ms lead to the goal."""
         nonlocal stamp
         stamp += MS
@@ -138,7 +158,7 @@ def test_the_hybrids_node_answers_a_pose_with_joints_that_lead_there(peer, hybri
     assert np.abs(robot.fk(answers.values[-1]) - goal).max() < 1e-9
 
 
-def test_a_stewart_slave_goes_where_a_pose_says_from_process_to_process(peer):
+def test_a_stewart_slave_goes_where_a_pose_says_from_process_to_process(peer: "Peer") -> None:
     robot = load_robot("stewart")
     goal, stamp = beside_home(robot), 0
     setpoints, measured = (
@@ -149,7 +169,7 @@ def test_a_stewart_slave_goes_where_a_pose_says_from_process_to_process(peer):
     for name in ("slave", "inverse_kinematics"):
         peer.wait_state(name, "active")
 
-    def arrived():
+    def arrived() -> Any:
         nonlocal stamp
         stamp += MS
         send_pose(peer, stamp, goal)

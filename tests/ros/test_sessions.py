@@ -1,6 +1,8 @@
 """Several nodes together: safe with bad input, deaths and restarts, equal to virtual time."""
 
 import signal
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
@@ -14,10 +16,15 @@ from teleop_core.chain.mapping.inverse_kinematics import (
     InverseKinematicsParameters,
 )
 from teleop_core.graph import topics
+from teleop_core.graph.topics import Topic
+from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot
 from teleop_core.session.configuration import configure
 from teleop_core.session.virtual import VirtualTime
 from teleop_core.slave.pair import ArmParameters, SimulatedArm
+
+if TYPE_CHECKING:
+    from ros.conftest import Listener, Peer
 
 pytestmark = pytest.mark.ros
 
@@ -27,18 +34,18 @@ MS = 1_000_000
 LONGEST_TIMEOUT = 5.0  # [s], of a slave
 STILL = 3e-4  # [rad or m], a few encoder steps: what counts as not moving
 # A hand without tremor and noise that goes 20 mm away and stays there.
-STEADY = {
+STEADY: dict[str, Any] = {
     "operator__kind": "hold", "operator__center": [0.0, 0.0, 0.02], "operator__approach_time": 2.0,
     "operator__rotation": 0.0,
     "operator__tremor_amplitude": 0.0, "device__gimbal_noise": 0.0,
 }  # fmt: skip
 
 
-def drive(peer, topic, wanted, listener, start=0):
+def drive(peer: "Peer", topic: Topic, wanted: Any, listener: "Listener", start: int = 0) -> int:
     """Send a value until the slave's setpoints carry its stamp; returns that stamp."""
     stamp = start
 
-    def in_force():
+    def in_force() -> int | bool:
         nonlocal stamp
         stamp += MS
         peer.send(topic, stamp, wanted)
@@ -49,13 +56,13 @@ def drive(peer, topic, wanted, listener, start=0):
 
 
 @pytest.mark.slow
-def test_slave_refuses_bad_commands_and_holds(peer):
+def test_slave_refuses_bad_commands_and_holds(peer: "Peer") -> None:
     setpoints = peer.listen(topics.SLAVE_SETPOINT_JS)
     peer.start("slave")
     wanted = HOME - 0.001 * np.eye(6)[0]
     last = drive(peer, topics.SLAVE_SERVO_JP, wanted, setpoints)
 
-    def there():
+    def there() -> int | bool:
         nonlocal last
         last += MS
         peer.send(topics.SLAVE_SERVO_JP, last, wanted)
@@ -64,11 +71,11 @@ def test_slave_refuses_bad_commands_and_holds(peer):
     peer.wait(there, "rest")
     setpoints.forget()
 
-    def refuse(key, publish):
+    def refuse(key: str, publish: Callable[..., object]) -> None:
         """Publish until one more is refused for this reason."""
         name = f"refused.slave/servo_jp.{key}"
 
-        def refused():
+        def refused() -> Any:
             nonlocal last
             last += MS
             publish(last)
@@ -80,8 +87,8 @@ def test_slave_refuses_bad_commands_and_holds(peer):
     near = HOME - 0.002 * np.eye(6)[0]
     publisher = peer.publisher(topics.SLAVE_SERVO_JP)
 
-    def typed(names, position):
-        def publish(stamp):
+    def typed(names: list[Any] | tuple[str, ...], position: Any) -> Callable[..., object]:
+        def publish(stamp: int) -> None:
             message = JointState(name=list(names), position=list(map(float, position)))
             message.header.stamp.sec, message.header.stamp.nanosec = divmod(stamp, 10**9)
             publisher.publish(message)
@@ -98,7 +105,7 @@ def test_slave_refuses_bad_commands_and_holds(peer):
     last = max(setpoints.stamps)
     good = drive(peer, topics.SLAVE_SERVO_JP, wanted, setpoints, last)
 
-    def backwards():
+    def backwards() -> Any:
         peer.send(topics.SLAVE_SERVO_JP, good - MS, near)
         status = peer.status("slave")
         return status and status.number("refused.slave/servo_jp.not_newer") > 0
@@ -110,13 +117,13 @@ def test_slave_refuses_bad_commands_and_holds(peer):
     assert np.abs(np.array(setpoints.values) - wanted).max() < 1e-7
 
 
-def test_poses_that_are_not_unit_or_not_finite_are_refused(peer):
+def test_poses_that_are_not_unit_or_not_finite_are_refused(peer: "Peer") -> None:
     answers = peer.listen(topics.SLAVE_SERVO_JP)
     peer.start("inverse_kinematics")
     stamp = 0
 
-    def refuse(key, pose):
-        def refused():
+    def refuse(key: str, pose: Callable[..., object] | list[Any]) -> None:
+        def refused() -> Any:
             nonlocal stamp
             stamp += MS
             peer.send(topics.SLAVE_SETPOINT_JS, 0, HOME)
@@ -132,7 +139,7 @@ def test_poses_that_are_not_unit_or_not_finite_are_refused(peer):
     assert answers.take() == 0
 
 
-def test_another_frame_and_another_order_of_joints_give_the_same_motion(peer):
+def test_another_frame_and_another_order_of_joints_give_the_same_motion(peer: "Peer") -> None:
     setpoints = peer.listen(topics.SLAVE_SETPOINT_JS)
     peer.start("slave", reference_filter__is_on=False)
     publisher = peer.publisher(topics.SLAVE_SERVO_JP)
@@ -140,7 +147,7 @@ def test_another_frame_and_another_order_of_joints_give_the_same_motion(peer):
     order = [3, 0, 5, 1, 4, 2]
     stamp = 0
 
-    def followed():
+    def followed() -> int | bool:
         nonlocal stamp
         stamp += MS
         message = JointState(
@@ -157,7 +164,7 @@ def test_another_frame_and_another_order_of_joints_give_the_same_motion(peer):
 
 
 @pytest.mark.slow
-def test_a_foreign_pose_gives_the_same_answer_as_our_own(peer):
+def test_a_foreign_pose_gives_the_same_answer_as_our_own(peer: "Peer") -> None:
     answers = peer.listen(topics.SLAVE_SERVO_CP)
     peer.start("motion_scaling", feedback_timeout=5.0)
     publisher = peer.publisher(topics.MASTER_MEASURED_CP)
@@ -165,7 +172,7 @@ def test_a_foreign_pose_gives_the_same_answer_as_our_own(peer):
     pose = np.array([0.01, -0.06, -0.08, 0.8, 0.0, 0.6, 0.0])
     stamp = 0
 
-    def send(is_foreign):
+    def send(is_foreign: Any) -> None:
         nonlocal stamp
         stamp += MS
         peer.send(topics.SLAVE_SETPOINT_CP, 1, where)
@@ -177,11 +184,11 @@ def test_a_foreign_pose_gives_the_same_answer_as_our_own(peer):
         else:
             peer.send(topics.MASTER_MEASURED_CP, stamp, pose)
 
-    def answer(is_foreign):
+    def answer(is_foreign: bool) -> Array:
         """Answer to one of the samples that are sent from now on, but the first few."""
         first = stamp + 4 * MS
 
-        def has_come():
+        def has_come() -> int | bool:
             send(is_foreign)
             return answers.take() and answers.stamps[-1] >= first
 
@@ -192,9 +199,9 @@ def test_a_foreign_pose_gives_the_same_answer_as_our_own(peer):
     np.testing.assert_allclose(answer(is_foreign=True), ours, atol=1e-12)
 
 
-def chain(peer, master=STEADY):
+def chain(peer: "Peer", master: dict[str, Any] = STEADY) -> None:
     # On a busy machine nothing is paused, held or aligned anew while the hand moves.
-    calm = {
+    calm: dict[str, Any] = {
         "slave": {"operation__longest_outage": 0.0, "command_timeout": LONGEST_TIMEOUT},
         "motion_scaling": {"feedback_timeout": LONGEST_TIMEOUT},
     }
@@ -207,7 +214,7 @@ def chain(peer, master=STEADY):
 
 @pytest.mark.slow
 @pytest.mark.alone
-def test_the_hand_rests_until_the_slave_follows(peer):
+def test_the_hand_rests_until_the_slave_follows(peer: "Peer") -> None:
     poses = peer.listen(topics.MASTER_MEASURED_CP)
     peer.start("haptic_master", patience=3600.0, **STEADY)
     peer.wait(lambda: poses.take() > 1000, "samples")
@@ -219,10 +226,10 @@ def test_the_hand_rests_until_the_slave_follows(peer):
     peer.wait_value("operator", "has_begun", lambda n: n == 1)
 
 
-def rest(peer, listener):
+def rest(peer: "Peer", listener: "Listener") -> Array:
     """Joints of the slave once it has followed the hand to its rest."""
 
-    def is_at_rest():
+    def is_at_rest() -> bool:
         listener.take()
         q = np.array(listener.values[-1000:])[:, :6]
         travelled = np.abs(q[-1] - HOME).max() if len(q) else 0.0
@@ -232,7 +239,7 @@ def rest(peer, listener):
     return listener.values[-1][:6].copy()
 
 
-def follows(peer, setpoints):
+def follows(peer: "Peer", setpoints: "Listener") -> None:
     """Wait until commands younger than now are in force.
 
     An outage of more than two seconds has paused the arm, which goes on on purpose only.
@@ -241,7 +248,7 @@ def follows(peer, setpoints):
     peer.wait(setpoints.take, "setpoints")
     old = setpoints.stamps[-1]
 
-    def is_following():
+    def is_following() -> int | bool:
         if "PAUSED" in peer.status("slave").message:
             peer.call(Trigger, "/slave/resume", Trigger.Request())
         return setpoints.take() and setpoints.stamps[-1] > old + 500 * MS
@@ -252,7 +259,7 @@ def follows(peer, setpoints):
 @pytest.mark.slow
 @pytest.mark.alone
 @pytest.mark.parametrize("name", ["motion_scaling", "inverse_kinematics", "haptic_master"])
-def test_restarting_a_node_does_not_move_the_slave(peer, name):
+def test_restarting_a_node_does_not_move_the_slave(peer: "Peer", name: str) -> None:
     measured, setpoints = (
         peer.listen(topics.SLAVE_MEASURED_JS),
         peer.listen(topics.SLAVE_SETPOINT_JS),
@@ -263,13 +270,13 @@ def test_restarting_a_node_does_not_move_the_slave(peer, name):
     (old,) = [node for node in peer.nodes if node.name == name]
     assert old.end(signal.SIGTERM) == 0
 
-    def holds():
+    def holds() -> bool:
         measured.take()
         return peer.slave_holds()
 
     peer.wait(holds, "slave holds")
     # A new master starts in the inkwell, 20 mm away, and leaves it very slowly.
-    slow = STEADY | {"operator__approach_time": 60.0}
+    slow: dict[str, Any] = STEADY | {"operator__approach_time": 60.0}
     peer.start(name, **(slow if name == "haptic_master" else {}))
     follows(peer, setpoints)
     assert measured.take() > 1000
@@ -281,7 +288,7 @@ def test_restarting_a_node_does_not_move_the_slave(peer, name):
 
 @pytest.mark.slow
 @pytest.mark.alone
-def test_slave_holds_when_the_master_dies(peer):
+def test_slave_holds_when_the_master_dies(peer: "Peer") -> None:
     measured = peer.listen(topics.SLAVE_MEASURED_JS)
     circle = {"operator__kind": "circle", "operator__approach_time": 0.5, "operator__period": 4.0}
     chain(peer, circle)
@@ -296,7 +303,7 @@ def test_slave_holds_when_the_master_dies(peer):
     assert np.ptp(np.array(measured.values)[500:, :6], axis=0).max() < STILL
 
 
-def test_a_second_publisher_of_commands_is_reported(peer):
+def test_a_second_publisher_of_commands_is_reported(peer: "Peer") -> None:
     peer.start("slave")
     kind = JointState
     both = [peer.node.create_publisher(kind, topics.SLAVE_SERVO_JP.name, 10) for _ in range(2)]
@@ -305,7 +312,7 @@ def test_a_second_publisher_of_commands_is_reported(peer):
 
 
 @pytest.mark.slow
-def test_nodes_give_bit_equal_setpoints_to_the_core_for_the_same_commands(peer):
+def test_nodes_give_bit_equal_setpoints_to_the_core_for_the_same_commands(peer: "Peer") -> None:
     settings = [f"slave.start={HOME.tolist()}", "motion_scaling.reach_force.is_on=false"]
     session = VirtualTime(configure("free_motion", settings=settings))
     poses = session.run(2500)["slave_servo_cp"]
@@ -313,7 +320,7 @@ def test_nodes_give_bit_equal_setpoints_to_the_core_for_the_same_commands(peer):
     references, setpoints = listeners
     # A machine that stands still is no outage here, and an arm that is heard of late blinds
     # nobody: the law is about numbers.
-    patient = {"operation__longest_outage": 0.0, "operation__longest_silence": 60.0}
+    patient: dict[str, Any] = {"operation__longest_outage": 0.0, "operation__longest_silence": 60.0}
     peer.start("slave", max_catch_up=10_000, command_timeout=LONGEST_TIMEOUT, **patient)
     # Stamps from 0 on: within the feedback timeout nothing depends on when feedback came.
     peer.start("inverse_kinematics", feedback_timeout=5.0)
@@ -323,10 +330,10 @@ def test_nodes_give_bit_equal_setpoints_to_the_core_for_the_same_commands(peer):
     )
     peer.wait(lambda: setpoints.take() > 100, "slave/setpoint_js")
 
-    def take_all():
+    def take_all() -> int:
         return [listener.take() for listener in listeners][-1]
 
-    def wait_ticks(count):
+    def wait_ticks(count: int) -> None:
         seen = take_all()
         peer.wait(lambda: take_all() > seen + count, "ticks")
 
@@ -349,7 +356,7 @@ def test_nodes_give_bit_equal_setpoints_to_the_core_for_the_same_commands(peer):
     _assert_core_slave_leads_alike(commands, setpoints)
 
 
-def _end_slave(peer, setpoints):
+def _end_slave(peer: "Peer", setpoints: "Listener") -> None:
     """End the slave; every setpoint of a tick was seen since the first one that was."""
     (slave,) = [node for node in peer.nodes if node.name == "slave"]
     assert slave.end(signal.SIGINT) == 0
@@ -358,10 +365,10 @@ def _end_slave(peer, setpoints):
     setpoints.insist_on_all()
 
 
-def _core_answers(poses, stamps):
+def _core_answers(poses: Array, stamps: list[int]) -> Array:
     stage = InverseKinematics(InverseKinematicsParameters(feedback_timeout=5.0))
     stage.signals["slave_setpoint_js"] = HOME
-    answers = []
+    answers: list[Any] = []
     for stamp in stamps:
         if answers:  # the slave is known to follow the first
             stage.signals["slave_setpoint_js_ns"] = stamps[0]
@@ -372,7 +379,7 @@ def _core_answers(poses, stamps):
     return np.array(answers)
 
 
-def _assert_core_slave_leads_alike(commands, setpoints):
+def _assert_core_slave_leads_alike(commands: dict[int, Array], setpoints: "Listener") -> None:
     given = ArmParameters(start=tuple(HOME.tolist()), command_timeout=LONGEST_TIMEOUT)
     stage = SimulatedArm(given)
     row = stage.signals

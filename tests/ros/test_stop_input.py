@@ -4,30 +4,37 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import psutil
 import pytest
+from rclpy.publisher import Publisher
 from std_msgs.msg import Bool
 
+from present import present
 from teleop_core.nodes.children import environment
 from teleop_core.nodes.operation import STOP_TOPIC, StopButton, StopInput
+
+if TYPE_CHECKING:
+    from ros.conftest import Peer
 
 pytestmark = pytest.mark.ros
 READER = Path(__file__).resolve().parents[1] / "stop_reader.py"
 
 
 @pytest.fixture
-def start(peer):
+def start(peer: "Peer") -> Iterator[Callable[..., object]]:
     """Function that starts a process which listens for so many presses."""
     started = []
 
-    def start(presses):
+    def start(presses: int) -> subprocess.Popen[str]:
         words, env = [sys.executable, str(READER), str(presses)], environment()
         process = subprocess.Popen(words, stdout=subprocess.PIPE, text=True,
                                    env=env | {"ROS_DOMAIN_ID": peer.domain})  # fmt: skip
         started.append(process)
-        assert process.stdout.readline() == "ready\n"
+        assert present(process.stdout).readline() == "ready\n"
         peer.wait(lambda: peer.node.count_subscribers(STOP_TOPIC) == 3, "all three readers")
         return process
 
@@ -35,37 +42,37 @@ def start(peer):
     for process in started:
         process.kill()
         process.wait()
-        process.stdout.close()
+        present(process.stdout).close()
 
 
-def button_of(peer):
+def button_of(peer: "Peer") -> Publisher:
     button = peer.node.create_publisher(Bool, STOP_TOPIC, 10)
     peer.wait(lambda: button.get_subscription_count() == 2, "both who hear reliable senders")
     return button
 
 
-def say(button, released):
+def say(button: Publisher, released: int) -> None:
     """A press, and so many releases after it, as fast as they go."""
     for is_pressed in (True,) + (False,) * released:
         button.publish(Bool(data=is_pressed))
 
 
-def stand_still(peer, reader):
+def stand_still(peer: "Peer", reader: Any) -> float:
     reader.send_signal(signal.SIGSTOP)
     process = psutil.Process(reader.pid)
     peer.wait(lambda: process.status() == psutil.STATUS_STOPPED, "a reader that stands still")
     return time.monotonic()
 
 
-def go_on(peer, reader, since):
+def go_on(peer: "Peer", reader: Any, since: float) -> None:
     """Go on after a standstill of a third of a second at least."""
     peer.wait(lambda: time.monotonic() > since + 0.3, "a standstill")
     reader.send_signal(signal.SIGCONT)
 
 
 def test_a_press_that_is_the_first_word_of_a_button_is_heard_though_the_middleware_lost_it(
-    peer, start
-):
+    peer: "Peer", start: Callable[..., Any]
+) -> None:
     """The middleware keeps the newest messages for who stands still; no number tells of others."""
     reader, button = start(1), button_of(peer)
     assert reader.stdout.readline() == "found\n"
@@ -75,7 +82,9 @@ def test_a_press_that_is_the_first_word_of_a_button_is_heard_though_the_middlewa
     assert reader.wait(30) == 0
 
 
-def test_presses_of_buttons_that_were_made_while_the_listener_stood_still_are_heard(peer, start):
+def test_presses_of_buttons_that_were_made_while_the_listener_stood_still_are_heard(
+    peer: "Peer", start: Callable[..., Any]
+) -> None:
     """A button keeps its last ten messages for who has not found it yet.
 
     Often all of them arrive nevertheless: hence several buttons.
@@ -88,35 +97,51 @@ def test_presses_of_buttons_that_were_made_while_the_listener_stood_still_are_he
     assert reader.wait(30) == 0
 
 
-def test_a_button_that_was_released_before_it_was_found_is_released_after_a_standstill_too(peer):
+def test_a_button_that_was_released_before_it_was_found_is_released_after_a_standstill_too(
+    peer: "Peer",
+) -> None:
     button = StopButton(peer.node)
     button.say(is_pressed=True)
     button.say(is_pressed=False)
-    stop, heard = StopInput(peer.node), []
+    heard: list[Any] = []
+    stop = StopInput(peer.node)
+
+    def take() -> bool:
+        heard.extend(stop.take())
+        return False
+
     try:
         stop.take()
         since = time.monotonic()
         peer.wait(lambda: button.listeners == 3 and time.monotonic() > since + 0.3, "a while")
-        peer.wait(lambda: heard.extend(stop.take()) or heard, "its state")
+        peer.wait(lambda: take() or heard, "its state")
     finally:
         stop.close()
     assert heard == [False]
 
 
 @pytest.mark.parametrize("stood_still", [True, False])
-def test_what_a_button_said_before_it_was_heard_counts_after_a_standstill_alone(peer, stood_still):
+def test_what_a_button_said_before_it_was_heard_counts_after_a_standstill_alone(
+    peer: "Peer", stood_still: bool
+) -> None:
     button = peer.node.create_publisher(Bool, STOP_TOPIC, 10)
     for _ in range(3):
         button.publish(Bool(data=False))
-    stop, heard, begin = StopInput(peer.node), [], time.monotonic()
+    heard: list[Any] = []
+    stop, begin = StopInput(peer.node), time.monotonic()
+
+    def take() -> bool:
+        heard.extend(stop.take())
+        return False
+
     try:
         peer.wait(lambda: button.get_subscription_count() == 2, "both who hear reliable senders")
         heard += stop.take()
-        peer.wait(lambda: (not stood_still and heard.extend(stop.take()))
+        peer.wait(lambda: (not stood_still and take())
                   or time.monotonic() > begin + 0.4, "a while")  # fmt: skip
         assert not heard
         button.publish(Bool(data=False))
-        peer.wait(lambda: heard.extend(stop.take()) or heard, "the fourth message")
+        peer.wait(lambda: take() or heard, "the fourth message")
     finally:
         stop.close()
     assert heard == [True, False] if stood_still else heard == [False]

@@ -5,7 +5,9 @@ import os
 import signal
 import subprocess
 import sys
+from collections.abc import Callable
 from itertools import pairwise
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
@@ -13,6 +15,7 @@ from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
 from std_srvs.srv import Trigger
 
+from present import present
 from teleop_core.bags.reader import Bag
 from teleop_core.graph import topics
 from teleop_core.graph.graph import BUILT_IN, RECORDER_NAME
@@ -22,6 +25,9 @@ from teleop_core.nodes.real_time import apply_options, is_priority_granted
 from teleop_core.robots import load_robot
 from teleop_core.session.configuration import configure
 from teleop_core.session.virtual import VirtualTime
+
+if TYPE_CHECKING:
+    from ros.conftest import Listener, Peer
 
 pytestmark = [pytest.mark.ros, pytest.mark.slow]
 NODES = [*BUILT_IN, RECORDER_NAME]
@@ -38,13 +44,13 @@ SETTINGS = {
 
 
 @pytest.fixture
-def session(compose):
+def session(compose: Callable[..., object]) -> Any:
     """Process of the composed session, all its nodes active."""
     return compose(**SETTINGS)
 
 
 @pytest.fixture(scope="module")
-def recorded(composed_session):
+def recorded(composed_session: Any) -> Bag:
     """Recording of three seconds of a session."""
     with composed_session(**SETTINGS) as (peer, process, bag):
         peer.wait_value("slave", "ticks", lambda ticks: ticks > 3000)
@@ -53,12 +59,12 @@ def recorded(composed_session):
         return Bag(bag)
 
 
-def change(peer, name, transition):
+def change(peer: "Peer", name: str, transition: Any) -> None:
     request = ChangeState.Request(transition=Transition(id=transition))
     assert peer.call(ChangeState, f"/{name}/change_state", request).success
 
 
-def test_a_composed_session_loses_no_sample_between_its_stages(recorded):
+def test_a_composed_session_loses_no_sample_between_its_stages(recorded: Bag) -> None:
     sample, pose, joints = (
         recorded.read(t).stamp_ns
         for t in (topics.MASTER_MEASURED_CP, topics.SLAVE_SERVO_CP, topics.SLAVE_SERVO_JP)
@@ -71,7 +77,7 @@ def test_a_composed_session_loses_no_sample_between_its_stages(recorded):
     assert (np.diff(recorded.read(topics.SLAVE_MEASURED_JS).stamp_ns) == MS).all()
 
 
-def test_a_composed_session_computes_what_virtual_time_computes(recorded):
+def test_a_composed_session_computes_what_virtual_time_computes(recorded: Bag) -> None:
     live_poses = recorded.read(topics.MASTER_MEASURED_CP).values
     settings = ["operator.approach_time=1.0", "haptic_master.patience=0.0",
                 f"slave.start={HOME}", "motion_scaling.reach_force.is_on=false"]  # fmt: skip
@@ -80,7 +86,9 @@ def test_a_composed_session_computes_what_virtual_time_computes(recorded):
     assert np.array_equal(live_poses, virtual["master_measured_cp"])
 
 
-def test_an_outside_master_takes_over_when_the_inside_one_is_off(peer, session):
+def test_an_outside_master_takes_over_when_the_inside_one_is_off(
+    peer: "Peer", session: object
+) -> None:
     change(peer, "haptic_master", Transition.TRANSITION_DEACTIVATE)
     peer.wait_state("haptic_master", "inactive")
     commands = peer.listen(topics.SLAVE_SERVO_CP)
@@ -88,19 +96,20 @@ def test_an_outside_master_takes_over_when_the_inside_one_is_off(peer, session):
     clock = peer.node.get_clock()
     publisher = peer.publisher(topics.MASTER_MEASURED_CP, readers=2)  # scaling and recorder
 
-    def moved():
-        moved.step += 1
+    step = [0]
+
+    def moved() -> bool:
+        step[0] += 1
         now = clock.now().nanoseconds
-        pose = rest + np.array([0.0, 1e-5 * moved.step, 0.0, 0, 0, 0, 0])
+        pose = rest + np.array([0.0, 1e-5 * step[0], 0.0, 0, 0, 0, 0])
         peer.send(topics.MASTER_MEASURED_CP, now, pose)
         return commands.take() > 200 and np.ptp(np.array(commands.values)[:, 2]) > 1e-3
 
-    moved.step = 0
     assert publisher.get_subscription_count() >= 2
     peer.wait(moved, "slave commands that follow the outside master")
 
 
-def test_the_inside_master_comes_back_without_a_jump(peer, session):
+def test_the_inside_master_comes_back_without_a_jump(peer: "Peer", session: object) -> None:
     measured = peer.listen(topics.SLAVE_MEASURED_JS)
     # Few samples are no stream, of which an outage would pause the arm.
     peer.wait(
@@ -121,7 +130,7 @@ def test_the_inside_master_comes_back_without_a_jump(peer, session):
     assert np.abs(np.diff(np.array(measured.values)[:, :6], axis=0)).max() < 0.01
 
 
-def test_a_node_may_leave_a_composed_session_in_any_moment(peer, session):
+def test_a_node_may_leave_a_composed_session_in_any_moment(peer: "Peer", session: Any) -> None:
     for _ in range(20):
         for transition in (
             Transition.TRANSITION_DEACTIVATE, Transition.TRANSITION_CLEANUP,
@@ -135,8 +144,8 @@ def test_a_node_may_leave_a_composed_session_in_any_moment(peer, session):
 
 
 def test_live_composed_records_all_topics_at_times_that_rise_from_stage_to_stage(
-    peer, session_until
-):
+    peer: "Peer", session_until: Callable[..., tuple[Bag, str]]
+) -> None:
     enough = {topic.name: 1500 for topic in STREAMS}
     configuration = configure("coarse_box", settings=["teleop.duration=600.0"])
     bag, text = session_until(configuration, lambda: peer.has_recorded(enough), is_composed=True)
@@ -152,7 +161,7 @@ def test_live_composed_records_all_topics_at_times_that_rise_from_stage_to_stage
         assert (after.log_ns[j] >= before.log_ns[i]).all()
 
 
-def test_real_time_options_are_taken_or_refused_in_one_line():
+def test_real_time_options_are_taken_or_refused_in_one_line() -> None:
     allowed = os.sched_getaffinity(0)
     try:
         (refusal,) = apply_options(RealTimeParameters(cpus=(4096,), freeze_gc=False))
@@ -163,7 +172,7 @@ def test_real_time_options_are_taken_or_refused_in_one_line():
         os.sched_setaffinity(0, allowed)
 
 
-def test_with_a_priority_all_threads_come_before_other_processes_but_not_what_they_start():
+def test_with_a_priority_all_threads_come_before_other_processes_but_not_what_they_start() -> None:
     if not is_priority_granted(10):
         pytest.skip("the system grants no priority")
     script = """
@@ -181,15 +190,15 @@ subprocess.run([sys.executable, "-c", started], check=True)
         [sys.executable, "-uc", script], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
     )
     with process:
-        said = [process.stdout.readline().strip() for _ in range(2)]
-        process.stdin.close()
+        said = [present(process.stdout).readline().strip() for _ in range(2)]
+        present(process.stdin).close()
     main, *others = ast.literal_eval(said[0])
     assert main == 10
     assert set(others) == {1}
     assert said[1] == "0"
 
 
-def rest_of(measured):
+def rest_of(measured: "Listener") -> Any:
     """Joints of an arm that has not moved for 500 samples; nothing before."""
     measured.take()
     joints = np.array(measured.values)[-500:, :6]
@@ -198,7 +207,9 @@ def rest_of(measured):
 
 
 @pytest.mark.alone
-def test_a_flood_of_commands_is_not_followed_faster_and_drops_no_step(peer, session):
+def test_a_flood_of_commands_is_not_followed_faster_and_drops_no_step(
+    peer: "Peer", session: object
+) -> None:
     change(peer, "inverse_kinematics", Transition.TRANSITION_DEACTIVATE)
     peer.wait_state("inverse_kinematics", "inactive")
     measured = peer.listen(topics.SLAVE_MEASURED_JS)
@@ -207,7 +218,7 @@ def test_a_flood_of_commands_is_not_followed_faster_and_drops_no_step(peer, sess
     status = peer.status("slave")
     known = [(status.number("received.slave/servo_jp"), status.number("dropped_time_ms"))]
 
-    def flooded_without_loss():
+    def flooded_without_loss() -> Any:
         """Send far more than the slave takes, until it has got a thousand and dropped no step.
 
         A machine that stood still for a moment costs a flood; one that the slave cannot bear

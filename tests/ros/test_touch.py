@@ -1,14 +1,22 @@
 """Touch over real topics: what the slave's tip feels reaches the hand, and the recording."""
 
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
 import numpy as np
 import pytest
 
 from teleop_core.graph.topics import MASTER_SERVO_CF, SLAVE_MEASURED_CF
 
+if TYPE_CHECKING:
+    from ros.conftest import Listener, Peer
+
 pytestmark = [pytest.mark.ros, pytest.mark.slow]
 
 
-def test_the_hand_feels_the_block_that_the_slave_presses(peer, compose):
+def test_the_hand_feels_the_block_that_the_slave_presses(
+    peer: "Peer", compose: Callable[..., object]
+) -> None:
     compose(
         operator={"kind": "line", "center": [0.0, -0.02, 0.04], "size": [0.0, 0.04, 0.0],
                   "period": 4.0, "rotation": 0.0},
@@ -19,7 +27,7 @@ def test_the_hand_feels_the_block_that_the_slave_presses(peer, compose):
     )  # fmt: skip
     felt, given = peer.listen(SLAVE_MEASURED_CF), peer.listen(MASTER_SERVO_CF)
 
-    def largest(listener, column):
+    def largest(listener: "Listener", column: int) -> float:
         listener.take()
         return max((row[column] for row in listener.values), default=0.0)
 

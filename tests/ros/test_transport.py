@@ -4,11 +4,14 @@ import json
 import os
 import subprocess
 import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import psutil
 import pytest
 
+from present import present
 from teleop_core.graph import topics
 from teleop_core.nodes.discovery import (
     LOOPBACK,
@@ -18,6 +21,9 @@ from teleop_core.nodes.discovery import (
     choose_transport,
 )
 from teleop_core.robots import load_robot
+
+if TYPE_CHECKING:
+    from ros.conftest import Peer
 
 pytestmark = pytest.mark.ros
 
@@ -48,14 +54,14 @@ while True:
 """
 
 
-def plain(**said):
+def plain(**said: object) -> dict[str | Any, str | Any]:
     """Environment of a user who has said nothing but this."""
     kept = {k: v for k, v in os.environ.items() if not k.startswith(MIDDLEWARE)}
     return kept | said
 
 
 @pytest.mark.parametrize("said", [{}, {RANGE: "LOCALHOST"}])
-def test_a_plain_ros_process_hears_and_commands_our_nodes(peer, said):
+def test_a_plain_ros_process_hears_and_commands_our_nodes(peer: "Peer", said: Any) -> None:
     """The stranger has the middleware's own defaults: shared memory and all interfaces."""
     peer.start("slave")
     names = json.dumps(load_robot("rcrt1").joint_names)
@@ -65,13 +71,13 @@ def test_a_plain_ros_process_hears_and_commands_our_nodes(peer, said):
     ) as stranger:  # fmt: skip
         try:
             peer.wait_value("slave", "received.slave/servo_jp", lambda n: n > 50)
-            assert stranger.stdout.readline() == "heard\n"
+            assert present(stranger.stdout).readline() == "heard\n"
         finally:
             stranger.kill()
 
 
 @pytest.mark.parametrize("said", [{}, {RANGE: "LOCALHOST"}, {"ROS_LOCALHOST_ONLY": "1"}])
-def test_a_node_has_sockets_of_this_machine_alone(peer, said):
+def test_a_node_has_sockets_of_this_machine_alone(peer: "Peer", said: Any) -> None:
     """As `ros2 run` starts it, by a user who has set nothing, or said so in either way."""
     before = {
         name: os.environ.pop(name) for name in list(os.environ) if name.startswith(MIDDLEWARE)
@@ -91,7 +97,7 @@ def test_a_node_has_sockets_of_this_machine_alone(peer, said):
     assert "open to other machines" not in node.stderr.read_text()
 
 
-def test_a_node_that_is_open_to_others_says_so_in_one_line(peer):
+def test_a_node_that_is_open_to_others_says_so_in_one_line(peer: "Peer") -> None:
     node = peer.start("slave", env={RANGE: "SUBNET", **dict.fromkeys(PROFILES, "")})
     lines = [line for line in node.stderr.read_text().splitlines() if "other machines" in line]
     assert len(lines) == 1
@@ -115,7 +121,7 @@ PROFILES = (PROFILE, "FASTDDS_DEFAULT_PROFILES_FILE")
         ({"RMW_IMPLEMENTATION": "rmw_fastrtps_cpp"}, (LOOPBACK, "SYSTEM_DEFAULT")),
     ],
 )
-def test_what_the_user_says_of_the_range_holds(said, chosen):
+def test_what_the_user_says_of_the_range_holds(said: Any, chosen: Any) -> None:
     environment = dict(said)
     choose_transport(environment)
     again = dict(environment)
@@ -127,7 +133,9 @@ def test_what_the_user_says_of_the_range_holds(said, chosen):
 
 
 @pytest.mark.slow
-def test_the_stream_of_a_slave_goes_on_while_those_who_read_it_are_killed(peer, tmp_path):
+def test_the_stream_of_a_slave_goes_on_while_those_who_read_it_are_killed(
+    peer: "Peer", tmp_path: Path
+) -> None:
     """A reader that was killed held its writer's thread up for two seconds at a time."""
     peer.start("slave", real_time__freeze_gc=True)
     listener, longest = peer.listen(topics.SLAVE_MEASURED_CP), []

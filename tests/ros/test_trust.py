@@ -1,6 +1,8 @@
 """Trust: whatever anybody publishes, nodes go on and say what they refuse."""
 
 import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
@@ -13,6 +15,9 @@ from teleop_core.graph.stage import STAGES
 from teleop_core.nodes.recorder import DISCOVERY_NS
 from teleop_core.nodes.streams import message_type
 
+if TYPE_CHECKING:
+    from ros.conftest import Peer
+
 pytestmark = pytest.mark.ros
 
 GARBAGE = b"\0\1\0\0" + bytes(range(200, 256))
@@ -20,12 +25,16 @@ NODES = ("operator", "haptic_master", "motion_scaling", "inverse_kinematics", "s
 
 
 @pytest.mark.parametrize("name", NODES)
-def test_bytes_that_are_no_message_are_refused_on_every_topic_a_node_reads(peer, name):
+def test_bytes_that_are_no_message_are_refused_on_every_topic_a_node_reads(
+    peer: "Peer", name: str
+) -> None:
     reads = STAGES.find(name).reads
-    looks = {"kind": "remote"} if name == "operator" else {}  # others do not look at what is told
+    looks: dict[str, Any] = (
+        {"kind": "remote"} if name == "operator" else {}
+    )  # others do not look at what is told
     node = peer.start(name, has_arm=False, **looks)
 
-    def refused():
+    def refused() -> bool:
         for topic in reads:
             peer.publisher(topic).publish(GARBAGE)
         values = peer.status(name).values
@@ -36,11 +45,11 @@ def test_bytes_that_are_no_message_are_refused_on_every_topic_a_node_reads(peer,
     assert node.end() == 0
 
 
-def test_who_watches_a_session_passes_reports_over_that_are_none(peer):
+def test_who_watches_a_session_passes_reports_over_that_are_none(peer: "Peer") -> None:
     peer.start("motion_scaling")
     publisher = peer.publisher(topics.DIAGNOSTICS)
 
-    def counted():
+    def counted() -> int:
         publisher.publish(GARBAGE)
         peer.status("motion_scaling")
         return peer.observer.malformed
@@ -50,7 +59,7 @@ def test_who_watches_a_session_passes_reports_over_that_are_none(peer):
     peer.wait(lambda: peer.status("motion_scaling"), "a further report")
 
 
-def test_a_second_master_is_refused_and_the_first_one_goes_on(peer):
+def test_a_second_master_is_refused_and_the_first_one_goes_on(peer: "Peer") -> None:
     peer.start("motion_scaling", owner_silence=10.0)
     first = peer.publisher(topics.MASTER_MEASURED_CP)
     kind = message_type(topics.MASTER_MEASURED_CP.kind.ros_type)
@@ -60,14 +69,14 @@ def test_a_second_master_is_refused_and_the_first_one_goes_on(peer):
     for number in range(1, stamp):  # so that their numbers are apart
         first.publish(form.encode_one(number, pose))
 
-    def heard():
+    def heard() -> Any:
         first.publish(form.encode_one(stamp, pose))
         return peer.status("motion_scaling").number("received.master/measured_cp") > 0
 
     peer.wait(heard, "the first one, which owns the topic from then on")
     commands = peer.listen(topics.SLAVE_SERVO_CP)  # which carry the stamps of their poses on
 
-    def refused():
+    def refused() -> Any:
         """Report that tells of it; a later one is of a time without messages."""
         nonlocal stamp
         stamp += 2
@@ -121,18 +130,20 @@ def test_a_recorder_tells_how_much_of_a_node_that_starts_again_came_before_it_kn
     assert "lost" in status.message
 
 
-def test_a_sender_whose_stamps_stand_still_is_told_what_to_do(peer):
+def test_a_sender_whose_stamps_stand_still_is_told_what_to_do(peer: "Peer") -> None:
     peer.start("motion_scaling")
     pose = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]
 
-    def told():
+    def told() -> bool:
         peer.send(topics.MASTER_MEASURED_CP, 0, pose)
         return "its stamps are 0: stamp each" in peer.status("motion_scaling").message
 
     peer.wait(told, "the advice")
 
 
-def test_a_recorder_does_not_take_a_second_publisher_for_losses(peer, tmp_path):
+def test_a_recorder_does_not_take_a_second_publisher_for_losses(
+    peer: "Peer", tmp_path: Path
+) -> None:
     peer.start("recorder", out=str(tmp_path / "bag"))
     topic = topics.MASTER_MEASURED_CP
     first = peer.publisher(topic)
@@ -142,7 +153,7 @@ def test_a_recorder_does_not_take_a_second_publisher_for_losses(peer, tmp_path):
         first.publish(data)
     sent = 1000
 
-    def recorded():
+    def recorded() -> Any:
         nonlocal sent
         for _ in range(20):
             first.publish(data)

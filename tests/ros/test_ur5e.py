@@ -3,8 +3,11 @@
 import shlex
 import subprocess
 import sys
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from itertools import chain, repeat
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,6 +20,7 @@ import teleop_core as tc
 from drill_runs import run_drill
 from live_process import wait_until
 from mutants import ROOT
+from present import present
 from teleop_core.graph.topics import MASTER_MEASURED_CP, SLAVE_MEASURED_CP
 from teleop_core.nodes.children import environment, free_domain
 from teleop_core.nodes.console_session import ConsoleSession
@@ -34,7 +38,7 @@ STEP = 2.5  # 1.2 of a rated speed, over two periods at most, in steps of one at
 
 
 @pytest.fixture
-def bridge(tmp_path):
+def bridge(tmp_path: Path) -> list[Any]:
     """Command of the bridge that leads the arm."""
     file = tmp_path / "arm.yaml"
     file.write_text(
@@ -46,7 +50,7 @@ def bridge(tmp_path):
 
 
 @contextmanager
-def witness(domain):
+def witness(domain: int) -> Iterator[Callable[[], object]]:
     """What the controller says of its commands: first one's distance, and the largest step."""
     context = Context()
     context.init(domain_id=domain)
@@ -54,9 +58,13 @@ def witness(domain):
     executor = SingleThreadedExecutor(context=context)
     executor.add_node(node)
     said = []
-    node.create_subscription(Float64MultiArray, "witness", lambda m: said.append(list(m.data)), 10)
 
-    def newest():
+    def take_data(message: Any) -> None:
+        said.append(list(message.data))
+
+    node.create_subscription(Float64MultiArray, "witness", take_data, 10)
+
+    def newest() -> list[Any]:
         while not said or np.isnan(said[-1][0]):
             executor.spin_once(0.1)
         for _ in range(100):
@@ -72,7 +80,7 @@ def witness(domain):
 
 
 @contextmanager
-def arm(*others):
+def arm(*others: Any) -> Iterator[Any]:
     """A domain in which the others run, and what the controller among them witnesses at the end."""
     env = environment() | {"ROS_DOMAIN_ID": free_domain()}
     started = [subprocess.Popen(command, env=env) for command in others]
@@ -86,7 +94,7 @@ def arm(*others):
     assert set(codes) == {0}
 
 
-def led(tmp_path, bridge, seed, *settings, operator=()):
+def led(tmp_path: Path, bridge: Any, seed: int, *settings: Any, operator: Any = ()) -> Any:
     """A recorded session that leads the arm, and what the controller witnessed."""
     out = tmp_path / f"bag_{seed}"
     live = [
@@ -104,7 +112,7 @@ def led(tmp_path, bridge, seed, *settings, operator=()):
     return tc.open_recording(out), first, largest
 
 
-def goes_home_and_follows(recording, first, largest):
+def goes_home_and_follows(recording: tc.Recording, first: Any, largest: Any) -> None:
     assert first <= STEP
     assert largest <= STEP
     measured, setpoints = recording["slave/measured_js"], recording["slave/setpoint_js"]
@@ -119,12 +127,16 @@ def goes_home_and_follows(recording, first, largest):
     assert went.max() > 0.8 * asked.max()
 
 
-def test_a_session_leads_it_home_and_after_the_hand_without_a_jump(tmp_path, bridge):
+def test_a_session_leads_it_home_and_after_the_hand_without_a_jump(
+    tmp_path: Path, bridge: list[Any]
+) -> None:
     goes_home_and_follows(*led(tmp_path, bridge, 1))
 
 
 @pytest.mark.soak
-def test_a_gamepad_leads_it_home_and_after_its_stick_without_a_jump(tmp_path, bridge):
+def test_a_gamepad_leads_it_home_and_after_its_stick_without_a_jump(
+    tmp_path: Path, bridge: list[Any]
+) -> None:
     pytest.importorskip("pygame")
     pad = [sys.executable, str(ROOT / "tests/padded_operator.py"), "operator"]
     operator = [*pad, "--ros-args", "-p", "kind:=gamepad"]
@@ -135,7 +147,9 @@ def test_a_gamepad_leads_it_home_and_after_its_stick_without_a_jump(tmp_path, br
 
 
 @pytest.mark.soak
-def test_a_person_at_the_console_leads_it_without_a_jump(tmp_path, bridge, monkeypatch):
+def test_a_person_at_the_console_leads_it_without_a_jump(
+    tmp_path: Path, bridge: list[Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
     remote = ["operator=remote", "operator.patience=0.0", "teleop.duration=3600.0"]
     remote += ["operator.remote.timeout=1.5"]  # a busy console is no reason to let go
     configured = api.configuration(None, texts=[*remote, *ARM])
@@ -147,13 +161,18 @@ def test_a_person_at_the_console_leads_it_without_a_jump(tmp_path, bridge, monke
         ):
             seen = link.view().arms[""]
             wait_until(lambda: link.view() and "ENABLED, homed" in seen.operation_text, "homed")
-            tip, stylus = seen.get(SLAVE_MEASURED_CP)[:3], seen.get(MASTER_MEASURED_CP)[:7]
+            tip, stylus = (
+                present(seen.get(SLAVE_MEASURED_CP))[:3],
+                present(seen.get(MASTER_MEASURED_CP))[:7],
+            )
             ways = chain(np.linspace(0.0, _PULLED, 100), repeat(_PULLED))  # a grip moves nothing
 
-            def is_pulled():
+            def is_pulled() -> Any:
                 link.hold("", stylus + next(ways) * np.eye(7)[0])
                 link.view()
-                return np.linalg.norm(seen.get(SLAVE_MEASURED_CP)[:3] - tip) > 0.5 * _PULLED
+                return (
+                    np.linalg.norm(present(seen.get(SLAVE_MEASURED_CP))[:3] - tip) > 0.5 * _PULLED
+                )
 
             wait_until(is_pulled, "an arm that is pulled")
         first, largest = newest()
@@ -161,12 +180,14 @@ def test_a_person_at_the_console_leads_it_without_a_jump(tmp_path, bridge, monke
 
 
 @pytest.mark.soak
-def test_it_starts_twenty_times_without_a_jump(tmp_path, bridge):
+def test_it_starts_twenty_times_without_a_jump(tmp_path: Path, bridge: list[Any]) -> None:
     for seed in range(2, 22):
         goes_home_and_follows(*led(tmp_path, bridge, seed))
 
 
-def test_the_drill_stops_it_and_finds_it_lost_as_a_simulated_arm(tmp_path, bridge):
+def test_the_drill_stops_it_and_finds_it_lost_as_a_simulated_arm(
+    tmp_path: Path, bridge: list[Any]
+) -> None:
     names = ("stop_topic", "kill_slave_sim")
     code, text, outcomes = run_drill(
         tmp_path, *names, "--drives", shlex.join(bridge), "--arm", shlex.join(CONTROLLER),

@@ -1,5 +1,8 @@
 """What RViz and Foxglove get of a running session, and what its recording holds of it."""
 
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
 import numpy as np
 import pytest
 from rclpy.qos import DurabilityPolicy, QoSProfile
@@ -15,6 +18,9 @@ from teleop_core.robots import load_robot
 from teleop_core.robots.bodies import bodies_of
 from teleop_core.robots.bodies.urdf import urdf_of
 
+if TYPE_CHECKING:
+    from ros.conftest import Peer
+
 pytestmark = pytest.mark.ros
 
 MS = 1_000_000
@@ -22,16 +28,18 @@ REST = [0.0, -0.06, -0.08, 1.0, 0.0, 0.0, 0.0]
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
-def test_a_recorder_shows_and_records_the_robot_that_it_hears(peer, tmp_path):
+def test_a_recorder_shows_and_records_the_robot_that_it_hears(peer: "Peer", tmp_path: Path) -> None:
     robot = load_robot("rcrt1")
     recorder = peer.start("recorder", out=str(tmp_path / "bag"))
+    described: list[Any]
+    drawn: list[Any]
     described, drawn = [], []
     joints = np.concatenate((robot.start, np.zeros(2 * robot.n)))
     tip = bodies_of(robot).poses(robot.start)[-1]
     peer.node.create_subscription(MarkerArray, "/teleop/markers", drawn.append, 10)
     stamps = iter(range(MS, 10**6 * MS, MS))
 
-    def sent():
+    def sent() -> bool:
         stamp_ns = next(stamps)
         peer.send(SLAVE_MEASURED_JS, stamp_ns, joints)
         peer.send(SLAVE_MEASURED_CP, stamp_ns, tip)
@@ -43,7 +51,7 @@ def test_a_recorder_shows_and_records_the_robot_that_it_hears(peer, tmp_path):
     # Somebody who comes late gets the description all the same.
     peer.node.create_subscription(String, "/robot_description", described.append, LATCHED)
 
-    def told():
+    def told() -> list[Any]:
         peer.spin()
         return described
 
@@ -61,7 +69,9 @@ def test_a_recorder_shows_and_records_the_robot_that_it_hears(peer, tmp_path):
         assert [place.x, place.y, place.z] == pytest.approx(tip[:3])
 
 
-def test_a_robot_that_is_not_the_recorders_is_not_drawn_as_this_one(peer, tmp_path):
+def test_a_robot_that_is_not_the_recorders_is_not_drawn_as_this_one(
+    peer: "Peer", tmp_path: Path
+) -> None:
     robot = load_robot("puma560")
     recorder = peer.start("recorder", out=str(tmp_path / "bag"))
     joints = np.concatenate((robot.start, np.zeros(2 * robot.n)))
@@ -70,7 +80,7 @@ def test_a_robot_that_is_not_the_recorders_is_not_drawn_as_this_one(peer, tmp_pa
     publisher = peer.publisher(SLAVE_MEASURED_JS)
     key = f"received.{MASTER_MEASURED_CP.name}"
 
-    def heard():
+    def heard() -> Any:
         stamp_ns = next(stamps)
         publisher.publish(form.encode_one(stamp_ns, joints))
         peer.send(MASTER_MEASURED_CP, stamp_ns, np.array(REST))

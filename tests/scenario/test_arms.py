@@ -1,14 +1,19 @@
 """Arms: each one as if it were alone, with its own parameters and robot, in one recording."""
 
+from pathlib import Path
+from typing import Any
+
 import numpy as np
 import pytest
 import yaml
+from numpy.typing import NDArray
 
 from teleop_core.bags.reader import Bag
 from teleop_core.base.errors import TeleopError
 from teleop_core.chain.operators import register_operator
 from teleop_core.graph.layers import parse_layer
 from teleop_core.graph.topics import STREAMS
+from teleop_core.kernels.geometry import Array
 from teleop_core.session.configuration import Configuration, configure
 from teleop_core.session.runner import replay, simulate
 from teleop_core.session.virtual import VirtualTime
@@ -21,35 +26,35 @@ ARMS = ("teleop.arms=[right, left]", "left/robot=scara", "left/seed=7", "left/co
         "right/fixture=sphere", "right/fixture.sphere.diameter=0.01")  # fmt: skip
 
 
-def settings(*more):
+def settings(*more: str) -> Configuration:
     return configure(settings=[*SHORT, *more])
 
 
 @pytest.fixture(scope="module")
-def both():
+def both() -> NDArray[np.void]:
     """Rows of a session of two arms with different robots."""
     return VirtualTime(settings(*ARMS)).run(TICKS)
 
 
-def assert_same_streams(block, arm, other):
+def assert_same_streams(block: NDArray[np.void], arm: str, other: NDArray[np.void]) -> None:
     for topic in STREAMS:
         field = topic.of_arm(arm).field
         assert np.array_equal(block[field], other[topic.field]), field
         assert np.array_equal(block[f"{field}_ns"], other[f"{topic.field}_ns"]), field
 
 
-def test_default_arm_moves_as_alone_to_the_bit(both):
+def test_default_arm_moves_as_alone_to_the_bit(both: NDArray[np.void]) -> None:
     alone = VirtualTime(settings("fixture=sphere", "fixture.sphere.diameter=0.01")).run(TICKS)
     assert_same_streams(both, "", alone)
     assert np.abs(both["master_servo_cf"]).max() > 0.1
 
 
-def test_second_arm_moves_as_its_robot_alone_to_the_bit(both):
+def test_second_arm_moves_as_its_robot_alone_to_the_bit(both: NDArray[np.void]) -> None:
     alone = VirtualTime(settings("robot=scara", "seed=7", "coarse_gain=0.5")).run(TICKS)
     assert_same_streams(both, "left", alone)
 
 
-def test_arms_differ_in_what_is_said_of_one_alone():
+def test_arms_differ_in_what_is_said_of_one_alone() -> None:
     groups = settings(*ARMS, "fine_gain=0.2").groups
     assert (groups["slave_sim"].robot, groups["left/slave_sim"].robot) == ("rcrt1", "scara")
     gains = [groups[f"{arm}motion_scaling"].coarse_gain for arm in ("", "left/")]
@@ -58,12 +63,12 @@ def test_arms_differ_in_what_is_said_of_one_alone():
     assert (gains, kinds, fine) == ([1.0, 0.5], ["sphere", "box"], [0.2, 0.2])
 
 
-def test_what_is_said_of_an_arm_wins_whatever_comes_later():
+def test_what_is_said_of_an_arm_wins_whatever_comes_later() -> None:
     groups = settings("teleop.arms=[right, left]", "left/seed=7", "seed=9").groups
     assert (groups["haptic_master"].seed, groups["left/haptic_master"].seed) == (9, 7)
 
 
-def test_arms_are_said_in_files_too(tmp_path):
+def test_arms_are_said_in_files_too(tmp_path: Path) -> None:
     path = tmp_path / "arms.yaml"
     path.write_text(
         "teleop: {ros__parameters: {arms: [right, left]}}\n"
@@ -74,7 +79,7 @@ def test_arms_are_said_in_files_too(tmp_path):
     assert (groups["haptic_master"].seed, groups["left/haptic_master"].seed) == (5, 7)
 
 
-def test_text_of_two_arms_reads_back_the_same():
+def test_text_of_two_arms_reads_back_the_same() -> None:
     configuration = settings(*ARMS)
     layer = parse_layer(yaml.safe_load(configuration.text()), "text")
     assert Configuration.from_layers([layer]) == configuration
@@ -94,20 +99,22 @@ def test_text_of_two_arms_reads_back_the_same():
         ),
     ],
 )
-def test_wrong_arms_are_refused_in_one_line_before_anything_runs(more, says):
+def test_wrong_arms_are_refused_in_one_line_before_anything_runs(
+    more: tuple[str, ...], says: str
+) -> None:
     with pytest.raises(TeleopError, match=says) as error:
         settings(*more)
     assert "\n" not in str(error.value)
 
 
-def waits(times):
+def waits(times: Any) -> Array:
     """Rest until the slave follows, with the delay too; then swing by 20 mm."""
     swing = 0.01 * (1.0 - np.cos(2.0 * np.pi * np.maximum(times - 0.1, 0.0)))
     return np.column_stack((swing, -swing, 0.5 * swing))
 
 
 @pytest.mark.slow
-def test_delay_of_one_arm_is_not_one_of_the_other(own_parts):
+def test_delay_of_one_arm_is_not_one_of_the_other(own_parts: None) -> None:
     register_operator("waits", waits)
     # The scara starts at home; its hand begins at once, whenever it follows.
     still = ("left/operator=waits", "left/patience=0.0", "left/tremor_amplitude=0.0",
@@ -122,7 +129,9 @@ def test_delay_of_one_arm_is_not_one_of_the_other(own_parts):
 
 
 @pytest.mark.slow
-def test_one_recording_holds_and_replays_both_arms_to_the_bit(tmp_path, both):
+def test_one_recording_holds_and_replays_both_arms_to_the_bit(
+    tmp_path: Path, both: NDArray[np.void]
+) -> None:
     configuration = settings(*ARMS, "duration=1.5")
     simulate(configuration, tmp_path / "bag")
     bag = Bag(tmp_path / "bag")

@@ -7,6 +7,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -52,14 +53,16 @@ print(json.dumps({"told": told, "kilobytes": resource.getrusage(resource.RUSAGE_
 """
 
 
-def run_recorder(path: Path, compression: str, seconds: int, ending: str) -> tuple[int, dict]:
+def run_recorder(
+    path: Path, compression: str, seconds: int, ending: str
+) -> tuple[int, dict[str, Any]]:
     command = [sys.executable, "-c", RECORDER, str(path), compression, str(seconds), ending]
     done = subprocess.run(command, stdout=subprocess.PIPE, text=True, check=False, timeout=600)
     return done.returncode, json.loads(done.stdout or "{}")
 
 
 @pytest.fixture
-def small_disk(tmp_path) -> Iterator[str | None]:
+def small_disk(tmp_path: Path) -> Iterator[str | None]:
     """A disk of a few megabytes where mounting is allowed; else a limit of the file size."""
     disk = tmp_path / "disk"
     disk.mkdir()
@@ -88,28 +91,30 @@ def assert_safe(path: Path, told: str) -> None:
 
 
 @pytest.mark.parametrize("compression", ["none", "zstd"])
-def test_a_full_disk_keeps_what_was_recorded_so_far(small_disk, tmp_path, compression):
+def test_a_full_disk_keeps_what_was_recorded_so_far(
+    small_disk: str | None, tmp_path: Path, compression: str
+) -> None:
     path = tmp_path / "disk" / "bag"
     code, result = run_recorder(path, compression, 30, small_disk or f"limit{LIMIT}")
     assert code == 0
     assert_safe(path, result["told"])
 
 
-def test_a_file_that_may_not_grow_is_finished_within_its_limit(tmp_path):
+def test_a_file_that_may_not_grow_is_finished_within_its_limit(tmp_path: Path) -> None:
     code, result = run_recorder(tmp_path / "bag", "none", 30, f"limit{LIMIT}")
     assert code == 0
     assert_safe(tmp_path / "bag", result["told"])
     assert (tmp_path / "bag" / "bag_0.mcap").stat().st_size <= LIMIT
 
 
-def test_a_disk_without_any_room_leaves_nothing_behind(tmp_path):
+def test_a_disk_without_any_room_leaves_nothing_behind(tmp_path: Path) -> None:
     code, result = run_recorder(tmp_path / "bag", "none", 1, "limit100")
     assert code == 0
     assert result["told"].startswith(f"{tmp_path / 'bag'}: cannot be written")
     assert not (tmp_path / "bag").exists()
 
 
-def test_what_a_killed_process_recorded_is_recovered(tmp_path):
+def test_what_a_killed_process_recorded_is_recovered(tmp_path: Path) -> None:
     code, _ = run_recorder(tmp_path / "bag", "zstd", 5, "kill")
     assert code == -signal.SIGKILL
     with pytest.raises(RecordingError, match="teleop recover"):
@@ -122,7 +127,7 @@ def test_what_a_killed_process_recorded_is_recovered(tmp_path):
 
 
 @pytest.mark.slow
-def test_memory_does_not_grow_with_the_length_of_the_recording(tmp_path):
+def test_memory_does_not_grow_with_the_length_of_the_recording(tmp_path: Path) -> None:
     _, short = run_recorder(tmp_path / "short", "lz4", 20, "end")
     _, long = run_recorder(tmp_path / "long", "lz4", 200, "end")
     assert long["kilobytes"] < 1.1 * short["kilobytes"]

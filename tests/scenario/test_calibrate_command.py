@@ -2,12 +2,15 @@
 
 import json
 import re
+from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
 import yaml
 
+from present import present
 from teleop_core import cli
 from teleop_core.bags.reader import Bag
 from teleop_core.graph.topics import SLAVE_MEASURED_CP
@@ -17,10 +20,10 @@ RCRT1 = load_robot("rcrt1")
 
 
 @pytest.fixture
-def calibrate(capsys):
+def calibrate(capsys: pytest.CaptureFixture[str]) -> Callable[..., str]:
     """Run the command in this process; what it prints, or its one line of error."""
 
-    def run(*arguments, code=0):
+    def run(*arguments: str | int | Path, code: int = 0) -> str:
         assert cli.main(["calibrate", *map(str, arguments)]) == code
         out, error = capsys.readouterr()
         if code:
@@ -31,12 +34,12 @@ def calibrate(capsys):
     return run
 
 
-def last_rms(text):
+def last_rms(text: str) -> list[float]:
     """Total RMS before and after [mm], of the last line."""
-    return [float(x) for x in re.search(r"total RMS (\S+) -> (\S+) mm", text).groups()]
+    return [float(x) for x in present(re.search(r"total RMS (\S+) -> (\S+) mm", text)).groups()]
 
 
-def poses_file(path, count=40):
+def poses_file(path: Path, count: int = 40) -> Path:
     """Poses of an arm whose joint 3 is off by 5.5 mm, in degrees and millimetres."""
     rng = np.random.default_rng(1)
     joints = rng.uniform(RCRT1.lower, RCRT1.upper, (count, 6))
@@ -47,13 +50,17 @@ def poses_file(path, count=40):
     return path
 
 
-def test_the_published_table_comes_out_of_the_published_readings(calibrate):
+def test_the_published_table_comes_out_of_the_published_readings(
+    calibrate: Callable[..., str],
+) -> None:
     text = calibrate("--data", "published", "--fit", "d3")
     assert re.search(r"d3 +5\.500\d +1\.1\d+ +mm", text)
     assert re.search(r"total +0\.7440 +0\.5925 +2\.0000 +0\.3515", text)
 
 
-def test_a_session_takes_the_arm_that_was_found(calibrate, tmp_path):
+def test_a_session_takes_the_arm_that_was_found(
+    calibrate: Callable[..., str], tmp_path: Path
+) -> None:
     arm, numbers, bag = tmp_path / "arm.yaml", tmp_path / "c.json", tmp_path / "bag"
     text = calibrate("--poses", 20, "--out", arm, "--json", numbers)
     before, after = last_rms(text.rsplit("numbers:", 1)[0])
@@ -68,22 +75,26 @@ def test_a_session_takes_the_arm_that_was_found(calibrate, tmp_path):
     assert np.isfinite(Bag(bag).read(SLAVE_MEASURED_CP).values).all()
 
 
-def test_a_file_of_poses_gives_the_offset_it_was_made_with(calibrate, tmp_path):
+def test_a_file_of_poses_gives_the_offset_it_was_made_with(
+    calibrate: Callable[..., str], tmp_path: Path
+) -> None:
     text = calibrate("--data", poses_file(tmp_path / "poses.csv"), "--fit", "offsets")
-    value, half = map(float, re.search(r"d3 +(\S+) +(\S+) +mm", text).groups())
+    value, half = map(float, present(re.search(r"d3 +(\S+) +(\S+) +mm", text)).groups())
     assert abs(value - 5.5) < 2.0 * half < 0.2
     assert last_rms(text)[1] < 0.25
     assert "without its fifth" in text
 
 
-def test_a_tracker_of_unknown_place_gives_it_too(calibrate, tmp_path):
+def test_a_tracker_of_unknown_place_gives_it_too(
+    calibrate: Callable[..., str], tmp_path: Path
+) -> None:
     text = calibrate("--data", poses_file(tmp_path / "p.csv"), "--fit", "d3", "--frame", "unknown")
     assert re.search(r"d3 +5\.[45]\d+ ", text)
     assert "frame_rz" in text
 
 
 @pytest.mark.parametrize("robot", ["puma560", "config/robots/scara.yaml"])
-def test_other_chains_and_choices_are_taken(calibrate, robot):
+def test_other_chains_and_choices_are_taken(calibrate: Callable[..., str], robot: str) -> None:
     text = calibrate(
         "--robot", robot, "--errors", "prototype", "theta1=2e-3", "--choose", "random", "--seed", 3
     )
@@ -111,5 +122,7 @@ def test_other_chains_and_choices_are_taken(calibrate, robot):
         (("--out", "nowhere/arm.yaml"), "nowhere"),
     ],
 )
-def test_wrong_use_is_one_line_that_says_what_is_right(calibrate, arguments, message):
+def test_wrong_use_is_one_line_that_says_what_is_right(
+    calibrate: Callable[..., str], arguments: tuple[str | int, ...], message: str
+) -> None:
     assert message in calibrate(*arguments, code=2)

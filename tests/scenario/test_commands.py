@@ -8,6 +8,7 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ import yaml
 from numba.core import event
 from scipy.spatial.transform import Rotation
 
+from present import present
 from teleop_core.bags.reader import Bag
 from teleop_core.bags.writer import BagWriter
 from teleop_core.commands.progress import Progress, say_work
@@ -22,16 +24,19 @@ from teleop_core.graph import topics
 from teleop_core.graph.topics import STREAMS
 from teleop_core.robots import load_robot
 
+if TYPE_CHECKING:
+    from conftest import Run
+
 COMPILING = "compiling kernels"
 
 
-def lead():
+def lead() -> int:
     """Ticks in which the slave moves from home to where it starts, at half of its speed limits.
 
     A cubic move is 1.5 times as fast in its middle as it is on average.
     """
     robot = load_robot("rcrt1")
-    times = 1.5 * np.abs(robot.start - robot.home) / (0.5 * robot.drives.speed_limit)
+    times = 1.5 * np.abs(robot.start - robot.home) / (0.5 * present(robot.drives).speed_limit)
     return math.ceil(times.max() / 1e-3)
 
 
@@ -47,14 +52,16 @@ def one_line(done: subprocess.CompletedProcess[str]) -> str:
     return lines[0]
 
 
-def test_sim_records_every_stream_at_1_khz(recording):
+def test_sim_records_every_stream_at_1_khz(recording: Path) -> None:
     bag = Bag(recording)
     for topic in STREAMS:
         assert bag.topics[topic.name].count == TICKS
 
 
 @pytest.mark.slow
-def test_the_same_seed_gives_the_same_bytes_and_another_seed_does_not(teleop, tmp_path):
+def test_the_same_seed_gives_the_same_bytes_and_another_seed_does_not(
+    teleop: "Run", tmp_path: Path
+) -> None:
     bytes_of = []
     for folder, seed in (("a", 3), ("b", 3), ("c", 4)):
         out = tmp_path / folder / "bag"
@@ -64,7 +71,9 @@ def test_the_same_seed_gives_the_same_bytes_and_another_seed_does_not(teleop, tm
     assert bytes_of[0] != bytes_of[2]
 
 
-def test_replay_with_the_same_configuration_is_bit_identical(teleop, recording, tmp_path):
+def test_replay_with_the_same_configuration_is_bit_identical(
+    teleop: "Run", recording: Path, tmp_path: Path
+) -> None:
     teleop("replay", recording, "--out", tmp_path / "again")
     first, again = Bag(recording), Bag(tmp_path / "again")
     for topic in STREAMS:
@@ -73,7 +82,9 @@ def test_replay_with_the_same_configuration_is_bit_identical(teleop, recording, 
         assert np.array_equal(a.stamp_ns, b.stamp_ns), topic.name
 
 
-def test_replay_with_another_configuration_answers_what_if(teleop_again, recording, tmp_path):
+def test_replay_with_another_configuration_answers_what_if(
+    teleop_again: "Run", recording: Path, tmp_path: Path
+) -> None:
     teleop_again("replay", recording, "--out", tmp_path / "what_if", "--set", "fine_gain=0.5")
     first, other = Bag(recording), Bag(tmp_path / "what_if")
     assert np.array_equal(
@@ -85,7 +96,7 @@ def test_replay_with_another_configuration_answers_what_if(teleop_again, recordi
     assert np.abs(a - b).max() > 1e-3
 
 
-def test_a_recording_stores_what_repeats_it(recording):
+def test_a_recording_stores_what_repeats_it(recording: Path) -> None:
     metadata = Bag(recording).metadata
     stored = yaml.safe_load(metadata["configuration"])
     assert metadata["scenario"] == "mode_switching"
@@ -94,7 +105,7 @@ def test_a_recording_stores_what_repeats_it(recording):
     assert stored["operator"]["ros__parameters"]["buttons.fixture"] == [2.0, 11.0]
 
 
-def test_state_reports_every_change_of_clutch_mode_and_box(recording):
+def test_state_reports_every_change_of_clutch_mode_and_box(recording: Path) -> None:
     reports = Bag(recording).reports(topics.TELEOP_STATE)
     told = [(r.stamp_ns, r.message) for r in reports]
     assert told[0][1].startswith("ALIGNING")
@@ -110,7 +121,9 @@ def test_state_reports_every_change_of_clutch_mode_and_box(recording):
     assert "box" not in at[11.0]
 
 
-def test_evaluate_prints_a_table_and_writes_json_and_page(teleop, recording, tmp_path):
+def test_evaluate_prints_a_table_and_writes_json_and_page(
+    teleop: "Run", recording: Path, tmp_path: Path
+) -> None:
     scores, page = tmp_path / "scores.json", tmp_path / "page.html"
     done = teleop("evaluate", recording, "--json", scores, "--html", page)
     assert "position, RMS mm" in done.stdout
@@ -124,8 +137,8 @@ def test_evaluate_prints_a_table_and_writes_json_and_page(teleop, recording, tmp
 
 
 def test_a_process_that_has_loaded_tells_wrong_use_as_a_fresh_one_does(
-    teleop, teleop_again, tmp_path
-):
+    teleop: "Run", teleop_again: "Run", tmp_path: Path
+) -> None:
     wrong = ("sim", "--set", "robot=r2d2", "--out", tmp_path / "bag")
     fresh, copied = (one_line(run(*wrong, code=2)) for run in (teleop, teleop_again))
     assert copied == fresh
@@ -147,7 +160,9 @@ def test_a_process_that_has_loaded_tells_wrong_use_as_a_fresh_one_does(
         (["--config", "/nowhere.yaml"], ["/nowhere.yaml", "No such file"]),
     ],
 )
-def test_sim_refuses_wrong_input_in_one_line(teleop_again, tmp_path, arguments, words):
+def test_sim_refuses_wrong_input_in_one_line(
+    teleop_again: "Run", tmp_path: Path, arguments: list[str], words: list[str]
+) -> None:
     line = one_line(teleop_again("sim", *arguments, "--out", tmp_path / "bag", code=2))
     for word in words:
         assert word in line
@@ -165,7 +180,9 @@ def test_sim_refuses_wrong_input_in_one_line(teleop_again, tmp_path, arguments, 
         ("slave: {ros__parameters: {command_timeout: 1}}", "float"),
     ],
 )
-def test_sim_refuses_wrong_parameter_files_in_one_line(teleop_again, tmp_path, text, word):
+def test_sim_refuses_wrong_parameter_files_in_one_line(
+    teleop_again: "Run", tmp_path: Path, text: str, word: str
+) -> None:
     file = tmp_path / "wrong.yaml"
     file.write_text(text)
     assert word in one_line(
@@ -174,7 +191,9 @@ def test_sim_refuses_wrong_parameter_files_in_one_line(teleop_again, tmp_path, t
 
 
 @pytest.mark.slow
-def test_an_existing_output_is_never_overwritten(teleop, recording, tmp_path):
+def test_an_existing_output_is_never_overwritten(
+    teleop: "Run", recording: Path, tmp_path: Path
+) -> None:
     for command in (("sim",), ("replay", recording)):
         line = one_line(teleop(*command, "--out", recording, code=2))
         assert "exists" in line
@@ -187,7 +206,7 @@ def make_foreign(path: Path) -> None:
         writer.write_block({topics.MASTER_BUTTONS: (stamps, np.zeros((2, 3)), stamps)})
 
 
-def test_replay_and_evaluate_name_what_a_bag_lacks(teleop_again, tmp_path):
+def test_replay_and_evaluate_name_what_a_bag_lacks(teleop_again: "Run", tmp_path: Path) -> None:
     make_foreign(tmp_path / "foreign")
     replay, evaluate = ("replay", "--out", tmp_path / "out"), ("evaluate",)
     for command, lacking in ((replay, "no topic of poses"), (evaluate, "measured_cp")):
@@ -197,7 +216,9 @@ def test_replay_and_evaluate_name_what_a_bag_lacks(teleop_again, tmp_path):
     assert not (tmp_path / "out").exists()
 
 
-def test_a_missing_a_truncated_and_an_empty_bag_are_told_apart(teleop_again, recording, tmp_path):
+def test_a_missing_a_truncated_and_an_empty_bag_are_told_apart(
+    teleop_again: "Run", recording: Path, tmp_path: Path
+) -> None:
     assert "does not exist" in one_line(teleop_again("evaluate", tmp_path / "none", code=2))
     cut = tmp_path / "cut"
     shutil.copytree(recording, cut)
@@ -209,7 +230,9 @@ def test_a_missing_a_truncated_and_an_empty_bag_are_told_apart(teleop_again, rec
     assert "no messages" in one_line(teleop_again("evaluate", tmp_path / "empty", code=2))
 
 
-def test_recover_saves_what_a_truncated_bag_holds(teleop, recording, tmp_path):
+def test_recover_saves_what_a_truncated_bag_holds(
+    teleop: "Run", recording: Path, tmp_path: Path
+) -> None:
     cut = tmp_path / "cut"
     shutil.copytree(recording, cut)
     file = next(cut.glob("*.mcap"))
@@ -221,7 +244,7 @@ def test_recover_saves_what_a_truncated_bag_holds(teleop, recording, tmp_path):
 
 
 @pytest.mark.slow
-def test_lookups_answer_without_a_session(teleop):
+def test_lookups_answer_without_a_session(teleop: "Run") -> None:
     assert "coarse_box" in teleop("scenarios").stdout
     assert "motion_scaling.fine_gain" in teleop("parameters").stdout
     assert "slave_sim" not in teleop("parameters", "motion_scaling").stdout
@@ -232,7 +255,7 @@ def test_lookups_answer_without_a_session(teleop):
     assert "motion_scaling" in one_line(teleop("parameters", "nobody", code=2))
 
 
-def test_help_answers_without_numpy(teleop):
+def test_help_answers_without_numpy(teleop: "Run") -> None:
     code = "import sys; from teleop_core import cli; cli.main(['--help'])"
     done = subprocess.run(
         [sys.executable, "-X", "importtime", "-c", code],
@@ -245,7 +268,7 @@ def test_help_answers_without_numpy(teleop):
 
 
 @pytest.mark.slow
-def test_progress_shows_on_a_terminal_and_not_in_a_pipe(teleop, tmp_path):
+def test_progress_shows_on_a_terminal_and_not_in_a_pipe(teleop: "Run", tmp_path: Path) -> None:
     piped = teleop("sim", "--duration", 1, "--out", tmp_path / "piped")
     assert "simulating" not in piped.stderr
     reader, terminal = pty.openpty()
@@ -265,7 +288,9 @@ def test_progress_shows_on_a_terminal_and_not_in_a_pipe(teleop, tmp_path):
     assert b"simulating" in shown
 
 
-def test_compiling_is_told_while_something_compiles_and_at_no_other_time(capsys):
+def test_compiling_is_told_while_something_compiles_and_at_no_other_time(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
     assert not say_work()
     assert capsys.readouterr().err == ""
     with event.trigger_event("numba:compile"):  # what numba itself does around its compiler
@@ -273,14 +298,14 @@ def test_compiling_is_told_while_something_compiles_and_at_no_other_time(capsys)
     assert capsys.readouterr().err == f"{COMPILING}, once …\n"
 
 
-def test_sessions_of_an_experiment_are_counted():
+def test_sessions_of_an_experiment_are_counted() -> None:
     progress = Progress()
     for done in (1, 5, 10, 1, 10, 3):
         progress(done, 10)
     assert progress.sessions == 3
 
 
-def test_the_shell_completes_commands_and_options(tmp_path):
+def test_the_shell_completes_commands_and_options(tmp_path: Path) -> None:
     for line, expected in (("teleop ev", "evaluate"), ("teleop import --pre", "--preset")):
         answer = tmp_path / "answer"
         environment = os.environ | {
@@ -294,7 +319,7 @@ def test_the_shell_completes_commands_and_options(tmp_path):
 
 
 @pytest.mark.slow
-def test_an_operator_can_follow_a_recording(teleop, recording, tmp_path):
+def test_an_operator_can_follow_a_recording(teleop: "Run", recording: Path, tmp_path: Path) -> None:
     out = tmp_path / "followed"
     settings = ("path.kind=bag", f"path.bag={recording}", "tremor_amplitude=0.0")
     teleop("sim", "--duration", 8, "--out", out, "--set", *settings)

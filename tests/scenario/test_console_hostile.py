@@ -1,8 +1,12 @@
 """Hostile pages: nothing that they send moves an arm that they do not drive, or stops the stop."""
 
 import logging
+from collections.abc import Callable
+from typing import Any
 
 import pytest
+
+from present import present
 
 pytest.importorskip("viser")
 
@@ -18,7 +22,7 @@ pytestmark = pytest.mark.filterwarnings("ignore:Queued a")
 
 
 @pytest.fixture(scope="module")
-def served():
+def served() -> Any:
     """A page of a desk, drawn as the command draws it, and whoever drives it."""
     with shown(Desk()) as (server, desk), PageClient(server.port) as driver:
         until(lambda: server.drivers.driver is not None, "it drives")
@@ -26,7 +30,11 @@ def served():
 
 
 @pytest.mark.parametrize("attack", hostile.HOSTILE, ids=lambda attack: attack.__name__)
-def test_page_that(attack, served, caplog):
+def test_page_that(
+    attack: Callable[[PageClient, PageClient], None],
+    served: Any,
+    caplog: pytest.LogCaptureFixture,
+) -> None:
     server, desk, driver = served
     with PageClient(server.port) as watcher:
         desk.asked.clear()
@@ -45,7 +53,9 @@ def test_page_that(attack, served, caplog):
     until(lambda: server.viser.connections() == 1, "the page has gone")
 
 
-def handle_state(server, uuid):
+def handle_state(
+    server: ConsoleServer, uuid: str
+) -> tuple[str | bool, str, bool, bool, int, bool] | None:
     """What viser keeps of an element that pages could change."""
     handle = server.viser.gui._gui_input_handle_from_uuid.get(uuid)
     if handle is None:
@@ -55,7 +65,7 @@ def handle_state(server, uuid):
     return handle.value, handle.label, handle.visible, handle.disabled, callbacks, state.removed
 
 
-def test_driver_is_heard_all_the_same(served):
+def test_driver_is_heard_all_the_same(served: tuple[ConsoleServer, Desk, PageClient]) -> None:
     server, desk, driver = served
     desk.asked.clear()
     driver.say({"type": "TransformControlsDragStartMessage", "name": driver.gizmos[0], "owner": ""})
@@ -65,10 +75,12 @@ def test_driver_is_heard_all_the_same(served):
     driver.click("Home")
     until(lambda: "home" in desk.asked, "it goes home")
     driver.set(driver.elements["dark"], value=True)
-    until(lambda: handle_state(server, driver.elements["dark"])[0], "it is dark")
+    until(lambda: present(handle_state(server, driver.elements["dark"]))[0], "it is dark")
 
 
-def test_stop_is_sent_while_every_press_of_a_button_waits_for_an_arm_that_does_not_answer(served):
+def test_stop_is_sent_while_every_press_of_a_button_waits_for_an_arm_that_does_not_answer(
+    served: tuple[ConsoleServer, Desk, PageClient],
+) -> None:
     _, desk, driver = served
     desk.obeys.clear()
     try:
@@ -83,7 +95,9 @@ def test_stop_is_sent_while_every_press_of_a_button_waits_for_an_arm_that_does_n
         desk.obeys.set()
 
 
-def test_what_a_watching_page_changed_on_its_own_screen_is_put_back(served):
+def test_what_a_watching_page_changed_on_its_own_screen_is_put_back(
+    served: tuple[ConsoleServer, Desk, PageClient],
+) -> None:
     server, _, _ = served
     with PageClient(server.port) as watcher:
         uuid = watcher.elements["paths"]
@@ -91,7 +105,7 @@ def test_what_a_watching_page_changed_on_its_own_screen_is_put_back(served):
         until(lambda: watcher.values.get(uuid, [])[-1:] == [True], "it is shown as it is")
 
 
-def test_refusals_are_counted_and_each_kind_is_said_once(caplog):
+def test_refusals_are_counted_and_each_kind_is_said_once(caplog: pytest.LogCaptureFixture) -> None:
     with ConsoleServer(0) as server, PageClient(server.port, comes_up=False) as page:
         for _ in range(50):
             page.raw(b"nothing")
@@ -106,7 +120,7 @@ def test_refusals_are_counted_and_each_kind_is_said_once(caplog):
     assert len(said) == len(counts)
 
 
-def test_the_stop_is_nobodys_where_there_is_no_session():
+def test_the_stop_is_nobodys_where_there_is_no_session() -> None:
     with ConsoleServer(0) as server:
         assert ask(server.port, "/stop", Teleop_Page="new")[0] == 409
         assert ask(server.port, "/alive", Teleop_Page="new")[1]["can_stop"] is False

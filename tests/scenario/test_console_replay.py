@@ -1,6 +1,13 @@
 """Replay on the console's page: a real browser shows a recording as it was at any time."""
 
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
 import pytest
+
+from headless import Headless
+from teleop_core.kernels.geometry import Array
 
 pytest.importorskip("viser")
 
@@ -18,7 +25,7 @@ STILL = 3e-5  # poses that differ less from what is drawn are not sent [m]
 
 
 @pytest.fixture(scope="module")
-def page(recording, tmp_path_factory):
+def page(recording: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Headless]:
     """Page of a recording in a browser."""
     console = ConsoleProcess(tmp_path_factory.mktemp("console"), recording)
     try:
@@ -30,14 +37,14 @@ def page(recording, tmp_path_factory):
         assert console.end() == 0, console.text
 
 
-def go_to(page, time):
+def go_to(page: Any, time: float) -> None:
     """Write a time [s] beside its slider."""
     page.fill("time", f"{time:.3f}")
     page.key("Enter")
     page.until(f"{SHOWN} === '{time:.2f}'")
 
 
-def measured(recording, time):
+def measured(recording: Path, time: float) -> Array:
     """Where the tip was last measured by a time since the begin [m], as the recording says."""
     bag = Bag(recording)
     series = bag.read(SLAVE_MEASURED_CP)
@@ -46,7 +53,9 @@ def measured(recording, time):
 
 
 @pytest.mark.parametrize("time", [9.5, 4.25, 11.0])
-def test_tip_is_shown_where_the_recording_says_at_a_time(page, recording, time):
+def test_tip_is_shown_where_the_recording_says_at_a_time(
+    page: Any, recording: Path, time: float
+) -> None:
     go_to(page, time)
     wanted = measured(recording, time)
     page.until(f"""{page.place_of(TIP)}.every((x, i) => Math.abs(
@@ -54,7 +63,7 @@ def test_tip_is_shown_where_the_recording_says_at_a_time(page, recording, time):
     assert not page.faults()
 
 
-def test_replay_plays_pauses_and_steps(page):
+def test_replay_plays_pauses_and_steps(page: Any) -> None:
     go_to(page, 2.0)
     page.click("Play")
     page.shows("Pause")
@@ -74,12 +83,12 @@ def test_replay_plays_pauses_and_steps(page):
     page.until("!document.body.innerText.includes('Pause')")  # or the time is written over
 
 
-def test_recording_cannot_be_driven_from_the_page(page):
+def test_recording_cannot_be_driven_from_the_page(page: Headless) -> None:
     assert not page.value("document.body.innerText.includes('EMERGENCY STOP')")
     assert not page.value("document.body.innerText.includes('Initialize')")
 
 
-def test_pictures_from_tool_and_microscope_show_the_scene(page):
+def test_pictures_from_tool_and_microscope_show_the_scene(page: Any) -> None:
     go_to(page, 6.0)
     page.click("View")
     page.click("show")

@@ -3,11 +3,17 @@
 import asyncio
 import threading
 from collections import deque
+from collections.abc import Iterator
 from functools import partial
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from typing import Any
 
 import numpy as np
 import pytest
+
+from headless import Headless
+from present import present
+from teleop_core.kernels.geometry import Array
 
 pytest.importorskip("viser")
 
@@ -28,19 +34,19 @@ CENTER = (700, 450)
 
 
 @pytest.fixture(scope="module")
-def tab(tmp_path_factory):
+def tab(tmp_path_factory: pytest.TempPathFactory) -> Any:
     with Tab(tmp_path_factory.mktemp("first")) as opened:
         yield opened
 
 
 @pytest.fixture(scope="module")
-def other(tmp_path_factory):
+def other(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Headless]:
     with Tab(tmp_path_factory.mktemp("second")) as opened:
         yield opened
 
 
 @pytest.fixture(autouse=True)
-def _clean(request):
+def _clean(request: pytest.FixtureRequest) -> None:
     """Each test has its tabs empty and with no memory of errors."""
     for name in {"tab", "other"} & set(request.fixturenames):
         opened = request.getfixturevalue(name)
@@ -50,11 +56,13 @@ def _clean(request):
             kept.clear()
 
 
-def is_driven(server):
+def is_driven(server: ConsoleServer) -> bool:
     return server.drivers.driver is not None
 
 
-def test_page_opens_without_errors_asks_no_other_host_and_is_used(tab, capfd):
+def test_page_opens_without_errors_asks_no_other_host_and_is_used(
+    tab: Any, capfd: pytest.CaptureFixture[str]
+) -> None:
     with ConsoleServer(0, token="secret", label="arm") as server:
         clicks = []
         server.viser.gui.add_button("Start").on_click(lambda event: clicks.append(event.client_id))
@@ -71,7 +79,7 @@ def test_page_opens_without_errors_asks_no_other_host_and_is_used(tab, capfd):
     assert capfd.readouterr() == ("", "")
 
 
-def test_page_without_the_token_is_refused_until_it_has_shown_it_once(tab):
+def test_page_without_the_token_is_refused_until_it_has_shown_it_once(tab: Any) -> None:
     with ConsoleServer(0, token="secret") as server:
         address = server.url.split("?", maxsplit=1)[0]
         for wrong in (address, address + "?token=guess"):
@@ -85,7 +93,7 @@ def test_page_without_the_token_is_refused_until_it_has_shown_it_once(tab):
         assert tab.value("document.cookie") == ""  # no script can read it
 
 
-def test_page_of_another_origin_gets_no_connection_no_frame_and_no_answer(tab):
+def test_page_of_another_origin_gets_no_connection_no_frame_and_no_answer(tab: Any) -> None:
     with ConsoleServer(0) as server, elsewhere() as foreign:
         tab.call("Page.navigate", url=foreign)
         tab.until("document.body")
@@ -103,35 +111,37 @@ def test_page_of_another_origin_gets_no_connection_no_frame_and_no_answer(tab):
         assert server.drivers.pages == (0,)
 
 
-def elsewhere():
+def elsewhere() -> "Elsewhere":
     """Address of a harmless page that another server of this machine has."""
     return Elsewhere()
 
 
 class Elsewhere:
     class Answer(BaseHTTPRequestHandler):
-        def do_GET(self):
+        def do_GET(self) -> None:
             self.send_response(200)
             self.end_headers()
             self.wfile.write(b"<body>somewhere else</body>")
 
-        def log_message(self, *told):
+        def log_message(self, *told: object) -> None:
             pass
 
-    def __enter__(self):
+    def __enter__(self) -> str:
         self._server = ThreadingHTTPServer(("127.0.0.1", 0), self.Answer)
         threading.Thread(target=self._server.serve_forever, daemon=True).start()
         return f"http://127.0.0.1:{self._server.server_port}/"
 
-    def __exit__(self, *error):
+    def __exit__(self, *error: object) -> None:
         self._server.shutdown()
         self._server.server_close()
 
 
-def test_of_two_browsers_one_drives_and_a_reload_in_the_middle_keeps_it_so(tab, other):
+def test_of_two_browsers_one_drives_and_a_reload_in_the_middle_keeps_it_so(
+    tab: Any, other: Any
+) -> None:
     with ConsoleServer(0) as server:
         take = server.viser.gui.add_button("Take control")
-        take.on_click(lambda event: server.drivers.take(event.client_id))
+        take.on_click(lambda event: server.drivers.take(present(event.client_id)))
         server.viser.make_public(take)
         tab.visit(server.url)
         until(lambda: is_driven(server), "the first page is there")
@@ -149,7 +159,7 @@ def test_of_two_browsers_one_drives_and_a_reload_in_the_middle_keeps_it_so(tab, 
         assert not tab.faults()
 
 
-def test_browser_that_stands_still_while_it_holds_the_stylus_loses_control(tab):
+def test_browser_that_stands_still_while_it_holds_the_stylus_loses_control(tab: Any) -> None:
     with ConsoleServer(0, patience=2.5) as server:
         held = []
         gizmo = server.viser.scene.add_transform_controls("/stylus", scale=2.0)
@@ -169,15 +179,15 @@ def test_browser_that_stands_still_while_it_holds_the_stylus_loses_control(tab):
         assert server.drivers.pages == (page,)  # its connection is well: a worker answers
 
 
-def gizmo_tip(tab):
+def gizmo_tip(tab: Headless) -> Any:
     """A point of the upward arrow of a gizmo at the origin [px]: where the cursor grabs it."""
     tab.value("new Promise((done) => setTimeout(done, 500))")
     return (CENTER[0], CENTER[1] - 40)
 
 
 def test_client_that_never_reads_costs_little_and_is_dropped_while_others_are_served(
-    tab, monkeypatch
-):
+    tab: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(connection, "STUCK", 1.0)
     with ConsoleServer(0) as server:
         scene = server.viser.scene
@@ -192,9 +202,9 @@ def test_client_that_never_reads_costs_little_and_is_dropped_while_others_are_se
         until(lambda: server.viser.connections() == 1, "the page that never reads")
         tab.visit(server.url)
         until(lambda: is_driven(server), "the page is there")
-        kept = []
+        kept: list[Any] = []
 
-        def went():
+        def went() -> bool:
             for _ in range(20):
                 body.position = (0.001 * len(kept), 0.0, 0.0)
                 mesh.points = cloud(len(kept))["points"]
@@ -208,12 +218,12 @@ def test_client_that_never_reads_costs_little_and_is_dropped_while_others_are_se
         dead.close()
 
 
-def cloud(seed):
+def cloud(seed: int) -> dict[Any, Any]:
     points = np.random.default_rng(seed).normal(size=(20_000, 3)).astype(np.float32)
     return {"points": points, "colors": np.zeros((20_000, 3), np.uint8)}
 
 
-def test_page_is_led_out_of_the_machine_by_nobody(tab):
+def test_page_is_led_out_of_the_machine_by_nobody(tab: Any) -> None:
     with ConsoleServer(0) as server:
         tab.visit(server.url)
         until(lambda: is_driven(server), "the page is there")
@@ -225,12 +235,12 @@ def test_page_is_led_out_of_the_machine_by_nobody(tab):
             server.viser.request_share_url()
 
 
-def test_port_of_another_console_is_refused_and_not_counted_up():
+def test_port_of_another_console_is_refused_and_not_counted_up() -> None:
     with ConsoleServer(0) as server, pytest.raises(SessionError, match="taken by"):
         ConsoleServer(server.port)
 
 
-def test_other_addresses_than_the_loopback_are_served_with_a_token_alone():
+def test_other_addresses_than_the_loopback_are_served_with_a_token_alone() -> None:
     with ConsoleServer(0, "0.0.0.0") as server:
         assert len(server.token) >= 32
         assert server.url == f"http://localhost:{server.port}/?token={server.token}"
@@ -243,10 +253,11 @@ def test_other_addresses_than_the_loopback_are_served_with_a_token_alone():
         assert server.token == ""
 
 
-def test_message_that_is_drawn_just_before_its_reader_waits_is_sent():
-    async def read():
+def test_message_that_is_drawn_just_before_its_reader_waits_is_sent() -> None:
+    async def read() -> bool:
         # As viser makes its buffers, once the console's hooks are in place.
-        buffer = _infra.AsyncMessageBuffer(asyncio.get_running_loop(), persistent_messages=True)
+        infra: Any = _infra
+        buffer = infra.AsyncMessageBuffer(asyncio.get_running_loop(), persistent_messages=True)
         message = _messages.RunJavascriptMessage("drawn")
         buffer.message_event._waiters = AfterDrawing(partial(buffer.push, message))
         return await asyncio.wait_for(anext(buffer.window_generator(0)), 20) == [message]
@@ -254,14 +265,14 @@ def test_message_that_is_drawn_just_before_its_reader_waits_is_sent():
     assert asyncio.run(read())
 
 
-class AfterDrawing(deque):
+class AfterDrawing(deque[Any]):
     """Who waits for an event; each comes only after another thread has drawn once."""
 
-    def __init__(self, draw):
+    def __init__(self, draw: partial[None]) -> None:
         super().__init__()
         self._draw = draw
 
-    def append(self, waiter):
+    def append(self, waiter: int | Array | None) -> None:
         drawing = threading.Thread(target=self._draw)
         drawing.start()
         drawing.join()

@@ -1,6 +1,12 @@
 """The page's emergency stop: in view at any scroll, and seen by all pages when pressed."""
 
+from collections.abc import Iterator
+from typing import Any
+
 import pytest
+
+from headless import Headless
+from teleop_core.console.server import ConsoleServer
 
 pytest.importorskip("viser")
 
@@ -25,13 +31,13 @@ DEAD = """[...document.querySelectorAll('button')].filter((b) =>
 
 
 @pytest.fixture(scope="module")
-def tab(tmp_path_factory):
+def tab(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Headless]:
     with Tab(tmp_path_factory.mktemp("stop"), 390, 780) as opened:
         yield opened
 
 
 @pytest.fixture(autouse=True)
-def _clean(tab):
+def _clean(tab: Any) -> Iterator[None]:
     """Each test begins with an empty tab and with no memory of errors."""
     yield
     tab.call("Page.navigate", url="about:blank")
@@ -40,7 +46,9 @@ def _clean(tab):
 
 
 @pytest.mark.parametrize("size", [(390, 780), (780, 390), (1400, 900)])
-def test_stop_is_in_view_at_any_scroll_and_the_page_looks_stopped_when_it_was_pressed(tab, size):
+def test_stop_is_in_view_at_any_scroll_and_the_page_looks_stopped_when_it_was_pressed(
+    tab: Any, size: tuple[int, int]
+) -> None:
     tab.resize(*size)
     with shown(Desk(is_stoppable=True)) as (server, desk):
         tab.visit(server.url)
@@ -62,12 +70,12 @@ def test_stop_is_in_view_at_any_scroll_and_the_page_looks_stopped_when_it_was_pr
         assert not tab.faults()
 
 
-def gizmos(server):
+def gizmos(server: ConsoleServer) -> list[Any]:
     """All styli's handles that the server shows."""
     return list(server.viser.scene._handle_from_transform_controls_name.values())
 
 
-def test_space_stops_from_anywhere_but_a_field_in_which_it_is_typed(tab):
+def test_space_stops_from_anywhere_but_a_field_in_which_it_is_typed(tab: Any) -> None:
     with shown(Desk(is_stoppable=True)) as (server, desk):
         tab.visit(server.url)
         tab.shows("ENABLED")
@@ -81,7 +89,9 @@ def test_space_stops_from_anywhere_but_a_field_in_which_it_is_typed(tab):
         until(lambda: desk.stops == 1, "the stop is heard")
 
 
-def test_every_page_looks_stopped_whoever_pressed_and_says_when_the_console_is_gone(tab):
+def test_every_page_looks_stopped_whoever_pressed_and_says_when_the_console_is_gone(
+    tab: Any,
+) -> None:
     with shown(Desk(is_stoppable=True)) as (server, desk):
         tab.visit(server.url)
         tab.shows("ENABLED")

@@ -1,11 +1,13 @@
 """Control laws in sessions on the hardware plant, and their comparison as an experiment."""
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
 
 import teleop_core as tc
+from present import present
 from teleop_core.graph.topics import NO_COMMAND_NS
 from teleop_core.robots import load_robot
 from teleop_lab.experiments.bench import Bench
@@ -16,15 +18,15 @@ SHORT = 16.0
 
 
 @pytest.fixture(scope="module")
-def bench():
+def bench() -> Bench:
     return Bench(seed=5, settings={"duration": SHORT})
 
 
 @pytest.mark.parametrize("scenario", ["coarse_box", "fine_box"])
 @pytest.mark.parametrize("law", BETTER)
 def test_law_tracks_within_three_resolutions_on_the_plant_that_predicts_the_machine(
-    bench, scenario, law
-):
+    bench: Bench, scenario: str, law: str
+) -> None:
     found = tracking_of(bench.session(scenario, settings={"plant": "hardware", **LAWS[law]}))
     assert found.rms <= GOAL_UM
     source = tracking_of(
@@ -34,8 +36,8 @@ def test_law_tracks_within_three_resolutions_on_the_plant_that_predicts_the_mach
     assert found.chatter < 0.5 * source.chatter
 
 
-def test_tracking_is_what_its_definition_gives_of_the_recording():
-    law = {"plant": "hardware", "controller": "adaptive", "duration": 6.0}
+def test_tracking_is_what_its_definition_gives_of_the_recording() -> None:
+    law: dict[str, Any] = {"plant": "hardware", "controller": "adaptive", "duration": 6.0}
     bench = Bench(seed=2)
     found = tracking_of(bench.session("fine_box", settings=law))
     recording = tc.run("fine_box", seed=2, settings=law)
@@ -55,26 +57,26 @@ def test_tracking_is_what_its_definition_gives_of_the_recording():
     assert math.isclose(found.true_spread, spread, rel_tol=1e-9)
     robot = load_robot("rcrt1")
     efforts = frames["measured_js"][[f"{name}.effort" for name in robot.joint_names]].iloc[kept]
-    change = (efforts / robot.drives.effort_limit).diff().dropna()
+    change = (efforts / present(robot.drives).effort_limit).diff().dropna()
     assert math.isclose(found.chatter, 100.0 * np.sqrt((change**2).to_numpy().mean()), rel_tol=1e-9)
 
 
-def test_same_session_of_a_law_is_run_once(bench):
+def test_same_session_of_a_law_is_run_once(bench: Bench) -> None:
     before = bench.session("fine_box", settings={"plant": "hardware", **LAWS["adaptive"]})
     count = bench.runs
     assert bench.session("fine_box", settings={"plant": "hardware", **LAWS["adaptive"]}) is before
     assert bench.runs == count
 
 
-def test_sessions_compared_differ_in_their_hands_alone(bench):
+def test_sessions_compared_differ_in_their_hands_alone(bench: Bench) -> None:
     sessions = compared(bench, "fine_box", "adaptive")
     assert [one.seed for one in sessions] == [5, 6, 7]
     assert {one.name for one in sessions} == {"fine_box"}
 
 
-def test_law_that_learns_suffers_least_from_friction_that_is_not_as_known(bench):
-    twice = tuple(2.0 * value for value in load_robot("rcrt1").hardware.coulomb)
-    settings = {"plant": "hardware", "plant.hardware.coulomb": twice}
+def test_law_that_learns_suffers_least_from_friction_that_is_not_as_known(bench: Bench) -> None:
+    twice = tuple(2.0 * value for value in present(load_robot("rcrt1").hardware).coulomb)
+    settings: Any = {"plant": "hardware", "plant.hardware.coulomb": twice}
     known, learned = (
         tracking_of(bench.session("coarse_box", settings={**settings, **LAWS[law]})).rms
         for law in ("friction_compensation", "adaptive")

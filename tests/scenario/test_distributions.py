@@ -2,7 +2,9 @@
 
 import subprocess
 import sys
+from collections.abc import Callable, Iterator
 from importlib.metadata import EntryPoint, entry_points
+from pathlib import Path
 
 import pytest
 
@@ -23,7 +25,7 @@ sys.exit(cli.main(sys.argv[1:]))
 """Command of the core, as if neither of the others were installed."""
 
 
-def alone(*words, code=0):
+def alone(*words: object, code: int = 0) -> subprocess.CompletedProcess[str]:
     done = subprocess.run(
         [sys.executable, "-c", ALONE, *map(str, words)], capture_output=True, text=True, check=False
     )
@@ -32,10 +34,10 @@ def alone(*words, code=0):
 
 
 @pytest.fixture
-def entries(monkeypatch):
+def entries(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[..., None]]:
     """Replace the installed commands: ``entries(polish="module:add")``."""
 
-    def replace(**places):
+    def replace(**places: str) -> None:
         group = [EntryPoint(name, place, installed.GROUP) for name, place in places.items()]
         monkeypatch.setattr("importlib.metadata.entry_points", lambda **_: group)
         cli._core.cache_clear()
@@ -47,7 +49,7 @@ def entries(monkeypatch):
 
 
 @pytest.mark.slow
-def test_core_alone_runs_replays_and_scores_a_session(tmp_path):
+def test_core_alone_runs_replays_and_scores_a_session(tmp_path: Path) -> None:
     alone("sim", "--duration", 1, "--out", tmp_path / "bag")
     alone("replay", tmp_path / "bag", "--out", tmp_path / "again")
     scores = tmp_path / "scores.json"
@@ -57,8 +59,8 @@ def test_core_alone_runs_replays_and_scores_a_session(tmp_path):
 
 @pytest.mark.parametrize(("name", "distribution"), installed.RELEASED_TOGETHER.items())
 def test_command_of_a_missing_distribution_says_what_to_install(
-    entries, capsys, name, distribution
-):
+    entries: Callable[..., None], capsys: pytest.CaptureFixture[str], name: str, distribution: str
+) -> None:
     entries()
     with pytest.raises(SystemExit, match="2"):
         cli.main([name, "--list"])
@@ -66,13 +68,15 @@ def test_command_of_a_missing_distribution_says_what_to_install(
     assert capsys.readouterr().err == text
 
 
-def test_commands_of_the_other_distributions_are_where_the_advice_says():
+def test_commands_of_the_other_distributions_are_where_the_advice_says() -> None:
     found = {entry.name: entry.module for entry in entry_points(group=installed.GROUP)}
     places = installed.RELEASED_TOGETHER.items()
     assert found.items() >= {(name, f"{package}.commands.{name}") for name, package in places}
 
 
-def test_commands_of_the_core_ask_no_installed_package(monkeypatch, capsys):
+def test_commands_of_the_core_ask_no_installed_package(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     monkeypatch.setattr(installed, "add", lambda _: pytest.fail("looked for installed commands"))
     cli._parser.cache_clear()
     cli._core.cache_clear()
@@ -91,11 +95,13 @@ def test_commands_of_the_core_ask_no_installed_package(monkeypatch, capsys):
         ([], None),
     ],
 )
-def test_command_is_the_first_word_that_is_no_option(words, name):
+def test_command_is_the_first_word_that_is_no_option(words: list[str], name: str | None) -> None:
     assert cli._command_of(words) == name
 
 
-def test_command_that_cannot_be_loaded_is_named_and_the_others_work(entries, capsys):
+def test_command_that_cannot_be_loaded_is_named_and_the_others_work(
+    entries: Callable[..., None], capsys: pytest.CaptureFixture[str]
+) -> None:
     entries(broken="no_such_module:add", drill="teleop_drill.commands.drill:add")
     assert cli.main(["drill", "--list"]) == 0
     captured = capsys.readouterr()
@@ -106,7 +112,9 @@ def test_command_that_cannot_be_loaded_is_named_and_the_others_work(entries, cap
     )
 
 
-def test_installed_command_does_not_replace_one_of_the_core(entries, capsys):
+def test_installed_command_does_not_replace_one_of_the_core(
+    entries: Callable[..., None], capsys: pytest.CaptureFixture[str]
+) -> None:
     entries(scenarios="no_such_module:add", drill="teleop_drill.commands.drill:add")
     assert cli.main(["scenarios"]) == 0
     assert cli.main(["drill", "--list"]) == 0

@@ -8,6 +8,7 @@ import sys
 import tomllib
 import xml.etree.ElementTree as ET
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -15,8 +16,8 @@ import teleop_core
 import teleop_drill
 import teleop_lab
 from teleop_core.cli import _parser
+from teleop_core.graph.layers import parse_setting
 from teleop_core.session.api import configuration
-from teleop_core.session.configuration import parse_setting
 from teleop_core.session.virtual import VirtualTime
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -61,7 +62,7 @@ def run(code: list[str], folder: Path, **env: str) -> "subprocess.CompletedProce
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_every_relative_link_leads_somewhere(name):
+def test_every_relative_link_leads_somewhere(name: str) -> None:
     for target in re.findall(r"\]\(([^)\s]+)\)", text_of(name)):
         if "://" in target:
             continue
@@ -73,7 +74,7 @@ def test_every_relative_link_leads_somewhere(name):
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_every_teleop_command_parses_with_its_settings(name):
+def test_every_teleop_command_parses_with_its_settings(name: str) -> None:
     for line in commands(text_of(name)):
         words = shlex.split(line, comments=True)
         arguments = _parser().parse_args([word for word in words if word != "..."])
@@ -83,12 +84,14 @@ def test_every_teleop_command_parses_with_its_settings(name):
 
 
 @pytest.mark.slow
-def test_every_session_of_a_documented_command_can_be_begun(tmp_path, monkeypatch):
+def test_every_session_of_a_documented_command_can_be_begun(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     for name in ("bags", "config", "examples"):
         (tmp_path / name).symlink_to(ROOT / name)
     (tmp_path / "my_arm.urdf").symlink_to(ROOT / "examples/ur5e.urdf")  # "yours" of a document
     monkeypatch.chdir(tmp_path)
-    parsers = next(action.choices for action in _parser()._actions if action.dest == "command")
+    parsers: Any = next(action.choices for action in _parser()._actions if action.dest == "command")
     helps = "\n".join(parser.format_help() for parser in parsers.values())
     shown = re.findall(r"^ +teleop (.+?)(?:  .*)?$", helps, re.MULTILINE)
     begun = set()
@@ -104,14 +107,14 @@ def test_every_session_of_a_documented_command_can_be_begun(tmp_path, monkeypatc
 
 
 @pytest.mark.parametrize("name", [name for name in NAMES if name != "CHANGELOG.md"])
-def test_no_sentence_has_more_words_than_the_style_allows(name):
+def test_no_sentence_has_more_words_than_the_style_allows(name: str) -> None:
     for paragraph in re.split(r"\n\s*\n|\n(?=- )", prose(name)):
         for sentence in re.split(r"(?<=[.!?:;])\s+| · ", " ".join(paragraph.split())):
             assert len(sentence.split()) <= STYLE["longest_sentence"], sentence
 
 
 @pytest.mark.parametrize("name", [name for name in NAMES if name not in HISTORY])
-def test_no_page_has_a_word_that_the_style_avoids(name):
+def test_no_page_has_a_word_that_the_style_avoids(name: str) -> None:
     text = re.sub(r"`[^`]*`", "", prose(name))
     for avoided, better in (STYLE["instead"] | STYLE["glossary"]).items():
         found = re.search(rf"\b(?:{avoided})", text, re.IGNORECASE)
@@ -126,7 +129,9 @@ def prose(name: str) -> str:
 
 
 @pytest.mark.parametrize("path", TUTORIALS, ids=lambda path: path.stem)
-def test_every_tutorial_teaches_one_thing_in_ten_minutes_and_opens_with_its_picture(path):
+def test_every_tutorial_teaches_one_thing_in_ten_minutes_and_opens_with_its_picture(
+    path: Path,
+) -> None:
     text = path.read_text(encoding="utf-8")
     assert text.count("**You learn:**") == 1
     assert text.count("```{code-cell} python\n:tags: [picture]\n") == 1
@@ -134,7 +139,7 @@ def test_every_tutorial_teaches_one_thing_in_ten_minutes_and_opens_with_its_pict
     assert len(text.split()) <= 10 * words_a_minute
 
 
-def test_every_block_that_says_so_is_run_or_parsed_by_the_tests():
+def test_every_block_that_says_so_is_run_or_parsed_by_the_tests() -> None:
     for name in NAMES:
         for language, code in re.findall(r"^```(\w+)\n(.*?)^```", text_of(name), re.DOTALL | re.M):
             if blocks.mark_of(language, code) == blocks.RUN_BY_TESTS:
@@ -146,7 +151,7 @@ def test_every_block_that_says_so_is_run_or_parsed_by_the_tests():
         assert blocks.mark_of("", code) == blocks.NOT_RUN
 
 
-def test_every_picture_is_drawn_by_the_build_or_says_which_version_it_shows():
+def test_every_picture_is_drawn_by_the_build_or_says_which_version_it_shows() -> None:
     kept = {
         path.name for path in ROOT.glob("docs/**/*") if path.suffix in {".png", ".webp", ".gif"}
     }
@@ -154,11 +159,11 @@ def test_every_picture_is_drawn_by_the_build_or_says_which_version_it_shows():
     assert (ROOT / "docs/images/console.webp").stat().st_size < 2e6
 
 
-def test_commands_are_found_in_the_readme():
+def test_commands_are_found_in_the_readme() -> None:
     assert len(commands(text_of("README.md"))) > 8
 
 
-def test_generated_pages_are_what_the_code_says():
+def test_generated_pages_are_what_the_code_says() -> None:
     run([str(ROOT / "docs" / "generate.py"), "--check"], ROOT)
 
 
@@ -166,14 +171,16 @@ def test_generated_pages_are_what_the_code_says():
 @pytest.mark.parametrize(
     "name", [name for name in NAMES if snippets(text_of(name).split(PACKAGE_HEADING)[0], "python")]
 )
-def test_python_of_a_document_runs_from_top_to_bottom(name, tmp_path):
+def test_python_of_a_document_runs_from_top_to_bottom(name: Any, tmp_path: Path) -> None:
     code = "\n".join(snippets(text_of(name).split(PACKAGE_HEADING)[0], "python"))
     (tmp_path / "document.py").write_text(code, encoding="utf-8")
     run(["document.py"], tmp_path)
 
 
 @pytest.mark.slow
-def test_parts_of_the_package_in_the_documents_are_there_once_it_is_installed(tmp_path):
+def test_parts_of_the_package_in_the_documents_are_there_once_it_is_installed(
+    tmp_path: Path,
+) -> None:
     section = text_of("docs/parts.md").split(PACKAGE_HEADING)[1]
     (tmp_path / "pyproject.toml").write_text(snippets(section, "toml")[0])
     (tmp_path / "my_teleop_parts.py").write_text(snippets(section, "python")[0])
@@ -184,7 +191,7 @@ def test_parts_of_the_package_in_the_documents_are_there_once_it_is_installed(tm
     run(["-m", "teleop_core.cli", *sim], tmp_path, PYTHONPATH=str(tmp_path))
 
 
-def test_version_is_the_same_wherever_it_stands():
+def test_version_is_the_same_wherever_it_stands() -> None:
     version = teleop_core.__version__
     assert version == teleop_lab.__version__ == teleop_drill.__version__
     for package in ("teleop_core", "teleop_lab", "teleop_drill"):

@@ -7,10 +7,12 @@ import subprocess
 import sys
 import tempfile
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from example_runs import EXAMPLES, NAMES, numbers, run
+from present import present
 from teleop_core.session.configuration import configure
 from teleop_core.session.virtual import VirtualTime
 
@@ -19,13 +21,13 @@ PARTS = [name for name in NAMES if name.startswith("own_")]
 pytestmark = pytest.mark.slow
 
 
-def test_hand_and_slave_draw_the_circle_of_the_table(tmp_path):
+def test_hand_and_slave_draw_the_circle_of_the_table(tmp_path: Path) -> None:
     widths = numbers(r"([\d.]+) mm wide", run("operator_from_csv", tmp_path))
     assert len(widths) == 2
     assert all(19.0 < width < 20.5 for width in widths)
 
 
-def test_own_fixture_holds_the_hand_as_the_built_in_ones_do(tmp_path):
+def test_own_fixture_holds_the_hand_as_the_built_in_ones_do(tmp_path: Path) -> None:
     text = run("own_fixture", tmp_path)
     assert re.findall(r"(\w+): slave", text) == ["box", "sphere", "pill"]
     depths = numbers(r"at most ([\d.]+) mm", text)
@@ -33,19 +35,19 @@ def test_own_fixture_holds_the_hand_as_the_built_in_ones_do(tmp_path):
     assert all(0.1 < depth < 4.0 for depth in depths)
 
 
-def test_an_arm_known_by_its_urdf_alone_follows_the_hand(tmp_path):
+def test_an_arm_known_by_its_urdf_alone_follows_the_hand(tmp_path: Path) -> None:
     text = run("any_arm", tmp_path)
     assert numbers(r"([\d.]+) % of 1000", text)[0] >= 99.5
     assert numbers(r"([\d.]+) mm RMS", text)[0] < 0.5
 
 
-def test_own_object_is_touched_as_the_built_in_ones_are(tmp_path):
+def test_own_object_is_touched_as_the_built_in_ones_are(tmp_path: Path) -> None:
     text = run("own_world_object", tmp_path)
     assert re.findall(r"(\w+): pushed", text) == ["box", "sphere", "ring"]
     assert all(0.9 < peak < 1.2 for peak in numbers(r"at most ([\d.]+) N", text))
 
 
-def test_own_architecture_feels_force_as_position_force_does_and_less_drag(tmp_path):
+def test_own_architecture_feels_force_as_position_force_does_and_less_drag(tmp_path: Path) -> None:
     text = run("own_architecture", tmp_path)
     drag, felt = numbers(r"([\d.]+) N in free", text), numbers(r"to ([\d.]+) N", text)
     assert drag[:2] == [0.0, 0.0]
@@ -55,8 +57,8 @@ def test_own_architecture_feels_force_as_position_force_does_and_less_drag(tmp_p
 
 
 def test_more_channels_keep_a_late_hand_calm_and_the_fourth_lets_the_tip_go_where_it_is_led(
-    tmp_path,
-):
+    tmp_path: Path,
+) -> None:
     text = run("channels", tmp_path)
     fastest, way = numbers(r"most (\d+) mm/s", text), numbers(r"(-?[\d.]+) mm from", text)
     assert fastest[1] > 2.0 * max(fastest[5], fastest[7])
@@ -64,7 +66,9 @@ def test_more_channels_keep_a_late_hand_calm_and_the_fourth_lets_the_tip_go_wher
     assert way[4] > 1.0
 
 
-def test_delay_takes_least_of_what_waves_let_feel_and_they_alone_press_no_harder(tmp_path):
+def test_delay_takes_least_of_what_waves_let_feel_and_they_alone_press_no_harder(
+    tmp_path: Path,
+) -> None:
     text = run("far_touch", tmp_path)
     felt, most = numbers(r"feels ([\d.]+) N", text), numbers(r"tip ([\d.]+) N at most", text)
     none, tank, tdpa, wave = (felt[i : i + 3] for i in range(0, 12, 3))
@@ -73,14 +77,14 @@ def test_delay_takes_least_of_what_waves_let_feel_and_they_alone_press_no_harder
     assert max(most[9:]) == most[9] < max(most[:9])
 
 
-def test_own_network_loses_more_the_deeper_it_fades(tmp_path):
+def test_own_network_loses_more_the_deeper_it_fades(tmp_path: Path) -> None:
     text = run("own_network", tmp_path)
     lost, ages = numbers(r"(\d+) % lost", text), numbers(r"than (\d+) ms", text)
     assert lost == pytest.approx([0.0, 25.0, 49.5], abs=4.0)
     assert ages[0] < 2.0 < ages[2]
 
 
-def test_own_tremor_filter_is_later_than_the_built_in_ones(tmp_path):
+def test_own_tremor_filter_is_later_than_the_built_in_ones(tmp_path: Path) -> None:
     text = run("own_tremor_filter", tmp_path)
     left, late = numbers(r"(\d+) % left", text), numbers(r"left, ([\d.]+) ms", text)
     assert len(left) == 5
@@ -88,7 +92,7 @@ def test_own_tremor_filter_is_later_than_the_built_in_ones(tmp_path):
     assert late[0] > 4.0 * late[2] > 4.0 * late[4]
 
 
-def test_a_tool_keeps_to_its_port_within_a_millimetre(tmp_path):
+def test_a_tool_keeps_to_its_port_within_a_millimetre(tmp_path: Path) -> None:
     text = run("remote_centre", tmp_path)
     off, most = numbers(r"shaft ([\d.]+) mm", text), numbers(r"centre, ([\d.]+) at most", text)
     assert len(off) == 2
@@ -96,7 +100,9 @@ def test_a_tool_keeps_to_its_port_within_a_millimetre(tmp_path):
     assert max(off) < max(most) < 2.0
 
 
-def test_a_block_is_carried_where_the_fingers_hold_it_and_lost_where_they_do_not(tmp_path):
+def test_a_block_is_carried_where_the_fingers_hold_it_and_lost_where_they_do_not(
+    tmp_path: Path,
+) -> None:
     text = run("pick", tmp_path)
     ways, force = numbers(r"carried (-?[\d.]+) mm", text), numbers(r"drops, ([\d.]+) N", text)
     slips = numbers(r"(\d+) slips", text)
@@ -107,9 +113,9 @@ def test_a_block_is_carried_where_the_fingers_hold_it_and_lost_where_they_do_not
     assert max(force) < 5.0
 
 
-def test_blocks_go_from_peg_to_peg_where_hand_hole_and_fingers_let_them(tmp_path):
+def test_blocks_go_from_peg_to_peg_where_hand_hole_and_fingers_let_them(tmp_path: Path) -> None:
     text = run("peg_transfer", tmp_path)
-    rows = [row.split("  ") for row in text.replace("-", "0").splitlines()[1:]]
+    rows: Any = [row.split("  ") for row in text.replace("-", "0").splitlines()[1:]]
     rows = [[float(cell) for cell in row[1:] if cell.strip()] for row in rows]
     assert [row[:2] for row in rows] == [[3, 0], [0, 0], [2, 1], [0, 0]]
     pull = math.sqrt(3.86**2 - (0.05 * 9.81) ** 2)  # of a block of 50 g that slides; µ is 0.5
@@ -117,7 +123,7 @@ def test_blocks_go_from_peg_to_peg_where_hand_hole_and_fingers_let_them(tmp_path
     assert [row[4] for row in rows] == [0, 3, 0, 3]
 
 
-def test_shapes_made_of_others_hold_the_hand_and_better_still_the_slave(tmp_path):
+def test_shapes_made_of_others_hold_the_hand_and_better_still_the_slave(tmp_path: Path) -> None:
     text = run("combined_fixtures", tmp_path)
     assert re.findall(r"^(\w+) +(\w+)", text, re.MULTILINE) == [
         ("union", "hand"), ("union", "both"), ("intersection", "hand"), ("intersection", "both"),
@@ -128,38 +134,38 @@ def test_shapes_made_of_others_hold_the_hand_and_better_still_the_slave(tmp_path
     assert all(0.1 < push < 3.3 for push in numbers(r"push ([\d.]+) N", text))
 
 
-def test_an_operator_who_sees_is_slowed_down_by_what_it_sees_late(tmp_path):
+def test_an_operator_who_sees_is_slowed_down_by_what_it_sees_late(tmp_path: Path) -> None:
     at_once, late, later = numbers(r"([\d.]+) s to the goal", run("own_operator", tmp_path))
     # exp(-2 t) takes 29 mm to half a millimetre in 2.0 s; the device's friction makes it uneven.
     assert 1.2 < at_once < 2.6
     assert later > late > at_once + 0.1
 
 
-def test_own_controller_follows_better_than_pd(tmp_path):
+def test_own_controller_follows_better_than_pd(tmp_path: Path) -> None:
     pid, pd, own = numbers(r"([\d.]+) mm RMS", run("own_controller", tmp_path))
     assert pid < 0.2
     assert own < 0.25 * pd
 
 
-def test_own_stage_holds_its_limit_with_the_same_bits_compiled_or_not(tmp_path):
+def test_own_stage_holds_its_limit_with_the_same_bits_compiled_or_not(tmp_path: Path) -> None:
     text = run("own_stage", tmp_path)
     assert numbers(r"command ([\d.]+) mm/s", text) == [20.0, 20.0]
     assert "same bits: True" in text
 
 
-def test_own_metric_tells_that_the_filter_smooths(tmp_path):
+def test_own_metric_tells_that_the_filter_smooths(tmp_path: Path) -> None:
     filtered, unfiltered = numbers(r"([\d.]+) m/s³", run("own_metric", tmp_path))
     assert 1e3 < filtered < 0.2 * unfiltered
 
 
-def test_own_robot_follows_the_hand(tmp_path):
+def test_own_robot_follows_the_hand(tmp_path: Path) -> None:
     text = run("own_robot", tmp_path)
     assert "tip at [0.35 0.   0.3 ]" in text
     assert "FOLLOWED" in text
     assert numbers(r"([\d.]+) mm RMS", text)[0] < 0.4
 
 
-def test_own_force_slows_the_hand(tmp_path):
+def test_own_force_slows_the_hand(tmp_path: Path) -> None:
     text = run("own_force", tmp_path)
     alone, damped = numbers(r"([\d.]+) mm/s", text)
     assert damped < alone
@@ -167,7 +173,7 @@ def test_own_force_slows_the_hand(tmp_path):
     assert 0.5 < numbers(r"([\d.]+) N", text)[1] < 3.3
 
 
-def test_assemblies_are_told_from_poses_that_do_not_close(tmp_path):
+def test_assemblies_are_told_from_poses_that_do_not_close(tmp_path: Path) -> None:
     text = run("assemblies", tmp_path)
     assert re.findall(r": ([A-Z_]+), mode", text) == ["CLOSED", "OTHER_MODE", "NOT_CLOSED"]
     assert numbers(r"(\d+) assemblies", text) == [8.0, 8.0, 0.0]
@@ -175,27 +181,31 @@ def test_assemblies_are_told_from_poses_that_do_not_close(tmp_path):
     assert "must be joints with which the loops close" in text
 
 
-def test_two_arms_are_scored_one_by_one(tmp_path):
+def test_two_arms_are_scored_one_by_one(tmp_path: Path) -> None:
     text = run("two_arms", tmp_path)
     assert "left: rcrt1, seed 1" in text
     assert "right: puma560, seed 2" in text
     assert all(error < 0.6 for error in numbers(r"([\d.]+) mm RMS", text))
 
 
-def test_delay_of_twenty_milliseconds_makes_references_twenty_milliseconds_old(tmp_path):
+def test_delay_of_twenty_milliseconds_makes_references_twenty_milliseconds_old(
+    tmp_path: Path,
+) -> None:
     text = run("delay", tmp_path)
     assert "the reference in force is 20 ms old" in text
     direct, delayed = numbers(r"slave ([\d.]+) mm", text)
     assert delayed > direct
 
 
-def test_sweep_tells_that_a_stiffer_wall_holds_better(tmp_path):
+def test_sweep_tells_that_a_stiffer_wall_holds_better(tmp_path: Path) -> None:
     depths = numbers(r"N/m .* ([\d.]+)\n", run("sweep", tmp_path))
     assert len(depths) == 4
     assert depths == sorted(depths, reverse=True)
 
 
-def test_walls_hold_the_hand_by_how_far_it_aims_and_damped_ones_do_not_feed_it(tmp_path):
+def test_walls_hold_the_hand_by_how_far_it_aims_and_damped_ones_do_not_feed_it(
+    tmp_path: Path,
+) -> None:
     lines = [line.split() for line in run("walls", tmp_path).splitlines()[1:]]
     damped = [[float(text) for text in words[1:]] for words in lines if words[0] == "damped"]
     hand = [row[1] for row in damped]
@@ -206,7 +216,7 @@ def test_walls_hold_the_hand_by_how_far_it_aims_and_damped_ones_do_not_feed_it(t
     assert float(step[6]) > 100.0
 
 
-def test_a_hand_that_goes_too_far_is_followed_as_proposed(tmp_path):
+def test_a_hand_that_goes_too_far_is_followed_as_proposed(tmp_path: Path) -> None:
     text = run("reach", tmp_path)
     given, proposed = numbers(r"([\d.]+)% followed", text)
     assert given < 60.0
@@ -214,7 +224,7 @@ def test_a_hand_that_goes_too_far_is_followed_as_proposed(tmp_path):
     assert "motion_scaling.rotation_gain=" in text
 
 
-def test_human_operator_moves_as_people_do_and_the_random_one_does_not(tmp_path):
+def test_human_operator_moves_as_people_do_and_the_random_one_does_not(tmp_path: Path) -> None:
     text = run("human_operator", tmp_path)
     rows = {line.split()[0]: numbers(r"(-?[\d.]+)", line[24:]) for line in text.splitlines()[1:]}
     low, high, *values = rows["peaks_per_s"]
@@ -222,7 +232,7 @@ def test_human_operator_moves_as_people_do_and_the_random_one_does_not(tmp_path)
     assert all(value < low for value in values[2:])
 
 
-def test_own_experiment_stands_beside_those_of_the_package(tmp_path):
+def test_own_experiment_stands_beside_those_of_the_package(tmp_path: Path) -> None:
     text = run("experiments", tmp_path)
     assert "published 11.355 µm, predicted 11.355" in text
     beside = re.search(r"0\.293 +([\d.]+) +([\d.]+)", text)
@@ -230,7 +240,9 @@ def test_own_experiment_stands_beside_those_of_the_package(tmp_path):
     assert all(0.01 < float(error) < 2.0 for error in beside.groups())
 
 
-def test_plant_of_published_rests_predicts_the_published_errors_and_an_ideal_one_does_not(tmp_path):
+def test_plant_of_published_rests_predicts_the_published_errors_and_an_ideal_one_does_not(
+    tmp_path: Path,
+) -> None:
     text = run("predict_the_machine", tmp_path)
     bias = re.search(r"bias\.theta1 = ([\d.]+) \(([\d.]+) to ([\d.]+)\)", text)
     assert bias is not None
@@ -245,14 +257,14 @@ def test_plant_of_published_rests_predicts_the_published_errors_and_an_ideal_one
     assert numbers(r"on an ideal plant: ([\d.]+)", text)[0] < 0.6 * predicted[0]
 
 
-def test_recording_becomes_a_data_frame_and_a_page(tmp_path):
+def test_recording_becomes_a_data_frame_and_a_page(tmp_path: Path) -> None:
     text = run("bag_to_pandas", tmp_path)
     ticks = VirtualTime(configure("coarse_box")).lead + 10_000
     assert f"{ticks} rows" in text
     assert numbers(r"height.html: (\d+) MB", text)[0] >= 4
 
 
-def test_imported_hand_is_followed_by_the_slave(tmp_path):
+def test_imported_hand_is_followed_by_the_slave(tmp_path: Path) -> None:
     text = run("import_hand", tmp_path)
     assert "990 of 1000 rows, 10 with missing numbers left out" in text
     assert "positions in mm" in text
@@ -262,7 +274,7 @@ def test_imported_hand_is_followed_by_the_slave(tmp_path):
     assert abs(slave - hand) < 3.0
 
 
-def test_arms_are_led_closer_once_they_are_calibrated(tmp_path):
+def test_arms_are_led_closer_once_they_are_calibrated(tmp_path: Path) -> None:
     text = run("calibrate", tmp_path)
     assert "published: d3 5.50 mm, RMS 0.744 -> 0.352 mm" in text
     drawn, found = numbers(r"led as \w+: ([\d.]+) mm off", text)
@@ -272,7 +284,7 @@ def test_arms_are_led_closer_once_they_are_calibrated(tmp_path):
     assert tracker < ruler < 1.0
 
 
-def test_commands_take_the_parts_of_the_examples(tmp_path):
+def test_commands_take_the_parts_of_the_examples(tmp_path: Path) -> None:
     files = [text for name in PARTS for text in ("--parts", str(EXAMPLES / f"{name}.py"))]
     settings = ["fixture=pill", "controller=following", "robot=gantry",
                 "stages=[velocity_limit, hand_damping]"]  # fmt: skip
@@ -291,7 +303,7 @@ def test_commands_take_the_parts_of_the_examples(tmp_path):
     assert "jerk" in done.stdout
 
 
-def test_laws_of_the_table_track_better_from_row_to_row(tmp_path):
+def test_laws_of_the_table_track_better_from_row_to_row(tmp_path: Path) -> None:
     text = run("compare_controllers", tmp_path)
     errors = numbers(r"\n\w+ +(\d+) µm", text)
     assert len(errors) == 6
@@ -300,7 +312,7 @@ def test_laws_of_the_table_track_better_from_row_to_row(tmp_path):
     assert all(error <= 34.0 for error in errors[2:])
 
 
-def test_a_stopped_arm_stands_still_and_goes_on_when_it_is_enabled(tmp_path):
+def test_a_stopped_arm_stands_still_and_goes_on_when_it_is_enabled(tmp_path: Path) -> None:
     text = run("operation", tmp_path)
     before, stopped, after, paused, again = numbers(r"moved +([\d.]+) mm", text)
     assert stopped == paused == 0.0
@@ -308,14 +320,14 @@ def test_a_stopped_arm_stands_still_and_goes_on_when_it_is_enabled(tmp_path):
     assert re.findall(r"s  (\w+)", text)[-1] == "ENABLED"
 
 
-def test_a_page_draws_the_recording_at_the_times_it_is_led_to(tmp_path):
+def test_a_page_draws_the_recording_at_the_times_it_is_led_to(tmp_path: Path) -> None:
     lines = run("console_replay", tmp_path).splitlines()
     places = [re.search(r"tip at \[\s*(-?\d+)", line) for line in lines[:5]]
-    assert len({place[1] for place in places}) > 2  # it moves
+    assert len({present(place)[1] for place in places}) > 2  # it moves
     assert "127.0.0.1 alone" in lines[5]
 
 
-def test_a_person_moves_the_slave_while_they_hold_the_stylus_and_not_else(tmp_path):
+def test_a_person_moves_the_slave_while_they_hold_the_stylus_and_not_else(tmp_path: Path) -> None:
     text = run("remote_hand", tmp_path)
     stylus, slave = (numbers(rf"{word} ([\d.]+) mm", text) for word in ("stylus", "slave"))
     assert len(stylus) == len(slave) == 3
@@ -323,7 +335,7 @@ def test_a_person_moves_the_slave_while_they_hold_the_stylus_and_not_else(tmp_pa
     assert max(stylus[1], slave[1]) < 0.2
 
 
-def test_who_sees_the_slave_later_takes_longer_to_the_goal(tmp_path):
+def test_who_sees_the_slave_later_takes_longer_to_the_goal(tmp_path: Path) -> None:
     delays, times = zip(
         *re.findall(r"seen +(\d+) ms late: ([\d.]+) s", run("step_by_step", tmp_path)), strict=True
     )
@@ -331,11 +343,11 @@ def test_who_sees_the_slave_later_takes_longer_to_the_goal(tmp_path):
     assert 1.0 < float(times[0]) < float(times[1]) < float(times[2])
 
 
-def test_own_control_is_a_button_beside_the_others(tmp_path):
+def test_own_control_is_a_button_beside_the_others(tmp_path: Path) -> None:
     assert re.search(r"buttons: .*Start.*, Gentle$", run("own_control", tmp_path), re.MULTILINE)
 
 
-def test_examples_pass_a_strict_type_check_of_a_user():
+def test_examples_pass_a_strict_type_check_of_a_user() -> None:
     with tempfile.TemporaryDirectory() as folder:
         options = ["--strict", "--config-file=", "--follow-imports=silent", "--no-error-summary",
                    "--disable-error-code=import-untyped"]  # fmt: skip

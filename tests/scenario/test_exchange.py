@@ -4,15 +4,21 @@ import json
 import re
 import subprocess
 import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
 import pytest
 from scipy.spatial.transform import Rotation
 
+from present import present
 from teleop_core.bags.reader import Bag
-from teleop_core.chain.master.haptic_master import REST_POSITION
+from teleop_core.chain.operators.rest import REST_POSITION
 from teleop_core.graph.topics import MASTER_MEASURED_CP, SLAVE_MEASURED_CP
+
+if TYPE_CHECKING:
+    from conftest import Run
 
 pytestmark = pytest.mark.slow
 
@@ -23,7 +29,7 @@ TURNS = Rotation.from_rotvec(0.2 * np.column_stack((np.sin(T), np.cos(T), 0.0 * 
 
 
 @pytest.fixture(scope="module")
-def hand(tmp_path_factory):
+def hand(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Ten seconds at 30 Hz with a pedal, as another program would write them."""
     names = ["time", "x", "y", "z", "qx", "qy", "qz", "qw"]
     table = pd.DataFrame(np.column_stack((T, PLACES, TURNS.as_quat())), columns=names)
@@ -34,17 +40,17 @@ def hand(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def imported(teleop, hand, tmp_path_factory):
+def imported(teleop: "Run", hand: Path, tmp_path_factory: pytest.TempPathFactory) -> Any:
     """The recording, and what the command said."""
     out = tmp_path_factory.mktemp("bags") / "hand"
     return out, teleop("import", hand, "--out", out).stdout
 
 
-def next_command(text):
-    return re.search(r"next: teleop (.*)", text)[1].split()
+def next_command(text: Any) -> list[str]:
+    return present(re.search(r"next: teleop (.*)", text))[1].split()
 
 
-def test_import_says_what_it_took_and_what_to_do_next(imported):
+def test_import_says_what_it_took_and_what_to_do_next(imported: Any) -> None:
     out, text = imported
     assert "300 of 300 rows" in text
     assert "button clutch" in text
@@ -52,7 +58,9 @@ def test_import_says_what_it_took_and_what_to_do_next(imported):
     assert next_command(text)[0] == "replay"
 
 
-def test_a_motion_goes_in_through_the_graph_and_out_unchanged(teleop, imported, tmp_path):
+def test_a_motion_goes_in_through_the_graph_and_out_unchanged(
+    teleop: "Run", imported: Any, tmp_path: Path
+) -> None:
     _, text = imported
     teleop(*next_command(text))
     answer = next_command(text)[-1]
@@ -71,7 +79,9 @@ def test_a_motion_goes_in_through_the_graph_and_out_unchanged(teleop, imported, 
     assert np.ptp(tip.to_numpy(), axis=0).min() > 0.01
 
 
-def test_replaying_the_file_itself_gives_the_same_motion(teleop, hand, imported, tmp_path):
+def test_replaying_the_file_itself_gives_the_same_motion(
+    teleop: "Run", hand: Path, imported: Any, tmp_path: Path
+) -> None:
     out, text = imported
     if not (out.parent / "hand_replayed").exists():
         teleop(*next_command(text))
@@ -83,7 +93,9 @@ def test_replaying_the_file_itself_gives_the_same_motion(teleop, hand, imported,
     assert np.array_equal(a, b)
 
 
-def test_import_is_repeated_by_what_its_metadata_say(teleop, hand, imported, tmp_path):
+def test_import_is_repeated_by_what_its_metadata_say(
+    teleop: "Run", hand: Path, imported: Any, tmp_path: Path
+) -> None:
     out, _ = imported
     about = Bag(out).metadata
     assert about["imported_from"] == "hand.csv"
@@ -100,7 +112,9 @@ def test_import_is_repeated_by_what_its_metadata_say(teleop, hand, imported, tmp
     assert np.array_equal(one.stamp_ns, two.stamp_ns)
 
 
-def test_axes_with_a_minus_are_values_not_options(teleop, hand, tmp_path):
+def test_axes_with_a_minus_are_values_not_options(
+    teleop: "Run", hand: Path, tmp_path: Path
+) -> None:
     for number, axes in enumerate((("-y", "+x", "+z"), ("+y", "-x", "+z"), ("z", "x", "y"))):
         out = tmp_path / str(number)
         teleop("import", hand, "--out", out, "--axes", *axes, "--scale", "0.5")
@@ -111,7 +125,9 @@ def test_axes_with_a_minus_are_values_not_options(teleop, hand, tmp_path):
         assert np.allclose(got, 0.5 * PLACES @ turn.T, rtol=0, atol=1e-15)
 
 
-def test_a_session_follows_the_recording_for_as_long_as_it_is(teleop, imported, tmp_path):
+def test_a_session_follows_the_recording_for_as_long_as_it_is(
+    teleop: "Run", imported: Any, tmp_path: Path
+) -> None:
     out, _ = imported
     center = np.array([0.0, 0.01, 0.03])
     settings = (f"operator.center={center.tolist()}", "operator.approach_time=1.0")
@@ -138,7 +154,9 @@ def test_a_session_follows_the_recording_for_as_long_as_it_is(teleop, imported, 
         (("replay", "{bag}/metadata.yaml", "--out", "{out}"), ""),
     ],
 )
-def test_mistakes_are_one_line_and_leave_nothing(teleop, imported, hand, tmp_path, arguments, text):
+def test_mistakes_are_one_line_and_leave_nothing(
+    teleop: "Run", imported: Any, hand: Path, tmp_path: Path, arguments: tuple[str, ...], text: str
+) -> None:
     places = {"hand": hand, "out": tmp_path / "out", "bag": imported[0]}
     done = teleop(*(word.format(**places) for word in arguments), code=2)
     lines = [line for line in done.stderr.splitlines() if not line.startswith("note:")]
@@ -147,7 +165,9 @@ def test_mistakes_are_one_line_and_leave_nothing(teleop, imported, hand, tmp_pat
     assert not list(tmp_path.iterdir())
 
 
-def test_a_data_set_of_several_recordings_is_made(teleop, imported, tmp_path):
+def test_a_data_set_of_several_recordings_is_made(
+    teleop: "Run", imported: Any, tmp_path: Path
+) -> None:
     _, text = imported
     answer = next_command(text)[-1]
     if not Bag(imported[0]).path.with_name("hand_replayed").exists():

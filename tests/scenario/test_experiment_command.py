@@ -6,18 +6,26 @@ import re
 import shutil
 import subprocess
 import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import pytest
 
 from headless import Headless
+from present import present
 from teleop_lab import experiments
+from teleop_lab.experiments.bench import Bench
+from teleop_lab.experiments.outcome import Outcome
 from teleop_lab.experiments.page import experiments_page
+
+if TYPE_CHECKING:
+    from conftest import Run
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 COMPILING = "compiling kernels"
 
 
-def one_line(done):
+def one_line(done: subprocess.CompletedProcess[str]) -> str:
     """The only line on standard error, beside the one of compiling; nothing on standard output."""
     assert done.stdout == ""
     lines = [line for line in done.stderr.splitlines() if not line.startswith(COMPILING)]
@@ -25,26 +33,26 @@ def one_line(done):
     return lines[0]
 
 
-def test_without_a_name_every_experiment_is_listed_in_a_line(teleop):
+def test_without_a_name_every_experiment_is_listed_in_a_line(teleop: "Run") -> None:
     lines = teleop("experiment").stdout.splitlines()
     assert [line.split()[0] for line in lines] == list(experiments.EXPERIMENTS.names())
     assert all(len(line.split()) > 3 for line in lines)
 
 
-def test_experiment_prints_published_beside_predicted(teleop):
+def test_experiment_prints_published_beside_predicted(teleop: "Run") -> None:
     shown = teleop("experiment", "resolution", "tendons").stdout
     assert re.search(r"tip, all axes.* 11\.355 +11\.3548 .* ✓", shown)
     assert re.search(r"motor 6 for joint 5 .* 1 +1\.39 .* ✗", shown)
     assert shown.splitlines()[-1].endswith("rows are not judged")
 
 
-def test_help_teaches_what_a_mark_means(teleop_again):
+def test_help_teaches_what_a_mark_means(teleop_again: "Run") -> None:
     shown = teleop_again("experiment", "--help").stdout
     assert "teleop experiment all --html" in shown
     assert "not whether a number is small" in shown
 
 
-def test_json_holds_every_number_exactly(teleop, tmp_path):
+def test_json_holds_every_number_exactly(teleop: "Run", tmp_path: Path) -> None:
     file = tmp_path / "found.json"
     teleop("experiment", "hybrid", "resolution", "--json", file)
     found = json.loads(file.read_text(encoding="utf-8"))["experiments"]
@@ -65,14 +73,18 @@ def test_json_holds_every_number_exactly(teleop, tmp_path):
         (("resolution", "--seed", "one"), "invalid int value"),
     ],
 )
-def test_wrong_use_is_told_in_one_line_and_writes_nothing(teleop_again, tmp_path, arguments, told):
+def test_wrong_use_is_told_in_one_line_and_writes_nothing(
+    teleop_again: "Run", tmp_path: Path, arguments: tuple[str, ...], told: str
+) -> None:
     texts = [argument.format(folder=tmp_path) for argument in arguments]
     done = teleop_again("experiment", *texts, code=2)
     assert told in one_line(done)
     assert not list(tmp_path.iterdir())
 
 
-def test_file_that_exists_is_kept_until_the_new_one_is_whole(teleop_again, tmp_path):
+def test_file_that_exists_is_kept_until_the_new_one_is_whole(
+    teleop_again: "Run", tmp_path: Path
+) -> None:
     file = tmp_path / "found.json"
     file.write_text("before")
     teleop_again("experiment", "resolution", "nosuch", "--json", file, code=2)
@@ -82,7 +94,7 @@ def test_file_that_exists_is_kept_until_the_new_one_is_whole(teleop_again, tmp_p
     assert [path.name for path in tmp_path.iterdir()] == ["found.json"]
 
 
-def test_files_are_written_although_nobody_reads_the_tables_to_their_end(tmp_path):
+def test_files_are_written_although_nobody_reads_the_tables_to_their_end(tmp_path: Path) -> None:
     file = tmp_path / "found.json"
     command = [sys.executable, "-m", "teleop_core.cli", "experiment", "poses", "--json", str(file)]
     reader = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
@@ -93,24 +105,24 @@ def test_files_are_written_although_nobody_reads_the_tables_to_their_end(tmp_pat
 
 
 @pytest.fixture(scope="module")
-def browser():
+def browser() -> str:
     found = next(filter(None, map(shutil.which, BROWSERS)), None)
     if found is None:
         pytest.skip(f"no browser to open the page with; install one of {', '.join(BROWSERS)}")
     return found
 
 
-SHORT = {"duration": 8.0, "approach_time": 1.0, "buttons.fixture": (1.5,)}
+SHORT: dict[str, Any] = {"duration": 8.0, "approach_time": 1.0, "buttons.fixture": (1.5,)}
 
 
 @pytest.fixture(scope="module")
-def bench():
+def bench() -> Bench:
     """Sessions that are shorter than the source's, each run once for all tests."""
     return experiments.Bench(settings=SHORT)
 
 
 @pytest.fixture(scope="module")
-def outcomes(bench):
+def outcomes(bench: Bench) -> list[Outcome]:
     """Experiments with plots of every kind."""
     names = ("resolution", "workspace", "master_slave", "gravity", "hybrid", "mma_frames")
     return experiments.run_several(names, bench=bench)
@@ -119,7 +131,9 @@ def outcomes(bench):
 @pytest.mark.browser
 @pytest.mark.slow
 @pytest.mark.parametrize("width", [1200, 500])
-def test_page_draws_every_figure_and_is_as_wide_as_its_window(browser, outcomes, tmp_path, width):
+def test_page_draws_every_figure_and_is_as_wide_as_its_window(
+    browser: str, outcomes: list[Outcome], tmp_path: Path, width: int
+) -> None:
     page = tmp_path / "page.html"
     page.write_text(experiments_page(outcomes), encoding="utf-8")
     figures = sum(len(outcome.figures) for outcome in outcomes)
@@ -134,7 +148,7 @@ def test_page_draws_every_figure_and_is_as_wide_as_its_window(browser, outcomes,
 
 
 @pytest.mark.slow
-def test_sessions_that_several_experiments_need_run_once(outcomes):
+def test_sessions_that_several_experiments_need_run_once(outcomes: list[Outcome]) -> None:
     bench = experiments.Bench(settings=SHORT)
     experiments.run("master_slave", bench=bench)
     alone = bench.runs
@@ -147,9 +161,9 @@ def test_sessions_that_several_experiments_need_run_once(outcomes):
     assert again.to_json() == found.to_json()
 
 
-def test_gravity_off_is_clearly_worse_under_the_sources_controller(bench):
+def test_gravity_off_is_clearly_worse_under_the_sources_controller(bench: Bench) -> None:
     found = experiments.run("gravity", bench=bench)
     for mode in ("coarse", "fine"):
         ratio = found.row("without over with", f"position error, RMS, {mode}")
-        assert ratio.predicted > 1.5
-        assert ratio.ours < 1.1
+        assert present(ratio.predicted) > 1.5
+        assert present(ratio.ours) < 1.1

@@ -3,6 +3,7 @@
 import runpy
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -19,18 +20,18 @@ PEOPLE = runpy.run_path(str(EXAMPLE))["PEOPLE"] | {"tremor_um": (57.0, 69.0)}
 SINGLE = 0.1
 
 
-def figures(name, **changes):
+def figures(name: str, **changes: object) -> list[Any]:
     """A figure of the hand, of each seed."""
     return [score.value(f"motion.hand.{name}") for score in scores(**changes)]
 
 
 @cache
-def scores(**changes):
+def scores(**changes: Any) -> list[Any]:
     return [tc.run("human", seed=seed, **changes).score() for seed in SEEDS]
 
 
 @pytest.mark.parametrize("name", sorted(set(PEOPLE) - {"speed_median_mm_s"}))
-def test_hand_moves_within_the_range_of_people(name):
+def test_hand_moves_within_the_range_of_people(name: Any) -> None:
     low, high = PEOPLE[name]
     values = np.array(figures(name))
     room = SINGLE * np.abs([low, high])
@@ -39,19 +40,19 @@ def test_hand_moves_within_the_range_of_people(name):
     assert low - 0.02 * abs(low) <= values.mean() <= high + 0.02 * abs(high)
 
 
-def test_median_speed_is_above_that_of_surgeons_by_less_than_a_factor_of_three():
+def test_median_speed_is_above_that_of_surgeons_by_less_than_a_factor_of_three() -> None:
     low, high = PEOPLE["speed_median_mm_s"]
     assert high < min(figures("speed_median_mm_s"))
     assert max(figures("speed_median_mm_s")) < 3.0 * low * 1.1
 
 
 @pytest.mark.parametrize("name", ["frequency_50_hz", "power_1_3", "peaks_per_s", "sparc"])
-def test_smooth_operator_is_no_human(name):
+def test_smooth_operator_is_no_human(name: str) -> None:
     low, high = PEOPLE[name]
     assert all(value < low or value > high for value in figures(name, operator="random"))
 
 
-def test_strokes_of_the_clutch_part_the_motion_into_segments():
+def test_strokes_of_the_clutch_part_the_motion_into_segments() -> None:
     for score in scores():
         assert score.value("motion.clutch.count") == 2
         assert score.value("motion.clutch.time_s") == pytest.approx(1.0, abs=0.1)
@@ -61,7 +62,7 @@ def test_strokes_of_the_clutch_part_the_motion_into_segments():
         assert begins[0] < ends[0] < begins[1] < ends[1] < begins[2] < ends[2]
 
 
-def test_same_seed_gives_the_same_bits():
+def test_same_seed_gives_the_same_bits() -> None:
     first, again = (tc.run("human", seed=5, duration=6.0) for _ in range(2))
     for name in ("master/measured_cp", "slave/measured_js"):
         assert np.array_equal(first[name].values, again[name].values)

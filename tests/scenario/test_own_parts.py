@@ -1,9 +1,13 @@
 """Own parts in sessions: delays, stages, fixtures, controllers, operators, compiled and plain."""
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from teleop_core.bags.reader import Bag
 from teleop_core.base.errors import PartError
@@ -25,6 +29,7 @@ from teleop_core.graph.topics import (
     passed_on,
 )
 from teleop_core.kernels import kernel
+from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot
 from teleop_core.session.configuration import configure
 from teleop_core.session.runner import simulate
@@ -41,17 +46,19 @@ SHORT = (*AT_ONCE, "approach_time=0.5", "operator.period=2.0", "buttons.fixture=
          "buttons.clutch=[0.9, 1.0]", "fixture.box.size=[0.01, 0.01, 0.01]")  # fmt: skip
 
 
-def session(*settings, scenario="coarse_box", ticks=TICKS):
+def session(*settings: str, scenario: str = "coarse_box", ticks: int = TICKS) -> NDArray[np.void]:
     return VirtualTime(configure(scenario, settings=[*SHORT, *settings])).run(ticks)
 
 
 @pytest.fixture(scope="module")
-def plain():
+def plain() -> NDArray[np.void]:
     """Rows of a session without any further part."""
     return session()
 
 
-def assert_same_streams(block, other, topics=STREAMS):
+def assert_same_streams(
+    block: NDArray[np.void], other: NDArray[np.void], topics: Sequence[Topic] = STREAMS
+) -> None:
     for topic in topics:
         for field in (topic.field, f"{topic.field}_ns"):
             assert np.array_equal(block[field], other[field]), field
@@ -60,13 +67,15 @@ def assert_same_streams(block, other, topics=STREAMS):
 # Delays.
 
 
-def waits(times):
+def waits(times: Array) -> Array:
     """Rest until the slave follows, with the delay too; then swing by 20 mm."""
     swing = 0.01 * (1.0 - np.cos(2.0 * np.pi * np.maximum(times - 0.1, 0.0)))
     return np.column_stack((swing, -swing, 0.5 * swing))
 
 
-def test_delay_of_20_ms_on_the_joint_commands_shifts_the_setpoints_by_20_ticks(own_parts):
+def test_delay_of_20_ms_on_the_joint_commands_shifts_the_setpoints_by_20_ticks(
+    own_parts: None,
+) -> None:
     register_operator("waits", waits)
     # The push of the limit that home is at would differ by rounding.
     still = ("operator=waits", "tremor_amplitude=0.0", "gimbal_noise=0.0",
@@ -84,7 +93,7 @@ def test_delay_of_20_ms_on_the_joint_commands_shifts_the_setpoints_by_20_ticks(o
 
 
 @pytest.mark.parametrize(("seconds", "ticks"), [(0.0, 0), (0.0014, 1), (0.001, 1), (0.02, 20)])
-def test_delay_on_a_late_link_comes_on_top_of_its_tick(seconds, ticks):
+def test_delay_on_a_late_link_comes_on_top_of_its_tick(seconds: float, ticks: int) -> None:
     block = session(f"teleop.delays=[master/servo_cf={seconds}]", "fixture.max_force=2.0")
     applied, late = block["master_measured_cf"][:, :3], 1 + ticks
     # What the device applies is what was asked for, this many ticks ago, below its peak force.
@@ -93,17 +102,19 @@ def test_delay_on_a_late_link_comes_on_top_of_its_tick(seconds, ticks):
     assert np.abs(applied).max() > 0.1
 
 
-def mirror(name, topic, **more):
+def mirror(name: str, topic: Topic, **more: Any) -> Stage:
     """Stage that repeats the slave's pose, however old, under the name of its topic."""
 
-    def step(parameters, state, signals, dt):
+    def step(parameters: Any, state: Any, signals: Any, dt: Any) -> None:
         signals[topic.field] = signals["slave_measured_cp"]
 
     return Stage(name, NoParameters, (SLAVE_MEASURED_CP,), (topic,), step=step, **more)
 
 
 @pytest.mark.slow
-def test_delay_to_one_reader_leaves_the_others_in_time(own_parts, plain):
+def test_delay_to_one_reader_leaves_the_others_in_time(
+    own_parts: None, plain: NDArray[np.void]
+) -> None:
     first, second = (
         Topic(f"test/{name}", Kind.POSE, passed_on("slave/measured_cp")) for name in "ab"
     )
@@ -121,7 +132,9 @@ def test_delay_to_one_reader_leaves_the_others_in_time(own_parts, plain):
     assert_same_streams(block, plain[:300])
 
 
-def test_slave_whose_setpoints_come_late_follows_once_they_come_and_while_newer_ones_do(plain):
+def test_slave_whose_setpoints_come_late_follows_once_they_come_and_while_newer_ones_do(
+    plain: NDArray[np.void],
+) -> None:
     stopped = "slave.operation.events=[stop@0.6]"
     block = session("teleop.delays=[slave/setpoint_cp=0.15]", stopped, ticks=1100)
     state = block["teleop_state"][:, STATE["is_following"]]
@@ -143,7 +156,7 @@ class LimitParameters:
     speed: float = parameter(0.02, unit="m/s", lower=1e-3, upper=1.0, doc="along each axis")
 
 
-def limit_step(p, s, row, dt):
+def limit_step(p: Any, s: Any, row: Any, dt: float) -> None:
     for i in range(7):
         row.slave_limited_cp[i] = row.slave_servo_cp[i]
     reach = p.speed * dt
@@ -155,7 +168,7 @@ def limit_step(p, s, row, dt):
     s.is_begun = 1
 
 
-def limit(name, step):
+def limit(name: str, step: Callable[[object, object, object, float], None]) -> Stage:
     return Stage(
         name, LimitParameters, (SLAVE_SERVO_CP,), (LIMITED,), step=step,
         state=(("place", "f8", (3,)), ("is_begun", "i8")), trigger=SLAVE_SERVO_CP,
@@ -164,7 +177,7 @@ def limit(name, step):
 
 
 @pytest.mark.slow
-def test_plain_stage_gives_the_same_bits_as_the_same_function_compiled(own_parts):
+def test_plain_stage_gives_the_same_bits_as_the_same_function_compiled(own_parts: None) -> None:
     register_stage(limit("limit", kernel(limit_step)))
     register_stage(limit("plain_limit", limit_step))
     compiled = session("teleop.stages=[limit]")
@@ -176,14 +189,14 @@ def test_plain_stage_gives_the_same_bits_as_the_same_function_compiled(own_parts
     assert np.abs(np.diff(compiled["slave_servo_cp"][:, :3], axis=0)).max() > 0.02 * MS
 
 
-def test_parameters_of_an_own_stage_are_set_like_others(own_parts):
+def test_parameters_of_an_own_stage_are_set_like_others(own_parts: None) -> None:
     register_stage(limit("limit", kernel(limit_step)))
     block = session("teleop.stages=[limit]", "limit.speed=0.01")
     steps = np.abs(np.diff(block["slave_limited_cp"][:, :3], axis=0))
     assert steps.max() < 0.01 * MS + 1e-15
 
 
-def test_own_stage_is_recorded_with_its_topic_and_stamp(own_parts, tmp_path):
+def test_own_stage_is_recorded_with_its_topic_and_stamp(own_parts: None, tmp_path: Path) -> None:
     register_stage(limit("limit", kernel(limit_step)))
     settings = [*AT_ONCE, "teleop.stages=[limit]", "duration=0.2"]
     simulate(configure(settings=settings), tmp_path / "bag")
@@ -191,8 +204,8 @@ def test_own_stage_is_recorded_with_its_topic_and_stamp(own_parts, tmp_path):
     assert np.array_equal(series.stamp_ns, TICK_NS * np.arange(1, 201))
 
 
-def test_what_a_plain_stage_raises_reaches_the_user(own_parts):
-    def step(parameters, state, signals, dt):
+def test_what_a_plain_stage_raises_reaches_the_user(own_parts: None) -> None:
+    def step(parameters: Any, state: Any, signals: Any, dt: float) -> None:
         if signals["now_ns"] > 5 * TICK_NS:
             raise RuntimeError("my own mistake")
 
@@ -211,7 +224,7 @@ PUSH = Topic(
 )  # fmt: skip
 
 
-def push_step(p, s, row, dt):
+def push_step(p: Any, s: Any, row: Any, dt: float) -> None:
     row.contact_servo_cf[0] = p.newton
 
 
@@ -223,7 +236,9 @@ class PushParameters:
 
 
 @pytest.mark.parametrize("is_compiled", [True, False])
-def test_second_source_of_force_is_added_and_pushes_the_hand(own_parts, plain, is_compiled):
+def test_second_source_of_force_is_added_and_pushes_the_hand(
+    own_parts: None, plain: NDArray[np.void], is_compiled: bool
+) -> None:
     step = kernel(push_step) if is_compiled else push_step
     register_stage(Stage("contact", PushParameters, (MASTER_MEASURED_CP,), (PUSH,), step=step))
     block = session("teleop.stages=[contact]", "contact.newton=1.5", "fixture.max_force=1.5")
@@ -239,7 +254,9 @@ def test_second_source_of_force_is_added_and_pushes_the_hand(own_parts, plain, i
 
 
 @pytest.mark.parametrize("shape", [BOX, SPHERE], ids=["box", "sphere"])
-def test_plain_fixture_gives_the_same_bits_as_the_same_depth_compiled(own_parts, shape):
+def test_plain_fixture_gives_the_same_bits_as_the_same_depth_compiled(
+    own_parts: None, shape: Any
+) -> None:
     register_fixture(replace(shape, name="plain", depth=shape.depth.py_func))
     sizes = {"box": "box.size=[0.01, 0.01, 0.01]", "sphere": "sphere.diameter=0.01"}
     size = sizes[shape.name]
@@ -251,7 +268,7 @@ def test_plain_fixture_gives_the_same_bits_as_the_same_depth_compiled(own_parts,
     assert np.abs(compiled["master_servo_cf"]).max() > 0.1
 
 
-def test_sphere_holds_the_hand_at_the_same_distance_in_all_directions():
+def test_sphere_holds_the_hand_at_the_same_distance_in_all_directions() -> None:
     block = session("fixture=sphere", "fixture.sphere.diameter=0.01", "fixture.wall=soft")
     force = block["master_servo_cf"][:, :3]
     center = block["master_measured_cp"][
@@ -271,7 +288,9 @@ def test_sphere_holds_the_hand_at_the_same_distance_in_all_directions():
     assert sphere_depth(np.ascontiguousarray(offset[0]), np.array([10 * MS]), out) > 0.0
 
 
-def test_plain_controller_gives_the_same_bits_as_the_same_law_compiled(own_parts, plain):
+def test_plain_controller_gives_the_same_bits_as_the_same_law_compiled(
+    own_parts: None, plain: NDArray[np.void]
+) -> None:
     law = source_pid_control.py_func
     register_controller(replace(SOURCE_PID, name="plain", control=law))
     assert_same_streams(session("controller=plain", ticks=300), plain[:300])
@@ -280,12 +299,12 @@ def test_plain_controller_gives_the_same_bits_as_the_same_law_compiled(own_parts
 # Axis maps.
 
 
-def test_default_axis_map_is_the_published_one(plain):
+def test_default_axis_map_is_the_published_one(plain: NDArray[np.void]) -> None:
     named = session("axes=['-z', '-x', '+y']", "tool_axes=['+x', '-y', '-z']", ticks=300)
     assert_same_streams(named, plain[:300])
 
 
-def test_other_axis_map_moves_the_slave_along_other_axes():
+def test_other_axis_map_moves_the_slave_along_other_axes() -> None:
     line = ("operator=line", "operator.size=[0.02, 0.0, 0.0]", "rotation=0.0",
             "operator.center=[0.0, 0.0, 0.0]", "operator.tilt=[0.0, 0.0, 0.0]")  # fmt: skip
     still = (*line, "approach_time=0.5", "operator.period=2.0", "buttons.fixture=[]",
@@ -293,7 +312,7 @@ def test_other_axis_map_moves_the_slave_along_other_axes():
     axes = {"['-z', '-x', '+y']": (1, -1.0), "['+x', '+y', '+z']": (0, 1.0),
             "['+y', '+z', '+x']": (2, 1.0), "['-x', '-y', '+z']": (0, -1.0)}  # fmt: skip
     for text, (axis, sign) in axes.items():
-        block = VirtualTime(configure("coarse_box", settings=[*still, f"axes={text}"]))
+        block: Any = VirtualTime(configure("coarse_box", settings=[*still, f"axes={text}"]))
         block.run(block.lead)  # where it starts, all directions have room
         block = block.run(1200)
         command = block["slave_servo_cp"][:, :3] - block["slave_servo_cp"][0, :3]
@@ -307,7 +326,7 @@ def test_other_axis_map_moves_the_slave_along_other_axes():
 # What composes the tick anew.
 
 
-def test_another_kind_of_fixture_holds_from_the_next_block_on():
+def test_another_kind_of_fixture_holds_from_the_next_block_on() -> None:
     virtual = VirtualTime(configure("coarse_box"))
     virtual.run(5000)
     wide = {"fixture.kind": "sphere", "fixture.sphere.diameter": 0.5}
@@ -317,7 +336,7 @@ def test_another_kind_of_fixture_holds_from_the_next_block_on():
     assert virtual.run(4000)["master_servo_cf"].any()
 
 
-def test_reset_stages_repeat_the_session_with_a_jointed_handle_too():
+def test_reset_stages_repeat_the_session_with_a_jointed_handle_too() -> None:
     virtual = VirtualTime(configure(settings=["device.handle=mma"]))
     first = virtual.run(300)["master_measured_cp"]
     for stage in virtual.stages.values():

@@ -2,6 +2,9 @@
 
 import json
 import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
@@ -12,10 +15,13 @@ from teleop_core.graph.topics import SLAVE_SERVO_CP, passed_on
 from teleop_core.session.configuration import configure
 from teleop_core.session.virtual import VirtualTime
 
+if TYPE_CHECKING:
+    from conftest import Run
+
 ANSWER = tc.Topic("test/answer", tc.Kind.POSE, passed_on("slave/servo_cp"))
 
 
-def stage(step):
+def stage(step: Callable[[object, object, object, float], None]) -> tc.Stage:
     """Stage that answers every pose commanded; always the same graph, compiled once."""
     made = tc.Stage(
         "own", tc.NoParameters, (SLAVE_SERVO_CP,), (ANSWER,), step, trigger=SLAVE_SERVO_CP
@@ -23,13 +29,15 @@ def stage(step):
     return tc.register_stage(made)
 
 
-def session(step):
+def session(step: Callable[[object, object, object, float], None]) -> VirtualTime:
     return VirtualTime(configure(settings=[f"teleop.stages=[{stage(step).name}]"]))
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf])
-def test_stage_that_writes_no_number_ends_the_session_with_topic_and_time(own_parts, value):
-    def fails(p, s, row, dt):
+def test_stage_that_writes_no_number_ends_the_session_with_topic_and_time(
+    own_parts: None, value: float
+) -> None:
+    def fails(p: Any, s: Any, row: Any, dt: float) -> None:
         row.test_answer[2] = value if row.now_ns > 5 * TICK_NS else 0.0
 
     told = "^stage 'own' must be one that writes finite numbers; test/answer at 0.006 s is not"
@@ -37,8 +45,10 @@ def test_stage_that_writes_no_number_ends_the_session_with_topic_and_time(own_pa
         session(fails).run(10)
 
 
-def test_misspelt_field_in_a_plain_stage_is_told_with_the_near_one_and_the_line(own_parts):
-    def misspells(p, s, row, dt):
+def test_misspelt_field_in_a_plain_stage_is_told_with_the_near_one_and_the_line(
+    own_parts: None,
+) -> None:
+    def misspells(p: Any, s: Any, row: Any, dt: float) -> None:
         row.test_answer[0] = row.slave_servo_pc[0]
 
     line = misspells.__code__.co_firstlineno + 1
@@ -47,11 +57,11 @@ def test_misspelt_field_in_a_plain_stage_is_told_with_the_near_one_and_the_line(
         session(misspells).run(1)
 
 
-def copies(p, s, row, dt):
+def copies(p: Any, s: Any, row: Any, dt: float) -> None:
     row.test_answer[:] = row.slave_servo_cp
 
 
-def test_answer_that_nobody_reads_is_a_warning_with_the_way_out(own_parts):
+def test_answer_that_nobody_reads_is_a_warning_with_the_way_out(own_parts: None) -> None:
     told = "'own' writes test/answer, which no stage reads; replaces= would lead it to the"
     with pytest.warns(UserWarning, match=told):
         tc.run(duration=0.01, stages=stage(copies))
@@ -75,7 +85,7 @@ tc.register_stage(
 
 
 @pytest.fixture
-def forgetful(tmp_path):
+def forgetful(tmp_path: Path) -> Path:
     """File with a stage, which takes its name from a file beside it."""
     (tmp_path / "beside.py").write_text("NAME = 'own'\n")
     (tmp_path / "parts.py").write_text(FORGETFUL)
@@ -83,8 +93,8 @@ def forgetful(tmp_path):
 
 
 def test_file_of_parts_takes_what_stands_beside_it_before_and_after_the_command(
-    teleop, forgetful, tmp_path
-):
+    teleop: "Run", forgetful: Path, tmp_path: Path
+) -> None:
     text = "import teleop_core as tc\n\ntc.register_operator('still', lambda t: 0.0 * t)\n"
     (tmp_path / "more.py").write_text(text)
     first, second = forgetful, tmp_path / "more.py"
@@ -107,7 +117,9 @@ def test_file_of_parts_takes_what_stands_beside_it_before_and_after_the_command(
         ("x = (\n", r"SyntaxError: .*line 1\)"),
     ],
 )
-def test_file_of_parts_that_raises_is_told_with_its_line(teleop_again, tmp_path, text, told):
+def test_file_of_parts_that_raises_is_told_with_its_line(
+    teleop_again: "Run", tmp_path: Path, text: str, told: str
+) -> None:
     file = tmp_path / "wrong.py"
     file.write_text(text)
     (line,) = teleop_again("parts", "--parts", file, code=2).stderr.splitlines()
@@ -117,8 +129,8 @@ def test_file_of_parts_that_raises_is_told_with_its_line(teleop_again, tmp_path,
 
 @pytest.mark.slow
 def test_command_notes_an_answer_that_nobody_reads_and_scores_without_its_file(
-    teleop, forgetful, tmp_path
-):
+    teleop: "Run", forgetful: Path, tmp_path: Path
+) -> None:
     out, scores = tmp_path / "bag", tmp_path / "scores.json"
     done = teleop("sim", "--parts", forgetful, "--duration", 0.5, "--out", out,
                   "--set", "stages=[own]")  # fmt: skip

@@ -1,13 +1,16 @@
 """Published experiments of the RCRT-1, repeated on the simulated system, beside their figures."""
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
+from present import present
 from teleop_core.graph.signals import STATE, TICK_NS
 from teleop_core.graph.topics import NO_COMMAND_NS, SLAVE_MEASURED_CP, SLAVE_REACH, STREAMS
-from teleop_core.kernels.geometry import roll_pitch_yaw, rotations_from_quaternions
+from teleop_core.kernels.geometry import Array, roll_pitch_yaw, rotations_from_quaternions
 from teleop_core.robots import load_robot
 from teleop_core.session.configuration import configure
 from teleop_core.session.runner import session_ticks, simulate
@@ -25,24 +28,24 @@ BOX_MM = {"coarse_box": 30.0, "fine_box": 3.0}
 IDEAL = ("plant=ideal", "controller=pid")
 
 
-def session(scenario, *settings):
+def session(scenario: str, *settings: str) -> NDArray[np.void]:
     configuration = configure(scenario, settings=settings)
     virtual = VirtualTime(configuration)
     return virtual.run(session_ticks(configuration, virtual))
 
 
 @pytest.fixture(scope="module", params=PUBLISHED)
-def box(request):
+def box(request: pytest.FixtureRequest) -> tuple[str, NDArray[np.void]]:
     """Name of a box scenario and its signals, whole."""
     return request.param, session(request.param)
 
 
-def position_error_mm(block, reference="slave_setpoint_cp"):
+def position_error_mm(block: NDArray[np.void], reference: str = "slave_setpoint_cp") -> Array:
     off = block["slave_measured_cp"][:, :3] - block[reference][:, :3]
     return np.linalg.norm(off, axis=1) / MM
 
 
-def rotation_error_degrees(block):
+def rotation_error_degrees(block: NDArray[np.void]) -> Array:
     angles = [
         roll_pitch_yaw(rotations_from_quaternions(block[topic][:, 3:]))
         for topic in ("slave_measured_cp", "slave_setpoint_cp")
@@ -50,17 +53,17 @@ def rotation_error_degrees(block):
     return np.abs((angles[0] - angles[1] + math.pi) % (2 * math.pi) - math.pi) / DEGREE
 
 
-def rms(values):
+def rms(values: Array) -> float:
     return math.sqrt(np.mean(np.square(values)))
 
 
-def following(block):
+def following(block: NDArray[np.void]) -> NDArray[np.void]:
     """Rows of a session in which the slave follows the hand."""
     return block[block["command_status"] == CommandStatus.FRESH]
 
 
 @pytest.mark.slow
-def test_position_error_predicts_the_published_one():  # case 28
+def test_position_error_predicts_the_published_one() -> None:  # case 28
     # Of three hands; the plant is fitted to tables 7.1-7.6 alone.
     found = {}
     for name, (published, _) in PUBLISHED.items():
@@ -70,17 +73,21 @@ def test_position_error_predicts_the_published_one():  # case 28
     assert abs(found["fine_box"] / found["coarse_box"] - 0.87) < 0.12
 
 
-def test_largest_errors_are_of_the_published_size_but_smaller(box):
+def test_largest_errors_are_of_the_published_size_but_smaller(
+    box: tuple[str, NDArray[np.void]],
+) -> None:
     name, block = box
     largest = position_error_mm(following(block)).max()
     assert 0.5 < largest / PUBLISHED[name][1] < 1.0
 
 
-def test_rotation_error_stays_below_the_published_limit(box):  # case 28
+def test_rotation_error_stays_below_the_published_limit(
+    box: tuple[str, NDArray[np.void]],
+) -> None:  # case 28
     assert rotation_error_degrees(box[1]).max() < 0.9
 
 
-def test_without_compensation_of_gravity_the_error_is_clearly_worse():
+def test_without_compensation_of_gravity_the_error_is_clearly_worse() -> None:
     with_it, without = (
         rms(position_error_mm(following(session("coarse_box", "duration=20.0", *more))))
         for more in ((), ("gravity_compensation=none",))
@@ -88,14 +95,16 @@ def test_without_compensation_of_gravity_the_error_is_clearly_worse():
     assert without > 2.0 * with_it
 
 
-def test_an_ideal_arm_is_far_better_than_any_machine(box):
+def test_an_ideal_arm_is_far_better_than_any_machine(box: tuple[str, NDArray[np.void]]) -> None:
     # Which is why it is not compared with one.
     name, block = box
     ideal = following(session(name, "duration=20.0", *IDEAL))
     assert rms(position_error_mm(ideal)) < 0.5 * rms(position_error_mm(following(block)))
 
 
-def test_slave_stays_in_the_box_within_a_millimetre(box):  # case 30
+def test_slave_stays_in_the_box_within_a_millimetre(
+    box: tuple[str, NDArray[np.void]],
+) -> None:  # case 30
     name, block = box
     state = block["teleop_state"]
     on = state[:, STATE["is_fixture_on"]] > 0.0
@@ -110,28 +119,30 @@ def test_slave_stays_in_the_box_within_a_millimetre(box):  # case 30
     assert wanted_out > 0.3
 
 
-def test_hand_moves_over_most_of_the_box(box):
+def test_hand_moves_over_most_of_the_box(box: tuple[str, NDArray[np.void]]) -> None:
     name, block = box
     on = block["teleop_state"][:, STATE["is_fixture_on"]] > 0.0
     swept = np.ptp(block["slave_measured_cp"][on, :3], axis=0) / MM
     assert (swept > 0.7 * BOX_MM[name]).all()
 
 
-def test_device_never_pushes_harder_than_it_can(box):
+def test_device_never_pushes_harder_than_it_can(box: tuple[str, NDArray[np.void]]) -> None:
     force = np.linalg.norm(box[1]["master_measured_cf"][:, :3], axis=1)
     assert force.max() <= 3.3 * (1 + 1e-12)
 
 
-def test_every_command_is_followed_and_every_number_finite(box):  # case 31
+def test_every_command_is_followed_and_every_number_finite(
+    box: tuple[str, NDArray[np.void]],
+) -> None:  # case 31
     _, block = box
     is_moving = block["command_status"] == CommandStatus.MOVING
     assert (block["command_status"][~is_moving] == CommandStatus.FRESH).all()
     assert not is_moving[np.argmin(is_moving) :].any()
-    for name in block.dtype.names:
+    for name in present(block.dtype.names):
         assert np.isfinite(block[name]).all(), name
 
 
-def test_stamps_step_by_one_tick(box):  # case 31
+def test_stamps_step_by_one_tick(box: tuple[str, NDArray[np.void]]) -> None:  # case 31
     _, block = box
     assert np.array_equal(np.diff(block["now_ns"]), np.full(len(block) - 1, TICK_NS))
     for topic in STREAMS:
@@ -144,7 +155,7 @@ def test_stamps_step_by_one_tick(box):  # case 31
         assert np.array_equal(block[f"{topic.field}_ns"][is_sent], sent_ns), topic.name
 
 
-def test_without_the_box_the_hand_leaves_it():
+def test_without_the_box_the_hand_leaves_it() -> None:
     coarse, free = session("coarse_box"), session("coarse_box", "buttons.fixture=[]")
     on = coarse["teleop_state"][:, STATE["is_fixture_on"]] > 0.0
     state = coarse["teleop_state"][on][0]
@@ -158,19 +169,19 @@ def test_without_the_box_the_hand_leaves_it():
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3, 4])
-def test_inverse_kinematics_keeps_the_tool_within_the_published_rotation_error(seed):
+def test_inverse_kinematics_keeps_the_tool_within_the_published_rotation_error(seed: int) -> None:
     # Home is a wrist singularity: noise of the gimbal there must not send joint 4 to its limit.
     block = session("free_motion", f"seed={seed}", "duration=20.0")
     left = SLAVE_REACH.columns.index("rotation_residual")
     assert block["slave_reach"][:, left].max() < 0.9 * DEGREE
 
 
-def test_same_configuration_gives_the_same_session_to_the_bit():
+def test_same_configuration_gives_the_same_session_to_the_bit() -> None:
     first, second = (session("mode_switching", "duration=5.0") for _ in range(2))
     assert first.tobytes() == second.tobytes()
 
 
-def test_session_does_not_depend_on_the_blocks_it_is_run_in():
+def test_session_does_not_depend_on_the_blocks_it_is_run_in() -> None:
     configuration = configure("mode_switching", settings=["duration=5.0"])
     whole = VirtualTime(configuration).run(3000)
     again = VirtualTime(configuration)
@@ -178,7 +189,7 @@ def test_session_does_not_depend_on_the_blocks_it_is_run_in():
     assert whole.tobytes() == parts.tobytes()
 
 
-def test_switches_of_mode_clutch_and_box_make_no_jump():  # case 31
+def test_switches_of_mode_clutch_and_box_make_no_jump() -> None:  # case 31
     block = session("mode_switching")
     state, command = block["teleop_state"], block["slave_servo_cp"]
     for name in ("is_fine", "is_clutched", "is_fixture_on"):
@@ -195,7 +206,7 @@ def test_switches_of_mode_clutch_and_box_make_no_jump():  # case 31
         assert (np.abs(step - before) < 0.01 * MM).all(), name
 
 
-def test_toggled_fixture_does_not_disturb_the_motion():  # case 31
+def test_toggled_fixture_does_not_disturb_the_motion() -> None:  # case 31
     # A box far larger than the motion pushes never: with and without it the bits are the same.
     settings = ("fixture.box.size=[0.5, 0.5, 0.5]", "duration=10.0")
     on = session("coarse_box", *settings)
@@ -205,7 +216,7 @@ def test_toggled_fixture_does_not_disturb_the_motion():  # case 31
         assert np.array_equal(on[topic], off[topic]), topic
 
 
-def test_recorded_session_has_the_ticks_of_its_duration(tmp_path):
+def test_recorded_session_has_the_ticks_of_its_duration(tmp_path: Path) -> None:
     configuration = configure("mode_switching", settings=["duration=2.5"])
     ticks = simulate(configuration, tmp_path / "session")
     lead = VirtualTime(configuration).lead  # the hand waits until the slave is where it starts
@@ -213,8 +224,8 @@ def test_recorded_session_has_the_ticks_of_its_duration(tmp_path):
     assert ticks == 2500 + lead
 
 
-def test_published_time_scale_of_the_moves_is_impossible():  # misprint 16
+def test_published_time_scale_of_the_moves_is_impossible() -> None:  # misprint 16
     targets = read_rests(PUBLISHED_RESTS, ARM).targets
     for point, goal in enumerate(np.clip(targets, ARM.lower, ARM.upper)):
-        fastest = shortest_move_time(ARM.home, goal, ARM.drives.speed_limit)
+        fastest = shortest_move_time(ARM.home, goal, present(ARM.drives).speed_limit)
         assert 0.5 < fastest < 1.8, point

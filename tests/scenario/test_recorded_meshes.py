@@ -4,24 +4,29 @@ import base64
 import os
 import shutil
 import zlib
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 import trimesh
+from numpy.typing import NDArray
 
 import teleop_core as tc
+from present import present
 from teleop_core.bags import kept_files
 from teleop_core.bags.kept_files import KeptFiles, recorded_files
 from teleop_core.bags.reader import Bag
 from teleop_core.console.recorded_arms import configuration_of, recorded_arms
+from teleop_core.kernels.geometry import Array
 from teleop_core.robots.bodies.looks import looks_of
 
 URDF = (Path(__file__).parents[2] / "examples" / "any_arm.urdf").read_text()
 LINKS = ("column", "upper_arm", "forearm", "wrist_1")
 
 
-def arm(folder, size=1.0, lift="0.42"):
+def arm(folder: Path, size: float = 1.0, lift: str = "0.42") -> Path:
     """A package whose links have meshes, by a name of each form; path of its URDF.
 
     Its last link has a mesh in two places, which is one file.
@@ -43,19 +48,29 @@ def arm(folder, size=1.0, lift="0.42"):
     return path
 
 
-def recorded(folder, path, **more):
-    options = {"robot": str(path), "geometry": ["tip=tool0"], "duration": 0.3, **more}
+def recorded(
+    folder: Path, path: Path, **more: list[str] | Mapping[str, str | list[str]]
+) -> tc.Recording:
+    options: dict[str, Any] = {
+        "robot": str(path),
+        "geometry": ["tip=tool0"],
+        "duration": 0.3,
+        **more,
+    }
     return tc.run("coarse_box", out=folder / "bag", **options)
 
 
-def drawn(path):
+def drawn(path: Path) -> list[dict[int, tuple[Array, NDArray[np.int64]]]]:
     """Looks of each arm as the page of a recording draws them."""
     bag = Bag(path)
     arms, _ = recorded_arms(bag, configuration_of(bag))
     return [looks_of(one.arm.robot) for one in arms]
 
 
-def assert_same_looks(found, expected):
+def assert_same_looks(
+    found: list[dict[int, tuple[Array, NDArray[np.int64]]]],
+    expected: list[dict[int, tuple[Array, NDArray[np.int64]]]],
+) -> None:
     assert [list(looks) for looks in found] == [list(looks) for looks in expected]
     for one, other in zip(found, expected, strict=True):
         for (vertices, faces), (points, corners) in zip(one.values(), other.values(), strict=True):
@@ -63,24 +78,24 @@ def assert_same_looks(found, expected):
             np.testing.assert_array_equal(faces, corners)
 
 
-def kept(metadata):
+def kept(metadata: dict[str, str]) -> list[str]:
     return [key for key in metadata if key.startswith("sha256:")]
 
 
 def test_a_moved_recording_is_replayed_scored_and_drawn_as_ever_once_the_arms_folder_is_gone(
-    tmp_path,
-):
+    tmp_path: Path,
+) -> None:
     recording = recorded(tmp_path, arm(tmp_path / "mine"), settings={"world": "button"})
-    before = tc.replay(recording.path)["slave/setpoint_js"].values
-    looks, score = drawn(recording.path), recording.score()
+    before = tc.replay(present(recording.path))["slave/setpoint_js"].values
+    looks, score = drawn(present(recording.path)), recording.score()
     assert score.value("touch.presses") == 0  # what is scored needs the arm
     assert len(looks[0]) == len(LINKS)
-    elsewhere = tmp_path / "elsewhere" / "copy"
-    shutil.copytree(recording.path, elsewhere)
+    elsewhere: Any = tmp_path / "elsewhere" / "copy"
+    shutil.copytree(present(recording.path), elsewhere)
     shutil.rmtree(tmp_path / "mine")
-    shutil.rmtree(recording.path)
+    shutil.rmtree(present(recording.path))
     assert_same_looks(drawn(elsewhere), looks)
-    again = tc.open_recording(elsewhere).score()
+    again: Any = tc.open_recording(elsewhere).score()
     for key in ("touch.presses", "position_error_mm.rms"):
         assert again.value(key) == score.value(key)
     again = tc.replay(elsewhere, out=tmp_path / "again")
@@ -89,49 +104,53 @@ def test_a_moved_recording_is_replayed_scored_and_drawn_as_ever_once_the_arms_fo
     assert_same_looks(drawn(again.path), looks)
 
 
-def test_the_recorded_mesh_is_drawn_where_it_is_another_by_now(tmp_path):
+def test_the_recorded_mesh_is_drawn_where_it_is_another_by_now(tmp_path: Path) -> None:
     path = arm(tmp_path)
     recording = recorded(tmp_path, path)
-    looks = drawn(recording.path)
+    looks = drawn(present(recording.path))
     trimesh.creation.icosphere().export(path.parents[1] / "meshes" / "1.stl")
-    assert_same_looks(drawn(recording.path), looks)
+    assert_same_looks(drawn(present(recording.path)), looks)
 
 
 @pytest.mark.parametrize("is_gone", [False, True])
 def test_what_a_recording_has_no_room_for_is_told_in_one_line_and_again_when_it_changed(
-    is_gone, tmp_path, monkeypatch
-):
+    is_gone: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     path = arm(tmp_path)
     monkeypatch.setattr(kept_files, "_MOST", 1400)
     with pytest.warns(UserWarning, match=r"keeps .* only digests of 2\.STL, 3\.obj$") as told:
         recording = recorded(tmp_path, path)
     assert len(told) == 1
     assert len(kept(recording.metadata)) == 2
-    looks = drawn(recording.path)
+    looks = drawn(present(recording.path))
     assert len(looks[0]) == len(LINKS)
     mesh = path.parents[1] / "meshes" / "2.STL"
     path.write_text(path.read_text() + "<!-- other by now: the copy takes the mesh from here -->")
-    assert_same_looks(drawn(recording.path), looks)
+    assert_same_looks(drawn(present(recording.path)), looks)
     mesh.unlink() if is_gone else trimesh.creation.icosphere().export(mesh)
     said = f"2.STL: this file is {'gone' if is_gone else 'another by now'}; the recording has no"
     with pytest.warns(UserWarning, match=said):
         recorded_files(recording.metadata)
 
 
-def test_two_arms_with_the_same_meshes_keep_them_once_and_each_is_drawn_with_its_own(tmp_path):
+def test_two_arms_with_the_same_meshes_keep_them_once_and_each_is_drawn_with_its_own(
+    tmp_path: Path,
+) -> None:
     left, right, other = (arm(tmp_path / n, size) for n, size in (("l", 1), ("r", 1), ("o", 2)))
     for one, distinct in ((right, 4), (other, 8)):
         settings = {"right/robot": str(one)}
         folder = tmp_path / str(distinct)
         recording = recorded(folder, left, arms=["left", "right"], settings=settings)
         assert len(kept(recording.metadata)) == distinct
-        looks = drawn(recording.path)
+        looks = drawn(present(recording.path))
         one.rename(one.with_suffix(".moved"))
-        assert_same_looks(drawn(recording.path), looks)
+        assert_same_looks(drawn(present(recording.path)), looks)
         assert np.abs(looks[1][1][0] / looks[0][1][0]).max() == pytest.approx(distinct / 4)
 
 
-def test_a_mesh_that_is_touched_is_kept_before_those_that_are_only_looked_at(tmp_path, monkeypatch):
+def test_a_mesh_that_is_touched_is_kept_before_those_that_are_only_looked_at(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(kept_files, "_MOST", 700)
     ball = tmp_path / "ball.stl"
     trimesh.creation.box((50.0, 50.0, 30.0)).export(ball)
@@ -141,7 +160,7 @@ def test_a_mesh_that_is_touched_is_kept_before_those_that_are_only_looked_at(tmp
     assert kept(recording.metadata) == [recording.metadata["mesh_file"]]
 
 
-def test_each_of_two_arms_of_one_xacro_is_replayed_with_its_own_arguments(tmp_path):
+def test_each_of_two_arms_of_one_xacro_is_replayed_with_its_own_arguments(tmp_path: Path) -> None:
     path = tmp_path / "arm.xacro"
     path.write_text(
         URDF.replace("<robot ", '<robot xmlns:xacro="http://www.ros.org/wiki/xacro" ').replace(
@@ -151,7 +170,7 @@ def test_each_of_two_arms_of_one_xacro_is_replayed_with_its_own_arguments(tmp_pa
     settings = {"right/geometry": ["tip=tool0", "xacro.lift=0.5"]}
     recording = recorded(tmp_path, path, arms=["left", "right"], settings=settings)
     before = [recording[f"{arm}slave/measured_cp"].values for arm in ("", "right/")]
-    after = tc.replay(recording.path)
+    after = tc.replay(present(recording.path))
     for name, values in zip(("", "right/"), before, strict=True):
         np.testing.assert_array_equal(after[f"{name}slave/measured_cp"].values, values)
 
@@ -160,7 +179,9 @@ def test_each_of_two_arms_of_one_xacro_is_replayed_with_its_own_arguments(tmp_pa
     "packed", ["", "x", "zlib, base64: x", "zlib, base64: " + base64.b64encode(
         zlib.compress(b"another")).decode()]
 )  # fmt: skip
-def test_a_kept_mesh_that_was_damaged_is_told_as_one_that_is_gone(packed, tmp_path):
+def test_a_kept_mesh_that_was_damaged_is_told_as_one_that_is_gone(
+    packed: str, tmp_path: Path
+) -> None:
     files = KeptFiles()
     files.add_robot(str(arm(tmp_path)))
     texts = {"robot": str(tmp_path / "gone.urdf"), **files.texts()}
@@ -172,14 +193,16 @@ def test_a_kept_mesh_that_was_damaged_is_told_as_one_that_is_gone(packed, tmp_pa
     assert Path(copy).read_text() == texts["robot_file"]
 
 
-def test_a_recording_leads_to_no_pipe(tmp_path):
+def test_a_recording_leads_to_no_pipe(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe.stl")
     texts = {"mesh": str(tmp_path / "pipe.stl"), "mesh_file": "sha256:0"}
     with pytest.warns(UserWarning, match="gone"):
         assert recorded_files(texts) == {}
 
 
-def test_a_kept_mesh_unpacks_to_no_more_than_a_file_that_is_kept(tmp_path, monkeypatch):
+def test_a_kept_mesh_unpacks_to_no_more_than_a_file_that_is_kept(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     files = KeptFiles()
     files.add_mesh(str(arm(tmp_path).parents[1] / "meshes" / "1.stl"))
     shutil.rmtree(tmp_path / "some_arm")

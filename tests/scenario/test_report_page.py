@@ -5,10 +5,14 @@ import os
 import re
 import shutil
 import subprocess
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 import pytest
+from rich.console import Console
 
+from present import present
 from teleop_core.bags.reader import Bag
 from teleop_core.bags.reports import report
 from teleop_core.bags.writer import BagWriter
@@ -26,6 +30,9 @@ from teleop_core.graph.topics import (
     SLAVE_SETPOINT_JS,
     TELEOP_STATE,
 )
+
+if TYPE_CHECKING:
+    from conftest import Run
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 FLAGS = (
@@ -47,7 +54,7 @@ FIXTURE = {"gain": 1.0, "is_fixture_on": 1.0, "fixture_center_x": 0.4, "fixture_
 
 
 @pytest.fixture(scope="module")
-def browser():
+def browser() -> str:
     found = next(filter(None, map(shutil.which, BROWSERS)), None)
     if found is None:
         reason = f"no browser to open the page with; install one of {', '.join(BROWSERS)}"
@@ -55,7 +62,7 @@ def browser():
     return found
 
 
-def record(path, seed, fixture=None, count=6000):
+def record(path: Path, seed: int, fixture: dict[Any, Any] | None = None, count: int = 6000) -> Path:
     """A live-looking recording: a tip on a curve through a fixture, with delays and a noisy hand.
 
     ``fixture`` are names and texts that describe it; None for a box, as older recordings have it.
@@ -87,7 +94,7 @@ def record(path, seed, fixture=None, count=6000):
     return path
 
 
-def opened(browser, page, folder):
+def opened(browser: str, page: Path, folder: Path) -> Any:
     """The page's body attributes after its scripts have run, console lines and requested URLs."""
     log = folder / "net.json"
     command = [browser, *FLAGS, f"--user-data-dir={folder / 'profile'}", f"--log-net-log={log}",
@@ -100,7 +107,7 @@ def opened(browser, page, folder):
     return attributes, said, requested(log)
 
 
-def requested(log):
+def requested(log: Any) -> set[Any]:
     """URLs for which a page asked the network, from Chromium's log of it."""
     # One event per line; whether the end is written depends on how the browser ends.
     lines = [line.rstrip(",") for line in log.read_text(errors="replace").splitlines()]
@@ -115,7 +122,7 @@ def requested(log):
 
 @pytest.mark.browser
 @pytest.mark.slow
-def test_request_of_a_page_does_not_go_unnoticed(browser, tmp_path):
+def test_request_of_a_page_does_not_go_unnoticed(browser: str, tmp_path: Path) -> None:
     page = tmp_path / "page.html"
     page.write_text('<body data-drawn="0"><img src="http://example.com/x.png"></body>')
     assert opened(browser, page, tmp_path)[2] == {"http://example.com/x.png"}
@@ -123,7 +130,9 @@ def test_request_of_a_page_does_not_go_unnoticed(browser, tmp_path):
 
 @pytest.mark.browser
 @pytest.mark.slow
-def test_page_of_three_recordings_draws_everything_without_asking_the_network(browser, tmp_path):
+def test_page_of_three_recordings_draws_everything_without_asking_the_network(
+    browser: str, tmp_path: Path
+) -> None:
     bags = [
         record(tmp_path / "box", 1),
         record(tmp_path / "sphere", 2, {"fixture": "sphere", "fixture.diameter": "0.03"}),
@@ -132,7 +141,7 @@ def test_page_of_three_recordings_draws_everything_without_asking_the_network(br
     expected = sum(len(study(Bag(path)).figures()) for path in bags)
     assert expected == 27  # nine of each
     page = tmp_path / "report.html"
-    evaluate_bags(bags, None, page, _Silent())
+    evaluate_bags(bags, None, page, cast(Console, _Silent()))
     assert page.stat().st_size < LARGEST_PAGE
     attributes, said, urls = opened(browser, page, tmp_path)
     assert attributes.get("errors", "") == ""
@@ -144,7 +153,9 @@ def test_page_of_three_recordings_draws_everything_without_asking_the_network(br
 
 @pytest.mark.browser
 @pytest.mark.slow
-def test_page_of_a_session_shows_both_arms_with_their_fixtures(browser, teleop, tmp_path):
+def test_page_of_a_session_shows_both_arms_with_their_fixtures(
+    browser: str, teleop: "Run", tmp_path: Path
+) -> None:
     bag, page = tmp_path / "two", tmp_path / "report.html"
     arms = ("arms=[left,right]", "right/robot=puma560", "right/seed=2", "right/fixture=sphere")
     teleop("sim", "--scenario", "coarse_box", "--duration", 6, "--out", bag, "--set", *arms)
@@ -162,11 +173,13 @@ def test_page_of_a_session_shows_both_arms_with_their_fixtures(browser, teleop, 
 
 @pytest.mark.browser
 @pytest.mark.slow
-def test_page_tells_when_a_plot_cannot_be_drawn(browser, tmp_path):
+def test_page_tells_when_a_plot_cannot_be_drawn(browser: str, tmp_path: Path) -> None:
     page = tmp_path / "report.html"
-    evaluate_bags([record(tmp_path / "live", 1)], None, page, _Silent())
+    evaluate_bags([record(tmp_path / "live", 1)], None, page, cast(Console, _Silent()))
     text = page.read_text()
-    data = re.search(r'id="page-data" type="application/json">(.*?)</script>', text, re.DOTALL)
+    data = present(
+        re.search(r'id="page-data" type="application/json">(.*?)</script>', text, re.DOTALL)
+    )
     broken = json.loads(data.group(1))
     broken["figures"][2]["id"] = "nowhere"
     page.write_text(text.replace(data.group(1), json.dumps(broken)))
@@ -180,5 +193,5 @@ class _Silent:
 
     width = 80
 
-    def print(self, *things, **options):
+    def print(self, *things: object, **options: object) -> None:
         pass

@@ -1,9 +1,16 @@
 """Replay of the report page: in a real browser the robot stands where the recording says."""
 
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, cast
+
 import numpy as np
 import pytest
+from numpy.typing import NDArray
+from rich.console import Console
 
 from browser import Tab
+from headless import Headless
 from recipes import START_NS, Recipe, state
 from teleop_core.bags.writer import BagWriter
 from teleop_core.evaluation.command import evaluate_bags
@@ -16,8 +23,9 @@ from teleop_core.graph.topics import (
     SLAVE_SETPOINT_CP,
     TELEOP_STATE,
 )
-from teleop_core.kernels.geometry import pose_from_transform
+from teleop_core.kernels.geometry import Array, pose_from_transform
 from teleop_core.robots import load_robot
+from teleop_core.robots.robot import Robot
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
@@ -25,14 +33,19 @@ ROBOTS = ("scara", "stewart")  # of turning and sliding joints; of loops
 RATE, DURATION = 200, 8.0  # 1/s, s
 # Coordinates are rounded to 0.01 mm or mrad, and straight between moments 40 ms apart.
 TOLERANCE_MM = 0.2
-FIXTURE = {"gain": 1.0, "fixture_size_x": 0.03, "fixture_size_y": 0.03, "fixture_size_z": 0.03}
+FIXTURE: dict[str, Any] = {
+    "gain": 1.0,
+    "fixture_size_x": 0.03,
+    "fixture_size_y": 0.03,
+    "fixture_size_z": 0.03,
+}
 FIXTURE_ON = (3.0, 5.0)
 LARGEST_PAGE = 10_000_000
 CARD = """[...document.querySelectorAll('figure.card')].filter((f) =>
     f.querySelector('h3').textContent === 'Replay')[{number}]"""
 
 
-def joints_of(robot, times):
+def joints_of(robot: Robot, times: Array) -> Any:
     """Joints (N, n) on slow sines about home, within the limits."""
     room = np.minimum(robot.home - robot.lower, robot.upper - robot.home)
     reach = np.where(np.isfinite(room), np.minimum(0.5 * room, 0.1), 0.1)
@@ -40,7 +53,7 @@ def joints_of(robot, times):
     return robot.home + reach * np.sin(2.0 * np.pi * 0.25 * times[:, None] + phases)
 
 
-def record(path, name, duration=DURATION, rate=RATE):
+def record(path: Path, name: str, duration: float = DURATION, rate: int = RATE) -> Any:
     """A recording of a robot whose joints move; returns times and places of the tip [mm]."""
     robot = load_robot(name)
     times = np.arange(int(duration * rate)) / rate
@@ -73,16 +86,18 @@ def record(path, name, duration=DURATION, rate=RATE):
 
 
 @pytest.fixture(scope="module")
-def page(tmp_path_factory):
+def page(tmp_path_factory: pytest.TempPathFactory) -> Any:
     """A page with one recording of each robot, and where their tips were."""
     folder = tmp_path_factory.mktemp("replays")
     tips = [record(folder / name, name) for name in ROBOTS]
-    evaluate_bags([folder / name for name in ROBOTS], None, folder / "page.html", _Silent())
+    evaluate_bags(
+        [folder / name for name in ROBOTS], None, folder / "page.html", cast(Console, _Silent())
+    )
     return folder / "page.html", tips
 
 
 @pytest.fixture(scope="module")
-def tab(page, tmp_path_factory):
+def tab(page: Any, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Headless]:
     with Tab(tmp_path_factory.mktemp("profile"), 1200) as opened:
         opened.open(page[0])
         assert opened.value("document.body.dataset.errors") is None
@@ -90,7 +105,7 @@ def tab(page, tmp_path_factory):
 
 
 @pytest.fixture(autouse=True)
-def _whole(tab):
+def _whole(tab: Any) -> Iterator[None]:
     tab.value("document.querySelectorAll('.times .all').forEach((button) => button.click())")
     tab.settled()
     yield
@@ -98,7 +113,7 @@ def _whole(tab):
     assert tab.value("document.body.dataset.errors") is None
 
 
-def show(tab, number, time):
+def show(tab: Headless, number: int, time: float) -> Any:
     """Move the slider of a replay; returns what is drawn: tip, robot's last solid, fixture."""
     card = CARD.format(number=number)
     return tab.value(f"""(async () => {{
@@ -121,13 +136,15 @@ def show(tab, number, time):
     }})()""")
 
 
-def recorded(tips, time):
+def recorded(tips: NDArray[np.int64], time: float | Array) -> Array:
     times, places = tips
     return np.array([np.interp(time, times, column) for column in places.T])
 
 
 @pytest.mark.parametrize("number", range(len(ROBOTS)), ids=ROBOTS)
-def test_tip_is_drawn_where_the_recording_says_at_any_time(tab, page, number):
+def test_tip_is_drawn_where_the_recording_says_at_any_time(
+    tab: Headless, page: Any, number: int
+) -> None:
     _, tips = page
     for time in (0.0, 2.3456, 5.0, 7.9):
         shown = show(tab, number, time)
@@ -135,18 +152,18 @@ def test_tip_is_drawn_where_the_recording_says_at_any_time(tab, page, number):
     assert np.ptp(tips[number][1], axis=0).max() > 20 * TOLERANCE_MM  # it did move
 
 
-def test_last_solid_is_where_the_tip_is(tab, page):
+def test_last_solid_is_where_the_tip_is(tab: Headless, page: Any) -> None:
     for time in (1.0, 6.5):
         shown = show(tab, 0, time)
         np.testing.assert_allclose(shown["ball"], shown["tip"], atol=TOLERANCE_MM)
 
 
-def test_fixture_is_drawn_while_it_is_on(tab):
+def test_fixture_is_drawn_while_it_is_on(tab: Headless) -> None:
     shown = [show(tab, 0, time)["isOn"] for time in (1.0, 4.0, 6.0)]
     assert shown == [[False], [True], [False]]
 
 
-def test_replay_is_of_the_visible_time_and_plays_to_its_end(tab, page):
+def test_replay_is_of_the_visible_time_and_plays_to_its_end(tab: Headless, page: Any) -> None:
     tab.value("""(() => { const [from, to] = document.querySelectorAll('.times input');
         from.value = 2; to.value = 3; to.dispatchEvent(new Event('change')); })()""")
     tab.settled()
@@ -161,19 +178,19 @@ def test_replay_is_of_the_visible_time_and_plays_to_its_end(tab, page):
     np.testing.assert_allclose(drawn, recorded(page[1][0], 3.0), atol=TOLERANCE_MM)
 
 
-def test_recording_without_joints_or_of_an_unknown_robot_has_no_replay(tmp_path):
+def test_recording_without_joints_or_of_an_unknown_robot_has_no_replay(tmp_path: Path) -> None:
     for name, robot in (("still", "rcrt1"), ("foreign", "no such robot")):
         recipe = Recipe()
         recipe.metadata["robot"] = robot
         recipe.write(tmp_path / name)
-        evaluate_bags([tmp_path / name], None, tmp_path / f"{name}.html", _Silent())
+        evaluate_bags([tmp_path / name], None, tmp_path / f"{name}.html", cast(Console, _Silent()))
         assert "<h3>Replay</h3>" not in (tmp_path / f"{name}.html").read_text()
 
 
-def test_long_replay_stays_within_its_room(tmp_path, monkeypatch):
+def test_long_replay_stays_within_its_room(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(metric, "RATE", 250.0)  # as many moments as ten minutes have
     record(tmp_path / "long", "stewart", duration=20.0, rate=250)
-    evaluate_bags([tmp_path / "long"], None, tmp_path / "page.html", _Silent())
+    evaluate_bags([tmp_path / "long"], None, tmp_path / "page.html", cast(Console, _Silent()))
     page = tmp_path / "page.html"
     assert "<h3>Replay</h3>" in page.read_text()
     assert page.stat().st_size < 4_000_000 + ROOM
@@ -184,5 +201,5 @@ class _Silent:
 
     width = 80
 
-    def print(self, *things, **options):
+    def print(self, *things: object, **options: object) -> None:
         pass

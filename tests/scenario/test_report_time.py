@@ -3,10 +3,13 @@
 import json
 import os
 import shutil
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
+from typing import Any, cast
 
 import numpy as np
 import pytest
+from rich.console import Console
 
 from headless import Headless
 from recipes import START_NS, Recipe, state
@@ -20,6 +23,7 @@ from teleop_core.graph.topics import (
     TELEOP_STATE,
     Limit,
 )
+from teleop_core.kernels.geometry import Array
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
@@ -63,7 +67,7 @@ PLANE_COLUMNS = """
 
 
 @pytest.fixture(scope="module")
-def chromium():
+def chromium() -> str:
     found = next(filter(None, map(shutil.which, BROWSERS)), None)
     if found is None:
         reason = f"no browser to open the page with; install one of {', '.join(BROWSERS)}"
@@ -71,7 +75,7 @@ def chromium():
     return found
 
 
-def noisy(count, seed):
+def noisy(count: int, seed: int) -> Recipe:
     """A recording with a moving, noisy tip and a force; limits and a clutch on the way."""
     recipe, rng = Recipe(count), np.random.default_rng(seed)
     t = np.arange(count) * 1e-3
@@ -95,42 +99,46 @@ def noisy(count, seed):
 
 
 @pytest.fixture(scope="module")
-def short(tmp_path_factory):
+def short(tmp_path_factory: pytest.TempPathFactory) -> Any:
     """Two recordings on one page."""
     folder = tmp_path_factory.mktemp("short")
     recipes = {name: noisy(SHORT, seed) for seed, name in enumerate(("one", "two"))}
     for name, recipe in recipes.items():
         recipe.write(folder / name)
-    evaluate_bags([folder / name for name in recipes], None, folder / "page.html", _Silent())
+    evaluate_bags(
+        [folder / name for name in recipes], None, folder / "page.html", cast(Console, _Silent())
+    )
     return folder / "page.html", recipes
 
 
 @pytest.fixture(scope="module")
-def long(tmp_path_factory):
+def long(tmp_path_factory: pytest.TempPathFactory) -> Any:
     """Ten minutes at 1 kHz with more noise than a device has."""
     folder = tmp_path_factory.mktemp("long")
     recipe = noisy(LONG, 3)
     recipe.values(SLAVE_MEASURED_CP)[432_100, :3] += 0.004  # a single sample
     recipe.write(folder / "long")
-    evaluate_bags([folder / "long"], None, folder / "page.html", _Silent())
+    evaluate_bags([folder / "long"], None, folder / "page.html", cast(Console, _Silent()))
     return folder / "page.html", recipe
 
 
 @pytest.fixture(scope="module")
-def tabs():
+def tabs() -> Iterator[dict[Any, Any]]:
     """Tabs by page and width; drawing a page takes seconds."""
-    found = {}
+    found: dict[Any, Any] = {}
     yield found
     for tab in found.values():
         tab.__exit__()
 
 
 @pytest.fixture
-def opened(chromium, tabs, tmp_path_factory):
+def opened(
+    chromium: str, tabs: dict[tuple[Path, int], Headless], tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[Callable[..., Any]]:
     """Opens a page at a width; whatever goes wrong in it fails the test."""
     used = []
 
-    def open_page(page, width=1200):
+    def open_page(page: Any, width: int = 1200) -> Any:
         if (page, width) not in tabs:
             tabs[page, width] = Headless(chromium, tmp_path_factory.mktemp("profile"), width)
             tabs[page, width].open(page)
@@ -151,16 +159,16 @@ class _Silent:
 
     width = 80
 
-    def print(self, *things, **options):
+    def print(self, *things: object, **options: object) -> None:
         pass
 
 
-def plots(tab):
+def plots(tab: Any) -> Any:
     tab.settled()
     return tab.value(PLOTS)
 
 
-def ranges(tab, recording):
+def ranges(tab: object, recording: str) -> list[Any]:
     """Visible times of all plots against time of a recording, each once."""
     found = {
         (round(begin, 6), round(end, 6))
@@ -171,7 +179,7 @@ def ranges(tab, recording):
     return sorted(found)
 
 
-def show(tab, begin, end, recording=0):
+def show(tab: Any, begin: float, end: float, recording: int = 0) -> None:
     """Choose the visible time with the fields of a recording."""
     tab.value(
         f"""(() => {{ const bar = document.getElementById('times-{recording}');
@@ -181,7 +189,7 @@ def show(tab, begin, end, recording=0):
     tab.settled()
 
 
-def area(tab, selector):
+def area(tab: Any, selector: str) -> Any:
     """Left, top, width and height of an element that is brought into the window, [px]."""
     return tab.value(
         f"""(() => {{ const part = document.querySelector({json.dumps(selector)});
@@ -190,7 +198,7 @@ def area(tab, selector):
     )
 
 
-def drag(tab, selector, begin, end):
+def drag(tab: Any, selector: Any, begin: Sequence[float] | Array, end: Any) -> None:
     """Drag over shares of the width and height of an element."""
     left, top, width, height = area(tab, selector)
     tab.drag(*((left + x * width, top + y * height) for x, y in (begin, end)))
@@ -198,7 +206,7 @@ def drag(tab, selector, begin, end):
     tab.settled()
 
 
-def curve(tab, title, name, recording="one"):
+def curve(tab: object, title: str, name: str, recording: str = "one") -> Any:
     (trace,) = [t for t in plots(tab)[f"{recording}/{title}"]["traces"] if t["name"] == name]
     return np.array(trace["x"], float), np.array(trace["y"], float), trace["mode"]
 
@@ -206,7 +214,9 @@ def curve(tab, title, name, recording="one"):
 # -- linked ----------------------------------------------------------------------------------------
 
 
-def test_zooming_one_plot_moves_all_of_that_recording_and_no_other(opened, short):
+def test_zooming_one_plot_moves_all_of_that_recording_and_no_other(
+    opened: Callable[..., Any], short: Any
+) -> None:
     tab = opened(short[0])
     whole = ranges(tab, "two")
     plot = plots(tab)[f"one/{ERROR}"]["id"]
@@ -218,7 +228,7 @@ def test_zooming_one_plot_moves_all_of_that_recording_and_no_other(opened, short
     assert np.allclose([float(field) for field in fields], (begin, end), atol=1e-3)
 
 
-def test_panning_one_plot_moves_all(opened, short):
+def test_panning_one_plot_moves_all(opened: Callable[..., Any], short: Any) -> None:
     tab = opened(short[0])
     show(tab, 8.0, 12.0)
     plot = plots(tab)[f"one/{POSITION}"]["id"]
@@ -230,7 +240,9 @@ def test_panning_one_plot_moves_all(opened, short):
     assert np.allclose((begin, end), (9.0, 13.0), atol=0.05)
 
 
-def test_double_click_on_any_plot_shows_the_whole_recording(opened, short):
+def test_double_click_on_any_plot_shows_the_whole_recording(
+    opened: Callable[..., Any], short: Any
+) -> None:
     tab = opened(short[0])
     show(tab, 8.0, 12.0)
     plot = plots(tab)[f"one/{FORCE}"]["id"]
@@ -246,7 +258,9 @@ def test_double_click_on_any_plot_shows_the_whole_recording(opened, short):
     assert ranges(tab, "one") == [(0.0, 19.999)]
 
 
-def test_strip_selects_moves_and_resizes_the_visible_time(opened, short):
+def test_strip_selects_moves_and_resizes_the_visible_time(
+    opened: Callable[..., Any], short: Any
+) -> None:
     tab = opened(short[0])
     strip = "#times-0 .strip"
     for begin, end, expected in (
@@ -260,7 +274,7 @@ def test_strip_selects_moves_and_resizes_the_visible_time(opened, short):
         assert np.allclose((first, last), expected, atol=0.1)
 
 
-def test_keys_and_buttons_move_the_visible_time(opened, short):
+def test_keys_and_buttons_move_the_visible_time(opened: Callable[..., Any], short: Any) -> None:
     tab = opened(short[0])
     show(tab, 8.0, 12.0)
     for act, expected in (("later", (11.2, 15.2)), ("earlier", (8.0, 12.0)),
@@ -275,7 +289,7 @@ def test_keys_and_buttons_move_the_visible_time(opened, short):
     assert np.allclose(ranges(tab, "one"), [(8.4, 12.4)], atol=1e-6)
 
 
-def test_range_beyond_the_recording_is_cut_to_it(opened, short):
+def test_range_beyond_the_recording_is_cut_to_it(opened: Callable[..., object], short: Any) -> None:
     tab = opened(short[0])
     for begin, end, expected in ((-5.0, 5.0, (0.0, 10.0)), (15.0, 99.0, (0.0, 19.999)),
                                  (7.0, 7.0, (0.0, 19.999)), (19.99, 30.0, (9.989, 19.999)),
@@ -288,7 +302,9 @@ def test_range_beyond_the_recording_is_cut_to_it(opened, short):
 
 
 @pytest.mark.parametrize("count", [SHORT, LONG])
-def test_zooming_in_shows_every_sample(opened, short, long, count):
+def test_zooming_in_shows_every_sample(
+    opened: Callable[..., Any], short: Any, long: Any, count: Any
+) -> None:
     (page, recipe), name = (long, "long") if count == LONG else ((short[0], short[1]["one"]), "one")
     tab = opened(page)
     first, last = count - 5000, count - 4900
@@ -321,7 +337,9 @@ def test_zooming_in_shows_every_sample(opened, short, long, count):
         assert np.abs(np.array(trace["y"]) - measured[at, axis]).max() < ROUNDING_MM
 
 
-def test_page_of_ten_minutes_is_small_and_shows_a_single_peak(opened, long):
+def test_page_of_ten_minutes_is_small_and_shows_a_single_peak(
+    opened: Callable[..., Any], long: Any
+) -> None:
     page, _ = long
     assert page.stat().st_size < LARGEST_PAGE
     tab = opened(page)
@@ -336,14 +354,16 @@ def test_page_of_ten_minutes_is_small_and_shows_a_single_peak(opened, long):
 # -- bands -----------------------------------------------------------------------------------------
 
 
-def bounds(shape):
+def bounds(shape: Any) -> list[Any]:
     """Begins and ends of a band's stretches."""
     corners = shape["path"].replace("Z", "").split("M")[1:]
     places = [[float(corner.split(",")[0]) for corner in part.split("L")] for part in corners]
     return [[part[0], part[1]] for part in places]
 
 
-def test_every_plot_against_time_has_the_bands_of_the_state(opened, short):
+def test_every_plot_against_time_has_the_bands_of_the_state(
+    opened: Callable[..., Any], short: Any
+) -> None:
     tab = opened(short[0])
     timed = {name: plot for name, plot in plots(tab).items() if plot["times"]}
     assert len(timed) >= 8
@@ -361,7 +381,7 @@ def test_every_plot_against_time_has_the_bands_of_the_state(opened, short):
 
 
 @pytest.mark.parametrize("title", ["Path in space", "Path per plane"])
-def test_paths_show_the_visible_time(opened, short, title):
+def test_paths_show_the_visible_time(opened: Callable[..., object], short: Any, title: str) -> None:
     tab = opened(short[0])
     show(tab, 5.0, 7.0)
     traces = [t for t in plots(tab)[f"one/{title}"]["traces"] if t["times"]]
@@ -374,11 +394,13 @@ def test_paths_show_the_visible_time(opened, short, title):
         assert len(times) == 2001
     for trace in traces:
         if trace["isWhole"]:
-            times = [time for time in trace["times"] if time is not None]
-            assert np.allclose((min(times), max(times)), (0.0, 19.999), atol=1e-4)
+            known = [time for time in trace["times"] if time is not None]
+            assert np.allclose((min(known), max(known)), (0.0, 19.999), atol=1e-4)
 
 
-def test_long_path_in_a_plane_becomes_the_time_that_was_spent(opened, long):
+def test_long_path_in_a_plane_becomes_the_time_that_was_spent(
+    opened: Callable[..., object], long: Any
+) -> None:
     tab = opened(long[0])
     kinds = {trace["type"] for trace in plots(tab)["long/Path per plane"]["traces"]}
     assert kinds == {"heatmap", "scatter"}
@@ -388,7 +410,7 @@ def test_long_path_in_a_plane_becomes_the_time_that_was_spent(opened, long):
 
 
 @pytest.mark.parametrize("width", [500, 1200])
-def test_page_fits_into_the_window(opened, short, width):
+def test_page_fits_into_the_window(opened: Callable[..., Any], short: Any, width: int) -> None:
     tab = opened(short[0], width)
     assert tab.value("document.documentElement.scrollWidth") <= width
     for name, plot in plots(tab).items():
@@ -396,7 +418,9 @@ def test_page_fits_into_the_window(opened, short, width):
         assert plot["right"] <= width, name
 
 
-def test_page_follows_a_window_that_becomes_narrow_and_wide_again(opened, short):
+def test_page_follows_a_window_that_becomes_narrow_and_wide_again(
+    opened: Callable[..., Any], short: Any
+) -> None:
     tab = opened(short[0])
     for width, columns in ((500, 1), (1200, 3)):
         tab.resize(width, 900)
@@ -405,7 +429,9 @@ def test_page_follows_a_window_that_becomes_narrow_and_wide_again(opened, short)
         assert tab.value("document.documentElement.scrollWidth") <= width
 
 
-def test_without_scripts_there_are_tables_sketches_and_a_word(chromium, short, tmp_path):
+def test_without_scripts_there_are_tables_sketches_and_a_word(
+    chromium: str, short: Any, tmp_path: Path
+) -> None:
     with Headless(chromium, tmp_path) as tab:
         tab.call("Emulation.setScriptExecutionDisabled", value=True)
         tab.call("Page.navigate", url=Path(short[0]).as_uri())
@@ -422,13 +448,15 @@ def test_without_scripts_there_are_tables_sketches_and_a_word(chromium, short, t
         assert tab.value("document.querySelector('.times').clientHeight") == 0
 
 
-def test_table_is_folded_where_scripts_run(opened, short):
+def test_table_is_folded_where_scripts_run(opened: Callable[..., Any], short: Any) -> None:
     tab = opened(short[0])
     assert tab.value("document.querySelectorAll('details.table[open]').length") == 0
     assert "position, RMS" not in tab.value("document.body.innerText")
 
 
-def test_page_in_a_browser_that_cannot_unpack_says_so(chromium, short, tmp_path):
+def test_page_in_a_browser_that_cannot_unpack_says_so(
+    chromium: str, short: Any, tmp_path: Path
+) -> None:
     with Headless(chromium, tmp_path) as tab:
         source = "delete window.DecompressionStream"
         tab.call("Page.addScriptToEvaluateOnNewDocument", source=source)

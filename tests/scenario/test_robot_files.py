@@ -2,16 +2,20 @@
 
 import re
 import sys
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 import teleop_core as tc
+from present import present
 from teleop_core.bags.arms import of_arm
 from teleop_core.bags.kept_files import recorded_files
 from teleop_core.base.errors import ParameterError
 from teleop_core.cli import main
+from teleop_core.kernels.geometry import Array
 from teleop_core.session.runner import recorded_configuration
 
 URDF = (Path(__file__).parents[2] / "examples" / "any_arm.urdf").read_text()
@@ -37,47 +41,51 @@ ROBOTS = {
 }
 
 
-def gone(path):
+def gone(path: Path) -> None:
     path.unlink()
 
 
-def longer(path):
+def longer(path: Path) -> None:
     path.write_text(re.sub(r"\b0\.(3|4)\b", r"0.\g<1>3", path.read_text()))
     assert path.read_text() not in (URDF, TABLE, XACRO)
 
 
-def no_text(path):
+def no_text(path: Path) -> None:
     path.write_bytes(b"\xff\xfe<robot/>")
 
 
-def recorded(folder, name, **more):
+def recorded(
+    folder: Path, name: str, **more: list[str] | Mapping[str, str | list[object]]
+) -> tuple[tc.Recording, Path]:
     """Recording of a session with a robot of a file, and that file."""
     text, geometry = ROBOTS[name]
     path = folder / name
     path.write_text(text)
-    options = {"robot": str(path), "geometry": geometry, **more}
+    options: dict[str, Any] = {"robot": str(path), "geometry": geometry, **more}
     return tc.run("coarse_box", duration=0.6, out=folder / "bag", **options), path
 
 
-def replayed(bag, prefix=""):
+def replayed(bag: Path, prefix: str = "") -> Array:
     return tc.replay(bag)[f"{prefix}slave/setpoint_js"].values
 
 
 @pytest.mark.parametrize("becomes", [gone, longer, no_text])
 @pytest.mark.parametrize("name", ROBOTS)
 def test_a_session_replays_to_the_bit_whatever_became_of_the_file_of_its_robot(
-    name, becomes, tmp_path, monkeypatch
-):
+    name: str, becomes: Callable[[Path], None], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     recording, path = recorded(tmp_path, name)
-    before = replayed(recording.path)
+    before = replayed(present(recording.path))
     becomes(path)
     monkeypatch.setitem(sys.modules, "xacro", None)  # as where it is not installed
-    np.testing.assert_array_equal(replayed(recording.path), before)
-    again = tc.replay(recording.path, out=tmp_path / "again")  # which holds the arm as well
-    np.testing.assert_array_equal(replayed(again.path), before)
+    np.testing.assert_array_equal(replayed(present(recording.path)), before)
+    again = tc.replay(
+        present(recording.path), out=tmp_path / "again"
+    )  # which holds the arm as well
+    np.testing.assert_array_equal(replayed(present(again.path)), before)
 
 
-def test_the_report_draws_the_arm_that_moved_when_its_file_is_gone(tmp_path):
+def test_the_report_draws_the_arm_that_moved_when_its_file_is_gone(tmp_path: Path) -> None:
     recording, path = recorded(tmp_path, "arm.urdf")
     path.unlink()
     page = tmp_path / "report.html"
@@ -85,26 +93,26 @@ def test_the_report_draws_the_arm_that_moved_when_its_file_is_gone(tmp_path):
     assert '"name":"robot"' in page.read_text().replace(" ", "")
 
 
-def test_each_of_two_arms_keeps_its_own_file(tmp_path):
+def test_each_of_two_arms_keeps_its_own_file(tmp_path: Path) -> None:
     (tmp_path / "scara.yaml").write_text(TABLE)
-    right = {"right/robot": str(tmp_path / "scara.yaml"), "right/geometry": []}
+    right: Any = {"right/robot": str(tmp_path / "scara.yaml"), "right/geometry": []}
     recording, path = recorded(tmp_path, "arm.urdf", arms=["left", "right"], settings=right)
-    before = replayed(recording.path), replayed(recording.path, "right/")
+    before = replayed(present(recording.path)), replayed(present(recording.path), "right/")
     assert before[0].shape[1] != before[1].shape[1]
     path.unlink()
     longer(tmp_path / "scara.yaml")
     for prefix, values in zip(("", "right/"), before, strict=True):
-        np.testing.assert_array_equal(replayed(recording.path, prefix), values)
+        np.testing.assert_array_equal(replayed(present(recording.path), prefix), values)
 
 
-def test_an_arm_of_a_name_has_no_file_of_the_arm_beside_it(tmp_path):
-    right = {"right/robot": "puma560", "right/geometry": []}
+def test_an_arm_of_a_name_has_no_file_of_the_arm_beside_it(tmp_path: Path) -> None:
+    right: Any = {"right/robot": "puma560", "right/geometry": []}
     recording, path = recorded(tmp_path, "arm.urdf", arms=["left", "right"], settings=right)
     assert recorded_files(of_arm(recording.bag, "left").metadata) == {str(path): str(path)}
     assert recorded_files(of_arm(recording.bag, "right").metadata) == {}
 
 
-def test_a_file_that_says_what_it_said_is_read_where_it_lies(tmp_path):
+def test_a_file_that_says_what_it_said_is_read_where_it_lies(tmp_path: Path) -> None:
     recording, path = recorded(tmp_path, "arm.urdf")
     assert recorded_files(recording.metadata) == {str(path): str(path)}
     assert recording.metadata["robot_file"] == URDF
@@ -116,13 +124,13 @@ def test_a_file_that_says_what_it_said_is_read_where_it_lies(tmp_path):
     assert recorded_configuration(recording.bag)[0]["slave"]["robot"] == copy
 
 
-def test_nothing_of_a_recording_is_expanded(tmp_path):
+def test_nothing_of_a_recording_is_expanded(tmp_path: Path) -> None:
     kept = {"robot": str(tmp_path / "arm.xacro"), "robot_file": XACRO}
     with pytest.raises(ParameterError, match=r"xyz of joint \w+ is '0 0 \$"):
         tc.load_robot(recorded_files(kept)[kept["robot"]], tip="tool0")
 
 
-def test_of_a_xacro_the_urdf_is_recorded_that_its_arguments_made(tmp_path):
+def test_of_a_xacro_the_urdf_is_recorded_that_its_arguments_made(tmp_path: Path) -> None:
     recording, path = recorded(tmp_path, "arm.xacro")
     urdf = tmp_path / "arm.urdf"
     urdf.write_text(recording.metadata["robot_file"])
@@ -133,6 +141,6 @@ def test_of_a_xacro_the_urdf_is_recorded_that_its_arguments_made(tmp_path):
     )
 
 
-def test_robots_of_a_name_store_no_file(tmp_path):
+def test_robots_of_a_name_store_no_file(tmp_path: Path) -> None:
     recording = tc.run("coarse_box", duration=0.1, out=tmp_path / "bag")
     assert not [key for key in recording.metadata if key.endswith("robot_file")]

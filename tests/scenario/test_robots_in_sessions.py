@@ -1,10 +1,13 @@
 """Every robot in the whole graph: as slave, as master's handle, with options, in virtual time."""
 
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
+from present import present
 from teleop_core.bags.reader import Bag
 from teleop_core.graph import topics
 from teleop_core.robots import list_robots, load_robot
@@ -20,7 +23,9 @@ TABLES = sorted(map(str, Path("config/robots").glob("*.yaml")))
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", [*list_robots(), *TABLES])
-def test_every_robot_follows_a_session_inside_its_limits_and_drives(name, tmp_path):
+def test_every_robot_follows_a_session_inside_its_limits_and_drives(
+    name: Any, tmp_path: Path
+) -> None:
     configuration = configure("free_motion", settings=[*SHORT, f"robot={name}"])
     simulate(configuration, tmp_path / "bag")
     robot, bag = load_robot(name), Bag(tmp_path / "bag")
@@ -29,17 +34,17 @@ def test_every_robot_follows_a_session_inside_its_limits_and_drives(name, tmp_pa
     assert (references.values >= robot.lower - 1e-9).all()
     assert (references.values <= robot.upper + 1e-9).all()
     steps = np.abs(np.diff(references.values, axis=0))
-    assert (steps <= robot.drives.speed_limit * 1e-3 + 1e-12).all()
+    assert (steps <= present(robot.drives).speed_limit * 1e-3 + 1e-12).all()
     measured = bag.read(topics.SLAVE_MEASURED_JS).values[:, : robot.n]
     setpoints = bag.read(topics.SLAVE_SETPOINT_JS).values
     # A drive at its speed limit is never further behind than that speed takes in 0.1 s.
-    assert (np.abs(measured - setpoints) < robot.drives.speed_limit * 0.1).all()
+    assert (np.abs(measured - setpoints) < present(robot.drives).speed_limit * 0.1).all()
     assert np.ptp(measured, axis=0).max() > 1e-3
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("model", ["A", "B", "C"])
-def test_the_mma_reads_the_hand_as_well_as_its_encoders_allow(model):
+def test_the_mma_reads_the_hand_as_well_as_its_encoders_allow(model: str) -> None:
     handle = ("device.handle=mma", f"device.handle_geometry=[model={model}]")
     poses = [
         VirtualTime(configure("coarse_box", settings=[*SHORT, *extra])).run(3000)[
@@ -51,9 +56,10 @@ def test_the_mma_reads_the_hand_as_well_as_its_encoders_allow(model):
     assert np.abs(poses[0][:, :3] - poses[1][:, :3]).max() < 1e-4
 
 
-def test_an_option_of_a_robot_reaches_both_stages_that_need_it():
+def test_an_option_of_a_robot_reaches_both_stages_that_need_it() -> None:
     session = VirtualTime(configure(settings=["robot=scara_stewart", "geometry=[heading=carried]"]))
     fixed = load_robot("scara_stewart")
-    solver, slave = (session.stages[name].robot for name in ("inverse_kinematics", "slave"))
+    stages: Mapping[str, Any] = session.stages
+    solver, slave = (stages[name].robot for name in ("inverse_kinematics", "slave"))
     assert solver.geometry != fixed.geometry
     assert slave.geometry == solver.geometry

@@ -18,6 +18,7 @@ import subprocess
 import sys
 from collections import defaultdict
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -68,7 +69,7 @@ def arithmetic() -> str:
 def digests(scenario: str, *settings: str) -> dict[str, str]:
     """First 16 hexadecimal digits of the SHA-256 of each column's bytes, over a whole session."""
     configuration = configure(scenario, settings=settings)
-    found = defaultdict(hashlib.sha256)
+    found: Any = defaultdict(hashlib.sha256)
     session = VirtualTime(configuration)
     for block in run_blocks(session, session_ticks(configuration, session)):
         for name, field in FIELDS.items():
@@ -79,7 +80,7 @@ def digests(scenario: str, *settings: str) -> dict[str, str]:
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", SEEDS)
 @pytest.mark.parametrize("scenario", SCENARIOS)
-def test_every_stream_is_that_of_before_to_the_bit(scenario, seed):
+def test_every_stream_is_that_of_before_to_the_bit(scenario: str, seed: int) -> None:
     expected = json.loads(FILE.read_text())
     if (here := arithmetic()) != (there := expected["arithmetic"]):
         library = " ".join(platform.libc_ver())
@@ -89,7 +90,7 @@ def test_every_stream_is_that_of_before_to_the_bit(scenario, seed):
 
 
 @pytest.mark.slow
-def test_processors_that_round_otherwise_in_numpy_and_blas_give_the_same_bits():
+def test_processors_that_round_otherwise_in_numpy_and_blas_give_the_same_bits() -> None:
     here = _short_sessions({})
     for processor in PROCESSORS:
         if processor.get("OPENBLAS_CORETYPE") != "SkylakeX" or _has_avx512():

@@ -2,6 +2,7 @@
 
 import runpy
 import sys
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -13,7 +14,7 @@ T = np.linspace(0.0, 1.5, 151)
 FRAME = pd.DataFrame({"t": T, "x": 0.01 * np.sin(T), "y": 0.005 * T, "z": 0.0 * T, "clutch": T > 1})
 
 
-def test_a_data_frame_moves_the_hand_as_its_array_does():
+def test_a_data_frame_moves_the_hand_as_its_array_does() -> None:
     rows = FRAME.reindex(
         columns=["t", "x", "y", "z", "rx", "ry", "rz", "clutch", "fixture", "mode"], fill_value=0.0
     )
@@ -24,20 +25,22 @@ def test_a_data_frame_moves_the_hand_as_its_array_does():
             np.testing.assert_array_equal(by_frame[topic].values, by_array[topic].values)
 
 
-def test_a_data_frame_of_something_else_is_refused_with_what_is_needed():
+def test_a_data_frame_of_something_else_is_refused_with_what_is_needed() -> None:
     for frame in (FRAME.rename(columns={"x": "depth"}), FRAME.assign(force=1.0)):
         with pytest.raises(tc.ParameterError, match="columns of t, x, y, z"):
             tc.run(operator=frame, duration=1.0)
 
 
-def test_an_unknown_parameter_is_named_with_its_stage(tmp_path):
+def test_an_unknown_parameter_is_named_with_its_stage(tmp_path: Path) -> None:
     file = tmp_path / "own.yaml"
     file.write_text("haptic_master: {ros__parameters: {out: 1.0}}")
     with pytest.raises(tc.TeleopError, match=r"parameter of \S+ is 'out', must be one of: "):
         tc.configuration(files=[file])
 
 
-def test_the_crtk_client_says_what_it_lacks(monkeypatch, capsys):
+def test_the_crtk_client_says_what_it_lacks(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     monkeypatch.setitem(sys.modules, "crtk_msgs", None)
     monkeypatch.setitem(sys.modules, "crtk_msgs.msg", None)
     with pytest.raises(SystemExit) as end:

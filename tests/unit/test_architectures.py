@@ -1,7 +1,11 @@
 """Architectures: what the hand feels of the slave, by each law, and over a network."""
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 import teleop_core as tc
 from teleop_core.base.errors import PartError, UnknownNameError
@@ -9,6 +13,7 @@ from teleop_core.base.parameters import build
 from teleop_core.chain.mapping.parameters import MotionScalingParameters
 from teleop_core.graph.signals import STATE
 from teleop_core.kernels import kernel
+from teleop_core.kernels.geometry import Array
 from teleop_core.session.configuration import configure
 from teleop_core.session.virtual import VirtualTime
 
@@ -16,17 +21,17 @@ pytestmark = pytest.mark.usefixtures("own_parts")
 CALM = ("reach_force.is_on=false", "reflection.max_force=10.0")
 
 
-def pressing(*texts, ticks=14_000):
+def pressing(*texts: str, ticks: int = 14_000) -> NDArray[np.void]:
     """Signals of the scenario ``palpation``."""
     return VirtualTime(configure("palpation", settings=[*CALM, *texts])).run(ticks)
 
 
-def on_the_slave(force):
+def on_the_slave(force: Array) -> Array:
     """Forces (N, 3) of the hand along the slave's base."""
     return np.column_stack((-force[:, 2], -force[:, 0], force[:, 1]))
 
 
-def test_position_position_is_a_spring_from_the_command_to_the_tip():
+def test_position_position_is_a_spring_from_the_command_to_the_tip() -> None:
     chosen = ("reflection.architecture=position_position",)
     rows = pressing(*chosen, "position_position.stiffness=400.0")
     away = rows["slave_measured_cp"][:-1, :3] - rows["slave_servo_cp"][1:, :3]
@@ -36,7 +41,7 @@ def test_position_position_is_a_spring_from_the_command_to_the_tip():
     np.testing.assert_allclose(force[settled], 400.0 * away[settled], atol=1e-12)
 
 
-def test_the_hand_feels_no_spring_while_the_slave_goes_its_own_way():
+def test_the_hand_feels_no_spring_while_the_slave_goes_its_own_way() -> None:
     rows = pressing(
         "reflection.architecture=position_position", "feedback_timeout=1.0",
         "delays=[slave/measured_cp@motion_scaling=0.2]", ticks=6000,
@@ -49,7 +54,7 @@ def test_the_hand_feels_no_spring_while_the_slave_goes_its_own_way():
     assert rows["master_servo_cf"][own_way.stop + 200 :].any()
 
 
-def test_position_position_over_a_network_is_a_spring_to_where_the_tip_was():
+def test_position_position_over_a_network_is_a_spring_to_where_the_tip_was() -> None:
     rows = pressing(
         "teleop.stages=[network]", "network.preset=delay_100", "feedback_timeout=1.0",
         "reflection.architecture=position_position",
@@ -59,13 +64,13 @@ def test_position_position_over_a_network_is_a_spring_to_where_the_tip_was():
     np.testing.assert_allclose(force[6000:], 150.0 * away[6000:], atol=1e-12)
 
 
-def test_a_unilateral_hand_feels_nothing_of_what_the_slave_presses():
+def test_a_unilateral_hand_feels_nothing_of_what_the_slave_presses() -> None:
     rows = pressing("reflection.architecture=unilateral")
     assert rows["slave_true_cf"].any()
     assert not rows["master_servo_cf"].any()
 
 
-def swing(architecture, stiffness, delay):
+def swing(architecture: str, stiffness: float, delay: float) -> float:
     """Fastest that the hand gets [m/s] where it presses a block of which it hears late."""
     both = ",".join(f"slave/measured_{kind}@motion_scaling={delay}" for kind in ("cf", "cp"))
     rows = pressing(
@@ -77,7 +82,7 @@ def swing(architecture, stiffness, delay):
     return np.linalg.norm(places[20:] - places[:-20], axis=1).max() / 0.02
 
 
-def test_a_spring_softer_than_the_grip_throws_no_hand_that_force_does():
+def test_a_spring_softer_than_the_grip_throws_no_hand_that_force_does() -> None:
     calm = swing("unilateral", 20_000.0, 0.1)
     assert swing("position_force", 20_000.0, 0.1) > 3.0 * calm
     assert swing("position_position", 20_000.0, 0.1) < 1.5 * calm
@@ -86,7 +91,7 @@ def test_a_spring_softer_than_the_grip_throws_no_hand_that_force_does():
 @pytest.mark.parametrize(
     ("kind", "silent"), [("position_force", "cf"), ("position_position", "cp")]
 )
-def test_what_falls_silent_fades_within_a_tenth_of_a_second(kind, silent):
+def test_what_falls_silent_fades_within_a_tenth_of_a_second(kind: str, silent: str) -> None:
     chosen = [*CALM, f"reflection.architecture={kind}", "feedback_timeout=0.05"]
     session = VirtualTime(configure("palpation", settings=chosen))
     stage, pushes = session.stages["motion_scaling"], []
@@ -106,7 +111,7 @@ def test_what_falls_silent_fades_within_a_tenth_of_a_second(kind, silent):
     assert np.abs(np.diff(pushes)).max() < 0.05 * pushes[0]
 
 
-def test_another_architecture_sets_in_from_nothing_within_a_tenth_of_a_second():
+def test_another_architecture_sets_in_from_nothing_within_a_tenth_of_a_second() -> None:
     session = VirtualTime(configure("palpation", settings=[*CALM]))
     session.run(11_600)
     stage = session.stages["motion_scaling"]
@@ -121,9 +126,9 @@ def test_another_architecture_sets_in_from_nothing_within_a_tenth_of_a_second():
     assert not session.run(2)["master_servo_cf"].any()
 
 
-def test_an_architecture_of_ones_own_is_one_call_and_remembers_twelve_numbers():
+def test_an_architecture_of_ones_own_is_one_call_and_remembers_twelve_numbers() -> None:
     @kernel
-    def counting(numbers, memory, felt, away, period, out):
+    def counting(numbers: Any, memory: Any, felt: Any, away: Any, period: Any, out: Any) -> None:
         memory[11] += period
         out[0], out[1], out[2] = 0.0, 0.0, 0.01 * memory[11]
 
@@ -142,11 +147,13 @@ def test_an_architecture_of_ones_own_is_one_call_and_remembers_twelve_numbers():
         lambda n, m, f, a, t, out: out.base[3:].fill(0.0),  # behind what it may write
     ],
 )
-def test_an_architecture_that_cannot_work_is_refused_before_anything_runs(wrong):
+def test_an_architecture_that_cannot_work_is_refused_before_anything_runs(
+    wrong: Callable[..., Any],
+) -> None:
     with pytest.raises(PartError, match="architecture"):
         tc.register_architecture(tc.Architecture("wrong", tc.NoParameters, wrong))
 
 
-def test_an_unknown_architecture_is_refused_with_those_there_are():
+def test_an_unknown_architecture_is_refused_with_those_there_are() -> None:
     with pytest.raises(UnknownNameError, match="position_position"):
         configure("palpation", settings=["reflection.architecture=five_channel"])

@@ -1,8 +1,10 @@
 """Arm bridge without ROS: names, what is believed of an arm, when it is commanded and how far."""
 
 import re
+from collections.abc import Mapping
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -25,19 +27,24 @@ ROOT = Path(__file__).resolve().parents[2]
 ARMS, UR5E = sorted((ROOT / "config/arms").glob("*.yaml")), ROOT / "examples/ur5e.urdf"
 
 
-def hearing(oldest=0.1):
+def hearing(oldest: float = 0.1) -> Hearing:
     return Hearing(JointMap(("a", "b"), ["b=elbow"], [1.0, -1.0]), SPEED, 0.02, oldest)
 
 
-def sample(stamp_ms, position=(0.1, 0.2), names=("a", "elbow"), velocity=()):
+def sample(
+    stamp_ms: int,
+    position: tuple[float, ...] = (0.1, 0.2),
+    names: tuple[str, ...] = ("a", "elbow"),
+    velocity: tuple[float, ...] = (),
+) -> Sample:
     return Sample(names, position, velocity, (), stamp_ms * MS)
 
 
-def lead():
+def lead() -> Lead:
     return Lead(-np.ones(2), np.ones(2), SPEED, 0.02, 0.002)
 
 
-def test_a_command_in_the_arms_order_and_signs_is_measured_as_what_was_commanded():
+def test_a_command_in_the_arms_order_and_signs_is_measured_as_what_was_commanded() -> None:
     joints = JointMap(("a", "b"), ["a=x", "b=y"], [-1.0, 1.0], [0.5, 0.0], ["y", "x"])
     ours = np.array([0.3, -0.7])
     sent = dict(zip(joints.order, joints.command(ours), strict=True))
@@ -57,13 +64,15 @@ def test_a_command_in_the_arms_order_and_signs_is_measured_as_what_was_commanded
         ({"order": ["a", "a"]}, "order"),
     ],
 )
-def test_joints_that_do_not_fit_are_refused_by_their_parameter(given, name):
+def test_joints_that_do_not_fit_are_refused_by_their_parameter(
+    given: Mapping[str, Any], name: str
+) -> None:
     with pytest.raises(ParameterError) as caught:
         JointMap(("a", "b"), **given)
     assert caught.value.name == f"arm_bridge.{name}"
 
 
-def test_names_in_another_order_among_others_are_read_by_name():
+def test_names_in_another_order_among_others_are_read_by_name() -> None:
     heard = hearing()
     assert heard.hear(sample(1, (9.0, 0.2, 0.1), ("finger", "elbow", "a")), 2 * MS)
     assert heard.position == pytest.approx([0.1, -0.2])
@@ -82,7 +91,9 @@ def test_names_in_another_order_among_others_are_read_by_name():
         (sample(3, (0.2, 0.2)), Wrong.JUMP, "a jumped by 0.1"),
     ],
 )
-def test_a_sample_that_cannot_be_is_refused_and_changes_nothing(wrong, reason, words):
+def test_a_sample_that_cannot_be_is_refused_and_changes_nothing(
+    wrong: Sample, reason: Wrong, words: str
+) -> None:
     heard = hearing()
     assert heard.hear(sample(2), 2 * MS)
     assert not heard.hear(wrong, 3 * MS)
@@ -92,7 +103,7 @@ def test_a_sample_that_cannot_be_is_refused_and_changes_nothing(wrong, reason, w
     assert heard.stamp_ns == 2 * MS
 
 
-def test_nothing_is_believed_after_a_jump_before_the_arm_begins_anew():
+def test_nothing_is_believed_after_a_jump_before_the_arm_begins_anew() -> None:
     heard = hearing()
     heard.hear(sample(1), MS)
     heard.hear(sample(2, (0.9, 0.2)), 2 * MS)
@@ -101,14 +112,14 @@ def test_nothing_is_believed_after_a_jump_before_the_arm_begins_anew():
     assert heard.hear(sample(4, (0.9, 0.2)), 4 * MS)
 
 
-def test_a_speed_that_the_arm_does_not_know_is_that_of_its_motion():
+def test_a_speed_that_the_arm_does_not_know_is_that_of_its_motion() -> None:
     heard = hearing()
     for i in range(200):
         assert heard.hear(sample(1 + i, (0.5e-3 * i, 0.0), velocity=(np.nan, 0.0)), (1 + i) * MS)
     assert heard.velocity == pytest.approx([0.5, 0.0], rel=0.01)
 
 
-def test_nothing_is_commanded_before_the_arm_stands_at_its_setpoint():
+def test_nothing_is_commanded_before_the_arm_stands_at_its_setpoint() -> None:
     led, measured = lead(), np.array([0.1, 0.0])
     assert not led.step(np.array([0.2, 0.0]), measured, ("a", "b"), 0.002)
     assert "a is 0.1 from its setpoint" in led.waits
@@ -116,7 +127,7 @@ def test_nothing_is_commanded_before_the_arm_stands_at_its_setpoint():
     assert np.abs(led.position - measured).max() <= 1.2 * 0.002 * SPEED[0] + 1e-12
 
 
-def test_no_command_is_faster_than_its_joint_or_beyond_its_limits():
+def test_no_command_is_faster_than_its_joint_or_beyond_its_limits() -> None:
     led = lead()
     assert led.step(np.zeros(2), np.zeros(2), ("a", "b"), 0.002)
     for _ in range(2000):
@@ -126,7 +137,7 @@ def test_no_command_is_faster_than_its_joint_or_beyond_its_limits():
     assert led.position == pytest.approx([1.0, -1.0])
 
 
-def test_brakes_bring_the_command_to_where_the_arm_was_and_leave_it_there():
+def test_brakes_bring_the_command_to_where_the_arm_was_and_leave_it_there() -> None:
     led = lead()
     led.step(np.zeros(2), np.zeros(2), ("a", "b"), 0.002)
     at = np.array([-0.01, 0.01])
@@ -137,17 +148,17 @@ def test_brakes_bring_the_command_to_where_the_arm_was_and_leave_it_there():
     assert not led.is_leading
 
 
-def bridge(**values):
+def bridge(**values: int) -> ArmBridge:
     made = ArmBridge(build(ArmBridgeParameters, values))
     made.signals["slave_operation"][0] = 1.0
     return made
 
 
-def home_sample(made, stamp_ns):
+def home_sample(made: ArmBridge, stamp_ns: int) -> Sample:
     return Sample(made.joints.theirs, made.signals["slave_setpoint_js"].tolist(), (), (), stamp_ns)
 
 
-def test_a_silent_arm_server_or_setpoint_ends_the_commands():
+def test_a_silent_arm_server_or_setpoint_ends_the_commands() -> None:
     made = bridge()
     now = 10**9
     assert made.command(now, 0.0, True) is None
@@ -160,7 +171,7 @@ def test_a_silent_arm_server_or_setpoint_ends_the_commands():
     assert "no sound sample" in made.trouble()
 
 
-def test_an_arm_that_jumped_is_commanded_nothing_while_it_is_enabled():
+def test_an_arm_that_jumped_is_commanded_nothing_while_it_is_enabled() -> None:
     made, now = bridge(), 10**9
     made.signals["slave_operation"][0] = State.ENABLED
     assert made.hear(home_sample(made, now), now)
@@ -173,12 +184,12 @@ def test_an_arm_that_jumped_is_commanded_nothing_while_it_is_enabled():
     assert made.hear(home_sample(made, now + 4 * MS), now + 4 * MS)
 
 
-def test_an_arm_that_the_server_left_behind_is_not_passed_on_while_it_is_enabled():
+def test_an_arm_that_the_server_left_behind_is_not_passed_on_while_it_is_enabled() -> None:
     made, now = bridge(), 10**9
     made.signals["slave_operation"][0] = State.ENABLED
     there = home_sample(made, now)
 
-    def hear(time_ns):
+    def hear(time_ns: int) -> bool:
         return made.hear(Sample(there.names, there.position, (), (), time_ns), time_ns)
 
     made.signals["slave_setpoint_js"][0] += 0.1  # the server was heard too late
@@ -195,25 +206,25 @@ def test_an_arm_that_the_server_left_behind_is_not_passed_on_while_it_is_enabled
 
 
 @pytest.mark.parametrize("rate", RATES)
-def test_commands_go_out_at_the_rate_that_was_asked_for(rate):
+def test_commands_go_out_at_the_rate_that_was_asked_for(rate: int) -> None:
     made = bridge(rate=rate)
     assert sum(made.is_due(i * MS) for i in range(1000)) == rate
 
 
-def test_a_rate_between_whole_milliseconds_is_refused():
+def test_a_rate_between_whole_milliseconds_is_refused() -> None:
     with pytest.raises(ParameterError, match="rate"):
         build(ArmBridgeParameters, {"rate": 300})
 
 
-def blank(_=""):
-    def time():
+def blank(_: str = "") -> SimpleNamespace:
+    def time() -> SimpleNamespace:
         return SimpleNamespace(sec=0, nanosec=0)
 
     return SimpleNamespace(header=SimpleNamespace(stamp=time()), time_from_start=time())
 
 
 @pytest.mark.parametrize("name", list(BRIDGES))
-def test_every_kind_writes_the_positions_in_the_order_of_its_names(name):
+def test_every_kind_writes_the_positions_in_the_order_of_its_names(name: str) -> None:
     part, message = BRIDGES.find(name), blank()
     command = Command(("x", "y"), np.array([1.0, 2.0]), np.array([3.0, 4.0]), 0.004, 7 * 10**9)
     part.write(message, command, part.parameters(), blank)
@@ -230,7 +241,7 @@ def test_every_kind_writes_the_positions_in_the_order_of_its_names(name):
 
 
 @pytest.mark.parametrize("file", ARMS, ids=lambda path: path.stem)
-def test_the_configuration_of_each_arm_has_parameters_that_exist(file):
+def test_the_configuration_of_each_arm_has_parameters_that_exist(file: Path) -> None:
     groups = {k: v["ros__parameters"] for k, v in yaml.safe_load(file.read_text()).items()}
     common = groups["/**"]
     made = build(ArmBridgeParameters, common | groups["arm_bridge"])
@@ -240,7 +251,9 @@ def test_the_configuration_of_each_arm_has_parameters_that_exist(file):
 
 
 @pytest.mark.parametrize("file", ARMS, ids=lambda path: path.stem)
-def test_a_session_takes_the_file_of_each_arm_and_leaves_the_bridge_its_own(file, tmp_path):
+def test_a_session_takes_the_file_of_each_arm_and_leaves_the_bridge_its_own(
+    file: Path, tmp_path: Path
+) -> None:
     text = file.read_text()
     robot = yaml.safe_load(text)["/**"]["ros__parameters"]["robot"]
     (tmp_path / "arm.yaml").write_text(re.sub(rf"{re.escape(robot)}.*", str(UR5E), text))

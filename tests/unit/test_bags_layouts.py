@@ -1,16 +1,21 @@
 """Layouts: the bytes of messages, against rosbags' serialiser."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from numpy.typing import NDArray
 
+from present import present
 from teleop_core.bags import ros_types
 from teleop_core.bags.layouts import Layout, discover, layout, layout_of
 from teleop_core.bags.messages import Refusal, read_values
 from teleop_core.base.errors import ShapeError
 from teleop_core.graph import topics
 from teleop_core.graph.topics import Kind
+from teleop_core.kernels.geometry import Array
 
 JOINTS = ("theta1", "d2", "a_rather_long_joint_name")
 NAMES = st.text(st.characters(codec="utf-8", exclude_characters="\0"), min_size=1, max_size=9)
@@ -22,7 +27,9 @@ def names_of(kind: Kind) -> tuple[str, ...]:
     return topics.JAW if kind is Kind.JAW else JOINTS
 
 
-def rosbags_message(kind: Kind, stamp_ns: int, values, names, frame_id: str):
+def rosbags_message(
+    kind: Kind, stamp_ns: int, values: Array, names: tuple[str, ...], frame_id: str
+) -> object:
     """The same message made by rosbags."""
     t = ros_types.typestore().types
     header = t["std_msgs/msg/Header"](
@@ -43,7 +50,7 @@ def rosbags_message(kind: Kind, stamp_ns: int, values, names, frame_id: str):
 
 
 @st.composite
-def streams(draw):
+def streams(draw: st.DrawFn) -> tuple[Layout, NDArray[np.int64], Array]:
     """A layout with stamps and values that fit it."""
     kind = draw(st.sampled_from(FIXED))
     most = 1 if kind is Kind.JAW else 7
@@ -58,7 +65,9 @@ def streams(draw):
 
 @settings(deadline=None)
 @given(streams())
-def test_bytes_are_those_that_rosbags_writes(stream):
+def test_bytes_are_those_that_rosbags_writes(
+    stream: tuple[Layout, NDArray[np.int64], Array],
+) -> None:
     form, stamps, values = stream
     for row, stamp, numbers in zip(form.encode(stamps, values), stamps, values, strict=True):
         message = rosbags_message(form.kind, int(stamp), numbers, form.joint_names, form.frame_id)
@@ -67,7 +76,9 @@ def test_bytes_are_those_that_rosbags_writes(stream):
 
 @settings(deadline=None)
 @given(streams())
-def test_decoding_gives_back_what_was_encoded(stream):
+def test_decoding_gives_back_what_was_encoded(
+    stream: tuple[Layout, NDArray[np.int64], Array],
+) -> None:
     form, stamps, values = stream
     rows = form.encode(stamps, values)
     assert form.matches(rows)
@@ -78,7 +89,9 @@ def test_decoding_gives_back_what_was_encoded(stream):
 
 @settings(deadline=None)
 @given(streams())
-def test_single_messages_have_the_bytes_of_the_batch(stream):
+def test_single_messages_have_the_bytes_of_the_batch(
+    stream: tuple[Layout, NDArray[np.int64], Array],
+) -> None:
     form, stamps, values = stream
     for row, stamp, numbers in zip(form.encode(stamps, values), stamps, values, strict=True):
         data = form.encode_one(int(stamp), numbers)
@@ -91,14 +104,18 @@ def test_single_messages_have_the_bytes_of_the_batch(stream):
 
 @settings(deadline=None)
 @given(streams())
-def test_a_stream_is_recognised_by_its_first_message(stream):
+def test_a_stream_is_recognised_by_its_first_message(
+    stream: tuple[Layout, NDArray[np.int64], Array],
+) -> None:
     form, stamps, values = stream
     assert discover(form.kind, form.encode_one(int(stamps[0]), values[0])) is form
 
 
 @settings(deadline=None)
 @given(streams())
-def test_reading_by_attribute_agrees_with_reading_bytes(stream):
+def test_reading_by_attribute_agrees_with_reading_bytes(
+    stream: tuple[Layout, NDArray[np.int64], Array],
+) -> None:
     form, stamps, values = stream
     data = form.encode_one(int(stamps[0]), values[0])
     message = ros_types.deserialise(data, form.kind.ros_type)
@@ -110,7 +127,9 @@ def test_reading_by_attribute_agrees_with_reading_bytes(stream):
 
 @settings(deadline=None)
 @given(streams(), st.data())
-def test_any_other_constant_byte_is_noticed_one_by_one_and_in_batches(stream, data):
+def test_any_other_constant_byte_is_noticed_one_by_one_and_in_batches(
+    stream: tuple[Layout, NDArray[np.int64], Array], data: st.DataObject
+) -> None:
     form, stamps, values = stream
     rows = form.encode(stamps, values)
     other = layout_of(form.kind, tuple(n + "x" for n in form.joint_names), form.frame_id + "x")
@@ -123,28 +142,28 @@ def padding_of(form: Layout) -> list[int]:
     """Bytes that hold neither constants nor numbers."""
     used = form._mask.astype(bool)
     for name in form._dtype.names or ():
-        field, at = form._dtype.fields[name][:2]
+        field, at = present(form._dtype.fields)[name][:2]
         used[at : at + field.itemsize] = True
     return np.flatnonzero(~used).tolist()
 
 
-def test_messages_serialised_by_rclpy_are_understood():
+def test_messages_serialised_by_rclpy_are_understood() -> None:
     # JointState(name=[a, bb], position=[1, 2]) in slave_base at 1 s 2 ns, from rclpy 7.1.6: it ends
     # with eight bytes that belong to no field.
-    positions = bytes.fromhex(
+    positions: Any = bytes.fromhex(
         "0001000001000000020000000b000000736c6176655f62617365000002000000020000006100000003000000"
         "6262000002000000000000000000f03f00000000000000400000000000000000000000007d127402"
     )
     found = discover(Kind.JOINTS, positions)
     assert found is not None
     assert (found.joint_names, found.frame_id) == (("a", "bb"), "slave_base")
-    stamp_ns, values = found.decode_one(positions)
+    stamp_ns, values = present(found.decode_one(positions))
     assert stamp_ns == 1_000_000_002
     assert values.tolist() == [1.0, 2.0]
 
 
 @pytest.mark.parametrize("kind", FIXED)
-def test_padding_may_hold_anything_since_rclpy_does_not_clear_it(kind):
+def test_padding_may_hold_anything_since_rclpy_does_not_clear_it(kind: Kind) -> None:
     form = layout_of(kind, names_of(kind), "slave_base")
     values = np.arange(form.width, dtype=float)
     clean = form.encode_one(7, values)
@@ -161,7 +180,7 @@ def test_padding_may_hold_anything_since_rclpy_does_not_clear_it(kind):
 
 
 @pytest.mark.parametrize("kind", FIXED)
-def test_a_message_cut_short_is_not_decoded(kind):
+def test_a_message_cut_short_is_not_decoded(kind: Kind) -> None:
     form = layout_of(kind, names_of(kind), "slave_base")
     data = form.encode_one(7, np.zeros(form.width))
     for length in range(len(data)):
@@ -169,24 +188,24 @@ def test_a_message_cut_short_is_not_decoded(kind):
         assert discover(kind, data[:length]) is None
 
 
-def test_values_of_another_width_are_refused():
+def test_values_of_another_width_are_refused() -> None:
     form = layout(topics.SLAVE_MEASURED_CP, JOINTS)
     with pytest.raises(ShapeError) as caught:
         form.encode(np.zeros(2, np.int64), np.zeros((2, 6)))
     assert caught.value.expected == (2, 7)
 
 
-def test_a_frame_can_be_named_in_place_of_the_topics_own():
+def test_a_frame_can_be_named_in_place_of_the_topics_own() -> None:
     assert layout(topics.SLAVE_MEASURED_CP, JOINTS).frame_id == "slave_base"
     assert layout(topics.SLAVE_MEASURED_CP, JOINTS, "world").frame_id == "world"
 
 
-def test_reports_have_no_layout():
+def test_reports_have_no_layout() -> None:
     with pytest.raises(ValueError, match="teleop/state"):
         layout(topics.TELEOP_STATE, JOINTS)
 
 
-def test_positions_alone_are_not_taken_for_a_whole_state():
+def test_positions_alone_are_not_taken_for_a_whole_state() -> None:
     state = layout_of(Kind.STATE, JOINTS, "f")
     data = layout_of(Kind.JOINTS, JOINTS, "f").encode_one(1, np.zeros(3))
     assert state.decode_one(data + bytes(200)) is None

@@ -2,13 +2,16 @@
 
 import shutil
 import sqlite3
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from mcap.writer import CompressionType, IndexType, Writer
+from numpy.typing import NDArray
 from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as RosbagsWriter
 
@@ -18,14 +21,15 @@ from teleop_core.bags.reader import Bag, recover
 from teleop_core.bags.writer import BagWriter
 from teleop_core.base.errors import RecordingError
 from teleop_core.graph import topics
-from teleop_core.graph.topics import Kind
+from teleop_core.graph.topics import Kind, Topic
+from teleop_core.kernels.geometry import Array
 
 JOINTS = ("a", "b", "c")
 MS = 1_000_000
 STREAMS = (topics.SLAVE_MEASURED_CP, topics.SLAVE_MEASURED_JS, topics.MASTER_BUTTONS)
 
 
-def samples(count=60):
+def samples(count: int = 60) -> tuple[NDArray[np.int64], dict[Topic, Array]]:
     """Stamps, and values per topic, of one recording."""
     rng = np.random.default_rng(5)
     values = {topic: rng.normal(size=(count, topic.width(3))).round(3) for topic in STREAMS}
@@ -33,7 +37,7 @@ def samples(count=60):
     return np.arange(count) * MS + 3, values
 
 
-def ours(path: Path, parts=3, **options) -> Path:
+def ours(path: Path, parts: int = 3, **options: Any) -> Path:
     stamps, values = samples()
     with BagWriter(path, topics.ALL, JOINTS, **options) as writer:
         for part in np.array_split(np.arange(len(stamps)), parts):
@@ -44,7 +48,13 @@ def ours(path: Path, parts=3, **options) -> Path:
     return path
 
 
-def foreign(path: Path, *, frame_id=None, joint_names=JOINTS, **options) -> Path:
+def foreign(
+    path: Path,
+    *,
+    frame_id: str | None = None,
+    joint_names: tuple[str, str, str] = JOINTS,
+    **options: Any,
+) -> Path:
     """A file that the mcap library wrote."""
     stamps, values = samples()
     with path.open("wb") as file:
@@ -76,7 +86,7 @@ def assert_holds_samples(bag: Bag) -> None:
 
 
 @pytest.mark.parametrize("compression", ["zstd", "lz4", "none"])
-def test_our_recordings_are_read_as_they_were_written(tmp_path, compression):
+def test_our_recordings_are_read_as_they_were_written(tmp_path: Path, compression: str) -> None:
     bag = Bag(ours(tmp_path / "bag", compression=compression, metadata={"seed": "4"}))
     assert_holds_samples(bag)
     assert bag.metadata == {"seed": "4"}
@@ -105,7 +115,7 @@ FOREIGN = {
 
 
 @pytest.mark.parametrize("options", FOREIGN.values(), ids=FOREIGN)
-def test_files_of_other_writers_are_read_too(tmp_path, options):
+def test_files_of_other_writers_are_read_too(tmp_path: Path, options: Mapping[str, Any]) -> None:
     bag = Bag(foreign(tmp_path / "other.mcap", **options))
     assert bag.metadata == {}
     assert_holds_samples(bag)
@@ -114,7 +124,7 @@ def test_files_of_other_writers_are_read_too(tmp_path, options):
     assert len(times) == 180
 
 
-def test_a_recording_of_rosbags_is_read_with_joints_of_changing_order(tmp_path):
+def test_a_recording_of_rosbags_is_read_with_joints_of_changing_order(tmp_path: Path) -> None:
     path = tmp_path / "bag"
     orders = [("a", "b", "c"), ("c", "b", "a")]
     with RosbagsWriter(path, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
@@ -131,7 +141,7 @@ def test_a_recording_of_rosbags_is_read_with_joints_of_changing_order(tmp_path):
     np.testing.assert_array_equal(series.values[:, :3], np.arange(10)[:, None] + np.arange(3))
 
 
-def test_joints_are_read_in_the_order_that_is_asked_for(tmp_path):
+def test_joints_are_read_in_the_order_that_is_asked_for(tmp_path: Path) -> None:
     bag = Bag(ours(tmp_path / "bag"))
     plain = bag.read(topics.SLAVE_MEASURED_JS).values
     series = bag.read(topics.SLAVE_MEASURED_JS, ("c", "a"))
@@ -139,7 +149,7 @@ def test_joints_are_read_in_the_order_that_is_asked_for(tmp_path):
     np.testing.assert_array_equal(series.values, plain[:, [2, 0, 5, 3, 8, 6]])
 
 
-def test_a_topic_unknown_to_us_is_read_by_its_type(tmp_path):
+def test_a_topic_unknown_to_us_is_read_by_its_type(tmp_path: Path) -> None:
     path = tmp_path / "other.mcap"
     with path.open("wb") as file:
         writer = Writer(file)
@@ -155,7 +165,7 @@ def test_a_topic_unknown_to_us_is_read_by_its_type(tmp_path):
     assert bag.read("arm/state").values.tolist() == [list(range(9))]
 
 
-def test_several_files_of_one_recording_follow_each_other(tmp_path):
+def test_several_files_of_one_recording_follow_each_other(tmp_path: Path) -> None:
     first, second = ours(tmp_path / "bag"), ours(tmp_path / "second")
     shutil.copy(second / "second_0.mcap", first / "bag_1.mcap")
     text = (first / "metadata.yaml").read_text()
@@ -167,7 +177,7 @@ def test_several_files_of_one_recording_follow_each_other(tmp_path):
 
 
 @pytest.mark.parametrize("parts", [1, 7])
-def test_blocks_are_the_whole_series_piece_by_piece(tmp_path, parts):
+def test_blocks_are_the_whole_series_piece_by_piece(tmp_path: Path, parts: int) -> None:
     bag = Bag(ours(tmp_path / "bag", parts))
     blocks = [block["slave/measured_cp"] for block in bag.blocks([topics.SLAVE_MEASURED_CP])]
     assert len(blocks) == parts
@@ -178,8 +188,8 @@ def test_blocks_are_the_whole_series_piece_by_piece(tmp_path, parts):
 @settings(max_examples=25, deadline=None)
 @given(st.lists(st.integers(0, 40), min_size=1, max_size=50), st.integers(1, 300), st.booleans())
 def test_messages_come_in_log_time_order_even_if_chunks_overlap(
-    tmp_path_factory, times, chunk_size, is_loose
-):
+    tmp_path_factory: pytest.TempPathFactory, times: list[int], chunk_size: int, is_loose: bool
+) -> None:
     path = tmp_path_factory.mktemp("raw") / "other.mcap"
     with path.open("wb") as file:
         writer = Writer(file, chunk_size=chunk_size, use_chunking=not is_loose)
@@ -193,7 +203,7 @@ def test_messages_come_in_log_time_order_even_if_chunks_overlap(
     assert found == sorted((log_ns, number) for number, log_ns in enumerate(times))
 
 
-def test_raw_messages_are_those_of_the_chosen_topics(tmp_path):
+def test_raw_messages_are_those_of_the_chosen_topics(tmp_path: Path) -> None:
     bag = Bag(ours(tmp_path / "bag"))
     messages = list(bag.raw([topics.TELEOP_STATE]))
     state = ("teleop/state", "diagnostic_msgs/msg/DiagnosticArray", 9)
@@ -212,21 +222,21 @@ def refusal(path: Path) -> str:
     return caught.value.reason
 
 
-def test_a_missing_path_is_named(tmp_path):
+def test_a_missing_path_is_named(tmp_path: Path) -> None:
     assert "does not exist" in refusal(tmp_path / "nothing")
 
 
-def test_a_directory_without_a_recording_is_refused(tmp_path):
+def test_a_directory_without_a_recording_is_refused(tmp_path: Path) -> None:
     assert "no .mcap file" in refusal(tmp_path)
 
 
-def test_a_recording_that_was_not_finished_points_to_recover(tmp_path):
+def test_a_recording_that_was_not_finished_points_to_recover(tmp_path: Path) -> None:
     (ours(tmp_path / "bag") / "metadata.yaml").unlink()
     assert f"teleop recover {tmp_path / 'bag'}" in refusal(tmp_path / "bag")
 
 
 @pytest.mark.parametrize("kept", [0.01, 0.3, 0.9, 0.9999])
-def test_a_file_that_was_cut_off_points_to_recover(tmp_path, kept):
+def test_a_file_that_was_cut_off_points_to_recover(tmp_path: Path, kept: float) -> None:
     file = ours(tmp_path / "bag") / "bag_0.mcap"
     data = file.read_bytes()
     file.write_bytes(data[: int(len(data) * kept)])
@@ -235,17 +245,17 @@ def test_a_file_that_was_cut_off_points_to_recover(tmp_path, kept):
     assert "teleop recover" in reason
 
 
-def test_an_empty_file_is_refused(tmp_path):
+def test_an_empty_file_is_refused(tmp_path: Path) -> None:
     (tmp_path / "bag.mcap").write_bytes(b"")
     assert "empty" in refusal(tmp_path / "bag.mcap")
 
 
-def test_a_file_of_another_format_is_refused(tmp_path):
+def test_a_file_of_another_format_is_refused(tmp_path: Path) -> None:
     (tmp_path / "bag.mcap").write_bytes(b"#ROSBAG V2.0\n" * 20)
     assert "no MCAP file" in refusal(tmp_path / "bag.mcap")
 
 
-def test_sqlite_recordings_are_refused_with_the_way_out(tmp_path):
+def test_sqlite_recordings_are_refused_with_the_way_out(tmp_path: Path) -> None:
     (tmp_path / "bag").mkdir()
     database = sqlite3.connect(tmp_path / "bag" / "bag_0.db3")
     database.execute("CREATE TABLE messages(id INTEGER)")
@@ -255,7 +265,7 @@ def test_sqlite_recordings_are_refused_with_the_way_out(tmp_path):
     assert "SQLite" in refusal(tmp_path / "bag" / "bag_0.db3")
 
 
-def test_a_recording_without_messages_is_refused(tmp_path):
+def test_a_recording_without_messages_is_refused(tmp_path: Path) -> None:
     with BagWriter(tmp_path / "bag", topics.ALL, JOINTS):
         pass
     assert "holds no messages" in refusal(tmp_path / "bag")
@@ -280,12 +290,12 @@ def test_a_recording_without_messages_is_refused(tmp_path):
         ),
     ],
 )
-def test_a_wrong_metadata_file_is_refused(tmp_path, text, expected):
+def test_a_wrong_metadata_file_is_refused(tmp_path: Path, text: str, expected: str) -> None:
     (ours(tmp_path / "bag") / "metadata.yaml").write_text(text)
     assert expected in refusal(tmp_path / "bag")
 
 
-def test_missing_topics_are_listed_with_those_there_are(tmp_path):
+def test_missing_topics_are_listed_with_those_there_are(tmp_path: Path) -> None:
     bag = Bag(ours(tmp_path / "bag"))
     bag.require(STREAMS)
     with pytest.raises(RecordingError) as caught:
@@ -294,7 +304,7 @@ def test_missing_topics_are_listed_with_those_there_are(tmp_path):
     assert caught.value.reason.startswith(expected)
 
 
-def test_a_topic_of_another_type_counts_as_missing(tmp_path):
+def test_a_topic_of_another_type_counts_as_missing(tmp_path: Path) -> None:
     path = tmp_path / "other.mcap"
     with path.open("wb") as file:
         writer = Writer(file)
@@ -310,7 +320,7 @@ def test_a_topic_of_another_type_counts_as_missing(tmp_path):
         bag.read("slave/measured_cp")
 
 
-def test_reports_are_not_read_as_numbers_nor_numbers_as_reports(tmp_path):
+def test_reports_are_not_read_as_numbers_nor_numbers_as_reports(tmp_path: Path) -> None:
     bag = Bag(ours(tmp_path / "bag"))
     with pytest.raises(RecordingError, match="not read as numbers"):
         bag.read(topics.TELEOP_STATE)
@@ -318,7 +328,7 @@ def test_reports_are_not_read_as_numbers_nor_numbers_as_reports(tmp_path):
         bag.reports("slave/measured_cp")
 
 
-def test_missing_joints_are_named(tmp_path):
+def test_missing_joints_are_named(tmp_path: Path) -> None:
     bag = Bag(ours(tmp_path / "bag"))
     with pytest.raises(RecordingError, match="lacks joints z; it has a, b, c"):
         bag.read(topics.SLAVE_MEASURED_JS, ("a", "z"))
@@ -326,7 +336,9 @@ def test_missing_joints_are_named(tmp_path):
 
 @settings(max_examples=150, deadline=None)
 @given(place=st.floats(0, 1), value=st.integers(0, 255), length=st.integers(1, 8))
-def test_damage_is_told_or_harmless(tmp_path_factory, place, value, length):
+def test_damage_is_told_or_harmless(
+    tmp_path_factory: pytest.TempPathFactory, place: float, value: int, length: int
+) -> None:
     path = tmp_path_factory.getbasetemp() / "damage"
     data = bytearray((path if path.exists() else ours(path)).joinpath("damage_0.mcap").read_bytes())
     at = int(place * (len(data) - length))
@@ -348,8 +360,8 @@ def test_damage_is_told_or_harmless(tmp_path_factory, place, value, length):
 @settings(max_examples=25, deadline=None)
 @given(kept=st.floats(0.0, 1.0))
 def test_recovery_saves_every_whole_chunk_and_leaves_the_old_file(
-    tmp_path_factory, compression, kept
-):
+    tmp_path_factory: pytest.TempPathFactory, compression: str, kept: float
+) -> None:
     path = tmp_path_factory.mktemp("cut") / "bag"
     ours(path, 10, compression=compression, metadata={"seed": "4"})
     whole = Bag(path).read(topics.SLAVE_MEASURED_JS)
@@ -371,7 +383,7 @@ def test_recovery_saves_every_whole_chunk_and_leaves_the_old_file(
     assert file.read_bytes() == cut
 
 
-def test_recovery_reads_files_of_other_writers_without_an_end(tmp_path):
+def test_recovery_reads_files_of_other_writers_without_an_end(tmp_path: Path) -> None:
     file = foreign(tmp_path / "other.mcap", use_chunking=False)
     data = file.read_bytes()
     file.write_bytes(data[: len(data) // 2])
@@ -386,7 +398,7 @@ def test_recovery_reads_files_of_other_writers_without_an_end(tmp_path):
     )
 
 
-def test_recovery_never_overwrites(tmp_path):
+def test_recovery_never_overwrites(tmp_path: Path) -> None:
     path = ours(tmp_path / "bag")
     (tmp_path / "bag_recovered").mkdir()
     with pytest.raises(RecordingError, match="exists already"):
@@ -395,7 +407,7 @@ def test_recovery_never_overwrites(tmp_path):
     assert_holds_samples(Bag(out))
 
 
-def test_recovery_of_nothing_is_refused(tmp_path):
+def test_recovery_of_nothing_is_refused(tmp_path: Path) -> None:
     with pytest.raises(RecordingError, match="does not exist"):
         recover(tmp_path / "nothing")
     with pytest.raises(RecordingError, match=r"0 \.mcap files"):

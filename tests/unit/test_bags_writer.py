@@ -2,8 +2,10 @@
 
 import hashlib
 import struct
+from collections.abc import Mapping
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,10 +17,12 @@ from mcap.reader import make_reader
 from mcap.records import Channel, Chunk, Message, MessageIndex
 from mcap.stream_reader import StreamReader
 from mcap_ros2.decoder import DecoderFactory
+from numpy.typing import NDArray
 from rosbags.highlevel import AnyReader
 from rosbags.interfaces import QosDurability, QosReliability
 from rosbags.rosbag2 import Reader
 
+from present import present
 from teleop_core.bags import ros_types
 from teleop_core.bags.messages import layout, report
 from teleop_core.bags.reader import Bag
@@ -27,6 +31,8 @@ from teleop_core.bags.writer import BagWriter
 from teleop_core.base.errors import ParameterError, RecordingError, ShapeError, UnknownNameError
 from teleop_core.base.parameters import build
 from teleop_core.graph import topics
+from teleop_core.graph.topics import Topic
+from teleop_core.kernels.geometry import Array
 
 JOINTS = ("a", "b", "c")
 MS = 1_000_000
@@ -38,7 +44,9 @@ def rng() -> np.random.Generator:
     return np.random.default_rng(11)
 
 
-def block(rng, begin, count, chosen=topics.STREAMS):
+def block(
+    rng: Any, begin: int, count: int, chosen: Any = topics.STREAMS
+) -> dict[Topic, tuple[NDArray[np.int64], Array, NDArray[np.int64]]]:
     """Samples of one block; stamps lie a little before log times."""
     log_ns = np.arange(begin, begin + count) * MS + 10
     return {
@@ -49,7 +57,13 @@ def block(rng, begin, count, chosen=topics.STREAMS):
     }
 
 
-def record(path: Path, rng, blocks=3, count=50, **options) -> dict[str, int]:
+def record(
+    path: Path,
+    rng: np.random.Generator,
+    blocks: int = 3,
+    count: int = 50,
+    **options: Any,
+) -> dict[str, int]:
     with BagWriter(path, topics.ALL, JOINTS, **options) as writer:
         for number in range(blocks):
             begin = number * count
@@ -64,10 +78,13 @@ def mcap_file(path: Path) -> Path:
 
 
 @EVERY_COMPRESSION
-def test_rosbags_reads_every_value_that_was_written(tmp_path, rng, compression):
+def test_rosbags_reads_every_value_that_was_written(
+    tmp_path: Path, rng: np.random.Generator, compression: str
+) -> None:
     written = block(rng, 5, 40)
     with BagWriter(tmp_path / "bag", topics.ALL, JOINTS, compression=compression) as writer:
         writer.write_block(written)
+    found: Any
     found = {topic.name: [] for topic in topics.STREAMS}
     with AnyReader([tmp_path / "bag"]) as reader:
         for connection, log_ns, data in reader.messages():
@@ -79,12 +96,15 @@ def test_rosbags_reads_every_value_that_was_written(tmp_path, rng, compression):
         assert found[topic.name] == [(t, r.tobytes()) for t, r in zip(logs, rows, strict=True)]
 
 
-def test_messages_of_one_time_stand_in_the_order_of_their_topics(tmp_path, rng):
+def test_messages_of_one_time_stand_in_the_order_of_their_topics(
+    tmp_path: Path, rng: np.random.Generator
+) -> None:
     with BagWriter(tmp_path / "bag", topics.ALL, JOINTS) as writer:
         writer.write_block(block(rng, 0, 1000))
     order = [topic.name for topic in topics.STREAMS]
     with mcap_file(tmp_path / "bag").open("rb") as file:
         stream = StreamReader(file)  # record by record, as they stand in the file
+        found: dict[Any, Any]
         names, found = {}, {}
         for record_ in stream.records:
             if isinstance(record_, Channel):
@@ -147,20 +167,22 @@ def test_chunks_are_cut_between_times_whatever_the_clock(tmp_path, rng, begin_ns
 
 
 @EVERY_COMPRESSION
-def test_the_mcap_library_decodes_and_validates_the_file(tmp_path, rng, compression):
+def test_the_mcap_library_decodes_and_validates_the_file(
+    tmp_path: Path, rng: np.random.Generator, compression: str
+) -> None:
     counts = record(tmp_path / "bag", rng, compression=compression, metadata={"seed": "7"})
     with mcap_file(tmp_path / "bag").open("rb") as file:
         reader = make_reader(file, validate_crcs=True, decoder_factories=[DecoderFactory()])
         times = [m.message.log_time for m in reader.iter_decoded_messages()]
-        summary = reader.get_summary()
+        summary = present(reader.get_summary())
         metadata = list(reader.iter_metadata())
     assert len(times) == sum(counts.values())
     assert times == sorted(times)
-    assert summary.statistics.message_count == len(times)
+    assert present(summary.statistics).message_count == len(times)
     assert [(entry.name, entry.metadata) for entry in metadata] == [("teleop_core", {"seed": "7"})]
 
 
-def test_message_indexes_point_at_their_messages(tmp_path, rng):
+def test_message_indexes_point_at_their_messages(tmp_path: Path, rng: np.random.Generator) -> None:
     counts = record(tmp_path / "bag", rng, compression="none")
     with mcap_file(tmp_path / "bag").open("rb") as file:
         records = list(StreamReader(file, emit_chunks=True, validate_crcs=True).records)
@@ -178,7 +200,9 @@ def test_message_indexes_point_at_their_messages(tmp_path, rng):
     assert indexed == sum(counts.values())
 
 
-def test_messages_stand_in_log_time_order_even_without_the_index(tmp_path, rng):
+def test_messages_stand_in_log_time_order_even_without_the_index(
+    tmp_path: Path, rng: np.random.Generator
+) -> None:
     options = RecordingParameters(every=3, every_of=("slave/measured_js=2",))
     record(tmp_path / "bag", rng, parameters=options)
     with mcap_file(tmp_path / "bag").open("rb") as file:
@@ -186,7 +210,7 @@ def test_messages_stand_in_log_time_order_even_without_the_index(tmp_path, rng):
     assert times == sorted(times)
 
 
-def test_the_directory_says_what_rosbag2_says(tmp_path, rng):
+def test_the_directory_says_what_rosbag2_says(tmp_path: Path, rng: np.random.Generator) -> None:
     counts = record(tmp_path / "bag", rng)
     text = (tmp_path / "bag" / "metadata.yaml").read_text()
     assert "&id" not in text
@@ -199,7 +223,9 @@ def test_the_directory_says_what_rosbag2_says(tmp_path, rng):
     entries = {t["topic_metadata"]["name"]: t for t in about["topics_with_message_count"]}
     assert {name[1:]: t["message_count"] for name, t in entries.items()} == counts
     with Reader(tmp_path / "bag") as reader:
-        by_topic = {c.topic: c for c in reader.connections}
+        by_topic: Any = {c.topic: c for c in reader.connections}
+    pose: Any
+    state: Any
     state, pose = by_topic["/teleop/state"], by_topic["/slave/measured_cp"]
     assert pose.digest == ros_types.type_hash("geometry_msgs/msg/PoseStamped")
     assert pose.ext.offered_qos_profiles[0].reliability is QosReliability.RELIABLE
@@ -209,7 +235,7 @@ def test_the_directory_says_what_rosbag2_says(tmp_path, rng):
 
 
 @EVERY_COMPRESSION
-def test_the_same_calls_give_the_same_bytes(tmp_path, compression):
+def test_the_same_calls_give_the_same_bytes(tmp_path: Path, compression: str) -> None:
     digests = set()
     for attempt in ("first", "second"):
         path = tmp_path / attempt / "bag"
@@ -220,7 +246,9 @@ def test_the_same_calls_give_the_same_bytes(tmp_path, compression):
     assert len(digests) == 1
 
 
-def test_arrays_may_be_reused_as_soon_as_a_block_is_written(tmp_path, rng):
+def test_arrays_may_be_reused_as_soon_as_a_block_is_written(
+    tmp_path: Path, rng: np.random.Generator
+) -> None:
     samples = block(rng, 0, 20, [topics.SLAVE_MEASURED_CP])
     stamps, values, logs = samples[topics.SLAVE_MEASURED_CP]
     expected = values.copy()
@@ -230,12 +258,14 @@ def test_arrays_may_be_reused_as_soon_as_a_block_is_written(tmp_path, rng):
     np.testing.assert_array_equal(Bag(tmp_path / "bag").read("slave/measured_cp").values, expected)
 
 
-def test_a_long_block_is_cut_into_chunks_that_do_not_overlap(tmp_path, rng):
+def test_a_long_block_is_cut_into_chunks_that_do_not_overlap(
+    tmp_path: Path, rng: np.random.Generator
+) -> None:
     with BagWriter(tmp_path / "bag", topics.ALL, JOINTS) as writer:
         writer.write(topics.DIAGNOSTICS, 3, report(3, "a", 0, "b", {}))
         writer.write_block(block(rng, 0, 9000))
     with mcap_file(tmp_path / "bag").open("rb") as file:
-        chunks = make_reader(file).get_summary().chunk_indexes
+        chunks = present(make_reader(file).get_summary()).chunk_indexes
     assert len(chunks) > 5
     assert all(a.message_end_time < b.message_start_time for a, b in pairwise(chunks))
     assert max(chunk.uncompressed_size for chunk in chunks) < 3 << 20
@@ -248,7 +278,9 @@ def test_a_long_block_is_cut_into_chunks_that_do_not_overlap(tmp_path, rng):
     of=st.integers(1, 7),
     sizes=st.lists(st.integers(0, 30), min_size=1, max_size=5),
 )
-def test_every_nth_sample_is_recorded_whatever_the_blocks(tmp_path_factory, every, of, sizes):
+def test_every_nth_sample_is_recorded_whatever_the_blocks(
+    tmp_path_factory: pytest.TempPathFactory, every: int, of: int, sizes: list[int]
+) -> None:
     path = tmp_path_factory.mktemp("every") / "bag"
     options = RecordingParameters(every=every, every_of=(f"slave/measured_js={of}",))
     rng, begin = np.random.default_rng(1), 0
@@ -265,7 +297,7 @@ def test_every_nth_sample_is_recorded_whatever_the_blocks(tmp_path_factory, ever
             np.testing.assert_array_equal(bag.read(topic).stamp_ns, expected)
 
 
-def test_single_messages_are_thinned_out_like_samples_of_blocks(tmp_path):
+def test_single_messages_are_thinned_out_like_samples_of_blocks(tmp_path: Path) -> None:
     form = layout(topics.SLAVE_MEASURED_CP, JOINTS)
     options = RecordingParameters(every=4)
     with BagWriter(tmp_path / "bag", topics.ALL, JOINTS, parameters=options) as writer:
@@ -277,7 +309,7 @@ def test_single_messages_are_thinned_out_like_samples_of_blocks(tmp_path):
     assert bag.topics["diagnostics"].count == 10
 
 
-def test_only_chosen_topics_are_recorded(tmp_path, rng):
+def test_only_chosen_topics_are_recorded(tmp_path: Path, rng: np.random.Generator) -> None:
     options = RecordingParameters(topics=("slave/measured_cp", "teleop/state"))
     counts = record(tmp_path / "bag", rng, parameters=options)
     assert counts == {"slave/measured_cp": 150, "teleop/state": 3}
@@ -285,7 +317,9 @@ def test_only_chosen_topics_are_recorded(tmp_path, rng):
 
 
 @pytest.mark.parametrize("values", [{"topics": ("slave/measured",)}, {"every_of": ("slave=2",)}])
-def test_topics_that_nobody_announced_are_refused_and_leave_no_folder(tmp_path, values):
+def test_topics_that_nobody_announced_are_refused_and_leave_no_folder(
+    tmp_path: Path, values: dict[str, Any]
+) -> None:
     parameters = RecordingParameters(**values)
     with pytest.raises(UnknownNameError, match=r"one of: .*slave/\w+, "):
         BagWriter(tmp_path / "bag", topics.ALL, JOINTS, parameters=parameters)
@@ -301,14 +335,18 @@ def test_topics_that_nobody_announced_are_refused_and_leave_no_folder(tmp_path, 
         ({"every_of": ("slave/measured_js=0",)}, ParameterError, "topic=n"),
     ],
 )
-def test_recording_parameters_out_of_range_are_refused(values, error, named):
+def test_recording_parameters_out_of_range_are_refused(
+    values: Mapping[str, Any], error: type[ParameterError], named: str
+) -> None:
     with pytest.raises(error, match=named):
         build(RecordingParameters, values)
     with pytest.raises(error, match=named):
         RecordingParameters(**values)
 
 
-def test_an_existing_recording_is_never_overwritten(tmp_path, rng):
+def test_an_existing_recording_is_never_overwritten(
+    tmp_path: Path, rng: np.random.Generator
+) -> None:
     record(tmp_path / "bag", rng)
     before = mcap_file(tmp_path / "bag").read_bytes()
     with pytest.raises(RecordingError, match="choose another --out") as caught:
@@ -317,15 +355,17 @@ def test_an_existing_recording_is_never_overwritten(tmp_path, rng):
     assert mcap_file(tmp_path / "bag").read_bytes() == before
 
 
-def test_a_place_that_cannot_be_written_is_named(tmp_path):
+def test_a_place_that_cannot_be_written_is_named(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(RecordingError, match="Not a directory") as caught:
         BagWriter(tmp_path / "file" / "bag", topics.ALL, JOINTS)
     assert caught.value.path == tmp_path / "file" / "bag"
 
 
-def test_a_recording_is_finished_when_the_session_fails(tmp_path, rng):
-    def fail():
+def test_a_recording_is_finished_when_the_session_fails(
+    tmp_path: Path, rng: np.random.Generator
+) -> None:
+    def fail() -> None:
         with BagWriter(tmp_path / "bag", topics.ALL, JOINTS) as writer:
             writer.write_block(block(rng, 0, 10))
             writer.write(topics.DIAGNOSTICS, 5, report(5, "a", 2, "broken", {}))
@@ -338,14 +378,16 @@ def test_a_recording_is_finished_when_the_session_fails(tmp_path, rng):
     assert bag.reports("diagnostics")[0].message == "broken"
 
 
-def test_a_recording_in_progress_does_not_look_complete(tmp_path, rng):
+def test_a_recording_in_progress_does_not_look_complete(
+    tmp_path: Path, rng: np.random.Generator
+) -> None:
     with BagWriter(tmp_path / "bag", topics.ALL, JOINTS) as writer:
         writer.write_block(block(rng, 0, 10))
         assert not (tmp_path / "bag" / "metadata.yaml").exists()
     assert (tmp_path / "bag" / "metadata.yaml").exists()
 
 
-def test_a_closed_recording_takes_nothing_more(tmp_path, rng):
+def test_a_closed_recording_takes_nothing_more(tmp_path: Path, rng: np.random.Generator) -> None:
     writer = BagWriter(tmp_path / "bag", topics.ALL, JOINTS)
     writer.close()
     writer.close()
@@ -353,7 +395,7 @@ def test_a_closed_recording_takes_nothing_more(tmp_path, rng):
         writer.write_block(block(rng, 0, 3))
 
 
-def test_blocks_that_do_not_fit_are_refused_at_once(tmp_path):
+def test_blocks_that_do_not_fit_are_refused_at_once(tmp_path: Path) -> None:
     stamps = np.arange(3)
     with BagWriter(tmp_path / "bag", topics.STREAMS, JOINTS) as writer:
         with pytest.raises(ShapeError) as caught:
@@ -370,7 +412,7 @@ def test_blocks_that_do_not_fit_are_refused_at_once(tmp_path):
 
 
 @pytest.mark.parametrize("log_ns", [[-1, 0, 1], [0, 2, 1]])
-def test_log_times_never_go_back_within_a_block(tmp_path, log_ns):
+def test_log_times_never_go_back_within_a_block(tmp_path: Path, log_ns: list[int]) -> None:
     times = np.array(log_ns)
     with BagWriter(tmp_path / "bag", topics.ALL, JOINTS) as writer:
         with pytest.raises(ParameterError) as caught:
@@ -378,8 +420,10 @@ def test_log_times_never_go_back_within_a_block(tmp_path, log_ns):
         assert caught.value.requirement == "not negative, not decreasing"
 
 
-def test_a_message_that_cannot_be_stored_does_not_cost_those_before_it(tmp_path, rng):
-    def fail():
+def test_a_message_that_cannot_be_stored_does_not_cost_those_before_it(
+    tmp_path: Path, rng: np.random.Generator
+) -> None:
+    def fail() -> None:
         with BagWriter(tmp_path / "bag", topics.ALL, JOINTS) as writer:
             writer.write_block(block(rng, 0, 10))
             writer.write(topics.DIAGNOSTICS, -1, b"")
@@ -389,13 +433,13 @@ def test_a_message_that_cannot_be_stored_does_not_cost_those_before_it(tmp_path,
     assert len(Bag(tmp_path / "bag").read(topics.SLAVE_MEASURED_CP)) == 10
 
 
-def test_live_messages_wait_for_a_chunk_no_longer_than_a_second_of_log_time(tmp_path):
+def test_live_messages_wait_for_a_chunk_no_longer_than_a_second_of_log_time(tmp_path: Path) -> None:
     data = layout(topics.SLAVE_MEASURED_CP, JOINTS).encode_one(0, np.zeros(7))
     with BagWriter(tmp_path / "bag", topics.ALL, JOINTS) as writer:
         for i in range(2500):
             writer.write(topics.SLAVE_MEASURED_CP, i * MS, data, publish_ns=i)
     with mcap_file(tmp_path / "bag").open("rb") as file:
         reader = make_reader(file)
-        chunks = reader.get_summary().chunk_indexes
+        chunks = present(reader.get_summary()).chunk_indexes
         assert [c.message_end_time // MS for c in chunks] == [1000, 2001, 2499]
         assert [m.publish_time for _, _, m in reader.iter_messages()] == list(range(2500))

@@ -1,17 +1,22 @@
 """Bandwidth: a packet waits for the line, takes its size over the bandwidth, or finds no place."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from numpy.typing import NDArray
 
+from present import present
 from teleop_core.bags.cdr import template
 from teleop_core.base.errors import ParameterError
 from teleop_core.base.parameters import build
 from teleop_core.chain.network.network import NETWORK, NetworkLink
 from teleop_core.chain.network.packet_size import HEADER, message_size
 from teleop_core.chain.network.parameters import NetworkParameters
-from teleop_core.graph.topics import SLAVE_SERVO_CP
+from teleop_core.graph.topics import SLAVE_SERVO_CP, Topic
+from teleop_core.kernels.geometry import Array
 from teleop_core.session.configuration import configure
 from teleop_core.session.virtual import VirtualTime
 
@@ -20,18 +25,18 @@ BITS = 8 * (HEADER + message_size(SLAVE_SERVO_CP))
 """Of a packet to the slave that carries a command alone."""
 
 
-def link(**values):
+def link(**values: str | float) -> NetworkLink:
     """Network at work; double underscores in names stand for dots."""
     named = {name.replace("__", "."): value for name, value in values.items()}
     return NetworkLink(build(NetworkParameters, named))
 
 
-def line(service, **values):
+def line(service: float, **values: str | float) -> NetworkLink:
     """Network whose line to the slave takes ``service`` ticks for a packet."""
     return link(there__bandwidth=1e3 * BITS / service, **values)
 
 
-def arrivals(network, sent, ticks):
+def arrivals(network: NetworkLink, sent: Any, ticks: int) -> NDArray[np.int64]:
     """Commands that arrive (N, 2): tick at which each was sent, and tick at which it came.
 
     Args:
@@ -49,10 +54,10 @@ def arrivals(network, sent, ticks):
         network.step()
         if network.state["arrived"][0]:
             came.append((row["network_servo_cp_ns"] // MS, tick))
-    return np.array(came)
+    return np.array(came, np.int64).reshape(-1, 2)
 
 
-def departures(sent, service):
+def departures(sent: NDArray[np.int64], service: float) -> Array:
     """When the transmission of each packet ends, computed by hand (N,)."""
     ends, end = [], 0.0
     for tick in sent:
@@ -62,12 +67,12 @@ def departures(sent, service):
 
 
 @pytest.mark.parametrize("topic", [*NETWORK.reads, *NETWORK.writes], ids=lambda topic: topic.name)
-def test_a_message_has_the_size_with_which_it_is_recorded(topic):
+def test_a_message_has_the_size_with_which_it_is_recorded(topic: Topic) -> None:
     recorded = template(topic.kind, topic.names(()), topic.frame_id).template
     assert message_size(topic) == len(recorded)
 
 
-def test_a_command_takes_84_bytes_in_a_datagram_with_28_of_headers():
+def test_a_command_takes_84_bytes_in_a_datagram_with_28_of_headers() -> None:
     network = link(there__bandwidth=8 * 112 * 100.0)  # a hundred of them in a second
     np.testing.assert_array_equal(arrivals(network, [10], 50), [[10, 20]])
 
@@ -76,8 +81,8 @@ def test_a_command_takes_84_bytes_in_a_datagram_with_28_of_headers():
 @settings(max_examples=15, deadline=None)
 @given(service=st.floats(1.01, 30.0), share=st.floats(0.02, 0.9), seed=st.integers(0, 10**6))
 def test_a_packet_departs_a_service_time_after_it_came_or_after_the_one_before(
-    order, service, share, seed
-):
+    order: str, service: float, share: float, seed: int
+) -> None:
     rng = np.random.default_rng(seed)
     sent = 2 + np.flatnonzero(rng.random(1500) < share / service)
     came = arrivals(line(service, there__packet_order=order, there__queue=1000), sent, 4000)
@@ -85,7 +90,7 @@ def test_a_packet_departs_a_service_time_after_it_came_or_after_the_one_before(
     assert np.abs(came[:, 1] - departures(sent, service)).max() <= 0.5 + 1e-9
 
 
-def test_the_mean_wait_is_that_of_the_queue_with_random_arrivals_and_equal_services():
+def test_the_mean_wait_is_that_of_the_queue_with_random_arrivals_and_equal_services() -> None:
     """Geo/D/1 (Meisling 1958), whose limit of short ticks is M/D/1 (Pollaczek-Khinchine)."""
     service, load = 20, 0.7
     rng = np.random.default_rng(1)
@@ -97,7 +102,9 @@ def test_the_mean_wait_is_that_of_the_queue_with_random_arrivals_and_equal_servi
 
 @pytest.mark.parametrize("order", ["newest", "kept"])
 @pytest.mark.parametrize("queue", [1, 20])
-def test_more_than_the_line_carries_is_lost_and_the_rest_as_old_as_the_queue_is_long(order, queue):
+def test_more_than_the_line_carries_is_lost_and_the_rest_as_old_as_the_queue_is_long(
+    order: str, queue: int
+) -> None:
     service, ticks = 2.5, 8000
     network = line(service, there__packet_order=order, there__queue=queue)
     came = arrivals(network, range(2, ticks), ticks)
@@ -111,7 +118,7 @@ def test_more_than_the_line_carries_is_lost_and_the_rest_as_old_as_the_queue_is_
     assert (np.diff(came[:, 0]) > 0).all()
 
 
-def test_a_line_that_is_wide_enough_or_without_a_bound_adds_no_delay():
+def test_a_line_that_is_wide_enough_or_without_a_bound_adds_no_delay() -> None:
     sent = range(2, 500)
     for network in (link(), line(0.4)):
         came = arrivals(network, sent, 600)
@@ -120,7 +127,7 @@ def test_a_line_that_is_wide_enough_or_without_a_bound_adds_no_delay():
     np.testing.assert_array_equal(slow, [[10, 63]])
 
 
-def test_what_waits_goes_at_once_when_the_line_becomes_wide():
+def test_what_waits_goes_at_once_when_the_line_becomes_wide() -> None:
     network = line(50.0)
     assert len(arrivals(network, range(2, 60), 60)) == 1
     network.retune(build(NetworkParameters, {}))
@@ -129,7 +136,7 @@ def test_what_waits_goes_at_once_when_the_line_becomes_wide():
     assert network.state["waits"][0] == 0
 
 
-def test_a_packet_that_waits_keeps_its_own_values_and_increments_add_up():
+def test_a_packet_that_waits_keeps_its_own_values_and_increments_add_up() -> None:
     network = line(4.0, commands="incremental", there__packet_order="kept", there__queue=500)
     row, places = network.signals, np.random.default_rng(3).normal(0.0, 1e-3, (100, 3))
     row["slave_setpoint_cp"][3], seen = 1.0, []
@@ -144,7 +151,7 @@ def test_a_packet_that_waits_keeps_its_own_values_and_increments_add_up():
     np.testing.assert_allclose(seen, places, atol=1e-12)
 
 
-def test_a_session_over_a_narrow_line_scores_its_losses_and_repeats_to_the_bit():
+def test_a_session_over_a_narrow_line_scores_its_losses_and_repeats_to_the_bit() -> None:
     given = ["teleop.stages=[network]", "slave.starts_at_home=true",
              f"network.there.bandwidth={500 * BITS}", "network.there.queue=1"]  # fmt: skip
     rows = VirtualTime(configure("free_motion", settings=given)).run(6000)
@@ -154,10 +161,10 @@ def test_a_session_over_a_narrow_line_scores_its_losses_and_repeats_to_the_bit()
     assert 2.0 <= ages.min() <= ages.max() <= 5.0
     assert rows["teleop_state"][-2000:, 0].all()
     again = VirtualTime(configure("free_motion", settings=given)).run(6000)
-    assert all((rows[name] == again[name]).all() for name in rows.dtype.names)
+    assert all((rows[name] == again[name]).all() for name in present(rows.dtype.names))
 
 
 @pytest.mark.parametrize(("name", "value"), [("bandwidth", -1.0), ("queue", 0), ("queue", 2000)])
-def test_a_line_that_cannot_be_is_refused(name, value):
+def test_a_line_that_cannot_be_is_refused(name: str, value: float) -> None:
     with pytest.raises(ParameterError, match=name):
         link(**{f"there__{name}": value})

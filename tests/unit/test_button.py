@@ -1,5 +1,7 @@
 """Button: a spring that snaps and a stop, its presses, and its energy."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -8,6 +10,7 @@ from hypothesis import strategies as st
 import teleop_core as tc
 from led_tip import PIECES, along_z, lead, wandering
 from teleop_core.base.errors import ParameterError
+from teleop_core.kernels.geometry import Array
 from teleop_core.session.configuration import configure
 from teleop_core.session.virtual import VirtualTime
 from teleop_core.slave.world.button import BUTTON, ButtonParameters, count_presses
@@ -15,7 +18,13 @@ from teleop_core.slave.world.button import BUTTON, ButtonParameters, count_press
 STOP = 20_000.0  # stiffness of the stop [N/m]
 
 
-def press(*heights, button=None, damping=0.0, way=None, **numbers):
+def press(
+    *heights: float,
+    button: ButtonParameters | None = None,
+    damping: float = 0.0,
+    way: Array | None = None,
+    **numbers: float,
+) -> tuple[Array, Array, Array, Any]:
     """Depths (ticks,) [m] and pushes (ticks,) [N] of a tip led through heights over the button.
 
     The energy lost (ticks,) [J] and the state of the simulation come after them.
@@ -29,7 +38,9 @@ def press(*heights, button=None, damping=0.0, way=None, **numbers):
 
 
 @pytest.mark.parametrize("damping", [0.0, 5.0])
-def test_a_press_rises_to_the_click_force_falls_to_the_contact_force_and_meets_the_stop(damping):
+def test_a_press_rises_to_the_click_force_falls_to_the_contact_force_and_meets_the_stop(
+    damping: float,
+) -> None:
     button = ButtonParameters(click_force=1.5, contact_force=0.5, click_travel=1e-3, stroke=4e-3)
     depth, push, _, _ = press(2e-3, -3.99e-3, button=button, damping=damping)
     wanted = np.interp(depth, (0.0, 1e-3, 4e-3), (0.0, 1.5, 0.5))
@@ -41,14 +52,14 @@ def test_a_press_rises_to_the_click_force_falls_to_the_contact_force_and_meets_t
     assert push[-1] == pytest.approx(0.5 + STOP * (depth[-1] - 4e-3), rel=1e-9)
 
 
-def test_on_the_way_out_its_share_is_missing():
+def test_on_the_way_out_its_share_is_missing() -> None:
     depth, push, _, _ = press(2e-3, -2.9e-3, 2e-3)
     is_back = (np.arange(len(depth)) > depth.argmax() + 20) & (depth > 0.0)
     wanted = 0.7 * np.interp(depth, (0.0, 2e-3, 3e-3), (0.0, 1.0, 0.4))
     np.testing.assert_allclose(push[is_back], wanted[is_back], rtol=1e-9, atol=1e-12)
 
 
-def test_a_cycle_loses_the_hysteresis_and_nothing_without_one():
+def test_a_cycle_loses_the_hysteresis_and_nothing_without_one() -> None:
     """The area between both ways: the share of the work on the way in."""
     for hysteresis in (0.0, 0.3, 1.0):
         _, _, lost, s = press(2e-3, -4e-3, 2e-3, button=ButtonParameters(hysteresis=hysteresis))
@@ -57,7 +68,7 @@ def test_a_cycle_loses_the_hysteresis_and_nothing_without_one():
         assert s.presses == 1
 
 
-def test_a_press_counts_at_the_stop_and_again_after_the_click_on_the_way_back():
+def test_a_press_counts_at_the_stop_and_again_after_the_click_on_the_way_back() -> None:
     stop = -3.01e-3
     assert press(2e-3, -2.99e-3, 2e-3)[-1].presses == 0
     assert press(2e-3, stop, -2.01e-3, stop)[-1].presses == 1
@@ -66,7 +77,7 @@ def test_a_press_counts_at_the_stop_and_again_after_the_click_on_the_way_back():
 
 
 @pytest.mark.parametrize("turn", [-2.01e-3, -1.99e-3])
-def test_the_score_counts_presses_along_a_way_as_the_button_does(turn):
+def test_the_score_counts_presses_along_a_way_as_the_button_does(turn: float) -> None:
     way = along_z(2e-3, -3.01e-3, turn, -3.01e-3, 2e-3)
     s, count, is_pressed = press(way=way)[-1], 0, False
     for depths in np.array_split(-way[:, 2], 7):
@@ -77,7 +88,7 @@ def test_the_score_counts_presses_along_a_way_as_the_button_does(turn):
 
 
 @pytest.mark.parametrize("damping", [0.0, 100.0])
-def test_the_push_is_that_of_the_spring_at_least_and_with_the_stop_at_most(damping):
+def test_the_push_is_that_of_the_spring_at_least_and_with_the_stop_at_most(damping: float) -> None:
     """However fast the tip leaves the stop: its damper does not pull."""
     tall = ButtonParameters(height=0.2, radius=0.1)
     for seed in range(20):
@@ -97,8 +108,16 @@ def test_the_push_is_that_of_the_spring_at_least_and_with_the_stop_at_most(dampi
     more=st.floats(3e-4, 5e-3), hysteresis=st.floats(0.0, 1.0),
 )  # fmt: skip
 def test_no_motion_gets_energy_from_a_button(
-    seed, stiffness, damping, friction, click, contact, travel, more, hysteresis
-):
+    seed: int,
+    stiffness: float,
+    damping: float,
+    friction: float,
+    click: float,
+    contact: float,
+    travel: float,
+    more: float,
+    hysteresis: float,
+) -> None:
     """In no tick: what it gave grows by what is stored, or more."""
     button = ButtonParameters(
         click_force=click, contact_force=contact * click, click_travel=travel,
@@ -115,21 +134,22 @@ def test_no_motion_gets_energy_from_a_button(
     assert np.diff(lost).min() >= -1e-5 * lost[-1] - 0.25 * steepest * piece * piece
 
 
-def test_a_session_counts_what_its_score_counts():
+def test_a_session_counts_what_its_score_counts() -> None:
     texts = {"world": "button", "world.material": "silicone"}
     session = VirtualTime(configure("palpation", settings=[f"{k}={v}" for k, v in texts.items()]))
     session.run(24_000)
+    stage: Any
     stage, score = session.stages["slave_sim"], tc.run("palpation", settings=texts).score()
     assert score.value("touch.presses") == stage.presses == 5
     stage.reset()
     assert stage.presses == 0
 
 
-def test_without_a_button_there_are_no_presses():
+def test_without_a_button_there_are_no_presses() -> None:
     assert tc.run("palpation", duration=1.0).score().value("touch.presses") is None
 
 
-def test_its_outline_lies_on_the_post_and_on_the_stop():
+def test_its_outline_lies_on_the_post_and_on_the_stop() -> None:
     outline = BUTTON.outline(ButtonParameters())
     post, stop = outline[:-42], outline[-41:]
     distances = [BUTTON.distance(p, BUTTON.numbers(ButtonParameters()), np.zeros(3)) for p in post]
@@ -145,7 +165,7 @@ def test_its_outline_lies_on_the_post_and_on_the_stop():
         (["world.button.hysteresis=1.1"], "hysteresis"), (["world.puncture_force=1.0"], "puncture"),
     ],
 )  # fmt: skip
-def test_numbers_that_no_button_has_are_refused_by_name(texts, name):
+def test_numbers_that_no_button_has_are_refused_by_name(texts: list[str], name: str) -> None:
     with pytest.raises(ParameterError, match=name) as error:
         configure("palpation", settings=["world=button", *texts])
     assert "\n" not in str(error.value)

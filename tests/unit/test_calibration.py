@@ -2,6 +2,7 @@
 
 import json
 import math
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -9,9 +10,12 @@ import pytest
 import yaml
 from scipy.spatial.transform import Rotation
 
+from present import present
 from teleop_core.base.errors import ParameterError, RecordingError, ShapeError, UnknownNameError
+from teleop_core.kernels.geometry import Array
 from teleop_core.robots import dh_kernels, load_robot, robot_from_table
 from teleop_core.robots.chains import true_chain
+from teleop_core.robots.robot import Robot
 from teleop_lab.calibration import (
     CalibrationError,
     LinkErrors,
@@ -33,19 +37,21 @@ CHAINS = ("rcrt1", "puma560", "scara", "planar_3r", "five_axis")
 RCRT1 = load_robot("rcrt1")
 
 
-def drawn_errors(n, rng, size=1e-3):
+def drawn_errors(n: int, rng: np.random.Generator, size: float = 1e-3) -> LinkErrors:
     return LinkErrors.from_vector(rng.normal(0.0, size, 4 * n))
 
 
-def kernel_tips(robot, errors, q):
+def kernel_tips(robot: Robot, errors: LinkErrors, q: Array) -> Array:
     row, T, out = true_chain(robot, errors), np.empty((4, 4)), []
     for joints in q:
-        dh_kernels.fk(joints, row, T)
+        dh_kernels.fk(joints, present(row), T)
         out.append(T[:3, 3].copy())
     return np.array(out)
 
 
-def measured_at(robot, errors, count, rng, noise=0.0):
+def measured_at(
+    robot: Robot, errors: LinkErrors, count: int, rng: np.random.Generator, noise: float = 0.0
+) -> Measured:
     model = Model.of(robot)
     return tracked(model, errors, random_poses(robot, count, rng), noise, rng)
 
@@ -54,7 +60,7 @@ def measured_at(robot, errors, count, rng, noise=0.0):
 
 
 @pytest.mark.parametrize("name", CHAINS)
-def test_the_tip_of_the_model_is_that_of_the_kernels(name):
+def test_the_tip_of_the_model_is_that_of_the_kernels(name: str) -> None:
     robot, rng = load_robot(name), np.random.default_rng(1)
     q, errors = random_poses(robot, 30, rng), drawn_errors(robot.n, rng, 0.01)
     tips = Model.of(robot).tips(q, np.concatenate((errors.vector, np.zeros(6))))
@@ -62,7 +68,7 @@ def test_the_tip_of_the_model_is_that_of_the_kernels(name):
 
 
 @pytest.mark.parametrize("name", CHAINS)
-def test_slopes_of_the_tip_are_those_of_differences(name):
+def test_slopes_of_the_tip_are_those_of_differences(name: str) -> None:
     robot, rng, step = load_robot(name), np.random.default_rng(2), 1e-6
     turn = Frame(Rotation.random(rng=rng).as_matrix(), rng.normal(0.0, 1.0, 3))
     for model in (Model.of(robot), Model.of(robot, turn)):
@@ -75,7 +81,7 @@ def test_slopes_of_the_tip_are_those_of_differences(name):
             assert np.allclose(J[:, :, i], difference / (2 * step), rtol=0, atol=2e-9)
 
 
-def test_slopes_of_distances_are_those_of_differences():
+def test_slopes_of_distances_are_those_of_differences() -> None:
     model, step = Model.of(RCRT1), 1e-6
     measured = appendix_e.published(RCRT1)
     vector = np.concatenate((np.random.default_rng(3).normal(0, 0.01, 24), np.zeros(6)))
@@ -85,7 +91,7 @@ def test_slopes_of_distances_are_those_of_differences():
         assert np.allclose(J[:, i], (higher - lower) / (2 * step), rtol=0, atol=1e-8)
 
 
-def test_alignment_is_that_of_scipy():
+def test_alignment_is_that_of_scipy() -> None:
     rng = np.random.default_rng(4)
     points = rng.normal(size=(20, 3))
     turn = Rotation.random(rng=rng)
@@ -101,7 +107,7 @@ def test_alignment_is_that_of_scipy():
 
 
 @pytest.mark.parametrize("name", CHAINS)
-def test_errors_of_any_chain_are_found_from_points_without_noise(name):
+def test_errors_of_any_chain_are_found_from_points_without_noise(name: str) -> None:
     robot, rng = load_robot(name), np.random.default_rng(5)
     errors = drawn_errors(robot.n, rng)
     found = identify(Model.of(robot), measured_at(robot, errors, 60, rng), "all")
@@ -114,7 +120,7 @@ def test_errors_of_any_chain_are_found_from_points_without_noise(name):
     assert before.min() > 2e-4
 
 
-def test_an_arm_with_errors_that_can_be_told_apart_is_found_to_rounding():
+def test_an_arm_with_errors_that_can_be_told_apart_is_found_to_rounding() -> None:
     rng = np.random.default_rng(6)
     names = {"a2": 4e-4, "alpha1": 2e-3, "d3": 5.5e-3, "theta2": -3e-3, "theta5": 4e-3, "d6": 1e-3}
     errors = LinkErrors.of(RCRT1, names)
@@ -124,7 +130,7 @@ def test_an_arm_with_errors_that_can_be_told_apart_is_found_to_rounding():
 
 
 @pytest.mark.parametrize("is_elsewhere", [False, True])
-def test_a_frame_that_nobody_knows_costs_no_accuracy(is_elsewhere):
+def test_a_frame_that_nobody_knows_costs_no_accuracy(is_elsewhere: bool) -> None:
     rng, model = np.random.default_rng(7), Model.of(RCRT1)
     errors = LinkErrors.of(RCRT1, {"d3": 5.5e-3, "theta4": 2e-3})
     q = random_poses(RCRT1, 40, rng)
@@ -137,7 +143,7 @@ def test_a_frame_that_nobody_knows_costs_no_accuracy(is_elsewhere):
             identify(model, measured, "offsets")
 
 
-def test_intervals_hold_the_truth_as_often_as_they_say():
+def test_intervals_hold_the_truth_as_often_as_they_say() -> None:
     names, rng, model = (
         ["d3", "theta1", "theta2", "theta5"],
         np.random.default_rng(8),
@@ -154,7 +160,7 @@ def test_intervals_hold_the_truth_as_often_as_they_say():
     assert abs(share - 0.95) < 4 * math.sqrt(0.95 * 0.05 / 1000) + 0.005
 
 
-def test_more_poses_make_intervals_narrower_by_the_root():
+def test_more_poses_make_intervals_narrower_by_the_root() -> None:
     model, errors = Model.of(RCRT1), LinkErrors.of(RCRT1, {"d3": 1e-3})
     width = {}
     for count in (50, 800):
@@ -167,7 +173,7 @@ def test_more_poses_make_intervals_narrower_by_the_root():
 # What can be told apart.
 
 
-def test_what_cannot_be_told_apart_is_named_with_what_it_acts_as():
+def test_what_cannot_be_told_apart_is_named_with_what_it_acts_as() -> None:
     measured = measured_at(RCRT1, LinkErrors.none(6), 60, np.random.default_rng(10))
     left = {
         entry.name: entry.reason
@@ -183,7 +189,7 @@ def test_what_cannot_be_told_apart_is_named_with_what_it_acts_as():
 
 
 @pytest.mark.parametrize("name", CHAINS)
-def test_as_many_errors_are_found_as_the_rank_says(name):
+def test_as_many_errors_are_found_as_the_rank_says(name: str) -> None:
     robot, rng = load_robot(name), np.random.default_rng(11)
     model = Model.of(robot)
     measured = measured_at(robot, LinkErrors.none(robot.n), 200, rng, 1e-5)
@@ -194,7 +200,7 @@ def test_as_many_errors_are_found_as_the_rank_says(name):
     assert 1.0 <= found.condition < 100.0
 
 
-def test_errors_that_are_not_told_from_zero_stay_zero():
+def test_errors_that_are_not_told_from_zero_stay_zero() -> None:
     rng = np.random.default_rng(12)
     measured = measured_at(RCRT1, LinkErrors.of(RCRT1, {"d3": 5.5e-3}), 40, rng, 1e-4)
     kept = identify(Model.of(RCRT1), measured, keeps_all=True)
@@ -204,7 +210,7 @@ def test_errors_that_are_not_told_from_zero_stay_zero():
     assert all(abs(v) >= h for v, h in zip(pruned.values, pruned.half_widths, strict=True))
 
 
-def test_an_arm_that_is_as_drawn_is_said_to_be():
+def test_an_arm_that_is_as_drawn_is_said_to_be() -> None:
     nothing = simulate(RCRT1, poses=30, noise="ruler", errors=["d3=0"])
     assert not nothing.found.names
     assert nothing.fitted.before == nothing.fitted.after
@@ -217,7 +223,7 @@ def test_an_arm_that_is_as_drawn_is_said_to_be():
 # Published measurements.
 
 
-def test_one_offset_of_d3_explains_the_published_accuracy_test():
+def test_one_offset_of_d3_explains_the_published_accuracy_test() -> None:
     calibration = calibrate(RCRT1, appendix_e.published(RCRT1), ["d3"])
     value, half = calibration.found.values[0], calibration.found.half_widths[0]
     assert value == pytest.approx(5.5e-3, abs=0.05e-3)
@@ -226,10 +232,10 @@ def test_one_offset_of_d3_explains_the_published_accuracy_test():
     assert before.rms == pytest.approx(0.744e-3, abs=0.5e-6)
     assert after.rms == pytest.approx(0.352e-3, abs=0.6e-6)
     # Nor does it come from the readings it is tried on.
-    assert calibration.tried.after["total"].rms < 0.37e-3
+    assert present(calibration.tried).after["total"].rms < 0.37e-3
 
 
-def test_published_readings_have_the_published_statistics():
+def test_published_readings_have_the_published_statistics() -> None:
     before = calibrate(RCRT1, appendix_e.published(RCRT1), ["d3"]).fitted.before
     for axis, (rms, deviation, largest) in {
         "x": (0.32, 0.29, 0.50),
@@ -244,7 +250,7 @@ def test_published_readings_have_the_published_statistics():
     assert np.allclose(np.multiply(1e3, spread(error)), (0.85, 0.56, 1.19), rtol=0, atol=0.006)
 
 
-def test_all_offsets_together_leave_only_that_of_d3_in_the_published_test():
+def test_all_offsets_together_leave_only_that_of_d3_in_the_published_test() -> None:
     found = calibrate(RCRT1, appendix_e.published(RCRT1), "offsets").found
     assert found.names == ("d3",)
     reasons = {entry.name: entry.reason for entry in found.left}
@@ -256,21 +262,23 @@ def test_all_offsets_together_leave_only_that_of_d3_in_the_published_test():
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
-def test_the_offset_of_d3_is_found_with_a_ruler_and_with_a_tracker(seed):
+def test_the_offset_of_d3_is_found_with_a_ruler_and_with_a_tracker(seed: int) -> None:
     for noise, poses, bound in (("ruler", 30, 0.8e-3), (0.1e-3, 40, 0.1e-3)):
         made = simulate(RCRT1, poses=poses, noise=noise, seed=seed)
         found = made.found.errors.named()
         assert found["d3"] == pytest.approx(made.equivalent["d3"], abs=bound)
         assert made.equivalent["d3"] == pytest.approx(5.5e-3, abs=0.1e-3)
-        before, after = (s["total"].rms for s in (made.tried.before, made.tried.after))
+        before, after = (
+            s["total"].rms for s in (present(made.tried).before, present(made.tried).after)
+        )
         assert before == pytest.approx(5.5e-3, rel=0.02)
         assert after < 0.4e-3
         assert noise == "ruler" or after < 0.1e-3
 
 
-def test_a_ruler_reads_in_half_millimetres_along_one_axis_after_the_other():
+def test_a_ruler_reads_in_half_millimetres_along_one_axis_after_the_other() -> None:
     measured = ruled(Model.of(RCRT1), LinkErrors.of(RCRT1, {"d3": 5.5e-3}), 30)
-    halves = measured.distances / 0.5e-3
+    halves = present(measured.distances) / 0.5e-3
     assert np.allclose(halves, np.round(halves), rtol=0, atol=1e-9)
     assert measured.labels == ("x",) * 10 + ("y",) * 10 + ("z",) * 10
     way = RCRT1.fk(measured.joints)[:, :3, 3] - RCRT1.fk(RCRT1.home)[:3, 3]
@@ -280,7 +288,7 @@ def test_a_ruler_reads_in_half_millimetres_along_one_axis_after_the_other():
     assert np.allclose(way[20:], np.outer(np.arange(1, 11), [0, 0, 0.01]), rtol=0, atol=1e-9)
 
 
-def test_tolerances_are_drawn_within_their_width_and_values_replace_them():
+def test_tolerances_are_drawn_within_their_width_and_values_replace_them() -> None:
     errors = true_errors(RCRT1, ["cnc", "d3=5.5e-3"], np.random.default_rng(1))
     assert errors.d[2] == 5.5e-3
     lengths = np.concatenate((errors.a, np.delete(errors.d, 2)))
@@ -291,14 +299,14 @@ def test_tolerances_are_drawn_within_their_width_and_values_replace_them():
     assert np.allclose(wider.a, 5.0 * errors.a)
 
 
-def test_the_same_seed_gives_the_same_calibration_and_another_does_not():
+def test_the_same_seed_gives_the_same_calibration_and_another_does_not() -> None:
     first, again, other = (simulate(RCRT1, poses=20, seed=seed).to_json() for seed in (1, 1, 2))
     assert first == again
     assert first != other
 
 
 @pytest.mark.parametrize("name", CHAINS)
-def test_chosen_poses_tell_more_than_random_ones(name):
+def test_chosen_poses_tell_more_than_random_ones(name: str) -> None:
     robot = load_robot(name)
     model, worth = Model.of(robot), {}
     rng = np.random.default_rng(13)
@@ -319,23 +327,23 @@ def test_chosen_poses_tell_more_than_random_ones(name):
 
 
 @pytest.mark.parametrize("name", [*CHAINS, "config/robots/five_axis_sheth_uicker.yaml"])
-def test_the_file_of_corrections_is_the_arm_that_was_found(name):
+def test_the_file_of_corrections_is_the_arm_that_was_found(name: str) -> None:
     robot, rng = load_robot(name), np.random.default_rng(14)
     calibration = simulate(robot, poses=30, noise=1e-5)
     arm = robot_from_table(yaml.safe_load(correction_file(calibration)))
     for q in random_poses(robot, 20, rng):
         row, T = true_chain(robot, calibration.found.errors), np.empty((4, 4))
-        dh_kernels.fk(q, row, T)
+        dh_kernels.fk(q, present(row), T)
         assert np.allclose(arm.fk(q), T, rtol=0, atol=1e-14)
     assert arm.joint_names == robot.joint_names
     assert arm.task_mask == robot.task_mask
     for entry in ("lower", "upper", "home", "start"):
         assert np.allclose(getattr(arm, entry), getattr(robot, entry), rtol=0, atol=1e-15)
-    assert np.allclose(arm.drives.speed_limit, robot.drives.speed_limit)
-    assert not arm.drives.assumed
+    assert np.allclose(present(arm.drives).speed_limit, present(robot.drives).speed_limit)
+    assert not present(arm.drives).assumed
 
 
-def test_an_arm_that_is_led_by_its_corrected_table_goes_where_it_is_sent():
+def test_an_arm_that_is_led_by_its_corrected_table_goes_where_it_is_sent() -> None:
     calibration, rng = simulate(RCRT1, poses=40, noise=0.1e-3), np.random.default_rng(15)
     arm = robot_from_table(calibration.table())
     poses = RCRT1.fk(RCRT1.start + rng.uniform(-0.2, 0.2, (50, 6)) * [1, 1, 0.1, 1, 1, 1])
@@ -343,21 +351,24 @@ def test_an_arm_that_is_led_by_its_corrected_table_goes_where_it_is_sent():
     for name, robot in (("drawn", RCRT1), ("corrected", arm)):
         answer = robot.ik_batch(poses, RCRT1.start)
         assert answer.residual[:, 0].max() < 1e-8
-        tips = kernel_tips(RCRT1, calibration.truth, answer.q)
+        tips = kernel_tips(RCRT1, present(calibration.truth), answer.q)
         off[name] = np.linalg.norm(tips - poses[:, :3, 3], axis=1)
     assert off["drawn"].min() > 5e-3
     assert off["corrected"].max() < 0.2e-3
 
 
-def test_numbers_of_json_are_those_of_the_table():
+def test_numbers_of_json_are_those_of_the_table() -> None:
     calibration = simulate(RCRT1, poses=20)
     numbers = json.loads(json.dumps(calibration.to_json(), allow_nan=False))
     assert numbers["found"]["d3"]["value"] == calibration.found.errors.d[2]
-    assert numbers["accuracy"][1]["after"]["total"]["rms"] == calibration.tried.after["total"].rms
+    assert (
+        numbers["accuracy"][1]["after"]["total"]["rms"]
+        == present(calibration.tried).after["total"].rms
+    )
     assert f"{1e3 * calibration.found.errors.d[2]:.4f}" in str(calibration)
 
 
-def test_spreads_are_those_of_pandas():
+def test_spreads_are_those_of_pandas() -> None:
     errors = np.random.default_rng(16).normal(0.1, 1.0, (50, 3))
     errors[3, 1] = np.nan
     frame = pd.DataFrame(errors, columns=list("xyz"))
@@ -371,7 +382,7 @@ def test_spreads_are_those_of_pandas():
 # Measurements of others.
 
 
-def poses_table(count=20, seed=17):
+def poses_table(count: int = 20, seed: int = 17) -> tuple[pd.DataFrame, Measured]:
     rng = np.random.default_rng(seed)
     measured = measured_at(RCRT1, LinkErrors.of(RCRT1, {"d3": 5.5e-3}), count, rng, 1e-5)
     table = pd.DataFrame(measured.joints, columns=list(RCRT1.joint_names))
@@ -379,16 +390,16 @@ def poses_table(count=20, seed=17):
     return table, measured
 
 
-def test_a_table_of_poses_is_read_as_it_was_written(tmp_path):
+def test_a_table_of_poses_is_read_as_it_was_written(tmp_path: Path) -> None:
     table, measured = poses_table()
     table.insert(0, "note", "first")
     table.to_csv(tmp_path / "poses.csv", index=False)
     read = read_measured(tmp_path / "poses.csv", RCRT1)
     assert np.array_equal(read.joints, measured.joints)
-    assert np.array_equal(read.points, measured.points)
+    assert np.array_equal(present(read.points), present(measured.points))
 
 
-def test_units_in_the_head_and_other_separators_are_understood(tmp_path):
+def test_units_in_the_head_and_other_separators_are_understood(tmp_path: Path) -> None:
     table, measured = poses_table()
     other = pd.DataFrame()
     for i, name in enumerate(RCRT1.joint_names):
@@ -400,10 +411,10 @@ def test_units_in_the_head_and_other_separators_are_understood(tmp_path):
     other.to_csv(tmp_path / "poses.csv", index=False, sep=";")
     read = read_measured(tmp_path / "poses.csv", RCRT1)
     assert np.allclose(read.joints, measured.joints, rtol=0, atol=1e-14)
-    assert np.allclose(read.points, measured.points, rtol=0, atol=1e-14)
+    assert np.allclose(present(read.points), present(measured.points), rtol=0, atol=1e-14)
 
 
-def test_axes_that_were_not_read_are_left_out(tmp_path):
+def test_axes_that_were_not_read_are_left_out(tmp_path: Path) -> None:
     table, _ = poses_table(40)
     table.loc[::2, "x"] = np.nan
     table.to_csv(tmp_path / "poses.csv", index=False)
@@ -413,7 +424,7 @@ def test_axes_that_were_not_read_are_left_out(tmp_path):
     assert found.errors.d[2] == pytest.approx(5.5e-3, abs=2e-5)
 
 
-def test_tables_that_lack_something_are_refused_with_what_it_is(tmp_path):
+def test_tables_that_lack_something_are_refused_with_what_it_is(tmp_path: Path) -> None:
     table, _ = poses_table()
     path = tmp_path / "poses.csv"
     mistakes = {
@@ -436,14 +447,14 @@ def test_tables_that_lack_something_are_refused_with_what_it_is(tmp_path):
         read_measured(tmp_path / "none.csv", RCRT1)
 
 
-def test_poses_without_one_axis_have_a_total_too(tmp_path):
+def test_poses_without_one_axis_have_a_total_too(tmp_path: Path) -> None:
     table, _ = poses_table()
     table.assign(x=np.nan).to_csv(tmp_path / "poses.csv", index=False)
     found = calibrate(RCRT1, read_measured(tmp_path / "poses.csv", RCRT1), "offsets")
     assert "total RMS" in str(found)
 
 
-def test_a_pose_that_was_misread_is_named(tmp_path):
+def test_a_pose_that_was_misread_is_named(tmp_path: Path) -> None:
     table, _ = poses_table(40)
     clean = calibrate(RCRT1, Measured(joints=table.iloc[:, :6], points=table.iloc[:, 6:]), ["d3"])
     assert "misread" not in str(clean)
@@ -457,7 +468,7 @@ def test_a_pose_that_was_misread_is_named(tmp_path):
 # Mistakes.
 
 
-def test_too_few_poses_are_refused_with_how_many_it_takes():
+def test_too_few_poses_are_refused_with_how_many_it_takes() -> None:
     rng = np.random.default_rng(18)
     measured = measured_at(RCRT1, LinkErrors.none(6), 1, rng, 1e-4)
     with pytest.raises(CalibrationError, match="1 poses give 3 readings, too few for 4"):
@@ -466,7 +477,7 @@ def test_too_few_poses_are_refused_with_how_many_it_takes():
         identify(Model.of(RCRT1), measured, ["d3"], finds_frame=True)
 
 
-def test_named_errors_that_cannot_be_told_apart_are_refused():
+def test_named_errors_that_cannot_be_told_apart_are_refused() -> None:
     measured = measured_at(RCRT1, LinkErrors.none(6), 40, np.random.default_rng(19), 1e-4)
     with pytest.raises(CalibrationError, match=r"not identifiable.*d4 acts as d3"):
         identify(Model.of(RCRT1), measured, ["d3", "d4"])
@@ -477,7 +488,7 @@ def test_named_errors_that_cannot_be_told_apart_are_refused():
         identify(Model.of(RCRT1), still, ["d3", "theta1", "theta2", "theta4", "theta5"])
 
 
-def test_measurements_of_another_arm_are_refused():
+def test_measurements_of_another_arm_are_refused() -> None:
     rng = np.random.default_rng(20)
     q = random_poses(RCRT1, 40, rng)
     lost = Measured(joints=q, points=rng.uniform(-0.4, 0.4, (40, 3)))
@@ -485,7 +496,7 @@ def test_measurements_of_another_arm_are_refused():
         identify(Model.of(RCRT1), lost, "offsets")
 
 
-def test_wrong_names_and_robots_are_refused():
+def test_wrong_names_and_robots_are_refused() -> None:
     with pytest.raises(ParameterError, match="chain of links"):
         simulate(load_robot("stewart"))
     with pytest.raises(UnknownNameError, match="link error"):
@@ -506,7 +517,7 @@ def test_wrong_names_and_robots_are_refused():
         simulate(RCRT1, noise="ruler", finds_frame=True)
 
 
-def test_readings_that_do_not_belong_together_are_refused():
+def test_readings_that_do_not_belong_together_are_refused() -> None:
     q = np.zeros((3, 6))
     with pytest.raises(ParameterError, match="either points or distances"):
         Measured(joints=q)

@@ -1,11 +1,15 @@
 """Closed forms of arms from files: all solutions, limits, whole turns, paths and classes."""
 
 import math
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from eaik.IK_HP import HPRobot
 
+from present import present
 from random_arms import (
     IIWA14,
     IIWA14_LIMITS,
@@ -19,11 +23,14 @@ from random_arms import (
     wrist_axes,
 )
 from teleop_core.kernels import kernel
+from teleop_core.kernels.geometry import Array
 from teleop_core.robots import IkStatus, dh_kernels, load_robot, swivel
 from teleop_core.robots.branches import turn
 from teleop_core.robots.chains import chain_of
 from teleop_core.robots.closed_form import constants_at
 from teleop_core.robots.dexterity import manipulability
+from teleop_core.robots.kinematics import IkResult
+from teleop_core.robots.robot import Robot
 from teleop_core.robots.swivel_arcs import ARCS, MARGIN, cut_circle, swivel_of
 
 REACHED = (IkStatus.FOLLOWED, IkStatus.NEAR_SINGULAR)
@@ -35,10 +42,13 @@ NAMES = [f"{word}, {kind}, {'base' if side > 0 else 'tip'}" for kind, _, word, s
 
 
 @pytest.fixture
-def load(tmp_path):
+def load(tmp_path: Path) -> Any:
     """Robot of axes with limits [rad], the same for all joints or one pair for each."""
 
-    def made(axes, limits=(-math.pi, math.pi)):
+    def made(
+        axes: list[tuple[Array, Array]],
+        limits: Sequence[float | tuple[float, float]] = (-math.pi, math.pi),
+    ) -> Robot:
         pairs = limits if isinstance(limits, list) else [limits] * len(axes)
         path = tmp_path / "arm.urdf"
         path.write_text(urdf(axes, pairs))
@@ -47,20 +57,26 @@ def load(tmp_path):
     return made
 
 
-def narrow(rng, n=6):
+def narrow(rng: np.random.Generator, n: int = 6) -> list[tuple[float, float]]:
     """Limits [rad] of about a third of a turn, some of them not around zero."""
     middle, half = rng.uniform(-2.5, 2.5, n), rng.uniform(0.5, 1.5, n)
     return [(float(m - h), float(m + h)) for m, h in zip(middle, half, strict=True)]
 
 
-def apart(q, others):
+def apart(q: Array, others: Array) -> float:
     """Smallest of the largest differences of angles [rad], whole turns aside."""
     turns = (np.asarray(others) - q + math.pi) % (2.0 * math.pi) - math.pi
     return abs(turns).max(axis=-1).min(initial=math.inf)
 
 
 @pytest.mark.parametrize(("kind", "make", "word", "side"), EACH, ids=NAMES)
-def test_every_legal_pose_is_found_with_all_its_solutions(kind, make, word, side, load):
+def test_every_legal_pose_is_found_with_all_its_solutions(
+    kind: str,
+    make: Callable[[np.random.Generator, str], list[tuple[Array, Array]]],
+    word: str,
+    side: int,
+    load: Callable[..., Robot],
+) -> None:
     rng = np.random.default_rng(len(kind))
     for _ in range(3):
         axes, limits = make(rng, kind)[::side], narrow(rng)
@@ -81,7 +97,13 @@ def test_every_legal_pose_is_found_with_all_its_solutions(kind, make, word, side
 
 
 @pytest.mark.parametrize(("kind", "make", "word", "side"), EACH, ids=NAMES)
-def test_a_search_from_200_starts_finds_no_further_solution(kind, make, word, side, load):
+def test_a_search_from_200_starts_finds_no_further_solution(
+    kind: str,
+    make: Callable[[np.random.Generator, str], list[tuple[Array, Array]]],
+    word: str,
+    side: int,
+    load: Callable[..., Robot],
+) -> None:
     rng, found = np.random.default_rng(3), np.empty((64, 6))
     arm = load(make(rng, kind)[::side])
     for q in rng.uniform(arm.lower, arm.upper, (4, 6)):
@@ -97,7 +119,9 @@ TWO_ROUNDS = [WIDE, WIDE, (-1.0, 5.5), WIDE, (-6.0, 0.5), WIDE]
 
 
 @pytest.mark.parametrize("limits", [TWO_ROUNDS, [(-0.3, 4.5)] * 6], ids=["two rounds", "one side"])
-def test_the_nearest_branch_inside_the_limits_answers_whole_turns_included(limits, load):
+def test_the_nearest_branch_inside_the_limits_answers_whole_turns_included(
+    limits: list[tuple[float, float]], load: Callable[..., Robot]
+) -> None:
     arm = load(UR5E, limits)
     rng = np.random.default_rng(8)
     q = rng.uniform(arm.lower, arm.upper, (2000, 6))
@@ -117,35 +141,41 @@ def test_the_nearest_branch_inside_the_limits_answers_whole_turns_included(limit
         assert abs(abs(chosen - arm.home).max() - least) < 1e-9
 
 
-def smooth(arm, rng, count=1500):
+def smooth(arm: Robot, rng: np.random.Generator, count: int = 1500) -> Array:
     """Joint path (count, n), 1 ms apart, at up to 0.8 of the speed limits, inside the limits."""
     span, t = arm.upper - arm.lower, 1e-3 * np.arange(count)[:, None]
     middle = rng.uniform(arm.lower + 0.2 * span, arm.upper - 0.2 * span)
     swing = np.minimum(0.19 * span, 1.0) * rng.uniform(0.3, 1.0, arm.n)
-    rate = 0.8 * arm.drives.speed_limit / swing * rng.uniform(0.1, 1.0, arm.n)
+    rate = 0.8 * present(arm.drives).speed_limit / swing * rng.uniform(0.1, 1.0, arm.n)
     return middle + swing * np.sin(rate * t + rng.uniform(0.0, 6.3, arm.n))
 
 
-def least_singular_value(arm, joints):
+def least_singular_value(arm: Robot, joints: Array) -> float:
     J = np.stack([arm.jacobian(q) for q in joints[::10]])
     J[:, :3] /= arm.geometry["reach"]
     return np.linalg.svd(J, compute_uv=False)[:, -1].min()
 
 
-def check_path(arm, joints):
+def check_path(arm: Robot, joints: Array) -> IkResult[Any]:
     """Follow a path, then 1.5 s of its end: speeds, limits, and that what can be reached is."""
     tips = arm.fk(joints)
     tips = np.concatenate([tips, np.repeat(tips[-1:], 1500, axis=0)])
     answer = arm.follow(tips, joints[0])
     moves = abs(np.diff(answer.q, axis=0, prepend=joints[:1]))
     assert np.isfinite(answer.q).all()
-    assert (moves <= 1e-3 * arm.drives.speed_limit + 1e-14).all()
+    assert (moves <= 1e-3 * present(arm.drives).speed_limit + 1e-14).all()
     assert ((answer.q >= arm.lower) & (answer.q <= arm.upper)).all()
     return answer
 
 
 @pytest.mark.parametrize(("kind", "make", "word", "side"), EACH[1::3], ids=NAMES[1::3])
-def test_paths_are_followed_without_a_flip_and_within_speeds(kind, make, word, side, load):
+def test_paths_are_followed_without_a_flip_and_within_speeds(
+    kind: str,
+    make: Callable[[np.random.Generator, str], list[tuple[Array, Array]]],
+    word: str,
+    side: int,
+    load: Callable[..., Robot],
+) -> None:
     rng = np.random.default_rng(21)
     regular = singular = late = 0
     while regular < 4 or singular < 4:
@@ -167,7 +197,7 @@ def test_paths_are_followed_without_a_flip_and_within_speeds(kind, make, word, s
 
 
 @pytest.mark.parametrize("kind", ["2 and 3 parallel", "5 and 6 meet"])
-def test_out_of_reach_the_nearest_posture_answers_and_motion_goes_on(kind, load):
+def test_out_of_reach_the_nearest_posture_answers_and_motion_goes_on(kind: str, load: Any) -> None:
     rng = np.random.default_rng(4)
     arm = load(MAKERS[kind](rng, kind), WIDE)
     wanted = arm.fk(arm.home)
@@ -184,11 +214,13 @@ def test_out_of_reach_the_nearest_posture_answers_and_motion_goes_on(kind, load)
     tips[:, :3, 3] += way[:, None] * (far - wanted)[:3, 3]
     answer = arm.follow(tips, arm.home)
     assert (answer.status == IkStatus.UNREACHABLE).any()
-    assert (abs(np.diff(answer.q, axis=0)) <= 1e-3 * arm.drives.speed_limit + 1e-14).all()
+    assert (abs(np.diff(answer.q, axis=0)) <= 1e-3 * present(arm.drives).speed_limit + 1e-14).all()
     assert answer.status[-1] in REACHED
 
 
-def test_rounded_files_are_recognised_and_solved_to_the_last_digit(load):
+def test_rounded_files_are_recognised_and_solved_to_the_last_digit(
+    load: Callable[..., Robot],
+) -> None:
     axes = [(np.round(w, 5), np.round(o, 5)) for w, o in UR5E]
     axes[3] = (axes[3][0] + np.array([4e-6, 0.0, 3e-6]), axes[3][1])
     arm = load(axes)
@@ -200,19 +232,19 @@ def test_rounded_files_are_recognised_and_solved_to_the_last_digit(load):
 
 
 @pytest.mark.parametrize("tilt", [1e-3, 0.1])
-def test_arms_that_do_not_decompose_are_searched(tilt, load):
+def test_arms_that_do_not_decompose_are_searched(tilt: float, load: Callable[..., Robot]) -> None:
     axes = list(UR5E)
     axes[3] = (axes[3][0] + np.array([tilt, 0.0, tilt]), axes[3][1])
     assert "search" in load(axes).solution
 
 
-def test_the_arm_as_built_has_the_constants_of_its_chain_alone(load):
+def test_the_arm_as_built_has_the_constants_of_its_chain_alone(load: Callable[..., Robot]) -> None:
     arm = load(UR5E)
-    np.testing.assert_array_equal(chain_of(arm).fixed[0][3], [0.0, 0.0, 0.0, 1.0])
+    np.testing.assert_array_equal(present(chain_of(arm)).fixed[0][3], [0.0, 0.0, 0.0, 1.0])
 
 
 @pytest.mark.parametrize("kind", ["2 and 3 parallel", "1 and 2 meet", "5 and 6 meet"])
-def test_eaik_knows_as_many_solutions(kind, load):
+def test_eaik_knows_as_many_solutions(kind: str, load: Callable[..., Robot]) -> None:
     rng = np.random.default_rng(12)
     axes = MAKERS[kind](rng, kind)
     arm = load(axes)
@@ -229,7 +261,9 @@ def test_eaik_knows_as_many_solutions(kind, load):
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_narrow_limits_of_seven_axes_lose_no_reachable_pose(seed, load):
+def test_narrow_limits_of_seven_axes_lose_no_reachable_pose(
+    seed: int, load: Callable[..., Robot]
+) -> None:
     rng = np.random.default_rng(seed)
     for _ in range(4):
         middle, half = rng.uniform(-2.5, 2.5, 7), rng.uniform(0.05, 0.6, 7)
@@ -245,7 +279,9 @@ def test_narrow_limits_of_seven_axes_lose_no_reachable_pose(seed, load):
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_the_arcs_of_the_swivel_hold_a_legal_posture_without_any_search(seed, load):
+def test_the_arcs_of_the_swivel_hold_a_legal_posture_without_any_search(
+    seed: int, load: Callable[..., Robot]
+) -> None:
     rng = np.random.default_rng(40 + seed)
     middle, half = rng.uniform(-2.5, 2.5, 7), rng.uniform(0.02, 0.5, 7)
     arm = load(swivel_axes(rng), [(float(m - h), float(m + h))
@@ -259,7 +295,9 @@ def test_the_arcs_of_the_swivel_hold_a_legal_posture_without_any_search(seed, lo
 
 
 @kernel
-def psi_of(branch, elbow, seed, limits, geometry, work):
+def psi_of(
+    branch: Any, elbow: Any, seed: Array, limits: Array, geometry: Array, work: Array
+) -> float:
     """Psi [rad] that is taken of a branch; infinity where none is legal."""
     S, W = work[16 + 20 * elbow : 25 + 20 * elbow], work[25 + 20 * elbow : 34 + 20 * elbow]
     K, arcs = geometry[constants_at(7) :], np.empty(ARCS)
@@ -268,7 +306,16 @@ def psi_of(branch, elbow, seed, limits, geometry, work):
 
 
 @kernel
-def write_at(branch, psi, elbow, seed, limits, geometry, work, q):
+def write_at(
+    branch: Any,
+    psi: Any,
+    elbow: Any,
+    seed: Array,
+    limits: Array,
+    geometry: Array,
+    work: Array,
+    q: Any,
+) -> None:
     """Write the joints (8,) of a branch at psi [rad], by whole turns into limits if any are."""
     S, W = work[16 + 20 * elbow : 25 + 20 * elbow], work[25 + 20 * elbow : 34 + 20 * elbow]
     K, M, angles = geometry[constants_at(7) :], work[8:12], work[12:14]
@@ -276,7 +323,9 @@ def write_at(branch, psi, elbow, seed, limits, geometry, work, q):
     turn(q, seed, limits, 0, 7)
 
 
-def test_no_legal_swivel_is_nearer_to_the_seed_than_the_answer_less_its_margin(load):
+def test_no_legal_swivel_is_nearer_to_the_seed_than_the_answer_less_its_margin(
+    load: Callable[..., Robot],
+) -> None:
     rng, scan, legal = np.random.default_rng(6), np.arange(-3.14, 3.14, 0.02), 0
     for _ in range(4):
         arm, found, work = (
@@ -300,7 +349,9 @@ def test_no_legal_swivel_is_nearer_to_the_seed_than_the_answer_less_its_margin(l
 
 
 @pytest.mark.parametrize("limits", [IIWA14_LIMITS, [(-0.9, 0.7)] * 7], ids=["iiwa 14", "narrow"])
-def test_seven_axes_use_their_freedom_to_follow_paths_within_speeds_and_limits(limits, load):
+def test_seven_axes_use_their_freedom_to_follow_paths_within_speeds_and_limits(
+    limits: list[tuple[float, float]], load: Callable[..., Robot]
+) -> None:
     arm, rng, regular = load(IIWA14, limits), np.random.default_rng(5), 0
     for _ in range(10):
         joints = smooth(arm, rng)
@@ -314,14 +365,14 @@ def test_seven_axes_use_their_freedom_to_follow_paths_within_speeds_and_limits(l
 
 
 @kernel
-def least_move(T, seed, limits, geometry, q):
+def least_move(T: Any, seed: Array, limits: Array, geometry: Array, q: Array) -> bool:
     return swivel._least_move(T, seed, limits, geometry, q)
 
 
-def moved_least(arm, tips, q):
+def moved_least(arm: Robot, tips: Array, q: Array) -> Array:
     """Joints (count, n) of a path by the least move alone."""
     limits, path = arm.limits().copy(), []
-    limits[2] = 1e-3 * arm.drives.speed_limit
+    limits[2] = 1e-3 * present(arm.drives).speed_limit
     for tip in tips:
         path.append(q.copy())
         assert least_move(tip, q, limits, arm.geometry_row, path[-1])
@@ -329,7 +380,7 @@ def moved_least(arm, tips, q):
     return np.array(path)
 
 
-def past_singular(rng, flat, beside):
+def past_singular(rng: np.random.Generator, flat: int, beside: int) -> Array:
     """Joint path (5000, 7) past a posture whose shoulder or wrist is flat."""
     middle, slope = rng.uniform(-1.0, 1.0, 7), rng.uniform(-0.15, 0.15, 7)
     middle[3], middle[6 - flat] = rng.choice((-1, 1), 2) * rng.uniform(0.8, 1.2, 2)
@@ -338,13 +389,15 @@ def past_singular(rng, flat, beside):
     return middle + slope * np.linspace(-1.0, 1.0, 5000)[:, None]
 
 
-def least_manipulability(arm, joints):
+def least_manipulability(arm: Robot, joints: Array) -> float:
     reach = arm.geometry["reach"]
     return min(manipulability(arm, q, reach) for q in joints[::20])
 
 
 @pytest.mark.parametrize(("flat", "beside"), [(1, 2), (5, 4)], ids=["shoulder", "wrist"])
-def test_slow_paths_past_a_singular_posture_keep_more_manipulability(flat, beside, load):
+def test_slow_paths_past_a_singular_posture_keep_more_manipulability(
+    flat: int, beside: int, load: Callable[..., Robot]
+) -> None:
     arm, rng = load(IIWA14, IIWA14_LIMITS), np.random.default_rng(3)
     for _ in range(5):
         joints = past_singular(rng, flat, beside)
@@ -356,11 +409,13 @@ def test_slow_paths_past_a_singular_posture_keep_more_manipulability(flat, besid
         bends = [abs(np.diff(path, 2, axis=0)).max() for path in (answer.q[:5000], plain)]
         assert bends[0] < bends[1] + 1e-6  # 1 rad/s²
         standing = abs(np.diff(answer.q[5000:], axis=0))
-        assert (standing <= 0.3e-3 * arm.drives.speed_limit + 1e-9).all()
+        assert (standing <= 0.3e-3 * present(arm.drives).speed_limit + 1e-9).all()
         np.testing.assert_array_equal(arm.follow(arm.fk(joints), joints[0]).q, answer.q[:5000])
 
 
-def test_far_from_singular_postures_the_least_move_alone_is_made(load):
+def test_far_from_singular_postures_the_least_move_alone_is_made(
+    load: Callable[..., Robot],
+) -> None:
     arm = load(IIWA14, IIWA14_LIMITS)
     joints = np.array([0.3, 0.8, -0.4, 1.2, 0.5, -0.9, 0.2]) + 0.1 * np.sin(
         np.linspace(0.0, 6.0, 3000)[:, None] + np.arange(7))  # fmt: skip

@@ -5,16 +5,21 @@ pinocchio's constraint Jacobian close the loops, and its kinematics tells where 
 """
 
 import math
+from collections.abc import Iterator, Mapping
 from functools import cache
+from typing import Any
 
 import numpy as np
 import pinocchio
 import pytest
+from numpy.typing import ArrayLike, NDArray
 from pinocchio import SE3
 
+from teleop_core.kernels.geometry import Array
 from teleop_core.robots import IkStatus, load_robot
 from teleop_core.robots.four_bar import FourBar
 from teleop_core.robots.mobility import PLANAR, SPATIAL, degrees_of_freedom
+from teleop_core.robots.robot import Robot
 from teleop_core.robots.rps3 import assembly_modes
 from teleop_core.robots.stewart import PAIRED, Layout
 from teleop_core.robots.three_finger_hand import Grasp, Hand
@@ -30,27 +35,29 @@ X, Y, Z = np.eye(3)
 THIRDS = 2.0 * math.pi / 3.0 * np.arange(3)
 
 
-def at(*point):
+def at(*point: float) -> Any:
     return SE3(np.eye(3), np.array(point, float))
 
 
 class Mechanism:
     """Tree of joints with pins; ``x`` is pinocchio's configuration, q the robot's joint vector."""
 
-    def __init__(self):
+    def __init__(self) -> None:
+        self.motors: list[Any]
+        self.pins: list[Any]
         self.model, self.pins, self.motors, self.tip_frame = pinocchio.Model(), [], [], 0
 
-    def add(self, parent, joint, place=None):
+    def add(self, parent: int, joint: Any, place: SE3 | None = None) -> int:
         """Number of a new joint, placed in the body of its parent."""
         name = str(self.model.njoints)
         return self.model.addJoint(parent, joint, place or SE3.Identity(), name)
 
-    def pin(self, first, there, second, here):
+    def pin(self, first: int, there: tuple[float, int, int], second: int, here: Any) -> None:
         """Keep a point of one body at a point of another."""
         kind, ends = pinocchio.ContactType.CONTACT_3D, (at(*there), at(*here))
         self.pins.append((kind, first, ends[0], second, ends[1]))
 
-    def finish(self, motors, body, tip=None):
+    def finish(self, motors: list[int], body: int, tip: SE3 | None = None) -> None:
         """Say which joints are q, and where the tip is."""
         frame = pinocchio.Frame("tip", body, tip or at(0, 0, 0), pinocchio.FrameType.OP_FRAME)
         self.tip_frame, self.motors, self.body = self.model.addFrame(frame), motors, body
@@ -64,34 +71,34 @@ class Mechanism:
         self.gears[self.columns(*motors), range(len(motors))] = 1.0
 
     @property
-    def free(self):
+    def free(self) -> NDArray[np.int64]:
         """Columns that no motor turns."""
         return np.flatnonzero(~self.gears.any(axis=1))
 
-    def columns(self, *joints):
+    def columns(self, *joints: int) -> NDArray[np.int64]:
         """Where joints are in velocities."""
         spans = [(self.model.idx_vs[j], self.model.nvs[j]) for j in joints]
         return np.concatenate([np.arange(first, first + count) for first, count in spans])
 
-    def put(self, x, joint, value):
+    def put(self, x: Array, joint: int, value: float | SE3) -> Array:
         """Configuration with one joint at a number or, for a free body, a pose."""
         x, first = x.copy(), self.model.idx_qs[joint]
         numbers = pinocchio.SE3ToXYZQUAT(value) if isinstance(value, SE3) else np.array([value])
         x[first : first + len(numbers)] = numbers
         return x
 
-    def q(self, x, joints=None):
+    def q(self, x: Array, joints: Any = None) -> Array:
         """Joint vector of a configuration."""
         return x[[self.model.idx_qs[j] for j in joints or self.motors]]
 
-    def gaps(self, x):
+    def gaps(self, x: Array) -> Array:
         """How far the ends are apart, in axes of the first (3 k,) [m]."""
         pinocchio.forwardKinematics(self.model, self.data, x)
         for pin, data in zip(self.pins, self.pin_data, strict=True):
             pin.calc(self.model, self.data, data)
         return np.concatenate([data.c1Mc2.translation for data in self.pin_data])
 
-    def slopes(self, x):
+    def slopes(self, x: Array) -> Array:
         """Constraint Jacobian (3 k, nv)."""
         self.gaps(x)
         pinocchio.computeJointJacobians(self.model, self.data, x)
@@ -100,7 +107,7 @@ class Mechanism:
             for pin, data in zip(self.pins, self.pin_data, strict=True)
         ])  # fmt: skip
 
-    def closed(self, x, free=None):
+    def closed(self, x: Array, free: NDArray[np.int64] | None = None) -> Array:
         """Configuration next to x in which all pins hold; only free columns move."""
         free, move = self.free if free is None else free, np.zeros(self.model.nv)
         for _ in range(50):
@@ -113,7 +120,7 @@ class Mechanism:
         assert np.abs(gaps).max() < EXACT
         return x
 
-    def led(self, q):
+    def led(self, q: Array) -> Array:
         """Closed configuration with the motors at q, in the assembly that start leads to."""
         x, ways = self.start, q - self.q(self.start)
         count = max(1, math.ceil(np.abs(ways).max() / 0.1))
@@ -121,25 +128,25 @@ class Mechanism:
             x = self.closed(pinocchio.integrate(self.model, x, self.gears @ ways / count))
         return x
 
-    def speeds(self, x, given, free=None):
+    def speeds(self, x: Array, given: Array, free: NDArray[np.int64] | None = None) -> Array:
         """Joint velocities (nv, k) that keep the pins, with given ones on columns not free."""
         free, slopes, out = self.free if free is None else free, self.slopes(x), given.copy()
         out[free] -= np.linalg.lstsq(slopes[:, free], slopes @ given, rcond=ZERO)[0]
         assert np.abs(slopes @ out).max() < SOLVED
         return out
 
-    def freedoms(self, x, locked=()):
+    def freedoms(self, x: Array, locked: ArrayLike = ()) -> int:
         """In how many ways the mechanism moves, some columns locked."""
         columns = np.setdiff1d(np.arange(self.model.nv), locked)
         values = np.linalg.svd(self.slopes(x)[:, columns], compute_uv=False)
         return len(columns) - int((values > ZERO * values[0]).sum())
 
-    def tip(self, x):
+    def tip(self, x: Array) -> Array:
         """Pose of the tip (4, 4)."""
         pinocchio.framesForwardKinematics(self.model, self.data, x)
         return self.data.oMf[self.tip_frame].homogeneous.copy()
 
-    def tip_slopes(self, x):
+    def tip_slopes(self, x: Array) -> Array:
         """Twist of the tip in base axes, linear first, per joint velocity (6, nv)."""
         axes = pinocchio.LOCAL_WORLD_ALIGNED
         return pinocchio.computeFrameJacobian(self.model, self.data, x, self.tip_frame, axes)
@@ -148,7 +155,7 @@ class Mechanism:
 # -- mechanisms ----------------------------------------------------------------------------------
 
 
-def add_legs(drawn, ground, body, base, platform):
+def add_legs(drawn: Mechanism, ground: int, body: int, base: Array, platform: Array) -> list[int]:
     """Six legs of a universal joint and a slide, pinned to a body: the slides."""
     slides = []
     for b, m in zip(base, platform, strict=True):
@@ -159,7 +166,7 @@ def add_legs(drawn, ground, body, base, platform):
     return slides
 
 
-def raised(drawn, slides, height):
+def raised(drawn: Any, slides: list[int], height: float) -> Mechanism:
     """Start with a level body on all its legs."""
     for slide in slides:
         drawn.start = drawn.put(drawn.start, slide, height)
@@ -169,7 +176,7 @@ def raised(drawn, slides, height):
     return drawn
 
 
-def stewart(layout, height):
+def stewart(layout: Layout, height: float) -> Any:
     drawn = Mechanism()
     body = drawn.add(0, pinocchio.JointModelFreeFlyer())
     slides = add_legs(drawn, 0, body, layout.base, layout.platform)
@@ -177,9 +184,9 @@ def stewart(layout, height):
     return raised(drawn, slides, height)
 
 
-def hybrid(g, heading):
+def hybrid(g: Mapping[str, float], heading: str) -> Any:
     """SCARA with six legs on its end, which a wrist keeps from turning or not."""
-    drawn = Mechanism()
+    drawn: Any = Mechanism()
     arm = [drawn.add(0, pinocchio.JointModelRZ(), at(0, 0, g["h1"]))]
     arm.append(drawn.add(arm[0], pinocchio.JointModelRZ(), at(g["l1"], 0, 0)))
     arm.append(drawn.add(arm[1], pinocchio.JointModelPZ(), at(g["l2"], 0, 0)))
@@ -202,7 +209,7 @@ def hybrid(g, heading):
     return raised(drawn, slides, g["w_z"])
 
 
-def rps3(g):
+def rps3(g: Mapping[str, float]) -> Mechanism:
     drawn = Mechanism()
     body, slides = drawn.add(0, pinocchio.JointModelFreeFlyer()), []
     for angle in THIRDS:
@@ -219,7 +226,7 @@ def rps3(g):
     return drawn
 
 
-def four_bar(l0, l1, l2, l3, a, mode):
+def four_bar(l0: float, l1: float, l2: float, l3: float, a: float, mode: float) -> Mechanism:
     drawn = Mechanism()
     crank = drawn.add(0, pinocchio.JointModelRZ())
     coupler = drawn.add(crank, pinocchio.JointModelRZ(), at(l1, 0, 0))
@@ -232,9 +239,9 @@ def four_bar(l0, l1, l2, l3, a, mode):
     return drawn
 
 
-def hand(g):
+def hand(g: Mapping[str, float]) -> Any:
     """Fingers of the hand pinned to the object; theta and psi are the motors."""
-    drawn = Mechanism()
+    drawn: Any = Mechanism()
     body, drawn.fingers = drawn.add(0, pinocchio.JointModelFreeFlyer()), []
     thumb = SE3(pinocchio.exp3(g["gamma"] * Y), np.zeros(3))
     places = (at(0, -g["d"], g["h"]), at(0, g["d"], g["h"]), thumb)
@@ -255,7 +262,7 @@ IN_PAIRS = {"sigma_b": math.radians(15.0), "sigma_m": math.radians(15.0)}
 
 
 @cache
-def case(name):
+def case(name: str) -> Any:
     """Robot with as many motors as freedoms of its loops (and arm), and its drawing."""
     kind, _, option = name.partition("_")
     if kind == "stewart":
@@ -271,7 +278,7 @@ def case(name):
     return robot, hybrid(robot.geometry, option)
 
 
-def assembled(name, count):
+def assembled(name: str, count: int) -> Iterator[tuple[Array, Array]]:
     """Joint vectors, and configurations that pinocchio assembled with them."""
     robot, drawn = case(name)
     rng = np.random.default_rng(CASES.index(name))
@@ -288,14 +295,14 @@ def assembled(name, count):
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_direct_kinematics_is_the_pose_that_pinocchio_assembles(name):
+def test_direct_kinematics_is_the_pose_that_pinocchio_assembles(name: str) -> None:
     robot, drawn = case(name)
     for q, x in assembled(name, 20):
         assert np.abs(robot.fk(q) - drawn.tip(x)).max() < SOLVED
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_jacobian_is_how_the_pinned_loops_move(name):
+def test_jacobian_is_how_the_pinned_loops_move(name: str) -> None:
     robot, drawn = case(name)
     for q, x in assembled(name, 20):
         moves = drawn.tip_slopes(x) @ drawn.speeds(x, drawn.gears)
@@ -303,7 +310,7 @@ def test_jacobian_is_how_the_pinned_loops_move(name):
 
 
 @pytest.mark.parametrize("name", CASES[:4])
-def test_inverse_kinematics_gives_the_motors_of_an_assembled_pose_back(name):
+def test_inverse_kinematics_gives_the_motors_of_an_assembled_pose_back(name: str) -> None:
     robot, drawn = case(name)
     for q, x in assembled(name, 20):
         result = robot.ik(drawn.tip(x), seed=q + 0.01)
@@ -320,7 +327,7 @@ COUNTS = {
 
 
 @pytest.mark.parametrize("name", COUNTS)
-def test_pinned_loops_have_the_counted_mobility_and_the_motors_hold_them(name):
+def test_pinned_loops_have_the_counted_mobility_and_the_motors_hold_them(name: str) -> None:
     (robot, drawn), (links, joints, freedoms, space) = case(name), COUNTS[name]
     for _, x in assembled(name, 5):
         counted = degrees_of_freedom(links, joints, freedoms, space=space)
@@ -330,11 +337,11 @@ def test_pinned_loops_have_the_counted_mobility_and_the_motors_hold_them(name):
 
 # -- legs ----------------------------------------------------------------------------------------
 
-SIXTHS = math.pi / 3.0 * np.arange(6)
+SIXTHS: Any = math.pi / 3.0 * np.arange(6)
 HEXAGONS = Layout.circular(0.2, SIXTHS, 0.1, SIXTHS)
 
 
-def scattered():
+def scattered() -> Layout:
     rng = np.random.default_rng(11)
     flat = np.array([1.0, 1.0, 0.2])
     return Layout(0.2 * flat * rng.normal(size=(6, 3)), 0.1 * flat * rng.normal(size=(6, 3)))
@@ -343,7 +350,7 @@ def scattered():
 LAYOUTS = {"pairs": PAIRED, "hexagons": HEXAGONS, "scattered": scattered()}
 
 
-def platform_poses(seed, count, tilt=0.6):
+def platform_poses(seed: int, count: int, tilt: float = 0.6) -> Iterator[SE3]:
     rng = np.random.default_rng(seed)
     for _ in range(count):
         turn = pinocchio.rpy.rpyToMatrix(*rng.uniform(-tilt, tilt, 3))
@@ -351,7 +358,7 @@ def platform_poses(seed, count, tilt=0.6):
 
 
 @pytest.mark.parametrize("name", LAYOUTS)
-def test_legs_and_leg_jacobian_are_those_of_a_platform_pinned_to_slides(name):
+def test_legs_and_leg_jacobian_are_those_of_a_platform_pinned_to_slides(name: str) -> None:
     layout = LAYOUTS[name]
     drawn = stewart(layout, 0.2)
     for T in platform_poses(1, 20):
@@ -364,7 +371,7 @@ def test_legs_and_leg_jacobian_are_those_of_a_platform_pinned_to_slides(name):
         assert np.abs(layout.leg_jacobian(T.homogeneous) - slides).max() < SOLVED
 
 
-def test_legs_meet_the_platform_where_direct_kinematics_puts_it_in_other_assemblies_too():
+def test_legs_meet_the_platform_where_direct_kinematics_puts_it_in_other_assemblies_too() -> None:
     robot, drawn = case("stewart")
     others = 0
     for T in platform_poses(3, 40, tilt=0.9):
@@ -376,7 +383,7 @@ def test_legs_meet_the_platform_where_direct_kinematics_puts_it_in_other_assembl
     assert others > 0
 
 
-def test_only_the_published_hexagons_move_with_all_slides_locked():
+def test_only_the_published_hexagons_move_with_all_slides_locked() -> None:
     for name, layout in LAYOUTS.items():
         drawn = stewart(layout, 0.2)
         for T in platform_poses(2, 10):
@@ -385,7 +392,7 @@ def test_only_the_published_hexagons_move_with_all_slides_locked():
             assert still_moves == (1 if name == "hexagons" else 0) == 6 - layout.rank(T.homogeneous)
 
 
-def test_locked_hexagons_move_on_and_no_leg_changes():
+def test_locked_hexagons_move_on_and_no_leg_changes() -> None:
     drawn = stewart(HEXAGONS, 0.2)
     T = SE3(pinocchio.exp3(math.pi / 6.0 * X), 0.2 * Z)
     x = drawn.closed(drawn.put(drawn.start, drawn.body, T), drawn.legs)
@@ -405,7 +412,7 @@ def test_locked_hexagons_move_on_and_no_leg_changes():
 HYBRIDS = [(heading, sigmas) for heading in ("fixed", "carried") for sigmas in ({}, IN_PAIRS)]
 
 
-def tool_poses(count):
+def tool_poses(count: int) -> Iterator[SE3]:
     """Poses with tilts that the ball joints allow, in the ring that the arm reaches."""
     rng = np.random.default_rng(21)
     for _ in range(count):
@@ -415,7 +422,7 @@ def tool_poses(count):
         yield SE3(turn, place)
 
 
-def held(robot, drawn, T):
+def held(robot: Robot, drawn: Any, T: SE3) -> Iterator[tuple[Array, SE3, Array]]:
     """Solutions for a tool pose, and configurations with their arm that hold the tool there."""
     tool = at(0, 0, robot.geometry["e_eff"])
     for q in robot.ik_all(T.homogeneous):
@@ -427,7 +434,9 @@ def held(robot, drawn, T):
 
 
 @pytest.mark.parametrize(("heading", "sigmas"), HYBRIDS)
-def test_both_elbows_of_the_hybrid_hold_the_platforms_centre_on_the_legs_they_name(heading, sigmas):
+def test_both_elbows_of_the_hybrid_hold_the_platforms_centre_on_the_legs_they_name(
+    heading: str, sigmas: dict[str, float]
+) -> None:
     robot = load_robot("scara_stewart", heading=heading, **sigmas)
     drawn, count = hybrid(robot.geometry, heading), 0
     for T in tool_poses(10):
@@ -440,7 +449,9 @@ def test_both_elbows_of_the_hybrid_hold_the_platforms_centre_on_the_legs_they_na
 
 
 @pytest.mark.parametrize(("heading", "sigmas"), HYBRIDS)
-def test_hybrid_jacobian_is_right_for_moves_that_hold_the_platforms_centre(heading, sigmas):
+def test_hybrid_jacobian_is_right_for_moves_that_hold_the_platforms_centre(
+    heading: str, sigmas: dict[str, float]
+) -> None:
     robot = load_robot("scara_stewart", heading=heading, **sigmas)
     drawn = hybrid(robot.geometry, heading)
     turns = np.zeros((drawn.model.nv, 3))
@@ -457,7 +468,7 @@ def test_hybrid_jacobian_is_right_for_moves_that_hold_the_platforms_centre(headi
 # -- 3-RPS ---------------------------------------------------------------------------------------
 
 
-def test_every_assembly_mode_of_the_3rps_closes_its_pins():
+def test_every_assembly_mode_of_the_3rps_closes_its_pins() -> None:
     robot, drawn = case("rps3")
     rng, found = np.random.default_rng(31), 0
     for _ in range(20):
@@ -472,7 +483,7 @@ def test_every_assembly_mode_of_the_3rps_closes_its_pins():
     assert found > 80
 
 
-def test_pins_leave_the_3rps_its_height_and_normal_and_legs_answer_to_these_alone():
+def test_pins_leave_the_3rps_its_height_and_normal_and_legs_answer_to_these_alone() -> None:
     robot, drawn = case("rps3")
     for q, x in assembled("rps3", 20):
         elsewhere = at(0.03, -0.02, 0) * SE3(drawn.tip(x)) * SE3(pinocchio.exp3(0.3 * Z), 0.0 * Z)
@@ -482,7 +493,7 @@ def test_pins_leave_the_3rps_its_height_and_normal_and_legs_answer_to_these_alon
 # -- four-bar and parallelogram ------------------------------------------------------------------
 
 
-def test_closure_angles_close_a_chain_of_three_joints_pinned_to_the_ground():
+def test_closure_angles_close_a_chain_of_three_joints_pinned_to_the_ground() -> None:
     rng, closed = np.random.default_rng(41), 0
     for _ in range(200):
         l0, l1, l2, l3 = lengths = rng.uniform(0.5, 4.0, 4)
@@ -507,7 +518,7 @@ def test_closure_angles_close_a_chain_of_three_joints_pinned_to_the_ground():
 
 
 @pytest.mark.parametrize("name", ["four_bar", "four_bar_crossed"])
-def test_crank_leads_the_coupler_all_around_and_back_in_one_mode(name):
+def test_crank_leads_the_coupler_all_around_and_back_in_one_mode(name: str) -> None:
     robot, drawn = case(name)
     for theta in (-2.0 * math.pi, 2.0 * math.pi):
         x = drawn.led(np.array([theta]))
@@ -515,7 +526,7 @@ def test_crank_leads_the_coupler_all_around_and_back_in_one_mode(name):
         assert np.abs(robot.fk([theta]) - drawn.tip(x)).max() < SOLVED
 
 
-def parallelogram(theta):
+def parallelogram(theta: float) -> tuple[Robot, Mechanism, Array]:
     robot = load_robot("parallelogram")
     l0, l1, a = (robot.geometry[symbol] for symbol in ("l0", "l1", "a"))
     drawn = four_bar(l0, l1, l0, l1, a, 1.0)
@@ -523,7 +534,7 @@ def parallelogram(theta):
 
 
 @pytest.mark.parametrize("theta", [-3.0, -1.7, -0.2, 0.4, 1.2, 2.9])
-def test_parallelogram_is_the_four_bar_whose_coupler_does_not_turn(theta):
+def test_parallelogram_is_the_four_bar_whose_coupler_does_not_turn(theta: float) -> None:
     robot, drawn, x = parallelogram(theta)
     assert np.abs(drawn.gaps(x)).max() < EXACT
     assert drawn.freedoms(x) == 1
@@ -536,7 +547,9 @@ def test_parallelogram_is_the_four_bar_whose_coupler_does_not_turn(theta):
 
 
 @pytest.mark.parametrize("theta", [0.0, math.pi])
-def test_where_all_links_are_in_line_the_parallelogram_takes_one_of_two_motions(theta):
+def test_where_all_links_are_in_line_the_parallelogram_takes_one_of_two_motions(
+    theta: float,
+) -> None:
     robot, drawn, x = parallelogram(theta)
     assert drawn.freedoms(x) == 2
     parallel = np.array([[1.0], [-1.0], [1.0]])
@@ -548,7 +561,7 @@ def test_where_all_links_are_in_line_the_parallelogram_takes_one_of_two_motions(
 
 
 @cache
-def grasp():
+def grasp() -> Any:
     """Hand with unequal fingers that holds its object at home, and its drawing."""
     robot = load_robot("three_finger_hand", l11=0.028, l22=0.052, l23=0.041, l33=0.043)
     drawn = hand(robot.geometry)
@@ -558,7 +571,7 @@ def grasp():
     return robot, drawn
 
 
-def grasps(count):
+def grasps(count: int) -> Iterator[tuple[Array, Array]]:
     """Object poses beside home, and the grasps that pinocchio moves its fingers to."""
     _, drawn = grasp()
     rng, home = np.random.default_rng(51), SE3(drawn.tip(drawn.start))
@@ -569,7 +582,7 @@ def grasps(count):
         yield T.homogeneous, drawn.closed(x, drawn.columns(*drawn.fingers))
 
 
-def test_fingers_follow_the_object_with_the_joints_of_inverse_kinematics():
+def test_fingers_follow_the_object_with_the_joints_of_inverse_kinematics() -> None:
     robot, drawn = grasp()
     for T, x in grasps(30):
         q = drawn.q(x, drawn.fingers)
@@ -577,7 +590,7 @@ def test_fingers_follow_the_object_with_the_joints_of_inverse_kinematics():
         assert np.abs(robot.fk(q) - drawn.tip(x)).max() < SOLVED
 
 
-def test_every_branch_of_the_fingers_holds_the_pins_of_the_object():
+def test_every_branch_of_the_fingers_holds_the_pins_of_the_object() -> None:
     robot, drawn = grasp()
     for T, x in grasps(10):
         solutions = robot.ik_all(T)
@@ -589,7 +602,7 @@ def test_every_branch_of_the_fingers_holds_the_pins_of_the_object():
             assert np.abs(drawn.gaps(bent)).max() < EXACT
 
 
-def test_hand_jacobian_is_right_for_moves_that_hold_the_object():
+def test_hand_jacobian_is_right_for_moves_that_hold_the_object() -> None:
     robot, drawn = grasp()
     fingers, body = drawn.columns(*drawn.fingers), drawn.columns(drawn.body)
     given = np.zeros((drawn.model.nv, 6))
@@ -602,7 +615,7 @@ def test_hand_jacobian_is_right_for_moves_that_hold_the_object():
         assert np.abs(jacobian @ moves[fingers] - wanted).max() < SOLVED
 
 
-def test_third_joints_that_hold_the_object_are_those_that_the_pins_leave():
+def test_third_joints_that_hold_the_object_are_those_that_the_pins_leave() -> None:
     robot, drawn = grasp()
     rng, answers = np.random.default_rng(52), Hand(robot.geometry)
     for _, x in grasps(30):

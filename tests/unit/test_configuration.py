@@ -1,6 +1,8 @@
 """Configuration: layers of files and settings over the defaults, and what a refusal says."""
 
 import dataclasses
+from pathlib import Path
+from typing import Any
 
 import pytest
 import yaml
@@ -21,36 +23,36 @@ SCENARIOS = ("coarse_box", "fine_box", "free_motion", "mode_switching")
 
 
 @pytest.mark.parametrize("name", SCENARIOS)
-def test_scenario_builds_every_group_and_says_what_it_is(name):
+def test_scenario_builds_every_group_and_says_what_it_is(name: str) -> None:
     assert list_scenarios()[name]
     assert set(configure(name).groups) == {SESSION, *BUILT_IN, RECORDER_NAME}
 
 
-def test_unknown_scenario_is_refused_with_the_scenarios():
+def test_unknown_scenario_is_refused_with_the_scenarios() -> None:
     with pytest.raises(UnknownNameError) as error:
         configure("coarse")
     assert set(SCENARIOS) <= set(error.value.alternatives)
 
 
-def test_default_file_changes_no_default_of_the_code():
+def test_default_file_changes_no_default_of_the_code() -> None:
     defaults = Configuration.from_layers([])
     assert configure().groups == defaults.groups
 
 
 @pytest.mark.parametrize("name", SCENARIOS)
-def test_text_of_a_configuration_reads_back_the_same(name):
+def test_text_of_a_configuration_reads_back_the_same(name: str) -> None:
     configuration = configure(name, settings=["seed=7", "pid.bandwidth=[50,50,50,70,70,70]"])
     layer = parse_layer(yaml.safe_load(configuration.text()), "text")
     assert Configuration.from_layers([layer], name) == configuration
 
 
-def test_setting_with_its_stage_sets_that_parameter_alone():
+def test_setting_with_its_stage_sets_that_parameter_alone() -> None:
     assert parse_setting("haptic_master.hand.stiffness=250") == {
         "haptic_master": {"hand.stiffness": 250.0}
     }
 
 
-def test_bare_key_sets_every_stage_that_has_it():
+def test_bare_key_sets_every_stage_that_has_it() -> None:
     layer = parse_setting("robot=mma")
     assert layer == {
         name: {"robot": "mma"}
@@ -76,7 +78,9 @@ def test_bare_key_sets_every_stage_that_has_it():
         ("reference_filter.is_on=false", "slave", "reference_filter.is_on", False),
     ],
 )
-def test_setting_is_read_as_its_declaration_wants(text, stage, name, value):
+def test_setting_is_read_as_its_declaration_wants(
+    text: str, stage: str, name: str, value: str | float | bool | tuple[float, ...]
+) -> None:
     layer = parse_setting(text)
     assert layer == {stage: {name: value}}
     assert type(layer[stage][name]) is type(value)
@@ -90,25 +94,25 @@ def test_setting_is_read_as_its_declaration_wants(text, stage, name, value):
         ("hand.stifness", "hand.stiffness"),
     ],
 )
-def test_unknown_key_suggests_the_near_ones(key, meant):
+def test_unknown_key_suggests_the_near_ones(key: str, meant: str) -> None:
     with pytest.raises(UnknownNameError) as error:
         parse_setting(f"{key}=1")
     assert meant in error.value.alternatives
     assert len(error.value.alternatives) <= 3
 
 
-def test_key_like_no_other_is_refused_with_all_keys():
+def test_key_like_no_other_is_refused_with_all_keys() -> None:
     with pytest.raises(UnknownNameError) as error:
         parse_setting("zzzzzz=1")
     assert "motion_scaling.coarse_gain" in error.value.alternatives
 
 
-def test_setting_without_equals_sign_is_refused():
+def test_setting_without_equals_sign_is_refused() -> None:
     with pytest.raises(TeleopError, match="key=value"):
         parse_setting("duration")
 
 
-def test_setting_whose_value_is_no_yaml_is_refused():
+def test_setting_whose_value_is_no_yaml_is_refused() -> None:
     with pytest.raises(TeleopError, match="YAML"):
         parse_setting("duration=[1")
 
@@ -126,31 +130,33 @@ def test_setting_whose_value_is_no_yaml_is_refused():
         ("fine_gain=11", "motion_scaling.fine_gain"),
     ],
 )
-def test_setting_that_breaks_its_declaration_is_refused_by_full_name(setting, name):
+def test_setting_that_breaks_its_declaration_is_refused_by_full_name(
+    setting: str, name: str
+) -> None:
     with pytest.raises(ParameterError) as error:
         configure(settings=[setting])
     assert error.value.name == name
 
 
-def test_fine_gain_above_the_coarse_one_is_refused():
+def test_fine_gain_above_the_coarse_one_is_refused() -> None:
     with pytest.raises(ParameterError) as error:
         configure(settings=["fine_gain=2"])
     assert error.value.name.endswith("fine_gain")
 
 
-def test_two_stages_for_different_robots_are_refused():
+def test_two_stages_for_different_robots_are_refused() -> None:
     with pytest.raises(ParameterError) as error:
         configure(settings=["slave_sim.robot=mma"])
     assert error.value.name == "robot"
 
 
-def write(path, content):
+def write(path: Path, content: Any) -> Path:
     path.write_text(yaml.safe_dump(content))
     return path
 
 
-def test_settings_win_over_files_and_files_over_the_scenario(tmp_path):
-    def file(name, **values):
+def test_settings_win_over_files_and_files_over_the_scenario(tmp_path: Path) -> None:
+    def file(name: str, **values: int | dict[str, float]) -> Path:
         return write(tmp_path / name, {"haptic_master": {"ros__parameters": values}})
 
     first = file("first.yaml", seed=11, operator={"period": 5.0, "rotation": 0.1})
@@ -162,7 +168,7 @@ def test_settings_win_over_files_and_files_over_the_scenario(tmp_path):
 
 
 @pytest.mark.parametrize("stage", ["operator", "haptic_master"])
-def test_what_operator_and_device_both_know_is_said_of_one_of_them(stage):
+def test_what_operator_and_device_both_know_is_said_of_one_of_them(stage: str) -> None:
     room = (0.1, 0.1, 0.1)
     told = [f"{stage}.seed=7", f"{stage}.device.workspace={list(room)}"]
     groups = configure(settings=told).groups
@@ -181,7 +187,9 @@ def test_what_operator_and_device_both_know_is_said_of_one_of_them(stage):
         ("a: [", "YAML"),
     ],
 )
-def test_file_of_another_shape_is_refused_with_its_name(tmp_path, text, says):
+def test_file_of_another_shape_is_refused_with_its_name(
+    tmp_path: Path, text: str, says: str
+) -> None:
     path = tmp_path / "mine.yaml"
     path.write_text(text)
     with pytest.raises(TeleopError, match=says) as error:
@@ -190,12 +198,12 @@ def test_file_of_another_shape_is_refused_with_its_name(tmp_path, text, says):
     assert "\n" not in str(error.value)
 
 
-def test_missing_file_is_refused_with_its_name(tmp_path):
+def test_missing_file_is_refused_with_its_name(tmp_path: Path) -> None:
     with pytest.raises(TeleopError, match=r"nowhere\.yaml.*cannot be read"):
         load_file(tmp_path / "nowhere.yaml")
 
 
-def test_unknown_name_in_a_file_is_refused_with_its_stage(tmp_path):
+def test_unknown_name_in_a_file_is_refused_with_its_stage(tmp_path: Path) -> None:
     path = write(tmp_path / "mine.yaml", {"slave": {"ros__parameters": {"speed": 1.0}}})
     with pytest.raises(UnknownNameError) as error:
         configure(files=[path])
@@ -203,7 +211,9 @@ def test_unknown_name_in_a_file_is_refused_with_its_stage(tmp_path):
     assert "command_timeout" in error.value.alternatives
 
 
-def test_what_stands_under_every_node_holds_for_those_that_have_it_and_say_nothing_else(tmp_path):
+def test_what_stands_under_every_node_holds_for_those_that_have_it_and_say_nothing_else(
+    tmp_path: Path,
+) -> None:
     own = {"slave": {"ros__parameters": {"robot": "mma"}}}
     every = {"/**": {"ros__parameters": {"robot": "puma560", "command_timeout": 0.3}}}
     layer = load_file(write(tmp_path / "mine.yaml", own | every))
@@ -214,11 +224,11 @@ def test_what_stands_under_every_node_holds_for_those_that_have_it_and_say_nothi
         configure(files=[wrong])
 
 
-def test_parameter_files_lie_where_the_package_finds_them():
+def test_parameter_files_lie_where_the_package_finds_them() -> None:
     assert (config_folder() / "teleop.yaml").is_file()
 
 
-def test_groups_of_a_configuration_cannot_be_changed_behind_its_back():
+def test_groups_of_a_configuration_cannot_be_changed_behind_its_back() -> None:
     scaling = configure().groups["motion_scaling"]
     with pytest.raises(dataclasses.FrozenInstanceError):
         scaling.coarse_gain = 2.0
@@ -241,11 +251,13 @@ def test_groups_of_a_configuration_cannot_be_changed_behind_its_back():
         ("slave_sim.operation.heartbeat", 0.5, "slave", "operation.heartbeat", 0.5),
     ],
 )
-def test_former_name_sets_what_it_is_called_now(key, value, stage, name, meant):
+def test_former_name_sets_what_it_is_called_now(
+    key: str, value: str | float, stage: str, name: str, meant: str | float | tuple[float, ...]
+) -> None:
     assert parse_setting(f"{key}={value}") == {stage: {name: meant}}
 
 
-def test_file_with_former_names_gives_the_same_configuration(tmp_path):
+def test_file_with_former_names_gives_the_same_configuration(tmp_path: Path) -> None:
     old = {
         "haptic_master": {"path": {"kind": "circle", "period": 5.0}, "seed": 3},
         "motion_scaling": {"fixture.size": [0.1, 0.2, 0.3]},

@@ -1,5 +1,8 @@
 """Controls of the console: what a part must be, and what the built-in ones ask of a session."""
 
+from collections.abc import Callable
+from typing import Any
+
 import pytest
 
 import teleop_core as tc
@@ -16,47 +19,47 @@ class Asked:
         self.buttons: list[tuple[str, str]] = []
         self._moving = moving
 
-    def command(self, word, arm=""):
+    def command(self, word: str, arm: str = "") -> tuple[bool, str]:
         self.words.append((word, arm))
         self._moving -= 1
         return self._moving < 0, f"{word}: {'done' if self._moving < 0 else 'not at rest yet'}"
 
-    def press(self, *, is_pressed):
+    def press(self, *, is_pressed: bool) -> None:
         self.pressed.append(is_pressed)
 
-    def press_button(self, arm, name):
+    def press_button(self, arm: str, name: str) -> None:
         self.buttons.append((arm, name))
 
 
-def test_initialize_lets_the_stop_go_and_then_resets_enables_and_homes():
-    session = Asked()
+def test_initialize_lets_the_stop_go_and_then_resets_enables_and_homes() -> None:
+    session: Any = Asked()
     answers = CONTROLS.find("Initialize").act(session, "left")
     assert session.pressed == [False]
     assert session.words == [("reset", "left"), ("enable", "left"), ("home", "left")]
     assert [is_taken for is_taken, _ in answers] == [True] * 3
 
 
-def test_an_arm_that_is_coming_to_rest_is_asked_again():
-    session = Asked(moving=2)
+def test_an_arm_that_is_coming_to_rest_is_asked_again() -> None:
+    session: Any = Asked(moving=2)
     assert commands("enable")(session, "") == [(True, "enable: done")]
     assert len(session.words) == 3
 
 
-def test_buttons_of_the_stylus_are_those_of_the_device():
-    session = Asked()
+def test_buttons_of_the_stylus_are_those_of_the_device() -> None:
+    session: Any = Asked()
     for name in ("mode", "fixture"):
         CONTROLS.find(name).act(session, "")
     assert session.buttons == [("", "mode"), ("", "fixture")]
 
 
-@pytest.mark.parametrize("part", [len, tc.Control("x", "", None), tc.Control("x", "", len, "", 3)])
-def test_what_is_no_control_is_refused(part):
+@pytest.mark.parametrize("part", [len, tc.Control("x", "", None), tc.Control("x", "", len, "", 3)])  # type: ignore[arg-type]
+def test_what_is_no_control_is_refused(part: Callable[..., object] | tc.Control) -> None:
     with pytest.raises(PartError) as told:
         CONTROLS.add("x", part)
     assert told.value.kind == "control"
 
 
-def test_a_control_of_ones_own_stands_behind_those_that_are_there():
+def test_a_control_of_ones_own_stands_behind_those_that_are_there() -> None:
     mine = register_control(tc.Control("Mine", "does nothing", lambda link, arm: ()))
     try:
         assert CONTROLS.names()[-1] == mine.name

@@ -1,6 +1,7 @@
 """Drivers: of all open pages one drives, and who stands still while holding loses control."""
 
 from itertools import pairwise
+from typing import Any
 
 from hypothesis import given
 from hypothesis import strategies as st
@@ -17,15 +18,16 @@ STEPS = st.lists(
 
 
 class Clock:
-    def __init__(self):
+    def __init__(self) -> None:
         self.now = 0.0
 
-    def __call__(self):
+    def __call__(self) -> float:
         return self.now
 
 
-def pages(count, clock=None):
+def pages(count: int, clock: Clock | None = None) -> tuple[Drivers, list[object]]:
     """Drivers with pages 0 to count - 1, and the changes that are heard from now on."""
+    changes: list[Any]
     drivers, changes = Drivers(clock=clock or Clock()), []
     for page in range(count):
         drivers.join(page)
@@ -34,8 +36,11 @@ def pages(count, clock=None):
 
 
 @given(STEPS)
-def test_never_does_more_than_one_page_drive_nor_one_that_is_closed(steps):
+def test_never_does_more_than_one_page_drive_nor_one_that_is_closed(
+    steps: list[tuple[str, int]],
+) -> None:
     clock = Clock()
+    told: list[Any]
     drivers, told = Drivers(clock=clock), []
     drivers.on_change(told.append)
     for word, page in steps:
@@ -52,7 +57,7 @@ def test_never_does_more_than_one_page_drive_nor_one_that_is_closed(steps):
     assert all(one != other for one, other in pairwise(told))
 
 
-def test_first_page_drives_and_the_second_watches_until_it_takes_control():
+def test_first_page_drives_and_the_second_watches_until_it_takes_control() -> None:
     drivers, changes = pages(2)
     assert [drivers.role(page) for page in (0, 1)] == ["you drive", "you watch"]
     drivers.take(1)
@@ -60,7 +65,9 @@ def test_first_page_drives_and_the_second_watches_until_it_takes_control():
     assert changes == [1]
 
 
-def test_nobody_gets_control_unasked_when_the_driver_leaves_but_a_page_that_is_loaded_anew():
+def test_nobody_gets_control_unasked_when_the_driver_leaves_but_a_page_that_is_loaded_anew() -> (
+    None
+):
     drivers, changes = pages(2)
     drivers.leave(0)
     assert drivers.driver is None
@@ -70,7 +77,7 @@ def test_nobody_gets_control_unasked_when_the_driver_leaves_but_a_page_that_is_l
     assert changes == [None, 2]
 
 
-def test_page_that_holds_the_stylus_in_silence_loses_control_after_its_patience():
+def test_page_that_holds_the_stylus_in_silence_loses_control_after_its_patience() -> None:
     clock = Clock()
     drivers, changes = pages(2, clock)
     assert drivers.hold(0)
@@ -84,7 +91,7 @@ def test_page_that_holds_the_stylus_in_silence_loses_control_after_its_patience(
     assert drivers.driver is None
 
 
-def test_page_that_gives_signs_of_life_may_hold_still_for_ever():
+def test_page_that_gives_signs_of_life_may_hold_still_for_ever() -> None:
     clock = Clock()
     drivers, _ = pages(1, clock)
     drivers.hold(0)
@@ -94,7 +101,7 @@ def test_page_that_gives_signs_of_life_may_hold_still_for_ever():
     assert drivers.driver == 0
 
 
-def test_silence_with_an_idle_stylus_costs_nothing():
+def test_silence_with_an_idle_stylus_costs_nothing() -> None:
     clock = Clock()
     drivers, _ = pages(1, clock)
     drivers.hold(0)
@@ -104,7 +111,7 @@ def test_silence_with_an_idle_stylus_costs_nothing():
     assert drivers.driver == 0
 
 
-def test_page_that_watches_can_neither_hold_nor_let_go():
+def test_page_that_watches_can_neither_hold_nor_let_go() -> None:
     clock = Clock()
     drivers, _ = pages(2, clock)
     drivers.hold(0)
@@ -115,7 +122,7 @@ def test_page_that_watches_can_neither_hold_nor_let_go():
     assert drivers.driver is None  # the driver did hold
 
 
-def test_who_takes_control_holds_nothing_yet():
+def test_who_takes_control_holds_nothing_yet() -> None:
     clock = Clock()
     drivers, _ = pages(2, clock)
     drivers.hold(0)
@@ -125,14 +132,14 @@ def test_who_takes_control_holds_nothing_yet():
     assert drivers.driver == 1
 
 
-def test_page_that_is_gone_cannot_take_control():
+def test_page_that_is_gone_cannot_take_control() -> None:
     drivers, changes = pages(1)
     drivers.take(7)
     assert drivers.driver == 0
     assert changes == []
 
 
-def test_every_page_drives_where_nothing_can_be_harmed():
+def test_every_page_drives_where_nothing_can_be_harmed() -> None:
     drivers, _ = pages(3)
     drivers.is_for_all = True
     assert all(drivers.may_drive(page) for page in drivers.pages)

@@ -1,5 +1,7 @@
 """Guard: a page from elsewhere, a name that was made to lead here, a wrong token get nothing."""
 
+from typing import Any
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -7,7 +9,7 @@ from hypothesis import strategies as st
 from teleop_core.console.guard import Guard, Request, is_loopback, is_wildcard
 
 
-def ask(guard, path="/", is_socket=False, **headers):
+def ask(guard: Guard, path: str = "/", is_socket: bool = False, **headers: str | list[str]) -> str:
     """Why a request with some headers is refused; lists are headers that come several times."""
     told = {"host": "localhost:8080"} | {n.replace("_", "-"): v for n, v in headers.items()}
     given = {name: [value] if isinstance(value, str) else value for name, value in told.items()}
@@ -19,7 +21,7 @@ SECRET = Guard("127.0.0.1", 8080, "secret")
 
 
 @pytest.mark.parametrize("host", ["localhost:8080", "127.0.0.1:8080", "[::1]:8080", "LOCALHOST"])
-def test_own_page_is_answered_by_any_name_of_the_loopback(host):
+def test_own_page_is_answered_by_any_name_of_the_loopback(host: str) -> None:
     assert not ask(LOCAL, host=host)
     assert not ask(LOCAL, host=host, is_socket=True, origin=f"http://{host}")
 
@@ -29,7 +31,7 @@ def test_own_page_is_answered_by_any_name_of_the_loopback(host):
     ["evil.example:8080", "localhost.evil.example", "127.0.0.1.evil.example", "127.0.0.2", "", "[",
      "evil@localhost.example", ["localhost:8080", "evil.example"], []],
 )  # fmt: skip
-def test_name_that_is_not_ours_is_refused_though_it_leads_here(host):
+def test_name_that_is_not_ours_is_refused_though_it_leads_here(host: str | list[str]) -> None:
     origin = f"http://{host}" if isinstance(host, str) else "http://localhost:8080"
     assert "not known by that name" in ask(LOCAL, host=host, is_socket=True, origin=origin)
 
@@ -40,32 +42,32 @@ def test_name_that_is_not_ours_is_refused_though_it_leads_here(host):
      "http://127.0.0.1:8080", "http://localhost:8080.evil.example", "null", "file://", "",
      ["http://localhost:8080", "http://evil.example"]],
 )  # fmt: skip
-def test_page_of_another_origin_is_refused(origin):
+def test_page_of_another_origin_is_refused(origin: str | list[str]) -> None:
     assert "own page" in ask(LOCAL, is_socket=True, origin=origin)
     assert "own page" in ask(LOCAL, origin=origin)
 
 
 @pytest.mark.parametrize("site", ["cross-site", "same-site"])
-def test_what_another_page_fetches_is_refused_but_a_link_to_ours_is_followed(site):
+def test_what_another_page_fetches_is_refused_but_a_link_to_ours_is_followed(site: str) -> None:
     for mode in ("no-cors", "cors", "websocket"):
         assert "own page" in ask(LOCAL, sec_fetch_site=site, sec_fetch_mode=mode)
     assert not ask(LOCAL, sec_fetch_site=site, sec_fetch_mode="navigate")
     assert not ask(LOCAL, sec_fetch_site="same-origin", sec_fetch_mode="cors")
 
 
-def test_socket_needs_an_origin_and_a_page_none():
+def test_socket_needs_an_origin_and_a_page_none() -> None:
     assert not ask(LOCAL)
     assert ask(LOCAL, is_socket=True)
 
 
 @given(st.text(max_size=30))
-def test_no_text_but_the_token_is_taken_for_it(text):
+def test_no_text_but_the_token_is_taken_for_it(text: str) -> None:
     if text != "secret":
         assert ask(SECRET, path=f"/?token={text.replace('&', '').replace('#', '')}x")
     assert not ask(SECRET, path="/?token=secret")
 
 
-def test_token_in_the_cookie_is_as_good_as_in_the_address():
+def test_token_in_the_cookie_is_as_good_as_in_the_address() -> None:
     cookie = SECRET.cookie()
     assert "HttpOnly" in cookie
     assert "SameSite=Strict" in cookie
@@ -78,20 +80,20 @@ def test_token_in_the_cookie_is_as_good_as_in_the_address():
     assert ask(SECRET)
 
 
-def test_right_token_does_not_help_a_page_from_elsewhere():
-    told = {"path": "/?token=secret", "is_socket": True}
+def test_right_token_does_not_help_a_page_from_elsewhere() -> None:
+    told: dict[str, Any] = {"path": "/?token=secret", "is_socket": True}
     assert ask(SECRET, origin="http://evil.example", **told)
     assert ask(SECRET, host="evil.example", origin="http://evil.example", **told)
 
 
-def test_server_of_all_addresses_is_found_by_numbers_but_by_no_foreign_name():
+def test_server_of_all_addresses_is_found_by_numbers_but_by_no_foreign_name() -> None:
     everywhere = Guard("0.0.0.0", 8080, "secret")
     path = "/?token=secret"
     assert not ask(everywhere, path=path, host="192.0.2.7:8080")
     assert ask(everywhere, path=path, host="evil.example:8080")
 
 
-def test_loopback_and_wildcard_are_told_from_other_addresses():
+def test_loopback_and_wildcard_are_told_from_other_addresses() -> None:
     assert all(map(is_loopback, ("127.0.0.1", "::1", "localhost", "127.1.2.3")))
     assert not any(map(is_loopback, ("0.0.0.0", "192.0.2.7", "", "robot")))
     assert all(map(is_wildcard, ("0.0.0.0", "::", "")))

@@ -1,5 +1,7 @@
 """What the page remembers: the last thirty seconds, and figures that numpy finds too."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -18,7 +20,13 @@ from teleop_core.robots import load_robot
 ARM = Arm("", load_robot("rcrt1"))
 
 
-def seen(reference, place, force=(0.0, 0.0, 0.0), *, is_following=True):
+def seen(
+    reference: tuple[float, int, int],
+    place: Any,
+    force: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    *,
+    is_following: bool = True,
+) -> ArmView:
     """A view of an arm whose tip is wanted in one place and is in another [m]."""
     turn = [1.0, 0.0, 0.0, 0.0]
     streams = {
@@ -29,7 +37,7 @@ def seen(reference, place, force=(0.0, 0.0, 0.0), *, is_following=True):
     return ArmView(streams=streams, state={"is_following": float(is_following)})
 
 
-def test_history_reaches_back_thirty_seconds_and_ends_now():
+def test_history_reaches_back_thirty_seconds_and_ends_now() -> None:
     history = History(ARM)
     for time in np.arange(0.0, 70.0, 1.0 / 30.0):
         history.add(float(time), seen((time, 0, 0), (0, 0, 0)), 0.001)
@@ -39,13 +47,13 @@ def test_history_reaches_back_thirty_seconds_and_ends_now():
     np.testing.assert_allclose(np.diff(reference[:, 0]), np.diff(at), atol=1e-9)
 
 
-def test_what_was_not_known_is_not_a_number_in_history():
+def test_what_was_not_known_is_not_a_number_in_history() -> None:
     history = History(ARM)
     history.add(1.0, ArmView(), float("nan"))
     assert np.isnan(history.read("joints")[1]).all()
 
 
-def test_the_energy_that_both_ports_may_still_give_is_drawn_in_joules():
+def test_the_energy_that_both_ports_may_still_give_is_drawn_in_joules() -> None:
     history, view = History(ARM), seen((0, 0, 0), (0, 0, 0))
     for topic, left in ((MASTER_ENERGY, 0.004), (SLAVE_ENERGY, -0.001)):
         view.streams[topic.name] = np.where(np.array(ENERGY) == "margin", left, 7.0)
@@ -53,21 +61,21 @@ def test_the_energy_that_both_ports_may_still_give_is_drawn_in_joules():
     assert history.read("left")[1].tolist() == [[0.004, -0.001]]
 
 
-def test_a_time_that_goes_back_begins_history_anew():
+def test_a_time_that_goes_back_begins_history_anew() -> None:
     history = History(ARM)
     for time in (5.0, 6.0, 2.0):
         history.add(time, seen((0, 0, 0), (0, 0, 0)), 0.0)
     assert len(history.read("error")[0]) == 1
 
 
-def test_a_time_that_stands_still_as_in_a_paused_replay_leaves_history_as_it_is():
+def test_a_time_that_stands_still_as_in_a_paused_replay_leaves_history_as_it_is() -> None:
     history = History(ARM)
     for time in (5.0, 6.0, 6.0, 6.0):
         history.add(time, seen((0, 0, 0), (0, 0, 0)), 0.0)
     assert history.read("error")[0].tolist() == [-1.0, 0.0]
 
 
-def test_live_figures_are_those_of_all_samples_at_even_times():
+def test_live_figures_are_those_of_all_samples_at_even_times() -> None:
     rng = np.random.default_rng(1)
     reference, place = rng.normal(0.0, 0.01, (2, 200, 3))
     force = rng.normal(0.0, 1.0, (200, 3))
@@ -83,14 +91,16 @@ def test_live_figures_are_those_of_all_samples_at_even_times():
 
 
 @pytest.mark.parametrize(("gap", "counted"), [(0.9, 0.9), (2.0, 0.0)])
-def test_a_second_that_the_page_did_not_see_is_not_counted_as_followed(gap, counted):
+def test_a_second_that_the_page_did_not_see_is_not_counted_as_followed(
+    gap: float, counted: float
+) -> None:
     scores = LiveScores()
     for time in (0.0, gap):
         scores.add(time, seen((1, 0, 0), (0, 0, 0)))
     assert scores.time == pytest.approx(counted)
 
 
-def test_what_does_not_follow_does_not_count():
+def test_what_does_not_follow_does_not_count() -> None:
     scores = LiveScores()
     for i in range(50):
         scores.add(0.03 * i, seen((1, 0, 0), (0, 0.01 * i, 0), is_following=False))
@@ -98,7 +108,7 @@ def test_what_does_not_follow_does_not_count():
     assert "0.0 s" in scores.text()
 
 
-def test_what_the_clutch_holds_does_not_count_as_followed():
+def test_what_the_clutch_holds_does_not_count_as_followed() -> None:
     scores = LiveScores()
     for i in range(400):
         view = seen((1, 0, 0), (0, 0.01, 0))

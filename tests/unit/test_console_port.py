@@ -9,35 +9,36 @@ from contextlib import suppress
 
 import pytest
 
+from present import present
 from teleop_core.base.errors import ParameterError, SessionError
 from teleop_core.console.server import ConsoleServer, free_port, listen, owner
 
 
-def test_taken_port_is_refused_with_its_owner_and_one_that_is_free():
+def test_taken_port_is_refused_with_its_owner_and_one_that_is_free() -> None:
     with listen("127.0.0.1", 0) as taken:
         port = taken.getsockname()[1]
         with pytest.raises(SessionError) as refused:
             listen("127.0.0.1", port)
         assert f"port {port} is taken by" in str(refused.value)
         assert f"(process {os.getpid()})" in str(refused.value)
-        free = int(re.search(r"(\d+) is free", str(refused.value)).group(1))
+        free = int(present(re.search(r"(\d+) is free", str(refused.value))).group(1))
         assert free != port
         listen("127.0.0.1", free).close()
 
 
-def test_port_that_all_addresses_have_is_taken_on_the_loopback_too():
+def test_port_that_all_addresses_have_is_taken_on_the_loopback_too() -> None:
     with listen("0.0.0.0", 0) as taken, pytest.raises(SessionError):
         listen("127.0.0.1", taken.getsockname()[1])
 
 
-def test_port_is_free_again_at_once_when_its_server_has_ended():
+def test_port_is_free_again_at_once_when_its_server_has_ended() -> None:
     port = free_port()
     for _ in range(2):
         with listen("127.0.0.1", port), socket.create_connection(("127.0.0.1", port)):
             pass
 
 
-def test_server_that_ends_while_others_come_in_leaves_no_connection_open():
+def test_server_that_ends_while_others_come_in_leaves_no_connection_open() -> None:
     for _ in range(10):
         with ConsoleServer(0) as server:
             came, ends = threading.Barrier(3), threading.Event()
@@ -52,7 +53,7 @@ def test_server_that_ends_while_others_come_in_leaves_no_connection_open():
     gc.collect()  # tells what is still open, which fails a test here
 
 
-def come_in(port, came, ends):
+def come_in(port: int, came: threading.Barrier, ends: threading.Event) -> None:
     """Come and go; meet the others after the tenth time."""
     times = 0
     while not ends.is_set():
@@ -63,12 +64,12 @@ def come_in(port, came, ends):
             came.wait(30)
 
 
-def test_owner_that_cannot_be_known_is_another_process():
+def test_owner_that_cannot_be_known_is_another_process() -> None:
     assert owner(free_port()) == "another process"
 
 
 @pytest.mark.parametrize(("host", "port"), [("127.0.0.1", 65536), ("127.0.0.1", -1),
                                             ("192.0.2.1", 0), ("no such host", 0)])  # fmt: skip
-def test_address_that_is_none_of_this_machine_is_a_wrong_value(host, port):
+def test_address_that_is_none_of_this_machine_is_a_wrong_value(host: str, port: int) -> None:
     with pytest.raises(ParameterError):
         listen(host, port)

@@ -2,6 +2,8 @@
 
 import bisect
 from dataclasses import replace
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -19,15 +21,15 @@ from teleop_core.graph.topics import MASTER_MEASURED_CP, SLAVE_MEASURED_CP, Kind
 
 
 @pytest.fixture(scope="module")
-def session(tmp_path_factory):
+def session(tmp_path_factory: pytest.TempPathFactory) -> tc.Recording:
     path = tmp_path_factory.mktemp("console") / "session"
     return tc.run("mode_switching", duration=6.0, out=path)
 
 
 @pytest.fixture(scope="module")
-def messages(session):
+def messages(session: Any) -> dict[str, list[tuple[int, Any]]]:
     """Times of recording [ns] and messages of some topics, as rosbags reads them."""
-    found = {}
+    found: dict[Any, Any] = {}
     with AnyReader([session.path]) as reader:
         for connection, log_ns, data in reader.messages():
             name = connection.topic.lstrip("/")
@@ -37,17 +39,19 @@ def messages(session):
 
 
 @pytest.fixture
-def link(session):
+def link(session: tc.Recording) -> RecordedLink:
     return RecordedLink(session.bag)
 
 
-def last(messages, time_ns):
+def last(messages: list[tuple[int, object]], time_ns: int) -> Any:
     """Last message that was recorded by a time."""
     return messages[bisect.bisect_right([log for log, _ in messages], time_ns) - 1][1]
 
 
 @pytest.mark.parametrize("time", [0.0, 0.7774, 2.5, 4.1239, 6.0, 1e9])
-def test_a_view_has_what_others_read_as_the_last_sample_by_that_time(link, messages, time):
+def test_a_view_has_what_others_read_as_the_last_sample_by_that_time(
+    link: RecordedLink, messages: dict[str, list[tuple[int, Any]]], time: float
+) -> None:
     link.seek(time)
     seen = link.view().arms[""]
     start = min(log for one in messages.values() for log, _ in one)
@@ -76,7 +80,9 @@ def test_a_view_has_what_others_read_as_the_last_sample_by_that_time(link, messa
         max_size=30,
     )
 )
-def test_time_stays_within_the_recording_whatever_is_done(small_link, steps):
+def test_time_stays_within_the_recording_whatever_is_done(
+    small_link: RecordedLink, steps: list[tuple[str, float]]
+) -> None:
     link = small_link
     for name, value in steps:
         if name == "loop":
@@ -89,17 +95,17 @@ def test_time_stays_within_the_recording_whatever_is_done(small_link, steps):
 
 
 @pytest.fixture(scope="module")
-def small():
+def small() -> Any:
     """A short session in memory."""
     return tc.run("coarse_box", duration=0.4).bag
 
 
 @pytest.fixture(scope="module")
-def small_link(small):
+def small_link(small: MemoryBag) -> RecordedLink:
     return RecordedLink(small)
 
 
-def test_time_passes_at_its_speed_and_stops_at_the_end(link):
+def test_time_passes_at_its_speed_and_stops_at_the_end(link: RecordedLink) -> None:
     link.advance(1.0)
     assert link.time == 0.0, "it is held until somebody plays it"
     link.play()
@@ -113,7 +119,7 @@ def test_time_passes_at_its_speed_and_stops_at_the_end(link):
     assert link.time == 0.0, "from the begin again"
 
 
-def test_a_loop_begins_again_at_its_end(link):
+def test_a_loop_begins_again_at_its_end(link: RecordedLink) -> None:
     link.loop = True
     link.play()
     link.advance(link.duration + 0.1)
@@ -121,7 +127,7 @@ def test_a_loop_begins_again_at_its_end(link):
     assert link.time < 1.0
 
 
-def test_a_step_holds_time_and_a_step_back_undoes_it(link):
+def test_a_step_holds_time_and_a_step_back_undoes_it(link: RecordedLink) -> None:
     link.seek(2.0)
     link.play()
     link.step(1)
@@ -132,17 +138,17 @@ def test_a_step_holds_time_and_a_step_back_undoes_it(link):
 
 
 @pytest.mark.parametrize("speed", [0.0, -1.0, 101.0, float("nan")])
-def test_impossible_speeds_are_refused(link, speed):
+def test_impossible_speeds_are_refused(link: RecordedLink, speed: float) -> None:
     with pytest.raises(tc.ParameterError, match="speed"):
         link.speed = speed
 
 
-def test_no_time_is_refused(link):
+def test_no_time_is_refused(link: RecordedLink) -> None:
     with pytest.raises(tc.ParameterError, match="time"):
         link.seek(float("nan"))
 
 
-def test_a_recording_cannot_be_commanded(link):
+def test_a_recording_cannot_be_commanded(link: RecordedLink) -> None:
     before = link.view()
     assert link.command("enable") == (False, "a recording cannot be commanded")
     assert "cannot be commanded" in link.change("motion_scaling", "mode", "fine")
@@ -157,14 +163,18 @@ def test_a_recording_cannot_be_commanded(link):
     assert not link.is_live
 
 
-def test_parameters_are_those_that_it_was_made_with(session, link):
+def test_parameters_are_those_that_it_was_made_with(
+    session: tc.Recording, link: RecordedLink
+) -> None:
     found = link.parameters()
     assert found["motion_scaling", "axes"].value == ("-z", "-x", "+y")
     assert found["slave_sim", "robot"].value == "rcrt1"
     assert all(info.is_fixed for info in found.values())
 
 
-def test_of_a_long_recording_one_of_some_samples_is_kept_and_memory_stays_bounded(session):
+def test_of_a_long_recording_one_of_some_samples_is_kept_and_memory_stays_bounded(
+    session: tc.Recording,
+) -> None:
     bag = session.bag
     most = 300_000
     (arm,), thinning = recorded_arms(bag, configuration_of(bag), most)
@@ -177,7 +187,7 @@ def test_of_a_long_recording_one_of_some_samples_is_kept_and_memory_stays_bounde
     np.testing.assert_array_equal(track.values, whole.values[::thinning])
 
 
-def test_a_path_is_that_of_the_last_seconds(link, session):
+def test_a_path_is_that_of_the_last_seconds(link: RecordedLink, session: tc.Recording) -> None:
     link.seek(3.0)
     times, rows = link.path(MASTER_MEASURED_CP, "", 2.0)
     assert len(times) == len(rows) > 100
@@ -186,13 +196,13 @@ def test_a_path_is_that_of_the_last_seconds(link, session):
     np.testing.assert_array_equal(rows[-1], link.view().arms[""].streams["master/measured_cp"])
 
 
-def test_what_was_not_recorded_has_no_path(link):
+def test_what_was_not_recorded_has_no_path(link: RecordedLink) -> None:
     times, rows = link.path(Topic("nobody/measured_cp", Kind.POSE), "", 10.0)
     assert times.shape == (0,)
     assert rows.shape == (0, 7)
 
 
-def foreign(small, lacking, metadata):
+def foreign(small: MemoryBag, lacking: tuple[str, ...], metadata: dict[str, str]) -> MemoryBag:
     """The same streams without some, as another system would have recorded them."""
     streams = {topic: s for topic, s in small.streams.items() if topic.name not in lacking}
     return MemoryBag("foreign", streams, {}, metadata)
@@ -208,18 +218,18 @@ def foreign(small, lacking, metadata):
     ],
 )
 def test_a_recording_of_another_system_is_refused_with_what_it_lacks(
-    small, lacking, metadata, reason
-):
+    small: MemoryBag, lacking: tuple[str, ...], metadata: dict[str, str], reason: str
+) -> None:
     with pytest.raises(tc.RecordingError, match=reason):
         RecordedLink(foreign(small, lacking, metadata))
 
 
-def test_a_path_that_is_none_is_refused(tmp_path):
+def test_a_path_that_is_none_is_refused(tmp_path: Path) -> None:
     with pytest.raises(tc.RecordingError):
         RecordedLink(tmp_path / "nothing")
 
 
-def test_a_robot_that_is_named_by_the_recording_alone_is_enough(small):
+def test_a_robot_that_is_named_by_the_recording_alone_is_enough(small: MemoryBag) -> None:
     link = RecordedLink(
         foreign(small, ("slave/servo_jp", "master/measured_cf"), {"robot": "rcrt1"})
     )
@@ -229,7 +239,7 @@ def test_a_robot_that_is_named_by_the_recording_alone_is_enough(small):
     assert seen.state == {}
 
 
-def test_each_arm_of_two_is_seen_as_it_was(small):
+def test_each_arm_of_two_is_seen_as_it_was(small: MemoryBag) -> None:
     later = {
         topic.of_arm("right"): replace(s, values=s.values[::-1])
         for topic, s in small.streams.items()
@@ -244,7 +254,9 @@ def test_each_arm_of_two_is_seen_as_it_was(small):
     np.testing.assert_array_equal(seen["right"].streams["slave/measured_js"], joints.values[0])
 
 
-def test_after_a_jump_in_time_plots_show_what_was_before(session, link):
+def test_after_a_jump_in_time_plots_show_what_was_before(
+    session: tc.Recording, link: RecordedLink
+) -> None:
     with ConsoleServer(port=0) as server:
         page = Console(server, link)
         page.panel.remember(link.view)

@@ -2,15 +2,20 @@
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any, cast
 
 import numpy as np
 import pytest
 import trimesh
+from numpy.typing import NDArray
+from viser._scene_handles import BoxHandle, FrameHandle
 
 import teleop_core as tc
+from present import present
 from teleop_core.chain.fixtures import FIXTURES
 from teleop_core.console.body_nodes import ROLES
 from teleop_core.console.fixture_outlines import Look, scale_of, unit_outline
+from teleop_core.console.hooks import Server
 from teleop_core.console.jaw_nodes import finger_poses
 from teleop_core.console.link import Arm, ArmView, View
 from teleop_core.console.look import GOOD, WRONG
@@ -18,7 +23,7 @@ from teleop_core.console.recorded import RecordedLink
 from teleop_core.console.scene import Scene
 from teleop_core.console.server import ConsoleServer
 from teleop_core.console.world_nodes import object_outline
-from teleop_core.kernels.geometry import rotations_from_quaternions
+from teleop_core.kernels.geometry import Array, rotations_from_quaternions
 from teleop_core.robots.bodies import Solid
 from teleop_core.robots.bodies.meshes import mesh_of
 
@@ -28,23 +33,23 @@ MASTER, TIP, FORCE = "master/measured_cp", "slave/measured_cp", "master/measured
 
 
 @pytest.fixture(scope="module")
-def server():
+def server() -> Any:
     with ConsoleServer(port=0) as opened:
         yield opened.viser
 
 
 @pytest.fixture(scope="module")
-def session():
+def session() -> tc.Recording:
     """Free motion, then a box of 16 mm, which the hand leaves."""
     return tc.run("coarse_box", duration=11.0, fixture__box__size=[0.016] * 3)
 
 
 @pytest.fixture
-def link(session):
+def link(session: tc.Recording) -> RecordedLink:
     return RecordedLink(session.bag)
 
 
-def drawn(server, link, time):
+def drawn(server: Server, link: RecordedLink, time: float) -> tuple[Scene, View]:
     """Scene of a recording at a time, and the view that it shows."""
     server.scene.reset()
     scene = Scene(server, link.arms)
@@ -55,24 +60,28 @@ def drawn(server, link, time):
     return scene, view
 
 
-def turned(node):
+def turned(node: FrameHandle | BoxHandle) -> Array:
     return rotations_from_quaternions(node.wxyz[None])[0]
 
 
-def sent(server):
+def sent(server: Server) -> int:
     """Messages that were ever queued for browsers."""
     return server._websock_server.get_message_buffer().message_counter
 
 
 @pytest.mark.parametrize("time", [0.0, 3.0, 7.5, 11.0])
-def test_the_tip_is_drawn_where_it_was_measured(server, link, time):
+def test_the_tip_is_drawn_where_it_was_measured(
+    server: Server, link: RecordedLink, time: float
+) -> None:
     scene, view = drawn(server, link, time)
     tip, measured = scene.arms[""].drawn.frames["tip"], view.arms[""].streams[TIP]
     np.testing.assert_allclose(tip.position, measured[:3], atol=STILL)
     assert abs(tip.wxyz @ measured[3:]) > 1.0 - STILL
 
 
-def test_the_stylus_moves_on_the_page_as_the_command_of_the_tip_does(server, link):
+def test_the_stylus_moves_on_the_page_as_the_command_of_the_tip_does(
+    server: Server, link: RecordedLink
+) -> None:
     scene, before = drawn(server, link, 2.0)
     link.seek(6.0)
     after = link.view()
@@ -85,37 +94,43 @@ def test_the_stylus_moves_on_the_page_as_the_command_of_the_tip_does(server, lin
     np.testing.assert_allclose(base @ hand, command, atol=5e-4)  # gain 1
 
 
-def test_the_fixture_is_drawn_around_the_hand_where_its_button_was_pressed(server, link, session):
+def test_the_fixture_is_drawn_around_the_hand_where_its_button_was_pressed(
+    server: Server, link: RecordedLink, session: tc.Recording
+) -> None:
     state = session["teleop/state"]
     when = state.stamp_ns[np.argmax(state["is_fixture_on"] > 0)]
     master = session[MASTER]
     there = master[["x", "y", "z"]][np.searchsorted(master.stamp_ns, when)]
     scene, view = drawn(server, link, 11.0)
     assert view.arms[""].state["is_fixture_on"]
-    outline = scene.arms[""].master.outline.line
+    outline = present(scene.arms[""].master.outline.line)
     np.testing.assert_allclose(outline.position, there, atol=2e-4)
     np.testing.assert_allclose(outline.scale, [0.016] * 3, rtol=1e-9)
 
 
-def test_a_fixture_is_red_where_its_wall_is_felt_and_green_elsewhere(server, link, session):
+def test_a_fixture_is_red_where_its_wall_is_felt_and_green_elsewhere(
+    server: Server, link: RecordedLink, session: tc.Recording
+) -> None:
     force = session[FORCE]
     size = np.linalg.norm(force[["fx", "fy", "fz"]], axis=1)
     colors = []
     for time in (force.time[np.argmax(size)], force.time[size == 0.0][-1]):
         scene, view = drawn(server, link, time)
         assert view.arms[""].state["is_fixture_on"]
-        colors.append(tuple(scene.arms[""].outline.line.colors.tolist()))
+        colors.append(tuple(present(scene.arms[""].outline.line).colors.tolist()))
     assert colors == [WRONG, GOOD]
 
 
-def path_of(server, name):
+def path_of(server: Any, name: str) -> NDArray[np.float32]:
     """Points of a path on the page, along it, without what is too old."""
-    line = server.scene.get_handle_by_name(f"/arm/{name}")
+    line = present(server.scene.get_handle_by_name(f"/arm/{name}"))
     points = np.concatenate((line.points[:, 0], line.points[-1:, 1]))
     return points[np.abs(np.diff(points, axis=0, prepend=np.nan)).max(axis=1) != 0.0]
 
 
-def test_the_path_of_the_tip_goes_through_where_it_was_measured(server, link, session):
+def test_the_path_of_the_tip_goes_through_where_it_was_measured(
+    server: Server, link: RecordedLink, session: tc.Recording
+) -> None:
     scene, _ = drawn(server, link, 4.0)
     for time in np.arange(4.0, 10.0, 1 / 30):
         link.seek(time)
@@ -127,7 +142,9 @@ def test_the_path_of_the_tip_goes_through_where_it_was_measured(server, link, se
     assert distances.max() < 1e-6
 
 
-def test_after_a_jump_in_time_the_path_is_that_of_the_recording(server, link, session):
+def test_after_a_jump_in_time_the_path_is_that_of_the_recording(
+    server: Server, link: RecordedLink, session: tc.Recording
+) -> None:
     scene, _ = drawn(server, link, 0.0)
     scene.draw(link.view())
     link.seek(9.0)
@@ -141,12 +158,12 @@ def test_after_a_jump_in_time_the_path_is_that_of_the_recording(server, link, se
     np.testing.assert_allclose(points[0], session[TIP][["x", "y", "z"]][0], atol=1e-4)
 
 
-def test_no_fixture_is_drawn_before_there_is_one(server, link):
+def test_no_fixture_is_drawn_before_there_is_one(server: Server, link: RecordedLink) -> None:
     scene, _ = drawn(server, link, 1.0)
     assert scene.arms[""].outline.line is None
 
 
-def test_the_same_view_again_sends_nothing(server, link):
+def test_the_same_view_again_sends_nothing(server: Server, link: RecordedLink) -> None:
     scene, view = drawn(server, link, 9.0)
     scene.draw(view)
     before = sent(server)
@@ -155,7 +172,7 @@ def test_the_same_view_again_sends_nothing(server, link):
     assert sent(server) == before
 
 
-def test_another_view_sends_no_mesh_again(server, link):
+def test_another_view_sends_no_mesh_again(server: Server, link: RecordedLink) -> None:
     scene, _ = drawn(server, link, 9.0)
     count = len(server._websock_server.get_message_buffer().message_from_id)
     for time in np.linspace(9.0, 10.5, 100):
@@ -166,7 +183,7 @@ def test_another_view_sends_no_mesh_again(server, link):
 
 
 @pytest.mark.parametrize("name", tc.list_robots())
-def test_every_robot_is_drawn(server, name):
+def test_every_robot_is_drawn(server: Server, name: str) -> None:
     server.scene.reset()
     robot = tc.load_robot(name)
     scene = Scene(server, [Arm("", robot)])
@@ -183,7 +200,9 @@ def test_every_robot_is_drawn(server, name):
     assert all(np.isfinite(frame.position).all() for frame in scene.arms[""].drawn.frames.values())
 
 
-def test_a_link_with_a_visual_is_drawn_as_it_looks_and_the_others_plainly(server, tmp_path):
+def test_a_link_with_a_visual_is_drawn_as_it_looks_and_the_others_plainly(
+    server: Any, tmp_path: Path
+) -> None:
     server.scene.reset()
     text = (Path(__file__).parents[2] / "examples" / "any_arm.urdf").read_text(encoding="utf-8")
     box = '<visual><geometry><box size="0.1 0.2 0.3"/></geometry></visual>'
@@ -192,24 +211,24 @@ def test_a_link_with_a_visual_is_drawn_as_it_looks_and_the_others_plainly(server
     scene = Scene(server, [Arm("", tc.load_robot(str(file), tip="tool0"))])
     scene.show_ghost(is_shown=True)
     for place in ("/arm/robot", "/arm/ghost"):
-        forearm = server.scene.get_handle_by_name(f"{place}/link3/link")
+        forearm = present(server.scene.get_handle_by_name(f"{place}/link3/link"))
         assert np.ptp(forearm.vertices, axis=0).max() == pytest.approx(0.3)
         assert server.scene.get_handle_by_name(f"{place}/link3/joint") is None
         assert server.scene.get_handle_by_name(f"{place}/link2/joint") is not None
 
 
-def test_a_joint_at_its_limit_is_drawn_in_another_colour(server):
+def test_a_joint_at_its_limit_is_drawn_in_another_colour(server: Server) -> None:
     server.scene.reset()
     robot = tc.load_robot("rcrt1")
     scene = Scene(server, [Arm("", robot)])
     bodies = scene.arms[""].bodies
 
-    def colours(joints):
+    def colours(joints: Array) -> set[tuple[int, int, int]]:
         state = np.concatenate((joints, np.zeros(2 * robot.n)))
         scene.draw(View(arms={"": ArmView({"slave/measured_js": state})}))
         name = bodies.bodies[bodies.joint_body[1]].name
         return {
-            mesh.color
+            cast(Any, mesh).color
             for role in ROLES
             if (mesh := server.scene.get_handle_by_name(f"/arm/robot/{name}/{role}")) is not None
         }
@@ -221,7 +240,9 @@ def test_a_joint_at_its_limit_is_drawn_in_another_colour(server):
     assert WRONG not in colours(robot.start)
 
 
-def test_two_arms_stand_beside_each_other_and_each_tip_is_where_it_was_measured(server, link):
+def test_two_arms_stand_beside_each_other_and_each_tip_is_where_it_was_measured(
+    server: Server, link: RecordedLink
+) -> None:
     server.scene.reset()
     scene = Scene(server, [replace(link.arms[0], name=name) for name in ("", "right")])
     view = View()
@@ -233,13 +254,13 @@ def test_two_arms_stand_beside_each_other_and_each_tip_is_where_it_was_measured(
     assert high[1] < low[1]
     for name in ("", "right"):
         nodes = scene.arms[name]
-        root = server.scene.get_handle_by_name(nodes.path)
-        tip = server.scene.get_handle_by_name(f"{nodes.path}/robot/tip")
+        root = present(server.scene.get_handle_by_name(nodes.path))
+        tip = present(server.scene.get_handle_by_name(f"{nodes.path}/robot/tip"))
         np.testing.assert_allclose(tip.position, view.arms[name].streams[TIP][:3], atol=STILL)
         np.testing.assert_allclose(nodes.tip()[:3], root.position + tip.position, atol=STILL)
 
 
-def test_the_first_camera_sees_all_of_every_robot_in_a_square_window(server):
+def test_the_first_camera_sees_all_of_every_robot_in_a_square_window(server: Server) -> None:
     for name in tc.list_robots():
         server.scene.reset()
         scene = Scene(server, [Arm("", tc.load_robot(name))])
@@ -263,10 +284,10 @@ SOLIDS = {
 
 
 @pytest.mark.parametrize("kind", SOLIDS)
-def test_meshes_are_closed_look_outwards_and_have_the_volume_of_their_solid(kind):
+def test_meshes_are_closed_look_outwards_and_have_the_volume_of_their_solid(kind: str) -> None:
     size, volume = SOLIDS[kind]
     pose = np.array([0.3, -0.2, 0.1, 0.5, 0.5, 0.5, 0.5])
-    mesh = trimesh.Trimesh(*mesh_of(Solid(kind, size, pose, "link")))
+    mesh = trimesh.Trimesh(*mesh_of(Solid(cast(Any, kind), size, pose, "link")))
     mesh.merge_vertices()
     mesh.update_faces(mesh.nondegenerate_faces())
     assert mesh.is_watertight
@@ -275,7 +296,7 @@ def test_meshes_are_closed_look_outwards_and_have_the_volume_of_their_solid(kind
 
 
 @pytest.mark.parametrize("kind", ["box", "sphere", "cylinder", "cone", "of another program"])
-def test_outlines_are_one_long_along_each_axis(kind):
+def test_outlines_are_one_long_along_each_axis(kind: str) -> None:
     points = unit_outline(Look(kind)).reshape(-1, 3)
     np.testing.assert_allclose(np.ptp(points, axis=0), 1.0)
 
@@ -292,7 +313,9 @@ TURNED = {
 
 
 @pytest.mark.parametrize("kind", [name for name in FIXTURES if "mesh" not in name])
-def test_outlines_are_those_of_the_fixtures_with_their_parameters(kind):
+def test_outlines_are_those_of_the_fixtures_with_their_parameters(kind: str) -> None:
+    part: Any
+    values: Any
     part, values, gain = FIXTURES.find(kind), TURNED.get(kind, {}), 0.2
     parameters = part.parameters(**values)
     unit = unit_outline(Look(kind, tuple(values.items())))
@@ -304,25 +327,27 @@ def test_outlines_are_those_of_the_fixtures_with_their_parameters(kind):
     np.testing.assert_allclose(np.ptp(points, axis=0), np.ptp(outline, axis=0), atol=1e-12)
 
 
-def test_the_scene_draws_a_fixture_where_its_parameters_have_it(server):
+def test_the_scene_draws_a_fixture_where_its_parameters_have_it(server: Server) -> None:
     session = tc.run("coarse_box", duration=5.0, fixture="half_space",
                      fixture__half_space__room=0.02)  # fmt: skip
     scene, view = drawn(server, RecordedLink(session.bag), 4.5)
     assert view.arms[""].state["is_fixture_on"]
-    line = scene.arms[""].master.outline.line
+    line: Any = scene.arms[""].master.outline.line
     below = line.scale[1] * line.points.reshape(-1, 3)[:, 1]
     np.testing.assert_allclose(below, -0.02, atol=1e-6)
 
 
 @pytest.fixture(scope="module")
-def pressed():
+def pressed() -> tc.Recording:
     """A block of tissue that the tip is pressed into."""
     return tc.run("palpation", duration=9.0)
 
 
-def test_the_object_is_drawn_where_the_tip_touches_it(server, pressed):
+def test_the_object_is_drawn_where_the_tip_touches_it(
+    server: Server, pressed: tc.Recording
+) -> None:
     scene, _ = drawn(server, RecordedLink(pressed.bag), 8.0)
-    points = scene.arms[""].world.line.points.reshape(-1, 3)
+    points = present(scene.arms[""].world.line).points.reshape(-1, 3)
     low, high = points.min(axis=0), points.max(axis=0)
     force = pressed["slave/true_cf"]
     first = force.stamp_ns[np.argmax(force["fz"] > 0.0)]
@@ -333,7 +358,9 @@ def test_the_object_is_drawn_where_the_tip_touches_it(server, pressed):
     assert place[2] == pytest.approx(high[2], abs=1e-4)
 
 
-def test_the_push_on_the_tip_is_drawn_there_as_large_as_it_is(server, pressed):
+def test_the_push_on_the_tip_is_drawn_there_as_large_as_it_is(
+    server: Server, pressed: tc.Recording
+) -> None:
     force = pressed["slave/measured_cf"]
     size = np.linalg.norm(force[["fx", "fy", "fz"]], axis=1)
     scene, view = drawn(server, RecordedLink(pressed.bag), force.time[np.argmax(size)])
@@ -345,7 +372,9 @@ def test_the_push_on_the_tip_is_drawn_there_as_large_as_it_is(server, pressed):
     assert not scene.arms[""].world.push._frame.visible
 
 
-def test_without_an_object_none_is_drawn_and_one_without_a_place_lies_below_the_tip(server, link):
+def test_without_an_object_none_is_drawn_and_one_without_a_place_lies_below_the_tip(
+    server: Server, link: RecordedLink
+) -> None:
     scene, _ = drawn(server, link, 3.0)
     assert scene.arms[""].world.line is None
     robot = link.arms[0].robot
@@ -354,13 +383,13 @@ def test_without_an_object_none_is_drawn_and_one_without_a_place_lies_below_the_
     middle = 0.5 * (below.reshape(-1, 3).min(axis=0) + below.reshape(-1, 3).max(axis=0))
     np.testing.assert_allclose(middle, tip - [0.0, 0.0, 0.03], atol=1e-6)
     assert not len(object_outline({"kind": "not installed here"}, robot))
-    foreign = {"kind": "sphere", "elsewhere.radius": 0.1, "sphere.radius": 0.01}
+    foreign: dict[str, Any] = {"kind": "sphere", "elsewhere.radius": 0.1, "sphere.radius": 0.01}
     assert len(object_outline(foreign, robot))
 
 
 def test_two_fingers_stand_at_the_tip_as_far_apart_as_the_jaw_is_open_and_the_block_where_it_is(
-    server, link
-):
+    server: Server, link: RecordedLink
+) -> None:
     picked = tc.run("pick", duration=6.0)
     scene, view = drawn(server, RecordedLink(picked.bag), picked.duration - 0.1)
     jaw, seen = scene.arms[""].jaw, view.arms[""].streams
@@ -377,7 +406,7 @@ def test_two_fingers_stand_at_the_tip_as_far_apart_as_the_jaw_is_open_and_the_bl
     assert not none.arms[""].jaw.blocks
 
 
-def test_every_block_and_every_peg_of_a_board_is_drawn_where_it_stands(server):
+def test_every_block_and_every_peg_of_a_board_is_drawn_where_it_stands(server: Server) -> None:
     carried = tc.run("peg_transfer", duration=17.0)
     scene, view = drawn(server, RecordedLink(carried.bag), carried.duration - 0.1)
     jaw = scene.arms[""].jaw
@@ -391,7 +420,7 @@ def test_every_block_and_every_peg_of_a_board_is_drawn_where_it_stands(server):
     np.testing.assert_allclose(feet, board[5] - 0.01, atol=STILL)  # where blocks stand
 
 
-def test_the_pads_are_at_the_tip_whatever_the_angle():
+def test_the_pads_are_at_the_tip_whatever_the_angle() -> None:
     tip = np.array([0.3, -0.1, 0.2, 0.5, 0.5, -0.5, 0.5])
     for angle in (0.0, 0.4, 1.0):
         poses = finger_poses(tip, angle, 0.04)

@@ -1,5 +1,7 @@
 """Settings of the page: what a control shows is what the parameter is, there and back."""
 
+from typing import Any
+
 import pytest
 
 from desk import Desk
@@ -20,7 +22,7 @@ EVERY = [
 
 
 @pytest.mark.parametrize(("node", "name", "value"), EVERY, ids=[f"{n}.{p}" for n, p, _ in EVERY])
-def test_a_value_that_is_shown_is_read_as_itself(node, name, value):
+def test_a_value_that_is_shown_is_read_as_itself(node: str, name: str, value: Any) -> None:
     info = ParameterInfo(node, name, value)
     read = _parsed(_shown(value), info)
     assert read == value or read == pytest.approx(value)
@@ -34,20 +36,26 @@ def test_a_value_that_is_shown_is_read_as_itself(node, name, value):
         ("[a]", (1.0,), None), (3, 2, 3), (3, 2.0, 3.0), (True, False, True),
     ],
 )  # fmt: skip
-def test_lists_are_read_as_people_write_them(shown, present, wanted):
+def test_lists_are_read_as_people_write_them(
+    shown: str | int | bool,
+    present: Any,
+    wanted: float | bool | tuple[str | float, ...] | None,
+) -> None:
     assert _parsed(shown, ParameterInfo("node", "name", present)) == wanted
 
 
 @pytest.mark.parametrize(
     "value", [(0.1, 2.0), ("a=0.1", "b"), ("ball at=[0, 1]", "box"), (), True, 3, 0.25, "hold"]
 )
-def test_a_setting_text_is_read_by_the_session_as_the_value(value):
+def test_a_setting_text_is_read_by_the_session_as_the_value(
+    value: Any,
+) -> None:
     found = parse(_text(value)) if not isinstance(value, bool) else {"True": True}[_text(value)]
     assert (tuple(found) if isinstance(found, list) else found) == value
 
 
-def test_value_that_a_button_of_the_stylus_changed_is_shown_as_it_is_and_can_be_set_back():
-    desk = Desk()
+def test_value_that_a_button_of_the_stylus_changed_is_shown_as_it_is_and_can_be_set_back() -> None:
+    desk: Any = Desk()
     desk.known = {
         MODE: ParameterInfo(*MODE, "coarse", choices=("coarse", "fine")),
         GAIN: ParameterInfo(*GAIN, 0.1),
@@ -57,7 +65,7 @@ def test_value_that_a_button_of_the_stylus_changed_is_shown_as_it_is_and_can_be_
         settings.refresh()
         inputs = server.viser.gui._gui_input_handle_from_uuid.values()
         shown = {handle.label: handle for handle in inputs}
-        heard = []
+        heard: list[Any] = []
         settings.on_change(heard.append)
         settings.follow({MODE: "fine", ("elsewhere", "mode"): "coarse"})
         assert shown["mode"].value == settings.known[MODE].value == "fine"

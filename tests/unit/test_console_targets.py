@@ -8,7 +8,7 @@ from teleop_core.console.scene import targets_of
 from teleop_core.graph.topics import MASTER_MEASURED_CP
 
 
-def test_the_hand_of_a_task_passes_every_target_and_no_other_operator_has_any():
+def test_the_hand_of_a_task_passes_every_target_and_no_other_operator_has_any() -> None:
     configuration = tc.configuration("points24", duration=40.0)
     targets = targets_of(parameters_of(configuration), "")
     assert targets.shape == (24, 3)

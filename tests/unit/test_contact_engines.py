@@ -6,13 +6,16 @@ the same spring. Theory stands beside both where there is some.
 """
 
 import math
+from collections.abc import Sequence
 
 import mujoco
 import numpy as np
 import pytest
+from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 
 from free_tool import fly
+from teleop_core.kernels.geometry import Array
 
 G, MASS = 9.81, 0.2
 IMPEDANCE = 2e-4
@@ -34,7 +37,7 @@ SLIDES = '<joint type="slide" axis="1 0 0"/><joint type="slide" axis="0 0 1"/>'
 HINGE = '<joint type="hinge" axis="0 1 0"/>'
 
 
-def row(values):
+def row(values: ArrayLike) -> str:
     """Numbers as XML takes them."""
     return " ".join(repr(float(value)) for value in np.ravel(values))
 
@@ -50,8 +53,18 @@ class Other:
         joints: XML of its joints.
     """
 
-    def __init__(self, begin, ways=((0, 0, 0),), radius=0.01, stiffness=None, damping=0.0,
-                 friction=0.0, joints=SLIDES, inertia=1.0, gravity=(0.0, 0.0, -G)):  # fmt: skip
+    def __init__(
+        self,
+        begin: tuple[float, float, float],
+        ways: Sequence[Sequence[float]] | Array = ((0, 0, 0),),
+        radius: float = 0.01,
+        stiffness: float | None = None,
+        damping: float = 0.0,
+        friction: float = 0.0,
+        joints: str = SLIDES,
+        inertia: float = 1.0,
+        gravity: tuple[float, float, float] = (0.0, 0.0, -G),
+    ) -> None:
         ball = '<geom type="sphere" size="{}" pos="{}" mass="0" priority="1" condim="{}" {}/>'
         soft = "" if stiffness is None else f'solimp="{IMPEDANCE} {IMPEDANCE} 0.001"'
         balls = "".join(
@@ -67,7 +80,7 @@ class Other:
             weight = self.model.body_invweight0[1, 0]  # what it takes for 1 / mass at a contact
             self.model.geom_solref[1:] = (-stiffness * weight, -damping * weight)
 
-    def fly(self, speed, ticks):
+    def fly(self, speed: tuple[float, ...], ticks: int) -> Array:
         """Joints (ticks, n) and speeds (ticks, n) at ticks of 1 ms."""
         self.data.qvel[: len(speed)] = speed
         found = np.empty((2, ticks, self.model.nv))
@@ -77,20 +90,20 @@ class Other:
         return found
 
 
-def restitution(a, speed):
+def restitution(a: float, speed: float) -> float:
     """Share of its speed with which a mass leaves a wall of Hunt and Crossley's, exponent 1.
 
     ``m v dv = -K x (1 + a v) dx`` from touch to touch: v / a - ln(1 + a v) / a² is the same before
     and after, whatever mass and stiffness are (Hunt and Crossley 1975, integrated).
     """
 
-    def kept(v):
+    def kept(v: float) -> float:
         return v / a - math.log1p(a * v) / a**2
 
     return -brentq(lambda v: kept(v) - kept(speed), -min(speed, (1.0 - 1e-9) / a), -1e-9) / speed
 
 
-def damped_restitution(damping, stiffness):
+def damped_restitution(damping: float, stiffness: float) -> float:
     """The same of a mass on a linear spring and damper that does not pull.
 
     Source:
@@ -101,7 +114,7 @@ def damped_restitution(damping, stiffness):
     return math.exp(-half / rate * (math.pi - math.atan2(2 * half * rate, rate**2 - half**2)))
 
 
-def bounces(height, speed, gap=2e-3):
+def bounces(height: Array, speed: Array, gap: float = 2e-3) -> tuple[float, float]:
     """Rebound height over drop, and time in the air, of the first bounce of a dropped body.
 
     Args:
@@ -120,15 +133,17 @@ def bounces(height, speed, gap=2e-3):
 @pytest.mark.parametrize("speed", [0.1, 2.0])
 @pytest.mark.parametrize("damping", [0.1, 1.0, 3.0])
 def test_a_wall_gives_back_the_speed_that_theory_says_whatever_the_stiffness(
-    damping, speed, stiffness
-):
+    damping: float, speed: float, stiffness: float
+) -> None:
     ours = fly((0.0, 0.0, 0.001), (0.0, 0.0, -speed), 300, mass=MASS, world_stiffness=stiffness,
                world_damping=damping, gravity=(0.0, 0.0, 0.0))  # fmt: skip
     assert ours["speed"][-1, 2] / speed == pytest.approx(restitution(damping, speed), rel=0.02)
 
 
 @pytest.mark.parametrize("damping", [0.2, 1.0])
-def test_a_body_bounces_as_high_and_as_long_as_mujocos_of_the_same_restitution(damping):
+def test_a_body_bounces_as_high_and_as_long_as_mujocos_of_the_same_restitution(
+    damping: float,
+) -> None:
     drop, stiffness = 0.1, 50_000.0
     wanted = restitution(damping, math.sqrt(2.0 * G * drop))
     other_damping = brentq(lambda c: damped_restitution(c, stiffness) - wanted, 0.1, 150.0)
@@ -142,7 +157,7 @@ def test_a_body_bounces_as_high_and_as_long_as_mujocos_of_the_same_restitution(d
     assert time == pytest.approx(other_time, abs=5e-3)
 
 
-def test_without_damping_a_bounce_is_mujocos_at_every_moment():
+def test_without_damping_a_bounce_is_mujocos_at_every_moment() -> None:
     stiffness, drop = 5000.0, 0.05
     ours = fly((0.0, 0.0, drop), (0.0, 0.0, 0.0), 800, mass=MASS, world_stiffness=stiffness,
                gravity=(0.0, 0.0, -G))  # fmt: skip
@@ -152,7 +167,7 @@ def test_without_damping_a_bounce_is_mujocos_at_every_moment():
 
 
 @pytest.mark.parametrize("stiffness", [200.0, 5000.0])
-def test_a_body_at_rest_lies_as_deep_as_its_weight_over_the_stiffness(stiffness):
+def test_a_body_at_rest_lies_as_deep_as_its_weight_over_the_stiffness(stiffness: float) -> None:
     begin, depth = -MASS * G / stiffness, MASS * G / stiffness
     critical = 2.0 * math.sqrt(stiffness * MASS)
     ours = fly((0.0, 0.0, 0.5 * begin), (0.0, 0.0, 0.0), 8000, mass=MASS, world_damping=100.0,
@@ -165,7 +180,9 @@ def test_a_body_at_rest_lies_as_deep_as_its_weight_over_the_stiffness(stiffness)
 
 @pytest.mark.parametrize("points", [1, 4])
 @pytest.mark.parametrize("friction", [0.1, 0.5])
-def test_a_sliding_body_stops_where_friction_says_and_where_mujocos_stops(friction, points):
+def test_a_sliding_body_stops_where_friction_says_and_where_mujocos_stops(
+    friction: float, points: int
+) -> None:
     """After v² / 2 μ g, and as soon as v / μ g, on one point or four."""
     stiffness, begin = 20_000.0, (0.0, 0.0, -MASS * G / 20_000.0 / points)
     ours = fly(begin, (1.0, 0.0, 0.0), 1500, (1.0, 0.0, 0.0), points=points, mass=MASS,
@@ -181,7 +198,9 @@ def test_a_sliding_body_stops_where_friction_says_and_where_mujocos_stops(fricti
 
 
 @pytest.mark.parametrize("friction", [0.2, 0.6])
-def test_on_a_slope_a_body_sticks_below_the_angle_of_friction_and_slides_above_it(friction):
+def test_on_a_slope_a_body_sticks_below_the_angle_of_friction_and_slides_above_it(
+    friction: float,
+) -> None:
     stiffness, angle = 20_000.0, math.atan(friction)
     for share in (0.9, 1.2):
         tilt = share * angle
@@ -202,7 +221,7 @@ def test_on_a_slope_a_body_sticks_below_the_angle_of_friction_and_slides_above_i
             assert gained[1] == pytest.approx(wanted, rel=0.03)
 
 
-def test_a_ball_that_slides_ends_rolling_with_five_sevenths_of_its_speed():
+def test_a_ball_that_slides_ends_rolling_with_five_sevenths_of_its_speed() -> None:
     """The balance of momentum about the ground, whatever the friction is."""
     radius, stiffness = 0.02, 20_000.0
     inertia = 0.4 * MASS * radius**2
@@ -220,7 +239,7 @@ def test_a_ball_that_slides_ends_rolling_with_five_sevenths_of_its_speed():
 
 
 @pytest.mark.parametrize("tilt", [0.0, 0.2, 0.5])
-def test_a_rod_with_several_points_tumbles_as_mujocos_rod_of_balls(tilt):
+def test_a_rod_with_several_points_tumbles_as_mujocos_rod_of_balls(tilt: float) -> None:
     """Without friction and damping, both with the same spring at each of five points."""
     length, radius, inertia, stiffness, drop = 0.08, 0.005, 4e-4, 3000.0, 0.03
     axis = np.array([math.cos(tilt), 0.0, math.sin(tilt)])

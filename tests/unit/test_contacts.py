@@ -1,6 +1,9 @@
 """Contacts: what the device renders, and the energy that it takes and gives back."""
 
 import math
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,15 +13,15 @@ from recipes import Recipe
 from teleop_core.base.parameters import build
 from teleop_core.chain.mapping.parameters import FixtureParameters
 from teleop_core.chain.mapping.walls import passive_stiffness
-from teleop_core.chain.master.haptic_master import (
-    REST_POSITION,
-    DeviceParameters,
-    HandParameters,
-    HapticMasterParameters,
-)
+from teleop_core.chain.master.device import DeviceParameters
+from teleop_core.chain.master.hand_mechanics import HandParameters
+from teleop_core.chain.master.haptic_master import HapticMasterParameters
 from teleop_core.chain.operators.parameters import OperatorParameters
+from teleop_core.chain.operators.rest import REST_POSITION
+from teleop_core.evaluation.score import Score
 from teleop_core.evaluation.scoring import evaluate
 from teleop_core.graph.topics import MASTER_CONTACT
+from teleop_core.kernels.geometry import Array
 from teleop_core.session.api import configuration
 from teleop_core.session.notes import notes_of, passive_note, rendered_note
 
@@ -30,11 +33,11 @@ STILL = build(
 )
 
 
-def master(hand=CALM, **device):
+def master(hand: HandParameters = CALM, **device: Any) -> HeldMaster:
     return HeldMaster(STILL, HapticMasterParameters(hand=hand, device=DeviceParameters(**device)))
 
 
-def push(device, forces):
+def push(device: HeldMaster, forces: Array) -> Iterator[Any]:
     """Places (N, 3) [m], forces (N, 3) [N] and contacts (N, 5) of ticks with commanded forces."""
     rows = []
     for force in forces:
@@ -51,7 +54,9 @@ def push(device, forces):
 
 @pytest.mark.parametrize("thermal_time", [0.1, 1.0, 5.0])
 @pytest.mark.parametrize("command", [1.0, 2.0, 3.3, 50.0])
-def test_mean_square_of_the_force_never_exceeds_the_continuous_one(thermal_time, command):
+def test_mean_square_of_the_force_never_exceeds_the_continuous_one(
+    thermal_time: float, command: float
+) -> None:
     forces = np.zeros((6000, 3))
     forces[:, 1] = command * np.sign(np.sin(np.arange(6000) / 200.0)) * (np.arange(6000) > 50)
     _, applied, _ = push(master(thermal_time=thermal_time), forces)
@@ -64,7 +69,7 @@ def test_mean_square_of_the_force_never_exceeds_the_continuous_one(thermal_time,
         assert hottest > 0.7 * 0.88**2
 
 
-def test_a_force_that_stays_falls_smoothly_from_the_peak_to_the_continuous_one():
+def test_a_force_that_stays_falls_smoothly_from_the_peak_to_the_continuous_one() -> None:
     _, applied, contacts = push(master(thermal_time=2.0), np.tile((0.0, 0.0, -5.0), (12_000, 1)))
     size = -applied[:, 2]
     assert size[0] == pytest.approx(3.3, rel=1e-12)
@@ -74,12 +79,12 @@ def test_a_force_that_stays_falls_smoothly_from_the_peak_to_the_continuous_one()
     assert np.allclose(size, contacts[:, COLUMN["largest_force"]], rtol=1e-12, atol=0)
 
 
-def test_a_force_below_the_continuous_one_is_never_cut():
+def test_a_force_below_the_continuous_one_is_never_cut() -> None:
     _, applied, _ = push(master(thermal_time=0.1), np.tile((0.87, 0.0, 0.0), (5000, 1)))
     assert (applied[:, 0] == 0.87).all()
 
 
-def test_motors_cool_while_nothing_is_asked_of_them():
+def test_motors_cool_while_nothing_is_asked_of_them() -> None:
     device = master(thermal_time=1.0)
     push(device, np.tile((3.3, 0.0, 0.0), (5000, 1)))
     push(device, np.zeros((5000, 3)))
@@ -88,7 +93,9 @@ def test_motors_cool_while_nothing_is_asked_of_them():
 
 
 @pytest.mark.parametrize("axis", [0, 1, 2])
-def test_reading_of_a_pushed_device_runs_ahead_of_the_hand_by_force_over_stiffness(axis):
+def test_reading_of_a_pushed_device_runs_ahead_of_the_hand_by_force_over_stiffness(
+    axis: int,
+) -> None:
     device = master(friction=0.0, continuous_force=3.3)
     force = np.zeros(3)
     force[axis] = 1.5
@@ -98,13 +105,13 @@ def test_reading_of_a_pushed_device_runs_ahead_of_the_hand_by_force_over_stiffne
 
 
 @pytest.mark.parametrize("size", [0.05, 0.2, 0.259])
-def test_device_sticks_without_creep_below_its_friction(size):
+def test_device_sticks_without_creep_below_its_friction(size: float) -> None:
     places, _, _ = push(master(), np.tile((size, 0.0, 0.0), (20_000, 1)))
     assert not (places[100:] - places[100]).any()
     assert places[-1, 0] == REST_POSITION[0]
 
 
-def test_friction_is_one_force_in_whatever_direction_it_slides():
+def test_friction_is_one_force_in_whatever_direction_it_slides() -> None:
     direction = np.array((0.6, 0.0, 0.8))
     device = master(stiffness=(1e6,) * 3)
     places, _, _ = push(device, np.tile(1.26 * direction, (4000, 1)))
@@ -117,7 +124,7 @@ def test_friction_is_one_force_in_whatever_direction_it_slides():
 # The energy.
 
 
-def test_energy_of_a_contact_is_force_times_way():
+def test_energy_of_a_contact_is_force_times_way() -> None:
     forces = np.zeros((600, 3))
     forces[100:200], forces[300:500] = (0.8, 0.3, 0.0), (0.0, 0.0, -1.1)
     places, applied, contacts = push(master(friction=0.05), forces)
@@ -136,14 +143,14 @@ def test_energy_of_a_contact_is_force_times_way():
 # The score.
 
 
-def recorded(path, rows):
+def recorded(path: Path, rows: Array) -> Score:
     """Score of a recording whose contact topic holds these rows (N, 5), 100 ticks each."""
     recipe = Recipe(count=100 * len(rows))
     recipe.rows[MASTER_CONTACT] = (recipe.stamps, np.repeat(rows, 100, axis=0), recipe.stamps)
     return evaluate(recipe.write(path))
 
 
-def test_contacts_are_scored_by_their_last_sample(tmp_path):
+def test_contacts_are_scored_by_their_last_sample(tmp_path: Path) -> None:
     rows = np.array([
         (0, 0, 0, 0, 3.3), (1, 2e-5, 0, 1e-6, 3.3), (1, 8e-5, 6e-5, 1e-6, 3.1),
         (2, 1e-4, 1.1e-4, 5e-6, 2.0), (3, 1e-9, 2e-9, 0.0, 3.3), (4, 4e-3, 1e-3, 1e-3, 3.3),
@@ -161,13 +168,13 @@ def test_contacts_are_scored_by_their_last_sample(tmp_path):
     }  # fmt: skip
 
 
-def test_a_session_without_contact_has_none(tmp_path):
+def test_a_session_without_contact_has_none(tmp_path: Path) -> None:
     score = recorded(tmp_path / "bag", np.array([(0, 0, 0, 0, 3.3)]))
     assert score.value("contact.count") == 0
     assert score.value("contact.returned_max") is None
 
 
-def test_recording_that_does_not_tell_of_contacts_says_so(tmp_path):
+def test_recording_that_does_not_tell_of_contacts_says_so(tmp_path: Path) -> None:
     bag = Recipe().write(tmp_path / "bag")
     assert bag.topics[MASTER_CONTACT.name].count == 0
     score = evaluate(bag)
@@ -189,7 +196,9 @@ def test_recording_that_does_not_tell_of_contacts_says_so(tmp_path):
         ({"wall": "step", "max_force": 0.0}, ""),
     ],
 )
-def test_a_wall_stiffer_than_the_device_is_told_with_what_the_hand_feels(settings, told):
+def test_a_wall_stiffer_than_the_device_is_told_with_what_the_hand_feels(
+    settings: Mapping[str, Any], told: str
+) -> None:
     note = rendered_note(DeviceParameters(), FixtureParameters(**settings))
     assert told in note
     assert bool(note) is bool(told)
@@ -203,25 +212,27 @@ HELD = ((1000.0, 0.0), (333.0, 1e-3), (140.0, 3e-3))
 
 
 @pytest.mark.parametrize(("stiffness", "delay"), BROKEN)
-def test_walls_that_were_seen_to_feed_a_hand_are_told(stiffness, delay):
+def test_walls_that_were_seen_to_feed_a_hand_are_told(stiffness: float, delay: float) -> None:
     fixture = FixtureParameters(stiffness=stiffness)
     assert "may give back more energy than it took" in passive_note(DEVICE, fixture, delay)
 
 
 @pytest.mark.parametrize(("stiffness", "delay"), HELD)
-def test_walls_within_what_is_passive_are_not_told(stiffness, delay):
+def test_walls_within_what_is_passive_are_not_told(stiffness: float, delay: float) -> None:
     assert not passive_note(DEVICE, FixtureParameters(stiffness=stiffness), delay)
 
 
 @pytest.mark.parametrize("wall", ["source", "soft", "step"])
-def test_a_wall_without_damping_is_told_whatever_its_stiffness(wall):
+def test_a_wall_without_damping_is_told_whatever_its_stiffness(wall: str) -> None:
     assert "it is not damped" in passive_note(DEVICE, FixtureParameters(wall=wall), 0.0)
     for silent in ({"max_force": 0.0}, {"side": "slave"}):  # the hand feels nothing
         assert not passive_note(DEVICE, FixtureParameters(wall=wall, **silent), 0.0)
         assert not rendered_note(DEVICE, FixtureParameters(wall=wall, **silent))
 
 
-def test_passive_stiffness_falls_with_delay_and_coarse_readings_and_gains_nothing_by_much_damping():
+def test_passive_stiffness_falls_with_delay_and_coarse_readings_and_gains_nothing_by_damping() -> (
+    None
+):
     given = {"damping": 10.0, "period": 1e-3, "delay": 0.0, "friction": 0.26, "step": 55e-6}
     assert math.isclose(passive_stiffness(**given), 1000.0)
     assert passive_stiffness(**given | {"delay": 1e-3}) < 0.34 * 1000.0
@@ -231,7 +242,7 @@ def test_passive_stiffness_falls_with_delay_and_coarse_readings_and_gains_nothin
     assert passive_stiffness(**given | {"damping": 0.0}) == 0.0
 
 
-def test_a_declared_delay_between_device_and_wall_counts():
+def test_a_declared_delay_between_device_and_wall_counts() -> None:
     late = configuration("coarse_box", delays={"master/servo_cf": 1e-3})
     assert "2 ms from sample to force it is passive up to 333 N/m" in " ".join(notes_of(late))
     elsewhere = configuration("coarse_box", delays={"slave/servo_cp": 1e-3})
@@ -239,7 +250,7 @@ def test_a_declared_delay_between_device_and_wall_counts():
     assert len(notes_of(configuration("coarse_box"), transport=1e-3)) == 1
 
 
-def test_sessions_and_their_arms_tell_what_their_devices_cannot_render():
+def test_sessions_and_their_arms_tell_what_their_devices_cannot_render() -> None:
     arms = configuration(arms=["left", "right"], settings={"right/fixture.wall": "source"})
     assert {note.split(":")[0] for note in notes_of(arms)} == {"arm 'right'"}
     assert not notes_of(configuration("coarse_box"))

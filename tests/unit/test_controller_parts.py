@@ -1,14 +1,18 @@
 """Controllers as parts: PD beside PID, own laws, and what is refused."""
 
 import math
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
 
+from present import present
 from teleop_core.base.errors import ParameterError, PartError
 from teleop_core.base.parameters import build
 from teleop_core.graph.signals import DT, TICK_NS
 from teleop_core.kernels import kernel
+from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot
 from teleop_core.slave.controllers import CONTROLLERS, Controller, register_controller
 from teleop_core.slave.controllers.pd import PD, PdParameters, pd_control
@@ -19,14 +23,14 @@ from teleop_core.slave.slave_sim import ControllerParameters
 ARM = load_robot("rcrt1")
 
 
-def own(name="own", **more):
-    parts = {
+def own(name: str = "own", **more: int | Callable[..., object] | type[float] | None) -> Any:
+    parts: dict[str, Any] = {
         "parameters": PidParameters, "gains": pid_gains, "control": pid_control, "memory": 4
     }  # fmt: skip
     return Controller(name, **{**parts, **more})
 
 
-def slave(kind, **values):
+def slave(kind: str, **values: Any) -> SimulatedArm:
     return SimulatedArm(
         ArmParameters(
             controller=build(ControllerParameters, {"kind": kind}),
@@ -36,7 +40,7 @@ def slave(kind, **values):
     )
 
 
-def trace(arm, goal, ticks):
+def trace(arm: SimulatedArm, goal: Array, ticks: int) -> Array:
     """Measured joints, speeds and efforts (ticks, 18) under a constant command."""
     rows = np.empty((ticks, 18))
     for i in range(ticks):
@@ -48,7 +52,7 @@ def trace(arm, goal, ticks):
     return rows
 
 
-def test_pd_effort_is_that_of_its_formula():
+def test_pd_effort_is_that_of_its_formula() -> None:
     gains, memory, effort = np.array([[100.0, 2.0]]), np.array([[0.2, 0.5]]), np.empty(1)
     one = np.ones(1)
     pd_control(gains, memory, 0.3 * one, 0.21 * one, 0.4 * one, 1e3 * one, DT, effort)
@@ -57,46 +61,48 @@ def test_pd_effort_is_that_of_its_formula():
     assert np.allclose(memory, [[0.21, speed]], rtol=1e-12, atol=0)
 
 
-def test_pd_gains_put_both_poles_at_the_bandwidth():
-    drives, viscous = ARM.drives, ARM.drives.viscous
+def test_pd_gains_put_both_poles_at_the_bandwidth() -> None:
+    drives, viscous = ARM.drives, present(ARM.drives).viscous
     gains = PD.gains(PdParameters(), ARM, viscous)
     # inertia (s + bandwidth)²
-    assert np.allclose(gains[:, 0], drives.bandwidth**2 * drives.inertia, rtol=1e-12, atol=0)
-    damping = (gains[:, 1] + viscous) / drives.inertia
-    assert np.allclose(damping, 2.0 * drives.bandwidth, rtol=1e-12, atol=0)
+    assert np.allclose(
+        gains[:, 0], present(drives).bandwidth ** 2 * present(drives).inertia, rtol=1e-12, atol=0
+    )
+    damping = (gains[:, 1] + viscous) / present(drives).inertia
+    assert np.allclose(damping, 2.0 * present(drives).bandwidth, rtol=1e-12, atol=0)
 
 
-def test_pd_of_another_length_than_the_joints_is_refused():
+def test_pd_of_another_length_than_the_joints_is_refused() -> None:
     with pytest.raises(ParameterError) as error:
-        PD.gains(PdParameters(bandwidth=(1.0,) * 5), ARM, ARM.drives.viscous)
+        PD.gains(PdParameters(bandwidth=(1.0,) * 5), ARM, present(ARM.drives).viscous)
     assert error.value.name == "slave_sim.controller.pd.bandwidth"
 
 
-def test_pd_sags_under_gravity_that_the_pid_holds():
+def test_pd_sags_under_gravity_that_the_pid_holds() -> None:
     # What the spring of the law leaves of axis 2: gravity over its gain.
     goal = ARM.home - np.array([0, 0.2, 0, 0, 0, 0])
     off = {}
     for kind in ("pid", "pd"):
         arm = slave(kind, gravity_compensation="none")
         off[kind] = np.abs(trace(arm, goal, 3000)[-1, :6] - goal)
-    count = ARM.drives.encoder_step
+    count = present(ARM.drives).encoder_step
     assert (off["pid"] <= count).all()
     assert off["pd"][1] > 10 * count[1]
 
 
 @pytest.mark.parametrize("kind", ["pid", "pd"])
-def test_every_law_moves_the_arm_to_its_goal_where_gravity_is_compensated(kind):
-    goal = ARM.home - 0.02 * ARM.drives.speed_limit
+def test_every_law_moves_the_arm_to_its_goal_where_gravity_is_compensated(kind: str) -> None:
+    goal = ARM.home - 0.02 * present(ARM.drives).speed_limit
     last = trace(slave(kind, gravity_compensation="all"), goal, 3000)[-1]
     # Dry friction over the spring of a law without an integrator.
-    stiffness = PD.gains(PdParameters(), ARM, ARM.drives.viscous)[:, 0]
-    room = ARM.drives.coulomb / stiffness + 2 * ARM.drives.encoder_step
+    stiffness = PD.gains(PdParameters(), ARM, present(ARM.drives).viscous)[:, 0]
+    room = present(ARM.drives).coulomb / stiffness + 2 * present(ARM.drives).encoder_step
     assert (np.abs(last[:6] - goal) <= room).all()
 
 
-def test_own_law_in_plain_python_gives_the_same_bits_as_compiled(own_parts):
+def test_own_law_in_plain_python_gives_the_same_bits_as_compiled(own_parts: None) -> None:
     register_controller(own("plain", control=pid_control.py_func))
-    goal = ARM.home - 0.02 * ARM.drives.speed_limit
+    goal = ARM.home - 0.02 * present(ARM.drives).speed_limit
     plain, compiled = (trace(slave(kind), goal, 300) for kind in ("plain", "pid"))
     # Begin and shift are those of the integrator, which an own law may leave out.
     compiled_without = register_controller(own("compiled"))
@@ -105,17 +111,35 @@ def test_own_law_in_plain_python_gives_the_same_bits_as_compiled(own_parts):
     assert not np.array_equal(plain, compiled)
 
 
-def test_effort_of_every_law_is_cut_at_the_drive_s(own_parts):
-    def control(gains, memory, setpoint, measured, feedforward, limit, dt, effort):
+def test_effort_of_every_law_is_cut_at_the_drive_s(own_parts: None) -> None:
+    def control(
+        gains: Array,
+        memory: Array,
+        setpoint: Array,
+        measured: Array,
+        feedforward: Array,
+        limit: Array,
+        dt: float,
+        effort: Array,
+    ) -> None:
         effort[:] = 1e6
 
     register_controller(own("strong", control=control))
     efforts = trace(slave("strong", trials="small"), ARM.home, 5)[:, 12:]
-    assert (np.abs(efforts) <= ARM.drives.effort_limit).all()
+    assert (np.abs(efforts) <= present(ARM.drives).effort_limit).all()
 
 
-def test_what_an_own_law_raises_while_it_runs_reaches_the_user(own_parts):
-    def control(gains, memory, setpoint, measured, feedforward, limit, dt, effort):
+def test_what_an_own_law_raises_while_it_runs_reaches_the_user(own_parts: None) -> None:
+    def control(
+        gains: Array,
+        memory: Array,
+        setpoint: Array,
+        measured: Array,
+        feedforward: Array,
+        limit: Array,
+        dt: float,
+        effort: Array,
+    ) -> None:
         effort[:] = 0.0
         if len(effort) == ARM.n:
             raise RuntimeError("my own mistake")
@@ -125,14 +149,25 @@ def test_what_an_own_law_raises_while_it_runs_reaches_the_user(own_parts):
         slave("raising").step()
 
 
-def shaped(value):
-    def control(gains, memory, setpoint, measured, feedforward, limit, dt, effort):
+def shaped(
+    value: float | Array,
+) -> Callable[[Array, Array, Array, Array, Array, Array, float, Array], None]:
+    def control(
+        gains: Array,
+        memory: Array,
+        setpoint: Array,
+        measured: Array,
+        feedforward: Array,
+        limit: Array,
+        dt: float,
+        effort: Array,
+    ) -> None:
         effort[:] = value
 
     return control
 
 
-def table(value):
+def table(value: Array) -> Callable[..., object]:
     return lambda parameters, robot, viscous: value
 
 
@@ -156,7 +191,8 @@ BAD = {
 
 
 @pytest.mark.parametrize("case", BAD)
-def test_law_that_cannot_work_is_refused_before_anything_runs(own_parts, case):
+def test_law_that_cannot_work_is_refused_before_anything_runs(own_parts: None, case: str) -> None:
+    values: Any
     values, expected = BAD[case]
     with pytest.raises(PartError) as error:
         register_controller(own(**values))

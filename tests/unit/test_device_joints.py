@@ -2,6 +2,7 @@
 
 import re
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -31,19 +32,20 @@ class Leader:
 
     topic, message = "/leader/joint_states", POSE_MESSAGES[-1]
 
-    def __init__(self, name, geometry, seed, offset=1.0):
+    def __init__(self, name: str, geometry: list[str], seed: int, offset: float = 1.0) -> None:
         rng = np.random.default_rng(seed)
         self.robot = load_robot(name, **dict(text.split("=") for text in geometry))
         n = self.robot.n
         self.names = [*(f"motor_{k}" for k in rng.permutation(n)), "gripper"]
         self.signs, self.offsets = rng.choice([-1.0, 1.0], n), offset * rng.uniform(0.3, 1.5, n)
+        self.said: list[Any]
         self.q, self.said = self.robot.home.copy(), []
 
-    def joints(self):
+    def joints(self) -> dict[str, float]:
         theirs = self.signs * (self.q - self.offsets)
         return dict(zip(self.names, [*theirs.tolist(), 0.5], strict=True))
 
-    def __call__(self, text):
+    def __call__(self, text: str) -> str:
         """Do what is asked; of a joint, find by small steps which way the words mean."""
         self.said.append(text)
         if found := re.match(r"move (\S+) alone, so that (.*), hold", text):
@@ -59,7 +61,7 @@ class Leader:
             self.q = self.robot.start.copy()
         return ""
 
-    def meant(self, joint, words):
+    def meant(self, joint: int, words: str) -> Any:
         ways = sum(np.array(way) for name, way in WAYS.items() if name in words)
         step = np.zeros(self.robot.n)
         step[joint] = 1e-6
@@ -75,8 +77,8 @@ class Leader:
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize(("name", "geometry"), HANDLES, ids=["scara", "urdf", "puma560"])
 def test_the_bridge_knows_where_a_handle_is_whose_joints_a_person_moved_as_the_words_say(
-    name, geometry, seed, monkeypatch
-):
+    name: str, geometry: list[str], seed: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
     leader = Leader(name, geometry, seed)
     monkeypatch.setattr("builtins.input", leader)
     text = mapped(leader, name, geometry)
@@ -92,7 +94,9 @@ def test_the_bridge_knows_where_a_handle_is_whose_joints_a_person_moved_as_the_w
     assert "unit" not in values
 
 
-def test_zeros_that_agree_as_well_as_a_hand_holds_a_posture_are_no_offsets(monkeypatch):
+def test_zeros_that_agree_as_well_as_a_hand_holds_a_posture_are_no_offsets(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     leader = Leader("scara", [], 0, offset=0.003)
     found = DeviceJoints(leader.robot, leader.joints())
     while found.joint:
@@ -102,7 +106,7 @@ def test_zeros_that_agree_as_well_as_a_hand_holds_a_posture_are_no_offsets(monke
     assert np.abs(found.parameters().handle_offsets).max() == 0.0
 
 
-def test_a_move_that_is_none_of_the_joint_alone_is_refused_and_asked_for_again():
+def test_a_move_that_is_none_of_the_joint_alone_is_refused_and_asked_for_again() -> None:
     robot = load_robot("scara")
     rest = dict.fromkeys(("a", "b", "c", "d"), 0.0)
     found = DeviceJoints(robot, rest)
@@ -120,11 +124,13 @@ def test_a_move_that_is_none_of_the_joint_alone_is_refused_and_asked_for_again()
         found.place({"a": 0.0})
 
 
-def test_a_person_who_moves_the_wrong_thing_is_told_and_asked_once_more(monkeypatch, capsys):
+def test_a_person_who_moves_the_wrong_thing_is_told_and_asked_once_more(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     leader = Leader("scara", [], 1)
     asked = []
 
-    def distracted(text):
+    def distracted(text: str) -> str:
         asked.append(text)
         return "" if len(asked) == 2 else leader(text)
 
@@ -134,7 +140,9 @@ def test_a_person_who_moves_the_wrong_thing_is_told_and_asked_once_more(monkeypa
     assert "once more" in capsys.readouterr().out
 
 
-def test_joints_need_a_robot_poses_take_none_and_motions_need_a_person(monkeypatch):
+def test_joints_need_a_robot_poses_take_none_and_motions_need_a_person(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     leader = Leader("scara", [], 0)
     with pytest.raises(ParameterError, match="handle"):
         mapped(leader, "", [])
@@ -142,7 +150,7 @@ def test_joints_need_a_robot_poses_take_none_and_motions_need_a_person(monkeypat
     with pytest.raises(ParameterError, match="handle"):
         mapped(leader, "scara", [])
 
-    def nobody(text):
+    def nobody(text: str) -> None:
         raise EOFError
 
     leader.message = POSE_MESSAGES[-1]

@@ -1,6 +1,8 @@
 """Devices: deflections become rates, rates poses; gamepads of SDL, reports of a 3-D mouse."""
 
 import struct
+from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 import pytest
@@ -8,16 +10,20 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from present import present
 from teleop_core.base.errors import ParameterError, SessionError
 from teleop_core.chain.devices import NOTHING, Reading
+from teleop_core.chain.devices.gamepad import Gamepad
 from teleop_core.chain.devices.pilot import Pilot, PilotParameters, beyond
 from teleop_core.chain.devices.spacemouse import Reports, is_space_mouse
 from teleop_core.chain.operators import OPERATORS
 from teleop_core.chain.operators.remote import AHEAD, RemoteHand
 from teleop_core.chain.operators.rest import rest_pose
 from teleop_core.cli import main
+from teleop_core.kernels.geometry import Array
 from teleop_core.session.configuration import configure
 from teleop_core.session.virtual import VirtualTime
+from virtual_pad import VirtualPad
 
 DT = 1e-3
 LIVE = ["gamepad", "spacemouse"]
@@ -29,23 +35,23 @@ int16 = st.integers(-(2**15), 2**15 - 1)
 class Session:
     """A pilot who looks at 100 Hz, and the hand that it tells, at 1000 Hz."""
 
-    def __init__(self, room=None, **parameters):
+    def __init__(self, room: tuple[Array, Array] | None = None, **parameters: Any) -> None:
         self.hand = RemoteHand(room=room)
         self.pilot = Pilot(self.hand, PilotParameters(**parameters))
         self.rows, self._looks = np.zeros((0, 13)), 0
 
-    def for_time(self, duration, reading):
+    def for_time(self, duration: float, reading: Reading) -> Array:
         for _ in range(round(duration / DT / AHEAD)):
             while self._looks * 0.01 <= len(self.rows) * DT:
                 self.pilot.step(reading, 0.01)
                 self._looks += 1
-            times = (len(self.rows) + 1 + np.arange(AHEAD)) * DT
+            times: Any = (len(self.rows) + 1 + np.arange(AHEAD)) * DT
             self.rows = np.vstack((self.rows, self.hand.motion(times)))
         return self.rows
 
 
 @given(six, st.floats(0.0, 0.9))
-def test_a_dead_zone_takes_rest_and_gives_all_directions_alike(rates, zone):
+def test_a_dead_zone_takes_rest_and_gives_all_directions_alike(rates: Array, zone: float) -> None:
     found = beyond(rates, zone)
     assert (found[np.abs(rates) <= zone] == 0.0).all()
     assert (np.abs(found) <= 1.0).all()
@@ -55,13 +61,15 @@ def test_a_dead_zone_takes_rest_and_gives_all_directions_alike(rates, zone):
 
 
 @given(st.floats(0.0, 0.9), st.floats(0.0, 1.0), st.floats(0.0, 1.0))
-def test_more_deflection_is_never_less_speed_and_nothing_jumps(zone, first, second):
+def test_more_deflection_is_never_less_speed_and_nothing_jumps(
+    zone: float, first: float, second: float
+) -> None:
     low, high = beyond(np.sort([first, second]), zone)
     assert 0.0 <= high - low <= (abs(second - first) + 1e-12) / (1.0 - zone) + 1e-12
 
 
 @pytest.mark.parametrize("axis", range(3))
-def test_full_deflection_moves_the_stylus_at_the_stated_speed(axis):
+def test_full_deflection_moves_the_stylus_at_the_stated_speed(axis: int) -> None:
     run, rates = Session(speed=0.03), np.zeros(6)
     rates[axis] = -1.0
     rows = run.for_time(1.0, Reading(rates, is_held=True))
@@ -71,7 +79,7 @@ def test_full_deflection_moves_the_stylus_at_the_stated_speed(axis):
 
 
 @pytest.mark.parametrize("axis", range(3))
-def test_full_deflection_turns_the_stylus_about_axes_of_the_base(axis):
+def test_full_deflection_turns_the_stylus_about_axes_of_the_base(axis: int) -> None:
     run, rates = Session(turn_speed=0.5), np.zeros(6)
     rates[3 + axis] = 1.0
     run.for_time(1.2, Reading(rates, is_held=True))
@@ -83,13 +91,13 @@ def test_full_deflection_turns_the_stylus_about_axes_of_the_base(axis):
 
 
 @given(six)
-def test_nothing_moves_unless_the_person_holds_on(rates):
+def test_nothing_moves_unless_the_person_holds_on(rates: Array) -> None:
     rows = Session().for_time(0.4, Reading(rates))
     assert (rows[:, :6] == 0.0).all()
     assert (rows[:, 6] == 1.0).all()
 
 
-def test_letting_go_presses_the_clutch_within_a_look_and_a_new_grip_does_not_jump():
+def test_letting_go_presses_the_clutch_within_a_look_and_a_new_grip_does_not_jump() -> None:
     run, away = Session(), Reading(np.array([1.0, 0, 0, 0, 0, 0]), is_held=True)
     run.for_time(0.5, away)
     assert run.rows[-1, 6] == 0.0
@@ -102,7 +110,7 @@ def test_letting_go_presses_the_clutch_within_a_look_and_a_new_grip_does_not_jum
     assert (run.rows[count + 20 :, 6] == 0.0).all()
 
 
-def test_who_steers_into_the_end_of_the_workspace_leaves_it_at_once():
+def test_who_steers_into_the_end_of_the_workspace_leaves_it_at_once() -> None:
     rest = rest_pose()[:3]
     run = Session(room=(rest - 0.01, rest + 0.01), speed=0.1)
     out, back = np.array([1.0, 0, 0, 0, 0, 0]), np.array([-1.0, 0, 0, 0, 0, 0])
@@ -112,7 +120,7 @@ def test_who_steers_into_the_end_of_the_workspace_leaves_it_at_once():
     assert run.rows[-1, 0] < 0.002
 
 
-def test_each_press_of_a_button_is_one_press_of_the_hand():
+def test_each_press_of_a_button_is_one_press_of_the_hand() -> None:
     run = Session()
     for _ in range(3):
         run.for_time(0.3, Reading(np.zeros(6), fixture=True))
@@ -122,7 +130,7 @@ def test_each_press_of_a_button_is_one_press_of_the_hand():
 
 
 @pytest.mark.parametrize("name", [*LIVE, "elsewhere"])
-def test_virtual_time_refuses_a_device_and_says_who_works(name):
+def test_virtual_time_refuses_a_device_and_says_who_works(name: str) -> None:
     with pytest.raises(
         ParameterError, match=rf"'{name}', must be one of random, .*remote.* in virt"
     ):
@@ -130,29 +138,29 @@ def test_virtual_time_refuses_a_device_and_says_who_works(name):
 
 
 @pytest.mark.parametrize("name", LIVE)
-def test_no_device_is_told_in_one_line_that_lists_what_was_found(name):
+def test_no_device_is_told_in_one_line_that_lists_what_was_found(name: str) -> None:
     pytest.importorskip("pygame" if name == "gamepad" else "hid")
     operator = OPERATORS.find(name)
-    parameters = operator.parameters(device="no such thing")
+    parameters: Any = operator.parameters(device="no such thing")
     with pytest.raises(SessionError, match=r"^no .*'no such thing' in its name; found: [^\n]+$"):
-        operator.opens(parameters)
+        present(operator.opens)(parameters)
 
 
 # -- the jaw ---------------------------------------------------------------------------------------
 
 
-def closed(run, share):
+def closed(run: Session, share: float | None) -> float:
     """How far the hand closes the jaw a tenth of a second after the device said a share."""
     return run.for_time(0.1, Reading(np.zeros(6), jaw=share))[-1, 12]
 
 
-def test_the_jaw_is_closed_as_far_as_the_device_says_whether_the_stylus_is_held_or_not():
+def test_the_jaw_is_closed_as_far_as_the_device_says_whether_the_stylus_is_held_or_not() -> None:
     run = Session()
     assert [closed(run, share) for share in (0.0, 0.4, 1.0, 0.2)] == [0.0, 0.4, 1.0, 0.2]
     assert [closed(run, share) for share in (1.5, -0.5)] == [1.0, 0.0]
 
 
-def test_a_device_that_comes_back_opens_the_jaw_only_after_it_was_closed_as_far_as_before():
+def test_a_device_that_comes_back_opens_the_jaw_only_after_it_was_closed_as_far_as_before() -> None:
     run = Session()
     assert closed(run, 0.8) == 0.8
     run.pilot.lose()
@@ -160,7 +168,7 @@ def test_a_device_that_comes_back_opens_the_jaw_only_after_it_was_closed_as_far_
     assert [closed(run, share) for share in (0.9, 0.0)] == [0.9, 0.0]
 
 
-def test_a_device_that_leads_no_jaw_and_one_that_says_no_number_leave_it_as_it_is():
+def test_a_device_that_leads_no_jaw_and_one_that_says_no_number_leave_it_as_it_is() -> None:
     run = Session()
     closed(run, 0.8)
     assert closed(run, None) == 0.8
@@ -172,7 +180,7 @@ def test_a_device_that_leads_no_jaw_and_one_that_says_no_number_leave_it_as_it_i
 
 
 @given(st.lists(int16, min_size=6, max_size=6))
-def test_both_forms_of_reports_say_the_same(numbers):
+def test_both_forms_of_reports_say_the_same(numbers: list[int]) -> None:
     long, short = Reports(), Reports()
     assert long.take(struct.pack("<B6h", 1, *numbers))
     assert short.take(struct.pack("<B3h", 1, *numbers[:3]))
@@ -184,7 +192,9 @@ def test_both_forms_of_reports_say_the_same(numbers):
 
 
 @given(six, six)
-def test_axes_of_the_mouse_and_of_the_master_are_turned_and_not_mirrored(first, second):
+def test_axes_of_the_mouse_and_of_the_master_are_turned_and_not_mirrored(
+    first: Array, second: Array
+) -> None:
     assume(np.linalg.norm(np.cross(first[:3], second[:3])) > 1e-3)
     reports = [Reports(), Reports(), Reports()]
     deflections = (first[:3], second[:3], np.cross(first[:3], second[:3]))
@@ -196,7 +206,7 @@ def test_axes_of_the_mouse_and_of_the_master_are_turned_and_not_mirrored(first, 
         np.testing.assert_array_equal(one.rates()[:3], one.rates()[3:])
 
 
-def test_pulling_the_cap_up_and_towards_the_person_moves_the_stylus_so():
+def test_pulling_the_cap_up_and_towards_the_person_moves_the_stylus_so() -> None:
     up, near, right = Reports(), Reports(), Reports()
     up.take(struct.pack("<B3h", 1, 0, 0, -350))
     near.take(struct.pack("<B3h", 1, 0, 350, 0))
@@ -206,7 +216,7 @@ def test_pulling_the_cap_up_and_towards_the_person_moves_the_stylus_so():
     np.testing.assert_array_equal(right.rates()[:3], [1.0, 0.0, 0.0])
 
 
-def test_buttons_are_bits():
+def test_buttons_are_bits() -> None:
     reports = Reports()
     for bits in (1, 2, 3, 0):
         assert reports.take(bytes([3, bits, 0]))
@@ -214,7 +224,7 @@ def test_buttons_are_bits():
 
 
 @given(st.binary(max_size=16))
-def test_no_bytes_are_more_than_a_full_deflection(data):
+def test_no_bytes_are_more_than_a_full_deflection(data: bytes) -> None:
     reports = Reports()
     before = reports.deflection.copy(), reports.buttons
     is_taken = reports.take(data)
@@ -225,7 +235,7 @@ def test_no_bytes_are_more_than_a_full_deflection(data):
         assert reports.buttons == before[1]
 
 
-def test_mice_of_the_maker_and_its_old_ones_of_another_are_known_and_plain_mice_are_not():
+def test_mice_of_the_maker_and_its_old_ones_of_another_are_known_and_plain_mice_are_not() -> None:
     assert is_space_mouse(0x256F, 0xC635)
     assert is_space_mouse(0x046D, 0xC626)
     assert not is_space_mouse(0x046D, 0xC077)
@@ -235,7 +245,7 @@ def test_mice_of_the_maker_and_its_old_ones_of_another_are_known_and_plain_mice_
 
 
 @pytest.fixture
-def pad():
+def pad() -> Iterator[VirtualPad]:
     pytest.importorskip("pygame")
     from virtual_pad import VirtualPad
 
@@ -245,7 +255,7 @@ def pad():
 
 
 @pytest.fixture
-def gamepad(pad):
+def gamepad(pad: VirtualPad) -> Iterator[Gamepad]:
     from teleop_core.chain.devices.gamepad import Gamepad
 
     made = Gamepad("virtual")
@@ -253,7 +263,7 @@ def gamepad(pad):
     made.close()
 
 
-def test_a_gamepad_at_rest_says_nothing(gamepad):
+def test_a_gamepad_at_rest_says_nothing(gamepad: Gamepad) -> None:
     reading = gamepad.read()
     assert (beyond(reading.rates, 0.12) == 0.0).all()
     assert reading[1:] == (False, False, False, None)
@@ -267,12 +277,14 @@ def test_a_gamepad_at_rest_says_nothing(gamepad):
         ("left trigger", 1.0, [0, 0, 0, 0, 0, 1]), ("right trigger", 1.0, [0, 0, 0, 0, 0, -1]),
     ],
 )  # fmt: skip
-def test_each_stick_of_a_gamepad_moves_or_turns_along_its_axis(pad, gamepad, axis, share, rates):
+def test_each_stick_of_a_gamepad_moves_or_turns_along_its_axis(
+    pad: VirtualPad, gamepad: Gamepad, axis: str, share: float, rates: list[int]
+) -> None:
     pad.move(axis, share)
     np.testing.assert_allclose(gamepad.read().rates, rates, atol=1e-4)
 
 
-def test_buttons_of_a_gamepad(pad, gamepad):
+def test_buttons_of_a_gamepad(pad: VirtualPad, gamepad: Gamepad) -> None:
     for button, place in (("left shoulder", 1), ("right shoulder", 1), ("a", 2), ("b", 3)):
         pad.press(button)
         pressed = gamepad.read()[1:4]
@@ -283,7 +295,9 @@ def test_buttons_of_a_gamepad(pad, gamepad):
     assert gamepad.read().rates[3] == -1.0
 
 
-def test_the_right_trigger_closes_the_jaw_where_that_is_wanted_and_rolls_no_more(pad):
+def test_the_right_trigger_closes_the_jaw_where_that_is_wanted_and_rolls_no_more(
+    pad: VirtualPad,
+) -> None:
     from teleop_core.chain.devices.gamepad import GamepadParameters, open_gamepad
 
     made = open_gamepad(GamepadParameters(device="virtual", triggers="jaw"))
@@ -296,14 +310,16 @@ def test_the_right_trigger_closes_the_jaw_where_that_is_wanted_and_rolls_no_more
         made.close()
 
 
-def test_a_gamepad_that_is_unplugged_is_gone(pad, gamepad):
+def test_a_gamepad_that_is_unplugged_is_gone(pad: VirtualPad, gamepad: Gamepad) -> None:
     assert gamepad.read() is not None
     pad.unplug()
     with pytest.raises(SessionError, match="is gone"):
         gamepad.read()
 
 
-def test_the_command_lists_what_is_there(pad, capsys):
+def test_the_command_lists_what_is_there(
+    pad: VirtualPad, capsys: pytest.CaptureFixture[str]
+) -> None:
     assert main(["devices"]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert "gamepad      Virtual Controller" in lines

@@ -1,6 +1,7 @@
 """Dexterity: singular values, manipulability and the workspace sampler."""
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,7 +17,7 @@ from teleop_core.robots.dexterity import (
 )
 
 
-def test_manipulability_of_the_puma_is_the_closed_form_determinant():
+def test_manipulability_of_the_puma_is_the_closed_form_determinant() -> None:
     # Wrist and arm decouple, so |det J| = a2 |u| (forearm part of the elbow) |sin q5|.
     arm, rng = load_robot("puma560"), np.random.default_rng(1)
     a2, a3, _, d4 = arm.geometry_row
@@ -27,25 +28,25 @@ def test_manipulability_of_the_puma_is_the_closed_form_determinant():
         assert manipulability(arm, q) == pytest.approx(expected, abs=1e-14)
 
 
-def test_scara_is_measured_in_the_four_directions_it_controls():
+def test_scara_is_measured_in_the_four_directions_it_controls() -> None:
     arm = load_robot("scara")
     q = np.array([0.3, 1.1, 0.1, 0.0])
     assert singular_values(arm, q).shape == (4,)
     assert manipulability(arm, q) == pytest.approx(0.4 * 0.3 * math.sin(1.1), abs=1e-15)
 
 
-def test_a_stretched_arm_has_no_manipulability():
+def test_a_stretched_arm_has_no_manipulability() -> None:
     arm = load_robot("planar_3r")
     assert manipulability(arm, [0.0, 0.0, 0.0]) < 1e-15
 
 
-def test_lengths_weigh_linear_against_angular_speed():
+def test_lengths_weigh_linear_against_angular_speed() -> None:
     arm = load_robot("rcrt1")
     q = arm.home + 0.1
     assert manipulability(arm, q, 0.1) == pytest.approx(1e3 * manipulability(arm, q))
 
 
-def test_samples_lie_in_the_annulus_that_the_arm_can_reach():
+def test_samples_lie_in_the_annulus_that_the_arm_can_reach() -> None:
     arm = load_robot("scara")
     points, values = sample_workspace(arm, 2000, np.random.default_rng(3))
     radius = np.hypot(points[:, 0], points[:, 1])
@@ -59,14 +60,14 @@ def test_samples_lie_in_the_annulus_that_the_arm_can_reach():
     assert points[:, 2].max() <= 0.0
 
 
-def test_the_same_seed_draws_the_same_workspace():
+def test_the_same_seed_draws_the_same_workspace() -> None:
     arm = load_robot("five_axis")
     one, other = (sample_workspace(arm, 50, np.random.default_rng(5)) for _ in range(2))
     assert np.array_equal(one[0], other[0])
     assert np.array_equal(one[1], other[1])
 
 
-def test_the_csv_holds_every_sample_with_all_digits(tmp_path):
+def test_the_csv_holds_every_sample_with_all_digits(tmp_path: Path) -> None:
     points, values = sample_workspace(load_robot("puma560"), 20, np.random.default_rng(7))
     write_workspace_csv(tmp_path / "puma.csv", points, values)
     header, *rows = (tmp_path / "puma.csv").read_text().splitlines()
@@ -76,14 +77,14 @@ def test_the_csv_holds_every_sample_with_all_digits(tmp_path):
 
 
 @pytest.mark.parametrize("count", [0, -3])
-def test_fewer_than_one_sample_is_refused(count):
+def test_fewer_than_one_sample_is_refused(count: int) -> None:
     with pytest.raises(ParameterError) as caught:
         sample_workspace(load_robot("scara"), count, np.random.default_rng(0))
     assert caught.value.name == "count"
 
 
 @pytest.mark.parametrize("length", [0.0, -1.0, math.nan, math.inf])
-def test_a_length_that_cannot_weigh_is_refused(length):
+def test_a_length_that_cannot_weigh_is_refused(length: float) -> None:
     with pytest.raises(ParameterError) as caught:
         singular_values(load_robot("scara"), [0.0, 1.0, 0.1, 0.0], length)
     assert caught.value.name == "length"

@@ -1,6 +1,9 @@
 """Denavit-Hartenberg tables: conventions, reading, and chains as robots."""
 
 import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,9 +17,9 @@ from teleop_core.base.errors import (
     TeleopError,
     UnknownNameError,
 )
-from teleop_core.kernels.geometry import rotation, transform
+from teleop_core.kernels.geometry import Array, rotation, transform
 from teleop_core.robots import IkStatus, load_robot
-from teleop_core.robots.dh import CONVENTIONS, elementary, load_table, parse_table
+from teleop_core.robots.dh import CONVENTIONS, DhTable, elementary, load_table, parse_table
 
 ROUNDING = 1e-14
 TABLES = (
@@ -25,13 +28,17 @@ TABLES = (
 REACHED = 1e-9
 
 
-def table(rows, convention="modified", **entries):
+def table(
+    rows: Any,
+    convention: str = "modified",
+    **entries: object,
+) -> DhTable:
     return parse_table(
         {"name": "chain", "convention": convention, "angles": "degrees", "rows": rows, **entries}
     )
 
 
-def modified_link(alpha, a, d, theta):
+def modified_link(alpha: float, a: float, d: float, theta: float) -> Array:
     """Equation (10) of the lecture."""
     ca, sa, ct, st = math.cos(alpha), math.sin(alpha), math.cos(theta), math.sin(theta)
     return np.array(
@@ -44,7 +51,7 @@ def modified_link(alpha, a, d, theta):
     )
 
 
-def test_d1_equation_10_is_the_product_of_its_four_motions_symbolically():
+def test_d1_equation_10_is_the_product_of_its_four_motions_symbolically() -> None:
     alpha, a, d, theta = sympy.symbols("alpha a d theta")
     ca, sa, ct, st = sympy.cos(alpha), sympy.sin(alpha), sympy.cos(theta), sympy.sin(theta)
     printed = sympy.Matrix(
@@ -62,7 +69,7 @@ def test_d1_equation_10_is_the_product_of_its_four_motions_symbolically():
     assert sympy.simplify(turn_x * slide_x * turn_z * slide_z - printed) == sympy.zeros(4)
 
 
-def test_d1_a_modified_row_is_equation_10():
+def test_d1_a_modified_row_is_equation_10() -> None:
     for alpha, a, d, theta in np.random.default_rng(1).uniform(-2.0, 2.0, (100, 4)):
         chain = parse_table(
             {
@@ -79,7 +86,7 @@ def test_d1_a_modified_row_is_equation_10():
 @pytest.mark.parametrize(
     ("convention", "link"), [("standard", "RevoluteDH"), ("modified", "RevoluteMDH")]
 )
-def test_roboticstoolbox_builds_the_same_chain(convention, link):
+def test_roboticstoolbox_builds_the_same_chain(convention: str, link: str) -> None:
     rng = np.random.default_rng(2)
     numbers = rng.uniform(-1.5, 1.5, (6, 3))
     ours = parse_table(
@@ -95,7 +102,7 @@ def test_roboticstoolbox_builds_the_same_chain(convention, link):
         assert np.abs(ours.jacobian(q) - theirs.jacob0(q)).max() < 1e-12
 
 
-def test_d13_the_chains_of_the_broken_four_bar_are_its_tables():
+def test_d13_the_chains_of_the_broken_four_bar_are_its_tables() -> None:
     left = table([{"theta": "q"}, {"a": 1.0, "theta": "q"}])
     right = table([{"theta": "q"}])
     theta1, phi2, phi1 = 0.4, 0.9, -0.3
@@ -109,7 +116,7 @@ def test_d13_the_chains_of_the_broken_four_bar_are_its_tables():
     assert np.abs(left.robot().fk([theta1, phi2]) - expected).max() < ROUNDING
 
 
-def test_d10_a_leg_of_the_3_rps_puts_its_spherical_joint_where_the_lecture_says():
+def test_d10_a_leg_of_the_3_rps_puts_its_spherical_joint_where_the_lecture_says() -> None:
     leg = table([{"theta": "q"}, {"alpha": -90, "d": "q", "lower": 0, "upper": 2}]).robot()
     expected = [
         (0.4, 0, 1.039230),
@@ -123,7 +130,7 @@ def test_d10_a_leg_of_the_3_rps_puts_its_spherical_joint_where_the_lecture_says(
         assert np.abs((base @ leg.fk([phi, length]))[:3, 3] - expected[i]).max() < 1e-6
 
 
-def test_d11_a_finger_points_where_the_lecture_says():
+def test_d11_a_finger_points_where_the_lecture_says() -> None:
     rows = [
         {"theta": "q"},
         {"alpha": 90, "a": 1.0, "theta": "q"},
@@ -135,7 +142,7 @@ def test_d11_a_finger_points_where_the_lecture_says():
 
 
 @pytest.mark.parametrize("name", TABLES)
-def test_example_tables_load_and_their_rows_multiply_to_the_pose(name):
+def test_example_tables_load_and_their_rows_multiply_to_the_pose(name: str) -> None:
     chain = load_table(f"config/robots/{name}.yaml")
     robot, rng = chain.robot(), np.random.default_rng(3)
     for q in rng.uniform(robot.lower, robot.upper, (20, robot.n)):
@@ -147,7 +154,7 @@ def test_example_tables_load_and_their_rows_multiply_to_the_pose(name):
 
 
 @pytest.mark.parametrize("name", TABLES)
-def test_the_jacobian_of_a_chain_is_the_difference_quotient(name):
+def test_the_jacobian_of_a_chain_is_the_difference_quotient(name: str) -> None:
     robot = load_table(f"config/robots/{name}.yaml").robot()
     rng, step = np.random.default_rng(4), 1e-6
     for q in rng.uniform(robot.lower, robot.upper, (20, robot.n)):
@@ -161,7 +168,7 @@ def test_the_jacobian_of_a_chain_is_the_difference_quotient(name):
 
 
 @pytest.mark.parametrize("name", TABLES)
-def test_poses_are_found_from_seeds_nearby_and_answers_stay_inside_limits(name):
+def test_poses_are_found_from_seeds_nearby_and_answers_stay_inside_limits(name: str) -> None:
     robot, rng = load_table(f"config/robots/{name}.yaml").robot(), np.random.default_rng(5)
     q = rng.uniform(robot.lower, robot.upper, (300, robot.n))
     seeds = np.clip(q + 0.1 * rng.standard_normal(q.shape), robot.lower, robot.upper)
@@ -176,21 +183,21 @@ def test_poses_are_found_from_seeds_nearby_and_answers_stay_inside_limits(name):
 
 
 @pytest.mark.parametrize("name", TABLES)
-def test_poses_are_found_from_home_nearly_always(name):
+def test_poses_are_found_from_home_nearly_always(name: str) -> None:
     robot, rng = load_table(f"config/robots/{name}.yaml").robot(), np.random.default_rng(6)
     poses = robot.fk(rng.uniform(robot.lower, robot.upper, (200, robot.n)))
     status = robot.ik(poses).status
     assert np.isin(status, (IkStatus.FOLLOWED, IkStatus.NEAR_SINGULAR)).mean() > 0.97
 
 
-def test_the_rcrt1_table_is_the_closed_form_arm():
+def test_the_rcrt1_table_is_the_closed_form_arm() -> None:
     ours, arm = load_table("config/robots/rcrt1.yaml").robot(), load_robot("rcrt1")
     for q in np.random.default_rng(7).uniform(arm.lower, arm.upper, (50, 6)):
         assert np.abs(ours.fk(q) - arm.fk(q)).max() < ROUNDING
         assert np.abs(ours.jacobian(q) - arm.jacobian(q)).max() < ROUNDING
 
 
-def test_the_puma_table_finds_all_eight_branches():
+def test_the_puma_table_finds_all_eight_branches() -> None:
     robot = load_table("config/robots/puma560.yaml").robot()
     pose = robot.fk([0.4, -0.6, -0.9, 0.5, 0.7, 0.3])
     solutions = robot.ik_all(pose)
@@ -198,7 +205,7 @@ def test_the_puma_table_finds_all_eight_branches():
     assert np.abs(robot.fk(solutions) - pose).max() < REACHED
 
 
-def test_paths_of_a_chain_keep_their_steps_and_pass_the_straight_wrist():
+def test_paths_of_a_chain_keep_their_steps_and_pass_the_straight_wrist() -> None:
     robot = load_table("config/robots/puma560.yaml").robot()
     q = robot.home.copy()
     q[4] = 0.0
@@ -218,7 +225,7 @@ def test_paths_of_a_chain_keep_their_steps_and_pass_the_straight_wrist():
     assert residual.max() < REACHED
 
 
-def test_unreachable_poses_come_back_as_a_status_with_finite_joints():
+def test_unreachable_poses_come_back_as_a_status_with_finite_joints() -> None:
     for name in TABLES:
         robot = load_table(f"config/robots/{name}.yaml").robot()
         result = robot.ik(transform(np.eye(3), np.array([20.0, 0.0, 0.0])))
@@ -227,7 +234,7 @@ def test_unreachable_poses_come_back_as_a_status_with_finite_joints():
         assert len(robot.ik_all(transform(np.eye(3), np.array([20.0, 0.0, 0.0])))) == 0
 
 
-def test_signs_offsets_limits_and_homes_are_read_in_the_table_unit():
+def test_signs_offsets_limits_and_homes_are_read_in_the_table_unit() -> None:
     chain = table(
         [
             {"theta": "-q + 30", "lower": -90, "upper": 45, "home": 10, "name": "yaw"},
@@ -265,7 +272,9 @@ def test_signs_offsets_limits_and_homes_are_read_in_the_table_unit():
         ([{"theta": "q", "twist": 3}], "row 1 entry"),
     ],
 )
-def test_malformed_rows_are_refused_by_name(rows, named):
+def test_malformed_rows_are_refused_by_name(
+    rows: str | Sequence[int | dict[str, str | float | bool | list[int]]], named: str
+) -> None:
     with pytest.raises(ParameterError) as caught:
         table(rows)
     assert caught.value.name == named
@@ -285,18 +294,20 @@ def test_malformed_rows_are_refused_by_name(rows, named):
         {"name": "a", "convention": "modified", "row": [{"theta": "q"}]},
     ],
 )
-def test_malformed_tables_are_refused(content):
+def test_malformed_tables_are_refused(
+    content: list[object] | Mapping[str, str | int | list[str | dict[str, str]]] | None,
+) -> None:
     with pytest.raises(TeleopError):
         parse_table(content)
 
 
-def test_unknown_conventions_list_the_known_ones():
+def test_unknown_conventions_list_the_known_ones() -> None:
     with pytest.raises(UnknownNameError) as caught:
         table([{"theta": "q"}], convention="distant")
     assert set(caught.value.alternatives) == set(CONVENTIONS)
 
 
-def test_files_that_are_not_yaml_or_not_there_are_refused(tmp_path):
+def test_files_that_are_not_yaml_or_not_there_are_refused(tmp_path: Path) -> None:
     broken = tmp_path / "broken.yaml"
     broken.write_text("rows: [", encoding="utf-8")
     for path in (broken, tmp_path / "missing.yaml"):
@@ -305,7 +316,7 @@ def test_files_that_are_not_yaml_or_not_there_are_refused(tmp_path):
         assert caught.value.path == path
 
 
-def test_joint_vectors_of_another_length_are_refused():
+def test_joint_vectors_of_another_length_are_refused() -> None:
     chain = table([{"theta": "q"}])
     with pytest.raises(ShapeError):
         chain.link_transforms([0.0, 1.0])

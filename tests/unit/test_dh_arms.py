@@ -1,12 +1,14 @@
 """Serial arms of the D-H sources: the laws that every one of them obeys."""
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
 
+from present import present
 from teleop_core.base.errors import ParameterError, ShapeError, UnknownNameError
-from teleop_core.kernels.geometry import rotation, transform
+from teleop_core.kernels.geometry import Array, rotation, transform
 from teleop_core.robots import IkStatus, load_robot
 
 BRANCHES = {"puma560": 8, "scara": 2, "planar_3r": 2, "five_axis": 4}
@@ -18,12 +20,12 @@ ROTARY = {name: np.array([j != "d3" for j in arm.joint_names]) for name, arm in 
 arms = pytest.mark.parametrize("name", BRANCHES)
 
 
-def drawn(name, count, seed=1):
+def drawn(name: str, count: int, seed: int = 1) -> Array:
     arm, rng = ARMS[name], np.random.default_rng(seed)
     return rng.uniform(arm.lower, arm.upper, (count, arm.n))
 
 
-def same_turns(name, a, b):
+def same_turns(name: str, a: Array, b: Array) -> Array:
     """Difference of joint vectors with whole turns taken out."""
     difference = a - b
     turns = np.round(difference / (2.0 * math.pi)) * (2.0 * math.pi)
@@ -31,7 +33,7 @@ def same_turns(name, a, b):
 
 
 @arms
-def test_every_branch_reaches_the_pose_and_one_is_the_original(name):
+def test_every_branch_reaches_the_pose_and_one_is_the_original(name: str) -> None:
     arm = ARMS[name]
     for q in drawn(name, 500):
         pose = arm.fk(q)
@@ -43,7 +45,7 @@ def test_every_branch_reaches_the_pose_and_one_is_the_original(name):
 
 
 @arms
-def test_reachable_poses_are_solved_from_any_seed_inside_the_limits(name):
+def test_reachable_poses_are_solved_from_any_seed_inside_the_limits(name: str) -> None:
     arm = ARMS[name]
     poses, seeds = arm.fk(drawn(name, 2000)), drawn(name, 2000, seed=2)
     result = arm.ik(poses, seeds)
@@ -55,7 +57,7 @@ def test_reachable_poses_are_solved_from_any_seed_inside_the_limits(name):
 
 
 @arms
-def test_the_chosen_branch_is_the_nearest_to_the_seed_that_limits_allow(name):
+def test_the_chosen_branch_is_the_nearest_to_the_seed_that_limits_allow(name: str) -> None:
     arm = ARMS[name]
     for q, seed in zip(drawn(name, 300), drawn(name, 300, seed=2), strict=True):
         result = arm.ik(arm.fk(q), seed)
@@ -68,13 +70,13 @@ def test_the_chosen_branch_is_the_nearest_to_the_seed_that_limits_allow(name):
 
 
 @arms
-def test_the_original_joints_come_back_when_they_are_the_seed(name):
+def test_the_original_joints_come_back_when_they_are_the_seed(name: str) -> None:
     arm, q = ARMS[name], drawn(name, 2000)
     assert np.abs(arm.ik(arm.fk(q), q).q - q).max() < 1e-8
 
 
 @arms
-def test_the_jacobian_is_the_difference_quotient_of_forward_kinematics(name):
+def test_the_jacobian_is_the_difference_quotient_of_forward_kinematics(name: str) -> None:
     arm, step = ARMS[name], 1e-6
     for q in drawn(name, 50):
         jacobian, pose = arm.jacobian(q), arm.fk(q)
@@ -88,11 +90,11 @@ def test_the_jacobian_is_the_difference_quotient_of_forward_kinematics(name):
 
 
 @arms
-def test_single_and_batched_answers_are_bit_equal(name):
+def test_single_and_batched_answers_are_bit_equal(name: str) -> None:
     arm = ARMS[name]
     q, seeds = drawn(name, 50), drawn(name, 50, seed=2)
     poses = arm.fk(q)
-    batch = arm.ik(poses, seeds)
+    batch: Any = arm.ik(poses, seeds)
     for i in range(50):
         assert np.array_equal(arm.fk(q[i]), poses[i])
         single = arm.ik(poses[i], seeds[i])
@@ -102,7 +104,7 @@ def test_single_and_batched_answers_are_bit_equal(name):
 
 
 @arms
-def test_a_pose_far_away_is_unreachable_and_the_answer_finite_inside_the_limits(name):
+def test_a_pose_far_away_is_unreachable_and_the_answer_finite_inside_the_limits(name: str) -> None:
     arm = ARMS[name]
     result = arm.ik(transform(np.eye(3), np.array([50.0, 20.0, 0.0])))
     assert result.status is IkStatus.UNREACHABLE
@@ -113,7 +115,7 @@ def test_a_pose_far_away_is_unreachable_and_the_answer_finite_inside_the_limits(
 
 
 @arms
-def test_any_rigid_pose_gets_a_finite_answer_with_an_honest_residual(name):
+def test_any_rigid_pose_gets_a_finite_answer_with_an_honest_residual(name: str) -> None:
     arm, rng = ARMS[name], np.random.default_rng(4)
     for _ in range(300):
         turn = rotation("z", rng.uniform(-3, 3)) @ rotation("y", rng.uniform(-3, 3))
@@ -127,7 +129,7 @@ def test_any_rigid_pose_gets_a_finite_answer_with_an_honest_residual(name):
 
 
 @arms
-def test_the_base_axis_itself_is_answered_with_finite_joints(name):
+def test_the_base_axis_itself_is_answered_with_finite_joints(name: str) -> None:
     arm = ARMS[name]
     for height in (0.0, -0.1, 0.215):
         result = arm.ik(transform(np.eye(3), np.array([0.0, 0.0, height])))
@@ -136,30 +138,32 @@ def test_the_base_axis_itself_is_answered_with_finite_joints(name):
 
 
 @arms
-def test_a_path_keeps_every_joint_within_its_speed_and_its_branch(name):
+def test_a_path_keeps_every_joint_within_its_speed_and_its_branch(name: str) -> None:
     arm, dt = ARMS[name], 1e-3
     # Around home, where no singularity offers another branch.
     way = arm.home + 0.05 * np.linspace(-1.0, 1.0, 400)[:, None]
     result = arm.follow(arm.fk(way), way[0], dt)
     steps = np.abs(np.diff(np.vstack((way[0], result.q)), axis=0))
-    assert (steps <= arm.drives.speed_limit * dt * (1.0 + 1e-9)).all()
+    assert (steps <= present(arm.drives).speed_limit * dt * (1.0 + 1e-9)).all()
     assert (result.status == IkStatus.FOLLOWED).all()
     assert np.abs(result.q - way).max() < 1e-8
 
 
 @arms
-def test_random_jumps_never_move_a_joint_faster_than_its_drive_or_out_of_its_limits(name):
+def test_random_jumps_never_move_a_joint_faster_than_its_drive_or_out_of_its_limits(
+    name: str,
+) -> None:
     arm, dt = ARMS[name], 1e-2
     poses = arm.fk(drawn(name, 500, seed=6))
     result = arm.follow(poses, arm.home, dt)
     steps = np.abs(np.diff(np.vstack((arm.home, result.q)), axis=0))
-    assert (steps <= arm.drives.speed_limit * dt * (1.0 + 1e-9)).all()
+    assert (steps <= present(arm.drives).speed_limit * dt * (1.0 + 1e-9)).all()
     assert (result.q >= arm.lower).all()
     assert (result.q <= arm.upper).all()
 
 
 @arms
-def test_a_path_that_stops_far_away_is_reached_in_the_end(name):
+def test_a_path_that_stops_far_away_is_reached_in_the_end(name: str) -> None:
     arm, near = ARMS[name], ARMS[name].home + 0.3
     near = np.clip(near, arm.lower, arm.upper)
     poses = np.repeat(arm.fk(near)[None], 4000, axis=0)
@@ -171,7 +175,7 @@ def test_a_path_that_stops_far_away_is_reached_in_the_end(name):
 
 @arms
 @pytest.mark.parametrize("bad", [math.nan, math.inf])
-def test_numbers_that_are_not_finite_are_refused(name, bad):
+def test_numbers_that_are_not_finite_are_refused(name: str, bad: float) -> None:
     arm = ARMS[name]
     pose, q = np.eye(4), arm.home.copy()
     pose[0, 3] = q[0] = bad
@@ -181,7 +185,7 @@ def test_numbers_that_are_not_finite_are_refused(name, bad):
 
 
 @arms
-def test_matrices_that_are_not_rigid_and_wrong_shapes_are_refused(name):
+def test_matrices_that_are_not_rigid_and_wrong_shapes_are_refused(name: str) -> None:
     arm = ARMS[name]
     with pytest.raises(ParameterError):
         arm.ik(np.diag([1.0, 1.0, -1.0, 1.0]))
@@ -192,7 +196,7 @@ def test_matrices_that_are_not_rigid_and_wrong_shapes_are_refused(name):
 
 
 @arms
-def test_unknown_symbols_list_the_known_ones_and_impossible_lengths_are_refused(name):
+def test_unknown_symbols_list_the_known_ones_and_impossible_lengths_are_refused(name: str) -> None:
     with pytest.raises(UnknownNameError) as caught:
         load_robot(name, wing=1.0)
     assert set(caught.value.alternatives) == set(ARMS[name].geometry)
@@ -204,7 +208,7 @@ def test_unknown_symbols_list_the_known_ones_and_impossible_lengths_are_refused(
 
 
 @arms
-def test_home_is_inside_the_limits_and_far_from_singular(name):
+def test_home_is_inside_the_limits_and_far_from_singular(name: str) -> None:
     arm = ARMS[name]
     assert (arm.lower < arm.home).all()
     assert (arm.home < arm.upper).all()
@@ -212,13 +216,17 @@ def test_home_is_inside_the_limits_and_far_from_singular(name):
 
 
 @arms
-def test_the_drive_table_is_complete_and_the_model_runs(name):
+def test_the_drive_table_is_complete_and_the_model_runs(name: str) -> None:
     arm = ARMS[name]
-    for entry in arm.drives.entries().values():
+    for entry in present(arm.drives).entries().values():
         assert entry.shape == (arm.n,)
         assert (entry > 0.0).all()
     out = np.empty(arm.n)
-    arm.dynamics.acceleration(
-        arm.home.copy(), np.zeros(arm.n), np.ones(arm.n), arm.dynamics.parameters.copy(), out
+    present(arm.dynamics).acceleration(
+        arm.home.copy(),
+        np.zeros(arm.n),
+        np.ones(arm.n),
+        present(arm.dynamics).parameters.copy(),
+        out,
     )
-    assert np.array_equal(out, 1.0 / arm.drives.inertia)
+    assert np.array_equal(out, 1.0 / present(arm.drives).inertia)

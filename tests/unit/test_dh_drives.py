@@ -1,8 +1,11 @@
 """Drives of Denavit-Hartenberg tables: every chain can be a slave, and says what is assumed."""
 
+from collections.abc import Mapping
+
 import numpy as np
 import pytest
 
+from present import present
 from teleop_core.base.errors import ParameterError
 from teleop_core.robots import IkStatus, load_robot, robot_from_table
 from teleop_core.robots.drives import ENTRIES
@@ -26,18 +29,18 @@ TABLE = {
 }
 
 
-def test_a_chain_that_states_no_drives_has_assumed_ones():
+def test_a_chain_that_states_no_drives_has_assumed_ones() -> None:
     robot = robot_from_table(TABLE)
-    assert robot.drives.assumed == ENTRIES
-    assert np.array_equal(robot.dynamics.parameters, robot.drives.inertia)
+    assert present(robot.drives).assumed == ENTRIES
+    assert np.array_equal(present(robot.dynamics).parameters, present(robot.drives).inertia)
 
 
-def test_stated_drives_are_read_in_the_table_unit_and_the_rest_is_assumed():
+def test_stated_drives_are_read_in_the_table_unit_and_the_rest_is_assumed() -> None:
     stated = {
         "q1": {"speed_limit": 90, "encoder_step": 0.01, "inertia": 0.5, "viscous": 0},
         "slide": {"speed_limit": 0.2, "inertia": 3.0},
     }
-    drives = robot_from_table({**TABLE, "drives": stated}).drives
+    drives = present(robot_from_table({**TABLE, "drives": stated}).drives)
     assert drives.speed_limit == pytest.approx([np.pi / 2.0, 2.0, 0.2])
     assert drives.encoder_step[0] == pytest.approx(np.radians(0.01))
     assert drives.inertia == pytest.approx([0.5, 0.1, 3.0])
@@ -47,7 +50,7 @@ def test_stated_drives_are_read_in_the_table_unit_and_the_rest_is_assumed():
     assert "inertia" in drives.assumed  # of q2
 
 
-def test_a_chain_that_states_every_entry_assumes_nothing():
+def test_a_chain_that_states_every_entry_assumes_nothing() -> None:
     every = {name: 60.0 if name == "bandwidth" else 1.0 for name in ENTRIES}
     names = ("q1", "q2", "slide")
     robot = robot_from_table({**TABLE, "drives": dict.fromkeys(names, every)})
@@ -72,13 +75,15 @@ def test_a_chain_that_states_every_entry_assumes_nothing():
         ),
     ],
 )
-def test_malformed_drives_of_a_chain_are_refused_by_name(drives, named):
+def test_malformed_drives_of_a_chain_are_refused_by_name(
+    drives: list[float] | Mapping[str, float | dict[str, str | float | bool]], named: str
+) -> None:
     with pytest.raises(ParameterError) as caught:
         robot_from_table({**TABLE, "drives": drives})
     assert caught.value.name == named
 
 
-def test_joints_with_one_name_are_refused():
+def test_joints_with_one_name_are_refused() -> None:
     rows = [{"theta": "q", "name": "yaw"}, {"a": 1.0, "theta": "q", "name": "yaw"}]
     with pytest.raises(ParameterError) as caught:
         robot_from_table({**TABLE, "rows": rows})
@@ -86,13 +91,13 @@ def test_joints_with_one_name_are_refused():
 
 
 @pytest.mark.parametrize("path", TABLES)
-def test_chains_follow_a_path_inside_their_limits_and_speeds(path):
+def test_chains_follow_a_path_inside_their_limits_and_speeds(path: str) -> None:
     robot, dt = load_robot(path), 1e-3
     way = np.sin(np.linspace(0.0, np.pi, 2000))[:, None]
     q = np.clip(robot.home + 0.1 * way, robot.lower, robot.upper)
     result = robot.follow(robot.fk(q), robot.home, dt)
     steps = np.diff(np.vstack((robot.home, result.q)), axis=0)
-    assert (np.abs(steps) <= robot.drives.speed_limit * dt * (1.0 + 1e-9)).all()
+    assert (np.abs(steps) <= present(robot.drives).speed_limit * dt * (1.0 + 1e-9)).all()
     assert (result.q >= robot.lower).all()
     assert (result.q <= robot.upper).all()
     reached = np.isin(result.status, (IkStatus.FOLLOWED, IkStatus.NEAR_SINGULAR))
@@ -100,10 +105,10 @@ def test_chains_follow_a_path_inside_their_limits_and_speeds(path):
 
 
 @pytest.mark.parametrize("path", TABLES)
-def test_chains_held_back_by_their_speeds_stay_within_them(path):
+def test_chains_held_back_by_their_speeds_stay_within_them(path: str) -> None:
     robot, dt = load_robot(path), 1e-3
     far = robot.fk(np.clip(robot.home + 0.5, robot.lower, robot.upper))
     result = robot.follow(np.repeat(far[None], 50, axis=0), robot.home, dt)
     steps = np.diff(np.vstack((robot.home, result.q)), axis=0)
-    assert (np.abs(steps) <= robot.drives.speed_limit * dt * (1.0 + 1e-9)).all()
+    assert (np.abs(steps) <= present(robot.drives).speed_limit * dt * (1.0 + 1e-9)).all()
     assert result.status[0] == IkStatus.LIMITED

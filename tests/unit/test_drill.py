@@ -1,19 +1,26 @@
 """Drill: what it measures, what it does to a hand, and when it is not satisfied."""
 
 import math
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
+from enum import Enum
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+from numpy.typing import ArrayLike
 
 from code_mutants import CODE_MUTANTS
-from mutants import MUTANTS, ROOT, changed
+from mutants import MUTANTS, ROOT, Mutant, changed
+from present import present
 from teleop_core.bags.reader import Bag
 from teleop_core.bags.reports import report
 from teleop_core.bags.writer import BagWriter
 from teleop_core.base.errors import UnknownNameError
 from teleop_core.graph.topics import DIAGNOSTICS, SLAVE_SETPOINT_JS, SLAVE_TRUE_CP
+from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot
 from teleop_core.session import api
 from teleop_core.slave.operation import Fault, State
@@ -28,6 +35,7 @@ from teleop_drill.drill import (
     measure,
 )
 from teleop_drill.drill.drill_table import drill_table, markdown, rows, summary
+from teleop_drill.drill.exercise import Exercise
 from teleop_drill.drill.hand import Sample
 from teleop_drill.drill.judging import Measured, Seen, judge
 from teleop_drill.drill.numbers import Numbers, Scheduling
@@ -37,52 +45,54 @@ MS = 1_000_000
 DT = 1e-3
 
 
-def trace(values, numbers=None):
+def trace(values: ArrayLike, numbers: Any = None) -> Any:
     """One message a millisecond, from 1 s on."""
     values = np.asarray(values, dtype=float)
     numbers = np.arange(len(values)) if numbers is None else np.asarray(numbers)
-    times = 1_000 * MS + numbers.astype(np.int64) * MS
-    return measure.Trace(times, numbers.astype(np.int64), values, times)
+    times = 1_000 * MS + present(numbers).astype(np.int64) * MS
+    return measure.Trace(times, present(numbers).astype(np.int64), values, times)
 
 
 @pytest.mark.parametrize(("steps", "ratio"), [([1e-3, 2e-3], 2.0), ([5e-4, -5e-4], 0.5)])
-def test_the_ratio_is_that_of_the_largest_step_of_any_joint(steps, ratio):
+def test_the_ratio_is_that_of_the_largest_step_of_any_joint(
+    steps: list[float], ratio: float
+) -> None:
     still = np.zeros((len(steps) + 1, 1))
     moving = np.concatenate(([0.0], np.cumsum(steps)))[:, np.newaxis]
     found = measure.step_ratio(trace(np.hstack((still, moving))), np.array([9.0, 1.0]), DT)
     assert found == pytest.approx(ratio)
 
 
-def test_messages_that_were_lost_count_as_ticks_in_which_a_joint_could_move():
+def test_messages_that_were_lost_count_as_ticks_in_which_a_joint_could_move() -> None:
     assert measure.step_ratio(trace([[0.0], [3e-3]], [0, 3]), np.array([1.0]), DT) == (
         pytest.approx(1.0)
     )
 
 
-def test_another_publisher_is_no_step():
+def test_another_publisher_is_no_step() -> None:
     assert measure.step_ratio(trace([[0.0], [9.0]], [500, 1]), np.array([1.0]), DT) == 0.0
 
 
 @pytest.mark.parametrize("moving_for", [0, 1, 7])
-def test_a_stop_is_over_with_the_first_setpoint_that_stands_still(moving_for):
+def test_a_stop_is_over_with_the_first_setpoint_that_stands_still(moving_for: int) -> None:
     way = np.cumsum(np.ones(100 + moving_for))
     places = np.concatenate((way, np.full(50, way[-1])))[:, np.newaxis]
     since_ns = 1_000 * MS + 99 * MS  # that of the hundredth message
     assert measure.stop_delay(trace(places), since_ns) == pytest.approx((moving_for + 1) * DT)
 
 
-def test_who_never_stands_still_has_no_time_of_stopping():
+def test_who_never_stands_still_has_no_time_of_stopping() -> None:
     assert math.isnan(measure.stop_delay(trace(np.arange(100.0)[:, None]), 1_050 * MS))
 
 
-def test_travel_is_counted_from_the_last_place_before_the_fault_and_until_the_end():
+def test_travel_is_counted_from_the_last_place_before_the_fault_and_until_the_end() -> None:
     places = np.zeros((100, 3))
     places[:, 0] = 1e-3 * np.arange(100)
     found = measure.travel(trace(places), 1_050 * MS, 1_060 * MS)
     assert found == pytest.approx(10e-3)
 
 
-def test_braking_takes_the_square_of_the_speed_over_twice_the_deceleration():
+def test_braking_takes_the_square_of_the_speed_over_twice_the_deceleration() -> None:
     speed, braking = 0.5, 4.0
     turning = trace(speed * DT * np.arange(100)[:, None])
     jacobian = np.zeros((6, 1))
@@ -91,7 +101,7 @@ def test_braking_takes_the_square_of_the_speed_over_twice_the_deceleration():
     assert found == pytest.approx(0.3 * speed**2 / (2.0 * braking))
 
 
-def test_the_bound_of_braking_holds_for_a_real_arm_that_brakes_all_joints():
+def test_the_bound_of_braking_holds_for_a_real_arm_that_brakes_all_joints() -> None:
     robot = load_robot("rcrt1")
     rng = np.random.default_rng(3)
     braking = np.full(robot.n, 20.0)
@@ -105,7 +115,7 @@ def test_the_bound_of_braking_holds_for_a_real_arm_that_brakes_all_joints():
         assert way <= 1.05 * bound
 
 
-def test_the_hand_goes_round_at_constant_speed_once_it_has_set_in():
+def test_the_hand_goes_round_at_constant_speed_once_it_has_set_in() -> None:
     times = np.arange(2.0, 6.0, hand.PERIOD)
     places = np.array([hand.circle(time)[:3] for time in times])
     speeds = np.linalg.norm(np.diff(places, axis=0), axis=1) / hand.PERIOD
@@ -113,7 +123,7 @@ def test_the_hand_goes_round_at_constant_speed_once_it_has_set_in():
     assert np.linalg.norm(hand.circle(hand.PERIOD)[:3] - hand.circle(0.0)[:3]) < 1e-6
 
 
-def sent(distortion, count=100):
+def sent(distortion: Callable[..., Any], count: int = 100) -> list[Sample]:
     """Samples that leave, of one every two milliseconds."""
     out = []
     for number in range(count):
@@ -121,24 +131,24 @@ def sent(distortion, count=100):
     return out
 
 
-def test_what_is_lost_is_a_share_and_the_rest_is_untouched():
+def test_what_is_lost_is_a_share_and_the_rest_is_untouched() -> None:
     left = sent(hand.lossy(0.3), 2000)
     assert 0.65 < len(left) / 2000 < 0.75
     assert [s.stamp_ns for s in left] == sorted({s.stamp_ns for s in left})
 
 
-def test_what_is_late_comes_in_order_and_so_many_samples_later():
+def test_what_is_late_comes_in_order_and_so_many_samples_later() -> None:
     held = hand.delayed(10)
     assert [len(held(Sample(n, hand.circle(0.0)))) for n in range(12)] == [0] * 10 + [1, 1]
 
 
-def test_what_is_out_of_order_is_all_there():
+def test_what_is_out_of_order_is_all_there() -> None:
     stamps = [s.stamp_ns for s in sent(hand.reordered(5))]
     assert stamps[:5] == sorted(stamps[:5], reverse=True)
     assert sorted(stamps) == [n * 2 * MS for n in range(100)]
 
 
-def test_stamps_are_changed_alone():
+def test_stamps_are_changed_alone() -> None:
     frozen, zero = sent(hand.frozen_stamps()), sent(hand.stamped(lambda _: 0))
     assert {s.stamp_ns for s in frozen} == {0}
     assert {s.stamp_ns for s in zero} == {0}
@@ -146,14 +156,14 @@ def test_stamps_are_changed_alone():
 
 
 @pytest.mark.parametrize("number", [math.nan, 1e308])
-def test_what_a_hand_cannot_send_is_sent(number):
+def test_what_a_hand_cannot_send_is_sent(number: float) -> None:
     for sample in sent(hand.filled(number), 3):
         assert np.array_equal(sample.pose[:3], [number] * 3, equal_nan=True)
 
 
-def outcome(**changed):
+def outcome(**changed: object) -> Outcome:
     """One that is as expected, of an arm that was stopped."""
-    good = {
+    good: dict[str, Any] = {
         "exercise": next(one for one in EXERCISES if one.name == "stop_topic"),
         "state": State.FAULT, "fault": Fault.STOP,
         "measures": {"travel_m": Measured("travel_m", "{0:.1f} mm, at most {1:.1f}", 1e-3, 2e-3)},
@@ -162,7 +172,7 @@ def outcome(**changed):
     return Outcome(**(good | changed))
 
 
-def test_an_outcome_as_expected_has_no_failures():
+def test_an_outcome_as_expected_has_no_failures() -> None:
     assert outcome().failures() == []
 
 
@@ -177,14 +187,16 @@ def test_an_outcome_as_expected_has_no_failures():
         ({"cure": Cure.NOTHING}, "by itself"),
     ],
 )
-def test_whatever_is_not_as_expected_fails_and_says_what(changed, word):
+def test_whatever_is_not_as_expected_fails_and_says_what(
+    changed: Mapping[str, str | float | bool | Enum | None], word: str
+) -> None:
     (failure,) = outcome(**changed).failures()
     assert word in failure
     assert rows([outcome(**changed)])[0][-1] == "✗"
     assert any(word in line for line in summary([outcome(**changed)]))
 
 
-def test_a_number_outside_its_bounds_fails_and_says_both():
+def test_a_number_outside_its_bounds_fails_and_says_both() -> None:
     far = Measured("travel_m", "{0:.1f} mm, at most {1:.1f}", 2.5e-3, 2e-3)
     assert outcome(measures={"travel_m": far}).failures() == ["2.5 mm, at most 2.0"]
     slow = Measured("path_m", "{0:.0f} mm, at least {1:.0f}", 1e-3, least=9e-3)
@@ -193,7 +205,7 @@ def test_a_number_outside_its_bounds_fails_and_says_both():
     assert not Measured("told_s", "{0} {1}", math.nan, 1.0).failure
 
 
-def test_what_is_not_recorded_fails_unless_the_fault_may_cost_it():
+def test_what_is_not_recorded_fails_unless_the_fault_may_cost_it() -> None:
     one = outcome()
     one.note_loss(0.3)
     assert "0.30 s" in one.failures()[0]
@@ -205,26 +217,32 @@ def test_what_is_not_recorded_fails_unless_the_fault_may_cost_it():
 # -- judging: an arm that goes round as the hand does, and what may be wrong with it ---------------
 
 
-def by_name(name):
+def by_name(name: str) -> Exercise:
     return next(one for one in EXERCISES if one.name == name)
 
 
 NUMBERS = Numbers.of(api.configuration("free_motion"))
 ROBOT = NUMBERS.robot
-BEGIN = 1_500 * MS
+BEGIN: Any = 1_500 * MS
 
 
-def seen(joints, lies=1.0, told=None, warned=None, late=0.0):
+def seen(
+    joints: Array,
+    lies: float = 1.0,
+    told: Any = None,
+    warned: Any = None,
+    late: float = 0.0,
+) -> Seen:
     """What a tap hears of an arm whose setpoint and measured joints are these, each millisecond."""
     joints = np.asarray(joints)
     measured = ROBOT.start + lies * (joints - ROBOT.start)
     tips = [np.append(ROBOT.fk(row)[:3, 3], [1.0, 0.0, 0.0, 0.0]) for row in joints]
     end = 1_000 * MS + len(joints) * MS
     heard = [trace(values) for values in (joints, measured, tips)]
-    return Seen(BEGIN, end, *heard, told, warned, Scheduling(late, late))
+    return Seen(BEGIN, end, heard[0], heard[1], heard[2], told, warned, Scheduling(late, late))
 
 
-def round_and_round(speed=1.0, count=2000):
+def round_and_round(speed: float = 1.0, count: int = 2000) -> Array:
     """Joints whose tip goes as fast as the hand: one joint there and back on a circle's arc."""
     pull = np.linalg.norm(ROBOT.jacobian(ROBOT.start)[:3, 0])
     rate = speed * NUMBERS.tip_speed / pull
@@ -233,7 +251,7 @@ def round_and_round(speed=1.0, count=2000):
     return ROBOT.start + way[:, None] * np.eye(ROBOT.n)[0]
 
 
-def stopping(after, braking=1.0, count=1500):
+def stopping(after: float, braking: float = 1.0, count: int = 1500) -> Array:
     """Joints that go on for a time after the fault, then brake with a share of what they can."""
     rate = np.eye(ROBOT.n)[0] * NUMBERS.tip_speed
     rate /= np.linalg.norm(ROBOT.jacobian(ROBOT.start)[:3, 0])
@@ -244,11 +262,11 @@ def stopping(after, braking=1.0, count=1500):
     return ROBOT.start + np.cumsum(step, axis=0)
 
 
-def wrong(name, found):
+def wrong(name: str, found: Seen) -> list[str]:
     return [m.name for m in judge(by_name(name), found, NUMBERS) if m.failure]
 
 
-def test_an_arm_that_goes_where_the_hand_goes_is_as_expected():
+def test_an_arm_that_goes_where_the_hand_goes_is_as_expected() -> None:
     assert wrong("loss", seen(round_and_round())) == []
 
 
@@ -260,11 +278,13 @@ def test_an_arm_that_goes_where_the_hand_goes_is_as_expected():
         (round_and_round(speed=0.0), ["path_m"]),
     ],
 )
-def test_an_arm_that_goes_on_goes_neither_faster_nor_slower_than_the_hand(joints, names):
+def test_an_arm_that_goes_on_goes_neither_faster_nor_slower_than_the_hand(
+    joints: Array, names: list[str]
+) -> None:
     assert wrong("loss", seen(joints)) == names
 
 
-def test_an_arm_follows_where_its_joints_go_and_not_where_its_setpoints_alone_do():
+def test_an_arm_follows_where_its_joints_go_and_not_where_its_setpoints_alone_do() -> None:
     wanted, limit = round_and_round()[:60], NUMBERS.speed_limit
     rng = np.random.default_rng(3)
     still = wanted[:1] + 1e-6 * limit * rng.standard_normal(wanted.shape)
@@ -275,11 +295,11 @@ def test_an_arm_follows_where_its_joints_go_and_not_where_its_setpoints_alone_do
     assert not measure.follows(wanted, wanted[:20], limit)
 
 
-def test_measured_joints_that_are_not_where_the_tip_is_are_found():
+def test_measured_joints_that_are_not_where_the_tip_is_are_found() -> None:
     assert wrong("loss", seen(round_and_round(), lies=0.5)) == ["apart_m"]
 
 
-def test_an_arm_that_is_paused_in_time_and_brakes_as_its_drives_can_is_as_expected():
+def test_an_arm_that_is_paused_in_time_and_brakes_as_its_drives_can_is_as_expected() -> None:
     found = seen(stopping(NUMBERS.command_timeout), told=BEGIN + round(1e9 * 2.0))
     assert wrong("master_silent", found) == []
 
@@ -293,27 +313,29 @@ def test_an_arm_that_is_paused_in_time_and_brakes_as_its_drives_can_is_as_expect
         (0.1, 1.0, None, ["told_s"]),
     ],
 )
-def test_an_arm_that_stops_late_or_softly_or_says_so_late_is_found(after, braking, told, names):
+def test_an_arm_that_stops_late_or_softly_or_says_so_late_is_found(
+    after: float, braking: float, told: float | None, names: list[str]
+) -> None:
     told_ns = None if told is None else BEGIN + round(1e9 * told)
     found = wrong("master_silent", seen(stopping(after, braking), told=told_ns))
     assert set(names) <= set(found)
     assert found
 
 
-def test_a_stop_that_comes_20_ms_late_is_found_and_one_in_the_next_tick_is_not():
+def test_a_stop_that_comes_20_ms_late_is_found_and_one_in_the_next_tick_is_not() -> None:
     told = BEGIN + MS
     assert wrong("stop_topic", seen(stopping(DT, 1e9), told=told)) == []
     assert "still_s" in wrong("stop_topic", seen(stopping(0.02, 1e9), told=told))
 
 
-def test_the_lateness_of_the_machine_is_granted_and_no_more():
+def test_the_lateness_of_the_machine_is_granted_and_no_more() -> None:
     joints = stopping(NUMBERS.command_timeout + 0.03)
     told = BEGIN + round(1e9 * 2.0)
     assert wrong("master_silent", seen(joints, told=told, late=0.02)) == []
     assert "still_s" in wrong("master_silent", seen(joints, told=told, late=0.005))
 
 
-def test_setpoints_beyond_a_limit_or_faster_than_a_drive_are_found_whatever_happens():
+def test_setpoints_beyond_a_limit_or_faster_than_a_drive_are_found_whatever_happens() -> None:
     joints = round_and_round()
     joints[1000:, 4] = ROBOT.upper[4] + 1e-6
     assert {"step_ratio", "beyond_limit"} <= set(wrong("loss", seen(joints)))
@@ -322,8 +344,8 @@ def test_setpoints_beyond_a_limit_or_faster_than_a_drive_are_found_whatever_happ
 @pytest.mark.parametrize("kept", [0, 600])
 @pytest.mark.parametrize("stream", ["true_cp", "measured_js"])
 def test_an_arm_that_tells_no_more_where_it_is_is_found_though_its_setpoints_stand_still(
-    stream, kept
-):
+    stream: str, kept: int
+) -> None:
     whole = seen(stopping(after=0.05), told=BEGIN + 50 * MS)
     heard = getattr(whole, stream)
     quiet = replace(whole, **{stream: heard.only(np.arange(len(heard)) < kept)})
@@ -332,25 +354,27 @@ def test_an_arm_that_tells_no_more_where_it_is_is_found_though_its_setpoints_sta
     assert "silent_s" not in {m.name for m in judge(exercise, whole, NUMBERS) if m.failure}
 
 
-def test_a_fault_that_nobody_warns_of_is_found():
+def test_a_fault_that_nobody_warns_of_is_found() -> None:
     assert "warned_s" in wrong("teleport", seen(round_and_round()))
     assert "warned_s" not in wrong("teleport", seen(round_and_round(), warned=BEGIN + 900 * MS))
 
 
 @pytest.mark.parametrize("share", [1.0, 0.1])
-def test_the_deceleration_is_read_off_the_last_steps(share):
+def test_the_deceleration_is_read_off_the_last_steps(share: float) -> None:
     found = measure.ramp(trace(stopping(0.1, share)), NUMBERS.braking, DT)
     assert found == pytest.approx(share, rel=1e-6)
 
 
-def test_a_joint_that_creeps_after_its_reference_and_stops_at_once_is_no_ramp():
+def test_a_joint_that_creeps_after_its_reference_and_stops_at_once_is_no_ramp() -> None:
     creeping = np.cumsum(1e-4 * 0.99 ** np.arange(500))
     places = np.concatenate((creeping, np.full(100, creeping[-1])))[:, None]
     assert math.isnan(measure.ramp(trace(places), np.array([50.0]), DT))
 
 
 @pytest.mark.parametrize("recorded", [[], [5, 6, 9], [5, 5, 6, 9, 9, 9]])
-def test_messages_that_are_not_recorded_are_counted_one_by_one(tmp_path, recorded):
+def test_messages_that_are_not_recorded_are_counted_one_by_one(
+    tmp_path: Path, recorded: list[int]
+) -> None:
     """Against a recording made by the writer itself; a stamp that comes again counts again."""
     heard = np.array([5, 5, 6, 7, 9, 9])
     names = ROBOT.joint_names
@@ -369,7 +393,7 @@ def test_messages_that_are_not_recorded_are_counted_one_by_one(tmp_path, recorde
     assert sorted(found) == sorted(expected)
 
 
-def test_every_exercise_says_what_is_expected_and_has_a_name_of_its_own_in_each_way():
+def test_every_exercise_says_what_is_expected_and_has_a_name_of_its_own_in_each_way() -> None:
     for is_composed in (False, True):
         names = [one.name for one in chosen((), is_composed=is_composed)]
         assert len(names) == len(set(names))
@@ -381,7 +405,7 @@ def test_every_exercise_says_what_is_expected_and_has_a_name_of_its_own_in_each_
 
 
 @pytest.mark.parametrize("mutant", MUTANTS, ids=lambda one: one.name)
-def test_every_mutant_fits_the_source_and_names_rows_that_there_are(mutant):
+def test_every_mutant_fits_the_source_and_names_rows_that_there_are(mutant: Mutant) -> None:
     assert changed(mutant)
     for is_composed in (False, True):
         rows = mutant.rows_of(is_composed=is_composed)
@@ -389,23 +413,23 @@ def test_every_mutant_fits_the_source_and_names_rows_that_there_are(mutant):
 
 
 @pytest.mark.parametrize("mutant", CODE_MUTANTS, ids=lambda one: one.name)
-def test_every_code_mutant_fits_the_source_and_names_files_of_tests(mutant):
+def test_every_code_mutant_fits_the_source_and_names_files_of_tests(mutant: Mutant) -> None:
     assert changed(mutant)
     assert mutant.rows
     assert all((ROOT / file).is_file() for file in mutant.rows)
 
 
-def test_the_short_form_is_there_in_five_processes():
+def test_the_short_form_is_there_in_five_processes() -> None:
     assert {one.name for one in chosen(SHORT, is_composed=False)} == set(SHORT)
 
 
-def test_a_fault_that_there_is_not_is_refused_with_those_that_there_are():
+def test_a_fault_that_there_is_not_is_refused_with_those_that_there_are() -> None:
     with pytest.raises(UnknownNameError) as caught:
         chosen(("kill_slave_simm",), is_composed=False)
     assert "kill_slave_sim" in str(caught.value)
 
 
-def test_the_tables_have_a_row_for_each_fault():
+def test_the_tables_have_a_row_for_each_fault() -> None:
     found = [outcome(), outcome(measures={}), outcome(recovered=math.nan)]
     assert drill_table(found).row_count == 3
     assert len(markdown(found).splitlines()) == 5
@@ -425,7 +449,7 @@ def test_what_the_recorder_tells_that_it_lost_is_counted_by_topic_and_time(tmp_p
     assert told(SLAVE_TRUE_CP.name, 0, 9 * second) == 0
 
 
-def test_a_recording_that_is_none_is_not_intact(tmp_path):
+def test_a_recording_that_is_none_is_not_intact(tmp_path: Path) -> None:
     assert not check_recording(tmp_path / "missing").is_good
     (tmp_path / "bag").mkdir()
     (tmp_path / "bag" / "bag_0.mcap").write_bytes(b"\x89MCAP0\r\n" + bytes(100))

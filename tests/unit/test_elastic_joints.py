@@ -1,17 +1,21 @@
 """Elastic joints, late and weak drives: each acts as its formula says, none by default."""
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
 
+from present import present
 from teleop_core.base.errors import ParameterError
 from teleop_core.base.parameters import build
 from teleop_core.graph.signals import DT, TICK_NS
 from teleop_core.kernels import kernel
+from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot
 from teleop_core.slave.elastic import integrate_elastic
 from teleop_core.slave.plants.hardware import faults_of
+from teleop_core.slave.simulation import SimulationNumbers, SimulationState
 from teleop_core.slave.slave_sim import SlaveSim, SlaveSimParameters
 from teleop_core.slave.transmission import drive
 
@@ -21,32 +25,32 @@ GEARS = {"plant.hardware.gear_stiffness": (STIFF, STIFF, 0.0, 0.0, 0.0, 0.0)}
 ALONE = {"plant.hardware.without": ("friction", "wandering", "bias", "drive_steps")}
 
 
-def slave(**settings):
+def slave(**settings: Any) -> SlaveSim:
     given = {"plant.kind": "hardware", "controller.kind": "source_pid"}
     return SlaveSim(build(SlaveSimParameters, given | settings))
 
 
-def test_by_default_no_gear_bends_and_no_effort_is_late():
+def test_by_default_no_gear_bends_and_no_effort_is_late() -> None:
     p = slave().parameters
     assert p["has_gears"] == 0
     assert p["delay_ticks"] == 0
     assert (p["drive_gain"] == 1.0).all()
 
 
-def test_a_link_hangs_in_its_gear_by_its_weight_over_the_stiffness():
+def test_a_link_hangs_in_its_gear_by_its_weight_over_the_stiffness() -> None:
     made = slave(**GEARS)
     for tick in range(1, 400):
         made.signals["now_ns"] = tick * TICK_NS
         made.step()
     gravity = np.zeros(6)
-    ARM.dynamics.gravity(made.state["link"].copy(), made.arm.dynamics.copy(), gravity)
+    present(ARM.dynamics).gravity(made.state["link"].copy(), made.arm.dynamics.copy(), gravity)
     bent = made.arm.q - made.state["link"]
     np.testing.assert_allclose(bent[:2], gravity[:2] / STIFF, rtol=1e-3, atol=1e-9)
     assert np.array_equal(bent[2:], np.zeros(4))
     assert np.allclose(made.arm.tip[:2], made.state["link"][:2], atol=1e-12)
 
 
-def test_a_gear_rings_at_the_frequency_of_two_masses_on_its_spring():
+def test_a_gear_rings_at_the_frequency_of_two_masses_on_its_spring() -> None:
     one = {"plant.hardware.gear_stiffness": (STIFF, 0.0, 0.0, 0.0, 0.0, 0.0)}
     made = slave(viscous=(0.0,) * 6, **one, **ALONE)
     p, s, arm = made.parameters, made.state, made.arm
@@ -59,7 +63,7 @@ def test_a_gear_rings_at_the_frequency_of_two_masses_on_its_spring():
     link = model[0, 0] - motor
     s["link"][0] += 1e-4
     held, path, weight = arm.q.copy(), [], np.zeros(6)
-    ARM.dynamics.gravity(held.copy(), arm.dynamics.copy(), weight)
+    present(ARM.dynamics).gravity(held.copy(), arm.dynamics.copy(), weight)
     for _ in range(1000):
         for i in range(1, 6):  # all other joints are held
             arm.q[i], s["link"][i], arm.dq[i], s["link_speed"][i] = held[i], held[i], 0.0, 0.0
@@ -79,18 +83,23 @@ def test_a_gear_rings_at_the_frequency_of_two_masses_on_its_spring():
     assert abs(period / expected - 1.0) < 0.01
 
 
-def test_a_gear_where_a_motor_is_all_that_moves_is_refused():
+def test_a_gear_where_a_motor_is_all_that_moves_is_refused() -> None:
     with pytest.raises(ParameterError, match=r"theta5.*all that it moves"):
         slave(**{"plant.hardware.gear_stiffness": (0.0, 0.0, 0.0, 0.0, 10.0, 0.0)})
 
 
-def test_a_gear_that_swings_too_fast_for_the_ticks_is_refused():
+def test_a_gear_that_swings_too_fast_for_the_ticks_is_refused() -> None:
     with pytest.raises(ParameterError, match=r"theta1.*1500"):
         slave(**{"plant.hardware.gear_stiffness": (1e7, 0.0, 0.0, 0.0, 0.0, 0.0)})
 
 
 @kernel
-def drive_on(p, s, arm, efforts):
+def drive_on(
+    p: SimulationNumbers,
+    s: SimulationState,
+    arm: Any,
+    efforts: Array,
+) -> None:
     """What drives give for rows of efforts (N, 6); written in their place."""
     for k in range(efforts.shape[0]):
         for i in range(6):
@@ -100,7 +109,7 @@ def drive_on(p, s, arm, efforts):
             efforts[k, i] = arm.effort[i]
 
 
-def test_late_drives_give_the_efforts_of_so_many_ticks_before_and_the_first_until_then():
+def test_late_drives_give_the_efforts_of_so_many_ticks_before_and_the_first_until_then() -> None:
     made = slave(**ALONE, **{"plant.hardware.effort_delay": 3e-3})
     asked = np.random.default_rng(1).uniform(-0.1, 0.1, (50, 6))
     given = asked.copy()
@@ -109,7 +118,7 @@ def test_late_drives_give_the_efforts_of_so_many_ticks_before_and_the_first_unti
     np.testing.assert_allclose(given[:3], np.repeat(asked[:1], 3, axis=0), atol=1e-15)
 
 
-def test_weak_drives_give_their_share_of_every_effort():
+def test_weak_drives_give_their_share_of_every_effort() -> None:
     made = slave(**ALONE, **{"plant.hardware.drive_gain": 0.8})
     asked = np.random.default_rng(1).uniform(-0.1, 0.1, (5, 6))
     given = asked.copy()
@@ -117,7 +126,7 @@ def test_weak_drives_give_their_share_of_every_effort():
     np.testing.assert_allclose(given, 0.8 * asked, atol=1e-15)
 
 
-def test_a_delay_that_makes_a_loop_swing_is_refused_though_the_loop_without_it_was_tried():
+def test_a_delay_that_makes_a_loop_swing_is_refused_though_the_loop_without_it_was_tried() -> None:
     law = {"controller.kind": "disturbance_observer"}
     slave(**law)
     with pytest.raises(ParameterError):

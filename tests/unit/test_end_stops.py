@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from present import present
 from teleop_core.robots import IkStatus, load_robot
 
 DT = 0.001
@@ -25,7 +26,7 @@ RUNS = {
 
 
 @pytest.mark.parametrize("run", RUNS)
-def test_path_beyond_an_end_stop_and_back_keeps_the_branch_and_ends_on_the_path(run):
+def test_path_beyond_an_end_stop_and_back_keeps_the_branch_and_ends_on_the_path(run: str) -> None:
     name, degrees, joint, beyond = RUNS[run]
     robot = load_robot(name)
     start = np.radians(degrees)
@@ -45,6 +46,6 @@ def test_path_beyond_an_end_stop_and_back_keeps_the_branch_and_ends_on_the_path(
     assert np.abs(done.q[:, turning] - start[turning]).max() < 0.5 * np.pi
     assert (np.sign(done.q[:, crossing]) == np.sign(start[crossing])).all()
     steps = np.abs(np.diff(done.q, axis=0))
-    assert (steps <= robot.drives.speed_limit * DT + 1e-15).all()
+    assert (steps <= present(robot.drives).speed_limit * DT + 1e-15).all()
     assert done.residual[-1].max() < 1e-9
     assert np.allclose(done.q[-1], start, rtol=0, atol=1e-9)

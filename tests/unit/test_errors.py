@@ -30,7 +30,7 @@ RAISED = (
 
 
 @pytest.mark.parametrize("error", RAISED, ids=lambda error: type(error).__name__)
-def test_an_error_of_another_process_is_the_same(error):
+def test_an_error_of_another_process_is_the_same(error: TeleopError) -> None:
     again = pickle.loads(pickle.dumps(error))
     assert type(again) is type(error)
     assert str(again) == str(error)

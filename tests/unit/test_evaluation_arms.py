@@ -2,11 +2,14 @@
 
 import io
 import json
+from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 import pytest
 from rich.console import Console
 
+from present import present
 from teleop_core.bags.arms import arm_names, of_arm, topic_prefix
 from teleop_core.bags.reader import Bag
 from teleop_core.bags.reports import report
@@ -23,6 +26,7 @@ from teleop_core.graph.topics import (
     SLAVE_SERVO_CP,
     SLAVE_SETPOINT_CP,
     TELEOP_STATE,
+    Topic,
 )
 
 COUNT = 5000
@@ -33,12 +37,17 @@ METADATA = {"arms": "right left", "scenario": "pair", "robot": "rcrt1", "seed": 
             "left/robot": "puma560", "left/seed": "8"}  # fmt: skip
 
 
-def state(gain):
+def state(gain: float) -> bytes:
     values = {name: repr(gain if name == "gain" else 0.0) for name in STATE_FIELDS}
     return report(0, "teleop", 0, "FOLLOWING", values)
 
 
-def write(path, offsets, metadata=METADATA, lost=()):
+def write(
+    path: Path,
+    offsets: dict[str, float],
+    metadata: dict[str, str] = METADATA,
+    lost: Sequence[Topic] = (),
+) -> Path:
     """A recording of arms whose tips are so far [m] from their references."""
     stamps = np.arange(1, COUNT + 1) * TICK_NS
     rest = np.tile([0.4, 0, 0, 1, 0, 0, 0], (COUNT, 1))
@@ -62,19 +71,19 @@ def write(path, offsets, metadata=METADATA, lost=()):
 
 
 @pytest.fixture(scope="module")
-def path(tmp_path_factory):
+def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return write(tmp_path_factory.mktemp("bags") / "pair", {"": 1 * MM, "left": 3 * MM})
 
 
 @pytest.fixture
-def bag(path):
+def bag(path: Path) -> Bag:
     return Bag(path)
 
 
-def test_each_arm_has_a_score_of_its_own(bag):
+def test_each_arm_has_a_score_of_its_own(bag: Bag) -> None:
     right, left = scores(bag)
-    assert np.isclose(right.position_error_mm.max, 1.0, atol=ROUNDING)
-    assert np.isclose(left.position_error_mm.max, 3.0, atol=ROUNDING)
+    assert np.isclose(present(right.position_error_mm.max), 1.0, atol=ROUNDING)
+    assert np.isclose(present(left.position_error_mm.max), 3.0, atol=ROUNDING)
     assert (right.session.arm, left.session.arm) == ("right", "left")
     assert (right.session.robot, left.session.robot) == ("rcrt1", "puma560")
     assert (right.session.seed, left.session.seed) == (7, 8)
@@ -82,13 +91,13 @@ def test_each_arm_has_a_score_of_its_own(bag):
     assert (right.session.gain, left.session.gain) == (1.0, 0.1)
 
 
-def test_default_arm_has_the_first_name_and_no_name(bag):
+def test_default_arm_has_the_first_name_and_no_name(bag: Bag) -> None:
     plain, named = evaluate(bag), evaluate(bag, "right")
     assert plain.session.arm == "right"
     assert plain.to_json() == named.to_json()
 
 
-def test_arm_is_scored_as_if_it_had_been_recorded_alone(bag, tmp_path):
+def test_arm_is_scored_as_if_it_had_been_recorded_alone(bag: Bag, tmp_path: Path) -> None:
     alone = evaluate(Bag(write(tmp_path / "pair", {"": 3 * MM}, {"scenario": "pair"})))
     left = evaluate(bag, "left")
     assert left.position_error_mm == alone.position_error_mm
@@ -96,14 +105,14 @@ def test_arm_is_scored_as_if_it_had_been_recorded_alone(bag, tmp_path):
     assert left.topics["slave/measured_js"] == alone.topics["slave/measured_js"]
 
 
-def test_nodes_are_those_of_the_arm(bag):
+def test_nodes_are_those_of_the_arm(bag: Bag) -> None:
     right, left = scores(bag)
     assert right.nodes == {"slave_sim": {"ticks": 1000}}
     assert left.nodes == {"slave_sim": {"ticks": 2000}, "play": {"ticks": 3000}}
     assert (right.ticks.executed, left.ticks.executed) == (1000, 2000)
 
 
-def test_view_of_an_arm_reads_what_the_recording_holds_of_it(bag):
+def test_view_of_an_arm_reads_what_the_recording_holds_of_it(bag: Bag) -> None:
     left = of_arm(bag, "left")
     series = left.read(SLAVE_MEASURED_JS)
     assert series.names == ("c", "d", "e")
@@ -113,7 +122,7 @@ def test_view_of_an_arm_reads_what_the_recording_holds_of_it(bag):
     assert "left/slave/measured_cp" not in of_arm(bag).topics
 
 
-def test_json_table_and_page_show_every_arm(path, tmp_path):
+def test_json_table_and_page_show_every_arm(path: Path, tmp_path: Path) -> None:
     shown = Console(width=80, record=True, file=io.StringIO(), color_system=None)
     target, page = tmp_path / "scores.json", tmp_path / "page.html"
     evaluate_bags([path], target, page, shown)
@@ -128,25 +137,27 @@ def test_json_table_and_page_show_every_arm(path, tmp_path):
     assert "pair · left</th>" in text
 
 
-def test_recording_without_names_of_arms_has_one_without_a_name(tmp_path):
+def test_recording_without_names_of_arms_has_one_without_a_name(tmp_path: Path) -> None:
     bag = Bag(write(tmp_path / "one", {"": 1 * MM}, {}))
     assert arm_names(bag) == ("",)
     assert of_arm(bag) is bag
     assert [score.session.arm for score in scores(bag)] == [""]
 
 
-def test_arm_that_was_recorded_alone_is_found_by_its_topics(tmp_path):
+def test_arm_that_was_recorded_alone_is_found_by_its_topics(tmp_path: Path) -> None:
     bag = Bag(write(tmp_path / "alone", {"left": 3 * MM}, {"robot": "puma560", "seed": "8"}))
     assert arm_names(bag) == ("left",)
     (score,) = scores(bag)
-    assert np.isclose(score.position_error_mm.max, 3.0, atol=ROUNDING)
+    assert np.isclose(present(score.position_error_mm.max), 3.0, atol=ROUNDING)
     assert (score.session.arm, score.session.robot, score.session.seed) == ("left", "puma560", 8)
     assert score.nodes == {"slave_sim": {"ticks": 2000}, "play": {"ticks": 3000}}
     assert evaluate(bag).to_json() == evaluate(bag, "left").to_json() == score.to_json()
     assert topic_prefix(bag, "") == topic_prefix(bag, "left") == "left/"
 
 
-def test_arms_without_names_are_the_plain_one_and_those_with_topics_of_their_own(tmp_path):
+def test_arms_without_names_are_the_plain_one_and_those_with_topics_of_their_own(
+    tmp_path: Path,
+) -> None:
     bag = Bag(write(tmp_path / "pair", {"": 1 * MM, "left": 3 * MM}, {"robot": "rcrt1"}))
     assert arm_names(bag) == ("", "left")
     plain, left = scores(bag)
@@ -156,14 +167,14 @@ def test_arms_without_names_are_the_plain_one_and_those_with_topics_of_their_own
     assert [topic_prefix(bag, arm) for arm in ("", "left")] == ["", "left/"]
 
 
-def test_topics_of_an_arm_that_measures_nothing_make_no_arm(tmp_path):
+def test_topics_of_an_arm_that_measures_nothing_make_no_arm(tmp_path: Path) -> None:
     lost = [t.of_arm("left") for t in (SLAVE_MEASURED_CP, SLAVE_SETPOINT_CP)]
     bag = Bag(write(tmp_path / "pair", {"": 1 * MM, "left": 3 * MM}, {}, lost=lost))
     assert arm_names(bag) == ("",)
     assert evaluate(bag).samples.scored == COUNT
 
 
-def test_unknown_arm_is_told_with_those_there_are(bag, tmp_path):
+def test_unknown_arm_is_told_with_those_there_are(bag: Bag, tmp_path: Path) -> None:
     with pytest.raises(UnknownNameError) as caught:
         evaluate(bag, "middle")
     assert caught.value.alternatives == ("right", "left")
@@ -172,13 +183,13 @@ def test_unknown_arm_is_told_with_those_there_are(bag, tmp_path):
         evaluate(single, "left")
 
 
-def test_arm_named_twice_is_refused(tmp_path):
+def test_arm_named_twice_is_refused(tmp_path: Path) -> None:
     bag = Bag(write(tmp_path / "one", {"": 1 * MM}, {"arms": "left left"}))
     with pytest.raises(RecordingError, match="names the arm left twice"):
         scores(bag)
 
 
-def test_what_an_arm_lacks_is_told_with_the_arm(tmp_path):
+def test_what_an_arm_lacks_is_told_with_the_arm(tmp_path: Path) -> None:
     lost = (SLAVE_SERVO_CP.of_arm("left"),)
     bag = Bag(write(tmp_path / "pair", {"": 1 * MM, "left": 1 * MM}, lost=lost))
     assert evaluate(bag).samples.scored == COUNT
@@ -186,7 +197,7 @@ def test_what_an_arm_lacks_is_told_with_the_arm(tmp_path):
         evaluate(bag, "left")
 
 
-def test_arm_that_never_meets_its_reference_is_named(tmp_path):
+def test_arm_that_never_meets_its_reference_is_named(tmp_path: Path) -> None:
     bag = Bag(write(tmp_path / "pair", {"": 1 * MM, "left": np.nan}))
     with pytest.raises(EvaluationError, match="of arm left has a valid"):
         scores(bag)

@@ -1,25 +1,32 @@
 """Fixtures in scores and pictures: any kind, turned and scaled as it stood around the slave."""
 
 import io
+from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 import yaml
 from rich.console import Console
 
+from present import present
 from recipes import START_NS, Recipe, state
+from teleop_core.bags.reader import Bag
 from teleop_core.base.errors import EvaluationError
 from teleop_core.base.parameters import parameter
 from teleop_core.chain.fixtures import Fixture, register_fixture
 from teleop_core.chain.fixtures.reported_fixture import ReportedFixture
 from teleop_core.chain.mapping.parameters import MotionScalingParameters, axis_map
 from teleop_core.evaluation.command import evaluate_bags
+from teleop_core.evaluation.figure import Figure
 from teleop_core.evaluation.origin import read_origin
-from teleop_core.evaluation.rows import summary
+from teleop_core.evaluation.rows import Row, summary
 from teleop_core.evaluation.scoring import evaluate, study
 from teleop_core.graph.signals import TICK_NS
-from teleop_core.graph.topics import SLAVE_MEASURED_CP, SLAVE_SERVO_CP, TELEOP_STATE
+from teleop_core.graph.topics import SLAVE_MEASURED_CP, SLAVE_SERVO_CP, TELEOP_STATE, Topic
+from teleop_core.kernels.geometry import Array
 
 # Lengths of some hundred millimetres in doubles.
 ROUNDING_MM = 1e-9
@@ -32,7 +39,12 @@ BOX = {"fixture": "box", "fixture.size": "(0.01, 0.02, 0.03)"}
 SIZES = {"sphere": (30, 30, 30), "box": (30, 10, 20)}
 
 
-def fixture_on(described, gain=1.0, size=(0.03, 0.03, 0.03), at=0):
+def fixture_on(
+    described: dict[str, str] | None,
+    gain: float = 1.0,
+    size: Any = (0.03, 0.03, 0.03),
+    at: int = 0,
+) -> tuple[Topic, int, bytes]:
     """Report that a fixture is on around the slave at rest."""
     stamp_ns = START_NS + at * TICK_NS
     values = {"is_fixture_on": 1.0, "gain": gain}
@@ -41,22 +53,22 @@ def fixture_on(described, gain=1.0, size=(0.03, 0.03, 0.03), at=0):
     return TELEOP_STATE, stamp_ns, state(stamp_ns, described, **values)
 
 
-def configuration(axes, stage="motion_scaling"):
+def configuration(axes: tuple[str, str, str], stage: str = "motion_scaling") -> str:
     return yaml.safe_dump({stage: {"ros__parameters": {"axes": list(axes)}}})
 
 
-def figures(bag):
+def figures(bag: Bag) -> dict[str, Figure]:
     """Figures of a recording by their titles."""
     return {figure.title: figure for figure in study(bag).figures()}
 
 
 @pytest.fixture
-def recipe():
+def recipe() -> Recipe:
     return Recipe(2000)
 
 
 @pytest.fixture
-def path(tmp_path):
+def path(tmp_path: Path) -> Path:
     return tmp_path / "bag"
 
 
@@ -64,7 +76,7 @@ def path(tmp_path):
 
 
 @pytest.mark.parametrize("gain", [1.0, 0.1])
-def test_depth_of_a_slave_is_that_of_the_hand_by_the_gain(gain):
+def test_depth_of_a_slave_is_that_of_the_hand_by_the_gain(gain: float) -> None:
     rng = np.random.default_rng(2)
     offsets = rng.normal(scale=0.02 * gain, size=(200, 3))
     box = ReportedFixture("box", (("size", "(0.01, 0.02, 0.03)"),))
@@ -76,23 +88,25 @@ def test_depth_of_a_slave_is_that_of_the_hand_by_the_gain(gain):
     assert (found > 0.0).any()
 
 
-def test_depth_of_what_is_no_number_is_none():
+def test_depth_of_what_is_no_number_is_none() -> None:
     sphere = ReportedFixture("sphere", (("diameter", "0.03"),))
     offsets = np.array([[np.nan, 0, 0], [0, np.inf, 0], [0, 0, 1.0], [0, 0, 0]])
     depth = sphere.depths(offsets, np.array([1.0, 1.0, 0.0, 1.0]), AXES)
     assert np.array_equal(depth, [np.nan, np.nan, np.nan, 0.0], equal_nan=True)
 
 
-def test_sphere_is_scored_by_the_distance_from_its_middle(recipe, path):
+def test_sphere_is_scored_by_the_distance_from_its_middle(recipe: Recipe, path: Path) -> None:
     recipe.singles = [fixture_on(SPHERE)]
     recipe.values(SLAVE_MEASURED_CP)[500:1000, :3] += 0.01  # inside of the box around it
     score = evaluate(recipe.write(path)).fixture
-    assert np.isclose(score.penetration_max_mm, 10 * np.sqrt(3) - 15, atol=ROUNDING_MM)
-    assert np.isclose(score.outside_share, 0.25)
+    assert np.isclose(present(score.penetration_max_mm), 10 * np.sqrt(3) - 15, atol=ROUNDING_MM)
+    assert np.isclose(present(score.outside_share), 0.25)
     assert (score.kind, score.unscored) == ("sphere", None)
 
 
-def test_box_of_the_hand_scores_as_the_box_of_the_slave_that_older_recordings_tell(tmp_path):
+def test_box_of_the_hand_scores_as_the_box_of_the_slave_that_older_recordings_tell(
+    tmp_path: Path,
+) -> None:
     scores = []
     for described in (BOX, None):
         recipe = Recipe(2000)
@@ -111,16 +125,18 @@ def test_box_of_the_hand_scores_as_the_box_of_the_slave_that_older_recordings_te
 
 
 @pytest.mark.parametrize(("axes", "outside_mm"), [(None, 5.0), (OTHER_AXES, 15.0)])
-def test_fixture_is_turned_by_the_recorded_map_of_axes(recipe, path, axes, outside_mm):
+def test_fixture_is_turned_by_the_recorded_map_of_axes(
+    recipe: Recipe, path: Path, axes: tuple[str, str, str] | None, outside_mm: float
+) -> None:
     if axes:
         recipe.metadata["configuration"] = configuration(axes)
     recipe.singles = [fixture_on(BOX)]
     recipe.values(SLAVE_MEASURED_CP)[:, 0] += 0.02  # the hand's z or x, of 30 or 10 mm
-    found = evaluate(recipe.write(path)).fixture.penetration_max_mm
+    found = present(evaluate(recipe.write(path)).fixture.penetration_max_mm)
     assert np.isclose(found, outside_mm, atol=ROUNDING_MM)
 
 
-def test_each_arm_has_its_own_map_of_axes(recipe, path):
+def test_each_arm_has_its_own_map_of_axes(recipe: Recipe, path: Path) -> None:
     recipe.metadata["configuration"] = configuration(OTHER_AXES, "left/motion_scaling")
     bag = recipe.write(path)
     assert np.array_equal(read_origin(bag, "left").axes, np.eye(3))
@@ -134,13 +150,17 @@ def test_each_arm_has_its_own_map_of_axes(recipe, path):
         [["-z"], "-x", "+y"], [{}, "-x", "+y"], [None, 1, 0.5],
     ],
 )  # fmt: skip
-def test_map_of_axes_that_is_none_is_the_published_one(recipe, path, axes):
+def test_map_of_axes_that_is_none_is_the_published_one(
+    recipe: Recipe,
+    path: Path,
+    axes: str | Sequence[str | float | list[str] | dict[str, object] | None],
+) -> None:
     said = {"motion_scaling": {"ros__parameters": {"axes": axes}}}
     recipe.metadata["configuration"] = yaml.safe_dump(said)
     assert np.array_equal(read_origin(recipe.write(path)).axes, AXES)
 
 
-def test_kind_and_size_may_change_while_the_fixture_is_on(recipe, path):
+def test_kind_and_size_may_change_while_the_fixture_is_on(recipe: Recipe, path: Path) -> None:
     recipe.singles = [
         fixture_on(SPHERE),
         fixture_on(SPHERE | {"fixture.diameter": "0.01"}, size=(0.01, 0.01, 0.01), at=500),
@@ -151,9 +171,11 @@ def test_kind_and_size_may_change_while_the_fixture_is_on(recipe, path):
     bag = recipe.write(path)
     score = evaluate(bag)
     assert score.fixture.kind == "sphere and box"
-    assert np.isclose(score.fixture.penetration_max_mm, 11.0, atol=ROUNDING_MM)
+    assert np.isclose(present(score.fixture.penetration_max_mm), 11.0, atol=ROUNDING_MM)
     mean_square = (1.0 + 11.0**2 + 1.0) / 3
-    assert np.isclose(score.fixture.penetration_rms_mm, np.sqrt(mean_square), atol=ROUNDING_MM)
+    assert np.isclose(
+        present(score.fixture.penetration_rms_mm), np.sqrt(mean_square), atol=ROUNDING_MM
+    )
     assert np.isclose(score.fixture.on_s, 1.5)
     drawn = {trace["name"] for trace in figures(bag)["Path in space"].traces}
     assert drawn >= {"sphere", "box"}
@@ -169,13 +191,13 @@ class WallParameters:
     height: float = parameter(0.01, unit="m", lower=0.0, upper=1.0, doc="above the middle")
 
 
-def wall_depth(offset, shape, out):
+def wall_depth(offset: Array, shape: Array, out: Array) -> float:
     out[:] = 0.0
     out[1] = max(offset[1] - shape[0], 0.0)
     return out[1]
 
 
-def wall_outline(parameters):
+def wall_outline(parameters: WallParameters) -> Array:
     corners = np.array([(-1, 0, -1), (1, 0, -1), (1, 0, 1), (-1, 0, 1), (-1, 0, -1)], float)
     return 0.01 * corners + np.array([0, parameters.height, 0])
 
@@ -185,24 +207,24 @@ REPORTED_WALL = {"fixture": "wall", "fixture.height": "0.01"}
 
 
 @pytest.mark.usefixtures("own_parts")
-def test_plain_function_of_a_user_is_scored_and_drawn(recipe, path):
+def test_plain_function_of_a_user_is_scored_and_drawn(recipe: Recipe, path: Path) -> None:
     register_fixture(WALL)
     recipe.singles = [fixture_on(REPORTED_WALL, 0.5)]
     recipe.values(SLAVE_MEASURED_CP)[:, 2] += 0.006  # the hand's y is the slave's z
     bag = recipe.write(path)
-    assert np.isclose(evaluate(bag).fixture.penetration_max_mm, 1.0, atol=ROUNDING_MM)
+    assert np.isclose(present(evaluate(bag).fixture.penetration_max_mm), 1.0, atol=ROUNDING_MM)
     trace = next(t for t in figures(bag)["Path in space"].traces if t["name"] == "wall")
     assert np.allclose(trace["z"], 1e3 * CENTER[2] + 5.0, rtol=0, atol=ROUNDING_MM)
 
 
-def failing_depth(offset, shape, out):
+def failing_depth(offset: Array, shape: Array, out: Array) -> float:
     if 0.01 < offset[1] < 0.1:
         raise ZeroDivisionError
     return wall_depth(offset, shape, out)
 
 
 @pytest.mark.usefixtures("own_parts")
-def test_depth_that_raises_is_told_with_the_metric(recipe, path):
+def test_depth_that_raises_is_told_with_the_metric(recipe: Recipe, path: Path) -> None:
     register_fixture(Fixture("wall", WallParameters, failing_depth, wall_outline))
     recipe.singles = [fixture_on(REPORTED_WALL)]
     recipe.values(SLAVE_MEASURED_CP)[:, 2] += 0.02
@@ -218,25 +240,27 @@ def test_depth_that_raises_is_told_with_the_metric(recipe, path):
         (SPHERE | {"fixture.radius": "0.1"}, "is 'radius', must be one of: diameter"),
     ],
 )
-def test_fixture_of_an_unknown_shape_leaves_the_rest_of_the_score(recipe, path, described, told):
+def test_fixture_of_an_unknown_shape_leaves_the_rest_of_the_score(
+    recipe: Recipe, path: Path, described: dict[str, str], told: str
+) -> None:
     recipe.singles = [fixture_on(described)]
     recipe.values(SLAVE_MEASURED_CP)[:, 0] += 0.5e-3
     bag = recipe.write(path)
     score = evaluate(bag)
-    assert np.isclose(score.position_error_mm.max, 0.5, atol=ROUNDING_MM)
+    assert np.isclose(present(score.position_error_mm.max), 0.5, atol=ROUNDING_MM)
     assert score.fixture.penetration_max_mm is score.fixture.outside_share is None
     assert np.isclose(score.fixture.on_s, 2.0)
-    assert told in score.fixture.unscored
+    assert told in present(score.fixture.unscored)
     (row,) = [row for row in summary(score) if row.label == "shape not known"]
     assert row.value == described["fixture"]
     assert f"not scored: {score.fixture.unscored}" in figures(bag)["Path in space"].sentence
 
 
-def test_known_shapes_are_scored_beside_unknown_ones(recipe, path):
+def test_known_shapes_are_scored_beside_unknown_ones(recipe: Recipe, path: Path) -> None:
     recipe.singles = [fixture_on(REPORTED_WALL), fixture_on(SPHERE, at=1000)]
     recipe.values(SLAVE_MEASURED_CP)[:, 0] += 0.016
     score = evaluate(recipe.write(path)).fixture
-    assert np.isclose(score.penetration_rms_mm, 1.0, atol=ROUNDING_MM)
+    assert np.isclose(present(score.penetration_rms_mm), 1.0, atol=ROUNDING_MM)
     assert score.outside_share == 1.0
     assert np.isclose(score.on_s, 2.0)
     assert score.kind == "wall and sphere"
@@ -245,12 +269,12 @@ def test_known_shapes_are_scored_beside_unknown_ones(recipe, path):
 # -- tables and pictures ---------------------------------------------------------------------------
 
 
-def rows_of(bag):
+def rows_of(bag: Bag) -> dict[str, Row]:
     return {row.label: row for row in summary(evaluate(bag))}
 
 
-def test_only_a_box_is_held_against_the_published_overshoot(tmp_path):
-    rows = {}
+def test_only_a_box_is_held_against_the_published_overshoot(tmp_path: Path) -> None:
+    rows: dict[Any, Any] = {}
     for described in (SPHERE, BOX):
         recipe = Recipe(1500)
         recipe.singles = [fixture_on(described)]
@@ -261,7 +285,9 @@ def test_only_a_box_is_held_against_the_published_overshoot(tmp_path):
     assert rows["box"]["slave outside, max"].published == "1.000"
 
 
-def test_another_robot_is_not_held_against_the_published_overshoot(recipe, path):
+def test_another_robot_is_not_held_against_the_published_overshoot(
+    recipe: Recipe, path: Path
+) -> None:
     recipe.singles = [fixture_on(BOX)]
     recipe.metadata["robot"] = "puma560"
     assert rows_of(recipe.write(path))["slave outside, max"].published == ""
@@ -269,7 +295,9 @@ def test_another_robot_is_not_held_against_the_published_overshoot(recipe, path)
 
 @pytest.mark.parametrize("described", [SPHERE, BOX])
 @pytest.mark.parametrize("gain", [1.0, 0.1])
-def test_outline_stands_around_the_slave_in_every_picture(recipe, path, described, gain):
+def test_outline_stands_around_the_slave_in_every_picture(
+    recipe: Recipe, path: Path, described: dict[str, str], gain: float
+) -> None:
     kind = described["fixture"]
     recipe.singles = [fixture_on(described, gain, at=200)]
     shown = figures(recipe.write(path))
@@ -300,7 +328,10 @@ OPEN = {
 
 @pytest.mark.parametrize("kind", OPEN)
 @pytest.mark.parametrize("gain", [1.0, 0.1])
-def test_walls_are_drawn_where_there_are_some_and_nowhere_else(recipe, path, kind, gain):
+def test_walls_are_drawn_where_there_are_some_and_nowhere_else(
+    recipe: Recipe, path: Path, kind: str, gain: float
+) -> None:
+    values: Any
     values, walls = OPEN[kind]
     told = {"fixture": kind} | {f"fixture.{name}": repr(value) for name, value in values.items()}
     recipe.singles = [fixture_on(told, gain, at=200)]
@@ -315,7 +346,7 @@ def test_walls_are_drawn_where_there_are_some_and_nowhere_else(recipe, path, kin
     assert f"leaves the {kind} by" in shown["Path in space"].sentence
 
 
-def test_page_speaks_of_the_kind_and_of_no_box(recipe, path, tmp_path):
+def test_page_speaks_of_the_kind_and_of_no_box(recipe: Recipe, path: Path, tmp_path: Path) -> None:
     recipe.singles = [fixture_on(SPHERE)]
     recipe.write(path)
     evaluate_bags([path], None, tmp_path / "page.html", Console(file=io.StringIO()))
@@ -324,7 +355,7 @@ def test_page_speaks_of_the_kind_and_of_no_box(recipe, path, tmp_path):
     assert "box" not in body
 
 
-def test_fixture_that_is_reported_again_is_drawn_once(recipe, path):
+def test_fixture_that_is_reported_again_is_drawn_once(recipe: Recipe, path: Path) -> None:
     recipe.singles = [fixture_on(SPHERE), fixture_on(SPHERE, at=500)]
     walls = figures(recipe.write(path))["Position against time"].layout["shapes"]
     assert [(wall["x0"], wall["x1"]) for wall in walls] == [(0.0, 1.999)] * 6

@@ -1,12 +1,15 @@
 """Evaluation follows the graph that a recording was made with: its chain, topics and stamps."""
 
 import io
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 import yaml
 from rich.console import Console
 
+from present import present
 from recipes import Recipe, pose_rows
 from teleop_core.base.parameters import NoParameters
 from teleop_core.evaluation.command import evaluate_bags
@@ -36,12 +39,12 @@ SMOOTHER = Stage(
 )  # fmt: skip
 
 
-def configuration(**session):
+def configuration(**session: int | list[str]) -> str:
     return yaml.safe_dump({"teleop": {"ros__parameters": session}})
 
 
 @pytest.fixture
-def recipe():
+def recipe() -> Recipe:
     """A recording of a session with a stage of a user; each answer 0.1 ms after its question."""
     made = Recipe(2000)
     made.topics += [SMOOTH_CP, NOISE_CV]
@@ -55,25 +58,27 @@ def recipe():
 
 
 @pytest.fixture
-def path(tmp_path):
+def path(tmp_path: Path) -> Path:
     return tmp_path / "bag"
 
 
 @pytest.fixture
-def _smoother(own_parts):
+def _smoother(own_parts: None) -> None:
     register_stage(SMOOTHER)
 
 
 @pytest.mark.usefixtures("_smoother")
-def test_stage_of_a_user_has_its_own_latency(recipe, path):
+def test_stage_of_a_user_has_its_own_latency(recipe: Recipe, path: Path) -> None:
     latency = evaluate(recipe.write(path)).latency_ms
     assert list(latency) == [*BUILT_IN[:2], "smoother", *BUILT_IN[2:4], "total"]
-    medians = [delay.median for delay in latency.values()]
+    medians: Any = [delay.median for delay in latency.values()]
     assert np.allclose(medians, [0.1, 0.1, 0.1, 0.1, 0.1, 0.5])
 
 
 @pytest.mark.usefixtures("_smoother")
-def test_table_and_page_show_the_stage_of_a_user(recipe, path, tmp_path):
+def test_table_and_page_show_the_stage_of_a_user(
+    recipe: Recipe, path: Path, tmp_path: Path
+) -> None:
     recipe.write(path)
     shown = Console(width=80, record=True, file=io.StringIO(), color_system=None)
     evaluate_bags([path], None, tmp_path / "page.html", shown)
@@ -83,7 +88,7 @@ def test_table_and_page_show_the_stage_of_a_user(recipe, path, tmp_path):
 
 
 @pytest.mark.usefixtures("_smoother")
-def test_gaps_of_a_topic_of_a_user_are_counted(recipe, path):
+def test_gaps_of_a_topic_of_a_user_are_counted(recipe: Recipe, path: Path) -> None:
     recipe.drop(SMOOTH_CP, [100, 101, 500])
     score = evaluate(recipe.write(path))
     assert (score.topics["slave/smooth_cp"].count, score.topics["slave/smooth_cp"].gaps) == (
@@ -94,14 +99,16 @@ def test_gaps_of_a_topic_of_a_user_are_counted(recipe, path):
 
 
 @pytest.mark.usefixtures("_smoother")
-def test_a_recording_that_lacks_many_messages_is_told_so_first(recipe, path):
+def test_a_recording_that_lacks_many_messages_is_told_so_first(recipe: Recipe, path: Path) -> None:
     recipe.drop(SMOOTH_CP, range(100, 300))
     verdict = evaluate(recipe.write(path)).verdict
     assert "200 messages missing" in verdict.text
 
 
 @pytest.mark.usefixtures("_smoother")
-def test_only_a_stamp_that_is_passed_on_may_come_again_for_one_that_was_lost(recipe, path):
+def test_only_a_stamp_that_is_passed_on_may_come_again_for_one_that_was_lost(
+    recipe: Recipe, path: Path
+) -> None:
     stamps = recipe.stamps.copy()
     stamps[700] = stamps[699]
     recipe.rows[SMOOTH_CP] = (stamps, pose_rows(2000), recipe.stamps)
@@ -111,10 +118,10 @@ def test_only_a_stamp_that_is_passed_on_may_come_again_for_one_that_was_lost(rec
     assert topics["slave/noise_cv"].gaps == 1
 
 
-def test_stage_that_is_not_installed_leaves_the_built_in_ones(recipe, path):
+def test_stage_that_is_not_installed_leaves_the_built_in_ones(recipe: Recipe, path: Path) -> None:
     score = evaluate(recipe.write(path))
     assert list(score.latency_ms) == [*BUILT_IN[:4], "total"]
-    assert np.isclose(score.latency_ms["inverse_kinematics"].median, 0.2)
+    assert np.isclose(present(score.latency_ms["inverse_kinematics"].median), 0.2)
     assert score.topics["slave/smooth_cp"].count == 2000
     assert score.topics["slave/smooth_cp"].gaps is None
 
@@ -133,12 +140,14 @@ def test_stage_that_is_not_installed_leaves_the_built_in_ones(recipe, path):
         configuration(arms=3),
     ],
 )
-def test_graph_that_cannot_be_built_is_that_of_the_built_in_stages(recipe, path, text):
+def test_graph_that_cannot_be_built_is_that_of_the_built_in_stages(
+    recipe: Recipe, path: Path, text: str
+) -> None:
     recipe.metadata["configuration"] = text
     assert read_origin(recipe.write(path)).graph == build_graph()
 
 
-def test_settings_of_the_graph_are_those_of_the_recording(recipe, path):
+def test_settings_of_the_graph_are_those_of_the_recording(recipe: Recipe, path: Path) -> None:
     recipe.metadata["configuration"] = configuration(
         arms=["right", "left"], delays=["slave/servo_jp=0.02"], former_parameter=1
     )
@@ -150,9 +159,9 @@ def test_settings_of_the_graph_are_those_of_the_recording(recipe, path):
     assert origin.writer(SMOOTH_CP) == ""
 
 
-def test_command_that_nobody_sent_does_not_count_in_the_total(recipe, path):
+def test_command_that_nobody_sent_does_not_count_in_the_total(recipe: Recipe, path: Path) -> None:
     stamps, rows, logs = recipe.rows[SLAVE_SETPOINT_JS]
     stamps = stamps.copy()
     stamps[:50] = np.arange(1, 51) * TICK_NS  # of a session before
     recipe.rows[SLAVE_SETPOINT_JS] = (stamps, rows, logs)
-    assert np.isclose(evaluate(recipe.write(path)).latency_ms["total"].max, 0.5)
+    assert np.isclose(present(evaluate(recipe.write(path)).latency_ms["total"].max), 0.5)

@@ -2,11 +2,15 @@
 
 import io
 import json
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import Any, ClassVar
 
 import numpy as np
 import pytest
 from rich.console import Console
 
+from present import present
 from teleop_core import evaluation
 from teleop_core.bags.reader import Bag
 from teleop_core.bags.writer import BagWriter
@@ -36,7 +40,9 @@ from teleop_core.graph.topics import (
     SLAVE_SERVO_CP,
     SLAVE_SETPOINT_CP,
     TELEOP_STATE,
+    Topic,
 )
+from teleop_core.kernels.geometry import Array
 
 JOINTS = ("joint_1", "joint_2")
 COUNT = 6000  # some windows
@@ -53,7 +59,7 @@ class JerkMetric(Metric):
         Key("jerk.rms|max", "m/s³", "jerk of slave/measured_cp along x"),
         Key("jerk.samples", "1", "from so many samples"),
     )
-    topics = (SLAVE_MEASURED_CP,)
+    topics: ClassVar[tuple[Topic, ...]] = (SLAVE_MEASURED_CP,)
 
     def __init__(self, context: Context) -> None:
         self._jerk, self._begin_ns = Moments(), context.bag.start_ns
@@ -76,11 +82,11 @@ class JerkMetric(Metric):
 
 
 @pytest.fixture
-def added():
+def added() -> Iterator[Callable[[str, object], None]]:
     """Add metrics for the time of one test."""
     names = []
 
-    def add(name, part):
+    def add(name: str, part: object) -> None:
         METRICS.add(name, part)
         names.append(name)
 
@@ -90,7 +96,7 @@ def added():
 
 
 @pytest.fixture(scope="module")
-def path(tmp_path_factory):
+def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A recording of a tip on x = t³ [m], its reference 1 mm beside it."""
     out = tmp_path_factory.mktemp("bags") / "cubic"
     stamps = np.arange(1, COUNT + 1) * TICK_NS
@@ -111,14 +117,16 @@ def path(tmp_path_factory):
 
 
 @pytest.fixture
-def bag(path):
+def bag(path: Path) -> Bag:
     return Bag(path)
 
 
 # -- a metric of a user ----------------------------------------------------------------------------
 
 
-def test_metric_of_a_user_stands_in_json_table_and_page(added, path, tmp_path):
+def test_metric_of_a_user_stands_in_json_table_and_page(
+    added: Callable[[str, object], None], path: Path, tmp_path: Path
+) -> None:
     added("jerk", JerkMetric)
     shown = Console(width=80, record=True, file=io.StringIO(), color_system=None)
     scores_file, page = tmp_path / "scores.json", tmp_path / "page.html"
@@ -131,58 +139,58 @@ def test_metric_of_a_user_stands_in_json_table_and_page(added, path, tmp_path):
     assert ["rms", "m/s³", "6.000"] in lines
     assert ["samples", str(COUNT - 3)] in lines
     assert "Jerk &lt;along&gt; x" in page.read_text()
-    assert np.isclose(score.value("jerk.rms"), JERK, atol=ROUNDING)
+    assert np.isclose(present(score.value("jerk.rms")), JERK, atol=ROUNDING)
 
 
-def test_metric_can_be_given_without_registering_it(bag):
+def test_metric_can_be_given_without_registering_it(bag: Bag) -> None:
     score = evaluate(bag, further=[JerkMetric])
-    assert np.isclose(score.value("jerk.max"), JERK, atol=ROUNDING)
+    assert np.isclose(present(score.value("jerk.max")), JERK, atol=ROUNDING)
     with pytest.raises(UnknownNameError):
         evaluate(bag).value("jerk.max")
 
 
-def test_metric_of_a_user_leaves_the_others_as_they_are(bag):
+def test_metric_of_a_user_leaves_the_others_as_they_are(bag: Bag) -> None:
     plain, other = evaluate(bag).to_json(), evaluate(bag, further=[JerkMetric]).to_json()
     del other["jerk"]
     assert json.dumps(plain) == json.dumps(other)
 
 
-def test_recording_without_a_state_has_a_page(path, tmp_path):
+def test_recording_without_a_state_has_a_page(path: Path, tmp_path: Path) -> None:
     page = tmp_path / "page.html"
     evaluate_bags([path], None, page, Console(file=io.StringIO()))
     assert "no fixture was on" in page.read_text()
 
 
-def test_scores_with_and_without_a_metric_stand_side_by_side(bag):
+def test_scores_with_and_without_a_metric_stand_side_by_side(bag: Bag) -> None:
     shown = Console(width=80, record=True, file=io.StringIO(), color_system=None)
     shown.print(score_tables([evaluate(bag), evaluate(bag, further=[JerkMetric])], 80)[0])
     (row,) = [text for text in shown.export_text().splitlines() if "rms m/s³" in text]
     assert row.split()[2:] == ["–", "6.000"]
 
 
-def test_metric_gets_each_sample_once_and_shares_what_others_compute(bag):
+def test_metric_gets_each_sample_once_and_shares_what_others_compute(bag: Bag) -> None:
     seen = []
 
     class Count(Metric):
         name = "count"
 
-        def add(self, window):
+        def add(self, window: Window) -> None:
             found = evaluation.tracked(window)
             assert evaluation.tracked(window) is found
             seen.extend(found.log_ns.tolist())
 
-        def values(self):
+        def values(self) -> dict[str, object]:
             return {}
 
     evaluate(bag, further=[Count])
     assert seen == list(range(TICK_NS, (COUNT + 1) * TICK_NS, TICK_NS))
 
 
-def test_topic_that_was_not_recorded_has_no_samples(bag):
+def test_topic_that_was_not_recorded_has_no_samples(bag: Bag) -> None:
     class Force(JerkMetric):
         topics = (MASTER_MEASURED_CF, SLAVE_MEASURED_JS)
 
-        def add(self, window):
+        def add(self, window: Window) -> None:
             assert not len(window.samples(MASTER_MEASURED_CF))
             assert window.samples(MASTER_MEASURED_CF).values.shape == (0, 6)
             assert not len(window.states(MASTER_MEASURED_CF).rows)
@@ -193,7 +201,7 @@ def test_topic_that_was_not_recorded_has_no_samples(bag):
 # -- values ----------------------------------------------------------------------------------------
 
 
-def test_every_number_of_a_score_has_its_key(bag):
+def test_every_number_of_a_score_has_its_key(bag: Bag) -> None:
     score = evaluate(bag)
     assert score.value("position_error_mm.rms") == score.position_error_mm.rms
     assert score.value("session.duration_s") == score.session.duration_s
@@ -202,7 +210,7 @@ def test_every_number_of_a_score_has_its_key(bag):
     assert score.record("command_error_mm", Spread) is score.command_error_mm
 
 
-def test_unknown_key_is_told_with_the_alternatives_nearby(bag):
+def test_unknown_key_is_told_with_the_alternatives_nearby(bag: Bag) -> None:
     score = evaluate(bag)
     with pytest.raises(UnknownNameError) as caught:
         score.value("position_error_mm.mean")
@@ -219,14 +227,14 @@ def test_unknown_key_is_told_with_the_alternatives_nearby(bag):
         score.record("jerk", dict)
 
 
-def test_attribute_that_a_score_has_not_leads_to_its_values(bag):
+def test_attribute_that_a_score_has_not_leads_to_its_values(bag: Bag) -> None:
     score = evaluate(bag)
     with pytest.raises(AttributeError, match=r"'jerk' .*: score\.value\('jerk\.rms'\)"):
         score.jerk  # noqa: B018
     assert not hasattr(score, "jerk")
 
 
-def test_score_tells_what_it_is_in_three_lines_and_as_a_table(bag):
+def test_score_tells_what_it_is_in_three_lines_and_as_a_table(bag: Bag) -> None:
     score = evaluate(bag)
     first, verdict, second = repr(score).splitlines()
     assert verdict == score.verdict.text
@@ -241,7 +249,9 @@ def test_score_tells_what_it_is_in_three_lines_and_as_a_table(bag):
 # -- wrong metrics ---------------------------------------------------------------------------------
 
 
-def changed(**entries):
+def changed(
+    **entries: str | Sequence[str | Key | Topic] | Callable[..., object],
+) -> type[JerkMetric]:
     """The jerk metric with something else in it."""
     return type("Changed", (JerkMetric,), entries)
 
@@ -267,7 +277,9 @@ WRONG = {
 
 
 @pytest.mark.parametrize(("part", "told"), WRONG.values(), ids=WRONG)
-def test_wrong_metric_is_refused_before_anything_runs(added, part, told):
+def test_wrong_metric_is_refused_before_anything_runs(
+    added: Callable[[str, object], None], part: object, told: str
+) -> None:
     with pytest.raises(PartError, match=told) as caught:
         added("jerk", part)
     assert (caught.value.kind, caught.value.name) == ("metric", "jerk")
@@ -275,34 +287,38 @@ def test_wrong_metric_is_refused_before_anything_runs(added, part, told):
 
 
 @pytest.mark.parametrize("name", ["session", "a.b", ""])
-def test_name_that_json_cannot_hold_is_refused(added, name):
+def test_name_that_json_cannot_hold_is_refused(
+    added: Callable[[str, object], None], name: str
+) -> None:
     with pytest.raises(PartError, match=r"without dots|named by letters"):
         added(name, changed(name=name, keys=()))
 
 
-def test_name_of_another_metric_is_refused(added, bag):
+def test_name_of_another_metric_is_refused(added: Callable[[str, object], None], bag: Bag) -> None:
     with pytest.raises(PartError, match="used already"):
         added("ticks", changed(name="ticks", keys=()))
     with pytest.raises(PartError, match="used already"):
         evaluate(bag, further=[JerkMetric, JerkMetric])
 
 
-def test_installed_packages_add_metrics_through_their_own_group():
+def test_installed_packages_add_metrics_through_their_own_group() -> None:
     assert METRICS.group == "teleop_core.metrics"
 
 
-def fail(self, *arguments):
+def fail(self: object, *arguments: Context | Window) -> None:
     raise ZeroDivisionError("by\nzero")
 
 
 @pytest.mark.parametrize("method", ["__init__", "add", "values", "rows"])
-def test_metric_that_raises_is_named_in_one_line(bag, method):
+def test_metric_that_raises_is_named_in_one_line(bag: Bag, method: str) -> None:
     part = changed(**{method: fail})
     with pytest.raises(EvaluationError, match="'jerk' failed with ZeroDivisionError: by zero"):
         evaluate(bag, further=[part])
 
 
-def test_metric_that_cannot_draw_is_named(added, path, tmp_path):
+def test_metric_that_cannot_draw_is_named(
+    added: Callable[[str, object], None], path: Path, tmp_path: Path
+) -> None:
     added("jerk", changed(figures=fail))
     with pytest.raises(EvaluationError, match="'jerk' failed with ZeroDivisionError"):
         evaluate_bags([path], None, tmp_path / "page.html", Console(file=io.StringIO()))
@@ -318,60 +334,62 @@ def test_metric_that_cannot_draw_is_named(added, path, tmp_path):
         ({"rows": lambda self: Row("a", "b", "c", "d")}, r"rows\(\) is a list of Row"),
     ],
 )
-def test_metric_that_does_not_keep_its_word_is_refused(bag, entries, told):
+def test_metric_that_does_not_keep_its_word_is_refused(
+    bag: Bag, entries: dict[str, Callable[..., object]], told: str
+) -> None:
     with pytest.raises(PartError, match=told):
         evaluate(bag, further=[changed(**entries)])
 
 
-def test_value_that_json_cannot_hold_is_refused(bag):
+def test_value_that_json_cannot_hold_is_refused(bag: Bag) -> None:
     part = changed(values=lambda self: {"rms": np.zeros(3), "max": 0.0, "samples": 0})
     with pytest.raises(EvaluationError, match="rms is a ndarray, must be a number"):
         evaluate(bag, further=[part])
 
 
-def test_accumulator_that_is_asked_for_too_late_is_refused(bag):
+def test_accumulator_that_is_asked_for_too_late_is_refused(bag: Bag) -> None:
     class Late:
-        def __init__(self, context):
+        def __init__(self, context: Any) -> None:
             pass
 
-        def add(self, window):
+        def add(self, window: Array | str) -> None:
             pass
 
     class LateMetric(JerkMetric):
-        def __init__(self, context):
+        def __init__(self, context: Context) -> None:
             super().__init__(context)
             self._context = context
 
-        def values(self):
-            return {"rms": self._context.shared(Late)}
+        def values(self) -> dict[Any, Any]:
+            return {"rms": self._context.shared(Late)}  # type: ignore[type-var]
 
     with pytest.raises(EvaluationError, match="Late is asked for too late"):
         evaluate(bag, further=[LateMetric])
 
 
-def test_part_that_two_metrics_share_gets_every_window_once(bag):
+def test_part_that_two_metrics_share_gets_every_window_once(bag: Bag) -> None:
     counts = []
 
     class Windows:
-        def __init__(self, context):
+        def __init__(self, context: Context) -> None:
             self.count = 0
 
-        def add(self, window):
+        def add(self, window: Window) -> None:
             self.count += 1
 
-    def metric(name):
+    def metric(name: str) -> type[Metric]:
         class Sharing(Metric):
             keys = (Key(f"{name}.windows", "1", "windows"),)
 
-            def __init__(self, context):
+            def __init__(self, context: Context) -> None:
                 self._windows = context.shared(Windows)
                 self._own = 0
 
-            def add(self, window):
+            def add(self, window: Window) -> None:
                 self._own += 1
                 assert self._own == self._windows.count  # it takes a window before its users
 
-            def values(self):
+            def values(self) -> dict[str, int]:
                 counts.append(self._own)
                 return {"windows": self._windows.count}
 

@@ -3,11 +3,15 @@
 import io
 import json
 import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from rich.console import Console
 
+from present import present
 from recipes import JOINTS, START_NS, Recipe, pose_rows, state
 from teleop_core.bags.reader import Bag
 from teleop_core.bags.reports import report
@@ -38,57 +42,64 @@ from teleop_core.graph.topics import (
     SLAVE_SETPOINT_CP,
     SLAVE_SETPOINT_JS,
     TELEOP_STATE,
+    Topic,
 )
 
 # Positions of some hundred millimetres in doubles, scaled to millimetres.
 EXACT_MM = 1e-9
 EXACT_DEG = 1e-7
 STAGES = ("haptic_master", "motion_scaling", "inverse_kinematics", "slave", "total")
-BOX = {"is_fixture_on": 1.0, "fixture_center_x": 0.4, "fixture_center_z": -0.18,
+BOX: dict[str, Any] = {"is_fixture_on": 1.0, "fixture_center_x": 0.4, "fixture_center_z": -0.18,
        "fixture_size_x": 0.03, "fixture_size_y": 0.03, "fixture_size_z": 0.03}  # fmt: skip
 
 
 @pytest.fixture
-def recipe():
+def recipe() -> Any:
     return Recipe()
 
 
 @pytest.fixture
-def path(tmp_path):
+def path(tmp_path: Path) -> Path:
     return tmp_path / "bag"
 
 
 # -- errors ----------------------------------------------------------------------------------------
 
 
-def test_constant_offset_gives_its_length_as_rms_and_maximum_and_no_deviation(recipe, path):
+def test_constant_offset_gives_its_length_as_rms_and_maximum_and_no_deviation(
+    recipe: Any, path: Path
+) -> None:
     recipe.values(SLAVE_MEASURED_CP)[:, :3] += [3e-4, 0.0, 4e-4]
-    error = evaluate(recipe.write(path)).position_error_mm
+    error: Any = evaluate(recipe.write(path)).position_error_mm
     assert np.allclose((error.rms, error.sd, error.max), (0.5, 0.0, 0.5), atol=EXACT_MM)
 
 
-def test_errors_against_reference_and_command_are_told_apart(recipe, path):
+def test_errors_against_reference_and_command_are_told_apart(recipe: Recipe, path: Path) -> None:
     recipe.values(SLAVE_SERVO_CP)[:, 0] += 2e-3
     recipe.values(SLAVE_MEASURED_CP)[:, 1] += 1e-3
     score = evaluate(recipe.write(path))
-    assert np.isclose(score.position_error_mm.max, 1.0, atol=EXACT_MM)
-    assert np.isclose(score.command_error_mm.max, np.sqrt(5.0), atol=EXACT_MM)
+    assert np.isclose(present(score.position_error_mm.max), 1.0, atol=EXACT_MM)
+    assert np.isclose(present(score.command_error_mm.max), np.sqrt(5.0), atol=EXACT_MM)
 
 
-def test_command_error_takes_the_command_that_was_known_at_the_sampling_time(recipe, path):
+def test_command_error_takes_the_command_that_was_known_at_the_sampling_time(
+    recipe: Recipe, path: Path
+) -> None:
     stamps, values, logs = recipe.rows[SLAVE_SERVO_CP]
     values[1500:, 0] += 5e-3
     recipe.rows[SLAVE_SERVO_CP] = (stamps + 200, values, logs + 200)  # 0.2 us after the sampling
     score = evaluate(recipe.write(path))
     expected = np.sqrt(25.0 * 1499 / 2999)
-    assert np.isclose(score.command_error_mm.rms, expected, atol=EXACT_MM)
+    assert np.isclose(present(score.command_error_mm.rms), expected, atol=EXACT_MM)
 
 
 @pytest.mark.parametrize(
     ("angles", "expected"),
     [((0.3, 66.6, 0.0), "roll"), ((0.0, 66.9, 0.0), "pitch"), ((0.0, 66.6, 0.3), "yaw")],
 )
-def test_turn_about_one_fixed_axis_is_an_error_of_its_angle_alone(recipe, path, angles, expected):
+def test_turn_about_one_fixed_axis_is_an_error_of_its_angle_alone(
+    recipe: Recipe, path: Path, angles: tuple[float, float, float], expected: str
+) -> None:
     recipe.values(SLAVE_MEASURED_CP)[:] = pose_rows(3000, angles=angles)
     error = evaluate(recipe.write(path)).orientation_error_deg
     for name in ("roll", "pitch", "yaw"):
@@ -99,24 +110,28 @@ def test_turn_about_one_fixed_axis_is_an_error_of_its_angle_alone(recipe, path, 
     assert error.degenerate_share == 0.0
 
 
-def test_turn_beyond_180_degrees_is_the_short_way_round(recipe, path):
+def test_turn_beyond_180_degrees_is_the_short_way_round(recipe: Recipe, path: Path) -> None:
     recipe.values(SLAVE_SETPOINT_CP)[:] = pose_rows(3000, angles=(179.9, 10.0, 0.0))
     recipe.values(SLAVE_MEASURED_CP)[:] = pose_rows(3000, angles=(-179.9, 10.0, 0.0))
     error = evaluate(recipe.write(path)).orientation_error_deg
-    assert np.isclose(error.roll.max, 0.2, atol=EXACT_DEG)
-    assert np.isclose(error.angle.max, 0.2, atol=EXACT_DEG)
+    assert np.isclose(present(error.roll.max), 0.2, atol=EXACT_DEG)
+    assert np.isclose(present(error.angle.max), 0.2, atol=EXACT_DEG)
 
 
-def test_orientation_straight_down_has_no_roll_and_no_yaw_but_an_angle(recipe, path):
+def test_orientation_straight_down_has_no_roll_and_no_yaw_but_an_angle(
+    recipe: Recipe, path: Path
+) -> None:
     recipe.values(SLAVE_SETPOINT_CP)[:] = pose_rows(3000, angles=(0.0, 90.0, 0.0))
     recipe.values(SLAVE_MEASURED_CP)[:] = pose_rows(3000, angles=(0.0, 90.0, 0.5))
     error = evaluate(recipe.write(path)).orientation_error_deg
     assert error.degenerate_share == 1.0
     assert error.roll.rms is error.yaw.rms is None
-    assert np.isclose(error.angle.rms, 0.5, atol=EXACT_DEG)
+    assert np.isclose(present(error.angle.rms), 0.5, atol=EXACT_DEG)
 
 
-def test_lost_messages_do_not_pair_a_pose_with_the_reference_of_another_tick(recipe, path):
+def test_lost_messages_do_not_pair_a_pose_with_the_reference_of_another_tick(
+    recipe: Any, path: Path
+) -> None:
     motion = np.linspace(0.0, 0.3, 3000)[:, None] * [1.0, 0.0, 0.0]  # 0.1 mm each tick
     for topic in recipe.rows:
         recipe.values(topic)[:, :3] += motion
@@ -124,11 +139,11 @@ def test_lost_messages_do_not_pair_a_pose_with_the_reference_of_another_tick(rec
     recipe.drop(SLAVE_SETPOINT_CP, [500, 1200, 1201, 1202])
     recipe.drop(SLAVE_MEASURED_CP, [900, 2100])
     score = evaluate(recipe.write(path))
-    assert score.position_error_mm.max < EXACT_MM
+    assert present(score.position_error_mm.max) < EXACT_MM
     assert (score.samples.scored, score.samples.unpaired) == (2994, 4)
 
 
-def test_poses_that_are_no_numbers_are_counted_and_left_out(recipe, path):
+def test_poses_that_are_no_numbers_are_counted_and_left_out(recipe: Recipe, path: Path) -> None:
     recipe.values(SLAVE_MEASURED_CP)[10, 0] = np.nan
     recipe.values(SLAVE_SETPOINT_CP)[20, 2] = np.inf
     recipe.values(SLAVE_SETPOINT_CP)[30, 3:] = 0.0
@@ -141,7 +156,7 @@ def test_poses_that_are_no_numbers_are_counted_and_left_out(recipe, path):
 # -- fixture, force --------------------------------------------------------------------------------
 
 
-def test_penetration_counts_only_while_the_box_is_on(recipe, path):
+def test_penetration_counts_only_while_the_box_is_on(recipe: Recipe, path: Path) -> None:
     on, off = START_NS + 1000 * TICK_NS, START_NS + 2000 * TICK_NS
     recipe.singles += [(TELEOP_STATE, on, state(on, **BOX)), (TELEOP_STATE, off, state(off))]
     tip = recipe.values(SLAVE_MEASURED_CP)
@@ -151,28 +166,30 @@ def test_penetration_counts_only_while_the_box_is_on(recipe, path):
     tip[2500:, 1] += 0.1
     box = evaluate(recipe.write(path)).fixture
     assert np.isclose(box.on_s, 1.0)
-    assert np.isclose(box.outside_share, 0.2)
-    assert np.isclose(box.penetration_max_mm, 0.7, atol=EXACT_MM)
-    assert np.isclose(box.penetration_rms_mm, np.sqrt((0.49 + 0.25) / 10), atol=EXACT_MM)
+    assert np.isclose(present(box.outside_share), 0.2)
+    assert np.isclose(present(box.penetration_max_mm), 0.7, atol=EXACT_MM)
+    assert np.isclose(present(box.penetration_rms_mm), np.sqrt((0.49 + 0.25) / 10), atol=EXACT_MM)
 
 
-def test_hand_is_as_far_out_as_its_command_divided_by_the_gain(recipe, path):
-    fine = BOX | {"gain": 0.1} | {f"fixture_size_{axis}": 0.003 for axis in "xyz"}
+def test_hand_is_as_far_out_as_its_command_divided_by_the_gain(recipe: Recipe, path: Path) -> None:
+    fine: dict[str, Any] = BOX | {"gain": 0.1} | {f"fixture_size_{axis}": 0.003 for axis in "xyz"}
     recipe.singles = [(TELEOP_STATE, START_NS, state(START_NS, **fine))]
     recipe.values(SLAVE_SERVO_CP)[100:200, 2] -= 0.0015 + 0.05e-3
     score = evaluate(recipe.write(path))
-    assert np.isclose(score.fixture.hand_penetration_max_mm, 0.5, atol=1e-8)
+    assert np.isclose(present(score.fixture.hand_penetration_max_mm), 0.5, atol=1e-8)
     assert score.session.gain == 0.1
 
 
-def test_force_is_scored_by_its_magnitude(recipe, path):
+def test_force_is_scored_by_its_magnitude(recipe: Recipe, path: Path) -> None:
     force = np.zeros((3000, 6))
     force[:, 0], force[:, 1] = 3.0, -4.0
     recipe.rows[MASTER_MEASURED_CF] = (recipe.stamps, force, recipe.stamps)
-    assert np.isclose(evaluate(recipe.write(path)).force_n.rms, 5.0)
+    assert np.isclose(present(evaluate(recipe.write(path)).force_n.rms), 5.0)
 
 
-def test_without_state_and_force_their_scores_are_not_applicable(recipe, path):
+def test_without_state_and_force_their_scores_are_not_applicable(
+    recipe: Recipe, path: Path
+) -> None:
     recipe.singles = []
     score = evaluate(recipe.write(path))
     assert score.session.gain is None
@@ -183,8 +200,8 @@ def test_without_state_and_force_their_scores_are_not_applicable(recipe, path):
 
 
 def test_a_fall_of_the_force_on_the_tip_counts_from_sample_to_sample_but_not_over_a_pause(
-    recipe, path
-):
+    recipe: Recipe, path: Path
+) -> None:
     force = np.zeros((len(recipe.stamps), 6))
     force[100:200, 0], force[200:300, 0] = -2.0, -1.5  # falls by 0.5 N, and then by 1.5
     force[1000:1100, 2] = 3.0
@@ -196,7 +213,9 @@ def test_a_fall_of_the_force_on_the_tip_counts_from_sample_to_sample_but_not_ove
     assert score.value("touch.drop_n") == pytest.approx(1.5)
 
 
-def test_a_tool_that_follows_misses_its_remote_centre_by_the_distance_of_its_shaft(recipe, path):
+def test_a_tool_that_follows_misses_its_remote_centre_by_the_distance_of_its_shaft(
+    recipe: Recipe, path: Path
+) -> None:
     poses = recipe.values(SLAVE_MEASURED_CP)
     poses[:, 3:7] = [1.0, 0.0, 0.0, 0.0]
     beside = np.where(np.arange(len(poses)) % 2, 3e-3, 4e-3)
@@ -221,8 +240,8 @@ def test_a_tool_that_follows_misses_its_remote_centre_by_the_distance_of_its_sha
 
 
 def test_grips_slips_and_drops_of_the_recording_count_and_the_delay_is_from_hand_to_grip(
-    recipe, path
-):
+    recipe: Recipe, path: Path
+) -> None:
     count = len(recipe.stamps)
     grip, asked = np.zeros((count, 6)), np.full((count, 1), 0.8)
     grip[:, 3:] = [7.0, 5.0, 3.0]  # what was before
@@ -242,8 +261,8 @@ def test_grips_slips_and_drops_of_the_recording_count_and_the_delay_is_from_hand
 
 
 def test_a_transfer_takes_from_the_last_grip_to_rest_and_what_was_before_does_not_count(
-    recipe, path
-):
+    recipe: Recipe, path: Path
+) -> None:
     count = len(recipe.stamps)
     grip, board = np.zeros((count, 6)), np.zeros((count, len(SLAVE_JAW_BOARD.columns)))
     grip[:, 3], board[:, :2] = 7.0, [4.0, 2.0]  # what was before
@@ -265,7 +284,7 @@ def test_a_transfer_takes_from_the_last_grip_to_rest_and_what_was_before_does_no
 # -- latency, ticks, gaps --------------------------------------------------------------------------
 
 
-def chain(recipe, delays_us):
+def chain(recipe: Recipe, delays_us: tuple[int, int, int, int]) -> None:
     """Give the recording all four links of the chain; each comes so much after the one before."""
     count, at = len(recipe.stamps), 0
     widths = {SLAVE_SERVO_JP: 6, SLAVE_SETPOINT_JS: 6}
@@ -276,15 +295,15 @@ def chain(recipe, delays_us):
         recipe.rows[topic] = (recipe.stamps, rows, recipe.stamps + at)
 
 
-def test_known_delays_come_out_per_stage_and_in_total(recipe, path):
+def test_known_delays_come_out_per_stage_and_in_total(recipe: Recipe, path: Path) -> None:
     chain(recipe, (100, 250, 50, 900))
     latency = evaluate(recipe.write(path)).latency_ms
     for stage, delay in zip(STAGES, (0.1, 0.25, 0.05, 0.9, 1.3), strict=True):
-        found = latency[stage]
+        found: Any = latency[stage]
         assert np.allclose((found.median, found.p99, found.max), delay), stage
 
 
-def test_command_that_is_held_counts_once(recipe, path):
+def test_command_that_is_held_counts_once(recipe: Recipe, path: Path) -> None:
     chain(recipe, (0, 0, 0, 1000))
     stamps, values, logs = recipe.rows[SLAVE_SETPOINT_JS]
     held = stamps.copy()
@@ -296,13 +315,13 @@ def test_command_that_is_held_counts_once(recipe, path):
     assert score.topics["slave/setpoint_js"].gaps == 0
 
 
-def test_stage_that_was_not_recorded_has_no_delay(recipe, path):
+def test_stage_that_was_not_recorded_has_no_delay(recipe: Recipe, path: Path) -> None:
     latency = evaluate(recipe.write(path)).latency_ms
     assert latency["slave"].median is None
     assert latency["haptic_master"].max is None
 
 
-def test_dropped_samples_are_gaps_of_their_topic_alone(recipe, path):
+def test_dropped_samples_are_gaps_of_their_topic_alone(recipe: Recipe, path: Path) -> None:
     recipe.drop(SLAVE_MEASURED_CP, [100, 101, 102, 999, 1000, 2500])
     score = evaluate(recipe.write(path))
     assert (score.topics["slave/measured_cp"].count, score.topics["slave/measured_cp"].gaps) == (
@@ -314,13 +333,13 @@ def test_dropped_samples_are_gaps_of_their_topic_alone(recipe, path):
     assert (score.ticks.executed, score.ticks.late, score.ticks.missed) == (2994, None, 6)
 
 
-def test_topic_recorded_at_a_tenth_of_the_rate_has_no_gaps(recipe, path):
+def test_topic_recorded_at_a_tenth_of_the_rate_has_no_gaps(recipe: Recipe, path: Path) -> None:
     stamps, values, logs = recipe.rows[SLAVE_SERVO_CP]
     recipe.rows[SLAVE_SERVO_CP] = (stamps[::10], values[::10], logs[::10])
     assert evaluate(recipe.write(path)).topics["slave/servo_cp"].gaps == 0
 
 
-def test_ticks_are_those_that_the_slave_reported_last(recipe, path):
+def test_ticks_are_those_that_the_slave_reported_last(recipe: Recipe, path: Path) -> None:
     for second in (1, 2):
         at = START_NS + second * 1000 * TICK_NS
         values = {"ticks": str(1000 * second), "late": str(3 * second), "missed": str(second),
@@ -335,7 +354,9 @@ def test_ticks_are_those_that_the_slave_reported_last(recipe, path):
 # -- whole recordings ------------------------------------------------------------------------------
 
 
-def test_long_recording_scores_the_same_window_by_window_as_at_once(path, monkeypatch):
+def test_long_recording_scores_the_same_window_by_window_as_at_once(
+    path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     recipe = Recipe(13_000)
     rng = np.random.default_rng(1)
     recipe.values(SLAVE_MEASURED_CP)[:, :3] += rng.normal(scale=1e-4, size=(13_000, 3))
@@ -346,15 +367,15 @@ def test_long_recording_scores_the_same_window_by_window_as_at_once(path, monkey
     assert (
         sum(p.own(SLAVE_MEASURED_CP).stop - p.own(SLAVE_MEASURED_CP).start for p in parts) == 13_000
     )
-    streamed = evaluate(bag).to_json()
+    streamed: dict[str, Any] = evaluate(bag).to_json()
     monkeypatch.setattr("teleop_core.evaluation.windows.WINDOW_NS", 10**15)
-    once = evaluate(bag).to_json()
+    once: dict[str, Any] = evaluate(bag).to_json()
     assert np.isclose(streamed["position_error_mm"]["sd"], once["position_error_mm"]["sd"])
     for part in ("latency_ms", "topics", "ticks", "samples"):
         assert streamed[part] == once[part]
 
 
-def test_recording_out_of_order_is_scored_all_the_same(path):
+def test_recording_out_of_order_is_scored_all_the_same(path: Path) -> None:
     recipe = Recipe(9000)
     recipe.values(SLAVE_MEASURED_CP)[:, 0] += np.linspace(0, 1e-3, 9000)
     straight = evaluate(recipe.write(path))
@@ -365,11 +386,11 @@ def test_recording_out_of_order_is_scored_all_the_same(path):
     with pytest.raises(DisorderError):
         list(windows(Bag(shuffled), recipe.rows))
     other = evaluate(Bag(shuffled))
-    assert np.isclose(other.position_error_mm.rms, straight.position_error_mm.rms)
+    assert np.isclose(present(other.position_error_mm.rms), present(straight.position_error_mm.rms))
     assert other.samples == straight.samples
 
 
-def test_json_has_exactly_the_documented_keys(recipe, path):
+def test_json_has_exactly_the_documented_keys(recipe: Recipe, path: Path) -> None:
     chain(recipe, (1, 1, 1, 1))
     at = START_NS + 5 * TICK_NS
     recipe.singles.append((DIAGNOSTICS, at, report(at, "slave_sim", 0, "", {"ticks": "5"})))
@@ -381,13 +402,16 @@ def test_json_has_exactly_the_documented_keys(recipe, path):
         assert any(p.fullmatch(leaf) for leaf in found), f"{key.path} does not occur"
 
 
-def test_documentation_of_the_keys_is_a_table_with_all_of_them():
+def test_documentation_of_the_keys_is_a_table_with_all_of_them() -> None:
     lines = key_table().splitlines()
     assert len(lines) == len(keys()) + 2
     assert {line.count("|") for line in lines} == {4}
 
 
-def leaves(tree, before=""):
+def leaves(
+    tree: Any,
+    before: str = "",
+) -> Iterator[str]:
     for name, value in tree.items():
         if isinstance(value, dict):
             yield from leaves(value, f"{before}{name}.")
@@ -396,14 +420,14 @@ def leaves(tree, before=""):
             yield before + name
 
 
-def pattern(key):
+def pattern(key: str) -> str:
     parts = []
     for part in key.split("."):
         parts.append("[^.]+" if part.startswith("<") else f"(?:{part})")
     return r"\.".join(parts)
 
 
-def test_session_is_told_by_the_metadata(recipe, path):
+def test_session_is_told_by_the_metadata(recipe: Recipe, path: Path) -> None:
     session = evaluate(recipe.write(path)).session
     assert (session.name, session.scenario, session.robot, session.seed) == (
         "bag",
@@ -417,11 +441,11 @@ def test_session_is_told_by_the_metadata(recipe, path):
 # -- the command -----------------------------------------------------------------------------------
 
 
-def console(width=80):
+def console(width: int = 80) -> Console:
     return Console(width=width, record=True, file=io.StringIO(), color_system=None)
 
 
-def test_command_writes_table_scores_and_page(recipe, path, tmp_path):
+def test_command_writes_table_scores_and_page(recipe: Recipe, path: Path, tmp_path: Path) -> None:
     recipe.values(SLAVE_MEASURED_CP)[:, 0] += 0.5e-3
     followed = np.zeros((len(recipe.stamps), len(SLAVE_REACH.columns)))
     recipe.rows[SLAVE_REACH] = (recipe.stamps, followed, recipe.stamps)
@@ -437,7 +461,7 @@ def test_command_writes_table_scores_and_page(recipe, path, tmp_path):
     assert page.read_text().startswith("<!DOCTYPE html>")
 
 
-def test_three_recordings_fit_side_by_side_on_a_narrow_terminal(recipe, path):
+def test_three_recordings_fit_side_by_side_on_a_narrow_terminal(recipe: Recipe, path: Path) -> None:
     score = evaluate(recipe.write(path))
     assert [len(table.columns) for table in score_tables([score] * 4, 80)] == [4, 2]
     shown = console(80)
@@ -445,7 +469,7 @@ def test_three_recordings_fit_side_by_side_on_a_narrow_terminal(recipe, path):
     assert "…" not in shown.export_text()
 
 
-def test_texts_of_a_recording_cannot_become_markup(recipe, tmp_path):
+def test_texts_of_a_recording_cannot_become_markup(recipe: Recipe, tmp_path: Path) -> None:
     recipe.metadata |= {"scenario": "</script><b>[red]x", "robot": '"><img src=x onerror=alert(1)>'}
     bag = recipe.write(tmp_path / "<i>bag")
     page = report_page([study(bag)])
@@ -458,7 +482,9 @@ def test_texts_of_a_recording_cannot_become_markup(recipe, tmp_path):
 
 
 @pytest.mark.parametrize("topic", [SLAVE_MEASURED_CP, SLAVE_SETPOINT_CP, SLAVE_SERVO_CP])
-def test_missing_topic_is_named_with_what_there_is(recipe, path, topic):
+def test_missing_topic_is_named_with_what_there_is(
+    recipe: Recipe, path: Path, topic: Topic
+) -> None:
     del recipe.rows[topic]
     recipe.write(path)
     with pytest.raises(RecordingError) as caught:
@@ -469,7 +495,7 @@ def test_missing_topic_is_named_with_what_there_is(recipe, path, topic):
     assert "\n" not in str(caught.value)
 
 
-def test_missing_empty_and_foreign_recordings_are_refused(path, tmp_path):
+def test_missing_empty_and_foreign_recordings_are_refused(path: Path, tmp_path: Path) -> None:
     with pytest.raises(RecordingError, match="does not exist"):
         evaluate_bags([path], None, None, console())
     with BagWriter(path, ALL, JOINTS):
@@ -483,14 +509,16 @@ def test_missing_empty_and_foreign_recordings_are_refused(path, tmp_path):
         evaluate_bags([foreign], None, None, console())
 
 
-def test_poses_that_never_meet_their_reference_are_refused(recipe, path):
+def test_poses_that_never_meet_their_reference_are_refused(recipe: Recipe, path: Path) -> None:
     recipe.delay(SLAVE_SETPOINT_CP, 10_000 * TICK_NS)
     with pytest.raises(EvaluationError, match="must be recorded together"):
         evaluate(recipe.write(path))
 
 
 @pytest.mark.parametrize(("text", "told"), [("wide", "must be a number"), (None, "lacks gain")])
-def test_state_of_another_make_is_refused_in_one_line(recipe, path, text, told):
+def test_state_of_another_make_is_refused_in_one_line(
+    recipe: Recipe, path: Path, text: Any, told: str
+) -> None:
     values = dict.fromkeys(STATE_FIELDS, "0.0") | {"gain": text}
     values = {name: value for name, value in values.items() if value is not None}
     recipe.singles = [(TELEOP_STATE, START_NS, report(START_NS, "teleop", 0, "", values))]
@@ -498,7 +526,9 @@ def test_state_of_another_make_is_refused_in_one_line(recipe, path, text, told):
         evaluate(recipe.write(path))
 
 
-def test_nothing_is_written_when_one_recording_cannot_be_scored(recipe, path, tmp_path):
+def test_nothing_is_written_when_one_recording_cannot_be_scored(
+    recipe: Recipe, path: Path, tmp_path: Path
+) -> None:
     recipe.write(path)
     target = tmp_path / "scores.json"
     with pytest.raises(RecordingError):
@@ -506,7 +536,7 @@ def test_nothing_is_written_when_one_recording_cannot_be_scored(recipe, path, tm
     assert not target.exists()
 
 
-def test_output_into_a_missing_directory_is_refused_before_scoring(tmp_path):
+def test_output_into_a_missing_directory_is_refused_before_scoring(tmp_path: Path) -> None:
     with pytest.raises(EvaluationError, match="does not exist; make it first"):
         evaluate_bags([tmp_path / "none"], tmp_path / "a" / "b.json", None, console())
     with pytest.raises(EvaluationError, match="is a directory"):

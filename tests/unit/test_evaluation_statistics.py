@@ -1,17 +1,21 @@
 """Evaluation: statistics, pairing and pose errors against closed forms and independent oracles."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
+from present import present
 from teleop_core.evaluation.accumulators import Distribution, Moments
 from teleop_core.evaluation.pairing import NONE, latest, same_stamp, same_tick
-from teleop_core.evaluation.published import COARSE, FINE, published_for
+from teleop_core.evaluation.published import COARSE, FINE, Published, published_for
 from teleop_core.evaluation.traces import BUCKETS, SAMPLES, Envelope, spacing_s
 from teleop_core.evaluation.tracking import pose_errors
-from teleop_core.kernels.geometry import rotations_from_quaternions
+from teleop_core.kernels.geometry import Array, rotations_from_quaternions
 from teleop_core.robots import load_robot
 
 MS = 1_000_000
@@ -47,14 +51,14 @@ POINT_6 = ([0.064, 0.054, 0.081, 0.081, 0.081, 0.057, 0.059, 0.105, 0.069, 0.095
            (0.076, 0.017, 0.105))  # fmt: skip
 
 
-def moments(*stretches):
+def moments(*stretches: ArrayLike) -> Any:
     out = Moments()
     for stretch in stretches:
         out.add(np.asarray(stretch, float))
     return out
 
 
-def poses(positions, rotations):
+def poses(positions: Array, rotations: Rotation) -> Array:
     x, y, z, w = np.atleast_2d(rotations.as_quat()).T
     return np.column_stack((positions, w, x, y, z))
 
@@ -63,13 +67,15 @@ def poses(positions, rotations):
 
 
 @pytest.mark.parametrize(("errors", "table"), [POINT_1, POINT_5, POINT_6])
-def test_spread_gives_table_7_7_from_the_printed_runs(errors, table):
+def test_spread_gives_table_7_7_from_the_printed_runs(
+    errors: Any, table: tuple[float, float, float]
+) -> None:
     spread = moments(errors).spread()
     # The printed errors are rounded to half a micrometre, the table once more.
     assert np.allclose((spread.rms, spread.sd, spread.max), table, atol=0.0011)
 
 
-def test_joint_rows_of_point_3_give_its_published_error_statistics():
+def test_joint_rows_of_point_3_give_its_published_error_statistics() -> None:
     robot = load_robot("rcrt1")
     rows = POINT_3_RUNS * [1, 1, 1e-3, 1, 1, 1]
     identity = Rotation.identity(len(rows))
@@ -81,30 +87,32 @@ def test_joint_rows_of_point_3_give_its_published_error_statistics():
 
 
 @given(st.lists(st.lists(st.floats(-1e3, 1e3), max_size=20), min_size=1, max_size=6))
-def test_spread_does_not_depend_on_how_the_samples_are_cut(stretches):
+def test_spread_does_not_depend_on_how_the_samples_are_cut(stretches: list[list[float]]) -> None:
     samples = np.concatenate([np.array(s, float) for s in stretches])
     spread = moments(*stretches).spread()
     if not len(samples):
         assert spread == moments().spread()
         return
-    assert np.isclose(spread.rms, np.sqrt(np.mean(samples**2)), rtol=ROUNDING, atol=1e-150)
+    assert np.isclose(present(spread.rms), np.sqrt(np.mean(samples**2)), rtol=ROUNDING, atol=1e-150)
     assert spread.max == np.abs(samples).max()
     if len(samples) > 1:
-        assert np.isclose(spread.sd, samples.std(ddof=1), rtol=1e-9, atol=1e-9)
+        assert np.isclose(present(spread.sd), samples.std(ddof=1), rtol=1e-9, atol=1e-9)
 
 
-def test_sample_deviation_of_a_small_error_on_a_large_mean_keeps_its_digits():
+def test_sample_deviation_of_a_small_error_on_a_large_mean_keeps_its_digits() -> None:
     samples = 1e6 + np.tile([1e-3, -1e-3], 5000)
-    assert np.isclose(moments(samples[:7], samples[7:]).spread().sd, samples.std(ddof=1), rtol=1e-6)
+    assert np.isclose(
+        present(moments(samples[:7], samples[7:]).spread().sd), samples.std(ddof=1), rtol=1e-6
+    )
 
 
-def test_spread_without_samples_is_not_applicable():
+def test_spread_without_samples_is_not_applicable() -> None:
     assert moments([]).spread() == moments([np.nan, np.inf]).spread()
     assert moments([]).spread().rms is None
     assert moments([2.0]).spread().sd is None
 
 
-def test_quantiles_are_exact_to_the_microsecond_however_the_durations_are_cut():
+def test_quantiles_are_exact_to_the_microsecond_however_the_durations_are_cut() -> None:
     rng = np.random.default_rng(3)
     durations = rng.integers(-20, 9000, 5000)
     spread = Distribution()
@@ -117,13 +125,13 @@ def test_quantiles_are_exact_to_the_microsecond_however_the_durations_are_cut():
     assert spread.delay().max == ordered[-1] / 1000
 
 
-def test_half_of_three_durations_are_two_of_them():
+def test_half_of_three_durations_are_two_of_them() -> None:
     spread = Distribution()
     spread.add(np.array([1000, 2000, 3000]))
     assert (spread.quantile_us(0.5), spread.quantile_us(0.1)) == (2, 1)
 
 
-def test_histogram_holds_all_durations():
+def test_histogram_holds_all_durations() -> None:
     spread = Distribution()
     spread.add(np.random.default_rng(4).exponential(2e6, 4000).astype(np.int64))
     middles, shares = spread.histogram(100)
@@ -132,7 +140,7 @@ def test_histogram_holds_all_durations():
     assert np.isclose(shares[0], 100 * np.mean(spread_of_first_bin(spread)))
 
 
-def spread_of_first_bin(spread):
+def spread_of_first_bin(spread: Distribution) -> NDArray[np.bool_]:
     """Whether each duration is within 0.1 ms of the shortest."""
     durations = np.repeat(spread.values_us, spread.counts)
     return durations < durations[0] + 100
@@ -141,7 +149,7 @@ def spread_of_first_bin(spread):
 # -- pairing ---------------------------------------------------------------------------------------
 
 
-def test_ticks_are_paired_by_order_when_the_recorder_was_held_up():
+def test_ticks_are_paired_by_order_when_the_recorder_was_held_up() -> None:
     measured = np.arange(2000) * MS
     setpoint = measured - 60_000
     held = slice(700, 707)  # seven ticks arrive at once, topic by topic
@@ -151,7 +159,7 @@ def test_ticks_are_paired_by_order_when_the_recorder_was_held_up():
     assert (same_tick(measured, setpoint) == np.arange(2000)).all()
 
 
-def test_jitter_beyond_a_tick_does_not_mix_the_ticks():
+def test_jitter_beyond_a_tick_does_not_mix_the_ticks() -> None:
     rng = np.random.default_rng(9)
     tick = np.arange(20_000) * MS
     is_late = rng.random(20_000) < 0.1
@@ -162,7 +170,7 @@ def test_jitter_beyond_a_tick_does_not_mix_the_ticks():
 
 
 @pytest.mark.parametrize("offset", [0, 60_000, -60_000])
-def test_pairs_stay_right_when_messages_of_either_topic_are_lost(offset):
+def test_pairs_stay_right_when_messages_of_either_topic_are_lost(offset: int) -> None:
     rng = np.random.default_rng(5)
     tick = np.arange(20_000)
     measured = tick[np.sort(rng.permutation(20_000)[:19_950])]
@@ -176,7 +184,7 @@ def test_pairs_stay_right_when_messages_of_either_topic_are_lost(offset):
     assert found.sum() >= len(np.intersect1d(measured, setpoint)) - 10
 
 
-def test_samples_far_apart_have_no_partner():
+def test_samples_far_apart_have_no_partner() -> None:
     assert (same_tick(np.arange(5) * MS, np.arange(5) * MS + 1000 * MS) == NONE).all()
     seldom = np.arange(9) * 1000 * MS
     assert (same_tick(seldom, seldom + 51 * MS) == NONE).all()
@@ -185,14 +193,14 @@ def test_samples_far_apart_have_no_partner():
     assert not len(same_tick(np.empty(0, np.int64), np.arange(5)))
 
 
-def test_latest_command_is_never_from_the_future():
+def test_latest_command_is_never_from_the_future() -> None:
     stamps = np.array([5, 10, 20])
     assert latest(np.array([4, 5, 9, 10, 25]), stamps).tolist() == [NONE, 0, 0, 1, 2]
     assert latest(np.array([4, 12]), stamps[::-1]).tolist() == [NONE, 1]
     assert latest(np.array([4]), np.empty(0, np.int64)).tolist() == [NONE]
 
 
-def test_same_stamp_finds_the_first_sample_that_carries_it():
+def test_same_stamp_finds_the_first_sample_that_carries_it() -> None:
     assert same_stamp(np.array([1, 3, 9]), np.array([1, 3, 3, 4])).tolist() == [0, 1, NONE]
     assert same_stamp(np.array([1]), np.empty(0, np.int64)).tolist() == [NONE]
 
@@ -200,7 +208,7 @@ def test_same_stamp_finds_the_first_sample_that_carries_it():
 # -- poses -----------------------------------------------------------------------------------------
 
 
-def test_angle_differences_agree_with_an_independent_library():
+def test_angle_differences_agree_with_an_independent_library() -> None:
     rng = np.random.default_rng(6)
     a = Rotation.from_euler("ZYX", rng.uniform(-1, 1, (500, 3)) * [180, 80, 180], degrees=True)
     b = Rotation.from_euler("ZYX", rng.uniform(-1, 1, (500, 3)) * [180, 80, 180], degrees=True)
@@ -213,7 +221,7 @@ def test_angle_differences_agree_with_an_independent_library():
     assert not errors.is_degenerate.any()
 
 
-def test_published_poses_turn_by_their_published_fixed_angles():
+def test_published_poses_turn_by_their_published_fixed_angles() -> None:
     joints = [[-30, 130, 0.35, 45, 45, 45], [30, 130, 0.4, 45, 45, 45]]
     robot = load_robot("rcrt1")
     scale = np.radians([1, 1, 180 / np.pi, 1, 1, 1])
@@ -225,7 +233,7 @@ def test_published_poses_turn_by_their_published_fixed_angles():
 
 
 @given(st.floats(1e-7, 179.0), st.integers(0, 10**6))
-def test_angle_error_is_the_angle_of_the_turn_however_small_it_is(angle, seed):
+def test_angle_error_is_the_angle_of_the_turn_however_small_it_is(angle: float, seed: int) -> None:
     rng = np.random.default_rng(seed)
     axis = rng.normal(size=3)
     b = Rotation.random(rng=rng)
@@ -235,7 +243,7 @@ def test_angle_error_is_the_angle_of_the_turn_however_small_it_is(angle, seed):
     assert np.isclose(errors.angle_deg[0], angle, atol=DEGREES * 10)
 
 
-def test_sign_of_a_quaternion_and_its_length_do_not_matter():
+def test_sign_of_a_quaternion_and_its_length_do_not_matter() -> None:
     rng = np.random.default_rng(7)
     a, b = (poses(rng.normal(size=(50, 3)), Rotation.random(50, rng=rng)) for _ in range(2))
     flipped = a.copy()
@@ -245,7 +253,7 @@ def test_sign_of_a_quaternion_and_its_length_do_not_matter():
     assert np.allclose(plain.roll_pitch_yaw_deg, other.roll_pitch_yaw_deg, atol=1e-9)
 
 
-def test_roll_and_yaw_are_left_out_where_pitch_makes_them_meaningless():
+def test_roll_and_yaw_are_left_out_where_pitch_makes_them_meaningless() -> None:
     near = Rotation.from_euler("ZYX", [[10, 89.6, 20], [10, 88.0, 20]], degrees=True)
     turned = Rotation.from_euler("ZYX", [[60, 89.6, 70], [11, 88.0, 20]], degrees=True)
     errors = pose_errors(poses(np.zeros((2, 3)), near), poses(np.zeros((2, 3)), turned))
@@ -255,7 +263,7 @@ def test_roll_and_yaw_are_left_out_where_pitch_makes_them_meaningless():
     assert errors.angle_deg[0] < 1.0  # the two turns nearly cancel
 
 
-def test_pose_without_direction_has_no_orientation_error():
+def test_pose_without_direction_has_no_orientation_error() -> None:
     still = np.zeros((1, 7))
     reference = poses(np.zeros((1, 3)), Rotation.identity(1))
     errors = pose_errors(still, reference)
@@ -263,7 +271,7 @@ def test_pose_without_direction_has_no_orientation_error():
     assert np.isnan(errors.angle_deg[0])
 
 
-def test_quaternion_order_is_that_of_the_package():
+def test_quaternion_order_is_that_of_the_package() -> None:
     quarter = Rotation.from_euler("Z", 90, degrees=True)
     row = poses(np.zeros((1, 3)), quarter)
     assert np.allclose(rotations_from_quaternions(row[:, 3:])[0], quarter.as_matrix())
@@ -275,16 +283,16 @@ def test_quaternion_order_is_that_of_the_package():
 @pytest.mark.parametrize(
     ("gain", "mode"), [(1.0, COARSE), (0.5, COARSE), (2.0, COARSE), (0.1, FINE), (0.2, FINE)]
 )
-def test_gain_chooses_the_published_mode(gain, mode):
+def test_gain_chooses_the_published_mode(gain: float, mode: Published) -> None:
     assert published_for(gain) is mode
 
 
 @pytest.mark.parametrize("gain", [None, 0.0])
-def test_without_a_gain_nothing_is_compared(gain):
+def test_without_a_gain_nothing_is_compared(gain: float | None) -> None:
     assert published_for(gain) is None
 
 
-def test_another_robot_is_not_held_against_the_published_figures():
+def test_another_robot_is_not_held_against_the_published_figures() -> None:
     assert published_for(1.0, "puma560") is None
     assert published_for(1.0, "rcrt1") is COARSE
     assert published_for(1.0, None) is COARSE
@@ -293,9 +301,9 @@ def test_another_robot_is_not_held_against_the_published_figures():
 # -- drawing ---------------------------------------------------------------------------------------
 
 
-def test_envelope_of_ten_minutes_is_the_recording():
+def test_envelope_of_ten_minutes_is_the_recording() -> None:
     times = np.arange(600_000) * MS
-    values = np.random.default_rng(8).normal(size=(600_000, 2)).astype(np.float32)
+    values: Any = np.random.default_rng(8).normal(size=(600_000, 2)).astype(np.float32)
     envelope = Envelope(0, int(times[-1]), 2)
     for part in np.array_split(np.arange(600_000), 9):
         envelope.add(times[part], values[part])
@@ -304,7 +312,7 @@ def test_envelope_of_ten_minutes_is_the_recording():
     assert np.allclose(seconds, np.arange(600_000) * 1e-3, rtol=0, atol=1e-9)
 
 
-def test_envelope_of_a_longer_recording_keeps_every_peak():
+def test_envelope_of_a_longer_recording_keeps_every_peak() -> None:
     count = SAMPLES + 100_000
     rng = np.random.default_rng(8)
     times = np.arange(count) * MS
@@ -323,7 +331,7 @@ def test_envelope_of_a_longer_recording_keeps_every_peak():
     assert np.isclose(spacing_s(count, length), length / BUCKETS)
 
 
-def test_envelope_leaves_a_hole_where_one_column_has_no_numbers():
+def test_envelope_leaves_a_hole_where_one_column_has_no_numbers() -> None:
     count = SAMPLES + 4
     values = np.random.default_rng(5).normal(size=(count, 2))
     values[1000:2000, 1] = np.nan

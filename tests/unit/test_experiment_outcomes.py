@@ -2,6 +2,8 @@
 
 import json
 import math
+from collections.abc import Callable
+from typing import Any
 
 import pytest
 from hypothesis import given
@@ -26,12 +28,12 @@ positive = st.floats(1e-6, 1e6)
 finite = st.floats(-1e9, 1e9)
 
 
-def outcome(*rows, notes=(), figures=()):
+def outcome(*rows: Row, notes: tuple[str, ...] = (), figures: tuple[Figure, ...] = ()) -> Outcome:
     return Outcome("trial", "a trial", "nobody 1900", 3, rows, figures, notes)
 
 
 @given(positive, positive)
-def test_prediction_agrees_within_a_share_whatever_its_sign(published, share):
+def test_prediction_agrees_within_a_share_whatever_its_sign(published: float, share: float) -> None:
     tolerance = percent(100.0 * share)
     for sign in (1.0, -1.0):
         assert tolerance.allows(sign * published, sign * published * (1.0 + 0.99 * share))
@@ -39,7 +41,7 @@ def test_prediction_agrees_within_a_share_whatever_its_sign(published, share):
 
 
 @given(finite, positive)
-def test_prediction_agrees_within_an_amount_on_both_sides(published, amount):
+def test_prediction_agrees_within_an_amount_on_both_sides(published: float, amount: float) -> None:
     tolerance = absolute(amount)
     assert tolerance.allows(published, published)
     for side in (1.0, -1.0):
@@ -48,7 +50,7 @@ def test_prediction_agrees_within_an_amount_on_both_sides(published, amount):
 
 
 @given(positive, st.floats(1.01, 100.0))
-def test_factor_bounds_the_ratio_from_above_and_below(published, times):
+def test_factor_bounds_the_ratio_from_above_and_below(published: float, times: float) -> None:
     tolerance = factor(times)
     assert tolerance.allows(published, published * times * 0.999)
     assert tolerance.allows(published, published / times * 1.001)
@@ -57,25 +59,25 @@ def test_factor_bounds_the_ratio_from_above_and_below(published, times):
     assert not tolerance.allows(published, -published)
 
 
-def test_a_small_error_does_not_agree_with_a_large_one():
+def test_a_small_error_does_not_agree_with_a_large_one() -> None:
     # What the machine did is to be predicted, not beaten.
     assert Row(quantity="e", published=0.338, predicted=0.037, within=percent(15)).agrees is False
 
 
-def test_exact_forgives_rounding_of_the_computer_alone():
+def test_exact_forgives_rounding_of_the_computer_alone() -> None:
     assert EXACT.allows(0.1 + 0.2, 0.3)
     assert EXACT.allows(0.0, -0.0)
     assert not EXACT.allows(360.0, 360.00001)
 
 
-def test_difference_that_is_just_the_tolerance_agrees():
+def test_difference_that_is_just_the_tolerance_agrees() -> None:
     assert absolute(0.25).allows(0.5, 0.25)
     assert percent(10.0).allows(1.0, 1.1)
 
 
 @pytest.mark.parametrize("missing", ["published", "predicted", "within"])
-def test_row_without_one_of_its_parts_is_not_judged(missing):
-    whole = {"published": 1.0, "predicted": 1.0, "within": EXACT}
+def test_row_without_one_of_its_parts_is_not_judged(missing: str) -> None:
+    whole: dict[str, Any] = {"published": 1.0, "predicted": 1.0, "within": EXACT}
     assert Row(quantity="q", **whole).agrees is True
     assert Row(quantity="q", **{**whole, missing: None}).agrees is None
 
@@ -91,14 +93,14 @@ def test_row_without_one_of_its_parts_is_not_judged(missing):
         (lambda: Row(quantity="q", predicted=math.inf), "predicted of q"),
     ],
 )
-def test_nonsense_is_refused_by_name(call, name):
+def test_nonsense_is_refused_by_name(call: Callable[..., object], name: str) -> None:
     with pytest.raises(ParameterError) as caught:
         call()
     assert caught.value.name == name
 
 
 @given(finite, finite)
-def test_json_brings_back_the_same_bits(published, predicted):
+def test_json_brings_back_the_same_bits(published: float, predicted: float) -> None:
     row = Row(quantity="q", unit="mm", published=published, predicted=predicted, within=EXACT)
     back = json.loads(json.dumps(outcome(row).to_json(), allow_nan=False))["rows"][0]
     assert back["published"] == published
@@ -107,7 +109,7 @@ def test_json_brings_back_the_same_bits(published, predicted):
     assert back["agrees"] == row.agrees
 
 
-def test_outcome_counts_what_is_judged_and_what_agrees():
+def test_outcome_counts_what_is_judged_and_what_agrees() -> None:
     rows = (
         Row(quantity="a", published=1.0, predicted=1.0, within=EXACT),
         Row(quantity="b", published=1.0, predicted=2.0, within=EXACT),
@@ -118,7 +120,7 @@ def test_outcome_counts_what_is_judged_and_what_agrees():
     assert summary([found, found]) == "2 of 4 published figures agree; 2 rows are not judged"
 
 
-def test_row_is_found_by_quantity_and_group_and_a_wrong_name_lists_those_there_are():
+def test_row_is_found_by_quantity_and_group_and_a_wrong_name_lists_those_there_are() -> None:
     first, second = (Row(quantity="rms", group=group, predicted=1.0) for group in ("x", "y"))
     found = outcome(first, second)
     assert found.row("rms") is first
@@ -128,13 +130,13 @@ def test_row_is_found_by_quantity_and_group_and_a_wrong_name_lists_those_there_a
     assert caught.value.alternatives == ("rms",)
 
 
-def test_prediction_is_shown_with_a_decimal_more_than_the_publication():
+def test_prediction_is_shown_with_a_decimal_more_than_the_publication() -> None:
     row = Row(quantity="q", published=22.3607, predicted=22.360680)
     assert numbers(row) == ("22.3607", "22.36068", "", "-2e-05")
     assert numbers(Row(quantity="q", published=1.0, predicted=1.0 + 1e-15))[3] == "0"
 
 
-def test_table_shows_marks_notes_and_ours_where_there_is_one():
+def test_table_shows_marks_notes_and_ours_where_there_is_one() -> None:
     row = Row(
         quantity="error", unit="mm", published=0.5, predicted=0.51, ours=0.04, within=percent(15),
         lowest=0.4, highest=0.6, group="coarse", note="by hand",
@@ -145,7 +147,7 @@ def test_table_shows_marks_notes_and_ours_where_there_is_one():
     assert "ours" not in text(outcome(Row(quantity="error", published=0.5, predicted=0.9)))
 
 
-def test_page_escapes_what_others_wrote_and_asks_nobody():
+def test_page_escapes_what_others_wrote_and_asks_nobody() -> None:
     evil = "<script>alert(1)</script>"
     figure = Figure(evil, evil, [{"type": "scatter", "x": [0.0], "y": [1.0], "name": evil}])
     page = experiments_page([outcome(Row(quantity=evil, note=evil), figures=(figure,))])
@@ -154,10 +156,10 @@ def test_page_escapes_what_others_wrote_and_asks_nobody():
     assert "default-src 'none'" in page
 
 
-def test_experiment_that_returns_something_else_is_named():
+def test_experiment_that_returns_something_else_is_named() -> None:
     from teleop_core.base.errors import PartError
     from teleop_lab.experiments import Bench
 
-    wrong = Experiment("mine", "mine", "me", lambda bench: None)
+    wrong = Experiment("mine", "mine", "me", lambda bench: None)  # type: ignore[arg-type, return-value]
     with pytest.raises(PartError, match="mine"):
         wrong.run(Bench())

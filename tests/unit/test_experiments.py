@@ -1,11 +1,15 @@
 """Experiments: what the sources printed comes out, misprints do not, sessions run once."""
 
+from typing import Any, cast
+
 import numpy as np
 import pytest
 from scipy.signal import dlti, dstep
 
+from present import present
 from teleop_core.base.errors import ParameterError, PartError, TeleopError, UnknownNameError
 from teleop_core.chain.operators.tour import tour
+from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot
 from teleop_core.session.configuration import configure
 from teleop_core.session.recording import Stream
@@ -14,13 +18,14 @@ from teleop_lab.experiments import Bench, Experiment, Findings, Row
 from teleop_lab.experiments.accuracy import (
     AXES,
     DESIRED_MM,
+    Axis,
     as_read,
     longer_d3,
     moved,
     readings,
 )
 from teleop_lab.experiments.drawing import box_edges
-from teleop_lab.experiments.points24 import visits_of
+from teleop_lab.experiments.points24 import Visits, visits_of
 from teleop_lab.experiments.reference_filter import gain_at, step_response
 from teleop_lab.experiments.responses import response
 
@@ -39,21 +44,21 @@ MISPRINTS = {
 
 
 @pytest.mark.parametrize("name", MISPRINTS)
-def test_everything_that_was_printed_comes_out_but_what_is_misprinted(name):
+def test_everything_that_was_printed_comes_out_but_what_is_misprinted(name: str) -> None:
     outcome = experiments.run(name)
     assert outcome.judged >= 4
     failed = {row.quantity for row in outcome.rows if row.agrees is False}
     assert failed == MISPRINTS[name]
 
 
-def test_misprints_of_home_are_in_the_table_of_home_alone():
+def test_misprints_of_home_are_in_the_table_of_home_alone() -> None:
     outcome = experiments.run("poses")
     groups = {row.group for row in outcome.rows if row.agrees is False}
     assert groups == {"home, table 6.1 against the joints of table 6.2"}
 
 
 @pytest.mark.parametrize("name", MISPRINTS)
-def test_figures_have_numbers_and_words(name):
+def test_figures_have_numbers_and_words(name: str) -> None:
     for figure in experiments.run(name).figures:
         assert figure.traces
         assert figure.title
@@ -62,7 +67,7 @@ def test_figures_have_numbers_and_words(name):
             assert np.isfinite(np.asarray(trace["x"], dtype=float)).any()
 
 
-def test_every_experiment_is_listed_with_one_line_and_a_source():
+def test_every_experiment_is_listed_with_one_line_and_a_source() -> None:
     titles = experiments.list_experiments()
     assert {*MISPRINTS, "accuracy", "filter", "master_slave", "gravity", "points24"} <= set(titles)
     for name, title in titles.items():
@@ -72,7 +77,7 @@ def test_every_experiment_is_listed_with_one_line_and_a_source():
         assert experiments.EXPERIMENTS.find(name).source
 
 
-def test_unknown_experiment_is_refused_before_any_runs():
+def test_unknown_experiment_is_refused_before_any_runs() -> None:
     ran = []
     with pytest.raises(UnknownNameError) as caught:
         experiments.run_several(["resolution", "nosuch"], began=lambda *told: ran.append(told))
@@ -80,7 +85,7 @@ def test_unknown_experiment_is_refused_before_any_runs():
     assert "resolution" in caught.value.alternatives
 
 
-def test_several_experiments_run_in_the_order_given_each_once():
+def test_several_experiments_run_in_the_order_given_each_once() -> None:
     told = []
     names = ["tendons", "resolution", "tendons"]
     outcomes = experiments.run_several(names, began=lambda *each: told.append(each))
@@ -88,8 +93,8 @@ def test_several_experiments_run_in_the_order_given_each_once():
     assert told == [("tendons", 0, 2), ("resolution", 1, 2)]
 
 
-def test_own_experiment_is_run_by_its_name():
-    def measure(bench):
+def test_own_experiment_is_run_by_its_name() -> None:
+    def measure(bench: Bench) -> Findings:
         return Findings((Row(quantity="seed", predicted=float(bench.seed)),))
 
     experiments.register_experiment("seeds", Experiment("seeds", "its seed", "me", measure))
@@ -99,15 +104,15 @@ def test_own_experiment_is_run_by_its_name():
     finally:
         experiments.EXPERIMENTS.remove("seeds")
     with pytest.raises(PartError):
-        experiments.register_experiment("mine", lambda bench: None)
+        experiments.register_experiment("mine", lambda bench: None)  # type: ignore[arg-type]
 
 
 # -- bench -----------------------------------------------------------------------------------------
 
-SHORT = {"duration": 3.0, "approach_time": 0.5, "buttons.fixture": (0.6,)}
+SHORT: dict[str, Any] = {"duration": 3.0, "approach_time": 0.5, "buttons.fixture": (0.6,)}
 
 
-def test_bench_runs_the_same_session_once_and_another_seed_or_setting_anew():
+def test_bench_runs_the_same_session_once_and_another_seed_or_setting_anew() -> None:
     bench = Bench(seed=2)
     first = bench.session("coarse_box", settings=SHORT)
     assert bench.session("coarse_box", 2, SHORT) is first
@@ -120,14 +125,16 @@ def test_bench_runs_the_same_session_once_and_another_seed_or_setting_anew():
         assert not np.array_equal(measured, first["slave/measured_cp"].values)
 
 
-def test_bench_of_the_same_seed_gives_the_same_bits():
+def test_bench_of_the_same_seed_gives_the_same_bits() -> None:
     first, second = (Bench(5).session("fine_box", settings=SHORT) for _ in range(2))
     for topic, stream in first.streams.items():
         assert np.array_equal(stream.values, second[topic].values, equal_nan=True), topic
     assert first.score.to_json() == second.score.to_json()
 
 
-def test_streams_of_an_old_session_come_back_with_the_same_bits(monkeypatch):
+def test_streams_of_an_old_session_come_back_with_the_same_bits(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     monkeypatch.setattr("teleop_lab.experiments.bench._WHOLE", 1)
     bench = Bench()
     old = bench.session("coarse_box", settings=SHORT)
@@ -139,7 +146,7 @@ def test_streams_of_an_old_session_come_back_with_the_same_bits(monkeypatch):
     assert bench.runs == 2
 
 
-def test_bench_refuses_a_negative_seed_and_names_topics_that_it_keeps():
+def test_bench_refuses_a_negative_seed_and_names_topics_that_it_keeps() -> None:
     with pytest.raises(ParameterError, match="seed"):
         Bench(-1)
     session = Bench().session("coarse_box", settings=SHORT)
@@ -147,7 +154,7 @@ def test_bench_refuses_a_negative_seed_and_names_topics_that_it_keeps():
         session["slave/nosuch"]
 
 
-def test_bench_settings_hold_for_sessions_and_for_moves_of_the_slave():
+def test_bench_settings_hold_for_sessions_and_for_moves_of_the_slave() -> None:
     bench = Bench(settings={"plant": "ideal", "controller": "pd"})
     assert bench.slave().controller.kind.kind == "pd"
     assert bench.slave({"controller": "pid"}).controller.kind.kind == "pid"
@@ -156,18 +163,18 @@ def test_bench_settings_hold_for_sessions_and_for_moves_of_the_slave():
 # -- accuracy --------------------------------------------------------------------------------------
 
 
-def rms(values):
+def rms(values: Array) -> float:
     return float(np.sqrt(np.mean(np.square(values))))
 
 
-def left(offset_mm):
+def left(offset_mm: float) -> float:
     """Readings less what a ruler says of an arm with an offset in d3, RMS [mm]."""
     robot = load_robot("rcrt1")
     expected = [readings(robot, which, longer_d3(robot, offset_mm)) for which in AXES.values()]
     return rms(np.concatenate([w.read_mm for w in AXES.values()]) - np.concatenate(expected))
 
 
-def test_offset_of_five_and_a_half_millimetres_halves_what_the_ruler_saw():
+def test_offset_of_five_and_a_half_millimetres_halves_what_the_ruler_saw() -> None:
     # Derived from the tables: 0.744 mm without it, 0.352 mm with it.
     assert left(0.0) == pytest.approx(0.744, abs=5e-4)
     assert left(5.5) == pytest.approx(0.352, abs=1e-3)
@@ -177,19 +184,19 @@ def test_offset_of_five_and_a_half_millimetres_halves_what_the_ruler_saw():
 
 
 @pytest.mark.parametrize("name", AXES)
-def test_arm_without_errors_moves_as_asked(name):
+def test_arm_without_errors_moves_as_asked(name: str) -> None:
     robot = load_robot("rcrt1")
     exact = readings(robot, AXES[name], longer_d3(robot, 0.0))
     assert np.abs(moved(exact, AXES[name].escape_mm) - DESIRED_MM).max() < 1e-9
 
 
-def published_errors(which):
+def published_errors(which: Axis) -> Array:
     """Desired less measured (10,), of the ruler's readings [mm]."""
     return DESIRED_MM - moved(np.array(which.read_mm), which.escape_mm)
 
 
 @pytest.mark.parametrize("name", AXES)
-def test_readings_have_the_printed_statistics_and_are_steps_of_the_ruler(name):
+def test_readings_have_the_printed_statistics_and_are_steps_of_the_ruler(name: str) -> None:
     which = AXES[name]
     error = published_errors(which)
     # Printed to 0.01 mm, of y from ways that were rounded so too.
@@ -199,7 +206,7 @@ def test_readings_have_the_printed_statistics_and_are_steps_of_the_ruler(name):
     assert np.array_equal(as_read(np.array(which.read_mm), which.step_mm), which.read_mm)
 
 
-def test_errors_of_the_accuracy_test_are_those_that_its_tables_print():
+def test_errors_of_the_accuracy_test_are_those_that_its_tables_print() -> None:
     assert AXES["y"].error_mm[0] == 0.39
     assert [AXES["y"].error_mm[k] for k in (5, 9)] == [-1.03, -1.15]
     for which in AXES.values():  # within the rounding of their own readings
@@ -209,7 +216,7 @@ def test_errors_of_the_accuracy_test_are_those_that_its_tables_print():
 # -- filter ----------------------------------------------------------------------------------------
 
 
-def test_step_and_gain_of_the_filter_are_scipys_of_the_printed_transfer_function():
+def test_step_and_gain_of_the_filter_are_scipys_of_the_printed_transfer_function() -> None:
     # Forward Euler of 0.1 (s + 100)/(s + 10) at 1 ms, sign corrected.
     system = dlti([0.1, -0.09], [1.0, -0.99], dt=1e-3)
     _, (expected,) = dstep(system, n=500)
@@ -225,7 +232,7 @@ def test_step_and_gain_of_the_filter_are_scipys_of_the_printed_transfer_function
 class Perfect:
     """A session whose tip is where the points are, or off by a known way."""
 
-    def __init__(self, off_mm=(0.0, 0.0, 0.0)):
+    def __init__(self, off_mm: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> None:
         made = configure("points24").group("operator")
         self.p, self.center = made.kind.parameters, np.array(made.center)
         self.approach = made.approach_time
@@ -237,31 +244,31 @@ class Perfect:
         self.path[0] = 1e3 * self.start
         self.is_followed = np.ones(len(self.time), bool)
 
-    def places_mm(self, topic):
+    def places_mm(self, topic: str) -> Array:
         return self.path
 
-    def __getitem__(self, topic):
+    def __getitem__(self, topic: str) -> Stream:
         ns = np.round(self.time * 1e9).astype(np.int64)
         return Stream(topic, ("x", "y", "z"), ns, ns, self.path * 1e-3, 0)
 
-    def visits(self):
-        return visits_of(self, self.p, self.center, self.approach)
+    def visits(self) -> Visits:
+        return visits_of(cast(Any, self), self.p, self.center, self.approach)
 
 
-def test_tip_that_is_where_the_points_are_misses_none():
+def test_tip_that_is_where_the_points_are_misses_none() -> None:
     visits = Perfect().visits()
     assert visits.off_mm.max() < 1e-9
     # Between samples of the line, 10 ms apart.
     assert visits.line_mm.max() < 0.05
 
 
-def test_tip_that_is_off_misses_by_as_much_in_the_plane_of_the_board():
+def test_tip_that_is_off_misses_by_as_much_in_the_plane_of_the_board() -> None:
     visits = Perfect((0.3, 0.4, 7.0)).visits()
     assert np.allclose(visits.off_mm, 0.5, atol=1e-9)
     assert np.allclose(visits.missed_mm, (0.3, 0.4, 7.0), atol=1e-9)
 
 
-def test_session_that_is_over_before_its_tour_is_told():
+def test_session_that_is_over_before_its_tour_is_told() -> None:
     bench = Bench(settings={"duration": 12.0})
     with pytest.raises(TeleopError, match="give it more time"):
         experiments.run("points24", bench=bench)
@@ -270,18 +277,18 @@ def test_session_that_is_over_before_its_tour_is_told():
 # -- responses -------------------------------------------------------------------------------------
 
 
-def test_move_ends_at_its_target_and_begins_at_home():
+def test_move_ends_at_its_target_and_begins_at_home() -> None:
     robot = load_robot("rcrt1")
     target = np.array([0.3, 1.9, 0.40, 0.4, 0.5, -0.3])
     found = response(Bench(settings={"plant": "ideal", "controller": "pid"}).slave(), target)
     assert np.abs(found.reference[0] - robot.home).max() < 1e-5
     assert np.abs(found.reference[-1] - target).max() < 1e-5
     # The ideal plant under integral action rests within an encoder count or two.
-    assert (np.abs(found.measured[-1] - target) < 2.5 * robot.drives.encoder_step).all()
+    assert (np.abs(found.measured[-1] - target) < 2.5 * present(robot.drives).encoder_step).all()
     assert np.allclose(found.reached_mm[-1], 1e3 * robot.fk(found.measured[-1])[:3, 3], atol=1e-9)
 
 
-def test_friction_that_sticks_keeps_the_tip_off_where_the_ideal_arm_rests():
+def test_friction_that_sticks_keeps_the_tip_off_where_the_ideal_arm_rests() -> None:
     target = np.array([0.3, 1.9, 0.40, 0.4, 0.5, -0.3])
     off = {
         plant: np.linalg.norm(
@@ -295,7 +302,7 @@ def test_friction_that_sticks_keeps_the_tip_off_where_the_ideal_arm_rests():
     assert off["hardware"] > 3.0 * off["ideal"]
 
 
-def test_edges_of_a_box_are_twelve_of_its_sides():
+def test_edges_of_a_box_are_twelve_of_its_sides() -> None:
     edges = box_edges(np.array([1.0, 2.0, 3.0]), np.array([2.0, 4.0, 6.0])).reshape(12, 3, 3)
     lengths = np.linalg.norm(edges[:, 1] - edges[:, 0], axis=1)
     assert sorted(lengths.tolist()) == [2.0] * 4 + [4.0] * 4 + [6.0] * 4

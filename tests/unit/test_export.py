@@ -6,29 +6,32 @@ import subprocess
 import sys
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
 import pyarrow.parquet as pq
 import pytest
+from pyarrow.lib import ChunkedArray, Table
 
 import teleop_core as tc
 from teleop_core.bags.writer import BagWriter
 from teleop_core.graph.topics import MASTER_BUTTONS, MASTER_MEASURED_CP
+from teleop_core.kernels.geometry import Array
 from teleop_core.session.exchange.joining import Streams
 
 STATE_TOPIC = "teleop/state"
 
 
 @pytest.fixture(scope="module")
-def session():
+def session() -> tc.Recording:
     """Six seconds with clutch, both modes and the box, in memory."""
     buttons = {"buttons.clutch": [1.0, 2.0], "buttons.mode": [2.5], "buttons.fixture": [3.0]}
     return tc.run("mode_switching", duration=3.0, settings=buttons)
 
 
 @pytest.fixture(scope="module")
-def saved(session, tmp_path_factory):
+def saved(session: tc.Recording, tmp_path_factory: pytest.TempPathFactory) -> tc.Recording:
     return session.save(tmp_path_factory.mktemp("bags") / "session")
 
 
@@ -41,7 +44,9 @@ READERS = {
 
 @pytest.mark.parametrize("name", READERS)
 @pytest.mark.parametrize("place", ["memory", "disk"])
-def test_table_is_the_frame_of_the_recording(name, place, session, saved, tmp_path):
+def test_table_is_the_frame_of_the_recording(
+    name: str, place: str, session: tc.Recording, saved: tc.Recording, tmp_path: Path
+) -> None:
     recording = session if place == "memory" else saved
     topics = ("slave/measured_cp", "slave/measured_js", "master/buttons")
     report = tc.export_recording(recording, tmp_path / name, topics=topics)
@@ -54,7 +59,9 @@ def test_table_is_the_frame_of_the_recording(name, place, session, saved, tmp_pa
     assert not list(tmp_path.glob(".*"))
 
 
-def test_without_topics_all_numbers_are_there_and_states_are_held(saved, tmp_path):
+def test_without_topics_all_numbers_are_there_and_states_are_held(
+    saved: tc.Recording, tmp_path: Path
+) -> None:
     tc.export_recording(saved, tmp_path / "all.parquet")
     got = pd.read_parquet(tmp_path / "all.parquet")
     for name in saved.topics:
@@ -67,13 +74,13 @@ def test_without_topics_all_numbers_are_there_and_states_are_held(saved, tmp_pat
     assert 0 < np.nansum(got[f"{STATE_TOPIC}.is_clutched"]) < len(got)
 
 
-def test_a_report_alone_has_a_row_for_each_message(saved, tmp_path):
+def test_a_report_alone_has_a_row_for_each_message(saved: tc.Recording, tmp_path: Path) -> None:
     tc.export_recording(saved, tmp_path / "state.csv", topics=[STATE_TOPIC])
     got = pd.read_csv(tmp_path / "state.csv")
     assert np.array_equal(got[f"{STATE_TOPIC}.gain"], saved[STATE_TOPIC]["gain"])
 
 
-def test_rows_at_a_rate_hold_the_newest_message(saved, tmp_path):
+def test_rows_at_a_rate_hold_the_newest_message(saved: tc.Recording, tmp_path: Path) -> None:
     tc.export_recording(saved, tmp_path / "a.csv", topics=["slave/measured_cp"], rate=125.0)
     got = pd.read_csv(tmp_path / "a.csv")
     stream = saved["slave/measured_cp"]
@@ -82,7 +89,9 @@ def test_rows_at_a_rate_hold_the_newest_message(saved, tmp_path):
     assert len(got) == int(saved.duration * 125.0) + 1
 
 
-def test_units_stand_in_the_metadata_and_on_request_in_the_names(saved, tmp_path):
+def test_units_stand_in_the_metadata_and_on_request_in_the_names(
+    saved: tc.Recording, tmp_path: Path
+) -> None:
     topics = ["slave/measured_cp", "slave/measured_js", "master/measured_cf"]
     for name, units in (("plain.parquet", False), ("named.parquet", True)):
         tc.export_recording(saved, tmp_path / name, topics=topics, units=units)
@@ -96,7 +105,7 @@ def test_units_stand_in_the_metadata_and_on_request_in_the_names(saved, tmp_path
     assert {"time [s]", "slave/measured_cp.x [m]", "master/measured_cf.fz [N]"} <= set(names)
 
 
-def sparse(path, chunks):
+def sparse(path: Path, chunks: int) -> tc.Recording:
     """Recording of poses at 100 Hz and buttons at 3 Hz, chunk by chunk."""
     with BagWriter(path, [MASTER_MEASURED_CP, MASTER_BUTTONS], ()) as writer:
         for begin in range(chunks):
@@ -110,7 +119,7 @@ def sparse(path, chunks):
     return tc.open_recording(path)
 
 
-def test_streams_of_different_rates_are_joined_over_many_chunks(tmp_path):
+def test_streams_of_different_rates_are_joined_over_many_chunks(tmp_path: Path) -> None:
     recording = sparse(tmp_path / "bag", 40)
     tc.export_recording(recording, tmp_path / "a.parquet")
     got = pd.read_parquet(tmp_path / "a.parquet").set_index("time")
@@ -121,7 +130,7 @@ def test_streams_of_different_rates_are_joined_over_many_chunks(tmp_path):
     assert all(a.time_ns[-1] < b.time_ns[0] for a, b in pairwise(pieces))
 
 
-def test_newest_values_are_held_over_many_chunks(tmp_path):
+def test_newest_values_are_held_over_many_chunks(tmp_path: Path) -> None:
     recording = sparse(tmp_path / "bag", 40)
     tc.export_recording(recording, tmp_path / "a.parquet", rate=50.0)
     got = pd.read_parquet(tmp_path / "a.parquet")
@@ -142,7 +151,9 @@ def test_newest_values_are_held_over_many_chunks(tmp_path):
         ({"out": "a.xlsx"}, ".parquet"),
     ],
 )
-def test_wrong_exports_are_refused_and_leave_nothing(options, text, session, tmp_path):
+def test_wrong_exports_are_refused_and_leave_nothing(
+    options: Any, text: str, session: tc.Recording, tmp_path: Path
+) -> None:
     out = tmp_path / options.pop("out", "a.csv")
     with pytest.raises(tc.TeleopError) as error:
         tc.export_recording(session, out, **options)
@@ -151,14 +162,14 @@ def test_wrong_exports_are_refused_and_leave_nothing(options, text, session, tmp
     assert not list(tmp_path.iterdir())
 
 
-def test_existing_files_are_never_touched(session, tmp_path):
+def test_existing_files_are_never_touched(session: tc.Recording, tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text("precious")
     with pytest.raises(tc.RecordingError, match="exists already"):
         tc.export_recording(session, tmp_path / "a.csv")
     assert (tmp_path / "a.csv").read_text() == "precious"
 
 
-def test_a_table_holds_one_recording(session, tmp_path):
+def test_a_table_holds_one_recording(session: tc.Recording, tmp_path: Path) -> None:
     with pytest.raises(tc.ParameterError, match="lerobot takes several"):
         tc.export_recording([session, session], tmp_path / "a.csv")
 
@@ -167,21 +178,25 @@ def test_a_table_holds_one_recording(session, tmp_path):
 
 
 @pytest.fixture(scope="module")
-def data_set(session, saved, tmp_path_factory):
+def data_set(
+    session: tc.Recording, saved: tc.Recording, tmp_path_factory: pytest.TempPathFactory
+) -> tuple[Path, tc.ExportReport]:
     out = tmp_path_factory.mktemp("sets") / "cut"
     report = tc.export_recording([saved, session], out, task="follow the edge")
     return out, report
 
 
-def frames_of(out):
+def frames_of(out: Path) -> Table:
     return pq.read_table(out / "data/chunk-000/file-000.parquet")
 
 
-def vectors(column):
+def vectors(column: ChunkedArray) -> Array:
     return np.array(column.to_pylist())
 
 
-def test_a_data_set_has_the_newest_values_fifty_times_a_second(data_set, saved):
+def test_a_data_set_has_the_newest_values_fifty_times_a_second(
+    data_set: tuple[Path, tc.ExportReport], saved: tc.Recording
+) -> None:
     out, report = data_set
     frames = frames_of(out)
     one = frames.filter(np.array(frames["episode_index"]) == 1)
@@ -201,7 +216,7 @@ def test_a_data_set_has_the_newest_values_fifty_times_a_second(data_set, saved):
     assert np.allclose(np.diff(np.array(one["timestamp"])), 0.02, rtol=0, atol=1e-4)
 
 
-def test_counters_of_a_data_set_count(data_set):
+def test_counters_of_a_data_set_count(data_set: tuple[Path, tc.ExportReport]) -> None:
     frames = frames_of(data_set[0])
     count = len(frames) // 2
     assert np.array_equal(frames["index"], np.arange(2 * count))
@@ -210,7 +225,9 @@ def test_counters_of_a_data_set_count(data_set):
     assert not np.any(frames["task_index"])
 
 
-def test_descriptions_of_a_data_set_agree_with_its_frames(data_set):
+def test_descriptions_of_a_data_set_agree_with_its_frames(
+    data_set: tuple[Path, tc.ExportReport],
+) -> None:
     out, _ = data_set
     frames, info = frames_of(out), json.loads((out / "meta/info.json").read_text())
     assert info["codebase_version"] == "v3.0"
@@ -237,7 +254,7 @@ def test_descriptions_of_a_data_set_agree_with_its_frames(data_set):
         assert np.allclose(stats["observation.state"][name], expected, rtol=1e-6, atol=1e-9)
 
 
-def test_actions_may_be_poses_of_the_tip(session, tmp_path):
+def test_actions_may_be_poses_of_the_tip(session: tc.Recording, tmp_path: Path) -> None:
     tc.export_recording(session, tmp_path / "set", action="tip", rate=10.0)
     info = json.loads((tmp_path / "set/meta/info.json").read_text())
     names = info["features"]["action"]["names"]
@@ -248,14 +265,14 @@ def test_actions_may_be_poses_of_the_tip(session, tmp_path):
     assert info["fps"] == 10
 
 
-def test_recordings_of_other_arms_do_not_mix(session, tmp_path):
+def test_recordings_of_other_arms_do_not_mix(session: tc.Recording, tmp_path: Path) -> None:
     other = tc.run("coarse_box", duration=0.1, robot="puma560")
     with pytest.raises(tc.RecordingError, match="other joints"):
         tc.export_recording([session, other], tmp_path / "set")
     assert not list(tmp_path.iterdir())
 
 
-def test_a_recording_without_a_slave_makes_no_data_set(tmp_path):
+def test_a_recording_without_a_slave_makes_no_data_set(tmp_path: Path) -> None:
     recording = sparse(tmp_path / "bag", 2)
     with pytest.raises(tc.RecordingError, match="slave/measured_js"):
         tc.export_recording(recording, tmp_path / "set")
@@ -274,7 +291,9 @@ print(json.dumps([len(found), found.num_episodes, found[0]["task"],
 """
 
 
-def test_the_loader_of_lerobot_reads_the_same_numbers(data_set):
+def test_the_loader_of_lerobot_reads_the_same_numbers(
+    data_set: tuple[Path, tc.ExportReport],
+) -> None:
     """LEROBOT_PYTHON names a Python that has the lerobot package; else that of the tests."""
     python = os.environ.get("LEROBOT_PYTHON", sys.executable)
     tried = subprocess.run([python, "-c", "import lerobot.datasets.lerobot_dataset"],

@@ -16,6 +16,7 @@ from teleop_lab.experiments.drift import (
 from teleop_lab.experiments.drift import report as drifts
 from teleop_lab.experiments.puncture import (
     SPEED,
+    Puncture,
     least_overshoot,
     measure_puncture,
 )
@@ -26,19 +27,21 @@ FORCE = ("position_force", "none")
 
 
 @pytest.fixture(scope="module")
-def steel():
+def steel() -> dict[str, Drift]:
     return {kind: measure_drift(Bench(), ("steel", kind, FAR)) for kind in PASSIVITIES}
 
 
 @pytest.fixture(scope="module")
-def pricked():
+def pricked() -> dict[tuple[tuple[str, str], float], Puncture]:
     jobs = [(FORCE, 0.0), (FORCE, 0.2), (("position_position", "none"), 0.2),
             (("position_force", "wave"), 0.4)]  # fmt: skip
     return {job: measure_puncture(Bench(), job) for job in jobs}
 
 
 @pytest.mark.parametrize("material", MATERIALS)
-def test_ten_contacts_700_ms_away_leave_less_drift_than_the_goal_with_tdpa(material, steel):
+def test_ten_contacts_700_ms_away_leave_less_drift_than_the_goal_with_tdpa(
+    material: str, steel: dict[str, Drift]
+) -> None:
     found = (
         steel["tdpa"] if material == "steel" else measure_drift(Bench(), (material, "tdpa", FAR))
     )
@@ -60,13 +63,17 @@ def test_a_tank_holds_a_command_back_before_steel_and_leaves_no_drift_either(ste
     assert 1e3 * steel["tank"].left.max() < GOAL_MM
 
 
-def test_tdpa_gives_a_far_hand_before_steel_less_than_before_its_drift_was_met(steel):
+def test_tdpa_gives_a_far_hand_before_steel_less_than_before_its_drift_was_met(
+    steel: dict[str, Drift],
+) -> None:
     """33.9 mJ was measured where drift faded with 5 mm/s alone, and 4.6 mm were left."""
     assert steel["tdpa"].given < 0.0339
     assert steel["tdpa"].force < 18.5
 
 
-def test_a_hand_notices_a_puncture_as_soon_as_the_news_is_there(pricked):
+def test_a_hand_notices_a_puncture_as_soon_as_the_news_is_there(
+    pricked: dict[tuple[tuple[str, str], float], Puncture],
+) -> None:
     for late in (0.0, 0.2):
         found = pricked[FORCE, late]
         assert 0.5 * late < found.notice < 0.5 * late + 0.01
@@ -74,7 +81,9 @@ def test_a_hand_notices_a_puncture_as_soon_as_the_news_is_there(pricked):
         assert found.hand_drop == pytest.approx(found.tip_drop, abs=0.01)
 
 
-def test_the_tip_overshoots_by_the_way_of_round_trip_and_reaction_and_by_what_springs(pricked):
+def test_the_tip_overshoots_by_the_way_of_round_trip_and_reaction_and_by_what_springs(
+    pricked: dict[tuple[tuple[str, str], float], Puncture],
+) -> None:
     assert least_overshoot(0.2) - least_overshoot(0.0) == pytest.approx(0.2 * SPEED)
     for late in (0.0, 0.2):
         more = pricked[FORCE, late].overshoot - least_overshoot(late)
@@ -83,17 +92,23 @@ def test_the_tip_overshoots_by_the_way_of_round_trip_and_reaction_and_by_what_sp
     assert pricked[FORCE, 0.2].overshoot > pricked[FORCE, 0.0].overshoot
 
 
-def test_a_hand_that_feels_its_own_spring_alone_does_not_notice(pricked):
+def test_a_hand_that_feels_its_own_spring_alone_does_not_notice(
+    pricked: dict[tuple[tuple[str, str], float], Puncture],
+) -> None:
     found = pricked[("position_position", "none"), 0.2]
     assert found.notice == np.inf
     assert found.hand_drop < 0.05
 
 
-def test_waves_over_400_ms_do_not_get_through_the_membrane(pricked):
+def test_waves_over_400_ms_do_not_get_through_the_membrane(
+    pricked: dict[tuple[tuple[str, str], float], Puncture],
+) -> None:
     assert np.isnan(pricked[("position_force", "wave"), 0.4].notice)
 
 
-def test_rows_say_what_was_stopped_held_or_not_noticed_and_all_figures_have_numbers(steel, pricked):
+def test_rows_say_what_was_stopped_held_or_not_noticed_and_all_figures_have_numbers(
+    steel: dict[str, Drift], pricked: dict[tuple[tuple[str, str], float], Puncture]
+) -> None:
     few = Drift(np.zeros(3), np.zeros(3), 0.0, 0.0, 0.0, 1.0)
     ways = {("steel", kind, FAR): found for kind, found in steel.items()}
     found = drifts(ways | {("tissue", "tank", FAR): few})

@@ -1,10 +1,14 @@
 """Feedback: the arm's server leads an arm that tells it where it is, and no other."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
+from present import present
 from teleop_core.base.parameters import build
 from teleop_core.graph.signals import DT, TICK_NS
+from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot
 from teleop_core.slave.commands import CommandStatus
 from teleop_core.slave.operation import Event, Fault, State
@@ -13,8 +17,8 @@ from teleop_core.slave.slave import Slave, SlaveParameters
 
 ARM = load_robot("rcrt1")
 N = ARM.n
-LIMIT = ARM.drives.speed_limit
-BRAKING = ARM.drives.effort_limit / ARM.drives.inertia
+LIMIT = present(ARM.drives).speed_limit
+BRAKING = present(ARM.drives).effort_limit / present(ARM.drives).inertia
 SLOW = 0.2 * LIMIT
 """Speed at which commands lead the joints away from their limits."""
 
@@ -22,12 +26,20 @@ SLOW = 0.2 * LIMIT
 class Led:
     """A server whose arm is wherever the test says, at rest where its setpoint is by default."""
 
-    def __init__(self, **values):
+    def __init__(self, **values: float | tuple[str, str, str]) -> None:
         given = {"starts_at_home": True, "reference_filter.is_on": False} | values
         self.slave = Slave(build(SlaveParameters, given))
         self.row, self.ns, self.commanded = self.slave.signals, 0, ARM.home.copy()
 
-    def tick(self, measured=None, *, speaks=True, follows=False, effort=0.0, ahead_ns=0):
+    def tick(
+        self,
+        measured: Array | None = None,
+        *,
+        speaks: bool = True,
+        follows: bool = False,
+        effort: Any = 0.0,
+        ahead_ns: int = 0,
+    ) -> Array:
         """One tick; the arm says before it where it is, and a command comes if it is to follow."""
         self.ns += TICK_NS
         row = self.row
@@ -45,15 +57,15 @@ class Led:
         return row["slave_setpoint_js"].copy()
 
     @property
-    def state(self):
+    def state(self) -> State:
         return State(int(self.slave.operation["state"]))
 
     @property
-    def status(self):
+    def status(self) -> CommandStatus:
         return CommandStatus(int(self.row["command_status"]))
 
 
-def following(**values):
+def following(**values: float | tuple[str, str, str]) -> Any:
     led = Led(**values)
     for _ in range(300):
         led.tick(follows=True)
@@ -61,7 +73,7 @@ def following(**values):
     return led
 
 
-def test_an_arm_that_says_no_more_where_it_is_holds_after_the_command_timeout():
+def test_an_arm_that_says_no_more_where_it_is_holds_after_the_command_timeout() -> None:
     led = following()
     setpoints = [led.tick(speaks=False, follows=True) for _ in range(300)]
     steps = np.abs(np.diff(setpoints, axis=0))
@@ -73,7 +85,7 @@ def test_an_arm_that_says_no_more_where_it_is_holds_after_the_command_timeout():
     assert (led.state, led.status) == (State.ENABLED, CommandStatus.BLIND)
 
 
-def test_it_goes_on_by_itself_once_it_speaks_again_before_that_is_a_fault():
+def test_it_goes_on_by_itself_once_it_speaks_again_before_that_is_a_fault() -> None:
     led = following()
     held = [led.tick(speaks=False, follows=True) for _ in range(300)][-1]
     for _ in range(100):
@@ -85,19 +97,22 @@ def test_it_goes_on_by_itself_once_it_speaks_again_before_that_is_a_fault():
     assert (np.abs(np.diff(moved, axis=0)) <= LIMIT * DT * (1.0 + 1e-9)).all()
 
 
-def test_a_longer_silence_of_the_arm_is_a_fault_whose_setpoint_stands_still():
-    led = following(**{"operation.longest_silence": 0.5})
+def test_a_longer_silence_of_the_arm_is_a_fault_whose_setpoint_stands_still() -> None:
+    led: Any = following(**{"operation.longest_silence": 0.5})
     for _ in range(500):
         led.tick(speaks=False, follows=True)
     assert led.state is State.ENABLED
     still = led.tick(speaks=False, follows=True)
-    assert led.state is State.FAULT
+    now: State = led.state
+    assert now is State.FAULT
     assert Fault(int(led.slave.operation["fault"])) is Fault.FEEDBACK
     assert led.slave.operation["fault_bound"] == 0.5
     assert np.array_equal(led.tick(follows=True), still)
 
 
-def test_an_arm_that_was_lost_is_led_from_where_it_is_found_and_only_when_it_is_enabled_again():
+def test_an_arm_that_was_lost_is_led_from_where_it_is_found_and_only_when_it_is_enabled_again() -> (
+    None
+):
     led = following(**{"operation.longest_silence": 0.5})
     for _ in range(600):
         held = led.tick(speaks=False, follows=True)
@@ -121,7 +136,7 @@ def test_an_arm_that_was_lost_is_led_from_where_it_is_found_and_only_when_it_is_
     assert (goes_on[-1] < found[-1]).all()
 
 
-def test_a_move_that_the_arm_did_not_see_goes_on_to_its_goal_once_it_speaks_again():
+def test_a_move_that_the_arm_did_not_see_goes_on_to_its_goal_once_it_speaks_again() -> None:
     led = Led()
     goal = ARM.home - 0.02
     led.tick()
@@ -137,7 +152,7 @@ def test_a_move_that_the_arm_did_not_see_goes_on_to_its_goal_once_it_speaks_agai
     assert np.array_equal(last, goal)
 
 
-def test_an_arm_that_stands_elsewhere_is_led_from_there_and_homes():
+def test_an_arm_that_stands_elsewhere_is_led_from_there_and_homes() -> None:
     led, there = Led(), ARM.home - np.array([0.3, 0.2, 0.05, 0.4, 0.3, 0.2])
     way = [led.tick(there)]
     assert np.allclose(way[0], there, rtol=0, atol=1e-6)  # a tick on its way already
@@ -150,17 +165,17 @@ def test_an_arm_that_stands_elsewhere_is_led_from_there_and_homes():
     assert (steps <= LIMIT * DT * (1.0 + 1e-9)).all()
 
 
-def test_an_arm_that_is_at_home_but_for_its_encoders_begins_there():
+def test_an_arm_that_is_at_home_but_for_its_encoders_begins_there() -> None:
     led = Led()
-    led.tick(ARM.home + 0.5 * ARM.drives.encoder_step)
+    led.tick(ARM.home + 0.5 * present(ARM.drives).encoder_step)
     assert np.array_equal(led.row["slave_setpoint_js"], ARM.home)
     assert led.slave.operation["is_homed"] == 1.0
 
 
 @pytest.mark.parametrize("every", [1, 10])
-def test_a_full_drive_is_a_fault_after_its_time_however_often_the_arm_speaks(every):
+def test_a_full_drive_is_a_fault_after_its_time_however_often_the_arm_speaks(every: int) -> None:
     led = Led(**{"operation.effort_time": 0.2})
-    full = np.where(np.arange(N) == 1, ARM.drives.effort_limit, 0.0)
+    full = np.where(np.arange(N) == 1, present(ARM.drives).effort_limit, 0.0)
     led.tick()
     ticks = 0
     while led.state is State.ENABLED:
@@ -171,9 +186,9 @@ def test_a_full_drive_is_a_fault_after_its_time_however_often_the_arm_speaks(eve
     assert ticks == pytest.approx(200, abs=2 * every + 2)
 
 
-def test_a_full_drive_after_a_gap_is_no_fault_for_the_gap():
+def test_a_full_drive_after_a_gap_is_no_fault_for_the_gap() -> None:
     led = Led()
-    full = np.where(np.arange(N) == 1, ARM.drives.effort_limit, 0.0)
+    full = np.where(np.arange(N) == 1, present(ARM.drives).effort_limit, 0.0)
     led.tick()
     for _ in range(1500):
         led.tick(speaks=False)
@@ -183,12 +198,12 @@ def test_a_full_drive_after_a_gap_is_no_fault_for_the_gap():
     assert led.slave.operation["is_braked"] == 0.0
 
 
-def test_simulated_drives_are_off_while_the_server_lets_brakes_hold_the_arm():
+def test_simulated_drives_are_off_while_the_server_lets_brakes_hold_the_arm() -> None:
     parameters = build(ArmParameters, {"starts_at_home": True, "operation.standstill": "brake"})
     arm = SimulatedArm(parameters)
     row = arm.signals
 
-    def efforts():
+    def efforts() -> Array:
         row["now_ns"] += TICK_NS
         arm.step()
         return row["slave_measured_js"][2 * N :].copy()
@@ -210,14 +225,14 @@ def faulty(led: Led) -> Fault:
     return Fault(int(led.slave.operation["fault"]))
 
 
-def others(*names):
+def others(*names: str) -> Any:
     """Faults that are told only, so that one alone can stop the arm."""
     watched = ("tracking", "tip", "overspeed", "effort")
     return tuple(name for name in watched if name not in names)
 
 
 @pytest.mark.parametrize("joint", range(N))
-def test_a_joint_too_far_from_its_setpoint_is_the_fault_tracking(joint):
+def test_a_joint_too_far_from_its_setpoint_is_the_fault_tracking(joint: int) -> None:
     led = following(**{"operation.reported": others("tracking")})
     bound = float(led.slave.parameters["lag"][joint])
     for share, fault in ((0.99, Fault.NONE), (-0.99, Fault.NONE), (1.01, Fault.TRACKING)):
@@ -231,7 +246,7 @@ def test_a_joint_too_far_from_its_setpoint_is_the_fault_tracking(joint):
     assert told["fault_bound"] == bound
 
 
-def test_a_joint_that_says_no_number_is_the_fault_tracking():
+def test_a_joint_that_says_no_number_is_the_fault_tracking() -> None:
     led = following(**{"operation.reported": others("tracking")})
     measured = led.row["slave_setpoint_js"].copy()
     measured[2] = np.nan
@@ -240,7 +255,7 @@ def test_a_joint_that_says_no_number_is_the_fault_tracking():
 
 
 @pytest.mark.parametrize("joint", range(N))
-def test_a_joint_faster_than_half_as_much_again_as_rated_is_the_fault_overspeed(joint):
+def test_a_joint_faster_than_half_as_much_again_as_rated_is_the_fault_overspeed(joint: int) -> None:
     led = following(**{"operation.reported": others("overspeed")})
     for share, fault in ((1.49, Fault.NONE), (-1.49, Fault.NONE), (-1.51, Fault.OVERSPEED)):
         led.row["slave_measured_js"][N + joint] = share * LIMIT[joint]
@@ -249,7 +264,7 @@ def test_a_joint_faster_than_half_as_much_again_as_rated_is_the_fault_overspeed(
     assert led.slave.operation["fault_joint"] == joint
 
 
-def test_a_tip_too_far_from_its_setpoint_is_the_fault_tip():
+def test_a_tip_too_far_from_its_setpoint_is_the_fault_tip() -> None:
     led = following(**{"operation.reported": others("tip"), "operation.tip_error": 5e-3})
     setpoint = led.row["slave_setpoint_js"].copy()
     for way, fault in ((4.9e-3, Fault.NONE), (5.1e-3, Fault.TIP)):
@@ -260,7 +275,7 @@ def test_a_tip_too_far_from_its_setpoint_is_the_fault_tip():
     assert led.slave.operation["fault_value"] == pytest.approx(5.1e-3, rel=1e-6)
 
 
-def test_a_command_that_presses_a_joint_into_its_end_is_the_fault_joint_limit_in_time():
+def test_a_command_that_presses_a_joint_into_its_end_is_the_fault_joint_limit_in_time() -> None:
     led = following(**{"operation.pressing_time": 0.2})
     led.commanded = led.row["slave_setpoint_js"].copy()
     for _ in range(20_000):
@@ -280,7 +295,7 @@ def test_a_command_that_presses_a_joint_into_its_end_is_the_fault_joint_limit_in
     assert ticks * DT == pytest.approx(0.2, abs=2.5e-3)
 
 
-def test_a_command_of_more_than_a_second_ahead_is_refused_and_the_next_one_is_taken():
+def test_a_command_of_more_than_a_second_ahead_is_refused_and_the_next_one_is_taken() -> None:
     led = following()
     for ahead_ns, status in (
         (900_000_000, CommandStatus.FRESH),

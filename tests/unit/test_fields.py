@@ -23,7 +23,7 @@ class Joined(Base):
     jacobian: Annotated[Array, 3, "joints"]
 
 
-def test_a_record_has_the_fields_of_its_class_and_of_its_bases_and_begins_at_zero():
+def test_a_record_has_the_fields_of_its_class_and_of_its_bases_and_begins_at_zero() -> None:
     made = record(Joined, 6)
     assert made.dtype.names == ("place", "count", "share", "joints", "ticks", "jacobian")
     shapes = [np.shape(made[name]) for name in made.dtype.names]
@@ -33,7 +33,7 @@ def test_a_record_has_the_fields_of_its_class_and_of_its_bases_and_begins_at_zer
     assert made.joints.dtype == np.float64
 
 
-def test_a_field_that_two_bases_name_is_there_once():
+def test_a_field_that_two_bases_name_is_there_once() -> None:
     class Other(Fields):
         count: int
 
@@ -43,7 +43,7 @@ def test_a_field_that_two_bases_name_is_there_once():
     assert [name for name, *_ in fields_of(Both)] == ["count", "place"]
 
 
-def test_the_row_names_each_field_of_each_topic_and_no_other():
+def test_the_row_names_each_field_of_each_topic_and_no_other() -> None:
     topics = [topic for topic in BY_NAME.values() if topic.width(1)]
     made = make_signals(topics, 1, (("answered_ns", "i8"),))
     assert {name for name, *_ in fields_of(Row)} == set(made.dtype.names)

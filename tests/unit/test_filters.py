@@ -1,6 +1,7 @@
 """Reference low-pass: published coefficients and step, and the printed sign that diverges."""
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from hypothesis import strategies as st
 from teleop_core.base.errors import ParameterError
 from teleop_core.base.parameters import build
 from teleop_core.kernels.filters import lag_step
+from teleop_core.kernels.geometry import Array
 from teleop_core.slave.slave import ReferenceFilterParameters
 
 GAIN, ZERO, POLE, DT = 0.1, 100.0, 10.0, 1e-3
@@ -17,7 +19,13 @@ GAIN, ZERO, POLE, DT = 0.1, 100.0, 10.0, 1e-3
 ROUNDING = 1e-15
 
 
-def filtered(values, start=0.0, gain=GAIN, zero=ZERO, pole=POLE):
+def filtered(
+    values: Any,
+    start: float = 0.0,
+    gain: float = GAIN,
+    zero: float = ZERO,
+    pole: float = POLE,
+) -> Array:
     """Output of the filter that rests at ``start`` before the values come."""
     last_input, output, out = start, start, []
     for value in values:
@@ -27,14 +35,14 @@ def filtered(values, start=0.0, gain=GAIN, zero=ZERO, pole=POLE):
     return np.array(out)
 
 
-def test_coefficients_are_the_published_ones():  # case 21
+def test_coefficients_are_the_published_ones() -> None:  # case 21
     published = {"c": 0.99, "last": -0.09, "now": 0.1}
     assert math.isclose(lag_step(0.0, 0.0, 1.0, GAIN, ZERO, POLE, DT), published["c"])
     assert math.isclose(lag_step(0.0, 1.0, 0.0, GAIN, ZERO, POLE, DT), published["last"])
     assert math.isclose(lag_step(1.0, 0.0, 0.0, GAIN, ZERO, POLE, DT), published["now"])
 
 
-def test_unit_step_runs_through_the_published_values_to_one():  # case 21
+def test_unit_step_runs_through_the_published_values_to_one() -> None:  # case 21
     output = filtered(np.ones(3000))
     assert np.allclose(output[:3], (0.1, 0.109, 0.11791), rtol=0, atol=ROUNDING)
     # 0.99^3000 = 8e-14 is left after 3 s.
@@ -42,7 +50,7 @@ def test_unit_step_runs_through_the_published_values_to_one():  # case 21
     assert (np.diff(output) >= 0.0).all()
 
 
-def test_printed_sign_puts_the_pole_outside_the_unit_circle():  # case 22
+def test_printed_sign_puts_the_pole_outside_the_unit_circle() -> None:  # case 22
     output, last = 0.0, 0.0
     for _ in range(3000):
         output = (1.0 + POLE * DT) * output + GAIN * (ZERO * DT - 1.0) * last + GAIN
@@ -52,7 +60,7 @@ def test_printed_sign_puts_the_pole_outside_the_unit_circle():  # case 22
 
 
 @pytest.mark.parametrize("hertz", [50.0, 100.0, 200.0, 400.0])
-def test_gain_above_50_hz_is_a_tenth(hertz):  # case 21
+def test_gain_above_50_hz_is_a_tenth(hertz: float) -> None:  # case 21
     z = np.exp(2j * math.pi * hertz * DT)
     gain = abs((0.1 - 0.09 / z) / (1.0 - 0.99 / z))
     times = np.arange(2000) * DT
@@ -63,25 +71,25 @@ def test_gain_above_50_hz_is_a_tenth(hertz):  # case 21
     assert math.isclose(measured, gain, rel_tol=1e-3)
 
 
-def test_gimbal_noise_comes_out_at_a_quarter_or_less():
+def test_gimbal_noise_comes_out_at_a_quarter_or_less() -> None:
     noise = np.random.default_rng(1).uniform(-2e-3, 2e-3, 20_000)
     # ±2e-3 rad becomes ±5e-4 rad in the source.
     assert np.abs(filtered(noise)).max() < 5e-4
 
 
-def test_output_lags_90_ms_behind_a_ramp():
+def test_output_lags_90_ms_behind_a_ramp() -> None:
     times = np.arange(3000) * DT
     # 1/pole - 1/zero, in steady motion.
     assert math.isclose(times[-1] - filtered(times)[-1], 0.09, abs_tol=1e-9)
 
 
 @given(st.floats(-3.0, 3.0))
-def test_filter_at_rest_stays_at_rest(value):
+def test_filter_at_rest_stays_at_rest(value: float) -> None:
     assert np.allclose(filtered(np.full(100, value), value), value, rtol=0, atol=1e-13)
 
 
 @given(st.lists(st.floats(-3.0, 3.0), min_size=1, max_size=50))
-def test_output_never_leaves_the_range_of_its_inputs(values):
+def test_output_never_leaves_the_range_of_its_inputs(values: list[float]) -> None:
     output = filtered(values, values[0])
     assert output.max() <= max(values) + 1e-13
     assert output.min() >= min(values) - 1e-13
@@ -91,7 +99,9 @@ def test_output_never_leaves_the_range_of_its_inputs(values):
     "values",
     [{"gain": 0.2}, {"gain": 0.0}, {"pole": 20.0}, {"zero": 50.0}, {"zero": 0.0}],
 )
-def test_filter_that_would_not_come_to_rest_at_its_input_is_refused(values):
+def test_filter_that_would_not_come_to_rest_at_its_input_is_refused(
+    values: dict[str, float],
+) -> None:
     # Steady output is gain * zero / pole times the input: else the arm stands elsewhere.
     with pytest.raises(ParameterError):
         build(ReferenceFilterParameters, values)
@@ -101,5 +111,5 @@ def test_filter_that_would_not_come_to_rest_at_its_input_is_refused(values):
     "values",
     [{}, {"gain": 0.2, "pole": 20.0}, {"pole": 5.0, "zero": 50.0}, {"gain": 1.0, "pole": 100.0}],
 )
-def test_filter_of_unit_steady_gain_is_accepted(values):
+def test_filter_of_unit_steady_gain_is_accepted(values: dict[str, float]) -> None:
     build(ReferenceFilterParameters, values)

@@ -2,12 +2,14 @@
 
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
 import pytest
 import yaml
 
+from present import present
 from teleop_core.base.errors import ParameterError, TeleopError, UnknownNameError
 from teleop_core.base.parameters import build
 from teleop_core.cli import main
@@ -15,7 +17,7 @@ from teleop_core.robots import load_robot
 from teleop_core.session.configuration import configure
 from teleop_core.slave.pair import ArmParameters
 from teleop_core.slave.plants.hardware import faults_of
-from teleop_lab.fitting.fit import FitError, default_free, fit
+from teleop_lab.fitting.fit import FitError, FitResult, default_free, fit
 from teleop_lab.fitting.rest_table import PUBLISHED, RestTable, read_rests
 from teleop_lab.fitting.rests import rest_positions
 
@@ -24,27 +26,27 @@ ARM = load_robot("rcrt1")
 NAMES = ARM.joint_names
 
 
-def slave(**settings):
+def slave(**settings: object) -> ArmParameters:
     given = {"plant.kind": "hardware", "controller.kind": "source_pid"}
     return build(ArmParameters, given | settings)
 
 
 @pytest.fixture(scope="module")
-def published():
+def published() -> Any:
     return read_rests(PUBLISHED, ARM)
 
 
 @pytest.fixture(scope="module")
-def found(published):
+def found(published: RestTable) -> FitResult:
     return fit(published, slave())
 
 
-def test_the_plant_has_the_numbers_that_its_fit_finds(found):
+def test_the_plant_has_the_numbers_that_its_fit_finds(found: FitResult) -> None:
     faults = faults_of(ARM)
     for number in found.numbers:
         kind, _, of = number.name.partition(".")
         if kind == "weight":
-            value = faults.dynamics[ARM.dynamics.unknown[of]]
+            value = faults.dynamics[present(ARM.dynamics).unknown[of]]
         else:
             value = getattr(faults, kind)[NAMES.index(of)]
         assert number.low < number.value < number.high
@@ -55,13 +57,17 @@ def test_the_plant_has_the_numbers_that_its_fit_finds(found):
         assert abs(value - number.value) < 0.15 * (number.high - number.low), number
 
 
-def test_fitted_rests_are_the_measured_ones_but_for_point_1(found):
-    off = (found.predicted - found.measured)[1:, [0, 1, 3]] / ARM.drives.encoder_step[[0, 1, 3]]
+def test_fitted_rests_are_the_measured_ones_but_for_point_1(found: FitResult) -> None:
+    off = (found.predicted - found.measured)[1:, [0, 1, 3]] / present(ARM.drives).encoder_step[
+        [0, 1, 3]
+    ]
     assert np.sqrt(np.mean(off**2)) < 6.0
-    assert abs(found.predicted[0, 1] - found.measured[0, 1]) / ARM.drives.encoder_step[1] > 50
+    assert (
+        abs(found.predicted[0, 1] - found.measured[0, 1]) / present(ARM.drives).encoder_step[1] > 50
+    )
 
 
-def test_spread_of_runs_is_the_pooled_deviation_about_the_means_of_their_points():
+def test_spread_of_runs_is_the_pooled_deviation_about_the_means_of_their_points() -> None:
     rng = np.random.default_rng(5)
     rests = tuple(rng.normal(size=(runs, 2)) for runs in (3, 4, 6))
     table = RestTable("drawn", np.zeros((3, 2)), rests)
@@ -69,13 +75,13 @@ def test_spread_of_runs_is_the_pooled_deviation_about_the_means_of_their_points(
     np.testing.assert_allclose(table.spread, np.sqrt(squares / (13 - 3)), rtol=1e-12)
 
 
-def test_fitted_spread_of_the_runs_is_the_measured_one(found):
+def test_fitted_spread_of_the_runs_is_the_measured_one(found: FitResult) -> None:
     ratio = (found.predicted_spread / found.measured_spread)[[0, 1, 3, 4, 5]]
     assert ((ratio > 0.7) & (ratio < 1.3)).all()
 
 
 @pytest.mark.soak
-def test_numbers_that_made_rests_come_back_from_them(published):
+def test_numbers_that_made_rests_come_back_from_them(published: RestTable) -> None:
     inside = np.clip(published.targets, ARM.lower, ARM.upper)
     truth = {"coulomb": (0.15, 0.4, 1.0, 0.01, 0.0012, 0.0009), "bias": (-0.05,) + (0.0,) * 5,
              "weights": ("m2b_L0b=0.02",), "wander": (0.2,) * 6}  # fmt: skip
@@ -91,17 +97,19 @@ def test_numbers_that_made_rests_come_back_from_them(published):
         assert abs(again.value(f"wander.{name}") - 0.2) < 0.08
 
 
-def test_plain_squares_believe_point_1_and_weigh_less(published, found):
+def test_plain_squares_believe_point_1_and_weigh_less(
+    published: RestTable, found: FitResult
+) -> None:
     plain = fit(published, slave(), ["coulomb.theta2", "weight.m2b_L0b"], loss="linear")
     assert plain.value("weight.m2b_L0b") < 0.6 * found.value("weight.m2b_L0b")
 
 
-def test_an_unknown_loss_is_refused(published):
+def test_an_unknown_loss_is_refused(published: RestTable) -> None:
     with pytest.raises(UnknownNameError, match="cauchy, huber"):
         fit(published, slave(), loss="tukey")
 
 
-def test_what_a_table_can_tell_leaves_out_what_an_integrator_hides(published):
+def test_what_a_table_can_tell_leaves_out_what_an_integrator_hides(published: RestTable) -> None:
     free = default_free(ARM, published)
     assert "coulomb.d3" not in free
     assert "bias.theta1" in free  # approached from both sides
@@ -117,7 +125,9 @@ def test_what_a_table_can_tell_leaves_out_what_an_integrator_hides(published):
         (["coulomb.theta2", "bias.theta2", "weight.m2b_L0b"], ["bias.theta2", "weight.m2b_L0b"]),
     ],
 )
-def test_parameters_that_cannot_be_told_apart_are_named(published, free, named):
+def test_parameters_that_cannot_be_told_apart_are_named(
+    published: RestTable, free: list[str], named: list[str]
+) -> None:
     with pytest.raises(FitError, match="not identifiable") as caught:
         fit(published, slave(), free)
     for name in named:
@@ -125,19 +135,19 @@ def test_parameters_that_cannot_be_told_apart_are_named(published, free, named):
 
 
 @pytest.mark.parametrize("free", [[], ["coulomb.theta1"] * 2])
-def test_nothing_to_fit_is_refused(published, free):
+def test_nothing_to_fit_is_refused(published: RestTable, free: Any) -> None:
     with pytest.raises(ParameterError, match="free"):
         fit(published, slave(), free)
 
 
-def test_an_unknown_parameter_and_another_plant_are_refused(published):
+def test_an_unknown_parameter_and_another_plant_are_refused(published: RestTable) -> None:
     with pytest.raises(UnknownNameError, match=r"coulomb\.theta1"):
         fit(published, slave(), ["coulomb.elbow"])
     with pytest.raises(ParameterError, match="hardware"):
         fit(published, slave(**{"plant.kind": "ideal"}))
 
 
-def changed(tmp_path, change):
+def changed(tmp_path: Path, change: Any) -> Path:
     table = pd.read_csv(PUBLISHED)
     file = tmp_path / "rests.csv"
     change(table).to_csv(file, index=False)
@@ -155,7 +165,9 @@ def changed(tmp_path, change):
         (lambda t: t[:0], "no rows"),
     ],
 )
-def test_a_table_of_another_shape_is_refused_in_one_line(tmp_path, capsys, change, needed):
+def test_a_table_of_another_shape_is_refused_in_one_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], change: Any, needed: str
+) -> None:
     file = changed(tmp_path, change)
     with pytest.raises(TeleopError, match=needed):
         read_rests(file, ARM)
@@ -166,14 +178,18 @@ def test_a_table_of_another_shape_is_refused_in_one_line(tmp_path, capsys, chang
     assert not (tmp_path / "out.yaml").exists()
 
 
-def test_a_missing_table_and_folder_are_told(tmp_path, capsys):
+def test_a_missing_table_and_folder_are_told(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     assert main(["fit", str(tmp_path / "none.csv")]) == 2
     assert "none.csv" in capsys.readouterr().err
     assert main(["fit", "--json", str(tmp_path / "no" / "fit.json")]) == 2
     assert "make it first" in capsys.readouterr().err
 
 
-def test_command_writes_a_plant_that_a_session_takes(tmp_path, capsys):
+def test_command_writes_a_plant_that_a_session_takes(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     out, numbers = tmp_path / "plant.yaml", tmp_path / "fit.json"
     names = ["coulomb.theta1", "bias.theta1"]
     assert main(["fit", "--free", *names, "--out", str(out), "--json", str(numbers)]) == 0

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from teleop_core.kernels.geometry import rotation, transform
+from present import present
+from teleop_core.kernels.geometry import Array, rotation, transform
 from teleop_core.robots import IkStatus, load_robot
-from teleop_core.robots.dh import load_table, parse_table
+from teleop_core.robots.dh import DhTable, load_table, parse_table
 from teleop_core.robots.five_axis import pitch_and_roll
 
 ARM = load_robot("five_axis")
@@ -17,7 +18,7 @@ ROUNDING = 1e-14
 DT = 1e-3
 
 
-def proximal_table(home_of_4):
+def proximal_table(home_of_4: int) -> DhTable:
     """Table 3.4 of the thesis; its theta4 counted from a home position."""
     return parse_table(
         {
@@ -36,11 +37,11 @@ def proximal_table(home_of_4):
     )
 
 
-def random_joints(count=100, seed=1):
+def random_joints(count: int = 100, seed: int = 1) -> Array:
     return np.random.default_rng(seed).uniform(ARM.lower, ARM.upper, (count, 5))
 
 
-def test_h12_proximal_distal_and_closed_form_are_one_arm():
+def test_h12_proximal_distal_and_closed_form_are_one_arm() -> None:
     proximal = proximal_table(0).robot()
     distal = load_table("config/robots/five_axis_standard.yaml").robot()
     for q in random_joints():
@@ -48,7 +49,7 @@ def test_h12_proximal_distal_and_closed_form_are_one_arm():
         assert np.abs(distal.fk(q) - ARM.fk(q)).max() < ROUNDING
 
 
-def test_sheth_uicker_is_the_same_arm_up_to_a_fixed_roll_of_minus_90_degrees():
+def test_sheth_uicker_is_the_same_arm_up_to_a_fixed_roll_of_minus_90_degrees() -> None:
     table = load_table("config/robots/five_axis_sheth_uicker.yaml").robot()
     roll = transform(rotation("z", -math.pi / 2.0), np.zeros(3))
     for q in random_joints():
@@ -59,20 +60,20 @@ def test_sheth_uicker_is_the_same_arm_up_to_a_fixed_roll_of_minus_90_degrees():
         )
 
 
-def test_joint_4_home_of_minus_90_points_the_tool_forward_and_the_printed_one_back():
+def test_joint_4_home_of_minus_90_points_the_tool_forward_and_the_printed_one_back() -> None:
     forward, back = (proximal_table(home).robot().fk(np.zeros(5)) for home in (-90, 90))
     assert np.abs(forward[:3, 2] - (1.0, 0.0, 0.0)).max() < ROUNDING
     assert np.abs(forward[:3, 3] - (A2 + A3 + D5, 0.0, D1)).max() < ROUNDING
     assert np.abs(back[:3, 2] - (-1.0, 0.0, 0.0)).max() < ROUNDING
 
 
-def test_at_home_the_tool_points_straight_down():
+def test_at_home_the_tool_points_straight_down() -> None:
     assert np.abs(ARM.fk(ARM.home)[:3, 2] - (0.0, 0.0, -1.0)).max() < ROUNDING
     assert ARM.task_mask == (True, True, True, False, True, True)
 
 
 @pytest.mark.parametrize("tilt", [0.01, 0.3, 1.0])
-def test_a_tilt_out_of_the_plane_is_left_as_residual_and_the_rest_followed(tilt):
+def test_a_tilt_out_of_the_plane_is_left_as_residual_and_the_rest_followed(tilt: float) -> None:
     q = ARM.home.copy()
     pose = ARM.fk(q)
     # At home the direction that the arm lacks is the turn about the base's x axis.
@@ -85,7 +86,7 @@ def test_a_tilt_out_of_the_plane_is_left_as_residual_and_the_rest_followed(tilt)
     assert len(ARM.ik_all(pose)) == 0
 
 
-def test_no_other_attitude_of_the_arm_is_nearer_than_the_one_it_takes():
+def test_no_other_attitude_of_the_arm_is_nearer_than_the_one_it_takes() -> None:
     rng = np.random.default_rng(5)
     for _ in range(20):
         turn = rotation("z", rng.uniform(-3, 3)) @ rotation("y", rng.uniform(-3, 3))
@@ -93,7 +94,7 @@ def test_no_other_attitude_of_the_arm_is_nearer_than_the_one_it_takes():
         q1 = rng.uniform(-3, 3)
         psi, q5 = pitch_and_roll(transform(wanted, np.zeros(3)), q1, 0.0, 0.0)
 
-        def miss(pitch, roll, q1=q1, wanted=wanted):
+        def miss(pitch: float, roll: float, q1: float = q1, wanted: Array = wanted) -> float:
             pose = ARM.fk(np.array([q1, 0.0, 0.0, pitch, roll]))
             return Rotation.from_matrix(pose[:3, :3].T @ wanted).magnitude()
 
@@ -105,7 +106,7 @@ def test_no_other_attitude_of_the_arm_is_nearer_than_the_one_it_takes():
             assert best <= miss(psi + a, q5 + b) + 1e-12
 
 
-def test_poses_with_a_tilt_are_reached_in_position_from_any_seed():
+def test_poses_with_a_tilt_are_reached_in_position_from_any_seed() -> None:
     rng = np.random.default_rng(6)
     for q, seed in zip(random_joints(200), random_joints(200, seed=2), strict=True):
         pose = ARM.fk(q)
@@ -117,19 +118,19 @@ def test_poses_with_a_tilt_are_reached_in_position_from_any_seed():
 
 
 @pytest.mark.parametrize("y", [0.0, 1e-9, 1e-4, 1e-2])
-def test_lines_over_the_base_axis_keep_speeds_and_go_on(y):
+def test_lines_over_the_base_axis_keep_speeds_and_go_on(y: float) -> None:
     x = np.concatenate((np.linspace(0.2, -0.2, 3000), np.full(4000, -0.2)))
     down = ARM.fk(ARM.home)[:3, :3]
     poses = np.array([transform(down, np.array([value, y, 0.3])) for value in x])
     seed = ARM.ik(poses[0]).q
     result = ARM.follow(poses, seed, DT)
     steps = np.abs(np.diff(np.vstack((seed, result.q)), axis=0))
-    assert (steps <= ARM.drives.speed_limit * DT * (1.0 + 1e-9)).all()
+    assert (steps <= present(ARM.drives).speed_limit * DT * (1.0 + 1e-9)).all()
     assert np.isfinite(result.residual).all()
 
 
 @pytest.mark.parametrize("reach", [1.001, 1.2])
-def test_stretching_beyond_reach_and_back_ends_on_the_path(reach):
+def test_stretching_beyond_reach_and_back_ends_on_the_path(reach: float) -> None:
     q = np.array([0.2, -0.6, 1.0, -0.4, 0.3])
     pose = ARM.fk(q)
     far = pose[:3, 3].copy()
@@ -139,5 +140,5 @@ def test_stretching_beyond_reach_and_back_ends_on_the_path(reach):
     poses = np.array([transform(pose[:3, :3], p) for p in points])
     result = ARM.follow(poses, q, DT)
     steps = np.abs(np.diff(np.vstack((q, result.q)), axis=0))
-    assert (steps <= ARM.drives.speed_limit * DT * (1.0 + 1e-9)).all()
+    assert (steps <= present(ARM.drives).speed_limit * DT * (1.0 + 1e-9)).all()
     assert result.residual[-1].max() < 1e-9

@@ -1,12 +1,15 @@
 """Fixtures as parts: the sphere beside the box, own shapes, and what is refused."""
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from numpy.typing import ArrayLike
 
 from teleop_core.base.errors import PartError
 from teleop_core.base.parameters import build, parameter
@@ -14,6 +17,7 @@ from teleop_core.chain.fixtures import FIXTURES, Fixture, register_fixture
 from teleop_core.chain.fixtures.sphere import SphereParameters, sphere_depth, sphere_outline
 from teleop_core.chain.mapping.parameters import FixtureParameters
 from teleop_core.kernels import kernel
+from teleop_core.kernels.geometry import Array
 from teleop_core.kernels.parts import numbers_of
 
 # Quotients of numbers below one.
@@ -21,23 +25,27 @@ ROUNDING = 1e-15
 places = st.tuples(*[st.floats(-0.1, 0.1)] * 3).map(np.array)
 
 
-def own(name="own", **more):
-    parts = {"parameters": SphereParameters, "depth": sphere_depth, "outline": sphere_outline}
+def own(name: str = "own", **more: Callable[..., object] | type[object] | None) -> Any:
+    parts: dict[str, Any] = {
+        "parameters": SphereParameters,
+        "depth": sphere_depth,
+        "outline": sphere_outline,
+    }
     return Fixture(name, **{**parts, **more})
 
 
 @given(places, st.floats(1e-3, 0.1))
-def test_depth_of_a_sphere_leads_to_its_nearest_point(offset, diameter):
+def test_depth_of_a_sphere_leads_to_its_nearest_point(offset: Any, diameter: float) -> None:
     out = np.full(3, math.nan)
     length = sphere_depth(offset, np.array([diameter]), out)
-    distance = np.linalg.norm(offset)
+    distance: Any = np.linalg.norm(offset)
     assert math.isclose(length, max(distance - 0.5 * diameter, 0.0), abs_tol=ROUNDING)
     nearest = offset * min(1.0, 0.5 * diameter / distance) if distance else offset
     assert np.allclose(offset - out, nearest, rtol=0, atol=ROUNDING)
 
 
 @pytest.mark.parametrize("name", ["box", "sphere"])
-def test_outline_lies_on_the_walls_and_depth_begins_there(name):
+def test_outline_lies_on_the_walls_and_depth_begins_there(name: str) -> None:
     part = FIXTURES.find(name)
     parameters = part.parameters()
     points, shape = part.outline(parameters), numbers_of(parameters)
@@ -48,22 +56,22 @@ def test_outline_lies_on_the_walls_and_depth_begins_there(name):
 
 
 @pytest.mark.parametrize("name", ["box", "sphere"])
-def test_middle_of_every_fixture_is_inside(name):
+def test_middle_of_every_fixture_is_inside(name: str) -> None:
     part = FIXTURES.find(name)
     assert not part.depths(np.zeros((1, 3)), numbers_of(part.parameters())).any()
 
 
-def test_own_fixture_is_chosen_by_its_name_and_has_its_parameters(own_parts):
+def test_own_fixture_is_chosen_by_its_name_and_has_its_parameters(own_parts: None) -> None:
     @dataclass(frozen=True, kw_only=True)
     class ConeParameters:
         height: float = parameter(0.04, unit="m", lower=0.01, upper=0.5, doc="tip to base")
         widths: tuple[float, ...] = parameter((0.02, 0.03), unit="m", length=2, doc="of the base")
 
-    def depth(offset, shape, out):
+    def depth(offset: Array, shape: Array, out: Array) -> float:
         out[:] = 0.0
         return 0.0
 
-    def outline(parameters):
+    def outline(parameters: Any) -> Array:
         return np.array([(0.0, 0.0, 0.0), (parameters.widths[0], 0.0, parameters.height)])
 
     register_fixture(Fixture("my_cone", ConeParameters, depth, outline))
@@ -72,18 +80,18 @@ def test_own_fixture_is_chosen_by_its_name_and_has_its_parameters(own_parts):
     assert np.array_equal(numbers_of(chosen.parameters), (0.05, 0.02, 0.03))
 
 
-def writes_four(offset, shape, out):
+def writes_four(offset: Any, shape: Any, out: Any) -> float:
     for i in range(4):
         out[i] = 0.0
     return 0.0
 
 
-def reads_beyond(offset, shape, out):
+def reads_beyond(offset: Any, shape: Any, out: Any) -> Any:
     return offset[0] - shape[3]
 
 
-def fills(value, length=0.0):
-    def depth(offset, shape, out):
+def fills(value: float | ArrayLike, length: float = 0.0) -> Callable[[Array, Array, Array], float]:
+    def depth(offset: Array, shape: Array, out: Array) -> float:
         out[:] = value
         return length
 
@@ -116,7 +124,10 @@ BAD = {
 
 
 @pytest.mark.parametrize("case", BAD)
-def test_fixture_that_cannot_work_is_refused_before_anything_runs(own_parts, case):
+def test_fixture_that_cannot_work_is_refused_before_anything_runs(
+    own_parts: None, case: str
+) -> None:
+    values: Any
     values, expected = BAD[case]
     with pytest.raises(PartError) as error:
         register_fixture(own(**values))

@@ -9,6 +9,7 @@ import math
 import os
 import subprocess
 import sys
+from typing import Any
 
 import numpy as np
 import pytest
@@ -37,6 +38,7 @@ from teleop_core.chain.fixtures.keep_out_sphere import KeepOutSphereParameters
 from teleop_core.chain.fixtures.line import LineParameters
 from teleop_core.chain.fixtures.path import PathParameters, path_depth
 from teleop_core.chain.mapping.parameters import FixtureParameters
+from teleop_core.kernels.geometry import Array
 from teleop_core.kernels.parts import numbers_of
 
 # Sums and products of numbers below one.
@@ -47,7 +49,7 @@ TURNED = 1e-12
 SHALLOW = 1e-6
 
 
-def a_place(data, parameters):
+def a_place(data: st.DataObject, parameters: Any) -> Array:
     """Place (3,) [m] to try: one of all, or, beside a forbidden body, one within its size."""
     offset = np.array(data.draw(places))
     if not hasattr(parameters, "place"):
@@ -56,15 +58,17 @@ def a_place(data, parameters):
     return np.array(parameters.place) + 5.5 * offset * size  # a tenth more than it is wide
 
 
-def test_every_fixture_there_is_is_tried_here():
+def test_every_fixture_there_is_is_tried_here() -> None:
     elsewhere = {"mesh", "keep_out_mesh", "union", "intersection"}
     assert set(FIXTURES.names()) - elsewhere == set(KINDS) == set(BEYOND)
 
 
 @pytest.mark.parametrize("name", KINDS)
 @given(st.data())
-def test_way_is_as_long_as_the_depth_and_leads_from_a_place_that_is_allowed(name, data):
-    parameters = data.draw(KINDS[name])
+def test_way_is_as_long_as_the_depth_and_leads_from_a_place_that_is_allowed(
+    name: str, data: Any
+) -> None:
+    parameters: Any = data.draw(KINDS[name])
     offset = a_place(data, parameters)
     depth, way = found(name, parameters, offset)
     assert depth >= 0.0
@@ -76,15 +80,15 @@ def test_way_is_as_long_as_the_depth_and_leads_from_a_place_that_is_allowed(name
         assert depth <= TURNED
 
 
-def step_of(p):
+def step_of(p: PathParameters) -> float:
     """Largest distance from one of the points along a path to the next [m]."""
     return np.linalg.norm(np.diff(pieces(p), axis=1), axis=-1).max() + TURNED
 
 
 @pytest.mark.parametrize("name", [name for name in KINDS if name not in THIN])
 @given(st.data())
-def test_no_place_that_is_allowed_is_nearer_than_the_depth(name, data):
-    parameters = data.draw(KINDS[name])
+def test_no_place_that_is_allowed_is_nearer_than_the_depth(name: str, data: Any) -> None:
+    parameters: Any = data.draw(KINDS[name])
     offset = a_place(data, parameters)
     depth, _ = found(name, parameters, offset)
     assume(depth > SHALLOW)
@@ -92,14 +96,18 @@ def test_no_place_that_is_allowed_is_nearer_than_the_depth(name, data):
 
 
 @given(KINDS["line"], places)
-def test_depth_beside_a_line_is_the_distance_from_it_beyond_what_is_free(p, offset):
+def test_depth_beside_a_line_is_the_distance_from_it_beyond_what_is_free(
+    p: LineParameters, offset: tuple[float, float, float]
+) -> None:
     expected = max(float(beyond_line(p, np.array(offset))), 0.0)
     assert math.isclose(found("line", p, offset)[0], expected, abs_tol=TURNED)
 
 
 @given(KINDS["path"], places)
 @settings(max_examples=200)
-def test_depth_beside_a_path_is_the_distance_from_the_nearest_of_its_points(p, offset):
+def test_depth_beside_a_path_is_the_distance_from_the_nearest_of_its_points(
+    p: PathParameters, offset: tuple[float, float, float]
+) -> None:
     apart = float(beyond_path(p, np.array(offset))) + p.tolerance
     half = 0.5 * step_of(p)
     depth, _ = found("path", p, offset)
@@ -109,7 +117,7 @@ def test_depth_beside_a_path_is_the_distance_from_the_nearest_of_its_points(p, o
 
 @pytest.mark.parametrize("name", KINDS)
 @given(st.data())
-def test_depth_changes_by_no_more_than_one_moves(name, data):
+def test_depth_changes_by_no_more_than_one_moves(name: str, data: st.DataObject) -> None:
     parameters = data.draw(KINDS[name])
     here, there = a_place(data, parameters), a_place(data, parameters)
     share = data.draw(st.sampled_from([1.0, 1e-3, 1e-6]))
@@ -120,7 +128,8 @@ def test_depth_changes_by_no_more_than_one_moves(name, data):
 
 @pytest.mark.parametrize("name", KINDS)
 @given(st.data())
-def test_outline_is_drawn_where_the_wall_is(name, data):
+def test_outline_is_drawn_where_the_wall_is(name: str, data: Any) -> None:
+    parameters: Any
     part, parameters = FIXTURES.find(name), data.draw(KINDS[name])
     points = part.outline(parameters)
     points = points[np.isfinite(points).all(axis=1)]
@@ -132,14 +141,16 @@ def test_outline_is_drawn_where_the_wall_is(name, data):
 
 @pytest.mark.parametrize("name", KINDS)
 @given(st.data())
-def test_middle_of_a_fixture_is_allowed_whatever_its_parameters(name, data):
+def test_middle_of_a_fixture_is_allowed_whatever_its_parameters(
+    name: str, data: st.DataObject
+) -> None:
     assert found(name, data.draw(KINDS[name]), np.zeros(3))[0] <= ROUNDING
 
 
 # Ends, ties and fixed directions.
 
 
-def test_a_tube_and_a_line_of_length_zero_have_no_ends():
+def test_a_tube_and_a_line_of_length_zero_have_no_ends() -> None:
     far = np.array([0.0, 50.0, 0.0])
     assert found("cylinder", CylinderParameters(length=0.0), far)[0] == 0.0
     assert found("cylinder", CylinderParameters(length=0.1), far)[0] == 49.95
@@ -149,38 +160,38 @@ def test_a_tube_and_a_line_of_length_zero_have_no_ends():
     assert found("line", short, far)[0] == 49.95
 
 
-def test_below_a_floor_the_way_out_is_down_from_the_plane():
+def test_below_a_floor_the_way_out_is_down_from_the_plane() -> None:
     floor = HalfSpaceParameters(room=0.01)
     depth, way = found("half_space", floor, np.array([0.02, -0.03, 0.0]))
     assert math.isclose(depth, 0.02)
     assert np.allclose(way, (0.0, -0.02, 0.0), rtol=0, atol=ROUNDING)
 
 
-def test_beyond_its_tip_a_cone_leads_to_the_tip():
+def test_beyond_its_tip_a_cone_leads_to_the_tip() -> None:
     depth, way = found("cone", ConeParameters(), np.array([0.0, -0.05, 0.0]))
     assert math.isclose(depth, 0.02)
     assert np.allclose(way, (0.0, -0.02, 0.0), rtol=0, atol=ROUNDING)
 
 
-def test_the_earlier_of_two_pieces_leads_where_both_are_equally_near():
+def test_the_earlier_of_two_pieces_leads_where_both_are_equally_near() -> None:
     # There and back 20 mm beside it: the point is halfway.
     p = PathParameters(points=(0.1, 0.0, 0.0, 0.1, 0.02, 0.0, 0.0, 0.02, 0.0), tolerance=0.0)
     depth, way = found("path", p, np.array([0.05, 0.01, 0.0]))
     assert (depth, way.tolist()) == (0.01, [0.0, 0.01, 0.0])
 
 
-def test_a_piece_of_no_length_is_a_point():
+def test_a_piece_of_no_length_is_a_point() -> None:
     p = PathParameters(points=(0.0, 0.0, 0.0), tolerance=0.0)
     assert found("path", p, np.array([0.0, 0.03, 0.0]))[0] == 0.03
 
 
-def test_the_middle_of_what_is_forbidden_has_a_way_out():
+def test_the_middle_of_what_is_forbidden_has_a_way_out() -> None:
     ball, block = KeepOutSphereParameters(), KeepOutBoxParameters(size=(0.04, 0.03, 0.02))
     assert found("keep_out_sphere", ball, ball.place)[1].tolist() == [0.0, 0.0, -0.015]
     assert found("keep_out_box", block, block.place)[1].tolist() == [0.0, 0.0, -0.01]
 
 
-def test_a_path_takes_64_points_and_no_more():
+def test_a_path_takes_64_points_and_no_more() -> None:
     most = PathParameters(points=(0.01, 0.0, 0.0) * 64)
     out = np.empty(3)
     assert path_depth(np.array([0.01, 0.0, 0.0]), numbers_of(most), out) == 0.0
@@ -204,7 +215,9 @@ def test_a_path_takes_64_points_and_no_more():
         ("keep_out_box.place", (0.0, 0.01, 0.0)),
     ],
 )
-def test_numbers_that_do_not_fit_together_are_refused_by_name(name, value):
+def test_numbers_that_do_not_fit_together_are_refused_by_name(
+    name: str, value: tuple[float, ...]
+) -> None:
     with pytest.raises(ParameterError) as error:
         build(FixtureParameters, {name: value})
     assert (error.value.name, error.value.value) == (name, value)
@@ -218,7 +231,7 @@ print(digest())
 """
 
 
-OBLIQUE = {
+OBLIQUE: Any = {
     "cylinder": {"direction": (0.3, 0.7, -0.5)},
     "half_space": {"normal": (-0.2, 0.9, 0.3)},
     "cone": {"axis": (0.1, 0.9, 0.2)},
@@ -230,18 +243,18 @@ OBLIQUE = {
 """Parameters along no axis: sums of zeros would be the same in any order."""
 
 
-def digest():
+def digest() -> str:
     """Digest of depths and ways of all kinds at forty places."""
     seen = hashlib.sha256()
     for name in KINDS:
-        part = FIXTURES.find(name)
+        part: Any = FIXTURES.find(name)
         shape, out = numbers_of(part.parameters(**OBLIQUE.get(name, {}))), np.empty(3)
         for offset in np.random.default_rng(2).uniform(-0.06, 0.06, (40, 3)):
             seen.update(np.float64(part.depth(offset, shape, out)).tobytes() + out.tobytes())
     return seen.hexdigest()
 
 
-def test_depths_have_the_same_bits_compiled_and_as_plain_python():
+def test_depths_have_the_same_bits_compiled_and_as_plain_python() -> None:
     plain = {**os.environ, "NUMBA_DISABLE_JIT": "1", "PYTHONPATH": os.pathsep.join(sys.path)}
     done = subprocess.run(
         [sys.executable, "-c", DIGEST, os.path.dirname(__file__)],

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,6 +18,7 @@ from teleop_core.chain.mapping.motion_scaling import to_slave_axes
 from teleop_core.chain.mapping.parameters import FixtureParameters
 from teleop_core.graph.signals import TICK_NS
 from teleop_core.kernels import kernel
+from teleop_core.kernels.geometry import Array
 
 # Sums of a few hundred steps of millimetres at half a metre [m].
 ROUNDING = 1e-12
@@ -30,13 +32,13 @@ EVENTS = st.sampled_from(["", "", "", "", "mode", "clutch"])
 HELD = pytest.mark.parametrize("side", ["slave", "both"])
 
 
-def fixture(side, **values):
+def fixture(side: str, **values: Any) -> FixtureParameters:
     """Parameters of a fixture; a name says ``__`` for a dot."""
     named = {name.replace("__", "."): value for name, value in values.items()}
     return build(FixtureParameters, {"side": side} | named)
 
 
-def chosen(side, kind, parameters):
+def chosen(side: str, kind: str, parameters: object) -> FixtureParameters:
     """Parameters of a fixture of a kind."""
     named = {f"{kind}.{name}": value for name, value in vars(parameters).items()}
     return build(FixtureParameters, {"side": side, "kind": kind} | named)
@@ -45,7 +47,7 @@ def chosen(side, kind, parameters):
 class HeldDesk(Desk):
     """A desk with a fixture around hand and slave, whose place at the slave it knows itself."""
 
-    def __init__(self, parameters, **values):
+    def __init__(self, parameters: FixtureParameters, **values: float) -> None:
         super().__init__(fixture=parameters, **values)
         self.sent = self.step()
         self.press("fixture")
@@ -55,10 +57,10 @@ class HeldDesk(Desk):
             to_slave_axes(self.scaling.parameters, np.eye(3)[i], turn[i])
         self.axes = turn.T
 
-    def gain(self):
+    def gain(self) -> float:
         return float(self.scaling.parameters["gain"][int(self.state("is_fine"))])
 
-    def go(self, move=(0, 0, 0), **how):
+    def go(self, move: Any = (0, 0, 0), **how: Any) -> Any:
         """One step of the hand; returns how far the slave's command goes beyond that of it [m]."""
         before, gain = self.sent, self.gain()
         self.sent = self.step(move, **how)
@@ -66,14 +68,14 @@ class HeldDesk(Desk):
             self.middle = before + (self.middle - before) * (self.gain() / gain)
         return np.linalg.norm(self.sent - before) - self.gain() * np.linalg.norm(move)
 
-    def retune(self, parameters):
+    def retune(self, parameters: FixtureParameters) -> None:
         self.scaling.retune(replace(self.scaling.present(), fixture=parameters))
 
-    def moved(self):
+    def moved(self) -> Array:
         """From the middle of the fixture to the slave's command, on the master's side [m]."""
         return self.axes.T @ (self.sent - self.middle) / self.gain()
 
-    def outside(self):
+    def outside(self) -> float:
         """How far the slave's command is outside of the fixture [m]."""
         kind = self.scaling.present().fixture.kind
         return self.gain() * found(kind.kind, kind.parameters, self.moved())[0]
@@ -83,7 +85,9 @@ class HeldDesk(Desk):
 @pytest.mark.parametrize("name", KINDS)
 @given(st.data())
 @settings(max_examples=30)
-def test_command_neither_leaves_a_fixture_nor_steps_farther_than_the_hand(name, side, data):
+def test_command_neither_leaves_a_fixture_nor_steps_farther_than_the_hand(
+    name: str, side: str, data: st.DataObject
+) -> None:
     coarse, fine = data.draw(GAINS)
     desk = HeldDesk(chosen(side, name, data.draw(KINDS[name])), coarse_gain=coarse, fine_gain=fine)
     for event, move, count in data.draw(
@@ -103,7 +107,7 @@ def test_command_neither_leaves_a_fixture_nor_steps_farther_than_the_hand(name, 
 
 
 @HELD
-def test_command_is_the_nearest_place_of_the_box_to_the_hand(side):
+def test_command_is_the_nearest_place_of_the_box_to_the_hand(side: str) -> None:
     rng, desk, hand = np.random.default_rng(3), HeldDesk(fixture(side)), np.zeros(3)
     for _ in range(500):
         move = rng.normal(scale=3 * MM, size=3) - 0.1 * hand
@@ -113,7 +117,7 @@ def test_command_is_the_nearest_place_of_the_box_to_the_hand(side):
 
 
 @HELD
-def test_a_hand_that_comes_back_moves_the_slave_once_it_is_inside(side):
+def test_a_hand_that_comes_back_moves_the_slave_once_it_is_inside(side: str) -> None:
     desk = HeldDesk(fixture(side))
     desk.go((18 * MM, 0, 0))
     for depth in (2, 1, 0):
@@ -124,7 +128,7 @@ def test_a_hand_that_comes_back_moves_the_slave_once_it_is_inside(side):
 
 
 @HELD
-def test_inside_a_fixture_every_side_has_the_same_bits(side):
+def test_inside_a_fixture_every_side_has_the_same_bits(side: str) -> None:
     rng = np.random.default_rng(4)
     desks = [HeldDesk(fixture(one)) for one in ("hand", side)]
     at = np.zeros(3)
@@ -137,7 +141,7 @@ def test_inside_a_fixture_every_side_has_the_same_bits(side):
         assert desks[0].row["teleop_state"].tobytes() == desks[1].row["teleop_state"].tobytes()
 
 
-def test_the_hand_feels_a_fixture_of_both_as_its_own_and_that_of_the_slave_not_at_all():
+def test_the_hand_feels_a_fixture_of_both_as_its_own_and_that_of_the_slave_not_at_all() -> None:
     rng = np.random.default_rng(5)
     hand, slave, both = (HeldDesk(fixture(side)) for side in ("hand", "slave", "both"))
     for _ in range(200):
@@ -151,7 +155,7 @@ def test_the_hand_feels_a_fixture_of_both_as_its_own_and_that_of_the_slave_not_a
 
 @HELD
 @pytest.mark.parametrize("button", ["fixture", "mode", "clutch"])
-def test_no_button_moves_a_slave_that_is_held_in(side, button):
+def test_no_button_moves_a_slave_that_is_held_in(side: str, button: str) -> None:
     desk = HeldDesk(fixture(side))
     desk.go((20 * MM, 9 * MM, 0))
     before = desk.sent
@@ -163,7 +167,9 @@ def test_no_button_moves_a_slave_that_is_held_in(side, button):
 
 
 @HELD
-def test_switched_off_while_it_holds_a_fixture_leaves_the_slave_where_it_is_led_from(side):
+def test_switched_off_while_it_holds_a_fixture_leaves_the_slave_where_it_is_led_from(
+    side: str,
+) -> None:
     desk = HeldDesk(fixture(side))
     desk.go((20 * MM, 0, 0))
     desk.hold("fixture")
@@ -176,7 +182,7 @@ def test_switched_off_while_it_holds_a_fixture_leaves_the_slave_where_it_is_led_
 
 
 @HELD
-def test_put_on_while_the_hand_moves_a_fixture_holds_the_slave_from_there(side):
+def test_put_on_while_the_hand_moves_a_fixture_holds_the_slave_from_there(side: str) -> None:
     desk = HeldDesk(fixture(side))
     desk.press("fixture")
     for _ in range(10):
@@ -201,7 +207,9 @@ def test_put_on_while_the_hand_moves_a_fixture_holds_the_slave_from_there(side):
     ],
 )
 @HELD
-def test_what_is_changed_while_the_hand_is_outside_leads_the_slave_by_the_hands_steps(side, after):
+def test_what_is_changed_while_the_hand_is_outside_leads_the_slave_by_the_hands_steps(
+    side: str, after: Any
+) -> None:
     rng, desk = np.random.default_rng(6), HeldDesk(fixture(side))
     desk.go((18 * MM, 4 * MM, 0))
     before = desk.sent
@@ -217,7 +225,7 @@ def test_what_is_changed_while_the_hand_is_outside_leads_the_slave_by_the_hands_
         assert outside[-1] <= LEAVES
 
 
-def test_a_slave_outside_comes_in_as_far_as_the_hand_moves_when_it_is_held_from_now_on():
+def test_a_slave_outside_comes_in_as_far_as_the_hand_moves_when_it_is_held_from_now_on() -> None:
     desk = HeldDesk(fixture("hand"))
     desk.go((18 * MM, 0, 0))
     desk.retune(fixture("slave"))
@@ -227,7 +235,7 @@ def test_a_slave_outside_comes_in_as_far_as_the_hand_moves_when_it_is_held_from_
 
 
 @HELD
-def test_a_slave_that_went_its_own_way_is_led_from_there_without_a_step(side):
+def test_a_slave_that_went_its_own_way_is_led_from_there_without_a_step(side: str) -> None:
     desk = HeldDesk(fixture(side))
     desk.go((18 * MM, 0, 0))
     for _ in range(200):
@@ -242,7 +250,7 @@ def test_a_slave_that_went_its_own_way_is_led_from_there_without_a_step(side):
 
 
 @HELD
-def test_tremor_that_is_left_out_of_the_pose_moves_no_slave(side):
+def test_tremor_that_is_left_out_of_the_pose_moves_no_slave(side: str) -> None:
     rng, desk = np.random.default_rng(8), HeldDesk(fixture(side))
     for i in range(300):
         desk.hold("clutch", is_held=i % 50 > 40)
@@ -254,7 +262,7 @@ def test_tremor_that_is_left_out_of_the_pose_moves_no_slave(side):
 
 
 @HELD
-def test_after_a_pause_of_the_master_the_slave_stays_where_it_is(side):
+def test_after_a_pause_of_the_master_the_slave_stays_where_it_is(side: str) -> None:
     desk = HeldDesk(fixture(side))
     desk.go((18 * MM, 0, 0))
     before = desk.sent
@@ -266,7 +274,9 @@ def test_after_a_pause_of_the_master_the_slave_stays_where_it_is(side):
 
 @HELD
 @pytest.mark.parametrize("aside", [0.0, 1e-6, 2 * MM])
-def test_a_hand_that_goes_through_a_forbidden_body_does_not_throw_the_slave_across(side, aside):
+def test_a_hand_that_goes_through_a_forbidden_body_does_not_throw_the_slave_across(
+    side: str, aside: float
+) -> None:
     desk = HeldDesk(fixture(side, kind="keep_out_sphere", keep_out_sphere__place=(0.03, 0.0, 0.0)))
     desk.go((0, aside, 0))
     for _ in range(46):
@@ -285,7 +295,7 @@ class WedgeParameters:
 
 
 @kernel
-def wedge_depth(offset, shape, out):
+def wedge_depth(offset: Any, shape: Any, out: Any) -> Any:
     """Depth beyond the deeper of two planes: one round leads in only where one is crossed."""
     first, second = offset[0] - 0.01, shape[0] * offset[0] + shape[1] * offset[1] - 0.01
     depth = max(first, second, 0.0)
@@ -296,8 +306,8 @@ def wedge_depth(offset, shape, out):
 
 @HELD
 def test_a_shape_that_does_not_lead_in_within_a_few_rounds_holds_the_slave_where_it_may_be(
-    own_parts, side
-):
+    own_parts: None, side: str
+) -> None:
     register_fixture(Fixture("wedge", WedgeParameters, wedge_depth, lambda _: np.zeros((2, 3))))
     rng, desk = np.random.default_rng(7), HeldDesk(fixture(side, kind="wedge"))
     for move in (
@@ -313,7 +323,7 @@ def test_a_shape_that_does_not_lead_in_within_a_few_rounds_holds_the_slave_where
     assert desk.outside() <= LEAVES
 
 
-def test_a_side_that_there_is_not_is_refused_by_name():
+def test_a_side_that_there_is_not_is_refused_by_name() -> None:
     with pytest.raises(ParameterError) as error:
         fixture("neither")
     assert (error.value.name, error.value.value) == ("side", "neither")

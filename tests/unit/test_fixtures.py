@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from numpy.typing import ArrayLike
 
 from teleop_core.chain.fixtures.box import box_depth
 from teleop_core.chain.mapping.walls import wall_force
+from teleop_core.kernels.geometry import Array
 
 # Products of numbers up to four.
 ROUNDING = 1e-12
@@ -18,13 +20,15 @@ CENTER = np.zeros(3)
 places = st.tuples(*[st.floats(-0.05, 0.05)] * 3).map(np.array)
 
 
-def penetration(offset, size=BOX):
+def penetration(offset: ArrayLike, size: Array = BOX) -> tuple[Array, float]:
     depth = np.full(3, math.nan)
     length = box_depth(np.asarray(offset, dtype=float), size, depth)
     return depth, length
 
 
-def force(position, stiffness=STIFFNESS, largest=LARGEST, size=BOX):
+def force(
+    position: ArrayLike, stiffness: float = STIFFNESS, largest: float = LARGEST, size: Array = BOX
+) -> Array:
     depth, length = penetration(position, size)
     push = np.full(3, math.nan)
     wall_force(depth, length, stiffness, largest, push)
@@ -35,13 +39,15 @@ def force(position, stiffness=STIFFNESS, largest=LARGEST, size=BOX):
     ("mm", "newton"), [(14.9, 0.0), (15.5, -1.65), (16.0, -3.3), (17.0, -3.3), (-15.5, 1.65)]
 )
 @pytest.mark.parametrize("axis", [0, 1, 2])
-def test_wall_pushes_with_the_published_force(mm, newton, axis):  # case 23
+def test_wall_pushes_with_the_published_force(
+    mm: float, newton: float, axis: int
+) -> None:  # case 23
     position, expected = np.zeros(3), np.zeros(3)
     position[axis], expected[axis] = mm * 1e-3, newton
     assert np.allclose(force(position), expected, rtol=0, atol=ROUNDING)
 
 
-def test_printed_sign_pushes_the_hand_further_out():  # misprint 15
+def test_printed_sign_pushes_the_hand_further_out() -> None:  # misprint 15
     outside = np.array([0.0155, 0.0, 0.0])
     printed = STIFFNESS * (outside - CENTER - 0.5 * WIDTH)
     assert printed[0] > 0.0
@@ -49,25 +55,27 @@ def test_printed_sign_pushes_the_hand_further_out():  # misprint 15
 
 
 @pytest.mark.parametrize("boundary", [0.015, 0.016])
-def test_soft_wall_has_no_step_where_it_begins_and_where_it_is_full(boundary):
+def test_soft_wall_has_no_step_where_it_begins_and_where_it_is_full(boundary: float) -> None:
     before, after = force((boundary - 1e-9, 0, 0)), force((boundary + 1e-9, 0, 0))
     # 2 nm at 3300 N/m.
     assert np.abs(after - before).max() <= 6.7e-6
 
 
-def test_hard_wall_pushes_fully_at_once():
+def test_hard_wall_pushes_fully_at_once() -> None:
     assert np.array_equal(force((0.0150001, 0, 0), math.inf), (-LARGEST, 0.0, 0.0))
     assert not force((0.0149999, 0, 0), math.inf).any()
 
 
 @pytest.mark.parametrize("stiffness", [STIFFNESS, math.inf])
 @pytest.mark.parametrize("position", [(0, 0, 0), (0.015, 0, 0), (0.015, -0.015, 0.015)])
-def test_inside_and_on_the_wall_there_is_no_force(stiffness, position):
+def test_inside_and_on_the_wall_there_is_no_force(
+    stiffness: float, position: tuple[float, float, float]
+) -> None:
     assert not force(position, stiffness).any()
 
 
 @given(places)
-def test_force_never_exceeds_its_limit_and_points_back_to_the_box(position):
+def test_force_never_exceeds_its_limit_and_points_back_to_the_box(position: Array) -> None:
     for stiffness in (STIFFNESS, math.inf):
         push = force(position, stiffness)
         depth, length = penetration(position)
@@ -78,7 +86,7 @@ def test_force_never_exceeds_its_limit_and_points_back_to_the_box(position):
         assert length == 0.0 or push @ depth < 0.0
 
 
-def test_per_axis_force_of_the_source_is_too_large_in_a_corner():
+def test_per_axis_force_of_the_source_is_too_large_in_a_corner() -> None:
     corner = np.full(3, 0.017)
     per_axis = np.full(3, -LARGEST)
     assert np.linalg.norm(per_axis) > 1.7 * LARGEST
@@ -86,7 +94,7 @@ def test_per_axis_force_of_the_source_is_too_large_in_a_corner():
 
 
 @given(places, st.tuples(*[st.floats(1e-4, 0.05)] * 3).map(np.array))
-def test_penetration_leads_to_the_nearest_point_of_the_box(offset, size):
+def test_penetration_leads_to_the_nearest_point_of_the_box(offset: Array, size: Array) -> None:
     depth, length = penetration(offset, size)
     nearest = np.clip(offset, -0.5 * size, 0.5 * size)
     assert np.allclose(offset - depth, nearest, rtol=0, atol=1e-16)
@@ -94,13 +102,13 @@ def test_penetration_leads_to_the_nearest_point_of_the_box(offset, size):
 
 
 @given(places)
-def test_force_is_even_in_every_axis(position):
+def test_force_is_even_in_every_axis(position: Array) -> None:
     assert np.array_equal(force(-position), -force(position))
 
 
 @pytest.mark.parametrize("depth", [5e-324, 1e-308, 1e-160])
 @pytest.mark.parametrize("stiffness", [STIFFNESS, math.inf])
-def test_smallest_penetrations_give_finite_forces(depth, stiffness):
+def test_smallest_penetrations_give_finite_forces(depth: float, stiffness: float) -> None:
     out = np.full(3, math.nan)
     wall_force(np.array([depth, 0.0, 0.0]), depth, stiffness, LARGEST, out)
     assert np.isfinite(out).all()

@@ -1,7 +1,9 @@
 """Unions and intersections: the nearest place that one part, or that all of them, allow."""
 
 import math
+from collections.abc import Sequence
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,6 +17,7 @@ from teleop_core.chain.fixtures import FIXTURES
 from teleop_core.chain.fixtures.combined import MOST, PARTS
 from teleop_core.chain.fixtures.reported_fixture import reported_fixture
 from teleop_core.chain.mapping.parameters import FixtureParameters
+from teleop_core.kernels.geometry import Array
 
 ALLOWED = 1e-7  # what the rounds leave of a way, at most [m]
 SHALLOW = 1e-5
@@ -24,14 +27,16 @@ places = st.tuples(*[st.floats(-0.08, 0.08)] * 3).map(np.array)
 middles = st.tuples(*[st.floats(-0.02, 0.02)] * 3)
 
 
-def text_of(kind, parameters, at):
+def text_of(kind: str, parameters: object, at: list[float]) -> str:
     values = {**values_of(parameters), "at": at}
     return " ".join([kind, *(f"{name}={list(v) if isinstance(v, tuple) else v}"
                              for name, v in values.items())])  # fmt: skip
 
 
 @st.composite
-def combined(draw, name, kinds=PARTS, is_moved=True):
+def combined(
+    draw: st.DrawFn, name: str, kinds: tuple[str, ...] = PARTS, is_moved: bool = True
+) -> tuple[Array, list[SimpleNamespace]]:
     """Numbers of a shape, and its parts: kind, parameters, middle."""
     parts = []
     for kind in draw(st.lists(st.sampled_from(kinds), min_size=2, max_size=4)):
@@ -45,18 +50,20 @@ def combined(draw, name, kinds=PARTS, is_moved=True):
         assume(False)
 
 
-def found(name, numbers, offset):
+def found(name: str, numbers: Array, offset: Sequence[float] | Array) -> tuple[float, Array]:
     out = np.full(3, math.nan)
     return FIXTURES.find(name).depth(np.array(offset, dtype=float), numbers, out), out
 
 
-def depth_of(part, offset):
+def depth_of(part: SimpleNamespace, offset: Array) -> float:
     kind = FIXTURES.find(part.kind)
     return kind.depth(offset - part.at, kind.numbers(part.given), np.zeros(3))
 
 
 @given(combined("union"), places)
-def test_a_union_is_as_far_as_its_nearest_part(shape, offset):
+def test_a_union_is_as_far_as_its_nearest_part(
+    shape: tuple[Array, list[SimpleNamespace]], offset: Array
+) -> None:
     numbers, parts = shape
     depth, way = found("union", numbers, offset)
     assert depth == min(depth_of(part, offset) for part in parts)
@@ -66,7 +73,9 @@ def test_a_union_is_as_far_as_its_nearest_part(shape, offset):
 
 @given(combined("intersection", CONVEX), places)
 @settings(max_examples=1000)
-def test_no_place_that_all_parts_allow_is_nearer_than_an_intersection_of_convex_ones(shape, offset):
+def test_no_place_that_all_parts_allow_is_nearer_than_an_intersection_of_convex_ones(
+    shape: tuple[Array, list[SimpleNamespace]], offset: Array
+) -> None:
     numbers, parts = shape
     depth, way = found("intersection", numbers, offset)
     deepest = max(depth_of(part, offset) for part in parts)
@@ -82,7 +91,7 @@ def test_no_place_that_all_parts_allow_is_nearer_than_an_intersection_of_convex_
     assert left <= ALLOWED or math.isclose(depth, deepest)  # how seldom: the next law
 
 
-def test_the_rounds_nearly_always_end_at_the_nearest_place():
+def test_the_rounds_nearly_always_end_at_the_nearest_place() -> None:
     rng, part, count, late = np.random.default_rng(1), FIXTURES.find("intersection"), 0, 0
     out = np.empty(3)
     for _ in range(400):
@@ -102,7 +111,9 @@ def test_the_rounds_nearly_always_end_at_the_nearest_place():
 
 
 @given(combined("intersection", is_moved=False), places)
-def test_an_intersection_leads_to_where_all_parts_allow_or_out_of_the_deepest(shape, offset):
+def test_an_intersection_leads_to_where_all_parts_allow_or_out_of_the_deepest(
+    shape: tuple[Array, list[SimpleNamespace]], offset: Array
+) -> None:
     numbers, parts = shape
     depth, way = found("intersection", numbers, offset)
     depths = [depth_of(part, offset) for part in parts]
@@ -113,7 +124,9 @@ def test_an_intersection_leads_to_where_all_parts_allow_or_out_of_the_deepest(sh
 
 
 @given(st.tuples(*[st.floats(0.002, 0.1)] * 3), places)
-def test_six_walls_at_right_angles_are_a_box(size, offset):
+def test_six_walls_at_right_angles_are_a_box(
+    size: tuple[float, float, float], offset: Array
+) -> None:
     walls = []
     for axis in range(3):
         for side in (1.0, -1.0):
@@ -127,7 +140,7 @@ def test_six_walls_at_right_angles_are_a_box(size, offset):
     np.testing.assert_allclose(way, wanted, rtol=0.0, atol=1e-15)
 
 
-def test_a_thin_wedge_leads_to_its_edge():
+def test_a_thin_wedge_leads_to_its_edge() -> None:
     """Two walls that meet at 20 degrees, and a place 10 mm beyond their edge."""
     angle = math.radians(10.0)
     walls = tuple(f"half_space normal={[math.sin(angle), side * math.cos(angle), 0.0]} room=0.0"
@@ -139,7 +152,7 @@ def test_a_thin_wedge_leads_to_its_edge():
     np.testing.assert_allclose(way, (-0.01, 0.0, 0.0), atol=2e-6)
 
 
-def test_between_two_walls_where_nothing_is_allowed_the_deepest_pushes():
+def test_between_two_walls_where_nothing_is_allowed_the_deepest_pushes() -> None:
     walls = ("half_space normal=[0, 1, 0] room=0.0", "half_space normal=[0, -1, 0] room=0.0",
              "keep_out_sphere place=[0.02, 0, 0] diameter=0.03")  # fmt: skip
     part = FIXTURES.find("intersection")
@@ -168,12 +181,14 @@ def test_between_two_walls_where_nothing_is_allowed_the_deepest_pushes():
         (("sphere", "keep_out_sphere place=[0, 0, 0]"), ParameterError, "keep_out_sphere.place"),
     ],
 )  # fmt: skip
-def test_a_part_that_is_wrong_is_refused_by_its_number(name, parts, error, said):
+def test_a_part_that_is_wrong_is_refused_by_its_number(
+    name: str, parts: tuple[str, ...], error: type[TeleopError], said: str
+) -> None:
     with pytest.raises(error, match=said):
         build(FixtureParameters, {f"{name}.parts": parts})
 
 
-def test_a_middle_that_is_not_allowed_is_refused():
+def test_a_middle_that_is_not_allowed_is_refused() -> None:
     far = "sphere diameter=0.02 at=[0.05, 0.0, 0.0]"
     with pytest.raises(ParameterError, match="one allows the middle"):
         build(FixtureParameters, {"union.parts": (far, far)})
@@ -185,19 +200,19 @@ def test_a_middle_that_is_not_allowed_is_refused():
 
 @pytest.mark.parametrize("name", ["union", "intersection"])
 @given(data=st.data())
-def test_the_lines_of_all_parts_are_drawn_where_they_are(name, data):
+def test_the_lines_of_all_parts_are_drawn_where_they_are(name: str, data: st.DataObject) -> None:
     numbers, parts = data.draw(combined(name))
     texts = tuple(text_of(part.kind, part.given, part.at.tolist()) for part in parts)
     part = FIXTURES.find(name)
-    points = part.outline(part.parameters(parts=texts))
+    points: Any = part.outline(part.parameters(parts=texts))
     points = points[np.isfinite(points).all(axis=1)]
-    wanted = [FIXTURES.find(p.kind).outline(p.given) + p.at for p in parts]
+    wanted: Any = [FIXTURES.find(p.kind).outline(p.given) + p.at for p in parts]
     wanted = np.concatenate(wanted)
     np.testing.assert_allclose(points, wanted[np.isfinite(wanted).all(axis=1)])
     assert len(numbers)
 
 
-def test_a_report_of_a_union_has_its_shape_again():
+def test_a_report_of_a_union_has_its_shape_again() -> None:
     parts = ("sphere diameter=0.02", "cylinder diameter=0.01 length=0.0 at=[0.0, 0.0, 0.001]")
     chosen = build(FixtureParameters, {"kind": "union", "union.parts": parts}).kind
     told = {"fixture": "union"}

@@ -1,14 +1,17 @@
 """Forward kinematics says what it found: closed loops, another assembly, or none."""
 
 import math
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import pytest
 
 from teleop_core.base.errors import ClosureError, ParameterError, ShapeError
-from teleop_core.kernels.geometry import rotation, transform
+from teleop_core.kernels.geometry import Array, rotation, transform
 from teleop_core.robots import FkStatus, list_robots, load_robot
 from teleop_core.robots.dexterity import sample_workspace
+from teleop_core.robots.robot import Robot
 from teleop_core.robots.rps3 import assembly_modes
 from teleop_core.robots.stewart import PAIRED
 
@@ -19,7 +22,7 @@ WITH_LOOPS = ("four_bar", "rps3", "scara_stewart", "stewart", "three_finger_hand
 TILTED = (1.715, 1.165, 1.687)
 
 
-def torn_rps3(T, legs, b=1.0, a=0.5):
+def torn_rps3(T: Array, legs: Sequence[float] | Array, b: float = 1.0, a: float = 0.5) -> float:
     """Largest error [m]: each ball joint in its leg's plane, as far from its hinge as the leg."""
     worst = 0.0
     for i, leg in enumerate(legs):
@@ -30,7 +33,7 @@ def torn_rps3(T, legs, b=1.0, a=0.5):
     return worst
 
 
-def torn_stewart(T, legs):
+def torn_stewart(T: Array, legs: Array) -> float:
     """Largest error of a leg [m]."""
     ends = T[:3, 3] + PAIRED.platform @ T[:3, :3].T
     return np.abs(np.linalg.norm(ends - PAIRED.base, axis=1) - legs).max()
@@ -40,7 +43,7 @@ TORN = {"rps3": torn_rps3, "stewart": torn_stewart}
 loops = pytest.mark.parametrize("name", TORN)
 
 
-def legal(robot, count, seed, share=1.0):
+def legal(robot: Robot, count: int, seed: int, share: float = 1.0) -> Array:
     """Leg sets (count, n) spread evenly over a share of the strokes around home."""
     lower = robot.home + share * (robot.lower - robot.home)
     upper = robot.home + share * (robot.upper - robot.home)
@@ -48,10 +51,10 @@ def legal(robot, count, seed, share=1.0):
 
 
 @pytest.mark.parametrize("name", [name for name in list_robots() if name not in WITH_LOOPS])
-def test_a_robot_without_loops_closes_exactly_everywhere(name):
+def test_a_robot_without_loops_closes_exactly_everywhere(name: str) -> None:
     robot = load_robot(name)
     q = legal(robot, 20, 1)
-    answer = robot.solve_fk(q)
+    answer: Any = robot.solve_fk(q)
     assert (answer.status == FkStatus.CLOSED).all()
     assert (answer.residual == 0.0).all()
     assert (answer.mode == 0).all()
@@ -60,7 +63,7 @@ def test_a_robot_without_loops_closes_exactly_everywhere(name):
 
 
 @pytest.mark.parametrize("name", WITH_LOOPS)
-def test_home_is_closed_in_the_mode_of_home_and_first_of_all_assemblies(name):
+def test_home_is_closed_in_the_mode_of_home_and_first_of_all_assemblies(name: str) -> None:
     robot = load_robot(name)
     answer = robot.solve_fk(robot.home)
     assert answer.status == FkStatus.CLOSED
@@ -71,10 +74,10 @@ def test_home_is_closed_in_the_mode_of_home_and_first_of_all_assemblies(name):
 
 
 @loops
-def test_no_pose_of_fk_leaves_a_loop_open(name):
+def test_no_pose_of_fk_leaves_a_loop_open(name: str) -> None:
     robot = load_robot(name)
     q = legal(robot, 400, 2)
-    is_closed = robot.solve_fk(q).status < FkStatus.NOT_CLOSED
+    is_closed: Any = robot.solve_fk(q).status < FkStatus.NOT_CLOSED
     assert is_closed.sum() > 100
     for legs in q[is_closed]:
         assert TORN[name](robot.fk(legs), legs) <= CLOSED
@@ -86,13 +89,13 @@ def test_no_pose_of_fk_leaves_a_loop_open(name):
 
 
 @loops
-def test_the_residual_is_the_error_of_the_loops_whatever_the_status(name):
+def test_the_residual_is_the_error_of_the_loops_whatever_the_status(name: str) -> None:
     robot = load_robot(name)
     q = legal(robot, 300, 3)
     for k, search in enumerate((True, False)):
-        answer = robot.solve_fk(q, search=search)
+        answer: Any = robot.solve_fk(q, search=search)
         torn = np.array([TORN[name](T, legs) for T, legs in zip(answer.T, q, strict=True)])
-        is_closed = answer.status < FkStatus.NOT_CLOSED
+        is_closed: Any = answer.status < FkStatus.NOT_CLOSED
         assert (torn[is_closed] <= CLOSED).all()
         assert (answer.residual[is_closed] <= CLOSED).all()
         assert (answer.residual[~is_closed] > CLOSED).all()
@@ -100,7 +103,7 @@ def test_the_residual_is_the_error_of_the_loops_whatever_the_status(name):
         assert (~is_closed).any() or (name, k) == ("rps3", 0)
 
 
-def test_the_triple_that_had_no_assembly_next_to_home_has_one():
+def test_the_triple_that_had_no_assembly_next_to_home_has_one() -> None:
     robot = load_robot("rps3")
     answer = robot.solve_fk(TILTED)
     assert answer.status == FkStatus.OTHER_MODE
@@ -112,14 +115,14 @@ def test_the_triple_that_had_no_assembly_next_to_home_has_one():
     assert np.abs(tilts - 57.8).min() < 0.01
 
 
-def test_every_legal_triple_of_the_3_rps_has_an_assembly_and_fk_finds_it():
+def test_every_legal_triple_of_the_3_rps_has_an_assembly_and_fk_finds_it() -> None:
     robot = load_robot("rps3")
-    answer = robot.solve_fk(legal(robot, 4000, 4))
+    answer: Any = robot.solve_fk(legal(robot, 4000, 4))
     assert (answer.status <= FkStatus.OTHER_MODE).all()
     assert 0.4 < (answer.status == FkStatus.OTHER_MODE).mean() < 0.6
 
 
-def test_assemblies_of_the_3_rps_are_those_of_its_polynomial():
+def test_assemblies_of_the_3_rps_are_those_of_its_polynomial() -> None:
     robot = load_robot("rps3")
     for q in np.random.default_rng(5).uniform(0.3, 2.5, (60, 3)):
         found, modes = robot.fk_all(q), assembly_modes(q, b=1.0, a=0.5).transforms
@@ -128,7 +131,7 @@ def test_assemblies_of_the_3_rps_are_those_of_its_polynomial():
             assert np.abs(found - T).max(axis=(1, 2)).min() < SAME
 
 
-def test_legs_of_a_real_pose_always_assemble():
+def test_legs_of_a_real_pose_always_assemble() -> None:
     robot, rng = load_robot("stewart"), np.random.default_rng(6)
     turned = [
         rotation("z", a) @ rotation("y", b) @ rotation("x", c)
@@ -139,18 +142,18 @@ def test_legs_of_a_real_pose_always_assemble():
     q = np.array([robot.ik_all(T)[0] for T in poses])
     is_legal = ((q >= robot.lower) & (q <= robot.upper)).all(axis=1)
     q, poses = q[is_legal], poses[is_legal]
-    answer = robot.solve_fk(q)
+    answer: Any = robot.solve_fk(q)
     assert is_legal.sum() > 300
     assert (answer.status < FkStatus.NOT_CLOSED).all()
     assert (answer.status == FkStatus.OTHER_MODE).any()
     # From its own pose as the seed, each is the pose itself.
-    own = robot.solve_fk(q, poses)
+    own: Any = robot.solve_fk(q, poses)
     assert (own.status <= FkStatus.NEAR_SINGULAR).all()
     assert np.allclose(own.T, poses, atol=SAME)
 
 
 @loops
-def test_all_assemblies_close_differ_and_begin_with_that_of_fk(name):
+def test_all_assemblies_close_differ_and_begin_with_that_of_fk(name: str) -> None:
     robot, checked = load_robot(name), 0
     for q in legal(robot, 12, 7, share=0.6):
         found = robot.fk_all(q)
@@ -165,7 +168,7 @@ def test_all_assemblies_close_differ_and_begin_with_that_of_fk(name):
 
 
 @loops
-def test_an_assembly_as_the_seed_is_kept(name):
+def test_an_assembly_as_the_seed_is_kept(name: str) -> None:
     robot = load_robot(name)
     for q in legal(robot, 10, 8, share=0.6):
         for T in robot.fk_all(q):
@@ -175,7 +178,7 @@ def test_an_assembly_as_the_seed_is_kept(name):
 
 
 @loops
-def test_closed_is_the_end_of_the_straight_way_from_home(name):
+def test_closed_is_the_end_of_the_straight_way_from_home(name: str) -> None:
     robot = load_robot(name)
     q = legal(robot, 400, 9)
     answer = robot.solve_fk(q)
@@ -191,7 +194,7 @@ def test_closed_is_the_end_of_the_straight_way_from_home(name):
 
 
 @loops
-def test_a_path_stays_in_its_assembly_and_moves_as_its_jacobian_says(name):
+def test_a_path_stays_in_its_assembly_and_moves_as_its_jacobian_says(name: str) -> None:
     robot, rng = load_robot(name), np.random.default_rng(10)
     angles = np.linspace(0.0, 2.0 * math.pi, 1500)[:, None] + rng.uniform(0.0, 6.0, robot.n)
     swing = 0.05 * (robot.upper - robot.lower)
@@ -211,7 +214,7 @@ def test_a_path_stays_in_its_assembly_and_moves_as_its_jacobian_says(name):
     assert np.abs(slope - told).max() < 1e-3 * np.abs(slope).max()
 
 
-def test_a_path_that_leaves_its_assembly_says_so_and_finds_back():
+def test_a_path_that_leaves_its_assembly_says_so_and_finds_back() -> None:
     robot = load_robot("rps3")
     there = np.linspace(robot.home, TILTED, 200)
     path = np.vstack((there, there[::-1]))
@@ -221,7 +224,7 @@ def test_a_path_that_leaves_its_assembly_says_so_and_finds_back():
     assert np.allclose(way.T[-1], way.T[0], atol=SAME)
 
 
-def test_opposite_modes_never_meet_without_a_singular_pose():
+def test_opposite_modes_never_meet_without_a_singular_pose() -> None:
     # Determinants of the legs' slopes, of poses by plain finite differences, have the mode's sign.
     robot = load_robot("stewart")
     for q in legal(robot, 6, 11, share=0.5):
@@ -231,7 +234,7 @@ def test_opposite_modes_never_meet_without_a_singular_pose():
             assert robot.solve_fk(q, T).mode == sign * home
 
 
-def test_a_crank_out_of_its_range_is_refused_and_both_modes_close_inside():
+def test_a_crank_out_of_its_range_is_refused_and_both_modes_close_inside() -> None:
     robot = load_robot("four_bar", l0=4.0, l1=3.0, l2=3.0, l3=2.0)
     for theta in np.linspace(robot.lower[0] + 0.01, robot.upper[0] - 0.01, 20):
         both = robot.fk_all([theta])
@@ -245,7 +248,7 @@ def test_a_crank_out_of_its_range_is_refused_and_both_modes_close_inside():
         robot.fk(outside)
 
 
-def test_a_hand_whose_fingers_slip_holds_no_object():
+def test_a_hand_whose_fingers_slip_holds_no_object() -> None:
     robot = load_robot("three_finger_hand")
     q = robot.home.copy()
     q[0] += 0.1
@@ -256,7 +259,7 @@ def test_a_hand_whose_fingers_slip_holds_no_object():
         robot.fk(q)
 
 
-def test_legs_of_the_hybrid_that_contradict_each_other_are_refused_beyond_play():
+def test_legs_of_the_hybrid_that_contradict_each_other_are_refused_beyond_play() -> None:
     robot = load_robot("scara_stewart")
     q = robot.home.copy()
     q[3] += 5e-5
@@ -267,7 +270,7 @@ def test_legs_of_the_hybrid_that_contradict_each_other_are_refused_beyond_play()
     assert 1e-4 < refusal.value.residual < 2e-3
 
 
-def test_the_hybrid_in_pairs_has_the_assemblies_of_its_platform():
+def test_the_hybrid_in_pairs_has_the_assemblies_of_its_platform() -> None:
     robot = load_robot("scara_stewart", sigma_b=0.26, sigma_m=0.26, heading="carried")
     found = robot.fk_all(robot.home)
     assert len(found) > 2
@@ -278,10 +281,10 @@ def test_the_hybrid_in_pairs_has_the_assemblies_of_its_platform():
 
 
 @loops
-def test_a_batch_is_its_single_questions(name):
+def test_a_batch_is_its_single_questions(name: str) -> None:
     robot = load_robot(name)
     q = legal(robot, 30, 12)
-    batch = robot.solve_fk(q)
+    batch: Any = robot.solve_fk(q)
     for k, legs in enumerate(q):
         one = robot.solve_fk(legs)
         assert np.array_equal(one.T, batch.T[k])
@@ -292,7 +295,7 @@ def test_a_batch_is_its_single_questions(name):
     assert robot.follow_fk(np.empty((0, robot.n))).T.shape == (0, 4, 4)
 
 
-def test_bad_questions_are_refused_by_name():
+def test_bad_questions_are_refused_by_name() -> None:
     robot = load_robot("rps3")
     for call in (robot.fk, robot.solve_fk, robot.fk_all, robot.follow_fk, robot.jacobian):
         with pytest.raises(ParameterError):
@@ -311,7 +314,7 @@ def test_bad_questions_are_refused_by_name():
         robot.jacobian([0.1, 0.1, 5.0])
 
 
-def test_a_workspace_is_made_of_joints_that_close_and_of_all_where_there_are_no_loops():
+def test_a_workspace_is_made_of_joints_that_close_and_of_all_where_there_are_no_loops() -> None:
     for name, low, high in (
         ("rcrt1", 300, 300),
         ("rps3", 100, 200),

@@ -1,15 +1,18 @@
 """Planar loops: four-bar in all closure forms, both modes, and the parallelogram."""
 
 import math
+from collections.abc import Iterator, Mapping
+from typing import Any
 
 import numpy as np
 import pytest
 import roboticstoolbox as rtb
 
 from teleop_core.base.errors import ParameterError, UnknownNameError
-from teleop_core.kernels.geometry import rotation, transform
+from teleop_core.kernels.geometry import Array, rotation, transform
 from teleop_core.robots import IkStatus, list_robots, load_robot
 from teleop_core.robots.four_bar import Assembly, FourBar
+from teleop_core.robots.four_bar_loop import Closure
 
 # Cosines and sines of a few terms of length below 10: rounding stays far under this.
 CLOSED = 1e-12
@@ -21,7 +24,7 @@ LOOP = FourBar(4.0, 1.0, 3.5, 2.5)
 # The four published forms of the closure, by where each breaks the loop: gaps [m] and [rad].
 
 
-def gap_3r(loop, theta1, phi1, phi2, phi3):
+def gap_3r(loop: FourBar, theta1: float, phi1: Array, phi2: Array, phi3: Array) -> Array:
     """Form A, at the right pivot; the angles add up to a multiple of 2 pi (source: 4 pi)."""
     second, third = theta1 + phi2, theta1 + phi2 + phi3
     x = loop.l1 * np.cos(theta1) + loop.l2 * np.cos(second) + loop.l3 * np.cos(third) - loop.l0
@@ -29,14 +32,16 @@ def gap_3r(loop, theta1, phi1, phi2, phi3):
     return np.stack((x, y, np.angle(-np.exp(1j * (third - phi1)))))
 
 
-def gap_2r_1r(loop, theta1, phi1, phi2):
+def gap_2r_1r(loop: FourBar, theta1: float, phi1: Array, phi2: Array) -> Array:
     """Form B, between coupler and rocker."""
     x = loop.l1 * np.cos(theta1) + loop.l2 * np.cos(theta1 + phi2)
     y = loop.l1 * np.sin(theta1) + loop.l2 * np.sin(theta1 + phi2)
     return np.stack((x - loop.l0 - loop.l3 * np.cos(phi1), y - loop.l3 * np.sin(phi1)))
 
 
-def gap_2r_2r(loop, theta1, phi1, phi2, right, a):
+def gap_2r_2r(
+    loop: FourBar, theta1: float, phi1: Array, phi2: Array, right: Array, a: float
+) -> Array:
     """Form C, in the coupler at ``a`` from the crank: theta1 + phi2 = phi1 + right + pi."""
     b, left = loop.l2 - a, theta1 + phi2
     x = loop.l1 * np.cos(theta1) + a * np.cos(left) - loop.l0 - loop.l3 * np.cos(phi1)
@@ -45,14 +50,14 @@ def gap_2r_2r(loop, theta1, phi1, phi2, right, a):
     return np.stack((x, y, np.angle(-np.exp(1j * (left - phi1 - right)))))
 
 
-def gap_freudenstein(loop, theta1, phi1):
+def gap_freudenstein(loop: FourBar, theta1: Any, phi1: Array) -> Array:
     """Form D, coupler as a distance: squared distance of its ends less l2² [m²]."""
     x = loop.l1 * np.cos(theta1) - loop.l0 - loop.l3 * np.cos(phi1)
     y = loop.l1 * np.sin(theta1) - loop.l3 * np.sin(phi1)
     return x * x + y * y - loop.l2**2
 
 
-def closed_loops(rng, count):
+def closed_loops(rng: np.random.Generator, count: int) -> Iterator[tuple[FourBar, float, Closure]]:
     """Random lengths and crank angles that close, with their closure."""
     for lengths in rng.uniform(0.3, 4.0, (count, 4)):
         loop = FourBar(*lengths)
@@ -62,14 +67,14 @@ def closed_loops(rng, count):
             yield loop, theta1, closure
 
 
-def test_published_fixture_closes_with_the_angles_of_the_specification():
+def test_published_fixture_closes_with_the_angles_of_the_specification() -> None:
     closure = LOOP.close(0.0)
     assert np.allclose(np.degrees(closure.phi1), [101.536959, -101.536959], atol=PRINTED)
     assert np.allclose(np.degrees(closure.phi2), [44.415309, -44.415309], atol=PRINTED)
     assert np.allclose(np.degrees(closure.phi3), [-122.878350, 122.878350], atol=PRINTED)
 
 
-def test_all_four_forms_of_the_closure_agree_for_random_loops_in_both_modes():
+def test_all_four_forms_of_the_closure_agree_for_random_loops_in_both_modes() -> None:
     rng = np.random.default_rng(1)
     count, worst = 0, 0.0
     for loop, theta1, (_, phi1, phi2, phi3) in closed_loops(rng, 3000):
@@ -87,7 +92,7 @@ def test_all_four_forms_of_the_closure_agree_for_random_loops_in_both_modes():
     assert worst < CLOSED
 
 
-def test_forms_as_printed_would_leave_gaps():
+def test_forms_as_printed_would_leave_gaps() -> None:
     theta1 = 0.7
     _, phi1, phi2, _ = LOOP.close(theta1)
     half_turn_short = theta1 + phi2 - phi1 - math.pi / 2.0  # the slide's pi/2
@@ -98,19 +103,19 @@ def test_forms_as_printed_would_leave_gaps():
     assert np.abs(without_ground).max() > 1.0
 
 
-def test_angles_around_the_loop_add_up_to_a_multiple_of_one_turn():
+def test_angles_around_the_loop_add_up_to_a_multiple_of_one_turn() -> None:
     _, phi1, phi2, phi3 = LOOP.close(0.0)
     positive = np.mod(phi2, 2 * math.pi), np.mod(phi3, 2 * math.pi)
     total = np.degrees(positive[0] + positive[1] + math.pi - phi1)
     assert np.allclose(np.sort(total), [360.0, 720.0], atol=PRINTED)
 
 
-def test_crank_rocker_assembles_all_around():
+def test_crank_rocker_assembles_all_around() -> None:
     assert (LOOP.close(np.linspace(-7.0, 7.0, 500)).status == Assembly.CLOSED).all()
     assert LOOP.crank_ranges() == ((-math.pi, math.pi),)
 
 
-def test_too_long_ground_never_assembles_and_says_so_with_finite_angles():
+def test_too_long_ground_never_assembles_and_says_so_with_finite_angles() -> None:
     loop = FourBar(6.0, 1.0, 2.0, 2.0)
     closure = loop.close(np.linspace(-4.0, 4.0, 100))
     assert (closure.status == Assembly.CANNOT_ASSEMBLE).all()
@@ -118,7 +123,7 @@ def test_too_long_ground_never_assembles_and_says_so_with_finite_angles():
     assert loop.crank_ranges() == ()
 
 
-def test_double_rocker_assembles_only_up_to_a_right_angle():
+def test_double_rocker_assembles_only_up_to_a_right_angle() -> None:
     loop = FourBar(4.0, 3.0, 3.0, 2.0)
     angles = np.radians([-179.0, -90.01, -90.0, -45.0, 0.0, 89.99, 90.0, 90.01, 150.0])
     expected = np.abs(np.degrees(angles)) > 90.0 + 1e-9
@@ -126,7 +131,7 @@ def test_double_rocker_assembles_only_up_to_a_right_angle():
     assert np.allclose(loop.crank_ranges(), [(-math.pi / 2, math.pi / 2)])
 
 
-def test_a_rocker_that_cannot_pass_the_ground_line_has_two_mirrored_ranges():
+def test_a_rocker_that_cannot_pass_the_ground_line_has_two_mirrored_ranges() -> None:
     loop = FourBar(3.0, 2.0, 3.0, 1.5)
     (lower, upper), mirrored = loop.crank_ranges()
     assert mirrored == (-upper, -lower)
@@ -134,7 +139,7 @@ def test_a_rocker_that_cannot_pass_the_ground_line_has_two_mirrored_ranges():
     assert loop.close(0.0).status == loop.close(math.pi).status == Assembly.CANNOT_ASSEMBLE
 
 
-def test_both_chains_of_the_denavit_hartenberg_tables_meet():
+def test_both_chains_of_the_denavit_hartenberg_tables_meet() -> None:
     # Lecture 6: 2R chain from the left pivot, 1R chain from the right one, broken at joint 3.
     left = rtb.DHRobot([rtb.RevoluteMDH(), rtb.RevoluteMDH(a=LOOP.l1)])
     right = rtb.DHRobot([rtb.RevoluteMDH()])
@@ -148,11 +153,11 @@ def test_both_chains_of_the_denavit_hartenberg_tables_meet():
             assert np.allclose(*ends, atol=CLOSED)
 
 
-def test_matrix_loop_closes_with_the_tool_block_as_the_pose_of_r_in_the_tool():
-    def link(angle, length):
+def test_matrix_loop_closes_with_the_tool_block_as_the_pose_of_r_in_the_tool() -> None:
+    def link(angle: float, length: float) -> Array:
         return transform(rotation("z", angle), np.zeros(3)) @ along(length)
 
-    def along(length):
+    def along(length: float) -> Array:
         return transform(np.eye(3), np.array([length, 0.0, 0.0]))
 
     for theta1 in np.linspace(-3.0, 3.0, 7):
@@ -166,7 +171,7 @@ def test_matrix_loop_closes_with_the_tool_block_as_the_pose_of_r_in_the_tool():
 
 
 @pytest.mark.parametrize("mode", [1.0, -1.0])
-def test_robot_draws_the_coupler_where_the_closure_says(mode):
+def test_robot_draws_the_coupler_where_the_closure_says(mode: float) -> None:
     robot = load_robot("four_bar", l0=4.0, l1=1.0, l2=3.5, l3=2.5, a=3.5, mode=mode)
     for theta1 in np.linspace(-3.0, 3.0, 11):
         phi1 = LOOP.close(theta1).phi1[0 if mode > 0 else 1]
@@ -176,7 +181,7 @@ def test_robot_draws_the_coupler_where_the_closure_says(mode):
 
 
 @pytest.mark.parametrize("name", ["four_bar", "parallelogram"])
-def test_jacobian_is_the_finite_difference(name):
+def test_jacobian_is_the_finite_difference(name: str) -> None:
     robot, step = load_robot(name), 1e-6
     for theta1 in np.linspace(-3.0, 3.0, 20):
         ahead, behind = robot.fk([theta1 + step]), robot.fk([theta1 - step])
@@ -188,7 +193,7 @@ def test_jacobian_is_the_finite_difference(name):
 
 
 @pytest.mark.parametrize("geometry", [{}, {"mode": -1.0}, {"l0": 4, "l1": 3, "l2": 3, "l3": 2}])
-def test_inverse_finds_the_crank_of_every_reachable_point(geometry):
+def test_inverse_finds_the_crank_of_every_reachable_point(geometry: dict[str, float]) -> None:
     robot = load_robot("four_bar", **geometry)
     rng = np.random.default_rng(2)
     for theta1 in rng.uniform(max(robot.lower[0], -3.1), min(robot.upper[0], 3.1), 200):
@@ -201,7 +206,7 @@ def test_inverse_finds_the_crank_of_every_reachable_point(geometry):
         assert all(np.allclose(robot.fk(q)[:2, 3], T[:2, 3], atol=1e-9) for q in found)
 
 
-def test_a_point_off_the_curve_gets_the_nearest_one_and_is_unreachable():
+def test_a_point_off_the_curve_gets_the_nearest_one_and_is_unreachable() -> None:
     robot = load_robot("four_bar")
     curve = robot.fk(np.linspace(-math.pi, math.pi, 2000)[:, None])[:, :2, 3]
     rng = np.random.default_rng(3)
@@ -214,7 +219,7 @@ def test_a_point_off_the_curve_gets_the_nearest_one_and_is_unreachable():
         assert robot.ik_all(T).shape == (0, 1)
 
 
-def test_along_a_path_the_crank_turns_on_without_a_jump():
+def test_along_a_path_the_crank_turns_on_without_a_jump() -> None:
     robot = load_robot("four_bar")
     cranks = np.linspace(0.0, 2.0 * math.pi, 2000)
     path = robot.fk(cranks[:, None])
@@ -229,7 +234,7 @@ def test_along_a_path_the_crank_turns_on_without_a_jump():
         q = found
 
 
-def test_parallelogram_passes_its_change_points_without_turning_the_coupler():
+def test_parallelogram_passes_its_change_points_without_turning_the_coupler() -> None:
     robot = load_robot("parallelogram")
     loop = FourBar(*(robot.geometry[s] for s in ("l0", "l1", "l0", "l1")))
     cranks = np.linspace(-1.0, 7.0, 4001)
@@ -242,7 +247,7 @@ def test_parallelogram_passes_its_change_points_without_turning_the_coupler():
     assert np.abs(np.exp(1j * modes) - np.exp(1j * cranks)[:, None]).min(axis=1).max() < 1e-6
 
 
-def test_parallelogram_keeps_its_crank_at_the_centre_and_reports_points_off_the_circle():
+def test_parallelogram_keeps_its_crank_at_the_centre_and_reports_points_off_the_circle() -> None:
     robot = load_robot("parallelogram")
     centre = transform(np.eye(3), np.array([robot.geometry["a"], 0.0, 0.0]))
     result = robot.ik(centre, seed=[0.3])
@@ -251,7 +256,7 @@ def test_parallelogram_keeps_its_crank_at_the_centre_and_reports_points_off_the_
     assert math.isclose(result.residual[0], robot.geometry["l1"])
 
 
-def test_robots_are_listed_and_name_what_they_control():
+def test_robots_are_listed_and_name_what_they_control() -> None:
     for name in ("four_bar", "parallelogram"):
         assert name in list_robots()
         assert load_robot(name).task_mask == (True, True, False, False, False, False)
@@ -267,13 +272,15 @@ def test_robots_are_listed_and_name_what_they_control():
         ({"mode": 0.5}, "mode"),
     ],
 )
-def test_impossible_loops_are_refused_with_their_values(geometry, name):
+def test_impossible_loops_are_refused_with_their_values(
+    geometry: Mapping[str, str | float], name: str
+) -> None:
     with pytest.raises(ParameterError) as refusal:
         load_robot("four_bar", **geometry)
     assert refusal.value.name == name
 
 
-def test_unknown_symbols_and_bad_parallelograms_are_refused():
+def test_unknown_symbols_and_bad_parallelograms_are_refused() -> None:
     with pytest.raises(UnknownNameError):
         load_robot("four_bar", l4=1.0)
     with pytest.raises(ParameterError):

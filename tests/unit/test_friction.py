@@ -1,6 +1,7 @@
 """Friction that sticks: it holds for ever, slips as Coulomb says, takes energy, wanders."""
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -8,11 +9,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
+from present import present
 from teleop_core.base.parameters import build
 from teleop_core.graph.signals import DT
 from teleop_core.kernels import kernel
+from teleop_core.kernels.geometry import Array
 from teleop_core.slave.friction import wander
 from teleop_core.slave.joints import integrate
+from teleop_core.slave.simulation import SimulationNumbers, SimulationState
 from teleop_core.slave.slave_sim import SlaveSim, SlaveSimParameters
 
 JOINT = 3  # theta4 of the rcrt1: an axis that acts on no other
@@ -21,17 +25,17 @@ JOINT = 3  # theta4 of the rcrt1: an axis that acts on no other
 class Joint:
     """One joint of the rcrt1 on the hardware plant, under any effort; friction does not wander."""
 
-    def __init__(self, steps=2, **settings):
+    def __init__(self, steps: int = 2, **settings: Any) -> None:
         given = {"plant.kind": "hardware", "plant.hardware.without": ("wandering",)}
         self.slave = SlaveSim(build(SlaveSimParameters, given | settings))
         self.steps, self.p, self.s = steps, self.slave.parameters, self.slave.state
         self.q, self.dq, self.effort = np.zeros(6), np.zeros(6), np.zeros(6)
         self.q[1:3] = self.slave.robot.home[1:3]
-        self.inertia = self.slave.robot.drives.inertia[JOINT]
+        self.inertia = present(self.slave.robot.drives).inertia[JOINT]
         self.dry, self.viscous = self.p["coulomb"][JOINT], self.p["viscous"][JOINT]
         self.stiffness = self.p["bristle"][JOINT]
 
-    def step(self, effort, count=1):
+    def step(self, effort: float, count: int = 1) -> Array:
         """Positions (count,) of the joint under a constant effort, after each tick."""
         arm, self.effort[JOINT], found = self.slave.arm, effort, np.empty(count)
         for k in range(count):
@@ -44,7 +48,7 @@ class Joint:
 
 
 @pytest.mark.parametrize("share", [0.1, 0.7, 0.99, -0.99])
-def test_a_load_below_dry_friction_is_held_for_ever(share):
+def test_a_load_below_dry_friction_is_held_for_ever(share: float) -> None:
     joint = Joint()
     for k in range(1000):  # a load that comes at once swings and may slip
         joint.step(k / 1000 * share * joint.dry)
@@ -55,7 +59,7 @@ def test_a_load_below_dry_friction_is_held_for_ever(share):
     assert abs(joint.q[JOINT]) < 1e-12  # it had only bent
 
 
-def test_a_load_above_dry_friction_slips_as_coulomb_says():
+def test_a_load_above_dry_friction_slips_as_coulomb_says() -> None:
     joint = Joint(viscous=(0.0,) * 6)
     joint.step(1.5 * joint.dry, 200)
     before = joint.dq[JOINT]
@@ -64,7 +68,7 @@ def test_a_load_above_dry_friction_slips_as_coulomb_says():
     assert math.isclose(joint.dq[JOINT] - before, expected, rel_tol=1e-12)
 
 
-def test_vibration_below_dry_friction_moves_nothing_away():
+def test_vibration_below_dry_friction_moves_nothing_away() -> None:
     # Plain LuGre creeps under just this.
     joint = Joint()
     joint.step(0.5 * joint.dry, 2000)
@@ -76,12 +80,12 @@ def test_vibration_below_dry_friction_moves_nothing_away():
 
 
 @pytest.mark.parametrize("hertz", [0.5, 3.0])
-def test_motion_is_that_of_an_elastic_and_plastic_bristle(hertz):
+def test_motion_is_that_of_an_elastic_and_plastic_bristle(hertz: float) -> None:
     joint = Joint(steps=20)
     amplitude, damping = 3.0 * joint.dry, joint.p["bristle_damping"][JOINT]
     most = joint.dry / joint.stiffness
 
-    def slopes(time, state):
+    def slopes(time: float, state: Array) -> list[float]:
         _, v, z = state
         pull = np.clip(joint.stiffness * z + damping * v, -joint.dry, joint.dry)
         is_slipping = abs(z) >= most and v * z > 0.0
@@ -102,7 +106,7 @@ def test_motion_is_that_of_an_elastic_and_plastic_bristle(hertz):
 
 @settings(max_examples=25, deadline=None)
 @given(st.lists(st.floats(-4.0, 4.0), min_size=3, max_size=12))
-def test_friction_gives_back_no_more_than_its_bristle_had_stored(shares):
+def test_friction_gives_back_no_more_than_its_bristle_had_stored(shares: list[float]) -> None:
     joint = Joint(steps=10, viscous=(0.0,) * 6)
     work, last = 0.0, 0.0
     for share in shares:
@@ -113,7 +117,7 @@ def test_friction_gives_back_no_more_than_its_bristle_had_stored(shares):
     assert work >= kinetic + stored - 1e-3 * abs(work) - 1e-12
 
 
-def test_a_second_step_size_gives_the_same_motion():
+def test_a_second_step_size_gives_the_same_motion() -> None:
     paths = []
     for steps in (2, 20):
         joint = Joint(steps=steps)
@@ -122,20 +126,22 @@ def test_a_second_step_size_gives_the_same_motion():
     assert np.abs(paths[0] - paths[1]).max() < 2e-3 * np.ptp(paths[1])
 
 
-def test_smooth_friction_creeps_under_the_load_that_sticking_friction_holds():
-    joint = Joint(**{"plant.hardware.without": ("wandering", "sticking")})
+def test_smooth_friction_creeps_under_the_load_that_sticking_friction_holds() -> None:
+    joint = Joint(**dict[str, Any]({"plant.hardware.without": ("wandering", "sticking")}))
     path = joint.step(0.7 * joint.dry, 5000)
     assert path[-1] - path[-1000] > 1e-3
 
 
 @kernel
-def wander_once(p, s):
+def wander_once(p: SimulationNumbers, s: SimulationState) -> None:
     """One tick of :func:`wander`, which only kernels call."""
     wander(p, s)
 
 
 @kernel
-def wander_on(p, s, share, ticks, found):
+def wander_on(
+    p: SimulationNumbers, s: SimulationState, share: float, ticks: int, found: Array
+) -> None:
     """Share of dry friction in force, every hundredth tick (ticks / 100, 6).
 
     All joints slip by a ``share`` of the way on which friction changes in every tick.
@@ -149,7 +155,7 @@ def wander_on(p, s, share, ticks, found):
                 found[k // 100, i] = s.grip[i]
 
 
-def grips(seed, share=1e-3, ways=600):
+def grips(seed: int, share: float = 1e-3, ways: int = 600) -> tuple[Array, Array]:
     slave = SlaveSim(build(SlaveSimParameters, {"plant.kind": "hardware", "seed": seed}))
     ticks = round(ways / share)
     found = np.empty((ticks // 100, 6))
@@ -158,7 +164,7 @@ def grips(seed, share=1e-3, ways=600):
 
 
 @pytest.mark.parametrize("share", [1e-3, 0.02])
-def test_friction_wanders_about_its_mean_as_much_as_it_is_told_at_any_speed(share):
+def test_friction_wanders_about_its_mean_as_much_as_it_is_told_at_any_speed(share: float) -> None:
     found, told = grips(1, share, ways=1200)
     quiet = told < 0.5  # above, the floor of a tenth cuts the share
     assert np.abs(found.mean(axis=0)[quiet] - 1.0).max() < 0.1
@@ -170,15 +176,15 @@ def test_friction_wanders_about_its_mean_as_much_as_it_is_told_at_any_speed(shar
     assert abs(np.mean(a[1:] * a[:-1]) / np.mean(a**2) - kept) < 0.1
 
 
-def test_friction_wanders_alike_for_one_seed_and_otherwise_for_another():
+def test_friction_wanders_alike_for_one_seed_and_otherwise_for_another() -> None:
     first, again, other = grips(1)[0], grips(1)[0], grips(2)[0]
     assert np.array_equal(first, again)
     assert abs(np.corrcoef(first[:, 0], other[:, 0])[0, 1]) < 0.2
     assert abs(np.corrcoef(first[:, 0], first[:, 1])[0, 1]) < 0.2
 
 
-def test_friction_of_a_joint_that_sticks_does_not_wander():
-    joint = Joint(**{"plant.hardware.without": ()})
+def test_friction_of_a_joint_that_sticks_does_not_wander() -> None:
+    joint = Joint(**dict[str, Any]({"plant.hardware.without": ()}))
     for _ in range(300):
         joint.step(3.0 * joint.dry)
         wander_once(joint.p, joint.s)
@@ -194,7 +200,7 @@ def test_friction_of_a_joint_that_sticks_does_not_wander():
 
 
 @pytest.mark.slow
-def test_an_arm_at_rest_stays_there_however_long_it_is_held():
+def test_an_arm_at_rest_stays_there_however_long_it_is_held() -> None:
     from teleop_core.robots import load_robot
     from teleop_core.slave.pair import ArmParameters
     from teleop_lab.fitting.rest_table import PUBLISHED, read_rests
@@ -205,7 +211,7 @@ def test_an_arm_at_rest_stays_there_however_long_it_is_held():
     for target in np.clip(read_rests(PUBLISHED, arm).targets, arm.lower, arm.upper)[1:4]:
         counts = np.array([
             Mover(build(ArmParameters, given), settle=seconds).move(target)
-            / arm.drives.encoder_step
+            / present(arm.drives).encoder_step
             for seconds in (1.0, 5.0, 20.0, 60.0)
         ])  # fmt: skip
         assert np.ptp(counts, axis=0)[[0, 1, 3, 4, 5]].max() < 1e-6

@@ -1,6 +1,7 @@
 """Graph: what follows from the stages, and what is refused before anything runs."""
 
 from itertools import permutations
+from typing import Any
 
 import pytest
 
@@ -25,23 +26,28 @@ LIMITED = Topic("test/limited_cp", Kind.POSE, passed_on("slave/servo_cp"))
 PUSH = Topic("test/push", Kind.WRENCH, passed_on("slave/measured_cp"), adds_to="master/servo_cf")
 
 
-def rest(parameters, state, signals, dt):
+def rest(parameters: Any, state: Any, signals: Any, dt: Any) -> None:
     """Step of a stage that does nothing."""
 
 
-def stage(name="echo", reads=(SLAVE_MEASURED_CP,), writes=(ECHO,), **more):
+def stage(
+    name: str = "echo",
+    reads: tuple[Topic, ...] = (SLAVE_MEASURED_CP,),
+    writes: tuple[Topic, ...] = (ECHO,),
+    **more: Any,
+) -> Any:
     return Stage(name, NoParameters, reads, writes, **{"step": rest, **more})
 
 
-def limit(name="limit", topic=LIMITED):
+def limit(name: str = "limit", topic: Topic = LIMITED) -> Stage:
     return stage(name, (SLAVE_SERVO_CP,), (topic,), replaces=SLAVE_SERVO_CP)
 
 
-def names(graph):
+def names(graph: Graph) -> list[str]:
     return [member.name for member in graph.members]
 
 
-def feeds(graph, reader, port):
+def feeds(graph: Graph, reader: str, port: str) -> list[str]:
     """Names of what arrives at a port of a stage of the default arm."""
     return [
         link.topic.name
@@ -54,11 +60,13 @@ def feeds(graph, reader, port):
 
 
 @pytest.mark.parametrize("order", list(permutations(range(6))))
-def test_order_of_a_tick_is_that_of_the_data_however_stages_are_listed(order):
+def test_order_of_a_tick_is_that_of_the_data_however_stages_are_listed(
+    order: tuple[int, ...],
+) -> None:
     assert names(Graph(tuple(BASE[i] for i in order))) == list(BUILT_IN)
 
 
-def test_order_of_stages_decides_where_the_data_does_not():
+def test_order_of_stages_decides_where_the_data_does_not() -> None:
     others = [stage(name, writes=(topic,)) for name, topic in (
         ("b", ECHO), ("a", Topic("test/other", Kind.POSE, passed_on("slave/measured_cp"))),
     )]  # fmt: skip
@@ -66,26 +74,26 @@ def test_order_of_stages_decides_where_the_data_does_not():
     assert names(Graph((*BASE, *others[::-1]))) == [*BUILT_IN, "a", "b"]
 
 
-def test_arms_follow_each_other_in_the_order_of_their_names():
+def test_arms_follow_each_other_in_the_order_of_their_names() -> None:
     graph = Graph(BASE, ("right", "left"))
     assert names(graph) == [*BUILT_IN, *(f"left/{name}" for name in BUILT_IN)]
     assert graph.topics[0] == topics.HAND_SERVO_CP
     assert "left/slave/servo_cp" in {topic.name for topic in graph.topics}
 
 
-def test_arms_share_no_link():
+def test_arms_share_no_link() -> None:
     for link in Graph(BASE, ("right", "left")).links:
         assert link.writer.arm == link.reader.arm == link.topic.arm
 
 
-def test_replacing_stage_comes_between_writer_and_readers():
+def test_replacing_stage_comes_between_writer_and_readers() -> None:
     graph = Graph((*BASE, limit()))
     assert names(graph) == [*BUILT_IN[:3], "limit", *BUILT_IN[3:]]
     assert feeds(graph, "inverse_kinematics", "slave/servo_cp") == ["test/limited_cp"]
     assert feeds(graph, "limit", "slave/servo_cp") == ["slave/servo_cp"]
 
 
-def test_stages_that_replace_the_same_topic_follow_each_other_in_the_order_of_their_names():
+def test_stages_that_replace_the_same_topic_follow_each_other_in_the_order_of_their_names() -> None:
     one, two = (Topic(f"test/{name}_cp", Kind.POSE, passed_on("slave/servo_cp")) for name in "ab")
     stages = limit("a", one), limit("b", two)
     for first, last in (stages, stages[::-1]):
@@ -95,24 +103,24 @@ def test_stages_that_replace_the_same_topic_follow_each_other_in_the_order_of_th
         assert feeds(graph, "inverse_kinematics", "slave/servo_cp") == [last.writes[0].name]
 
 
-def test_topic_that_adds_to_another_arrives_beside_it():
+def test_topic_that_adds_to_another_arrives_beside_it() -> None:
     graph = Graph((*BASE, stage("push", writes=(PUSH,))))
     assert feeds(graph, "haptic_master", "master/servo_cf") == ["master/servo_cf", "test/push"]
     added = [link.adds for link in graph.links if link.port.name == "master/servo_cf"]
     assert added == [False, True]
 
 
-def test_chain_leads_from_the_hand_to_the_slave():
+def test_chain_leads_from_the_hand_to_the_slave() -> None:
     assert [topic.name for _, topic in Graph(BASE).chain()] == [
         "master/measured_cp", "slave/servo_cp", "slave/servo_jp", "slave/setpoint_js",
     ]  # fmt: skip
 
 
-def test_chain_passes_through_a_replacing_stage():
+def test_chain_passes_through_a_replacing_stage() -> None:
     assert "limit" in [name for name, _ in Graph((*BASE, limit())).chain()]
 
 
-def test_answer_like_its_input_that_nobody_reads_is_noted_unless_it_replaces_or_adds():
+def test_answer_like_its_input_that_nobody_reads_is_noted_unless_it_replaces_or_adds() -> None:
     push = stage("push", writes=(PUSH,))
     watch = stage("watch", writes=(Topic("test/x", Kind.WRENCH, passed_on("slave/measured_cp")),))
     assert Graph((*BASE, limit(), push, watch)).notes == ()
@@ -126,7 +134,7 @@ def test_answer_like_its_input_that_nobody_reads_is_noted_unless_it_replaces_or_
 # Delays.
 
 
-def test_delay_is_on_all_links_of_its_topic_or_on_those_to_one_reader():
+def test_delay_is_on_all_links_of_its_topic_or_on_those_to_one_reader() -> None:
     everywhere = Graph(BASE, delays=(Delay("slave/servo_cp", 0.02),))
     delayed = {link.reader.name for link in everywhere.links if link.delay}
     assert delayed == {"inverse_kinematics"}
@@ -140,26 +148,26 @@ def test_delay_is_on_all_links_of_its_topic_or_on_those_to_one_reader():
     ["slave/servo_jp", "=0.1", "slave/servo_jp=", "slave/servo_jp=soon", "slave/servo_jp=-0.1",
      "slave/servo_jp=nan", "slave/servo_jp=61"],
 )  # fmt: skip
-def test_delay_of_another_form_is_refused_with_an_example(text):
+def test_delay_of_another_form_is_refused_with_an_example(text: str) -> None:
     with pytest.raises(ParameterError, match=r"slave/servo_jp=0\.02") as error:
         Delay.parse(text)
     assert (error.value.name, error.value.value) == ("teleop.delays", text)
 
 
-def test_delay_of_an_unknown_topic_is_refused_with_the_known_ones():
+def test_delay_of_an_unknown_topic_is_refused_with_the_known_ones() -> None:
     with pytest.raises(UnknownNameError) as error:
         configure(settings=["teleop.delays=[slave/servo_jq=0.02]"])
     assert error.value.value == "slave/servo_jq"
     assert "slave/servo_jp" in error.value.alternatives
 
 
-def test_delay_to_an_unknown_reader_is_refused_with_the_known_ones():
+def test_delay_to_an_unknown_reader_is_refused_with_the_known_ones() -> None:
     with pytest.raises(UnknownNameError) as error:
         configure(settings=["teleop.delays=[slave/servo_jp@slaves=0.02]"])
     assert "slave_sim" in error.value.alternatives
 
 
-def test_delay_to_a_stage_that_does_not_read_the_topic_is_refused():
+def test_delay_to_a_stage_that_does_not_read_the_topic_is_refused() -> None:
     with pytest.raises(PartError, match="reads slave/servo_jp"):
         Graph(BASE, delays=(Delay("slave/servo_jp", 0.02, "motion_scaling"),))
 
@@ -188,7 +196,9 @@ BAD_GRAPHS = {
     [(("left", "left"), "left", "two have this name"), (("", "left arm"), "left arm", "letters"),
      (("right", ""), "", "letters"), (("right", "2nd"), "2nd", "letters")],
 )  # fmt: skip
-def test_arms_that_cannot_be_told_apart_or_named_are_refused(arms, name, expected):
+def test_arms_that_cannot_be_told_apart_or_named_are_refused(
+    arms: tuple[str, str], name: str, expected: str
+) -> None:
     with pytest.raises(PartError) as error:
         Graph(BASE, arms)
     assert (error.value.kind, error.value.name) == ("arm", name)
@@ -196,7 +206,7 @@ def test_arms_that_cannot_be_told_apart_or_named_are_refused(arms, name, expecte
 
 
 @pytest.mark.parametrize("case", BAD_GRAPHS)
-def test_graph_that_cannot_run_is_refused_with_the_part_and_what_it_must_be(case):
+def test_graph_that_cannot_run_is_refused_with_the_part_and_what_it_must_be(case: str) -> None:
     stages, name, expected = BAD_GRAPHS[case]
     with pytest.raises(PartError) as error:
         Graph(stages)
@@ -205,7 +215,7 @@ def test_graph_that_cannot_run_is_refused_with_the_part_and_what_it_must_be(case
     assert "\n" not in str(error.value)
 
 
-def test_circle_runs_with_a_late_input_or_a_delay():
+def test_circle_runs_with_a_late_input_or_a_delay() -> None:
     late = stage("forth", (BACK,), (FORTH,), late=(BACK,))
     assert names(Graph((*BASE, late, CIRCLE[1])))[-2:] == ["forth", "back"]
     delayed = Graph((*BASE, *CIRCLE), delays=(Delay("test/forth", 0.001),))
@@ -235,7 +245,8 @@ BAD_STAGES = {
 
 
 @pytest.mark.parametrize("case", BAD_STAGES)
-def test_stage_that_contradicts_itself_is_refused(case):
+def test_stage_that_contradicts_itself_is_refused(case: str) -> None:
+    values: Any
     values, expected = BAD_STAGES[case]
     with pytest.raises(PartError) as error:
         stage(**values)
@@ -243,16 +254,16 @@ def test_stage_that_contradicts_itself_is_refused(case):
     assert expected in error.value.expected
 
 
-def test_stage_whose_stamp_is_of_a_command_in_force_gives_it_itself():
+def test_stage_whose_stamp_is_of_a_command_in_force_gives_it_itself() -> None:
     assert stage(writes=(Topic("test/x", Kind.POSE, in_force("slave/servo_jp")),)).writes
 
 
-def test_stage_whose_parameters_are_no_dataclass_is_refused():
+def test_stage_whose_parameters_are_no_dataclass_is_refused() -> None:
     with pytest.raises(PartError, match="dataclass"):
         Stage("echo", dict, (SLAVE_MEASURED_CP,), (ECHO,), step=rest)
 
 
-def test_unknown_stage_is_refused_with_the_known_ones():
+def test_unknown_stage_is_refused_with_the_known_ones() -> None:
     with pytest.raises(UnknownNameError) as error:
         build_graph(stages=["limiter"])
     assert set(BUILT_IN) <= set(error.value.alternatives)
@@ -263,7 +274,9 @@ def test_unknown_stage_is_refused_with_the_known_ones():
     ["teleop.stages=[reader]", "teleop.stages=[slave_sim]", "teleop.stages=[recorder]",
      "teleop.arms=[left, left]", "teleop.delays=[nothing=0.1]"],
 )  # fmt: skip
-def test_wrong_graph_is_refused_by_the_configuration_in_one_line(own_parts, setting):
+def test_wrong_graph_is_refused_by_the_configuration_in_one_line(
+    own_parts: None, setting: str
+) -> None:
     register_stage(stage("reader", (UNWRITTEN,), ()))
     with pytest.raises(TeleopError) as error:
         configure(settings=[setting])
@@ -275,7 +288,7 @@ def test_wrong_graph_is_refused_by_the_configuration_in_one_line(own_parts, sett
 
 @pytest.mark.parametrize("name", ["axes", "tool_axes"])
 @pytest.mark.parametrize("axes", ["[+x, +y, -z]", "[+z, -x, +y, +x]", "[+x, +x, +z]", "[x, y, z]"])
-def test_axis_map_that_mirrors_or_is_none_is_refused(name, axes):
+def test_axis_map_that_mirrors_or_is_none_is_refused(name: str, axes: str) -> None:
     with pytest.raises(ParameterError) as error:
         configure(settings=[f"{name}={axes}"])
     assert error.value.name.endswith(name)

@@ -1,50 +1,58 @@
 """Haptic master: the published device, a hand that gives way, tremor, buttons, same bits again."""
 
 import math
+from collections.abc import Mapping
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 from scipy.signal import periodogram
 from scipy.spatial.transform import Rotation
 
 from held_master import HeldMaster
 from teleop_core.base.errors import ParameterError
 from teleop_core.base.parameters import build
-from teleop_core.chain.master.haptic_master import (
-    REST_POSITION,
-    REST_TILT,
-    DeviceParameters,
-    HandParameters,
-    HapticMasterParameters,
-)
+from teleop_core.chain.master.device import DeviceParameters
+from teleop_core.chain.master.hand_mechanics import HandParameters
+from teleop_core.chain.master.haptic_master import HapticMasterParameters
 from teleop_core.chain.operators import OPERATORS, Setting, register_operator
 from teleop_core.chain.operators.parameters import ButtonParameters, OperatorParameters
+from teleop_core.chain.operators.rest import REST_POSITION, REST_TILT
 from teleop_core.chain.operators.shapes import PHASES
 from teleop_core.kernels import records
+from teleop_core.kernels.geometry import Array
 
 RESOLUTION, NOISE, PEAK = 0.055e-3, 2e-3, 3.3
 REST = Rotation.from_euler("x", REST_TILT)
-QUIET = {"position_resolution": 0.0, "gimbal_noise": 0.0}
+QUIET: dict[str, Any] = {"position_resolution": 0.0, "gimbal_noise": 0.0}
 COLD, FRICTION = {"continuous_force": PEAK}, 0.26
 TOPICS = ("master_measured_cp", "master_measured_cv", "master_measured_cf", "master_buttons")
 
 
-def operator(**values):
+def operator(**values: str | float | tuple[float, ...]) -> OperatorParameters:
     return build(OperatorParameters, values)
 
 
 STILL = operator(kind="hold", rotation=0.0)
 
 
-def held(given):
+def held(given: tuple[OperatorParameters, HapticMasterParameters]) -> Any:
     """Device and operator of given parameters."""
     return HeldMaster(*given)
 
 
-def parameters(*, seed=1, device=None, hand=None, operator=STILL, buttons=None):
+def parameters(
+    *,
+    seed: int = 1,
+    device: Mapping[str, Any] | None = None,
+    hand: dict[str, float] | None = None,
+    operator: OperatorParameters = STILL,
+    buttons: dict[str, tuple[float, ...]] | None = None,
+) -> Any:
     """Those of the operator and of the device; ``tremor_…`` of the hand are the operator's."""
-    own = {k: v for k, v in (hand or {}).items() if k.startswith("tremor")}
+    own: dict[str, Any] = {k: v for k, v in (hand or {}).items() if k.startswith("tremor")}
     rest = {k: v for k, v in (hand or {}).items() if k not in own}
     person = replace(
         operator, seed=seed, patience=0.0, buttons=ButtonParameters(**(buttons or {})), **own
@@ -54,15 +62,15 @@ def parameters(*, seed=1, device=None, hand=None, operator=STILL, buttons=None):
     )
 
 
-def wanted_places(wanted, ticks, seed=1):
+def wanted_places(wanted: OperatorParameters, ticks: int, seed: int = 1) -> Array:
     """Places (ticks, 3) [m] that the operator wants, tick by tick, in the master's base."""
     phases = np.random.default_rng(seed).uniform(0.0, 2.0 * math.pi, PHASES)
     setting = Setting(wanted, phases, seed)
     motion = OPERATORS.find(wanted.kind.kind).make(wanted.kind.parameters, setting)
-    return motion(1e-3 * np.arange(1, ticks + 1))[:, :3] + REST_POSITION
+    return motion(np.asarray(1e-3 * np.arange(1, ticks + 1), np.float64))[:, :3] + REST_POSITION
 
 
-def run(master, ticks, force=(0.0, 0.0, 0.0)):
+def run(master: HeldMaster, ticks: int, force: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> Any:
     """Signals of the next ticks (ticks,) under a constant commanded force [N]."""
     out = records(master.signals.dtype, ticks)
     for i in range(ticks):
@@ -72,18 +80,20 @@ def run(master, ticks, force=(0.0, 0.0, 0.0)):
     return out
 
 
-def places(signals):
+def places(signals: NDArray[np.void]) -> Array:
     return signals["master_measured_cp"][:, :3]
 
 
-def wobble(signals):
+def wobble(signals: NDArray[np.void]) -> Array:
     """Rotation vectors of the stylus readings against its rest, (N, 3)."""
     readings = Rotation.from_quat(signals["master_measured_cp"][:, 3:], scalar_first=True)
     return (REST.inv() * readings).as_rotvec()
 
 
 @pytest.mark.parametrize("force", [(3.0, 0, 0), (5.0, 0, 0), (3, -3, 3), (0, 0, -1e6), (0, 0, 0)])
-def test_applied_force_is_the_commanded_one_up_to_the_peak_and_in_its_direction(force):
+def test_applied_force_is_the_commanded_one_up_to_the_peak_and_in_its_direction(
+    force: tuple[float, int, float],
+) -> None:
     applied = run(held(parameters()), 1, force)["master_measured_cf"][0]
     size = np.linalg.norm(force)
     expected = np.array(force) * min(1.0, PEAK / size if size else 1.0)
@@ -91,13 +101,13 @@ def test_applied_force_is_the_commanded_one_up_to_the_peak_and_in_its_direction(
     assert not applied[3:].any()
 
 
-def test_hand_feels_no_more_than_the_peak_force():
+def test_hand_feels_no_more_than_the_peak_force() -> None:
     at_peak = places(run(held(parameters()), 500, (PEAK, 0, 0)))
     beyond = places(run(held(parameters()), 500, (100.0, 0, 0)))
     assert np.allclose(at_peak, beyond, rtol=0, atol=1e-12)
 
 
-def test_place_readings_are_multiples_of_the_resolution():
+def test_place_readings_are_multiples_of_the_resolution() -> None:
     path = operator(kind="random", approach_time=0.5)
     counts = places(run(held(parameters(operator=path)), 3000)) / RESOLUTION
     # A reading of 0.1 m is 2000 steps, known to 1e-12 of a step.
@@ -105,7 +115,7 @@ def test_place_readings_are_multiples_of_the_resolution():
     assert len(np.unique(np.round(counts))) > 100
 
 
-def test_reading_is_within_half_a_step_of_the_tip():
+def test_reading_is_within_half_a_step_of_the_tip() -> None:
     path = operator(kind="random", approach_time=0.5)
     master = held(parameters(operator=path))
     for _ in range(1000):
@@ -113,7 +123,7 @@ def test_reading_is_within_half_a_step_of_the_tip():
         assert np.abs(reading - master.state["position"]).max() <= 0.5 * RESOLUTION + 1e-15
 
 
-def test_gimbal_noise_fills_its_bounds_and_never_leaves_them():
+def test_gimbal_noise_fills_its_bounds_and_never_leaves_them() -> None:
     turns = wobble(run(held(parameters()), 5000))
     # Turns about three axes of 2e-3 rad mix by their product, 4e-6 rad.
     assert np.abs(turns).max() < NOISE + 4e-6
@@ -123,13 +133,13 @@ def test_gimbal_noise_fills_its_bounds_and_never_leaves_them():
     assert np.abs(turns.mean(axis=0)).max() < 4 * 0.48 * NOISE / math.sqrt(5000)
 
 
-def test_gimbal_noise_is_white():
+def test_gimbal_noise_is_white() -> None:
     turns = wobble(run(held(parameters()), 5000))[:, 0]
     lagged = np.corrcoef(turns[1:], turns[:-1])[0, 1]
     assert abs(lagged) < 4.0 / math.sqrt(5000)
 
 
-def hand_gain(hertz, hand, device, axis):
+def hand_gain(hertz: float, hand: HandParameters, device: DeviceParameters, axis: int) -> float:
     """Amplitude of the reading over that of the wanted place, without friction: two masses."""
     s = 2j * math.pi * hertz
     pull = hand.stiffness + hand.damping * s
@@ -139,7 +149,7 @@ def hand_gain(hertz, hand, device, axis):
 
 
 @pytest.mark.parametrize("middle", [9.0, 10.0, 11.0])
-def test_tremor_has_its_peak_in_the_band_with_the_wanted_amplitude(middle):
+def test_tremor_has_its_peak_in_the_band_with_the_wanted_amplitude(middle: float) -> None:
     hand = {"tremor_amplitude": 0.5e-3, "tremor_frequency": middle}
     device = {**QUIET, "friction": 0.0}
     signals = run(held(parameters(device=device, hand=hand)), 20_000)
@@ -155,15 +165,15 @@ def test_tremor_has_its_peak_in_the_band_with_the_wanted_amplitude(middle):
     assert np.allclose(amplitude, 0.5e-3 * np.array(gains), rtol=0.1, atol=0)
 
 
-def test_axes_tremble_independently():
+def test_axes_tremble_independently() -> None:
     hand = {"tremor_amplitude": 0.5e-3}
     motion = places(run(held(parameters(device=QUIET, hand=hand)), 20_000))[1000:]
-    between = np.corrcoef(motion.T)[np.triu_indices(3, 1)]
+    between = np.asarray(np.corrcoef(motion.T))[np.triu_indices(3, 1)]
     # Lines that wander over ±2 Hz forget their phase in about 0.2 s: 100 independent pieces.
     assert np.abs(between).max() < 0.4
 
 
-def test_without_tremor_and_noise_a_still_hand_is_perfectly_still():
+def test_without_tremor_and_noise_a_still_hand_is_perfectly_still() -> None:
     device = {"gimbal_noise": 0.0}
     signals = run(held(parameters(device=device, hand={"tremor_amplitude": 0.0})), 500)
     assert not np.diff(signals["master_measured_cp"], axis=0).any()
@@ -172,7 +182,9 @@ def test_without_tremor_and_noise_a_still_hand_is_perfectly_still():
 
 @pytest.mark.parametrize("stiffness", [100.0, 300.0, 1000.0])
 @pytest.mark.parametrize("force", [(1.0, 0, 0), (0, -2.0, 0), (0, 0, 3.0)])
-def test_hand_and_device_give_way_by_force_over_stiffness_but_for_friction(stiffness, force):
+def test_hand_and_device_give_way_by_force_over_stiffness_but_for_friction(
+    stiffness: float, force: tuple[float, float, float]
+) -> None:
     hand = {"tremor_amplitude": 0.0, "stiffness": stiffness}
     device = {**QUIET, "start": (0.0, 0.0, 0.0), **COLD}
     master = held(parameters(device=device, hand=hand))
@@ -185,7 +197,7 @@ def test_hand_and_device_give_way_by_force_over_stiffness_but_for_friction(stiff
     assert np.abs(master.state["speed"]).max() < 1e-12
 
 
-def test_without_friction_the_hand_gives_way_by_force_over_stiffness_and_returns():
+def test_without_friction_the_hand_gives_way_by_force_over_stiffness_and_returns() -> None:
     device = {**QUIET, "friction": 0.0, **COLD}
     master = held(parameters(device=device, hand={"tremor_amplitude": 0.0}))
     moved = places(run(master, 3000, (2.0, 0, 0)))[-1] - REST_POSITION
@@ -194,7 +206,7 @@ def test_without_friction_the_hand_gives_way_by_force_over_stiffness_and_returns
     assert np.abs(moved).max() < 1e-9
 
 
-def test_wanted_path_is_followed():
+def test_wanted_path_is_followed() -> None:
     path = operator(kind="circle", center=(0.0, 0.0, 0.03), approach_time=1.0, period=8.0)
     master = held(parameters(operator=path, device=QUIET, hand={"tremor_amplitude": 0.0}))
     wanted = wanted_places(path, 10_000)
@@ -203,7 +215,7 @@ def test_wanted_path_is_followed():
     assert off.max() < 1.1 * 0.26 / 300.0 * math.sqrt(3.0)
 
 
-def test_tip_stops_at_the_ends_of_the_workspace():
+def test_tip_stops_at_the_ends_of_the_workspace() -> None:
     far = operator(kind="hold", center=(0.2, -0.2, 0.2), approach_time=0.5, rotation=0.0)
     last = run(held(parameters(operator=far, device=QUIET)), 2000)[-1:]
     middle = np.subtract(REST_POSITION, (0.0, 0.0, -0.03))
@@ -213,7 +225,7 @@ def test_tip_stops_at_the_ends_of_the_workspace():
 
 
 @pytest.mark.parametrize("sign", [-1.0, 1.0])
-def test_tip_at_its_stop_is_at_rest(sign):
+def test_tip_at_its_stop_is_at_rest(sign: float) -> None:
     far = operator(kind="hold", center=(0.2 * sign,) * 3, approach_time=0.5, rotation=0.0)
     master = held(parameters(operator=far, device=QUIET, hand={"tremor_amplitude": 0.0}))
     run(master, 2000)
@@ -223,7 +235,7 @@ def test_tip_at_its_stop_is_at_rest(sign):
     assert np.array_equal(master.state["hand"], master.state["position"])
 
 
-def test_a_push_below_the_friction_moves_the_device_nowhere():
+def test_a_push_below_the_friction_moves_the_device_nowhere() -> None:
     master = held(parameters(device=QUIET, hand={"tremor_amplitude": 0.0}))
     run(master, 100)
     before = master.state["position"].copy()
@@ -231,7 +243,7 @@ def test_a_push_below_the_friction_moves_the_device_nowhere():
     assert np.array_equal(master.state["position"], before)
 
 
-def test_tip_leaves_its_stop_again():
+def test_tip_leaves_its_stop_again() -> None:
     points = (0.2, 0.0, 0.0, 0.0, 0.0, 0.0)
     path = operator(kind="points", points=points, approach_time=0.1, period=1.5)
     signals = run(held(parameters(operator=path, device=QUIET)), 4000)
@@ -239,7 +251,7 @@ def test_tip_leaves_its_stop_again():
     assert abs(places(signals)[-1, 0]) < 1e-3
 
 
-def test_master_starts_at_rest_in_the_inkwell():
+def test_master_starts_at_rest_in_the_inkwell() -> None:
     master = held(parameters(operator=operator(), device={"gimbal_noise": 0.0}))
     start = master.signals["master_measured_cp"].copy()
     assert np.allclose(start[3:], REST.as_quat(scalar_first=True), rtol=0, atol=1e-15)
@@ -249,7 +261,7 @@ def test_master_starts_at_rest_in_the_inkwell():
     assert np.abs(wobble(first)).max() < 1e-6
 
 
-def test_first_reading_is_the_start_itself_and_reports_no_motion():
+def test_first_reading_is_the_start_itself_and_reports_no_motion() -> None:
     master = held(parameters(device={"gimbal_noise": 0.0}))
     start = master.signals["master_measured_cp"].copy()
     assert np.abs(start[:3] - REST_POSITION).max() <= 0.5 * RESOLUTION
@@ -258,7 +270,7 @@ def test_first_reading_is_the_start_itself_and_reports_no_motion():
     assert not first["master_measured_cv"].any()
 
 
-def test_twist_is_the_filtered_rate_of_the_readings():
+def test_twist_is_the_filtered_rate_of_the_readings() -> None:
     path = operator(kind="circle", center=(0.0, 0.0, 0.03), approach_time=1.0, period=4.0)
     master = held(parameters(operator=path, device=QUIET, hand={"tremor_amplitude": 0.0}))
     signals = run(master, 4000)
@@ -269,7 +281,7 @@ def test_twist_is_the_filtered_rate_of_the_readings():
     assert np.abs(rate).max() > 0.02
 
 
-def test_turning_rate_is_that_of_the_stylus_in_base_axes():
+def test_turning_rate_is_that_of_the_stylus_in_base_axes() -> None:
     path = operator(kind="hold", tilt=(0.0, 0.0, 1.0), approach_time=2.0, rotation=0.0)
     signals = run(held(parameters(operator=path, device=QUIET)), 1500)
     about_stylus_z = REST.apply((0.0, 0.0, 1.0))
@@ -278,10 +290,12 @@ def test_turning_rate_is_that_of_the_stylus_in_base_axes():
     assert np.allclose(measured, 0.9375 * about_stylus_z, rtol=0, atol=1e-3)
 
 
-def test_turning_rate_does_not_see_that_opposite_quaternions_are_one_attitude(own_parts):
+def test_turning_rate_does_not_see_that_opposite_quaternions_are_one_attitude(
+    own_parts: None,
+) -> None:
     rate = 3.0
 
-    def wrapped(times):
+    def wrapped(times: Array) -> Array:
         angle = (rate * times + math.pi) % (2.0 * math.pi) - math.pi
         return np.column_stack((np.zeros((len(times), 5)), angle))
 
@@ -296,7 +310,7 @@ def test_turning_rate_does_not_see_that_opposite_quaternions_are_one_attitude(ow
     assert np.allclose(signals["master_measured_cv"][500:, 3:], expected, rtol=0, atol=1e-5)
 
 
-def test_buttons_are_pressed_at_their_times():
+def test_buttons_are_pressed_at_their_times() -> None:
     buttons = {"clutch": (0.1, 0.3), "fixture": (0.2,), "mode": (0.05, 0.4)}
     pressed = run(held(parameters(buttons=buttons)), 600)["master_buttons"]
     at = [np.flatnonzero(column) + 1 for column in pressed.T]  # tick k has the time k ms
@@ -309,7 +323,7 @@ def test_buttons_are_pressed_at_their_times():
 
 
 @pytest.mark.parametrize("clutch", [(1.0,), (2.0, 1.0), (1.0, 2.0, 3.0)])
-def test_clutch_times_that_are_no_rising_pairs_are_refused(clutch):
+def test_clutch_times_that_are_no_rising_pairs_are_refused(clutch: tuple[float, ...]) -> None:
     with pytest.raises(ParameterError) as error:
         ButtonParameters(clutch=clutch)
     assert error.value.name == "operator.buttons.clutch"
@@ -317,13 +331,15 @@ def test_clutch_times_that_are_no_rising_pairs_are_refused(clutch):
 
 @pytest.mark.parametrize("button", ["fixture", "mode"])
 @pytest.mark.parametrize("presses", [(1.0, 1.05), (2.0, 1.95), (1.0, 1.1)])
-def test_presses_that_would_run_into_one_are_refused(button, presses):
+def test_presses_that_would_run_into_one_are_refused(
+    button: str, presses: tuple[float, float]
+) -> None:
     with pytest.raises(ParameterError) as error:
         ButtonParameters(**{button: presses})
     assert error.value.name == f"operator.buttons.{button}"
 
 
-def test_presses_need_no_order():
+def test_presses_need_no_order() -> None:
     pressed = run(held(parameters(buttons={"mode": (0.3, 0.05)})), 400)["master_buttons"]
     assert np.count_nonzero(np.diff(pressed[:, 2]) > 0) == 2
 
@@ -331,7 +347,7 @@ def test_presses_need_no_order():
 RANDOM = operator(kind="random", approach_time=0.5)
 
 
-def test_same_seed_gives_the_same_bits_and_another_seed_others():
+def test_same_seed_gives_the_same_bits_and_another_seed_others() -> None:
     first, again, other = (
         run(held(parameters(seed=seed, operator=RANDOM)), 1500) for seed in (5, 5, 6)
     )
@@ -340,7 +356,7 @@ def test_same_seed_gives_the_same_bits_and_another_seed_others():
     assert np.abs(places(first)[-1] - places(other)[-1]).max() > 1e-3
 
 
-def test_reset_repeats_the_session_to_the_bit():
+def test_reset_repeats_the_session_to_the_bit() -> None:
     master = held(parameters(operator=RANDOM))
     first = run(master, 1200)
     master.reset()
@@ -350,7 +366,9 @@ def test_reset_repeats_the_session_to_the_bit():
 
 
 @pytest.mark.parametrize("sizes", [(1,) * 50, (7, 993, 1000), (1000,) * 3, (999, 1)])
-def test_what_the_operator_wants_does_not_depend_on_the_blocks_it_is_drawn_in(sizes):
+def test_what_the_operator_wants_does_not_depend_on_the_blocks_it_is_drawn_in(
+    sizes: tuple[int, ...],
+) -> None:
     buttons = {"clutch": (0.5, 1.0), "mode": (0.02,)}
     one_by_one = run(held(parameters(operator=RANDOM, buttons=buttons)), sum(sizes))
     master = held(parameters(operator=RANDOM, buttons=buttons))
@@ -362,7 +380,7 @@ def test_what_the_operator_wants_does_not_depend_on_the_blocks_it_is_drawn_in(si
         assert np.array_equal(np.concatenate(blocks)[topic], one_by_one[topic]), topic
 
 
-def test_new_hand_is_felt_from_the_next_tick_and_does_not_jump():
+def test_new_hand_is_felt_from_the_next_tick_and_does_not_jump() -> None:
     master = held(parameters(operator=RANDOM, device=QUIET))
     before = places(run(master, 1000))
     stiff = HandParameters(stiffness=2000.0, damping=30.0)
@@ -385,7 +403,9 @@ EXTREMES = [
 
 @pytest.mark.parametrize("friction", [0.0, 0.26, 5.0])
 @pytest.mark.parametrize("hand", EXTREMES)
-def test_hand_at_the_edge_of_its_parameters_stays_where_it_wants_to_be(hand, friction):
+def test_hand_at_the_edge_of_its_parameters_stays_where_it_wants_to_be(
+    hand: dict[str, float], friction: float
+) -> None:
     device = {**QUIET, "apparent_mass": 1e-3, "friction": friction}
     calm = {"stiffness": 300.0, **hand, "tremor_amplitude": 0.0}
     master = held(parameters(device=device, hand=calm))

@@ -1,19 +1,28 @@
 """Plants by name: what the hardware does beside its model, each fault alone, and mistakes."""
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
 
-from teleop_core.base.errors import ParameterError, PartError, ShapeError, UnknownNameError
-from teleop_core.base.parameters import MARKS, build, parameter, specs
+from present import present
+from teleop_core.base.errors import (
+    ParameterError,
+    PartError,
+    ShapeError,
+    TeleopError,
+    UnknownNameError,
+)
+from teleop_core.base.parameters import MARKS, NoParameters, build, parameter, specs
 from teleop_core.graph.signals import TICK_NS
 from teleop_core.robots import load_robot
 from teleop_core.robots.hardware import ENTRIES, Hardware
 from teleop_core.robots.link_errors import LinkErrors
+from teleop_core.robots.robot import Robot
 from teleop_core.session.configuration import configure
 from teleop_core.slave.pair import ArmParameters, SimulatedArm
-from teleop_core.slave.plants import PLANTS, Plant, register_plant
+from teleop_core.slave.plants import PLANTS, Physics, Plant, register_plant
 from teleop_core.slave.plants.hardware import FAULTS, HARDWARE, faults_of
 from teleop_core.slave.slave_sim import SlaveSim
 from teleop_lab.fitting.rests import Mover
@@ -22,66 +31,72 @@ ARM = load_robot("rcrt1")
 TARGET = ARM.home + np.array([0.5, -0.4, -0.04, 0.6, 0.5, 0.4])
 
 
-def slave(plant="hardware", controller="source_pid", **settings):
+def slave(
+    plant: str = "hardware",
+    controller: str = "source_pid",
+    **settings: Any,
+) -> ArmParameters:
     given = {"plant.kind": plant, "controller.kind": controller}
     return build(ArmParameters, given | settings)
 
 
-def rest(*without, **settings):
+def rest(*without: str, **settings: Any) -> Any:
     """Mover after a move to the target, and the encoders' rest less the target (6,)."""
-    mover = Mover(slave(**{"plant.hardware.without": without}, **settings))
+    mover = Mover(slave(**dict[str, Any]({"plant.hardware.without": without}), **settings))
     return mover, mover.move(TARGET) - TARGET
 
 
-def test_without_any_fault_the_hardware_is_the_ideal_plant_without_friction():
-    none = slave(**{"plant.hardware.without": tuple(FAULTS)})
+def test_without_any_fault_the_hardware_is_the_ideal_plant_without_friction() -> None:
+    none = slave(**dict[str, Any]({"plant.hardware.without": tuple(FAULTS)}))
     ideal = slave("ideal", coulomb=(0.0,) * 6)
-    rests = [Mover(parameters).move(TARGET) for parameters in (none, ideal)]
+    rests: Any = [Mover(parameters).move(TARGET) for parameters in (none, ideal)]
     assert np.array_equal(*rests)
 
 
-def test_dry_friction_stops_a_joint_short_by_its_size_over_kp():
+def test_dry_friction_stops_a_joint_short_by_its_size_over_kp() -> None:
     mover, off = rest("wandering", "bias", "weights", "drive_steps")
     kp = mover.slave.simulated.arm.gains[:, 0]
     short = faults_of(ARM).coulomb / kp
     towards = np.sign(ARM.home - TARGET)
-    step = ARM.drives.encoder_step
+    step = present(ARM.drives).encoder_step
     for joint in (0, 1, 3, 4, 5):  # an integrator brings d3 there
         assert abs(off[joint] - towards[joint] * short[joint]) < 2.5 * step[joint], joint
     assert abs(off[2]) < 3 * step[2]
 
 
-def test_bias_and_weight_push_a_joint_without_friction_off_by_their_size_over_kp():
+def test_bias_and_weight_push_a_joint_without_friction_off_by_their_size_over_kp() -> None:
     mover, off = rest("wandering", "friction", "drive_steps")
     kp, faults = mover.slave.simulated.arm.gains[:, 0], faults_of(ARM)
     gravity = np.zeros(6)
-    ARM.dynamics.gravity(TARGET, faults.dynamics.copy(), gravity)
+    present(ARM.dynamics).gravity(TARGET, faults.dynamics.copy(), gravity)
     known = np.zeros(6)
-    ARM.dynamics.gravity(TARGET, ARM.dynamics.parameters.copy(), known)
+    present(ARM.dynamics).gravity(TARGET, present(ARM.dynamics).parameters.copy(), known)
     expected = (faults.bias - (gravity - known)) / kp
-    step = ARM.drives.encoder_step
+    step = present(ARM.drives).encoder_step
     assert np.abs(off - expected)[[0, 1, 3, 4, 5]].max() < 2 * step.max()
     assert abs(off[1]) > 10 * step[1]  # the weight is felt
 
 
 @pytest.mark.parametrize("law", ["pid", "friction_compensation", "adaptive"])
-def test_a_law_that_can_hold_bias_and_weight_begins_in_balance(law):
+def test_a_law_that_can_hold_bias_and_weight_begins_in_balance(law: str) -> None:
     # Without friction whatever is not held moves axis 1, of the bias, or 2, of the weight, at once.
-    made = SimulatedArm(slave(controller=law, starts_at_home=True,
-                          **{"plant.hardware.without": ("friction", "wandering")}))  # fmt: skip
+    made = SimulatedArm(slave(
+        controller=law, starts_at_home=True,
+        **dict[str, Any]({"plant.hardware.without": ("friction", "wandering")}),
+    ))  # fmt: skip
     for tick in range(1, 301):
         made.signals["now_ns"] = tick * TICK_NS
         made.step()
         off = np.abs(made.simulated.arm.q - ARM.home)[:2]
-        assert (off < 1.5 * ARM.drives.encoder_step[:2]).all(), tick
+        assert (off < 1.5 * present(ARM.drives).encoder_step[:2]).all(), tick
 
 
-def test_encoders_see_nothing_that_lies_behind_them():
+def test_encoders_see_nothing_that_lies_behind_them() -> None:
     rests = [rest(*without)[1] for without in ((), ("play", "links"))]
     assert np.array_equal(*rests)
 
 
-def test_true_tip_is_that_of_the_arm_as_built_behind_its_play():
+def test_true_tip_is_that_of_the_arm_as_built_behind_its_play() -> None:
     mover, _ = rest()
     faults, s = faults_of(ARM), mover.slave.simulated.state
     encoders = mover.slave.simulated.arm.q
@@ -93,7 +108,7 @@ def test_true_tip_is_that_of_the_arm_as_built_behind_its_play():
     table = np.zeros((6, 4))  # a, alpha, d, theta
     table[:, 1] = np.array([-1.0, 1.0, 0.0, -1.0, 1.0, 0.0]) * math.pi / 2
     table[5, 2] = 0.037
-    table += faults.links.vector.reshape(4, 6).T
+    table += present(faults.links).vector.reshape(4, 6).T
     q, T = s["carried"], np.eye(4)
     for i, row in enumerate(table):
         a, alpha, d, theta = row + q[i] * np.eye(4)[2 if i == 2 else 3]
@@ -104,17 +119,17 @@ def test_true_tip_is_that_of_the_arm_as_built_behind_its_play():
     assert np.linalg.norm(mover.true_pose()[:3] - T[:3, 3]) < 1e-9
 
 
-def test_drives_give_efforts_in_steps_of_their_converter():
-    mover = Mover(slave(**{"plant.hardware.drive_bits": 8}))
+def test_drives_give_efforts_in_steps_of_their_converter() -> None:
+    mover = Mover(slave(**dict[str, Any]({"plant.hardware.drive_bits": 8})))
     mover.move(TARGET)
-    step = 2.0 * ARM.drives.effort_limit / 256
+    step = 2.0 * present(ARM.drives).effort_limit / 256
     effort = mover.slave.simulated.arm.effort - faults_of(ARM).bias
     assert np.abs(effort / step - np.round(effort / step)).max() < 1e-9
 
 
 @pytest.mark.parametrize("fault", FAULTS)
-def test_every_fault_can_be_left_out_alone(fault):
-    parameters = slave(**{"plant.hardware.without": (fault,)})
+def test_every_fault_can_be_left_out_alone(fault: str) -> None:
+    parameters = slave(**dict[str, Any]({"plant.hardware.without": (fault,)}))
     kind = parameters.plant.kind
     with_it = HARDWARE.physics(slave().plant.kind.parameters, ARM)
     without = HARDWARE.physics(kind.parameters, ARM)
@@ -130,7 +145,7 @@ def test_every_fault_can_be_left_out_alone(fault):
     assert differ == expected[fault]
 
 
-def test_every_number_of_the_hardware_says_how_it_is_known():
+def test_every_number_of_the_hardware_says_how_it_is_known() -> None:
     assert set(faults_of(ARM).sources) == set(ENTRIES)
     for text in faults_of(ARM).sources.values():
         assert text.partition(":")[0] in MARKS
@@ -139,16 +154,16 @@ def test_every_number_of_the_hardware_says_how_it_is_known():
 
 
 @pytest.mark.parametrize("name", ["puma560", "scara", "scara_stewart"])
-def test_other_robots_stick_by_their_drive_table_and_are_made_as_drawn(name):
+def test_other_robots_stick_by_their_drive_table_and_are_made_as_drawn(name: str) -> None:
     made = SimulatedArm(build(ArmParameters, {"robot": name, "plant.kind": "hardware"}))
     robot = made.robot
-    assert np.array_equal(made.simulated.parameters["coulomb"], robot.drives.coulomb)
+    assert np.array_equal(made.simulated.parameters["coulomb"], present(robot.drives).coulomb)
     assert (made.simulated.parameters["bristle"] > 0.0).all()
     assert np.array_equal(made.simulated.arm.tip_geometry, robot.geometry_row)
 
 
-def test_a_plant_of_ones_own_moves_the_slave():
-    def physics(parameters, robot):
+def test_a_plant_of_ones_own_moves_the_slave() -> None:
+    def physics(parameters: NoParameters, robot: Robot) -> Physics:
         made = PLANTS.find("ideal").physics(None, robot)
         return type(made)(**(vars(made) | {"bias": 0.5 * np.eye(robot.n)[0]}))
 
@@ -164,12 +179,12 @@ def test_a_plant_of_ones_own_moves_the_slave():
     ("plant", "needed"),
     [
         ("no plant", "a Plant"),
-        (Plant("bad", int, lambda p, r: None), "dataclass"),
-        (Plant("bad", HARDWARE.parameters, lambda p, r: None), "gives Physics"),
-        (Plant("bad", HARDWARE.parameters, lambda p, r: 1 / 0), "ZeroDivisionError"),
+        (Plant("bad", int, lambda p, r: None), "dataclass"),  # type: ignore[arg-type, return-value]
+        (Plant("bad", HARDWARE.parameters, lambda p, r: None), "gives Physics"),  # type: ignore[arg-type, return-value]
+        (Plant("bad", HARDWARE.parameters, lambda p, r: 1 / 0), "ZeroDivisionError"),  # type: ignore[arg-type, return-value]
     ],
 )
-def test_what_is_no_plant_is_refused_with_the_reason(plant, needed):
+def test_what_is_no_plant_is_refused_with_the_reason(plant: str | Plant, needed: str) -> None:
     with pytest.raises(PartError, match=needed):
         PLANTS.add("bad", plant)
     assert "bad" not in PLANTS.names()
@@ -186,7 +201,7 @@ def test_what_is_no_plant_is_refused_with_the_reason(plant, needed):
         ("plant.hardware.weights=[m2b_L0b=heavy]", "m2b_L0b=number"),
     ],
 )
-def test_wrong_numbers_of_a_plant_name_what_is_possible(setting, needed):
+def test_wrong_numbers_of_a_plant_name_what_is_possible(setting: str, needed: str) -> None:
     with pytest.raises((ParameterError, UnknownNameError), match=needed):
         SlaveSim(configure(None, settings=["plant=hardware", setting]).group("slave_sim"))
 
@@ -203,7 +218,10 @@ def test_wrong_numbers_of_a_plant_name_what_is_possible(setting, needed):
         ({"sources": {"play": "somewhere"}}, ParameterError),
     ],
 )
-def test_impossible_hardware_is_refused(changed, kind):
+def test_impossible_hardware_is_refused(
+    changed: Any,
+    kind: type[TeleopError],
+) -> None:
     zero = np.zeros(2)
     given = {"coulomb": zero, "bias": zero, "wander": zero, "play": zero,
              "coupling": np.zeros((2, 2))}  # fmt: skip
@@ -211,6 +229,6 @@ def test_impossible_hardware_is_refused(changed, kind):
         Hardware(**(given | changed))
 
 
-def test_a_source_without_a_mark_is_refused():
+def test_a_source_without_a_mark_is_refused() -> None:
     with pytest.raises(ParameterError, match="published"):
         parameter(1.0, doc="", source="my own measurement")

@@ -1,15 +1,19 @@
 """Height field: a table of heights as an object to touch, beside plane and sphere."""
 
+from collections.abc import Iterator
 from itertools import repeat
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 import teleop_core as tc
 from led_tip import lead
+from present import present
 from teleop_core.base.errors import ParameterError
 from teleop_core.console.world_nodes import object_outline
+from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot
 from teleop_core.slave.world.height_field import HEIGHT_FIELD, HeightFieldParameters
 from teleop_core.slave.world.heights import THICKNESS, read_heights
@@ -31,7 +35,7 @@ AWAY = 8e-3  # from the edges of a field [m]
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory):
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     """Tables of heights, and a cache of its own."""
     made = tmp_path_factory.mktemp("heights")
     for name, heights in FIELDS.items():
@@ -43,19 +47,23 @@ def folder(tmp_path_factory):
         yield made
 
 
-def field(folder, name, ending="csv", **more):
+def field(folder: Path, name: str, ending: str = "csv", **more: float) -> HeightFieldParameters:
     """Parameters of a field."""
     return HeightFieldParameters(file=str(folder / f"{name}.{ending}"), **more)
 
 
-def found(group, places, part=HEIGHT_FIELD):
+def found(
+    group: HeightFieldParameters, places: Array, part: tc.WorldObject = HEIGHT_FIELD
+) -> tuple[Array, Array]:
     """Distances (N,) and normals (N, 3) of an object at places (N, 3)."""
     normals, shape = np.zeros((len(places), 3)), part.numbers(group)
     distances = [part.distance(*row) for row in zip(places, repeat(shape), normals, strict=False)]
     return np.array(distances), normals
 
 
-def near_surface(name, rng, count=20_000):
+def near_surface(
+    name: str, rng: np.random.Generator, count: int = 20_000
+) -> tuple[Array, Array, Array]:
     """Places (N, 3) to 3 mm from a surface and away from its edges; distances and normals there."""
     half = (0.5 * np.array((np.ptp(X), np.ptp(Y)))) - AWAY
     places = np.column_stack(
@@ -78,8 +86,8 @@ def near_surface(name, rng, count=20_000):
     [("flat", 6e-6, 0.1), ("tilted", 6e-6, 0.2), ("ball", 6e-6, 0.1)],
 )
 def test_a_field_has_distance_and_normal_of_its_plane_or_sphere_within_the_bounds(
-    name, distance, angle, folder
-):
+    name: str, distance: float, angle: float, folder: Path
+) -> None:
     places, wanted, outward = near_surface(name, np.random.default_rng(1))
     measured, normal = found(field(folder, name), places)
     assert len(places) > 1000
@@ -88,7 +96,7 @@ def test_a_field_has_distance_and_normal_of_its_plane_or_sphere_within_the_bound
     assert np.degrees(turn.max()) < angle
 
 
-def test_between_heights_the_surface_is_that_of_a_cubic_spline_of_others(folder):
+def test_between_heights_the_surface_is_that_of_a_cubic_spline_of_others(folder: Path) -> None:
     """Natural at the ends, as ours."""
     from scipy.interpolate import CubicSpline
 
@@ -102,7 +110,7 @@ def test_between_heights_the_surface_is_that_of_a_cubic_spline_of_others(folder)
     np.testing.assert_allclose(top[..., 2], wanted, atol=1e-15)
 
 
-def test_the_block_is_a_closed_mesh_for_a_library_of_others(folder):
+def test_the_block_is_a_closed_mesh_for_a_library_of_others(folder: Path) -> None:
     import trimesh
 
     heights = FIELDS["waves"]
@@ -117,14 +125,14 @@ def test_the_block_is_a_closed_mesh_for_a_library_of_others(folder):
     assert found(field(folder, "waves"), np.array([(0.0, 0.0, floor - 5e-3)]))[0] > 4.9e-3
 
 
-def test_rows_are_places_along_x_and_both_formats_say_the_same(folder):
+def test_rows_are_places_along_x_and_both_formats_say_the_same(folder: Path) -> None:
     places = np.array([(0.01, 0.0, 3e-3), (0.0, 0.01, -2e-3)])
     for ending in ("csv", "npy"):
         distances, _ = found(field(folder, "tilted", ending), places)
         np.testing.assert_allclose(distances, 0.0, atol=1e-8)
 
 
-def test_the_normal_turns_without_a_kink_where_triangles_and_cells_meet(folder):
+def test_the_normal_turns_without_a_kink_where_triangles_and_cells_meet(folder: Path) -> None:
     x = np.linspace(-0.02, 0.02, 8001)
     height = 1.5e-3 * np.sin(x / 4e-3)
     _, normal = found(field(folder, "waves"), np.column_stack((x, 0.0 * x, height - 2e-4)))
@@ -135,7 +143,7 @@ def test_the_normal_turns_without_a_kink_where_triangles_and_cells_meet(folder):
 
 
 @pytest.mark.parametrize("friction", [0.0, 0.6])
-def test_no_motion_gains_energy_from_a_field(friction, folder):
+def test_no_motion_gains_energy_from_a_field(friction: float, folder: Path) -> None:
     """Tips that are led around closed ways through it, also across its edges."""
     rng, group, shares = np.random.default_rng(5), field(folder, "waves"), []
     share = np.linspace(0.0, 1.0, 3001)
@@ -156,20 +164,20 @@ def test_no_motion_gains_energy_from_a_field(friction, folder):
     assert min(shares) > (0.0 if friction else -1e-3)
 
 
-def test_a_recording_replays_to_the_bit_when_its_file_is_gone(folder, tmp_path):
+def test_a_recording_replays_to_the_bit_when_its_file_is_gone(folder: Path, tmp_path: Path) -> None:
     path = tmp_path / "ball.csv"
     path.write_bytes((folder / "ball.csv").read_bytes())
-    settings = {"world": "height_field", "world.height_field.file": str(path),
+    settings: Any = {"world": "height_field", "world.height_field.file": str(path),
                 "world.place": [0.241, -0.236, -0.077]}  # fmt: skip
     recording = tc.run("palpation", duration=8.0, out=tmp_path / "bag", settings=settings)
     before = recording["slave/true_cf"].values
     assert np.abs(before).max() > 0.1
     path.unlink()
-    again = tc.replay(recording.path)
+    again = tc.replay(present(recording.path))
     np.testing.assert_array_equal(again["slave/true_cf"].values, before)
 
 
-def test_the_page_draws_the_field_where_it_lies(folder):
+def test_the_page_draws_the_field_where_it_lies(folder: Path) -> None:
     place = np.array((0.2, -0.2, -0.1))
     values = {"kind": "height_field", "height_field.file": str(folder / "ball.csv")}
     drawn = object_outline(values | {"place": tuple(place.tolist())}, load_robot("rcrt1"))
@@ -185,7 +193,9 @@ def test_the_page_draws_the_field_where_it_lies(folder):
         (b"0,0,0,nan\n" * 4, "finite"), (b"\xff\xfe", "Unicode"),
     ],
 )  # fmt: skip
-def test_a_file_that_is_no_table_of_heights_is_refused(content, said, folder):
+def test_a_file_that_is_no_table_of_heights_is_refused(
+    content: bytes, said: str, folder: Path
+) -> None:
     path = folder / "bad.csv"
     path.write_bytes(content)
     with pytest.raises(ParameterError, match=said) as error:
@@ -201,7 +211,9 @@ def test_a_file_that_is_no_table_of_heights_is_refused(content, said, folder):
         ({"spacing": 0.1, "step": 5e-3}, "spacing"),
     ],
 )  # fmt: skip
-def test_a_field_that_does_not_fit_its_numbers_is_refused_by_their_name(more, parameter, folder):
+def test_a_field_that_does_not_fit_its_numbers_is_refused_by_their_name(
+    more: dict[str, float], parameter: str, folder: Path
+) -> None:
     np.save(folder / "narrow.npy", np.zeros((25, 4)))
     name = "narrow" if parameter == "spacing" else "flat"
     with pytest.raises(ParameterError) as error:
@@ -209,7 +221,7 @@ def test_a_field_that_does_not_fit_its_numbers_is_refused_by_their_name(more, pa
     assert error.value.name == f"world.height_field.{parameter}"
 
 
-def test_a_file_that_is_not_there_is_refused():
+def test_a_file_that_is_not_there_is_refused() -> None:
     for part, group in ((HEIGHT_FIELD, HeightFieldParameters()), (MESH, MeshParameters())):
         with pytest.raises(ParameterError, match="a file with") as error:
             part.numbers(group)

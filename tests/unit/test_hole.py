@@ -1,17 +1,23 @@
 """Hole: its distance against a library of others, a peg in it, and the scenario ``peg``."""
 
 import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
 
 import coal
 import numpy as np
 import pytest
 import trimesh
+from trimesh import Trimesh
 
 import teleop_core as tc
 from free_tool import drag, fly
+from present import present
 from teleop_core.base.errors import ParameterError
 from teleop_core.console.world_nodes import object_outline
 from teleop_core.evaluation.metrics.insertion import depth_in_hole
+from teleop_core.kernels.geometry import Array
 from teleop_core.kernels.parts import numbers_of
 from teleop_core.robots import load_robot
 from teleop_core.session.configuration import configure
@@ -28,7 +34,7 @@ PLATES = {
 SIDES = 720
 
 
-def turned_section(p):
+def turned_section(p: HoleParameters) -> Trimesh:
     """A solid of revolution from its section by trimesh, along z."""
     section = [(p.radius + p.chamfer, 0.0), (p.radius, -p.chamfer), (p.radius, -p.thickness),
                (p.plate_radius, -p.thickness), (p.plate_radius, 0.0),
@@ -36,14 +42,14 @@ def turned_section(p):
     return trimesh.creation.revolve(np.array(section), sections=SIDES)
 
 
-def to_axis(axis):
+def to_axis(axis: Sequence[float] | Array) -> Array:
     """Rotation (3, 3) from z to an axis in the plane x, z."""
     x, _, z = np.array(axis) / np.linalg.norm(axis)
     return np.array([[z, 0.0, x], [0.0, 1.0, 0.0], [-x, 0.0, z]])
 
 
 @pytest.mark.parametrize("name", PLATES)
-def test_a_library_of_others_finds_the_same_distance_and_the_same_way_out(name):
+def test_a_library_of_others_finds_the_same_distance_and_the_same_way_out(name: str) -> None:
     parameters = PLATES[name]
     solid, numbers, normal = turned_section(parameters), numbers_of(parameters), np.zeros(3)
     surface = coal.BVHModelOBBRSS()
@@ -76,7 +82,9 @@ def test_a_library_of_others_finds_the_same_distance_and_the_same_way_out(name):
 
 
 @pytest.mark.parametrize("axis", [(0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.3, -2.0, 0.7)])
-def test_on_the_axis_the_wall_is_a_radius_away_on_every_side(axis):
+def test_on_the_axis_the_wall_is_a_radius_away_on_every_side(
+    axis: tuple[float, float, float],
+) -> None:
     parameters, normal = HoleParameters(axis=axis), np.zeros(3)
     unit = np.array(axis) / np.linalg.norm(axis)
     found = HOLE.distance(-0.015 * unit, numbers_of(parameters), normal)
@@ -86,7 +94,7 @@ def test_on_the_axis_the_wall_is_a_radius_away_on_every_side(axis):
 
 
 @pytest.mark.parametrize("clearance", [1e-4, 5e-4])
-def test_a_peg_beside_the_axis_feels_the_wall_beyond_the_clearance_alone(clearance):
+def test_a_peg_beside_the_axis_feels_the_wall_beyond_the_clearance_alone(clearance: float) -> None:
     parameters = HoleParameters(radius=0.005 + clearance)
     for beside in (0.0, 0.9 * clearance, 1.5 * clearance):
         felt, *_ = drag((beside, 0.0, -0.02), (0, 0, -1), np.zeros((1, 6)), "hole", parameters,
@@ -95,7 +103,7 @@ def test_a_peg_beside_the_axis_feels_the_wall_beyond_the_clearance_alone(clearan
         assert felt[0, 0] == pytest.approx(expected, abs=1e-9)
 
 
-def test_a_tilted_peg_touches_with_both_ends_and_feels_a_moment():
+def test_a_tilted_peg_touches_with_both_ends_and_feels_a_moment() -> None:
     """Whitney's wedge (1982): two contacts, on opposite walls, that turn the peg straight."""
     tilt, length, clearance = 0.06, 0.02, 5e-4
     axis = np.array([math.sin(tilt), 0.0, -math.cos(tilt)])
@@ -108,7 +116,7 @@ def test_a_tilted_peg_touches_with_both_ends_and_feels_a_moment():
     assert felt[0, 4] == pytest.approx(push * length * math.cos(tilt), rel=1e-6)
 
 
-def test_the_chamfer_leads_a_peg_into_the_hole_and_without_it_the_peg_rests_on_the_plate():
+def test_the_chamfer_leads_a_peg_into_the_hole_and_without_it_the_peg_rests_on_the_plate() -> None:
     """A heavy peg with a round end and friction that falls 4.5 mm beside the axis."""
     depths = {}
     for chamfer in (0.003, 0.0):
@@ -122,11 +130,11 @@ def test_the_chamfer_leads_a_peg_into_the_hole_and_without_it_the_peg_rests_on_t
     assert depths[0.0] < 0.0
 
 
-def test_depth_counts_in_the_hole_alone():
+def test_depth_counts_in_the_hole_alone() -> None:
     hole, center = HoleParameters(axis=TILTED), np.array([0.1, 0.2, 0.3])
     axis, beside = np.array(TILTED), np.array([0.8, 0.0, -0.6])
 
-    def depth(*ways):
+    def depth(*ways: Array) -> float:
         return depth_in_hole(center + np.array(ways), center, hole)
 
     assert depth(0.01 * axis) == 0.0
@@ -143,14 +151,19 @@ def test_depth_counts_in_the_hole_alone():
         (["world.hole.plate_radius=0.0075"], "more than radius and chamfer"),
     ],
 )
-def test_a_hole_that_is_none_is_refused(texts, expected):
+def test_a_hole_that_is_none_is_refused(texts: list[str], expected: str) -> None:
     with pytest.raises(ParameterError, match=expected):
         configure("free_motion", settings=["world=hole", *texts])
 
 
-def test_the_page_draws_its_edges():
+def test_the_page_draws_its_edges() -> None:
     robot = load_robot("rcrt1")
-    values = {"kind": "hole", "place": (0.3, 0.0, 0.0), "hole.axis": TILTED, "tool_points": 5}
+    values: dict[str, Any] = {
+        "kind": "hole",
+        "place": (0.3, 0.0, 0.0),
+        "hole.axis": TILTED,
+        "tool_points": 5,
+    }
     drawn = object_outline(values, robot)
     assert len(drawn) == 5 * 40
     points = hole_outline(HoleParameters(axis=TILTED))
@@ -164,12 +177,12 @@ def test_the_page_draws_its_edges():
 
 
 @pytest.fixture(scope="module")
-def session(tmp_path_factory):
+def session(tmp_path_factory: pytest.TempPathFactory) -> tc.Recording:
     """Recording of the scenario ``peg``."""
     return tc.run("peg", out=tmp_path_factory.mktemp("peg") / "bag")
 
 
-def in_hole(recording):
+def in_hole(recording: tc.Recording) -> tuple[Array, Array, Array]:
     """Depth (N,) and distance from the axis (N, 3) [m] of the tip, and its wrench (N, 6)."""
     place, force = recording["slave/true_cp"], recording["slave/true_cf"]
     last = np.searchsorted(force.stamp_ns, place.stamp_ns, side="right") - 1
@@ -180,7 +193,7 @@ def in_hole(recording):
     return depth, ways - depth[:, None] * axis, force.values[last]
 
 
-def test_the_hand_takes_the_peg_into_the_hole_and_out_again(session):
+def test_the_hand_takes_the_peg_into_the_hole_and_out_again(session: tc.Recording) -> None:
     depth, beside, wrench = in_hole(session)
     touched = np.flatnonzero(wrench[:, :3].any(axis=1))
     deepest = np.argmax(depth[touched[0] :]) + touched[0]
@@ -190,7 +203,7 @@ def test_the_hand_takes_the_peg_into_the_hole_and_out_again(session):
     assert np.linalg.norm(beside[touched[0]]) > 0.7e-3  # where it began
 
 
-def test_the_walls_turn_the_peg_and_hold_it_back_within_friction(session):
+def test_the_walls_turn_the_peg_and_hold_it_back_within_friction(session: tc.Recording) -> None:
     _, _, wrench = in_hole(session)
     force, torque = (np.linalg.norm(part, axis=1) for part in (wrench[:, :3], wrench[:, 3:]))
     assert 0.1 < force.max() < 0.5
@@ -198,7 +211,7 @@ def test_the_walls_turn_the_peg_and_hold_it_back_within_friction(session):
     assert (torque <= (0.02 + 0.005) * 5 * force.max()).all()
 
 
-def test_the_score_tells_depth_resistance_and_torque(session):
+def test_the_score_tells_depth_resistance_and_torque(session: tc.Recording) -> None:
     depth, _, wrench = in_hole(session)
     score = session.score()
     is_touching = wrench[:, :3].any(axis=1)
@@ -215,12 +228,12 @@ def test_the_score_tells_depth_resistance_and_torque(session):
     )
 
 
-def test_a_session_without_a_hole_has_no_insertion(tmp_path):
+def test_a_session_without_a_hole_has_no_insertion(tmp_path: Path) -> None:
     score = tc.run("free_motion", duration=1.0, out=tmp_path / "bag").score()
     assert score.value("insertion.depth_mm") is None
 
 
-def test_it_is_replayed_to_the_bit(session):
-    again = tc.replay(session.path)
+def test_it_is_replayed_to_the_bit(session: tc.Recording) -> None:
+    again = tc.replay(present(session.path))
     for topic in ("slave/true_cf", "slave/true_cp"):
         np.testing.assert_array_equal(again[topic].values, session[topic].values)

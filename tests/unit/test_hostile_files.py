@@ -3,7 +3,9 @@
 import os
 import struct
 import tracemalloc
+from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import Any
 
 import lz4.frame
 import numpy as np
@@ -36,7 +38,7 @@ STREAMS = (topics.SLAVE_MEASURED_CP, topics.SLAVE_SETPOINT_CP, topics.SLAVE_SERV
 
 
 @pytest.fixture
-def little_memory():
+def little_memory() -> Iterator[None]:
     """A test in which no more than 100 MB may be taken, at any time."""
     tracemalloc.start()
     yield
@@ -56,7 +58,7 @@ def bomb(path: Path, name: str, packed: bytes, told: int) -> Path:
     return path
 
 
-def zeros(compress, size: int) -> bytes:
+def zeros(compress: Any, size: int) -> bytes:
     """So many zero bytes, packed bit by bit."""
     block = bytes(1 << 20)
     return b"".join([*(compress.compress(block) for _ in range(size >> 20)), compress.flush()])
@@ -83,8 +85,8 @@ def packed(kind: str) -> bytes:
 @pytest.mark.parametrize("told", [3 * GIGABYTE, 1000], ids=["told", "not told"])
 @pytest.mark.parametrize("kind", BOMBS, scope="module")
 def test_a_small_chunk_that_unpacks_to_gigabytes_is_refused(
-    tmp_path, packed, little_memory, kind, told
-):
+    tmp_path: Path, packed: bytes, little_memory: None, kind: str, told: int
+) -> None:
     path = bomb(tmp_path / "bomb.mcap", kind.partition(" ")[0], packed, told)
     with pytest.raises(RecordingError, match="is damaged") as error:
         Bag(path)
@@ -93,11 +95,11 @@ def test_a_small_chunk_that_unpacks_to_gigabytes_is_refused(
         recover(path)
 
 
-def test_the_largest_chunk_is_far_above_those_of_known_writers():
+def test_the_largest_chunk_is_far_above_those_of_known_writers() -> None:
     assert LARGEST > 50 * (1 << 20)
 
 
-def test_a_pipe_in_the_place_of_a_file_is_refused_and_not_waited_for(tmp_path):
+def test_a_pipe_in_the_place_of_a_file_is_refused_and_not_waited_for(tmp_path: Path) -> None:
     pipe = tmp_path / "pipe.mcap"
     os.mkfifo(pipe)
     for attempt in (load_file, load_table, Bag, recover, as_master_bag):
@@ -112,7 +114,9 @@ def test_a_pipe_in_the_place_of_a_file_is_refused_and_not_waited_for(tmp_path):
         Bag(bag)
 
 
-def test_a_length_that_a_file_claims_is_never_allocated(tmp_path, little_memory, capsys):
+def test_a_length_that_a_file_claims_is_never_allocated(
+    tmp_path: Path, little_memory: None, capsys: pytest.CaptureFixture[str]
+) -> None:
     recorded(tmp_path / "bag")
     file = tmp_path / "bag" / "bag_0.mcap"
     whole = bytearray(file.read_bytes())
@@ -140,7 +144,9 @@ def recorded(path: Path, **metadata: str) -> Path:
     return path
 
 
-def test_no_command_prints_codes_that_stand_in_a_recording(tmp_path, capsys):
+def test_no_command_prints_codes_that_stand_in_a_recording(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     path = recorded(tmp_path / "bag", scenario=ESCAPES, robot=ESCAPES, seed=ESCAPES)
     assert cli.main(["evaluate", str(path), "--html", str(tmp_path / "page.html")]) == 0
     said = "".join(capsys.readouterr())
@@ -150,13 +156,13 @@ def test_no_command_prints_codes_that_stand_in_a_recording(tmp_path, capsys):
     assert all(printable(text) == text for one in reports for text in (one.name, one.message))
 
 
-def test_a_recording_without_state_reports_has_a_page(tmp_path):
+def test_a_recording_without_state_reports_has_a_page(tmp_path: Path) -> None:
     page = tmp_path / "page.html"
     evaluate_bags([recorded(tmp_path / "bag")], None, page, Console(quiet=True))
     assert page.stat().st_size > 10_000
 
 
-def test_metadata_cannot_lead_out_of_the_directory(tmp_path):
+def test_metadata_cannot_lead_out_of_the_directory(tmp_path: Path) -> None:
     path, other = recorded(tmp_path / "bag"), recorded(tmp_path / "other")
     (other / "other_0.mcap").rename(tmp_path / "secret_0.mcap")
     index = path / "metadata.yaml"
@@ -167,7 +173,7 @@ def test_metadata_cannot_lead_out_of_the_directory(tmp_path):
             Bag(path)
 
 
-def test_a_file_that_is_listed_three_thousand_times_is_refused_in_one_line(tmp_path):
+def test_a_file_that_is_listed_three_thousand_times_is_refused_in_one_line(tmp_path: Path) -> None:
     path = recorded(tmp_path / "bag")
     index = path / "metadata.yaml"
     index.write_text(index.read_text().replace("- bag_0.mcap\n", "- bag_0.mcap\n  " * 3000))
@@ -183,14 +189,16 @@ VALUES = {
 
 
 @pytest.mark.parametrize("value", VALUES.values(), ids=VALUES)
-def test_every_value_is_shown_in_a_few_printable_words(value):
+def test_every_value_is_shown_in_a_few_printable_words(
+    value: str | int | Sequence[str | int],
+) -> None:
     text = str(UnknownNameError("name", value, ["a", "b"]))
     assert len(text) <= LONGEST_LINE
     assert printable(text) == text
     assert len(shown(value)) <= 250
 
 
-def test_a_long_message_keeps_its_beginning_and_its_end():
+def test_a_long_message_keeps_its_beginning_and_its_end() -> None:
     line = one_line("begin " + "middle " * 1000 + "end")
     assert line.startswith("begin")
     assert line.endswith("end")

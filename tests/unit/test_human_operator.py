@@ -1,7 +1,9 @@
 """The operator ``human``: reaches, errors, corrections, tremor; the same bits in any blocks."""
 
 import math
+from collections.abc import Callable
 from itertools import islice, pairwise
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,38 +15,50 @@ from teleop_core.chain.master.haptic_master import HapticMasterParameters
 from teleop_core.chain.operators import OPERATORS, Setting
 from teleop_core.chain.operators.human import HumanParameters, Submovement, submovements, tremor
 from teleop_core.chain.operators.parameters import OperatorParameters
+from teleop_core.kernels.geometry import Array
 
 SIZE, ROTATION, APPROACH = (0.06, 0.05, 0.04), 0.2, 2.0
 CENTER, TILT = (0.01, -0.02, 0.03), (-0.5, 0.1, 0.2)
-EXACT = {"shortfall": 0.0, "noise_along": 0.0, "noise_across": 0.0, "corrections": 0}
+EXACT: dict[str, Any] = {
+    "shortfall": 0.0,
+    "noise_along": 0.0,
+    "noise_across": 0.0,
+    "corrections": 0,
+}
 
 
-def region(**values):
+def region(**values: object) -> OperatorParameters:
     given = {"kind": "human", "size": SIZE, "rotation": ROTATION, "approach_time": APPROACH,
              "center": CENTER, "tilt": TILT}  # fmt: skip
     return build(OperatorParameters, given | values)
 
 
-def motion(seed=1, parameters=None, **values):
+def motion(
+    seed: int = 1,
+    parameters: HumanParameters | None = None,
+    **values: float | tuple[float, float, float],
+) -> Callable[..., Any]:
     setting = Setting(region(**values), np.zeros((6, 4)), seed)
     return OPERATORS.find("human").make(parameters or HumanParameters(), setting)
 
 
-def reaches(count, parameters, seed=1, **values):
+def reaches(
+    count: int, parameters: HumanParameters, seed: int = 1, **values: object
+) -> list[Submovement]:
     """The first submovements."""
     plan = submovements(parameters, region(**values), np.random.default_rng(seed))
     return list(islice(plan, count))
 
 
 @pytest.mark.parametrize("size", [1, 13, 1000, 7000])
-def test_motion_is_the_same_to_the_bit_in_blocks_of_any_size(size):
+def test_motion_is_the_same_to_the_bit_in_blocks_of_any_size(size: int) -> None:
     times = np.arange(1, 7001) * 1e-3 + APPROACH
     whole, asked = motion()(times), motion()
     parts = [asked(times[i : i + size]) for i in range(0, len(times), size)]
     assert np.array_equal(np.concatenate(parts), whole)
 
 
-def test_motion_asked_for_an_earlier_time_begins_anew():
+def test_motion_asked_for_an_earlier_time_begins_anew() -> None:
     times = np.arange(0.0, 30.0, 0.01)
     asked = motion()
     first = asked(times)
@@ -52,19 +66,19 @@ def test_motion_asked_for_an_earlier_time_begins_anew():
     assert np.array_equal(asked(times), first)
 
 
-def test_each_seed_is_another_motion():
+def test_each_seed_is_another_motion() -> None:
     times = np.arange(0.0, 20.0, 0.01)
     assert np.array_equal(motion(1)(times), motion(1)(times))
     assert np.abs(motion(1)(times) - motion(2)(times)).max() > 1e-3
 
 
-def test_hand_starts_at_rest_and_has_approached_the_centre_in_time():
+def test_hand_starts_at_rest_and_has_approached_the_centre_in_time() -> None:
     rows = motion(parameters=HumanParameters(tremor=0.0))(np.array([0.0, APPROACH]))
     assert not rows[0].any()
     np.testing.assert_allclose(rows[1, :6], (*CENTER, *TILT), atol=1e-12)
 
 
-def test_hand_without_noise_never_leaves_its_region():
+def test_hand_without_noise_never_leaves_its_region() -> None:
     times = np.arange(APPROACH, 120.0, 0.01)
     parameters = HumanParameters(**EXACT, overlap=0.0)
     rows = motion(parameters=parameters)(times)
@@ -73,19 +87,19 @@ def test_hand_without_noise_never_leaves_its_region():
     assert (offsets.max(axis=0) > 0.5 * np.array((*SIZE, *[ROTATION] * 3)) / 2.0).all()
 
 
-def test_hand_keeps_to_its_region_but_for_its_errors():
+def test_hand_keeps_to_its_region_but_for_its_errors() -> None:
     times = np.arange(APPROACH, 300.0, 0.01)
     offsets = np.abs(motion()(times)[:, :3] - CENTER)
     assert (offsets <= np.array(SIZE) / 2.0 + 0.01).all()
 
 
-def test_submovements_begin_one_after_the_other():
+def test_submovements_begin_one_after_the_other() -> None:
     found = reaches(500, HumanParameters())
     assert (np.diff([one.begin for one in found]) > 0.0).all()
     assert min(one.duration for one in found) > 0.0
 
 
-def test_correction_begins_a_reaction_time_after_the_eye_could_see_the_error():
+def test_correction_begins_a_reaction_time_after_the_eye_could_see_the_error() -> None:
     parameters = HumanParameters(passing=0.0, dwell_time=10.0, dwell_spread=0.0)
     found = reaches(400, parameters)
     starts = [(a, b.begin - a.begin) for a, b in pairwise(found)]
@@ -96,7 +110,7 @@ def test_correction_begins_a_reaction_time_after_the_eye_could_see_the_error():
         assert wait == pytest.approx(min(before.duration, seen))
 
 
-def test_end_of_a_movement_is_off_in_proportion_to_its_speed():
+def test_end_of_a_movement_is_off_in_proportion_to_its_speed() -> None:
     parameters = HumanParameters(shortfall=0.0, corrections=0, noise_along=0.03, noise_across=0.0)
     exact = HumanParameters(shortfall=0.0, corrections=0, noise_along=0.0, noise_across=0.0)
     # The same random numbers lead to the same first target.
@@ -110,7 +124,7 @@ def test_end_of_a_movement_is_off_in_proportion_to_its_speed():
     assert abs(np.mean(ratios)) < 0.006
 
 
-def test_far_targets_take_longer_by_a_time_per_bit():
+def test_far_targets_take_longer_by_a_time_per_bit() -> None:
     parameters = HumanParameters(time_spread=0.0, **EXACT)
     for one in reaches(100, parameters):
         bits = np.log2(np.linalg.norm(one.step[:3]) / parameters.width + 1.0)
@@ -118,17 +132,18 @@ def test_far_targets_take_longer_by_a_time_per_bit():
         assert one.duration == pytest.approx(expected)
 
 
-def test_submovement_ends_its_duration_after_its_beginning():
+def test_submovement_ends_its_duration_after_its_beginning() -> None:
     assert Submovement(1.0, 0.5, np.zeros(6)).end == 1.5
 
 
-def test_hand_without_room_holds_still_but_for_its_tremor():
+def test_hand_without_room_holds_still_but_for_its_tremor() -> None:
     rows = motion(size=(0.0, 0.0, 0.0), rotation=0.0)(np.arange(5.0, 60.0, 0.01))
     assert not np.ptp(rows[:, :3], axis=0).any()
     assert 63e-6 < np.sqrt((rows[:, 9:] ** 2).sum(axis=1).mean()) < 90e-6
 
 
-def test_tremor_has_its_size_in_its_band_and_a_spectrum_that_falls_off_smoothly_beside_it():
+def test_tremor_has_its_size_in_its_band_and_a_spectrum_that_falls_off_smoothly_beside_it() -> None:
+    density: Any
     times, density, size = np.arange(0.0, 100.0, 1e-3), 0.0, 0.0
     for seed in range(20):
         shaking = tremor(63e-6, np.random.default_rng(seed))(times)
@@ -145,7 +160,7 @@ def test_tremor_has_its_size_in_its_band_and_a_spectrum_that_falls_off_smoothly_
     assert 3.0 < found[4] / found[8] < 20.0  # 10 over 14 Hz: 160 and more of a box
 
 
-def resting(kind, **device):
+def resting(kind: str, **device: object) -> Array:
     """Reading (N, 3) [m] of ten seconds of a hand that rests in the device."""
     values = {"kind": kind, "size": (0.0, 0.0, 0.0), "rotation": 0.0, "patience": 0.0}
     person = build(OperatorParameters, values)
@@ -159,18 +174,18 @@ def resting(kind, **device):
     return out[5000:]
 
 
-def in_tremor_band(places):
+def in_tremor_band(places: Array) -> float:
     spectrum = np.abs(np.fft.rfft(places - places.mean(axis=0), axis=0)) ** 2
     frequency = np.fft.rfftfreq(len(places), 1e-3)
     in_band = (frequency >= 8.0) & (frequency <= 12.0)
     return float(np.sqrt(2.0 * spectrum[in_band].sum()) / len(places))
 
 
-def test_tremor_of_a_resting_human_is_in_the_reading_in_spite_of_friction_and_steps():
+def test_tremor_of_a_resting_human_is_in_the_reading_in_spite_of_friction_and_steps() -> None:
     assert in_tremor_band(resting("human")) == pytest.approx(63e-6, rel=0.15)
     assert in_tremor_band(resting("hold")) < 30e-6
 
 
-def test_tolerance_beyond_the_reach_is_refused():
+def test_tolerance_beyond_the_reach_is_refused() -> None:
     with pytest.raises(ParameterError, match="tolerance"):
         HumanParameters(tolerance=0.05)

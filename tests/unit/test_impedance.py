@@ -1,9 +1,12 @@
 """Impedance: the slave yields as its mass, spring and damper do, and channels say to what."""
 
+from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 from scipy.signal import lsim
 
 from teleop_core.base.errors import ParameterError, PartError
@@ -12,6 +15,7 @@ from teleop_core.chain.architectures.impedance import IMPEDANCE, ImpedanceParame
 from teleop_core.graph.graph import Graph, build_graph
 from teleop_core.graph.signals import TICK_NS
 from teleop_core.graph.topics import NO_COMMAND_NS
+from teleop_core.kernels.geometry import Array
 from teleop_core.session.configuration import configure
 from teleop_core.session.virtual import VirtualTime
 from teleop_core.slave.slave_sim import SLAVE_SIM
@@ -21,24 +25,29 @@ STAGES = "teleop.stages=[network,impedance,passivity]"
 LATE = ("network.there.least_delay=0.03", "network.back.least_delay=0.05")
 
 
-def pressing(*texts, stages=STAGES, ticks=9000):
+def pressing(*texts: str, stages: str = STAGES, ticks: int = 9000) -> NDArray[np.void]:
     """Signals of the scenario ``palpation``, whose slave yields."""
     settings = [stages, *CALM, *texts]
     return VirtualTime(configure("palpation", settings=settings)).run(ticks)
 
 
-def on_the_slave(force):
+def on_the_slave(force: Array) -> Array:
     """Forces (N, 3) of the hand along the slave's base."""
     return np.column_stack((-force[:, 2], -force[:, 0], force[:, 1]))
 
 
-def slave(**values):
+def slave(**values: float) -> tuple[Any, Callable[..., float]]:
     """A stage at work, and a call that gives it a command after some ticks: where the tip goes."""
     stage = IMPEDANCE.run(build(ImpedanceParameters, values))
     row = stage.signals
     row["slave_setpoint_cp_ns"] = NO_COMMAND_NS + 1
 
-    def command(force=0.0, lead=0.0, ticks=1, place=(0.1, 0.2, 0.3)):
+    def command(
+        force: float = 0.0,
+        lead: float = 0.0,
+        ticks: int = 1,
+        place: tuple[float, float, float] = (0.1, 0.2, 0.3),
+    ) -> float:
         row["slave_servo_cp"][:3] = place
         row["slave_servo_cp_ns"] += ticks * TICK_NS
         row["slave_measured_cf"][2], row["slave_servo_cf"][2] = force, lead
@@ -52,7 +61,7 @@ def slave(**values):
 
 
 @pytest.mark.parametrize(("mass", "damping"), [(1.0, 100.0), (2.0, 5.0), (0.0, 100.0)])
-def test_a_tip_yields_as_a_mass_with_spring_and_damper_does(mass, damping):
+def test_a_tip_yields_as_a_mass_with_spring_and_damper_does(mass: float, damping: float) -> None:
     _, command = slave(mass=mass, damping=damping, stiffness=400.0)
     times, force = np.arange(2000) * 1e-3, np.sin(np.arange(2000) * 4e-3) - 0.5
     way = [command(float(push)) for push in force]
@@ -61,14 +70,14 @@ def test_a_tip_yields_as_a_mass_with_spring_and_damper_does(mass, damping):
 
 
 @pytest.mark.parametrize("ticks", [1, 20, 300])
-def test_it_comes_to_rest_by_force_over_stiffness_however_seldom_commands_come(ticks):
+def test_it_comes_to_rest_by_force_over_stiffness_however_seldom_commands_come(ticks: int) -> None:
     _, command = slave(stiffness=500.0, force_gain=0.5)
     ways = [command(-2.0, ticks=ticks) for _ in range(2000 // ticks + 20)]
     assert ways[-1] == pytest.approx(-2e-3, rel=1e-3)
     assert min(ways) > -2e-3 * (1.0 + 1e-3)  # no way beyond that
 
 
-def test_no_force_leaves_every_command_as_it_came():
+def test_no_force_leaves_every_command_as_it_came() -> None:
     row, command = slave()
     rng = np.random.default_rng(2)
     for place in rng.normal(size=(50, 3)):
@@ -77,21 +86,21 @@ def test_no_force_leaves_every_command_as_it_came():
         np.testing.assert_array_equal(row["impedance_servo_cp"], row["slave_servo_cp"])
 
 
-def test_forces_that_agree_move_nothing_and_the_hand_pushes_where_the_tip_yields():
+def test_forces_that_agree_move_nothing_and_the_hand_pushes_where_the_tip_yields() -> None:
     _, command = slave(stiffness=1000.0)
     assert not any(command(-3.0, 3.0) for _ in range(500))
     ways = [command(-3.0, 5.0) for _ in range(2000)]
     assert ways[-1] == pytest.approx(2e-3, rel=1e-3)
 
 
-def test_a_force_out_of_all_measure_moves_the_tip_by_its_largest_way_and_lets_go_at_once():
+def test_a_force_out_of_all_measure_moves_the_tip_by_its_largest_way_and_lets_go_at_once() -> None:
     _, command = slave(largest_way=0.01)
     ways = [command(1e4) for _ in range(500)]
     assert max(ways) == pytest.approx(0.01, rel=1e-12)
     assert command(-1.0) < 0.01
 
 
-def test_a_slave_that_goes_its_own_way_gathers_none_and_loses_what_it_had_without_a_step():
+def test_a_slave_that_goes_its_own_way_gathers_none_and_loses_what_it_had_without_a_step() -> None:
     row, command = slave()
     for _ in range(1000):
         command(-2.0)
@@ -102,7 +111,7 @@ def test_a_slave_that_goes_its_own_way_gathers_none_and_loses_what_it_had_withou
     assert abs(ways[-1]) < 1e-7
 
 
-def test_commands_that_overtake_each_other_count_no_time_twice():
+def test_commands_that_overtake_each_other_count_no_time_twice() -> None:
     _, command = slave(damping=1000.0)
     _, plain = slave(damping=1000.0)
     for _ in range(100):
@@ -116,13 +125,13 @@ def test_commands_that_overtake_each_other_count_no_time_twice():
 # Channels.
 
 
-def settled(rows):
+def settled(rows: NDArray[np.void]) -> slice:
     """Ticks in which the slave follows, by far, and everything has set in."""
     return slice(5000, len(rows))
 
 
 @pytest.mark.parametrize("architecture", ["three_channel", "four_channel"])
-def test_the_hand_feels_the_force_by_its_gain_and_a_spring_to_the_tip(architecture):
+def test_the_hand_feels_the_force_by_its_gain_and_a_spring_to_the_tip(architecture: str) -> None:
     rows = pressing(
         f"reflection.architecture={architecture}", f"{architecture}.force_gain=0.5",
         f"{architecture}.stiffness=80.0", "reflection.max_force=10.0", *LATE,
@@ -135,7 +144,9 @@ def test_the_hand_feels_the_force_by_its_gain_and_a_spring_to_the_tip(architectu
 
 
 @pytest.mark.parametrize(("gain", "given"), [(None, 1.0), (0.5, 0.5)])
-def test_the_slave_gets_what_the_hand_bears_in_its_own_axes_as_late_as_commands(gain, given):
+def test_the_slave_gets_what_the_hand_bears_in_its_own_axes_as_late_as_commands(
+    gain: float | None, given: float
+) -> None:
     own = () if gain is None else (f"four_channel.hand_gain={gain}",)
     rows = pressing("reflection.architecture=four_channel", *own, *LATE)
     borne = -given * on_the_slave(rows["master_servo_cf"])
@@ -146,7 +157,7 @@ def test_the_slave_gets_what_the_hand_bears_in_its_own_axes_as_late_as_commands(
 
 
 @pytest.mark.parametrize("architecture", ["unilateral", "position_force", "three_channel"])
-def test_without_a_fourth_channel_the_hand_sends_no_force(architecture):
+def test_without_a_fourth_channel_the_hand_sends_no_force(architecture: str) -> None:
     rows = pressing(f"reflection.architecture={architecture}", "impedance.stiffness=500.0")
     assert not rows["slave_servo_cf"].any()
     yielded = rows["impedance_servo_cp"][:, 2] - rows["network_servo_cp"][:, 2]
@@ -155,7 +166,9 @@ def test_without_a_fourth_channel_the_hand_sends_no_force(architecture):
     )  # presses last
 
 
-def test_a_press_that_lasts_leaves_four_channels_no_way_from_the_command_and_three_its_force():
+def test_a_press_that_lasts_leaves_four_channels_no_way_from_the_command_and_three_its_force() -> (
+    None
+):
     away = {}
     for architecture in ("three_channel", "four_channel"):
         rows = pressing(f"reflection.architecture={architecture}", ticks=12_000)
@@ -167,7 +180,7 @@ def test_a_press_that_lasts_leaves_four_channels_no_way_from_the_command_and_thr
     assert abs(away["four_channel"]) < 0.1 * away["three_channel"]
 
 
-def test_a_session_whose_slave_does_not_yield_sends_no_force_there():
+def test_a_session_whose_slave_does_not_yield_sends_no_force_there() -> None:
     plain = build_graph(stages=["network", "passivity"])
     assert not {"slave/servo_cf", "network/servo_cf"} & {topic.name for topic in plain.topics}
     with_it = build_graph(stages=["network", "impedance", "passivity"])
@@ -182,7 +195,7 @@ def test_a_session_whose_slave_does_not_yield_sends_no_force_there():
     assert into.topic.name == "impedance/servo_cp"  # passivity counts how it yields
 
 
-def test_a_force_of_the_hand_behind_a_deadband_is_off_by_no_more_than_its_share():
+def test_a_force_of_the_hand_behind_a_deadband_is_off_by_no_more_than_its_share() -> None:
     rows = pressing(
         "reflection.architecture=four_channel", "network.deadband.is_on=true",
         "network.deadband.force=0.1", "network.deadband.least_force=0.02",
@@ -199,25 +212,27 @@ def test_a_force_of_the_hand_behind_a_deadband_is_off_by_no_more_than_its_share(
 
 
 @pytest.mark.parametrize("architecture", ["three_channel", "four_channel"])
-def test_channels_before_a_slave_that_does_not_yield_are_refused_with_what_there_is(architecture):
+def test_channels_before_a_slave_that_does_not_yield_are_refused_with_what_there_is(
+    architecture: str,
+) -> None:
     with pytest.raises(ParameterError, match=r"teleop.stages=\[impedance\].*position_force") as got:
         configure("palpation", settings=[f"reflection.architecture={architecture}"])
     assert got.value.value == architecture
 
 
-def test_waves_before_a_slave_that_yields_are_refused_with_the_others():
+def test_waves_before_a_slave_that_yields_are_refused_with_the_others() -> None:
     with pytest.raises(ParameterError, match="none, tank, tdpa with the stage impedance"):
         configure("palpation", settings=[STAGES, "reflection.passivity=wave"])
 
 
 @pytest.mark.parametrize("order", ["impedance,network", "passivity,impedance"])
-def test_a_slave_that_yields_on_the_wrong_side_is_refused_with_the_order(order):
+def test_a_slave_that_yields_on_the_wrong_side_is_refused_with_the_order(order: str) -> None:
     wanted = ",".join(sorted(order.split(","), key=["network", "impedance", "passivity"].index))
     with pytest.raises(PartError, match=wanted.replace(",", ", ")):
         configure("palpation", settings=[f"teleop.stages=[{order}]"])
 
 
-def test_a_slave_that_measures_no_force_cannot_yield():
+def test_a_slave_that_measures_no_force_cannot_yield() -> None:
     told = tuple(topic for topic in SLAVE_SIM.writes if topic.name != "slave/measured_cf")
     dumb = replace(SLAVE_SIM, writes=told)
     stages = build_graph(stages=["impedance"]).stages

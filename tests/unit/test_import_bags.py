@@ -1,17 +1,23 @@
 """Importing bags of others: any pose, any storage, ROS 1 and 2, read beside the rosbags library."""
 
+from collections.abc import Callable
 from functools import cache
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+from numpy.typing import ArrayLike, NDArray
 from rosbags.highlevel import AnyReader
 from rosbags.rosbag1 import Writer as Writer1
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
 from rosbags.rosbag2 import Writer as Writer2
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+from rosbags.typesys.store import Typestore
 from scipy.spatial.transform import Rotation
 
 import teleop_core as tc
+from teleop_core.kernels.geometry import Array
 from teleop_core.session.exchange import bag_messages
 
 START_NS = 1_700_000_000_000_000_000
@@ -27,7 +33,7 @@ KINDS = ("PoseStamped", "PoseWithCovarianceStamped", "TransformStamped", "Odomet
 
 
 @cache
-def types_of(is_ros2):
+def types_of(is_ros2: bool) -> Typestore:
     found = get_typestore(Stores.ROS2_JAZZY if is_ros2 else Stores.ROS1_NOETIC)
     if not is_ros2:
         text = "geometry_msgs/TransformStamped[] transforms"
@@ -38,19 +44,19 @@ def types_of(is_ros2):
 class Maker:
     """Messages of either version of ROS."""
 
-    def __init__(self, is_ros2=True):
+    def __init__(self, is_ros2: bool = True) -> None:
         self.types, self.is_ros2 = types_of(is_ros2), is_ros2
 
-    def make(self, name, **values):
+    def make(self, name: str, **values: Any) -> object:
         return self.types.types[name](**values)
 
-    def header(self, stamp_ns, frame="base", seq=0):
+    def header(self, stamp_ns: int, frame: str = "base", seq: int = 0) -> Any:
         sec, nanosec = divmod(int(stamp_ns), 1_000_000_000)
         stamp = self.make("builtin_interfaces/msg/Time", sec=sec, nanosec=nanosec)
         more = {} if self.is_ros2 else {"seq": seq}
         return self.make("std_msgs/msg/Header", stamp=stamp, frame_id=frame, **more)
 
-    def pose(self, i, kind, stamp_ns, child="tool"):
+    def pose(self, i: int, kind: str, stamp_ns: Any, child: str = "tool") -> Any:
         """Message of a kind, and the name of its type."""
         g = "geometry_msgs/msg"
         x, y, z = PLACES[i]
@@ -81,14 +87,19 @@ class Maker:
             "TFMessage": lambda: self.make("tf2_msgs/msg/TFMessage", transforms=[moved]),
         }[kind]()
 
-    def joy(self, stamp_ns, buttons):
+    def joy(self, stamp_ns: Any, buttons: list[int]) -> Any:
         return self.make(
             "sensor_msgs/msg/Joy", header=self.header(stamp_ns), axes=np.zeros(2, np.float32),
             buttons=np.array(buttons, np.int32),
         )  # fmt: skip
 
 
-def write2(path, messages, storage=StoragePlugin.MCAP, compression=None):
+def write2(
+    path: Path,
+    messages: list[tuple[str, int, Any]],
+    storage: StoragePlugin = StoragePlugin.MCAP,
+    compression: CompressionMode | None = None,
+) -> Path:
     """Rosbag2 directory of (topic, log time, message)."""
     maker, writer = types_of(True), Writer2(path, version=9, storage_plugin=storage)
     if compression is not None:
@@ -103,7 +114,11 @@ def write2(path, messages, storage=StoragePlugin.MCAP, compression=None):
     return path
 
 
-def write1(path, messages, compression=None):
+def write1(
+    path: Path,
+    messages: list[tuple[str, int, Any]],
+    compression: Writer1.CompressionFormat | None = None,
+) -> Path:
     """ROS 1 bag."""
     maker, writer = types_of(False), Writer1(path)
     if compression is not None:
@@ -118,26 +133,38 @@ def write1(path, messages, compression=None):
     return path
 
 
-def poses(kind="PoseStamped", topic="/hand/pose", is_ros2=True, stamps=STAMPS, logs=LOGS, **more):
+def poses(
+    kind: str = "PoseStamped",
+    topic: str = "/hand/pose",
+    is_ros2: bool = True,
+    stamps: NDArray[np.int64] = STAMPS,
+    logs: NDArray[np.int64] = LOGS,
+    **more: str,
+) -> list[tuple[str, int, Any]]:
     maker = Maker(is_ros2)
     return [(topic, logs[i], maker.pose(i, kind, stamps[i], **more)) for i in range(len(logs))]
 
 
-def presses(buttons, topic="/joy", stamps=STAMPS, is_ros2=True):
+def presses(
+    buttons: Callable[..., Any],
+    topic: str = "/joy",
+    stamps: NDArray[np.int64] = STAMPS,
+    is_ros2: bool = True,
+) -> Any:
     maker = Maker(is_ros2)
     return [(topic, LOGS[i], maker.joy(stamps[i], buttons(i))) for i in range(COUNT)]
 
 
-def in_order(*parts):
+def in_order(*parts: list[tuple[str, int, object]]) -> list[tuple[str, int, object]]:
     return sorted((m for part in parts for m in part), key=lambda message: message[1])
 
 
-def imported(path, tmp_path, **options):
+def imported(path: Path, tmp_path: Path, **options: Any) -> tuple[tc.ImportReport, tc.Stream]:
     report = tc.import_recording(path, tmp_path / "out", **options)
     return report, report.recording["master/measured_cp"]
 
 
-def assert_same(stream, stamps=STAMPS, rows=POSES):
+def assert_same(stream: tc.Stream, stamps: ArrayLike = STAMPS, rows: Array = POSES) -> None:
     assert np.array_equal(stream.stamp_ns, stamps)
     assert np.allclose(stream[["x", "y", "z"]], rows[:, :3], rtol=0, atol=1e-16)
     turn = ["qw", "qx", "qy", "qz"]
@@ -147,7 +174,9 @@ def assert_same(stream, stamps=STAMPS, rows=POSES):
 
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("version", ["mcap", "db3", "ros1"])
-def test_every_message_of_a_pose_is_read_from_every_storage(kind, version, tmp_path):
+def test_every_message_of_a_pose_is_read_from_every_storage(
+    kind: str, version: str, tmp_path: Path
+) -> None:
     messages = poses(kind, is_ros2=version != "ros1")
     if version == "ros1":
         path = write1(tmp_path / "user.bag", messages)
@@ -161,19 +190,21 @@ def test_every_message_of_a_pose_is_read_from_every_storage(kind, version, tmp_p
 
 @pytest.mark.parametrize("mode", [CompressionMode.FILE, CompressionMode.MESSAGE])
 @pytest.mark.parametrize("storage", list(StoragePlugin))
-def test_compressed_recordings_are_read(mode, storage, tmp_path):
+def test_compressed_recordings_are_read(
+    mode: CompressionMode, storage: StoragePlugin, tmp_path: Path
+) -> None:
     if mode is CompressionMode.FILE and storage is StoragePlugin.MCAP:
         mode = CompressionMode.STORAGE
     assert_same(imported(write2(tmp_path / "bag", poses(), storage, mode), tmp_path)[1])
 
 
 @pytest.mark.parametrize("form", list(Writer1.CompressionFormat))
-def test_compressed_bags_of_ros_1_are_read(form, tmp_path):
+def test_compressed_bags_of_ros_1_are_read(form: Writer1.CompressionFormat, tmp_path: Path) -> None:
     messages = poses(is_ros2=False)
     assert_same(imported(write1(tmp_path / "user.bag", messages, form), tmp_path)[1])
 
 
-def test_single_files_are_recordings_too(tmp_path):
+def test_single_files_are_recordings_too(tmp_path: Path) -> None:
     for number, storage in enumerate(StoragePlugin):
         folder = write2(tmp_path / f"bag{number}", poses(), storage)
         (file,) = [path for path in folder.iterdir() if path.suffix != ".yaml"]
@@ -181,12 +212,12 @@ def test_single_files_are_recordings_too(tmp_path):
         assert_same(report.recording["master/measured_cp"])
 
 
-def test_rows_are_those_of_the_rosbags_library(tmp_path):
+def test_rows_are_those_of_the_rosbags_library(tmp_path: Path) -> None:
     path = write2(tmp_path / "bag", poses("Odometry"), StoragePlugin.SQLITE3)
     expected = []
     with AnyReader([path], default_typestore=types_of(True)) as reader:
         for connection, log_ns, data in reader.messages():
-            message = reader.deserialize(data, connection.msgtype)
+            message: Any = reader.deserialize(data, connection.msgtype)
             p, q = message.pose.pose.position, message.pose.pose.orientation
             expected.append((log_ns, p.x, p.y, p.z, q.w, q.x, q.y, q.z))
     _, stream = imported(path, tmp_path, stamps="log")
@@ -194,7 +225,7 @@ def test_rows_are_those_of_the_rosbags_library(tmp_path):
     assert_same(stream, [row[0] for row in expected], rows)
 
 
-def test_messages_that_are_not_alike_are_read_one_by_one(tmp_path):
+def test_messages_that_are_not_alike_are_read_one_by_one(tmp_path: Path) -> None:
     messages = poses("Odometry")
     for i in range(0, COUNT, 3):  # of the same length, and of another one
         topic, log_ns, message = messages[i]
@@ -204,7 +235,9 @@ def test_messages_that_are_not_alike_are_read_one_by_one(tmp_path):
     assert_same(imported(path, tmp_path)[1])
 
 
-def test_messages_that_are_alike_are_read_as_one_array(tmp_path, monkeypatch):
+def test_messages_that_are_alike_are_read_as_one_array(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(bag_messages.PoseReader, "_one", None)  # reading one by one would fail
     path = write2(tmp_path / "bag", poses("TransformStamped"), StoragePlugin.SQLITE3)
     assert_same(imported(path, tmp_path)[1])
@@ -213,7 +246,7 @@ def test_messages_that_are_alike_are_read_as_one_array(tmp_path, monkeypatch):
 # Which topic.
 
 
-def test_several_topics_of_poses_are_listed_in_one_line(tmp_path):
+def test_several_topics_of_poses_are_listed_in_one_line(tmp_path: Path) -> None:
     path = write2(tmp_path / "bag", in_order(poses(topic="/left"), poses("Pose", "/right")))
     with pytest.raises(tc.UnknownNameError, match="left, right") as error:
         tc.import_recording(path, tmp_path / "out")
@@ -222,7 +255,7 @@ def test_several_topics_of_poses_are_listed_in_one_line(tmp_path):
     assert_same(imported(path, tmp_path, topic="/left")[1])
 
 
-def test_topics_that_are_no_poses_are_told(tmp_path):
+def test_topics_that_are_no_poses_are_told(tmp_path: Path) -> None:
     path = write2(tmp_path / "bag", in_order(poses(), presses(lambda i: [0])))
     with pytest.raises(tc.UnknownNameError, match="hand/pose"):
         tc.import_recording(path, tmp_path / "out", topic="foot/pose")
@@ -233,7 +266,7 @@ def test_topics_that_are_no_poses_are_told(tmp_path):
         tc.import_recording(only, tmp_path / "out")
 
 
-def test_of_several_transforms_one_frame_is_taken(tmp_path):
+def test_of_several_transforms_one_frame_is_taken(tmp_path: Path) -> None:
     both = in_order(poses("TFMessage", "/tf"), poses("TFMessage", "/tf", child="camera"))
     path = write2(tmp_path / "bag", both)
     with pytest.raises(tc.UnknownNameError, match="camera, tool"):
@@ -241,7 +274,7 @@ def test_of_several_transforms_one_frame_is_taken(tmp_path):
     assert_same(imported(path, tmp_path, frame="tool")[1])
 
 
-def test_options_of_columns_do_not_fit_a_bag(tmp_path):
+def test_options_of_columns_do_not_fit_a_bag(tmp_path: Path) -> None:
     path = write2(tmp_path / "bag", poses())
     with pytest.raises(tc.ParameterError, match="topics, not columns"):
         tc.import_recording(path, tmp_path / "out", position=("x", "y", "z"))
@@ -251,14 +284,14 @@ def test_options_of_columns_do_not_fit_a_bag(tmp_path):
 
 
 @pytest.mark.parametrize("stamp", [0, START_NS])
-def test_header_stamps_that_never_change_give_way_to_the_log(stamp, tmp_path):
+def test_header_stamps_that_never_change_give_way_to_the_log(stamp: int, tmp_path: Path) -> None:
     path = write2(tmp_path / "bag", poses(stamps=np.full(COUNT, stamp)))
     report, stream = imported(path, tmp_path)
     assert_same(stream, LOGS)
     assert any("time of recording" in text for text in report.told)
 
 
-def test_single_messages_without_a_stamp_are_left_out(tmp_path):
+def test_single_messages_without_a_stamp_are_left_out(tmp_path: Path) -> None:
     stamps = STAMPS.copy()
     stamps[[0, 1, 77]] = 0
     report, stream = imported(write2(tmp_path / "bag", poses(stamps=stamps)), tmp_path)
@@ -267,7 +300,7 @@ def test_single_messages_without_a_stamp_are_left_out(tmp_path):
     assert report.counts.missing == 3
 
 
-def test_log_times_are_taken_on_request(tmp_path):
+def test_log_times_are_taken_on_request(tmp_path: Path) -> None:
     assert_same(imported(write2(tmp_path / "bag", poses()), tmp_path, stamps="log")[1], LOGS)
 
 
@@ -285,8 +318,10 @@ def test_log_times_are_taken_on_request(tmp_path):
     ],
 )
 @pytest.mark.parametrize("is_ros2", [True, False])
-def test_any_joy_has_its_buttons_mapped(count, text, expected, is_ros2, tmp_path):
-    def buttons(i):
+def test_any_joy_has_its_buttons_mapped(
+    count: int, text: str, expected: tuple[int, int, int] | None, is_ros2: bool, tmp_path: Path
+) -> None:
+    def buttons(i: int) -> list[int]:
         return [(i // (7 * (n + 1))) % 2 for n in range(count)]
 
     messages = in_order(poses(is_ros2=is_ros2), presses(buttons, is_ros2=is_ros2))
@@ -302,13 +337,13 @@ def test_any_joy_has_its_buttons_mapped(count, text, expected, is_ros2, tmp_path
         assert np.array_equal(held[:, column], rows[:, number] if number >= 0 else np.zeros(COUNT))
 
 
-def test_a_button_that_the_joy_lacks_is_told(tmp_path):
+def test_a_button_that_the_joy_lacks_is_told(tmp_path: Path) -> None:
     path = write2(tmp_path / "bag", in_order(poses(), presses(lambda i: [0, 1])))
     with pytest.raises(tc.ParameterError, match="below 2"):
         tc.import_recording(path, tmp_path / "out", buttons="clutch=2")
 
 
-def test_buttons_follow_the_poses_to_the_log_times(tmp_path):
+def test_buttons_follow_the_poses_to_the_log_times(tmp_path: Path) -> None:
     zero = np.zeros(COUNT, np.int64)
     both = in_order(poses(stamps=zero), presses(lambda i: [int(i >= 100)], stamps=zero))
     report, _ = imported(write2(tmp_path / "bag", both), tmp_path)
@@ -320,7 +355,7 @@ def test_buttons_follow_the_poses_to_the_log_times(tmp_path):
 # Damage.
 
 
-def test_nan_and_strange_quaternions_are_left_out_and_counted(tmp_path):
+def test_nan_and_strange_quaternions_are_left_out_and_counted(tmp_path: Path) -> None:
     messages = poses()
     for i in (10, 11, 12):
         messages[i][2].pose.position.y = float("nan")
@@ -333,7 +368,7 @@ def test_nan_and_strange_quaternions_are_left_out_and_counted(tmp_path):
 
 
 @pytest.mark.parametrize("name", ["bag", "bag.bag", "bag.mcap", "bag.db3"])
-def test_what_is_no_recording_is_told_in_one_line(name, tmp_path):
+def test_what_is_no_recording_is_told_in_one_line(name: str, tmp_path: Path) -> None:
     path = tmp_path / name
     if path.suffix:
         path.write_bytes(b"nothing of the kind" * 10)
@@ -345,7 +380,7 @@ def test_what_is_no_recording_is_told_in_one_line(name, tmp_path):
     assert not (tmp_path / "out").exists()
 
 
-def test_a_bag_that_was_cut_off_is_told(tmp_path):
+def test_a_bag_that_was_cut_off_is_told(tmp_path: Path) -> None:
     path = write1(tmp_path / "user.bag", poses(is_ros2=False))
     data = path.read_bytes()
     path.write_bytes(data[: len(data) // 2])
@@ -359,9 +394,11 @@ def test_a_bag_that_was_cut_off_is_told(tmp_path):
 
 
 @pytest.mark.parametrize("is_ros2", [True, False])
-def test_both_masters_of_the_da_vinci_kit_and_its_pedal_are_two_arms(tmp_path, is_ros2):
+def test_both_masters_of_the_da_vinci_kit_and_its_pedal_are_two_arms(
+    tmp_path: Path, is_ros2: bool
+) -> None:
     maker = Maker(is_ros2)
-    messages = []
+    messages: Any = []
     for i, (stamp, log) in enumerate(zip(STAMPS, LOGS, strict=True)):
         for arm in ("MTML", "MTMR", "PSM1"):
             messages.append((f"/{arm}/measured_cp", log, maker.pose(i, "PoseStamped", stamp)))

@@ -1,12 +1,16 @@
 """Files and options that cannot be imported: one clear line each, and nothing is left behind."""
 
 import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
 import pytest
 
 import teleop_core as tc
+from teleop_core.kernels.geometry import Array
 from teleop_core.session.exchange import ImportOptions
 
 COUNT = 200
@@ -17,7 +21,7 @@ ROTATION = pd.DataFrame(np.tile(np.eye(3).reshape(-1), (COUNT, 1)),
                         columns=[f"r{i}{j}" for i in "123" for j in "123"])  # fmt: skip
 
 
-def refusal(path, tmp_path, **options):
+def refusal(path: Path, tmp_path: Path, **options: Any) -> str:
     """Text of the error, after which there must be nothing at the place of the recording."""
     out = tmp_path / "out"
     before = set(tmp_path.iterdir())
@@ -29,12 +33,12 @@ def refusal(path, tmp_path, **options):
     return text
 
 
-def written(tmp_path, table):
+def written(tmp_path: Path, table: pd.DataFrame) -> Path:
     table.to_csv(tmp_path / "hand.csv", index=False)
     return tmp_path / "hand.csv"
 
 
-def test_missing_file_is_told(tmp_path):
+def test_missing_file_is_told(tmp_path: Path) -> None:
     assert "no.csv: does not exist" in refusal(tmp_path / "no.csv", tmp_path)
 
 
@@ -51,32 +55,32 @@ def test_missing_file_is_told(tmp_path):
         (b"PAR1 broken", "no sound Parquet file"),
     ],
 )
-def test_what_is_no_table_is_refused(content, text, tmp_path):
+def test_what_is_no_table_is_refused(content: bytes, text: str, tmp_path: Path) -> None:
     (tmp_path / "hand.csv").write_bytes(content)
     assert text in refusal(tmp_path / "hand.csv", tmp_path)
 
 
-def test_a_column_that_is_not_there_is_told_with_those_that_are(tmp_path):
+def test_a_column_that_is_not_there_is_told_with_those_that_are(tmp_path: Path) -> None:
     text = refusal(written(tmp_path, GOOD), tmp_path, position=("x", "y", "depth"))
     assert "--position" in text
     assert "'depth'" in text
     assert "t, x, y, z" in text
 
 
-def test_a_number_beyond_the_columns_is_told(tmp_path):
+def test_a_number_beyond_the_columns_is_told(tmp_path: Path) -> None:
     GOOD.to_csv(tmp_path / "hand.csv", index=False, header=False)
     text = refusal(tmp_path / "hand.csv", tmp_path, position=(2, 3, 5), time=1)
     assert "'5'" in text
     assert "1 to 4" in text
 
 
-def test_without_a_time_a_rate_is_asked_for(tmp_path):
+def test_without_a_time_a_rate_is_asked_for(tmp_path: Path) -> None:
     text = refusal(written(tmp_path, GOOD[["x", "y", "z"]]), tmp_path)
     assert "--rate" in text
     assert "x, y, z" in text
 
 
-def test_without_a_place_columns_are_asked_for(tmp_path):
+def test_without_a_place_columns_are_asked_for(tmp_path: Path) -> None:
     table = GOOD.rename(columns={"x": "a", "y": "b", "z": "c"})
     text = refusal(written(tmp_path, table), tmp_path)
     assert "--position" in text
@@ -93,11 +97,13 @@ def test_without_a_place_columns_are_asked_for(tmp_path):
         ("t", np.where(np.arange(COUNT) < 100, T, T - 0.5), "goes back in 49 rows (24.5 %)"),
     ],
 )
-def test_columns_that_say_nothing_are_refused(column, values, text, tmp_path):
+def test_columns_that_say_nothing_are_refused(
+    column: str, values: float | Array, text: str, tmp_path: Path
+) -> None:
     assert text in refusal(written(tmp_path, GOOD.assign(**{column: values})), tmp_path)
 
 
-def test_a_single_step_back_is_refused_on_request(tmp_path):
+def test_a_single_step_back_is_refused_on_request(tmp_path: Path) -> None:
     table = GOOD.copy()
     table.loc[100, "t"] = 0.5
     text = refusal(written(tmp_path, table), tmp_path, backwards="refuse")
@@ -105,7 +111,7 @@ def test_a_single_step_back_is_refused_on_request(tmp_path):
     assert "--backwards" in text
 
 
-def test_text_among_numbers_is_told_with_its_column(tmp_path):
+def test_text_among_numbers_is_told_with_its_column(tmp_path: Path) -> None:
     table = GOOD.astype(object)
     table.loc[150, "y"] = "lost"
     text = refusal(written(tmp_path, table), tmp_path)
@@ -114,32 +120,32 @@ def test_text_among_numbers_is_told_with_its_column(tmp_path):
 
 
 @pytest.mark.parametrize("scale", [0.0, 0.5, 2.0])
-def test_quaternions_of_another_length_are_refused(scale, tmp_path):
+def test_quaternions_of_another_length_are_refused(scale: float, tmp_path: Path) -> None:
     table = pd.concat((GOOD, scale * QUATERNION), axis=1)
     text = refusal(written(tmp_path, table), tmp_path)
     assert "no orientation" in text if scale == 0.0 else "unit length" in text
 
 
-def test_columns_that_are_no_quaternion_are_refused_with_a_hint(tmp_path):
+def test_columns_that_are_no_quaternion_are_refused_with_a_hint(tmp_path: Path) -> None:
     table = pd.concat((GOOD, QUATERNION), axis=1)
     options = {"quaternion": ("t", "qx", "qy", "qz")}
     text = refusal(written(tmp_path, table), tmp_path, **options)
     assert "order" in text
 
 
-def test_a_named_order_that_the_option_contradicts_is_refused(tmp_path):
+def test_a_named_order_that_the_option_contradicts_is_refused(tmp_path: Path) -> None:
     table = pd.concat((GOOD, QUATERNION), axis=1)
-    options = {"quaternion": ("qx", "qy", "qz", "qw"), "quaternion_order": "wxyz"}
+    options: dict[str, Any] = {"quaternion": ("qx", "qy", "qz", "qw"), "quaternion_order": "wxyz"}
     assert "must be xyzw" in refusal(written(tmp_path, table), tmp_path, **options)
 
 
-def test_a_mirror_is_no_rotation(tmp_path):
+def test_a_mirror_is_no_rotation(tmp_path: Path) -> None:
     table = pd.concat((GOOD, ROTATION.assign(r33=-1.0)), axis=1)
     text = refusal(written(tmp_path, table), tmp_path)
     assert "mirror" in text
 
 
-def test_an_existing_directory_is_never_touched(tmp_path):
+def test_an_existing_directory_is_never_touched(tmp_path: Path) -> None:
     out = tmp_path / "out"
     out.mkdir()
     (out / "precious").write_text("1")
@@ -172,12 +178,14 @@ def test_an_existing_directory_is_never_touched(tmp_path):
         ({"topic": "/pose"}, "columns"),
     ],
 )
-def test_options_that_mean_nothing_are_refused(options, text, tmp_path):
+def test_options_that_mean_nothing_are_refused(
+    options: Mapping[str, str | float | tuple[str, ...]], text: str, tmp_path: Path
+) -> None:
     assert text in refusal(written(tmp_path, GOOD), tmp_path, **options)
 
 
-def test_options_say_what_they_are_on_the_command_line():
-    options = ImportOptions(position="2-4", unit="mm", euler=("xyz", "a", "b", "c"), rate=30.0)
+def test_options_say_what_they_are_on_the_command_line() -> None:
+    options = ImportOptions(position="2-4", unit="mm", euler=("xyz", "a", "b", "c"), rate=30.0)  # type: ignore[arg-type]
     assert options.as_arguments() == [
         "--rate", "30.0", "--position", "2", "3", "4", "--unit", "mm", "--euler", "xyz", "a", "b",
         "c",

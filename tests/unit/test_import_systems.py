@@ -1,5 +1,7 @@
 """Importing files of known systems, as these write them: Qualisys, JIGSAWS, Unity, da Vinci kit."""
 
+from pathlib import Path
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -7,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 import teleop_core as tc
 from teleop_core import cli
-from teleop_core.kernels.geometry import rotation_from_quaternion
+from teleop_core.kernels.geometry import Array, rotation_from_quaternion
 from teleop_core.session.exchange import ImportOptions
 
 COUNT = 300
@@ -22,7 +24,7 @@ NAMES = ["Frame", "Time", "Stylus X", "Y", "Z", "Roll", "Pitch", "Yaw", "Residua
          *(f"Rot[{i}]" for i in range(9))]  # fmt: skip
 
 
-def poses(recording, topic="master/measured_cp"):
+def poses(recording: tc.Recording, topic: str = "master/measured_cp") -> tuple[Array, Array]:
     """Places (N, 3) [m] and rotation matrices (N, 3, 3)."""
     values = recording[topic].values
     matrices = np.empty((len(values), 3, 3))
@@ -31,7 +33,7 @@ def poses(recording, topic="master/measured_cp"):
     return values[:, :3], matrices
 
 
-def qualisys(path, end=""):
+def qualisys(path: Path, end: str = "") -> Path:
     """Rigid body of Track Manager: eleven lines before the numbers, lengths in mm."""
     angles = TURNS.as_euler("XYZ", degrees=True)
     rows = [
@@ -45,7 +47,7 @@ def qualisys(path, end=""):
 
 
 @pytest.mark.parametrize("end", ["", "\t"])
-def test_a_rigid_body_of_qualisys_is_what_it_was(tmp_path, end):
+def test_a_rigid_body_of_qualisys_is_what_it_was(tmp_path: Path, end: str) -> None:
     report = tc.import_recording(
         qualisys(tmp_path / "hand.tsv", end), tmp_path / "bag", preset="qualisys"
     )
@@ -56,7 +58,9 @@ def test_a_rigid_body_of_qualisys_is_what_it_was(tmp_path, end):
     assert report.rate == pytest.approx(100.0)
 
 
-def test_places_far_beyond_a_hand_are_refused_until_somebody_says_their_unit(tmp_path):
+def test_places_far_beyond_a_hand_are_refused_until_somebody_says_their_unit(
+    tmp_path: Path,
+) -> None:
     file = qualisys(tmp_path / "hand.tsv")
     with pytest.raises(tc.TeleopError, match=r"up to 50 m from the origin.*--unit mm, or --unit m"):
         tc.import_recording(file, tmp_path / "bag")
@@ -64,7 +68,7 @@ def test_places_far_beyond_a_hand_are_refused_until_somebody_says_their_unit(tmp
     assert tc.import_recording(file, tmp_path / "said", unit="m").range[0] > 5.0
 
 
-def jigsaws(path):
+def jigsaws(path: Path) -> Path:
     """Kinematics of JIGSAWS: 76 columns, four arms of place, matrix, velocities and gripper."""
     arms = []
     for number in range(4):
@@ -74,7 +78,7 @@ def jigsaws(path):
     return path
 
 
-def test_both_masters_of_jigsaws_are_two_arms_that_replay(tmp_path):
+def test_both_masters_of_jigsaws_are_two_arms_that_replay(tmp_path: Path) -> None:
     report = tc.import_recording(jigsaws(tmp_path / "a.txt"), tmp_path / "bag", preset="jigsaws")
     assert [one.arm for one in (report, *report.others)] == ["left", "right"]
     assert report.rate == pytest.approx(30.0, rel=1e-3)
@@ -87,7 +91,7 @@ def test_both_masters_of_jigsaws_are_two_arms_that_replay(tmp_path):
     assert len(answer["right/slave/measured_cp"]) == len(answer["slave/measured_cp"])
 
 
-def unity(path):
+def unity(path: Path) -> Path:
     """A table as a script of Unity writes it: left-handed, y up, quaternions, True and False."""
     x, y, z, w = TURNS.as_quat().T
     table = pd.DataFrame(
@@ -100,14 +104,14 @@ def unity(path):
     return path
 
 
-def test_left_handed_axes_of_unity_are_mirrored_with_their_turns(tmp_path):
+def test_left_handed_axes_of_unity_are_mirrored_with_their_turns(tmp_path: Path) -> None:
     report = tc.import_recording(unity(tmp_path / "hand.csv"), tmp_path / "bag", preset="unity")
     places, matrices = poses(report.recording)
     np.testing.assert_allclose(places, PLACES, atol=1e-12)
     np.testing.assert_allclose(matrices, TURNS.as_matrix(), atol=1e-12)
 
 
-def test_a_left_handed_map_must_mirror_and_a_right_handed_one_must_not():
+def test_a_left_handed_map_must_mirror_and_a_right_handed_one_must_not() -> None:
     with pytest.raises(tc.ParameterError, match="mirror, for --handedness left"):
         ImportOptions(handedness="left")
     with pytest.raises(tc.ParameterError, match="do not mirror"):
@@ -115,7 +119,7 @@ def test_a_left_handed_map_must_mirror_and_a_right_handed_one_must_not():
 
 
 @pytest.mark.parametrize("separator", [",", " ", "\t"])
-def test_a_clutch_of_true_and_false_is_taken(tmp_path, separator):
+def test_a_clutch_of_true_and_false_is_taken(tmp_path: Path, separator: str) -> None:
     table = pd.read_csv(unity(tmp_path / "hand.csv"))
     table.to_csv(tmp_path / "again.csv", index=False, sep=separator)
     report = tc.import_recording(tmp_path / "again.csv", tmp_path / "bag", preset="unity")
@@ -124,14 +128,16 @@ def test_a_clutch_of_true_and_false_is_taken(tmp_path, separator):
     np.testing.assert_allclose(np.diff(buttons.stamp_ns) * 1e-9, [1.01, 0.99])
 
 
-def test_a_column_that_is_called_clutch_and_is_no_button_is_told(tmp_path):
+def test_a_column_that_is_called_clutch_and_is_no_button_is_told(tmp_path: Path) -> None:
     table = pd.read_csv(unity(tmp_path / "hand.csv")).assign(Clutch=0.7)
     table.to_csv(tmp_path / "hand.csv", index=False)
     report = tc.import_recording(tmp_path / "hand.csv", tmp_path / "bag", preset="unity")
     assert any("no button clutch: 'Clutch' holds more than 0 and 1" in text for text in report.told)
 
 
-def test_two_hands_of_a_table_are_said_on_the_command_line(tmp_path, capsys):
+def test_two_hands_of_a_table_are_said_on_the_command_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     table = pd.DataFrame({"t": T, "press": T > 1.0})
     for hand, sign in (("l", 1.0), ("r", -1.0)):
         for axis, column in zip("xyz", PLACES.T, strict=True):

@@ -3,6 +3,9 @@
 import bz2
 import gzip
 import math
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -10,6 +13,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import teleop_core as tc
+from teleop_core.kernels.geometry import Array
 from teleop_core.session.exchange import names, orientation
 
 COUNT, RATE = 400, 100.0
@@ -27,24 +31,30 @@ RADIANS = 1e-7
 """Rounding of an angle between two rotations: the square root of that of a cosine."""
 
 
-def frame(columns=HEAD, rows=TABLE):
+def frame(columns: list[str] = HEAD, rows: Array = TABLE) -> Any:
     return pd.DataFrame(rows, columns=columns)
 
 
-def imported(path, tmp_path, **options):
+def imported(path: Path, tmp_path: Path, **options: Any) -> Any:
     """Report and stream of an import."""
     report = tc.import_recording(path, tmp_path / "out", **options)
     return report, report.recording["master/measured_cp"]
 
 
-def assert_same_motion(stream, places=PLACES, turns=TURNS, times=TIMES, metres=1e-15):
+def assert_same_motion(
+    stream: tc.Stream,
+    places: Array = PLACES,
+    turns: Rotation = TURNS,
+    times: Array = TIMES,
+    metres: float = 1e-15,
+) -> None:
     assert np.allclose(stream[["x", "y", "z"]], places, rtol=0, atol=metres)
     got = Rotation.from_quat(stream[["qw", "qx", "qy", "qz"]], scalar_first=True)
     assert (turns.inv() * got).magnitude().max() < RADIANS
     assert np.abs((stream.stamp_ns - stream.stamp_ns[0]) * 1e-9 - (times - times[0])).max() < 1e-9
 
 
-FORMS = {
+FORMS: dict[str, dict[str, Any]] = {
     "comma.csv": {"sep": ","},
     "semicolon.csv": {"sep": ";"},
     "decimal_comma.csv": {"sep": ";", "decimal": ","},
@@ -58,7 +68,7 @@ FORMS = {
 
 
 @pytest.mark.parametrize("name", FORMS)
-def test_every_form_of_text_gives_the_same_motion(name, tmp_path):
+def test_every_form_of_text_gives_the_same_motion(name: str, tmp_path: Path) -> None:
     frame().to_csv(tmp_path / name, index=False, **FORMS[name])
     report, stream = imported(tmp_path / name, tmp_path)
     assert_same_motion(stream)
@@ -66,7 +76,9 @@ def test_every_form_of_text_gives_the_same_motion(name, tmp_path):
 
 
 @pytest.mark.parametrize(("name", "pack"), [("a.csv.gz", gzip.compress), ("a.bz2", bz2.compress)])
-def test_packed_text_is_read_by_what_it_is_not_how_it_is_called(name, pack, tmp_path):
+def test_packed_text_is_read_by_what_it_is_not_how_it_is_called(
+    name: str, pack: Callable[..., Any], tmp_path: Path
+) -> None:
     (tmp_path / name).write_bytes(pack(frame().to_csv(index=False).encode()))
     assert_same_motion(imported(tmp_path / name, tmp_path)[1])
     (tmp_path / "plain").write_bytes(pack(frame().to_csv(index=False).encode()))
@@ -74,12 +86,12 @@ def test_packed_text_is_read_by_what_it_is_not_how_it_is_called(name, pack, tmp_
     assert_same_motion(report.recording["master/measured_cp"])
 
 
-def test_parquet_gives_the_same_motion_in_any_groups_of_rows(tmp_path):
+def test_parquet_gives_the_same_motion_in_any_groups_of_rows(tmp_path: Path) -> None:
     frame().to_parquet(tmp_path / "a.parquet", row_group_size=77)
     assert_same_motion(imported(tmp_path / "a.parquet", tmp_path)[1], metres=0.0)
 
 
-def test_lists_in_parquet_are_columns_with_numbers(tmp_path):
+def test_lists_in_parquet_are_columns_with_numbers(tmp_path: Path) -> None:
     table = pd.DataFrame({"time": TIMES, "pose": list(TABLE[:, 1:])})
     table.to_parquet(tmp_path / "lists.parquet")
     places = [f"pose.{i}" for i in range(7)]
@@ -88,16 +100,18 @@ def test_lists_in_parquet_are_columns_with_numbers(tmp_path):
 
 
 @pytest.mark.parametrize("sep", [",", " ", "\t"])
-def test_without_a_head_columns_go_by_number_from_one(sep, tmp_path):
+def test_without_a_head_columns_go_by_number_from_one(sep: str, tmp_path: Path) -> None:
     noise = np.random.default_rng(1).normal(size=(COUNT, 3))
     pd.DataFrame(np.hstack((noise, TABLE))).to_csv(
         tmp_path / "bare.txt", sep=sep, header=False, index=False
     )
-    options = {"time": 4, "position": "5-7", "quaternion": ("8", "9", 10, "11")}
+    options: dict[str, Any] = {"time": 4, "position": "5-7", "quaternion": ("8", "9", 10, "11")}
     assert_same_motion(imported(tmp_path / "bare.txt", tmp_path, **options)[1])
 
 
-def test_eight_columns_without_a_head_are_time_place_and_quaternion_with_w_last(tmp_path):
+def test_eight_columns_without_a_head_are_time_place_and_quaternion_with_w_last(
+    tmp_path: Path,
+) -> None:
     rows = np.column_stack((TIMES, PLACES, TURNS.as_quat()))
     np.savetxt(tmp_path / "trajectory.txt", rows, fmt="%.17g")
     report, stream = imported(tmp_path / "trajectory.txt", tmp_path)
@@ -105,18 +119,18 @@ def test_eight_columns_without_a_head_are_time_place_and_quaternion_with_w_last(
     assert any("xyzw" in text for text in report.told)
 
 
-def test_rows_of_many_blanks_with_a_rate_and_a_matrix_are_read(tmp_path):
+def test_rows_of_many_blanks_with_a_rate_and_a_matrix_are_read(tmp_path: Path) -> None:
     # 76 columns without a head at 30 Hz, as of a surgical robot.
     rows = np.random.default_rng(2).normal(size=(COUNT, 76))
     rows[:, 38:41], rows[:, 41:50] = PLACES, TURNS.as_matrix().reshape(-1, 9)
     np.savetxt(tmp_path / "kinematics.txt", rows, fmt="  %16.12f")
-    options = {"rate": 30.0, "position": "39-41", "matrix": "42-50"}
+    options: dict[str, Any] = {"rate": 30.0, "position": "39-41", "matrix": "42-50"}
     report, stream = imported(tmp_path / "kinematics.txt", tmp_path, **options)
     assert_same_motion(stream, times=np.arange(COUNT) / 30.0, metres=1e-12)
     assert report.rate == pytest.approx(30.0, abs=1e-6)
 
 
-def test_comments_and_a_line_of_units_stand_before_the_numbers(tmp_path):
+def test_comments_and_a_line_of_units_stand_before_the_numbers(tmp_path: Path) -> None:
     text = "# recorded by hand\n# x is to the right\n\nt,x,y,z\n(s),(mm),(mm),(mm)\n"
     rows = np.column_stack((TIMES, 1e3 * PLACES))
     (tmp_path / "a.csv").write_text(text + "\n".join(",".join(map(repr, r)) for r in rows.tolist()))
@@ -125,12 +139,12 @@ def test_comments_and_a_line_of_units_stand_before_the_numbers(tmp_path):
     assert any("mm" in text for text in report.told)
 
 
-def test_a_comment_may_hold_the_names(tmp_path):
+def test_a_comment_may_hold_the_names(tmp_path: Path) -> None:
     np.savetxt(tmp_path / "a.txt", TABLE, fmt="%.17g", header=" ".join(HEAD))
     assert_same_motion(imported(tmp_path / "a.txt", tmp_path)[1])
 
 
-def test_lines_can_be_skipped(tmp_path):
+def test_lines_can_be_skipped(tmp_path: Path) -> None:
     text = "Motion capture 3.1\n1,2\n" + frame().to_csv(index=False)
     (tmp_path / "a.csv").write_text(text)
     assert_same_motion(imported(tmp_path / "a.csv", tmp_path, skip=2)[1])
@@ -139,7 +153,9 @@ def test_lines_can_be_skipped(tmp_path):
 # Orientation, against SciPy.
 
 
-def turned(path, tmp_path, columns, values, **options):
+def turned(
+    path: Path, tmp_path: Path, columns: list[str], values: Array, **options: str | Sequence[str]
+) -> tuple[tc.ImportReport, tc.Stream]:
     rows = np.column_stack((TIMES, PLACES, values))
     frame(["t", "x", "y", "z", *columns], rows).to_csv(path, index=False)
     return imported(path, tmp_path, **options)
@@ -147,7 +163,7 @@ def turned(path, tmp_path, columns, values, **options):
 
 @pytest.mark.parametrize("order", ["xyz", "ZYX", "zxz", "YXZ", "xzy", "XYZ"])
 @pytest.mark.parametrize("degrees", [True, False])
-def test_euler_angles_mean_what_they_do_in_scipy(order, degrees, tmp_path):
+def test_euler_angles_mean_what_they_do_in_scipy(order: str, degrees: bool, tmp_path: Path) -> None:
     path, names_of = tmp_path / "a.csv", ["a", "b", "c"]
     values = TURNS.as_euler(order, degrees=degrees)
     options = {"euler": (order, *names_of), "angles": "deg" if degrees else "rad"}
@@ -155,7 +171,7 @@ def test_euler_angles_mean_what_they_do_in_scipy(order, degrees, tmp_path):
 
 
 @pytest.mark.parametrize("order", ["row", "column"])
-def test_matrices_are_read_row_by_row_or_column_by_column(order, tmp_path):
+def test_matrices_are_read_row_by_row_or_column_by_column(order: str, tmp_path: Path) -> None:
     matrices = TURNS.as_matrix()
     values = (matrices if order == "row" else matrices.transpose(0, 2, 1)).reshape(-1, 9)
     columns = [f"m{i}" for i in range(9)]
@@ -164,27 +180,29 @@ def test_matrices_are_read_row_by_row_or_column_by_column(order, tmp_path):
 
 
 @pytest.mark.parametrize("degrees", [True, False])
-def test_rotation_vectors_mean_what_they_do_in_scipy(degrees, tmp_path):
+def test_rotation_vectors_mean_what_they_do_in_scipy(degrees: bool, tmp_path: Path) -> None:
     columns, values = ["u", "v", "w"], TURNS.as_rotvec(degrees=degrees)
     options = {"rotation_vector": columns, "angles": "deg" if degrees else "rad"}
     assert_same_motion(turned(tmp_path / "a.csv", tmp_path, columns, values, **options)[1])
 
 
 @pytest.mark.parametrize("order", ["wxyz", "xyzw"])
-def test_order_of_a_quaternion_is_stated(order, tmp_path):
+def test_order_of_a_quaternion_is_stated(order: str, tmp_path: Path) -> None:
     columns, values = ["a", "b", "c", "d"], TURNS.as_quat(scalar_first=order == "wxyz")
     options = {"quaternion": columns, "quaternion_order": order}
     assert_same_motion(turned(tmp_path / "a.csv", tmp_path, columns, values, **options)[1])
 
 
-def test_names_of_a_quaternion_say_its_order(tmp_path):
+def test_names_of_a_quaternion_say_its_order(tmp_path: Path) -> None:
     columns = ["qx", "qy", "qz", "qw"]
     options = {"quaternion": columns}
     _, stream = turned(tmp_path / "a.csv", tmp_path, columns, TURNS.as_quat(), **options)
     assert_same_motion(stream)
 
 
-def test_quaternions_of_any_sign_and_nearly_unit_length_give_a_continuous_one(tmp_path):
+def test_quaternions_of_any_sign_and_nearly_unit_length_give_a_continuous_one(
+    tmp_path: Path,
+) -> None:
     rng = np.random.default_rng(3)
     values = (
         WXYZ * rng.choice([-1.0, 1.0], COUNT)[:, None] * rng.uniform(0.95, 1.05, COUNT)[:, None]
@@ -196,7 +214,7 @@ def test_quaternions_of_any_sign_and_nearly_unit_length_give_a_continuous_one(tm
     assert np.allclose(np.linalg.norm(got, axis=1), 1.0, rtol=0, atol=1e-15)
 
 
-def test_a_direction_gives_the_attitude_that_turns_least(tmp_path):
+def test_a_direction_gives_the_attitude_that_turns_least(tmp_path: Path) -> None:
     directions = TURNS.apply([0.0, 0.0, 1.0])
     columns = ["ax", "ay", "az"]
     _, stream = turned(tmp_path / "a.csv", tmp_path, columns, 7.0 * directions, forward=columns)
@@ -209,7 +227,7 @@ def test_a_direction_gives_the_attitude_that_turns_least(tmp_path):
     assert np.abs(np.sum(steps * directions[:-1], axis=1)).max() < 1e-12
 
 
-def test_a_direction_that_turns_back_still_gives_rotations():
+def test_a_direction_that_turns_back_still_gives_rotations() -> None:
     reader = orientation.Attitudes("forward")
     rows = np.array([[0.0, 0.0, -1.0], [1.0, 0.0, 0.0], [-1.0, 0.0, 0.0], [np.nan, 0.0, 0.0]])
     got = reader.quaternions(rows)
@@ -218,14 +236,14 @@ def test_a_direction_that_turns_back_still_gives_rotations():
     assert np.isnan(got[3]).all()
 
 
-def test_without_an_orientation_it_is_constant(tmp_path):
+def test_without_an_orientation_it_is_constant(tmp_path: Path) -> None:
     frame(HEAD[:4], TABLE[:, :4]).to_csv(tmp_path / "a.csv", index=False)
     report, stream = imported(tmp_path / "a.csv", tmp_path)
     assert np.array_equal(stream[HEAD[4:]], np.tile([1.0, 0.0, 0.0, 0.0], (COUNT, 1)))
     assert any("constant" in text for text in report.told)
 
 
-def test_orientation_can_be_left_out(tmp_path):
+def test_orientation_can_be_left_out(tmp_path: Path) -> None:
     frame().to_csv(tmp_path / "a.csv", index=False)
     _, stream = imported(tmp_path / "a.csv", tmp_path, orientation="none")
     assert (stream["qw"] == 1.0).all()
@@ -236,7 +254,9 @@ def test_orientation_can_be_left_out(tmp_path):
 
 @pytest.mark.parametrize(("unit", "factor"), [("s", 1.0), ("ms", 1e3), ("us", 1e6), ("ns", 1e9)])
 @pytest.mark.parametrize("start", [0.0, 1_700_000_000.0])
-def test_unit_of_the_time_is_guessed_from_its_size_or_its_steps(unit, factor, start, tmp_path):
+def test_unit_of_the_time_is_guessed_from_its_size_or_its_steps(
+    unit: str, factor: float, start: float, tmp_path: Path
+) -> None:
     rows = TABLE.copy()
     stamps = np.round((start + TIMES) * 1e6).astype(np.int64)  # [us]
     whole = pd.DataFrame(rows, columns=HEAD)
@@ -250,13 +270,13 @@ def test_unit_of_the_time_is_guessed_from_its_size_or_its_steps(unit, factor, st
     assert np.abs(stream.stamp_ns - (first + np.round(TIMES * 1e9))).max() <= (0 if exact else 300)
 
 
-def test_given_unit_of_the_time_is_taken(tmp_path):
+def test_given_unit_of_the_time_is_taken(tmp_path: Path) -> None:
     frame().to_csv(tmp_path / "a.csv", index=False)
     report, _ = imported(tmp_path / "a.csv", tmp_path, time_unit="ms")
     assert report.duration == pytest.approx(TIMES[-1] * 1e-3, abs=1e-9)
 
 
-def test_seconds_and_nanoseconds_may_stand_in_two_columns(tmp_path):
+def test_seconds_and_nanoseconds_may_stand_in_two_columns(tmp_path: Path) -> None:
     stamps = 1_700_000_000_999_000_000 + np.arange(COUNT) * 10_000_000
     table = frame().drop(columns="t")
     table["stamp.sec"], table["stamp.nanosec"] = np.divmod(stamps, 1_000_000_000)
@@ -264,7 +284,7 @@ def test_seconds_and_nanoseconds_may_stand_in_two_columns(tmp_path):
     assert np.array_equal(imported(tmp_path / "a.csv", tmp_path)[1].stamp_ns, stamps)
 
 
-def test_dates_are_times(tmp_path):
+def test_dates_are_times(tmp_path: Path) -> None:
     table = frame()
     stamps = pd.date_range("2026-01-02T03:04:05.678", periods=COUNT, freq="10ms")
     table["t"] = stamps
@@ -276,7 +296,7 @@ def test_dates_are_times(tmp_path):
         assert np.array_equal(got, stamps.as_unit("ns").astype("int64"))
 
 
-def test_stamps_that_begin_near_zero_begin_at_a_second_and_others_stay(tmp_path):
+def test_stamps_that_begin_near_zero_begin_at_a_second_and_others_stay(tmp_path: Path) -> None:
     for number, (start, first) in enumerate(((-5.0, 1.0), (0.0, 1.0), (3.25, 3.25))):
         rows = TABLE.copy()
         rows[:, 0] += start
@@ -285,7 +305,7 @@ def test_stamps_that_begin_near_zero_begin_at_a_second_and_others_stay(tmp_path)
         assert report.start_ns == round(first * 1e9)
 
 
-def test_irregular_times_stay_as_they_are(tmp_path):
+def test_irregular_times_stay_as_they_are(tmp_path: Path) -> None:
     rows = TABLE.copy()
     rows[:, 0] = 10.0 + np.cumsum(np.random.default_rng(4).exponential(0.01, COUNT))
     frame(rows=rows).to_csv(tmp_path / "a.csv", index=False)
@@ -301,18 +321,24 @@ def test_irregular_times_stay_as_they_are(tmp_path):
 @pytest.mark.parametrize(
     ("unit", "metres"), [("m", 1.0), ("cm", 0.01), ("mm", 1e-3), ("in", 0.0254)]
 )
-def test_unit_of_the_place_is_given_or_stands_in_the_names(unit, metres, tmp_path):
+def test_unit_of_the_place_is_given_or_stands_in_the_names(
+    unit: str, metres: float, tmp_path: Path
+) -> None:
     rows = np.column_stack((TIMES, PLACES / metres))
+    head: list[str]
+    options: dict[str, Any]
     for number, (head, options) in enumerate(
         ((["t", "x", "y", "z"], {"unit": unit}), (["t", *(f"{a} [{unit}]" for a in "xyz")], {}))
     ):
         frame(head, rows).to_csv(tmp_path / "a.csv", index=False)
-        report = tc.import_recording(tmp_path / "a.csv", tmp_path / str(number), **options)
+        report = tc.import_recording(
+            tmp_path / "a.csv", tmp_path / str(number), **dict[str, Any](options)
+        )
         got = report.recording["master/measured_cp"][["x", "y", "z"]]
         assert np.allclose(got, PLACES, rtol=0, atol=1e-15)
 
 
-def test_axes_turn_places_and_attitudes_alike(tmp_path):
+def test_axes_turn_places_and_attitudes_alike(tmp_path: Path) -> None:
     frame().to_csv(tmp_path / "a.csv", index=False)
     _, stream = imported(tmp_path / "a.csv", tmp_path, axes=("+y", "-x", "+z"), scale=0.5)
     turn = Rotation.from_matrix([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
@@ -320,7 +346,7 @@ def test_axes_turn_places_and_attitudes_alike(tmp_path):
 
 
 @pytest.mark.parametrize("center", ["mean", "middle", "start"])
-def test_the_chosen_middle_comes_to_zero(center, tmp_path):
+def test_the_chosen_middle_comes_to_zero(center: str, tmp_path: Path) -> None:
     frame().to_csv(tmp_path / "a.csv", index=False)
     _, stream = imported(tmp_path / "a.csv", tmp_path, center=center, scale=2.0)
     got = stream[["x", "y", "z"]]
@@ -331,7 +357,7 @@ def test_the_chosen_middle_comes_to_zero(center, tmp_path):
     assert np.allclose(np.diff(got, axis=0), 2.0 * np.diff(PLACES, axis=0), rtol=0, atol=1e-15)
 
 
-def test_buttons_are_recorded_where_they_change(tmp_path):
+def test_buttons_are_recorded_where_they_change(tmp_path: Path) -> None:
     table = frame()
     table["pedal"] = np.where((TIMES > 1.0) & (TIMES < 2.0), 3.3, 0.2)
     table["mode"] = (TIMES > 3.0).astype(int)
@@ -345,7 +371,7 @@ def test_buttons_are_recorded_where_they_change(tmp_path):
     assert len(buttons) == 4
 
 
-def test_without_buttons_none_are_recorded(tmp_path):
+def test_without_buttons_none_are_recorded(tmp_path: Path) -> None:
     frame().to_csv(tmp_path / "a.csv", index=False)
     report, _ = imported(tmp_path / "a.csv", tmp_path)
     assert report.recording.topics == ("master/measured_cp",)
@@ -354,7 +380,7 @@ def test_without_buttons_none_are_recorded(tmp_path):
 # Rows that are damaged.
 
 
-def test_missing_rows_are_dropped_and_make_a_gap(tmp_path):
+def test_missing_rows_are_dropped_and_make_a_gap(tmp_path: Path) -> None:
     rows = TABLE.copy()
     rows[100:120, 2] = np.nan
     rows[200, 5] = np.inf
@@ -366,12 +392,12 @@ def test_missing_rows_are_dropped_and_make_a_gap(tmp_path):
     assert report.gaps == ((pytest.approx(0.99), pytest.approx(0.21)),)
 
 
-def test_short_stretches_of_missing_rows_are_bridged_on_request(tmp_path):
+def test_short_stretches_of_missing_rows_are_bridged_on_request(tmp_path: Path) -> None:
     rows = TABLE.copy()
     rows[100:105, 1:4] = np.nan
     rows[200:260, 4:] = np.nan
     frame(rows=rows).to_csv(tmp_path / "a.csv", index=False)
-    options = {"missing": "interpolate", "missing_time": 0.1}
+    options: dict[str, Any] = {"missing": "interpolate", "missing_time": 0.1}
     report, stream = imported(tmp_path / "a.csv", tmp_path, **options)
     assert (report.counts.filled, report.counts.missing) == (5, 60)
     share = np.linspace(0.0, 1.0, 7)[1:-1, None]
@@ -381,7 +407,7 @@ def test_short_stretches_of_missing_rows_are_bridged_on_request(tmp_path):
     assert (got.inv() * TURNS[100:105]).magnitude().max() < 1e-3
 
 
-def test_doubled_times_keep_the_first_row(tmp_path):
+def test_doubled_times_keep_the_first_row(tmp_path: Path) -> None:
     rows = np.repeat(TABLE, 2, axis=0)[: 2 * COUNT - 30]
     rows[1::2, 1] += 1.0
     frame(rows=rows[: COUNT // 2 * 2]).to_csv(tmp_path / "a.csv", index=False)
@@ -391,7 +417,7 @@ def test_doubled_times_keep_the_first_row(tmp_path):
     assert any("doubled" in text for text in report.warnings)
 
 
-def test_a_few_rows_that_go_back_are_dropped_and_counted(tmp_path):
+def test_a_few_rows_that_go_back_are_dropped_and_counted(tmp_path: Path) -> None:
     rows = TABLE.copy()
     rows[[50, 60, 70], 0] -= 0.105
     frame(rows=rows).to_csv(tmp_path / "a.csv", index=False)
@@ -401,13 +427,13 @@ def test_a_few_rows_that_go_back_are_dropped_and_counted(tmp_path):
     assert_same_motion(stream, PLACES[kept], TURNS[kept], TIMES[kept])
 
 
-def test_shuffled_rows_are_sorted_on_request(tmp_path):
+def test_shuffled_rows_are_sorted_on_request(tmp_path: Path) -> None:
     order = np.random.default_rng(5).permutation(COUNT)
     frame(rows=TABLE[order]).to_csv(tmp_path / "a.csv", index=False)
     assert_same_motion(imported(tmp_path / "a.csv", tmp_path, backwards="sort")[1])
 
 
-def test_rows_of_wrong_length_are_left_out_and_counted(tmp_path):
+def test_rows_of_wrong_length_are_left_out_and_counted(tmp_path: Path) -> None:
     lines = frame().to_csv(index=False).splitlines()
     lines[10], lines[20] = "1,2,3", lines[20] + ",9"
     (tmp_path / "a.csv").write_text("\n".join(lines))
@@ -416,7 +442,7 @@ def test_rows_of_wrong_length_are_left_out_and_counted(tmp_path):
     assert report.counts.rows == COUNT
 
 
-def test_a_long_table_passes_through_the_disk_and_gives_the_same(tmp_path):
+def test_a_long_table_passes_through_the_disk_and_gives_the_same(tmp_path: Path) -> None:
     count = 700_000
     times = np.arange(count) * 1e-3
     rows = np.column_stack((times, np.sin(times), np.cos(times), 0.0 * times))
@@ -431,7 +457,7 @@ def test_a_long_table_passes_through_the_disk_and_gives_the_same(tmp_path):
 # The report.
 
 
-def test_report_says_what_numpy_says(tmp_path):
+def test_report_says_what_numpy_says(tmp_path: Path) -> None:
     frame().to_csv(tmp_path / "a.csv", index=False)
     report, _ = imported(tmp_path / "a.csv", tmp_path)
     assert report.range == pytest.approx(np.ptp(PLACES, axis=0), abs=1e-12)
@@ -446,7 +472,7 @@ def test_report_says_what_numpy_says(tmp_path):
     assert "gaps      none" in text
 
 
-def test_metadata_say_how_the_import_can_be_repeated(tmp_path):
+def test_metadata_say_how_the_import_can_be_repeated(tmp_path: Path) -> None:
     frame().to_csv(tmp_path / "hand.csv", index=False)
     report, _ = imported(tmp_path / "hand.csv", tmp_path, scale=0.5, axes=("+y", "-x", "+z"))
     about = report.recording.metadata
@@ -461,7 +487,9 @@ def test_metadata_say_how_the_import_can_be_repeated(tmp_path):
     ("options", "text"),
     [({"unit": "m", "scale": 100.0}, "unit mm"), ({"rate": 5.0}, "slow"), ({"rate": 1e4}, "5 m/s")],
 )
-def test_what_looks_wrong_is_told(options, text, tmp_path):
+def test_what_looks_wrong_is_told(
+    options: Mapping[str, str | float], text: str, tmp_path: Path
+) -> None:
     rows = PLACES if "rate" in options else np.column_stack((TIMES, PLACES))
     rows = 2.0 * rows
     frame(HEAD[:4][-rows.shape[1] :], rows).to_csv(tmp_path / "a.csv", index=False)
@@ -494,7 +522,9 @@ def test_what_looks_wrong_is_told(options, text, tmp_path):
         ("t x y z q0 q1 q2 q3", "t", "x y z", "q0 q1 q2 q3"),
     ],
 )  # fmt: skip
-def test_names_of_many_recorders_are_understood(head, time, place, turn):
+def test_names_of_many_recorders_are_understood(
+    head: str, time: str, place: str, turn: str
+) -> None:
     columns = head.split()
     places = names.find_positions(columns)[:1]
     for found, expected in (
@@ -504,7 +534,7 @@ def test_names_of_many_recorders_are_understood(head, time, place, turn):
         assert [columns[i] for i in found] == expected.split()
 
 
-def test_other_positions_beside_the_one_taken_are_told(tmp_path):
+def test_other_positions_beside_the_one_taken_are_told(tmp_path: Path) -> None:
     head = ["t", *(f"{hand}.{axis}" for hand in ("left", "right") for axis in "xyz")]
     frame(head, np.column_stack((TIMES, PLACES, 2.0 * PLACES))).to_csv(
         tmp_path / "a.csv", index=False
@@ -524,11 +554,11 @@ def test_other_positions_beside_the_one_taken_are_told(tmp_path):
         ("x", ""),
     ],
 )
-def test_units_stand_behind_names(name, unit):
+def test_units_stand_behind_names(name: str, unit: str) -> None:
     assert names.without_unit(name)[1] == unit
 
 
-def test_angles_beyond_a_turn_are_degrees(tmp_path):
+def test_angles_beyond_a_turn_are_degrees(tmp_path: Path) -> None:
     values = np.degrees(TURNS.as_euler("xyz"))
     report, stream = turned(tmp_path / "a.csv", tmp_path, ["roll", "pitch", "yaw"], values)
     assert any("degrees" in text for text in report.told)

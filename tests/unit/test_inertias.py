@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from present import present
 from teleop_core.base.errors import ParameterError, ShapeError
 from teleop_core.robots import list_robots, load_robot, rcrt1_dynamics
 from teleop_core.robots.drives import Dynamics, independent_axes
@@ -20,7 +21,7 @@ points = st.lists(
 )
 
 
-def of_points(cloud):
+def of_points(cloud: list[tuple[float, float, float, float]]) -> LinkInertia:
     """Link of point masses (mass, x, y, z): sums over the points, as the definition says."""
     masses, places = np.array([p[0] for p in cloud]), np.array([p[1:] for p in cloud])
     tensor = sum(
@@ -30,12 +31,14 @@ def of_points(cloud):
     return LinkInertia(name="cloud", mass=masses.sum(), center=center, inertia=tensor)
 
 
-def principal(moments, name="box"):
+def principal(moments: tuple[float, float, float], name: str = "box") -> LinkInertia:
     return LinkInertia(name=name, mass=1.0, center=np.zeros(3), inertia=np.diag(moments))
 
 
 @given(points)
-def test_every_cloud_of_masses_has_a_possible_inertia_or_is_flat(cloud):
+def test_every_cloud_of_masses_has_a_possible_inertia_or_is_flat(
+    cloud: list[tuple[float, float, float, float]],
+) -> None:
     link = of_points(cloud)
     second = np.linalg.eigvalsh(link.pseudo)
     # Sums of squares: no eigenvalue is negative, whatever the cloud; rounding of 24 kg in 2 m.
@@ -45,7 +48,9 @@ def test_every_cloud_of_masses_has_a_possible_inertia_or_is_flat(cloud):
 
 
 @given(points)
-def test_central_inertia_is_that_of_pinocchio(cloud):
+def test_central_inertia_is_that_of_pinocchio(
+    cloud: list[tuple[float, float, float, float]],
+) -> None:
     link = of_points(cloud)
     pseudo = pinocchio.PseudoInertia.FromMatrix(link.pseudo)
     theirs = pinocchio.Inertia.FromPseudoInertia(pseudo)
@@ -54,7 +59,9 @@ def test_central_inertia_is_that_of_pinocchio(cloud):
 
 
 @given(st.tuples(*[st.floats(0.01, 1.0)] * 3))
-def test_the_triangle_inequality_is_the_pseudo_inertias_sign(moments):
+def test_the_triangle_inequality_is_the_pseudo_inertias_sign(
+    moments: tuple[float, float, float],
+) -> None:
     link = principal(moments)
     least = np.linalg.eigvalsh(link.pseudo)[0]
     if least > 1e-6:
@@ -65,21 +72,21 @@ def test_the_triangle_inequality_is_the_pseudo_inertias_sign(moments):
 
 
 @pytest.mark.parametrize("name", list_robots())
-def test_every_robot_has_possible_inertias(name):
+def test_every_robot_has_possible_inertias(name: str) -> None:
     robot = load_robot(name)
-    check_possible(robot.dynamics.links)
-    for link in robot.dynamics.links:
+    check_possible(present(robot.dynamics).links)
+    for link in present(robot.dynamics).links:
         assert np.linalg.eigvalsh(link.pseudo)[0] > 0.0
-    assert (robot.drives.inertia > 0.0).all()
+    assert (present(robot.drives).inertia > 0.0).all()
 
 
-def test_the_rcrt1_states_its_links():
-    assert [link.name for link in load_robot("rcrt1").dynamics.links] == [
+def test_the_rcrt1_states_its_links() -> None:
+    assert [link.name for link in present(load_robot("rcrt1").dynamics).links] == [
         "link 1", "link 2", "link 3",
     ]  # fmt: skip
 
 
-def test_link_3_with_the_printed_product_and_the_mended_centre_is_refused():
+def test_link_3_with_the_printed_product_and_the_mended_centre_is_refused() -> None:
     with pytest.raises(ParameterError, match=r"'link 3' is -0\.0035.*> 0") as refused:
         check_possible(link_inertias({**LINKS, "I3xz": 3.0e-3}))
     assert refused.value.value == pytest.approx(-0.0035226, abs=1e-7)
@@ -87,7 +94,7 @@ def test_link_3_with_the_printed_product_and_the_mended_centre_is_refused():
     check_possible(link_inertias({**LINKS, "I3xz": 3.0e-3, "G3z": 0.264245}))
 
 
-def test_no_one_sign_of_the_products_fits_links_1_and_2():
+def test_no_one_sign_of_the_products_fits_links_1_and_2() -> None:
     first, second, _ = link_inertias()
     for link in (first, second):
         products = np.diag(np.diag(link.inertia)) - link.inertia
@@ -96,13 +103,13 @@ def test_no_one_sign_of_the_products_fits_links_1_and_2():
             check_possible([turned])
 
 
-def test_every_sign_of_the_other_products_of_link_2_is_possible():
+def test_every_sign_of_the_other_products_of_link_2_is_possible() -> None:
     for xy, yz in itertools.product((1.0, -1.0), repeat=2):
         signs = {"I2xy": xy * LINKS["I2xy"], "I2yz": yz * LINKS["I2yz"]}
         check_possible(link_inertias({**LINKS, **signs}))
 
 
-def test_a_robot_with_an_impossible_link_is_refused_when_it_is_made():
+def test_a_robot_with_an_impossible_link_is_refused_when_it_is_made() -> None:
     bad = principal((1.0, 1.0, 2.5), name="forearm")
     with pytest.raises(ParameterError, match="forearm") as refused:
         Dynamics(
@@ -115,14 +122,14 @@ def test_a_robot_with_an_impossible_link_is_refused_when_it_is_made():
     assert refused.value.value == pytest.approx(-0.25)
 
 
-def test_a_flat_plate_is_possible_and_a_rod_without_thickness_is_not():
+def test_a_flat_plate_is_possible_and_a_rod_without_thickness_is_not() -> None:
     check_possible([principal((0.1, 0.2, 0.1 + 0.2))])
     with pytest.raises(ParameterError, match="smallest principal moment"):
         check_possible([principal((0.1, 0.1, 0.0))])
 
 
 @pytest.mark.parametrize("mass", [0.0, -1.0])
-def test_a_link_without_mass_is_refused(mass):
+def test_a_link_without_mass_is_refused(mass: float) -> None:
     link = replace(principal((1.0, 1.0, 1.0)), mass=mass)
     with pytest.raises(ParameterError) as refused:
         check_possible([link])
@@ -130,7 +137,7 @@ def test_a_link_without_mass_is_refused(mass):
     assert refused.value.value == mass
 
 
-def test_values_that_are_no_inertia_are_refused_by_name():
+def test_values_that_are_no_inertia_are_refused_by_name() -> None:
     with pytest.raises(ShapeError, match="center of link 'box'"):
         replace(principal((1.0, 1.0, 1.0)), center=np.zeros(2))
     with pytest.raises(ParameterError, match=r"inertia of link 'box'.*finite"):
@@ -144,6 +151,6 @@ def test_values_that_are_no_inertia_are_refused_by_name():
 
 
 @pytest.mark.parametrize("inertia", [0.0, -0.1, np.nan])
-def test_axes_without_links_still_need_inertia(inertia):
+def test_axes_without_links_still_need_inertia(inertia: float) -> None:
     with pytest.raises(ParameterError, match="inertia"):
         independent_axes(np.array([1.0, inertia]))

@@ -1,25 +1,35 @@
 """Interpolation: slow commands become a way that reaches each of them one period later."""
 
+from collections.abc import Sequence
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.interpolate import BPoly
 
+from present import present
 from teleop_core.graph.signals import DT, TICK_NS
+from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot
 from teleop_core.slave.commands import CommandStatus
 from teleop_core.slave.pair import ArmParameters, SimulatedArm
 from teleop_core.slave.slave import INTERPOLATIONS
 
 ROBOT = load_robot("planar_3r")  # it starts at home, with room on all sides
-HOME, SPEED = ROBOT.home, ROBOT.drives.speed_limit
+HOME, SPEED = ROBOT.home, present(ROBOT.drives).speed_limit
 PERIODS = [2, 8, 33, 100]  # of the commands, in ticks
 # Joints of up to 3 rad after a polynomial of the fifth degree.
 ROUNDING = 1e-13
 
 
-def way(interpolation, commands, ticks_between, robot="planar_3r", after=0):
+def way(
+    interpolation: str,
+    commands: Array,
+    ticks_between: list[int],
+    robot: str = "planar_3r",
+    after: int = 0,
+) -> Array:
     """Command in force at the end of every tick (N, n), under commands that come now and then.
 
     Args:
@@ -43,7 +53,7 @@ def way(interpolation, commands, ticks_between, robot="planar_3r", after=0):
     return np.array(found)
 
 
-def wander(count, period, seed=3):
+def wander(count: int, period: int, seed: int = 3) -> Array:
     """Commands (count, 3) from home on, each as far from the last as a stream may be."""
     rng = np.random.default_rng(seed)
     steps = 0.4 * period * DT * SPEED * rng.uniform(-1.0, 1.0, (count, 3))
@@ -53,7 +63,9 @@ def wander(count, period, seed=3):
 
 @pytest.mark.parametrize("interpolation", ["linear", "minimum_jerk"])
 @pytest.mark.parametrize("period", PERIODS)
-def test_each_command_is_reached_exactly_one_period_after_it_came(interpolation, period):
+def test_each_command_is_reached_exactly_one_period_after_it_came(
+    interpolation: str, period: int
+) -> None:
     commands = wander(12, period)
     found = way(interpolation, commands, [period] * 11, after=period)
     # The first comes alone; of the others each is there when the next one is due, not before.
@@ -64,7 +76,7 @@ def test_each_command_is_reached_exactly_one_period_after_it_came(interpolation,
 
 
 @pytest.mark.parametrize("period", PERIODS)
-def test_linear_way_is_the_straight_line_between_commands(period):
+def test_linear_way_is_the_straight_line_between_commands(period: int) -> None:
     commands = wander(12, period)
     found = way("linear", commands, [period] * 11, after=period)
     ticks = np.arange(len(found)) + 1.0
@@ -73,13 +85,13 @@ def test_linear_way_is_the_straight_line_between_commands(period):
     assert np.abs(found - line).max() < ROUNDING
 
 
-def test_without_interpolation_a_command_is_in_force_at_once_and_held():
+def test_without_interpolation_a_command_is_in_force_at_once_and_held() -> None:
     commands = wander(6, 20)
     found = way("none", commands, [20] * 5, after=20)
     assert np.array_equal(found, np.repeat(commands, 20, axis=0))
 
 
-def test_at_one_command_per_tick_all_kinds_are_equal():
+def test_at_one_command_per_tick_all_kinds_are_equal() -> None:
     commands = wander(300, 1)
     ways = [way(name, commands, [1] * 299, after=1) for name in INTERPOLATIONS]
     assert np.array_equal(ways[0], commands)
@@ -87,7 +99,7 @@ def test_at_one_command_per_tick_all_kinds_are_equal():
     assert np.array_equal(ways[0], ways[2])
 
 
-def least_jerk(commands, ticks_between, after):
+def least_jerk(commands: Array, ticks_between: list[int], after: int) -> Array:
     """The ways of least jerk, polynomials of SciPy one after the other, sampled every tick.
 
     A way takes as long as its command came after the last one. It begins where the one before it
@@ -113,7 +125,9 @@ def least_jerk(commands, ticks_between, after):
 @pytest.mark.parametrize(
     "ticks", [[20] * 9, [100] * 5, [3, 5, 40, 7, 90, 90, 11], [200, 30, 90, 10]], ids=str
 )
-def test_minimum_jerk_way_is_the_polynomial_of_fifth_degree_with_smooth_ends(ticks):
+def test_minimum_jerk_way_is_the_polynomial_of_fifth_degree_with_smooth_ends(
+    ticks: list[int],
+) -> None:
     rng = np.random.default_rng(5)
     steps = 0.4 * DT * np.array([0, *ticks])[:, None] * SPEED
     commands = HOME + np.cumsum(steps * rng.uniform(-1.0, 1.0, steps.shape), axis=0)
@@ -121,7 +135,7 @@ def test_minimum_jerk_way_is_the_polynomial_of_fifth_degree_with_smooth_ends(tic
     assert np.abs(found - least_jerk(commands, ticks, 50)).max() < ROUNDING
 
 
-def largest_changes(found, period):
+def largest_changes(found: Array, period: int) -> list[tuple[float, float]]:
     """Largest change per tick, of speed and of acceleration, near commands and between them."""
     changes = []
     for order in (2, 3):
@@ -132,7 +146,7 @@ def largest_changes(found, period):
     return changes
 
 
-def test_minimum_jerk_way_is_as_smooth_at_its_ends_as_on_the_way():
+def test_minimum_jerk_way_is_as_smooth_at_its_ends_as_on_the_way() -> None:
     commands = wander(12, 100)
     speed, acceleration = largest_changes(
         way("minimum_jerk", commands, [100] * 11, after=100)[100:], 100
@@ -146,7 +160,7 @@ def test_minimum_jerk_way_is_as_smooth_at_its_ends_as_on_the_way():
 @pytest.mark.parametrize(
     ("first", "then"), [("linear", "minimum_jerk"), ("minimum_jerk", "linear")]
 )
-def test_kinds_change_on_the_way_without_a_jump(first, then):
+def test_kinds_change_on_the_way_without_a_jump(first: str, then: str) -> None:
     slave = SimulatedArm(ArmParameters(robot="planar_3r", interpolation=first))
     row, found = slave.signals, []
     for tick in range(600):
@@ -163,7 +177,7 @@ def test_kinds_change_on_the_way_without_a_jump(first, then):
     assert np.allclose(steps, 0.2e-3 * SPEED, rtol=1e-9, atol=0)
 
 
-def test_a_still_command_after_other_kinds_is_a_still_way():
+def test_a_still_command_after_other_kinds_is_a_still_way() -> None:
     slave = SimulatedArm(ArmParameters(robot="planar_3r", interpolation="minimum_jerk"))
     row, found = slave.signals, []
     kinds = {100: "none", 200: "linear", 300: "minimum_jerk"}
@@ -187,7 +201,7 @@ SLIDING = load_robot("rcrt1")
 D3, TOP = 2, SLIDING.upper[2]
 
 
-def slide(interpolation, places, ticks):
+def slide(interpolation: str, places: Sequence[float] | Array, ticks: int) -> Array:
     """Commands in force (N,) of d3 [m], under commands to some places below its upper end [m]."""
     slave = SimulatedArm(ArmParameters(start=tuple(SLIDING.home), interpolation=interpolation))
     row, now_ns, found = slave.signals, 0, []
@@ -204,7 +218,7 @@ def slide(interpolation, places, ticks):
     return np.array(found)
 
 
-def test_minimum_jerk_way_that_would_swing_beyond_a_limit_stays_at_it():
+def test_minimum_jerk_way_that_would_swing_beyond_a_limit_stays_at_it() -> None:
     places = np.array([0.0, 4e-3, 4e-3, 0.0, 0.0, 0.0])
     found = slide("minimum_jerk", places, 50)
     commands = HOME + np.column_stack((-places, 0.0 * places, 0.0 * places))
@@ -220,7 +234,9 @@ def test_minimum_jerk_way_that_would_swing_beyond_a_limit_stays_at_it():
     st.integers(2, 90),
     st.sampled_from(INTERPOLATIONS),
 )
-def test_no_way_leaves_the_limits_of_the_joints(places, ticks, interpolation):
+def test_no_way_leaves_the_limits_of_the_joints(
+    places: list[float], ticks: int, interpolation: str
+) -> None:
     found = slide(interpolation, places, ticks)
     assert found.max() <= TOP
     assert found.min() >= SLIDING.lower[D3]

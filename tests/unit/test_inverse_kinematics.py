@@ -1,23 +1,25 @@
 """Inverse kinematics as a stage: its branch, the wrist singularity, speeds, limits and restarts."""
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from present import present
 from teleop_core.chain.mapping.inverse_kinematics import (
     InverseKinematics,
     InverseKinematicsParameters,
 )
 from teleop_core.graph.signals import TICK_NS
 from teleop_core.graph.topics import SLAVE_REACH
-from teleop_core.kernels.geometry import pose_from_transform, rotation, transform
+from teleop_core.kernels.geometry import Array, pose_from_transform, rotation, transform
 from teleop_core.robots import IkStatus, load_robot
 
 ARM = load_robot("rcrt1")
-SPEED = ARM.drives.speed_limit
+SPEED = present(ARM.drives).speed_limit
 STEP = SPEED * 1e-3
 # What a command asks for that comes alone, or first.
 ALONE = SPEED * 0.45
@@ -31,12 +33,12 @@ START = np.array([0.1, 1.7, 0.35, 0.2, 0.0, 0.1])
 class Stage:
     """Inverse kinematics with a slave that follows it at once, or stands still."""
 
-    def __init__(self, **values):
+    def __init__(self, **values: Any) -> None:
         self.ik = InverseKinematics(InverseKinematicsParameters(**values))
         self.row = self.ik.signals
         self.row["slave_setpoint_js"] = ARM.home
 
-    def step(self, pose, *, gap_ns=TICK_NS, does_follow=True):
+    def step(self, pose: Array, *, gap_ns: int = TICK_NS, does_follow: bool = True) -> Array:
         row = self.row
         row["slave_servo_cp_ns"] += gap_ns
         pose_from_transform(np.ascontiguousarray(pose), row["slave_servo_cp"])
@@ -46,26 +48,26 @@ class Stage:
             row["slave_setpoint_js_ns"] = row["slave_servo_cp_ns"]
         return row["slave_servo_jp"].copy()
 
-    def settle(self, pose, steps=3000):
+    def settle(self, pose: Array, steps: int = 3000) -> Array:
         """Joints after the arm had time to go to a pose."""
         for _ in range(steps):
             joints = self.step(pose)
         return joints
 
     @property
-    def status(self):
+    def status(self) -> IkStatus:
         return IkStatus(int(self.reach("status")))
 
-    def reach(self, name):
+    def reach(self, name: str) -> float:
         return self.row["slave_reach"][SLAVE_REACH.columns.index(name)]
 
     @property
-    def residual(self):
+    def residual(self) -> Array:
         """Distance [m] and angle [rad] that the answer leaves (2,)."""
         return np.array([self.reach("position_residual"), self.reach("rotation_residual")])
 
 
-def pass_by(distance, tool_speed, roll=0.0):
+def pass_by(distance: float, tool_speed: float, roll: float = 0.0) -> Array:
     """Poses (N, 4, 4), 1 ms apart, whose tool axis passes the wrist singularity at a distance.
 
     The tool turns by 0.8 rad at ``tool_speed`` [rad/s] about its own y axis, rolled by ``roll``;
@@ -78,14 +80,14 @@ def pass_by(distance, tool_speed, roll=0.0):
     return np.array(poses)
 
 
-def test_home_asks_for_home():
+def test_home_asks_for_home() -> None:
     joints = Stage().step(ARM.fk(ARM.home))
     assert np.allclose(joints, ARM.home, rtol=0, atol=ROUNDING)
 
 
 @pytest.mark.parametrize("about", ["x", "y", "z"])
 @pytest.mark.parametrize("sign", [-1, 1])
-def test_tool_turns_away_from_home_and_back_without_a_flip(about, sign):
+def test_tool_turns_away_from_home_and_back_without_a_flip(about: str, sign: int) -> None:
     stage, middle = Stage(), ARM.fk(ARM.home)
     middle[:3, 3] *= 0.9
     stage.settle(middle)
@@ -104,7 +106,9 @@ def test_tool_turns_away_from_home_and_back_without_a_flip(about, sign):
 
 @pytest.mark.parametrize("tool_speed", [0.2, 0.5, 2.0])
 @pytest.mark.parametrize("distance", [0.0, 1e-12, 1e-9, 1e-6, 1e-4, 1e-3, 5e-3, 0.02, 0.1])
-def test_joints_stay_within_their_speeds_beside_the_singularity(distance, tool_speed):
+def test_joints_stay_within_their_speeds_beside_the_singularity(
+    distance: float, tool_speed: float
+) -> None:
     stage, poses = Stage(), pass_by(distance, tool_speed)
     last = stage.settle(poses[0])
     for pose in poses:
@@ -117,8 +121,8 @@ def test_joints_stay_within_their_speeds_beside_the_singularity(distance, tool_s
 @pytest.mark.parametrize("tool_speed", [0.2, 0.5, 2.0])
 @pytest.mark.parametrize("distance", [0.0, 1e-9, 1e-6, 1e-4, 1e-3])
 def test_close_to_the_singularity_joint_5_goes_through_zero_and_motion_goes_on(
-    distance, tool_speed
-):
+    distance: float, tool_speed: float
+) -> None:
     stage, poses = Stage(), pass_by(distance, tool_speed)
     first = stage.settle(poses[0])
     worst = 0.0
@@ -134,7 +138,7 @@ def test_close_to_the_singularity_joint_5_goes_through_zero_and_motion_goes_on(
 
 
 @pytest.mark.parametrize("distance", [5e-3, 0.02])
-def test_further_beside_the_singularity_the_tool_lags_and_catches_up(distance):
+def test_further_beside_the_singularity_the_tool_lags_and_catches_up(distance: float) -> None:
     # Joints 4 and 6 have room for the half turn that following this path would take.
     stage, poses = Stage(), pass_by(distance, 0.5, roll=1.5)
     stage.settle(poses[0])
@@ -149,7 +153,7 @@ def test_further_beside_the_singularity_the_tool_lags_and_catches_up(distance):
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_noise_of_the_gimbal_at_home_does_not_drive_joint_4_away(seed):
+def test_noise_of_the_gimbal_at_home_does_not_drive_joint_4_away(seed: int) -> None:
     # There the tool's direction, which joint 4 turns to, is noise alone; at its limit of 170
     # degrees joint 4 would later keep the tool off its pose.
     rng, stage, home = np.random.default_rng(seed), Stage(), ARM.fk(ARM.home)
@@ -163,7 +167,7 @@ def test_noise_of_the_gimbal_at_home_does_not_drive_joint_4_away(seed):
     assert stage.residual[1] < 4e-3
 
 
-def test_turn_at_the_singularity_goes_to_joint_6_alone():
+def test_turn_at_the_singularity_goes_to_joint_6_alone() -> None:
     stage = Stage()
     stage.settle(ARM.fk(START))
     for turn in np.linspace(0.0, 1.0, 1000):
@@ -173,7 +177,8 @@ def test_turn_at_the_singularity_goes_to_joint_6_alone():
     assert stage.status is IkStatus.NEAR_SINGULAR
 
 
-def test_pose_far_away_is_limited_and_approached_at_full_speed_of_one_joint():
+def test_pose_far_away_is_limited_and_approached_at_full_speed_of_one_joint() -> None:
+    stage: Any
     stage, goal = Stage(), ARM.fk(np.array([1.0, 1.6, 0.3, 0.5, 0.6, 0.7]))
     stage.settle(ARM.fk(START))
     before = stage.step(ARM.fk(START))
@@ -182,10 +187,11 @@ def test_pose_far_away_is_limited_and_approached_at_full_speed_of_one_joint():
     assert stage.residual.max() > 0.1
     assert math.isclose((np.abs(after - before) / STEP).max(), 1.0, rel_tol=1e-9)
     stage.settle(goal)
-    assert stage.status is IkStatus.FOLLOWED
+    now: IkStatus = stage.status
+    assert now is IkStatus.FOLLOWED
 
 
-def test_pose_out_of_reach_is_unreachable_and_the_arm_points_there():
+def test_pose_out_of_reach_is_unreachable_and_the_arm_points_there() -> None:
     stage, goal = Stage(), ARM.fk(START)
     goal[:3, 3] *= 2.0
     stage.settle(goal)
@@ -194,7 +200,7 @@ def test_pose_out_of_reach_is_unreachable_and_the_arm_points_there():
     assert stage.residual[0] > 0.3
 
 
-def test_share_of_the_speed_limits_is_kept():
+def test_share_of_the_speed_limits_is_kept() -> None:
     stage, goal = Stage(speed_share=0.25), ARM.fk(np.array([1.0, 1.6, 0.3, 0.5, 0.6, 0.7]))
     last = stage.step(ARM.fk(ARM.home))
     for _ in range(100):
@@ -203,7 +209,7 @@ def test_share_of_the_speed_limits_is_kept():
         last = joints
 
 
-def test_new_share_holds_from_the_next_pose():
+def test_new_share_holds_from_the_next_pose() -> None:
     stage, goal = Stage(), ARM.fk(np.array([1.0, 1.6, 0.3, 0.5, 0.6, 0.7]))
     last = stage.step(ARM.fk(ARM.home))
     stage.ik.retune(InverseKinematicsParameters(speed_share=0.1))
@@ -211,7 +217,7 @@ def test_new_share_holds_from_the_next_pose():
     assert math.isclose((np.abs(joints - last) / STEP).max(), 0.1, rel_tol=1e-9)
 
 
-def test_slave_that_stands_still_is_where_solutions_start_again():
+def test_slave_that_stands_still_is_where_solutions_start_again() -> None:
     stage, goal = Stage(), ARM.fk(np.array([1.0, 1.6, 0.3, 0.5, 0.6, 0.7]))
     stage.settle(ARM.fk(START))
     held = stage.row["slave_setpoint_js"].copy()
@@ -221,7 +227,7 @@ def test_slave_that_stands_still_is_where_solutions_start_again():
     assert (np.abs(joints - held) <= STEP + STEP_ROUNDING).all()
 
 
-def test_restart_beside_the_flipped_branch_stays_on_it():
+def test_restart_beside_the_flipped_branch_stays_on_it() -> None:
     flipped = START + np.array([0, 0, 0, 0, -0.5, 0])
     stage = Stage()
     stage.row["slave_setpoint_js"] = flipped
@@ -229,7 +235,7 @@ def test_restart_beside_the_flipped_branch_stays_on_it():
     assert np.allclose(joints, flipped, rtol=0, atol=1e-9)
 
 
-def test_reset_starts_from_where_the_slave_is():
+def test_reset_starts_from_where_the_slave_is() -> None:
     stage = Stage()
     stage.settle(ARM.fk(START))
     stage.ik.reset()
@@ -239,7 +245,7 @@ def test_reset_starts_from_where_the_slave_is():
 
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf])
-def test_pose_that_is_not_finite_holds_the_joints(bad):
+def test_pose_that_is_not_finite_holds_the_joints(bad: float) -> None:
     stage = Stage()
     before = stage.settle(ARM.fk(START))
     stage.row["slave_servo_cp"][0] = bad
@@ -249,7 +255,7 @@ def test_pose_that_is_not_finite_holds_the_joints(bad):
     assert stage.reach("status") == -1
 
 
-def test_quaternion_that_is_not_unit_holds_the_joints():
+def test_quaternion_that_is_not_unit_holds_the_joints() -> None:
     stage = Stage()
     before = stage.settle(ARM.fk(START))
     stage.row["slave_servo_cp"][3:] *= 1.01
@@ -261,7 +267,9 @@ poses = st.tuples(*[st.floats(-1e3, 1e3)] * 3, *[st.floats(-3.2, 3.2)] * 3)
 
 
 @given(st.lists(poses, min_size=1, max_size=20))
-def test_any_poses_give_finite_joints_within_limits_and_speeds(wanted):
+def test_any_poses_give_finite_joints_within_limits_and_speeds(
+    wanted: list[tuple[float, ...]],
+) -> None:
     stage = Stage()
     last, most = ARM.home, ALONE
     for x, y, z, a, b, c in wanted:
@@ -274,7 +282,7 @@ def test_any_poses_give_finite_joints_within_limits_and_speeds(wanted):
         last, most = joints, STEP
 
 
-def smooth_poses(seed, count=500):
+def smooth_poses(seed: int, count: int = 500) -> tuple[Array, Array]:
     """Poses of a smooth joint path inside the limits."""
     rng = np.random.default_rng(seed)
     middle, times = 0.5 * (ARM.lower + ARM.upper), np.arange(count) * 1e-3
@@ -284,7 +292,7 @@ def smooth_poses(seed, count=500):
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_path_of_a_batch_is_that_of_the_stage(seed):
+def test_path_of_a_batch_is_that_of_the_stage(seed: int) -> None:
     joints, path = smooth_poses(seed)
     together = ARM.follow(path, joints[0])
     stage = Stage()
@@ -296,7 +304,7 @@ def test_path_of_a_batch_is_that_of_the_stage(seed):
 
 
 @pytest.mark.parametrize("seed", range(20))
-def test_joint_path_comes_back_from_its_poses(seed):
+def test_joint_path_comes_back_from_its_poses(seed: int) -> None:
     joints, path = smooth_poses(seed)
     if np.abs(joints[:, 4]).min() < 0.02:  # through the singularity joint 4 has a choice
         assert ARM.follow(path, joints[0]).residual.max() < 0.3

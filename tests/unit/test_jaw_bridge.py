@@ -1,10 +1,13 @@
 """Jaw bridge without ROS: a gripper that is led keeps its grip, and starts without a jump."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
 from teleop_core.base.errors import ParameterError
 from teleop_core.graph.topics import NO_COMMAND_NS, OPERATION
+from teleop_core.kernels.geometry import Array
 from teleop_core.slave.bridges.hearing import Sample
 from teleop_core.slave.bridges.jaw_bridge import JawBridge, JawBridgeParameters
 from teleop_core.slave.operation.states import State
@@ -17,13 +20,16 @@ SPEED = JawBridgeParameters().speed_limit
 class Gripper:
     """A gripper that goes at once where it is told, as far as what it holds lets it."""
 
-    def __init__(self, holds=0.0, **parameters):
+    def __init__(self, holds: float = 0.0, **parameters: Any) -> None:
         self.bridge = JawBridge(JawBridgeParameters(joint="finger", **parameters))
         self.row, self.holds = self.bridge.signals, holds
         self.row["slave_operation"][OPERATION.index("state")] = float(State.ENABLED)
+        self.sent: list[Any]
         self.now_ns, self.position, self.sent, self.setpoint_age = 0, 0.8, [], 0.0
 
-    def lead(self, setpoint, ticks=200, *, stamp_ns=MS, speaks=True):
+    def lead(
+        self, setpoint: float, ticks: int = 200, *, stamp_ns: int = MS, speaks: bool = True
+    ) -> None:
         """Commands of some periods while the server asks for an angle."""
         self.row["slave_jaw_setpoint_js"], self.row["slave_jaw_setpoint_js_ns"] = setpoint, stamp_ns
         for _ in range(ticks):
@@ -38,11 +44,11 @@ class Gripper:
                 self.position = max(self.sent[-1], self.holds)
 
     @property
-    def told(self):
+    def told(self) -> Array:
         return self.row["slave_jaw_measured_js"].copy()
 
 
-def test_a_gripper_is_commanded_nothing_before_a_command_of_the_hand_is_in_force():
+def test_a_gripper_is_commanded_nothing_before_a_command_of_the_hand_is_in_force() -> None:
     gripper = Gripper()
     gripper.lead(0.0, stamp_ns=NO_COMMAND_NS)
     assert gripper.sent == []
@@ -53,7 +59,7 @@ def test_a_gripper_is_commanded_nothing_before_a_command_of_the_hand_is_in_force
     assert gripper.bridge.trouble() == ""
 
 
-def test_commands_begin_where_the_gripper_is_and_are_at_most_a_fifth_faster_than_rated():
+def test_commands_begin_where_the_gripper_is_and_are_at_most_a_fifth_faster_than_rated() -> None:
     gripper = Gripper()
     gripper.lead(0.0)
     steps = np.diff([0.8, *gripper.sent])
@@ -62,7 +68,7 @@ def test_commands_begin_where_the_gripper_is_and_are_at_most_a_fifth_faster_than
 
 
 @pytest.mark.parametrize("how", ["brakes", "silence", "server"])
-def test_no_outage_loosens_a_grip(how):
+def test_no_outage_loosens_a_grip(how: str) -> None:
     gripper = Gripper(holds=0.1)
     gripper.lead(0.0)
     assert gripper.told[0] == 0.1
@@ -76,7 +82,7 @@ def test_no_outage_loosens_a_grip(how):
     assert max(gripper.sent[before:]) == 0.0
 
 
-def test_a_gripper_that_is_led_elsewhere_after_an_outage_starts_where_it_is():
+def test_a_gripper_that_is_led_elsewhere_after_an_outage_starts_where_it_is() -> None:
     gripper = Gripper()
     gripper.lead(0.0)
     gripper.lead(0.0, speaks=False)
@@ -85,7 +91,7 @@ def test_a_gripper_that_is_led_elsewhere_after_an_outage_starts_where_it_is():
     assert min(gripper.sent[before + 150 :]) == 0.6  # commands went on for 0.3 s of silence
 
 
-def test_a_sliding_gripper_is_read_and_led_in_its_own_units():
+def test_a_sliding_gripper_is_read_and_led_in_its_own_units() -> None:
     gripper = Gripper(scale=-20.0, offset=0.8)  # 0 m is open, 40 mm closed
     gripper.position = 0.0
     gripper.lead(0.0, stamp_ns=NO_COMMAND_NS, ticks=1)
@@ -95,13 +101,13 @@ def test_a_sliding_gripper_is_read_and_led_in_its_own_units():
     assert gripper.told[0] == pytest.approx(0.2)
 
 
-def test_effort_of_a_sliding_gripper_does_the_same_work_as_ours():
+def test_effort_of_a_sliding_gripper_does_the_same_work_as_ours() -> None:
     gripper = Gripper(scale=-20.0, offset=0.8)
     gripper.bridge.hear(Sample(("finger",), (0.01,), (0.05,), (8.0,), MS), MS)
     _, velocity, effort = gripper.told
     assert velocity * effort == pytest.approx(0.05 * 8.0)
 
 
-def test_a_scale_of_zero_is_refused():
+def test_a_scale_of_zero_is_refused() -> None:
     with pytest.raises(ParameterError, match="scale"):
         JawBridgeParameters(scale=0.0)

@@ -186,14 +186,14 @@ def again(folder: Path) -> Path:
 
 
 @pytest.fixture(scope="module")
-def calls_run(tmp_path_factory):
+def calls_run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = write_all(tmp_path_factory.mktemp("calls"), CALLS)
     assert run(folder) == ([70.0, 7.0], 0)
     return folder
 
 
 @pytest.fixture
-def calls(calls_run):
+def calls(calls_run: Path) -> Path:
     """Folder of calls after a first run, the same for each test."""
     return again(calls_run)
 
@@ -202,24 +202,26 @@ CONSTANT_VALUES = [20.0, 20.0, 11.0, 20.0, 15.0, 10.0, 20.0, 21.0]
 
 
 @pytest.fixture(scope="module")
-def constants_run(tmp_path_factory):
+def constants_run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = write_all(tmp_path_factory.mktemp("constants"), CONSTANTS)
     assert run(folder) == (CONSTANT_VALUES, 0)
     return folder
 
 
 @pytest.fixture
-def constants(constants_run):
+def constants(constants_run: Path) -> Path:
     """Folder of constants after a first run, the same for each test."""
     return again(constants_run)
 
 
-def test_kernels_of_unchanged_files_come_from_the_cache(calls):
+def test_kernels_of_unchanged_files_come_from_the_cache(calls: Path) -> None:
     assert run(calls) == ([70.0, 7.0], 1)
 
 
 @pytest.mark.parametrize("name", ["inner.py", "middle.py", "outer.py"])
-def test_change_of_one_digit_in_a_called_file_reaches_its_cached_callers(calls, name):
+def test_change_of_one_digit_in_a_called_file_reaches_its_cached_callers(
+    calls: Path, name: str
+) -> None:
     changed = CALLS[name].replace("2.0 * x", "5.0 * x").replace("+ 1.0", "+ 4.0")
     write(calls / name, changed.replace("10.0 *", "20.0 *"))
     assert (
@@ -232,7 +234,9 @@ def test_change_of_one_digit_in_a_called_file_reaches_its_cached_callers(calls, 
     )
 
 
-def test_changed_constant_of_another_module_reaches_every_cached_kernel_that_uses_it(constants):
+def test_changed_constant_of_another_module_reaches_every_cached_kernel_that_uses_it(
+    constants: Path,
+) -> None:
     assert run(constants) == (CONSTANT_VALUES, len(CONSTANT_VALUES))
     text = CONSTANTS["values.py"]
     for old, new in CHANGES.items():
@@ -242,12 +246,12 @@ def test_changed_constant_of_another_module_reaches_every_cached_kernel_that_use
     assert run(constants) == ([10.0, 10.0, 13.0, 40.0, 17.0, 20.0, 10.0, 23.0], 0)
 
 
-def test_constant_that_no_kernel_uses_leaves_the_cache_alone(constants):
+def test_constant_that_no_kernel_uses_leaves_the_cache_alone(constants: Path) -> None:
     write(constants / "values.py", CONSTANTS["values.py"] + "OTHER = 1\n")
     assert run(constants) == (CONSTANT_VALUES, len(CONSTANT_VALUES))
 
 
-def test_kernel_from_generated_source_is_compiled_once_for_all_processes(tmp_path):
+def test_kernel_from_generated_source_is_compiled_once_for_all_processes(tmp_path: Path) -> None:
     folder = write_all(tmp_path, GENERATED)
     assert run(folder) == ([9.0], 0)
     assert run(folder) == ([9.0], 1)
@@ -255,7 +259,7 @@ def test_kernel_from_generated_source_is_compiled_once_for_all_processes(tmp_pat
     assert run(folder) == ([12.0], 0)
 
 
-def test_kernel_without_a_source_file_works_and_leaves_nothing_on_the_disk(tmp_path):
+def test_kernel_without_a_source_file_works_and_leaves_nothing_on_the_disk(tmp_path: Path) -> None:
     text = CALLS["inner.py"] + "print(factor(4.0))"
     for arguments, given in ((["-c", text], ""), (["-"], text)):
         done = subprocess.run(
@@ -266,7 +270,7 @@ def test_kernel_without_a_source_file_works_and_leaves_nothing_on_the_disk(tmp_p
     assert not list(tmp_path.rglob("*factor*"))
 
 
-def test_kept_kernels_of_a_file_serve_it_under_one_module_name_only(tmp_path):
+def test_kept_kernels_of_a_file_serve_it_under_one_module_name_only(tmp_path: Path) -> None:
     load = """
 import sys
 from importlib.util import module_from_spec, spec_from_file_location
@@ -284,7 +288,7 @@ print(sum(module.factor.stats.cache_hits.values()))
 
 
 @pytest.mark.parametrize("left", [0, 0.5])
-def test_broken_files_of_the_cache_are_made_again(calls, left):
+def test_broken_files_of_the_cache_are_made_again(calls: Path, left: float) -> None:
     files = list((calls / "c").rglob("*.nb?"))
     assert files
     for file in files:
@@ -293,7 +297,7 @@ def test_broken_files_of_the_cache_are_made_again(calls, left):
     assert run(calls) == ([70.0, 7.0], 1)
 
 
-def test_kernel_works_while_another_version_keeps_what_this_one_cannot_read(tmp_path):
+def test_kernel_works_while_another_version_keeps_what_this_one_cannot_read(tmp_path: Path) -> None:
     folder = write_all(tmp_path, CALLS)
     (folder / "outer.py").write_text("""
 import pickle
@@ -325,7 +329,7 @@ print(sum(plus_one.stats.cache_hits.values()))
     assert run(folder) == ([9.0], 1)
 
 
-def test_kernel_works_where_its_cache_cannot_be_written_any_more(tmp_path):
+def test_kernel_works_where_its_cache_cannot_be_written_any_more(tmp_path: Path) -> None:
     folder = write_all(tmp_path, CALLS)
     (folder / "outer.py").write_text("""
 import shutil
@@ -341,14 +345,14 @@ print(0)
     assert run(folder) == ([7.0, 9.0], 0)
 
 
-def test_versions_of_numba_in_setup_are_those_that_the_kernels_are_written_for():
+def test_versions_of_numba_in_setup_are_those_that_the_kernels_are_written_for() -> None:
     setup = Path(__file__).parents[2] / "src/teleop_core/setup.py"
     bounds = re.findall(r'"numba>=(\d+)\.(\d+),<(\d+)\.(\d+)"', setup.read_text())
     assert [tuple(map(int, found)) for found in bounds] == [SUPPORTED[0] + SUPPORTED[1]]
 
 
 @pytest.mark.parametrize("found", ["0.67.0", "0.69.0dev0+5.g12ab", "1.0.1"])
-def test_another_version_of_numba_is_refused_in_one_line(found):
+def test_another_version_of_numba_is_refused_in_one_line(found: str) -> None:
     expected = rf"^numba is {re.escape(found)}, must be >= 0\.68 and < 0\.69$"
     with pytest.raises(ImportError, match=expected):
         check_version(found)
@@ -370,7 +374,7 @@ print(sum(total.stats.cache_hits.values()))
 """
 
 
-def test_kernels_kept_for_a_class_that_is_gone_are_compiled_anew(tmp_path):
+def test_kernels_kept_for_a_class_that_is_gone_are_compiled_anew(tmp_path: Path) -> None:
     for name in ("Pair", "Couple"):
         files = {"pairs.py": PAIRS, "outer.py": TOTAL}
         write_all(tmp_path, {file: text.format(name) for file, text in files.items()})
@@ -391,7 +395,7 @@ def in_store(folder: Path, place: Path) -> tuple[list[float], int]:
 
 
 @pytest.fixture(scope="module")
-def stored_run(tmp_path_factory):
+def stored_run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("stored")
     for copy in (folder / "first", folder / "second"):
         copy.mkdir()
@@ -401,24 +405,26 @@ def stored_run(tmp_path_factory):
 
 
 @pytest.fixture
-def stored(stored_run):
+def stored(stored_run: Path) -> Path:
     """Two copies of a source and the store, after a run of the first; the same for each test."""
     return again(stored_run)
 
 
-def test_a_second_copy_of_a_source_finds_what_the_first_one_compiled(stored):
+def test_a_second_copy_of_a_source_finds_what_the_first_one_compiled(stored: Path) -> None:
     assert in_store(stored / "second", stored / "kept") == ([70.0, 7.0], 1)
     assert not list(stored.glob("*/__pycache__/*.nb?"))
 
 
-def test_a_copy_that_differs_takes_nothing_of_the_other_and_leaves_it_there(stored):
+def test_a_copy_that_differs_takes_nothing_of_the_other_and_leaves_it_there(stored: Path) -> None:
     first, second, place = (stored / name for name in ("first", "second", "kept"))
     write(second / "inner.py", CALLS["inner.py"].replace("2.0 * x", "5.0 * x"))
     assert in_store(second, place) == ([160.0, 16.0], 0)
     assert in_store(first, place) == ([70.0, 7.0], 1)
 
 
-def test_what_nobody_used_for_long_is_removed_from_the_store(stored, monkeypatch):
+def test_what_nobody_used_for_long_is_removed_from_the_store(
+    stored: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     place = stored / "kept"
     monkeypatch.setenv("TELEOP_KERNELS", str(place))
     monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
@@ -443,7 +449,7 @@ print(size(np.zeros(2)), flush=True)
 """
 
 
-def test_a_kernel_is_kept_only_while_no_other_process_writes_there(tmp_path):
+def test_a_kernel_is_kept_only_while_no_other_process_writes_there(tmp_path: Path) -> None:
     write(tmp_path / "late.py", LATE)
     env = {**os.environ, "TELEOP_KERNELS": str(tmp_path / "kept")}
     env.pop("NUMBA_CACHE_DIR", None)

@@ -1,6 +1,8 @@
 """Plain Python functions in the place of kernels."""
 
 import threading
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
@@ -8,6 +10,7 @@ from numba import types
 
 from teleop_core.base.errors import KernelError
 from teleop_core.kernels import IS_COMPILED, kernel, pointer, raise_pending
+from teleop_core.kernels.geometry import Array
 
 compiled_only = pytest.mark.skipif(not IS_COMPILED, reason="measures the compiler")
 
@@ -15,20 +18,20 @@ ROW, TABLE = types.float64[::1], types.float64[:, ::1]
 
 
 @kernel
-def call_with_row(function, row, count):
+def call_with_row(function: Callable[..., Any], row: Array, count: int) -> float:
     total = 0.0
     for i in range(count):
         total += function(row, float(i))
     return total
 
 
-def test_plain_function_serves_in_place_of_a_kernel():
+def test_plain_function_serves_in_place_of_a_kernel() -> None:
     @kernel
-    def compiled(row, x):
+    def compiled(row: Any, x: Any) -> Any:
         row[0] += x
         return row[0]
 
-    def plain(row, x):
+    def plain(row: Array, x: float) -> float:
         assert isinstance(x, float)
         row[0] += x
         return row[0]
@@ -41,12 +44,12 @@ def test_plain_function_serves_in_place_of_a_kernel():
     raise_pending()
 
 
-def test_kernel_is_made_a_pointer_once_for_each_signature_and_a_plain_function_each_time():
+def test_kernel_is_made_a_pointer_once_for_each_signature_and_a_plain_function_each_time() -> None:
     @kernel
-    def compiled(row):
+    def compiled(row: Any) -> Any:
         return row[0]
 
-    def plain(row):
+    def plain(row: Any) -> Any:
         return row[0]
 
     whole, real = types.int64(ROW), types.float64(ROW)
@@ -57,16 +60,16 @@ def test_kernel_is_made_a_pointer_once_for_each_signature_and_a_plain_function_e
     assert pointer(compiled, real)(np.full(1, 2.5)) == 2.5
 
 
-def test_plain_function_gets_tables_flags_and_counts():
+def test_plain_function_gets_tables_flags_and_counts() -> None:
     seen = []
 
-    def plain(table, flag, count):
+    def plain(table: Array, flag: bool, count: int) -> int:
         seen.append((table.shape, flag, count))
         table[1, 2] = count
         return count + 1
 
     @kernel
-    def call(function, table, flag):
+    def call(function: Callable[..., object], table: Array, flag: bool) -> object:
         return function(table, flag, 7)
 
     table = np.zeros((2, 3))
@@ -78,17 +81,17 @@ def test_plain_function_gets_tables_flags_and_counts():
     assert seen[1] == ((4, 3), False, 7)
 
 
-def test_plain_function_may_return_nothing_and_may_be_any_callable():
+def test_plain_function_may_return_nothing_and_may_be_any_callable() -> None:
     class Mover:
-        def __init__(self):
+        def __init__(self) -> None:
             self.calls = 0
 
-        def __call__(self, row):
+        def __call__(self, row: Array) -> None:
             self.calls += 1
             row[:] = self.calls
 
     @kernel
-    def call(function, row):
+    def call(function: Callable[..., object], row: Array) -> None:
         function(row)
         function(row)
 
@@ -97,8 +100,8 @@ def test_plain_function_may_return_nothing_and_may_be_any_callable():
     assert row.tolist() == [2.0, 2.0]
 
 
-def test_plain_function_called_from_python_is_itself():
-    def plain(row, x):
+def test_plain_function_called_from_python_is_itself() -> None:
+    def plain(row: Array, x: float) -> None:
         raise ValueError("from Python at once")
 
     with pytest.raises(ValueError, match="at once"):
@@ -107,8 +110,8 @@ def test_plain_function_called_from_python_is_itself():
 
 
 @compiled_only
-def test_first_exception_of_a_plain_function_waits_until_the_block_is_over():
-    def plain(row, x):
+def test_first_exception_of_a_plain_function_waits_until_the_block_is_over() -> None:
+    def plain(row: Array, x: float) -> float:
         if x >= 2.0:
             raise ValueError(f"tick {x}")
         return 1.0
@@ -122,28 +125,29 @@ def test_first_exception_of_a_plain_function_waits_until_the_block_is_over():
 
 
 @compiled_only
-def test_result_of_another_type_counts_as_an_exception():
-    call_with_row(
-        pointer(lambda row, x: "three", types.float64(ROW, types.float64)), np.zeros(1), 1
-    )
+def test_result_of_another_type_counts_as_an_exception() -> None:
+    def wrong(row: Array, x: float) -> str:
+        return "three"
+
+    call_with_row(pointer(wrong, types.float64(ROW, types.float64)), np.zeros(1), 1)
     with pytest.raises(ValueError, match="three"):
         raise_pending()
 
 
 @compiled_only
-def test_plain_functions_run_in_threads_and_each_thread_gets_its_own_exceptions():
-    def plain(row, x):
+def test_plain_functions_run_in_threads_and_each_thread_gets_its_own_exceptions() -> None:
+    def plain(row: Array, x: float) -> float:
         row[0] += 1.0
         if threading.current_thread().name == "bad":
             raise ValueError("bad")
         return x
 
     function = pointer(plain, types.float64(ROW, types.float64))
-    found = {}
+    found: dict[str, tuple[Any, Any, str | None]] = {}
 
-    def work():
+    def work() -> None:
         row = np.zeros(2)
-        total = call_with_row(function, row, 2_000)
+        total: Any = call_with_row(function, row, 2_000)
         try:
             raise_pending()
         except ValueError as error:
@@ -181,8 +185,10 @@ def test_plain_functions_run_in_threads_and_each_thread_gets_its_own_exceptions(
         ),
     ],
 )
-def test_signature_that_a_plain_function_cannot_have_is_refused(signature, message):
-    def takes_two(row, x):
+def test_signature_that_a_plain_function_cannot_have_is_refused(
+    signature: Any, message: str
+) -> None:
+    def takes_two(row: Any, x: Any) -> float:
         return 0.0
 
     with pytest.raises(KernelError, match=message):

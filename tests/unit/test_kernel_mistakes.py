@@ -2,6 +2,8 @@
 
 import subprocess
 import sys
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,7 +16,7 @@ pytestmark = pytest.mark.skipif(not IS_COMPILED, reason="it is the compiler that
 ROW = types.float64[::1]
 
 
-def uncached(text: str, name: str):
+def uncached(text: str, name: str) -> Any:
     """Kernel of a text; it has no file, so every process compiles it."""
     space = {"kernel": kernel, "inner": inner}
     exec(text, space)
@@ -39,7 +41,7 @@ MISTAKES = {
 
 
 @pytest.mark.parametrize("line", MISTAKES)
-def test_mistake_in_a_kernel_is_one_line_with_its_place(line):
+def test_mistake_in_a_kernel_is_one_line_with_its_place(line: str) -> None:
     text = f"@inner\ndef deep(row): return row.zeroo\n@kernel\ndef wrong(row):\n    {line}\n"
     wrong = uncached(text, "wrong")
     wrong.py_func.__globals__["np"] = np
@@ -52,7 +54,7 @@ def test_mistake_in_a_kernel_is_one_line_with_its_place(line):
         assert raised.value.__cause__ is not None
 
 
-def test_mistake_in_a_pointer_or_an_argument_has_its_place_too():
+def test_mistake_in_a_pointer_or_an_argument_has_its_place_too() -> None:
     wrong = uncached("@kernel\ndef wrong(row):\n    return row.gain\n", "wrong")
     with pytest.raises(KernelError, match="<string>:3: kernel 'wrong': Unknown attribute 'gain'"):
         pointer(wrong, types.float64(ROW))
@@ -60,7 +62,9 @@ def test_mistake_in_a_pointer_or_an_argument_has_its_place_too():
         wrong({"gain": 1.0})
 
 
-def test_place_of_a_mistake_is_counted_from_the_package_or_the_working_directory(tmp_path):
+def test_place_of_a_mistake_is_counted_from_the_package_or_the_working_directory(
+    tmp_path: Path,
+) -> None:
     text = "from teleop_core.kernels import kernel\n@kernel\ndef f(x):\n    return x.gain\nf(1.0)\n"
     (tmp_path / "own.py").write_text(text)
     done = subprocess.run(

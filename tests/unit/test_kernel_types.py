@@ -112,7 +112,7 @@ def mypy(folder: Path, text: str) -> list[int]:
 
 
 @pytest.mark.slow
-def test_type_checker_finds_every_wrong_call_of_a_kernel_and_no_right_one(tmp_path):
+def test_type_checker_finds_every_wrong_call_of_a_kernel_and_no_right_one(tmp_path: Path) -> None:
     start = START + RIGHT
     first = len(start.splitlines()) + 1
     wrong = list(range(first, first + len(WRONG)))

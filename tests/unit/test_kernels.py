@@ -3,6 +3,8 @@
 import os
 import subprocess
 import sys
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,12 +19,12 @@ from teleop_core.kernels import (
     kernel_from_source,
     records,
 )
-from teleop_core.kernels.geometry import multiply_quaternions
+from teleop_core.kernels.geometry import Array, multiply_quaternions
 
 compiled_only = pytest.mark.skipif(not IS_COMPILED, reason="measures the compiler")
 
 
-def uncached(text: str, name: str):
+def uncached(text: str, name: str) -> Any:
     """Kernel of a text; it has no file, so every process compiles it."""
     space = {"kernel": kernel, "inner": inner}
     exec(text, space)
@@ -30,16 +32,16 @@ def uncached(text: str, name: str):
 
 
 @inner
-def power(x, n):
+def power(x: float, n: int) -> float:
     return x**n
 
 
 @kernel
-def polynomial(x):
+def polynomial(x: float) -> float:
     return power(x, 2) + power(x, 3)
 
 
-def test_kernel_bound_to_its_arguments_does_the_same():
+def test_kernel_bound_to_its_arguments_does_the_same() -> None:
     a, b = np.array([0.5, 0.5, 0.5, 0.5]), np.array([0.8, 0.0, 0.6, 0.0])
     direct, through = np.empty(4), np.empty(4)
     multiply_quaternions(a, b, direct)
@@ -52,14 +54,14 @@ def test_kernel_bound_to_its_arguments_does_the_same():
 
 
 @compiled_only
-def test_inner_kernel_refuses_a_call_from_python_and_serves_kernels():
+def test_inner_kernel_refuses_a_call_from_python_and_serves_kernels() -> None:
     assert polynomial(2.0) == 12.0
     with pytest.raises(TypeError, match="power is called by kernels only"):
         power(2.0, 3)
 
 
 @compiled_only
-def test_numbers_written_in_a_call_share_one_compilation():
+def test_numbers_written_in_a_call_share_one_compilation() -> None:
     called = "@inner\ndef power(x, n):\n    return x**n\n"
     caller = "@kernel\ndef both(x):\n    return power(x, 2) + power(x, 3)\n"
     both = uncached(called + caller, "both")
@@ -68,7 +70,7 @@ def test_numbers_written_in_a_call_share_one_compilation():
 
 
 @compiled_only
-def test_arrays_and_fields_of_all_lengths_share_one_compilation():
+def test_arrays_and_fields_of_all_lengths_share_one_compilation() -> None:
     called = "@inner\ndef first(x):\n    return x[0]\n"
     caller = "@kernel\ndef both(r, x):\n    return first(r.two) + first(r.three) + first(x)\n"
     both = uncached(called + caller, "both")
@@ -98,27 +100,27 @@ except ValueError as error:
 
 
 @compiled_only
-def test_slice_is_assigned_and_checked_without_compiling_functions_on_texts():
+def test_slice_is_assigned_and_checked_without_compiling_functions_on_texts() -> None:
     command = [sys.executable, "-c", SLICE]
     done = subprocess.run(command, capture_output=True, text=True, timeout=100, check=True)
     assert done.stdout == "3.0 2\ncannot assign slice from input of different size\n"
 
 
-def test_what_the_decorators_made_is_told_from_other_functions():
-    def plain(x):
+def test_what_the_decorators_made_is_told_from_other_functions() -> None:
+    def plain(x: int) -> int:
         return x
 
     assert all(is_kernel(value) for value in (power, polynomial, multiply_quaternions))
     assert is_kernel(kernel_from_source("def f(x): return x", "f", {}))
-    assert not any(is_kernel(value) for value in (plain, plain(1), np.sin, None, [], kernel))
+    assert not any(map(is_kernel, (plain, plain(1), np.sin, None, [], kernel)))
 
 
-def test_python_function_of_a_kernel_does_the_same():
+def test_python_function_of_a_kernel_does_the_same() -> None:
     assert polynomial.py_func.__name__ == polynomial.__name__ == "polynomial"
     assert polynomial(2.0) == 12.0
 
 
-def test_record_has_its_fields_as_attributes_and_shares_its_memory():
+def test_record_has_its_fields_as_attributes_and_shares_its_memory() -> None:
     rows = records([("gain", "f8"), ("point", "f8", (3,)), ("count", "i8")], 2)
     row = rows[1]
     row.gain, row.count = 2.5, 4
@@ -128,9 +130,9 @@ def test_record_has_its_fields_as_attributes_and_shares_its_memory():
     assert rows["point"].sum() == 3.0
 
 
-def test_field_named_like_something_that_numpy_numbers_have_is_the_field():
+def test_field_named_like_something_that_numpy_numbers_have_is_the_field() -> None:
     @kernel
-    def total(row):
+    def total(row: Any) -> Any:
         row.min = 3.0
         return row.size + row.min
 
@@ -144,7 +146,7 @@ def test_field_named_like_something_that_numpy_numbers_have_is_the_field():
         print(row.sise)
 
 
-def test_kernel_from_source_calls_what_it_is_given_and_is_made_once():
+def test_kernel_from_source_calls_what_it_is_given_and_is_made_once() -> None:
     text = "def twice(x):\n    return polynomial(x) * FACTOR\n"
     made = kernel_from_source(text, "twice", {"polynomial": polynomial, "FACTOR": 2.0})
     assert made(2.0) == 24.0
@@ -153,21 +155,21 @@ def test_kernel_from_source_calls_what_it_is_given_and_is_made_once():
 
 
 @kernel
-def turned(product, q, out):
+def turned(product: Callable[..., object], q: Array, out: Array) -> None:
     product(q, q, out)
 
 
 @kernel
-def take_all(source, target):
+def take_all(source: Any, target: Any) -> None:
     target[:] = source
 
 
 @kernel
-def hand_on(take, source, target):
+def hand_on(take: Callable[..., object], source: Array, target: Array) -> None:
     take(source, target)
 
 
-def test_kernel_that_stands_apart_gives_the_bits_of_one_whose_code_is_copied():
+def test_kernel_that_stands_apart_gives_the_bits_of_one_whose_code_is_copied() -> None:
     q, here, there = np.array([0.1, 0.7, -0.5, 0.3]), np.empty(4), np.empty(4)
     multiply_quaternions(q, q, here)
     turned(apart(multiply_quaternions, q, q, there), q, there)
@@ -175,7 +177,7 @@ def test_kernel_that_stands_apart_gives_the_bits_of_one_whose_code_is_copied():
 
 
 @compiled_only
-def test_code_of_a_kernel_that_stands_apart_is_not_in_its_caller():
+def test_code_of_a_kernel_that_stands_apart_is_not_in_its_caller() -> None:
     product = uncached("@kernel\ndef product(x):\n    return x * x\n", "product")
     call = uncached("@kernel\ndef call(product, x):\n    return product(x)\n", "call")
     assert call(apart(product, 3.0), 3.0) == 9.0
@@ -183,13 +185,15 @@ def test_code_of_a_kernel_that_stands_apart_is_not_in_its_caller():
     assert ["fmul" in text for text in call.inspect_llvm().values()] == [False]
 
 
-def test_what_a_kernel_that_stands_apart_raises_comes_to_its_caller():
+def test_what_a_kernel_that_stands_apart_raises_comes_to_its_caller() -> None:
     long, short = np.ones(3), np.empty(2)
     with pytest.raises(ValueError, match=r"size|shape"):
         hand_on(apart(take_all, long, short), long, short)
 
 
-def test_kernel_that_makes_an_array_is_called_by_a_generated_one_that_is_compiled_before_it():
+def test_kernel_that_makes_an_array_is_called_by_a_generated_one_that_is_compiled_before_it() -> (
+    None
+):
     text = "@kernel\ndef swapped(x, y):\n    pair = np.empty(2)\n    pair[0], pair[1] = y, x\n"
     space = {"kernel": kernel, "np": np}
     exec(text + "    return pair[0] - pair[1]\n", space)
@@ -197,7 +201,7 @@ def test_kernel_that_makes_an_array_is_called_by_a_generated_one_that_is_compile
     assert kernel_from_source(source, "call", {"swapped": space["swapped"]})(1.0, 3.0) == 2.0
 
 
-def test_traceback_of_generated_source_shows_its_line():
+def test_traceback_of_generated_source_shows_its_line() -> None:
     broken = kernel_from_source("def pick(row, i):\n    return row[i]\n", "pick", {})
     with pytest.raises(IndexError) as raised:
         broken.py_func([], 3)
@@ -225,7 +229,7 @@ print(top(row, half), deep(row), bound(top, row, half)(), raise_pending())
 """
 
 
-def test_without_the_compiler_kernels_are_python_functions_that_give_the_same():
+def test_without_the_compiler_kernels_are_python_functions_that_give_the_same() -> None:
     done = subprocess.run(
         [sys.executable, "-c", PURE], capture_output=True, text=True, check=True,
         env={**os.environ, "NUMBA_DISABLE_JIT": "1"},

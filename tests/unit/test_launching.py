@@ -4,27 +4,28 @@ import runpy
 import sys
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
+from typing import Any
 
 import pytest
 import yaml
 
 from teleop_core.base.errors import ParameterError
-from teleop_core.nodes.launching import COMMON, ONE_ARM, TWO_ARMS, processes
+from teleop_core.nodes.launching import COMMON, ONE_ARM, TWO_ARMS, Process, processes
 
 LAUNCH = Path(__file__).resolve().parents[2] / "src" / "teleop_core" / "launch"
 STAGES = {"operator", "haptic_master", "motion_scaling", "inverse_kinematics", "slave", "slave_sim"}
 
 
-def given(own=ONE_ARM, **values):
+def given(own: dict[str, tuple[str, str]] = ONE_ARM, **values: str) -> dict[str, str]:
     return {name: default for name, (default, _) in (COMMON | own).items()} | values
 
 
-def parameters(process):
+def parameters(process: Process) -> dict[str, dict[str, str | float | bool | list[str | float]]]:
     content = yaml.safe_load(Path(process.parameters).read_text())
     return {name: node["ros__parameters"] for name, node in content.items()}
 
 
-def test_a_session_is_one_process_per_node_with_the_recorder_first():
+def test_a_session_is_one_process_per_node_with_the_recorder_first() -> None:
     found = processes(given())
     assert found[0].name == "recorder"
     assert {process.name for process in found} == STAGES | {"recorder"}
@@ -35,27 +36,27 @@ def test_a_session_is_one_process_per_node_with_the_recorder_first():
     ("outer", "own", "where"),
     [("", "", ""), ("", "lab", "/lab"), ("/left", "", "/left"), ("/left", "/lab/", "/left/lab")],
 )
-def test_every_node_finds_its_parameters_where_it_is(outer, own, where):
+def test_every_node_finds_its_parameters_where_it_is(outer: str, own: str, where: str) -> None:
     for process in processes(given(namespace=own), outer):
         full = f"{process.namespace.rstrip('/')}/{process.name}"
         assert full == f"{where}/{process.name}"
         assert full in parameters(process)
 
 
-def test_one_process_holds_all_nodes_if_composed():
+def test_one_process_holds_all_nodes_if_composed() -> None:
     (process,) = processes(given(composed="true", namespace="lab"))
     assert (process.executable, process.name) == ("teleop_session", "")
     assert process.namespace == "/lab"
     assert {f"/lab/{name}" for name in STAGES | {"recorder"}} <= set(parameters(process))
 
 
-def test_nothing_records_where_it_is_not_wanted():
+def test_nothing_records_where_it_is_not_wanted() -> None:
     assert "recorder" not in {process.name for process in processes(given(record="false"))}
     (process,) = processes(given(record="false", composed="1"))
     assert parameters(process)["/recorder"]["autostart"] is False
 
 
-def test_a_robot_is_that_of_all_stages_of_its_arm():
+def test_a_robot_is_that_of_all_stages_of_its_arm() -> None:
     one = parameters(processes(given(robot="puma560"))[0])
     assert {one[f"/{name}"]["robot"] for name in ("slave", "slave_sim", "inverse_kinematics")} == {
         "puma560"
@@ -70,17 +71,22 @@ def test_a_robot_is_that_of_all_stages_of_its_arm():
 @pytest.mark.parametrize(
     ("name", "value"), [("log_level", "loud"), ("record", "perhaps"), ("composed", "")]
 )
-def test_an_argument_of_no_meaning_is_refused(name, value):
+def test_an_argument_of_no_meaning_is_refused(name: str, value: str) -> None:
     with pytest.raises(ParameterError, match=name):
-        processes(given(**{name: value}))
+        processes(given(**dict[str, Any]({name: value})))
 
 
 @pytest.mark.parametrize(
     ("file", "own", "count"), [("teleop", ONE_ARM, 7), ("two_arms", TWO_ARMS, 13)]
 )
-def test_a_launch_file_declares_its_arguments_and_starts_its_nodes(monkeypatch, file, own, count):
+def test_a_launch_file_declares_its_arguments_and_starts_its_nodes(
+    monkeypatch: pytest.MonkeyPatch, file: str, own: dict[str, tuple[str, str]], count: int
+) -> None:
     # Stand-ins for launch and launch_ros, which PyPI does not have, as far as they are used.
     declared, started = {}, []
+    launch: Any
+    actions: Any
+    ros: Any
     launch, actions, ros = ModuleType("launch"), ModuleType("launch.actions"), ModuleType("ros")
     launch.LaunchDescription = list
     actions.DeclareLaunchArgument = lambda name, default_value, description: declared.update(

@@ -7,6 +7,9 @@ import numpy as np
 import pytest
 
 import teleop_core as tc
+from present import present
+from teleop_core.kernels.geometry import Array
+from teleop_core_lerobot import MasterSide, SlaveSide
 
 PACKAGE = Path(__file__).resolve().parents[2] / "src/lerobot_robot_teleop_core"
 sides = pytest.importorskip("teleop_core_lerobot", reason="lerobot_robot_teleop_core is missing")
@@ -22,27 +25,27 @@ TELEOPERATOR = BOTH | {"feedback_features", "get_action", "send_feedback"}
 
 
 @pytest.fixture
-def slave():
+def slave() -> SlaveSide:
     made = sides.SlaveSide(scenario="free_motion", settings=AT_HOME)
     made.begin()
     return made
 
 
-def joints_of(side, named):
+def joints_of(side: MasterSide | SlaveSide, named: dict[str, float]) -> Array:
     return np.array([named[key] for key in side.joint_keys])
 
 
-def inside(slave):
+def inside(slave: SlaveSide) -> Array:
     """Joints (n,) where it is, a little inside all limits."""
     return joints_of(slave, slave.observe()) + 1e-4 * INWARD
 
 
-def sent(slave, joints):
+def sent(slave: SlaveSide, joints: Array) -> Array:
     """What comes back for joints (n,)."""
     return joints_of(slave, slave.send(dict(zip(slave.joint_keys, joints, strict=True))))
 
 
-def test_actions_are_the_references_of_the_same_session_without_a_loop():
+def test_actions_are_the_references_of_the_same_session_without_a_loop() -> None:
     master = sides.MasterSide(scenario="free_motion", fps=30)
     master.begin()
     actions = [joints_of(master, master.next_action()) for _ in range(60)]
@@ -55,7 +58,7 @@ def test_actions_are_the_references_of_the_same_session_without_a_loop():
 
 
 @pytest.mark.parametrize("fps", [1, 7, 30, 60, 1000])
-def test_as_many_calls_as_a_second_has_are_one_second(fps):
+def test_as_many_calls_as_a_second_has_are_one_second(fps: int) -> None:
     slave = sides.SlaveSide(scenario="free_motion", settings=AT_HOME, fps=fps)
     slave.begin()
     begin, home = slave._session.now_ns, slave.observe()
@@ -64,7 +67,7 @@ def test_as_many_calls_as_a_second_has_are_one_second(fps):
     assert slave._session.now_ns - begin == 1_000_000_000
 
 
-def test_reference_within_all_limits_comes_back_and_the_slave_gets_there(slave):
+def test_reference_within_all_limits_comes_back_and_the_slave_gets_there(slave: SlaveSide) -> None:
     begin = inside(slave)
     goal = begin + 0.01 * INWARD
     for share in np.linspace(0.0, 1.0, 31):
@@ -76,7 +79,7 @@ def test_reference_within_all_limits_comes_back_and_the_slave_gets_there(slave):
     assert joints_of(slave, slave.observe()) == pytest.approx(goal, abs=1e-3)
 
 
-def test_references_that_come_by_the_loop_are_joined_without_steps(slave):
+def test_references_that_come_by_the_loop_are_joined_without_steps(slave: SlaveSide) -> None:
     begin = joints_of(slave, slave.observe())
     slave._bag = "kept"  # keeps the rows
     for k in range(60):
@@ -86,10 +89,10 @@ def test_references_that_come_by_the_loop_are_joined_without_steps(slave):
     assert 0.0 < step < 3 * 0.003 / 33  # a stair has its whole rise in a few ticks
 
 
-def test_reference_beyond_a_joint_limit_comes_back_at_the_limit(slave):
+def test_reference_beyond_a_joint_limit_comes_back_at_the_limit(slave: SlaveSide) -> None:
     robot = tc.load_robot("rcrt1")
     joints = joints_of(slave, slave.observe())
-    reach = 0.03 * robot.drives.speed_limit
+    reach = 0.03 * present(robot.drives).speed_limit
     for _ in range(600):
         wanted = joints + reach * (np.arange(robot.n) == 0)
         back = sent(slave, wanted)
@@ -100,13 +103,13 @@ def test_reference_beyond_a_joint_limit_comes_back_at_the_limit(slave):
     assert back[0] == robot.upper[0] < wanted[0]
 
 
-def test_reference_that_is_a_jump_comes_back_as_the_one_before(slave):
+def test_reference_that_is_a_jump_comes_back_as_the_one_before(slave: SlaveSide) -> None:
     before = sent(slave, joints_of(slave, slave.observe()))
     assert np.array_equal(sent(slave, before + 3.0 * INWARD), before)
     assert joints_of(slave, slave.observe()) == pytest.approx(before, abs=1e-3)
 
 
-def test_stopped_slave_holds_and_says_where_whatever_is_sent():
+def test_stopped_slave_holds_and_says_where_whatever_is_sent() -> None:
     slave = sides.SlaveSide(
         scenario="free_motion", settings=(*AT_HOME, "slave.operation.events=[stop@0.5]")
     )
@@ -119,7 +122,7 @@ def test_stopped_slave_holds_and_says_where_whatever_is_sent():
     assert (np.abs(back[-1] - begin) < 0.03).all()
 
 
-def test_bag_has_what_was_observed_and_sent(tmp_path):
+def test_bag_has_what_was_observed_and_sent(tmp_path: Path) -> None:
     slave = sides.SlaveSide(
         scenario="free_motion", settings=AT_HOME, fps=50, bag=str(tmp_path / "bag")
     )
@@ -137,7 +140,7 @@ def test_bag_has_what_was_observed_and_sent(tmp_path):
     assert np.array_equal(bag["given/servo_jp"].values[ticks[1:]], given[:-1])
 
 
-def test_hand_feels_its_own_session_until_a_force_is_given():
+def test_hand_feels_its_own_session_until_a_force_is_given() -> None:
     master = sides.MasterSide(scenario="palpation", fps=10)
     master.begin()
     felt = []
@@ -151,7 +154,7 @@ def test_hand_feels_its_own_session_until_a_force_is_given():
     assert np.array_equal(felt, rows[lead + 99 :: 100])
 
 
-def test_hand_feels_the_force_that_is_given_as_it_feels_one_that_is_measured():
+def test_hand_feels_the_force_that_is_given_as_it_feels_one_that_is_measured() -> None:
     felt = {}
     for force in (0.0, 1.0, 2.0):
         master = sides.MasterSide(scenario="palpation")
@@ -165,7 +168,7 @@ def test_hand_feels_the_force_that_is_given_as_it_feels_one_that_is_measured():
     assert felt[2.0] == pytest.approx(2.0 * felt[1.0], rel=1e-6)
 
 
-def test_both_sides_refuse_what_they_cannot_use(slave):
+def test_both_sides_refuse_what_they_cannot_use(slave: SlaveSide) -> None:
     with pytest.raises(tc.ParameterError, match=r"theta1\.pos") as caught:
         slave.send({"theta1.pos": 0.0})
     assert caught.value.name == "action"
@@ -196,19 +199,21 @@ def test_both_sides_refuse_what_they_cannot_use(slave):
         ("lerobot_teleoperator_teleop_core", "Teleoperator", TELEOPERATOR),
     ],
 )
-def test_class_for_lerobot_has_what_its_documents_ask_for(package, base, names):
+def test_class_for_lerobot_has_what_its_documents_ask_for(
+    package: str, base: str, names: set[str]
+) -> None:
     tree = ast.parse((PACKAGE / package / "__init__.py").read_text())
     classes = {node.name: node for node in tree.body if isinstance(node, ast.ClassDef)}
     bases = ["Connection", base]  # in this order: what is shared stands in for LeRobot's abstract
     device = next(c for c in classes.values() if [ast.unparse(b) for b in c.bases] == bases)
     defined = {node.name for node in device.body if isinstance(node, ast.FunctionDef)}
     defined |= set(vars(sides.Connection))
-    defined |= {n.targets[0].id for n in device.body if isinstance(n, ast.Assign)}
+    defined |= {ast.unparse(n.targets[0]) for n in device.body if isinstance(n, ast.Assign)}
     assert defined >= names
     assert f"{device.name}Config" in classes  # LeRobot finds the class by this name
 
 
-def test_lerobot_makes_both_by_their_type_and_a_loop_runs():
+def test_lerobot_makes_both_by_their_type_and_a_loop_runs() -> None:
     pytest.importorskip("lerobot", reason="lerobot is not installed: it brings torch")
     from lerobot.robots import make_robot_from_config
     from lerobot.robots.config import RobotConfig

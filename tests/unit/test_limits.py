@@ -1,5 +1,7 @@
 """Limits: what the arm cannot follow is drawn back once, however late it is known."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -14,9 +16,14 @@ from teleop_core.chain.mapping.parameters import (
 )
 from teleop_core.graph.signals import STATE, TICK_NS
 from teleop_core.graph.topics import SLAVE_REACH, Limit
+from teleop_core.kernels.geometry import Array
 
 REACH = {name: index for index, name in enumerate(SLAVE_REACH.columns)}
-PLAIN = {"axes": ("+x", "+y", "+z"), "tool_axes": ("+x", "+y", "+z"), "tool_roll": 0.0}
+PLAIN: dict[str, Any] = {
+    "axes": ("+x", "+y", "+z"),
+    "tool_axes": ("+x", "+y", "+z"),
+    "tool_roll": 0.0,
+}
 STEP, TURN = 1e-4, 1e-3  # of the hand, each sample [m, rad]
 WALL, ANGLE = 5e-3, 0.03  # how far along x, and about x, the arm can go [m, rad]
 # Sums of a hundred steps.
@@ -29,14 +36,15 @@ class Arm:
     How far it could follow a command is told ``delay`` samples later.
     """
 
-    def __init__(self, delay=1, **values):
+    def __init__(self, delay: int = 1, **values: Any) -> None:
         self.scaling = MotionScaling(MotionScalingParameters(**PLAIN, **values))
+        self.told: list[Any]
         self.row, self.delay, self.told = self.scaling.signals, delay, []
         self.hand, self.turn, self.stamp_ns = np.zeros(3), 0.0, TICK_NS
         self.step(0)
         self.step(0)
 
-    def step(self, count, turn=0.0):
+    def step(self, count: int, turn: float = 0.0) -> float:
         """One sample after ``count`` steps of the hand along x; returns the command's x."""
         row, before_ns = self.row, self.stamp_ns
         self.stamp_ns += TICK_NS
@@ -53,7 +61,7 @@ class Arm:
         self.told.append((self.answer(), self.stamp_ns))
         return self.x
 
-    def answer(self):
+    def answer(self) -> Array:
         """How far the arm follows the present command."""
         found = np.zeros(len(REACH))
         found[REACH["cut_x"]] = min(0.0, WALL - self.x)
@@ -64,24 +72,24 @@ class Arm:
         return found
 
     @property
-    def x(self):
+    def x(self) -> float:
         return float(self.row["slave_servo_cp"][0])
 
     @property
-    def angle(self):
+    def angle(self) -> float:
         turned = Rotation.from_quat(self.row["slave_servo_cp"][3:], scalar_first=True)
         return float(turned.as_rotvec()[0])
 
-    def state(self, name):
+    def state(self, name: str) -> float:
         return self.row["teleop_state"][STATE[name]]
 
-    def rest(self):
+    def rest(self) -> None:
         for _ in range(self.delay + 2):
             self.step(0)
 
 
 @pytest.mark.parametrize("delay", [1, 2, 7, 40])
-def test_what_is_beyond_is_cut_once_however_late_it_is_known(delay):
+def test_what_is_beyond_is_cut_once_however_late_it_is_known(delay: int) -> None:
     arm = Arm(delay)
     for _ in range(120):  # 7 mm too far
         arm.step(1)
@@ -93,7 +101,7 @@ def test_what_is_beyond_is_cut_once_however_late_it_is_known(delay):
 
 
 @pytest.mark.parametrize("delay", [1, 7])
-def test_turns_beyond_are_cut_too_and_come_back_at_once(delay):
+def test_turns_beyond_are_cut_too_and_come_back_at_once(delay: int) -> None:
     arm = Arm(delay)
     for _ in range(80):
         arm.step(0, TURN)
@@ -103,7 +111,7 @@ def test_turns_beyond_are_cut_too_and_come_back_at_once(delay):
     assert arm.angle == pytest.approx(ANGLE - 5 * TURN, abs=1e-9)
 
 
-def test_an_answer_to_a_command_that_is_forgotten_draws_nothing_back():
+def test_an_answer_to_a_command_that_is_forgotten_draws_nothing_back() -> None:
     arm = Arm(delay=SENT + 100)
     for _ in range(2 * SENT):
         arm.step(1)
@@ -111,7 +119,7 @@ def test_an_answer_to_a_command_that_is_forgotten_draws_nothing_back():
 
 
 @pytest.mark.parametrize("gain", [1.0, 0.25])
-def test_the_push_grows_with_the_hand_beyond_the_wall_up_to_its_bound(gain):
+def test_the_push_grows_with_the_hand_beyond_the_wall_up_to_its_bound(gain: float) -> None:
     force = ReachForceParameters(stiffness=1000.0, max_force=1.2)
     arm = Arm(coarse_gain=gain, fine_gain=0.1, reach_force=force)
     for _ in range(round(WALL / gain / STEP)):
@@ -128,7 +136,7 @@ def test_the_push_grows_with_the_hand_beyond_the_wall_up_to_its_bound(gain):
     assert not arm.row["master_servo_cf"].any()
 
 
-def test_the_limit_is_told_while_the_hand_stands_against_it_and_a_moment_longer():
+def test_the_limit_is_told_while_the_hand_stands_against_it_and_a_moment_longer() -> None:
     arm = Arm()
     for _ in range(70):
         arm.step(1)
@@ -142,7 +150,7 @@ def test_the_limit_is_told_while_the_hand_stands_against_it_and_a_moment_longer(
     assert (arm.state("limit"), arm.state("limited_joint")) == (Limit.NONE, -1)
 
 
-def test_the_clutch_leaves_the_limit():
+def test_the_clutch_leaves_the_limit() -> None:
     arm = Arm()
     for _ in range(70):
         arm.step(1)
@@ -157,8 +165,8 @@ def test_the_clutch_leaves_the_limit():
 @pytest.mark.parametrize("side", ["slave", "both"])
 @pytest.mark.parametrize("half", [4e-3, 6e-3])
 def test_where_a_fixture_holds_the_slave_too_the_nearer_of_wall_and_limit_stops_it(
-    half, side, delay
-):
+    half: float, side: str, delay: int
+) -> None:
     box = {"side": side, "box.size": (2.0 * half,) * 3}
     arm = Arm(delay, fixture=build(FixtureParameters, box))
     for pressed in (1.0, 0.0):

@@ -5,10 +5,13 @@ import math
 import numpy as np
 import pytest
 
+from present import present
 from teleop_core.base.errors import ParameterError, ShapeError, UnknownNameError
+from teleop_core.kernels.geometry import Array
 from teleop_core.robots import dh_kernels, load_robot, robot_from_table
 from teleop_core.robots.chains import chain_of, true_chain
 from teleop_core.robots.link_errors import LinkErrors, error_names, next_axis_motion
+from teleop_core.robots.robot import Robot
 
 CHAINS = ("rcrt1", "puma560", "scara", "planar_3r", "five_axis")
 # Every joint of the standard convention, with and without lengths, offset and slide.
@@ -24,17 +27,17 @@ TABLE = {
 }
 
 
-def tip(row, q):
+def tip(row: Array, q: Array) -> Array:
     T = np.empty((4, 4))
     dh_kernels.fk(q, row, T)
     return T
 
 
-def joints(robot, rng):
+def joints(robot: Robot, rng: np.random.Generator) -> Array:
     return rng.uniform(robot.lower, robot.upper)
 
 
-def standard(theta, d, a, alpha):
+def standard(theta: float, d: float, a: float, alpha: float) -> Array:
     """One link, written out (Denavit and Hartenberg 1955)."""
     ct, st, ca, sa = math.cos(theta), math.sin(theta), math.cos(alpha), math.sin(alpha)
     return np.array(
@@ -48,9 +51,9 @@ def standard(theta, d, a, alpha):
 
 
 @pytest.mark.parametrize("name", CHAINS)
-def test_an_arm_without_errors_is_the_robot(name):
+def test_an_arm_without_errors_is_the_robot(name: str) -> None:
     robot, rng = load_robot(name), np.random.default_rng(1)
-    row = true_chain(robot, LinkErrors.none(robot.n))
+    row = present(true_chain(robot, LinkErrors.none(robot.n)))
     for _ in range(50):
         q = joints(robot, rng)
         # Lengths up to 2.3 m; a few roundings each.
@@ -58,16 +61,16 @@ def test_an_arm_without_errors_is_the_robot(name):
 
 
 @pytest.mark.parametrize("name", CHAINS)
-def test_changed_lengths_of_the_robot_are_those_of_its_chain(name):
+def test_changed_lengths_of_the_robot_are_those_of_its_chain(name: str) -> None:
     drawn = load_robot(name)
     symbol = next(iter(drawn.geometry))
     robot = load_robot(name, **{symbol: 0.123})
-    row = true_chain(robot, LinkErrors.none(robot.n))
+    row = present(true_chain(robot, LinkErrors.none(robot.n)))
     assert np.allclose(tip(row, robot.home), robot.fk(robot.home), rtol=0, atol=1e-15)
     assert not np.allclose(tip(row, robot.home), drawn.fk(robot.home), rtol=0, atol=1e-3)
 
 
-def test_errors_of_the_rcrt1_are_those_of_its_published_table():
+def test_errors_of_the_rcrt1_are_those_of_its_published_table() -> None:
     robot, rng = load_robot("rcrt1"), np.random.default_rng(2)
     right = math.pi / 2
     for _ in range(20):
@@ -78,11 +81,11 @@ def test_errors_of_the_rcrt1_are_those_of_its_published_table():
         expected = np.eye(4)
         for i in range(6):
             expected = expected @ standard(theta[i], d[i], e[0, i], alpha[i])
-        row = true_chain(robot, LinkErrors.from_vector(e.ravel()))
+        row = present(true_chain(robot, LinkErrors.from_vector(e.ravel())))
         assert np.allclose(tip(row, q), expected, rtol=0, atol=1e-14)
 
 
-def test_errors_of_a_table_are_those_of_its_rows():
+def test_errors_of_a_table_are_those_of_its_rows() -> None:
     robot, rng = robot_from_table(TABLE), np.random.default_rng(3)
     for _ in range(20):
         q, e = joints(robot, rng), rng.normal(0.0, 0.02, (4, 4))
@@ -92,7 +95,7 @@ def test_errors_of_a_table_are_those_of_its_rows():
         expected = np.eye(4)
         for i in range(4):
             expected = expected @ standard(theta[i], d[i], a[i], alpha[i])
-        row = true_chain(robot, LinkErrors.from_vector(e.ravel()))
+        row = present(true_chain(robot, LinkErrors.from_vector(e.ravel())))
         assert np.allclose(tip(row, q), expected, rtol=0, atol=1e-14)
 
 
@@ -105,28 +108,28 @@ def test_errors_of_a_table_are_those_of_its_rows():
         ("five_axis", "d5", "d5"), ("rcrt1", "L6", "d6"), ("rcrt1", "d2", "d2"),
     ],
 )  # fmt: skip
-def test_an_error_of_a_length_is_another_length(name, symbol, error):
+def test_an_error_of_a_length_is_another_length(name: str, symbol: str, error: str) -> None:
     robot, rng = load_robot(name), np.random.default_rng(4)
     longer = load_robot(name, **{symbol: robot.geometry[symbol] + 0.01})
-    row = true_chain(robot, LinkErrors.of(robot, {error: 0.01}))
+    row = present(true_chain(robot, LinkErrors.of(robot, {error: 0.01})))
     q = joints(robot, rng)
     assert np.allclose(tip(row, q), longer.fk(q), rtol=0, atol=1e-14)
 
 
 @pytest.mark.parametrize("name", CHAINS)
-def test_a_joint_offset_is_another_joint_vector(name):
+def test_a_joint_offset_is_another_joint_vector(name: str) -> None:
     robot, rng = load_robot(name), np.random.default_rng(5)
-    chain = chain_of(robot)
+    chain = present(chain_of(robot))
     for i, kind in enumerate(chain.kinds):
         q = joints(robot, rng)
         moved = q.copy()
         moved[i] += math.copysign(0.01, kind)
         error = {f"{'theta' if abs(kind) < 1.5 else 'd'}{i + 1}": 0.01}
-        row = true_chain(robot, LinkErrors.of(robot, error))
+        row = present(true_chain(robot, LinkErrors.of(robot, error)))
         assert np.allclose(tip(row, q), robot.fk(moved), rtol=0, atol=1e-14)
 
 
-def test_every_transform_between_axes_has_a_common_normal():
+def test_every_transform_between_axes_has_a_common_normal() -> None:
     rng = np.random.default_rng(6)
     for _ in range(200):
         theta, d, a, alpha, turn, slide = rng.uniform(-1.5, 1.5, 6)
@@ -137,19 +140,19 @@ def test_every_transform_between_axes_has_a_common_normal():
 
 
 @pytest.mark.parametrize("alpha", [0.0, math.pi])
-def test_parallel_axes_have_their_normal_where_the_link_is(alpha):
+def test_parallel_axes_have_their_normal_where_the_link_is(alpha: float) -> None:
     S = standard(0.4, 0.0, 0.0, 0.0)
     F = standard(0.7, 0.2, 0.3, alpha) @ S
     assert np.allclose(next_axis_motion(F), S, rtol=0, atol=1e-14)
 
 
 @pytest.mark.parametrize("name", ["stewart", "mma", "rps3", "three_finger_hand", "four_bar"])
-def test_robots_that_are_no_chain_have_none(name):
+def test_robots_that_are_no_chain_have_none(name: str) -> None:
     robot = load_robot(name)
     assert true_chain(robot, LinkErrors.none(robot.n)) is None
 
 
-def test_names_and_vectors_are_in_one_order():
+def test_names_and_vectors_are_in_one_order() -> None:
     names = error_names(2)
     assert names == ("a1", "a2", "alpha1", "alpha2", "d1", "d2", "theta1", "theta2")
     errors = LinkErrors.from_vector(np.arange(8.0))
@@ -158,7 +161,7 @@ def test_names_and_vectors_are_in_one_order():
     assert "a1" not in errors.named()
 
 
-def test_wrong_errors_are_refused_by_name():
+def test_wrong_errors_are_refused_by_name() -> None:
     robot = load_robot("rcrt1")
     with pytest.raises(UnknownNameError) as unknown:
         LinkErrors.of(robot, {"d7": 0.1})

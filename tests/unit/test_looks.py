@@ -1,6 +1,8 @@
 """Looks: meshes of a URDF in the frames of the robot's bodies, and files that are not read."""
 
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Any, cast
 
 import numpy as np
 import pinocchio
@@ -16,11 +18,11 @@ from teleop_core.robots.visuals import mesh_file
 
 TEXT = (Path(__file__).parents[2] / "examples" / "any_arm.urdf").read_text(encoding="utf-8")
 CORNERS = np.array([(0, 0, 0), (30, 0, 0), (0, 20, 0), (0, 0, 10)], np.float64)  # mm
-FACES = [(0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3)]
+FACES: Any = [(0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3)]
 LINKS = ("base", "column", "upper_arm", "forearm", "wrist_1", "wrist_2", "flange", "camera")
 
 
-def visual(link, name):
+def visual(link: str, name: str) -> str:
     """A mesh that lies askew in a link, another way in each."""
     k = LINKS.index(link)
     origin = f'<origin xyz="0.0{k} 0.02 -0.1" rpy="{0.3 * k} -0.5 1"/>'
@@ -28,7 +30,9 @@ def visual(link, name):
     return f"<visual>{origin}<geometry>{mesh}</geometry></visual>"
 
 
-def arm(folder, name="package://some_arm/meshes/part.stl", links=LINKS):
+def arm(
+    folder: Path, name: str = "package://some_arm/meshes/part.stl", links: Sequence[str] = LINKS
+) -> Path:
     """The example as a package with a mesh at some links; path of its URDF."""
     for part in ("urdf", "meshes"):
         (folder / "some_arm" / part).mkdir(parents=True)
@@ -42,7 +46,7 @@ def arm(folder, name="package://some_arm/meshes/part.stl", links=LINKS):
 
 
 @pytest.mark.parametrize("middle", [0.0, 1.0])
-def test_meshes_are_where_pinocchio_has_them_at_any_posture(middle, tmp_path):
+def test_meshes_are_where_pinocchio_has_them_at_any_posture(middle: float, tmp_path: Path) -> None:
     path = arm(tmp_path)
     if middle:  # home of a joint without 0 in its limits is another posture than zero
         path.write_text(path.read_text().replace('lower="-2.6" upper', 'lower="0.4" upper'))
@@ -66,13 +70,15 @@ def test_meshes_are_where_pinocchio_has_them_at_any_posture(middle, tmp_path):
         np.testing.assert_allclose(found, np.unique(np.round(expected, 9), axis=0), atol=2e-9)
 
 
-def test_plain_shapes_are_drawn_too_and_a_length_in_millimetres_is_read_as_such(tmp_path):
+def test_plain_shapes_are_drawn_too_and_a_length_in_millimetres_is_read_as_such(
+    tmp_path: Path,
+) -> None:
     path = arm(tmp_path, links=())
     ball = '<visual><geometry><sphere radius="0.04"/></geometry></visual>'
     inch = '<visual><geometry><mesh filename="../meshes/part.dae"/></geometry></visual>'
     text = path.read_text().replace('"base"></link>', f'"base">{ball}{inch}</link>')
     path.write_text(text)
-    part = trimesh.Trimesh(CORNERS + 100.0, FACES).export(file_type="dae").decode()
+    part = cast(bytes, trimesh.Trimesh(CORNERS + 100.0, FACES).export(file_type="dae")).decode()
     assert "<asset>" in part
     unit = '<unit name="millimeter" meter="0.001"/>'
     meshes = path.parents[1] / "meshes"
@@ -84,21 +90,21 @@ def test_plain_shapes_are_drawn_too_and_a_length_in_millimetres_is_read_as_such(
 
 @pytest.mark.parametrize("name", ["../meshes/gone.stl", "package://other_arm/gone.stl"])
 def test_a_mesh_that_is_not_there_is_told_by_its_link_and_the_link_is_drawn_as_solids(
-    name, tmp_path
-):
+    name: str, tmp_path: Path
+) -> None:
     robot = load_robot(str(arm(tmp_path, name, ["forearm"])), tip="tool0")
     with pytest.warns(UserWarning, match=r"link forearm is drawn without: mesh is '.*gone.stl'"):
         assert looks_of(robot) == {}
 
 
-def test_a_mesh_that_is_broken_is_told_by_its_link(tmp_path):
+def test_a_mesh_that_is_broken_is_told_by_its_link(tmp_path: Path) -> None:
     path = arm(tmp_path, links=["forearm"])
     (path.parents[1] / "meshes" / "part.stl").write_bytes(b"solid what")
     with pytest.warns(UserWarning, match="link forearm is drawn without"):
         assert looks_of(load_robot(str(path), tip="tool0")) == {}
 
 
-def test_no_file_is_read_outside_the_package_and_none_that_is_no_mesh(tmp_path):
+def test_no_file_is_read_outside_the_package_and_none_that_is_no_mesh(tmp_path: Path) -> None:
     deep = tmp_path / "a" / "b" / "c" / "d" / "e"
     path = arm(deep)
     assert mesh_file("package://some_arm/meshes/part.stl", path).name == "part.stl"

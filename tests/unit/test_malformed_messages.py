@@ -2,6 +2,7 @@
 
 import struct
 import warnings
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -32,7 +33,7 @@ GARBAGE = b"\0\1\0\0" + bytes(range(200, 256))
 SESSION_NAMES = (*(t.name for t in topics.STREAMS), topics.TELEOP_STATE.name)
 
 
-def sound(topic) -> bytes:
+def sound(topic: tc.Topic) -> bytes:
     if topic.kind is Kind.REPORT:
         return report(5, "x", 0, "fine", dict.fromkeys(topic.columns, "1"))
     count = topic.width(len(JOINTS))
@@ -40,7 +41,7 @@ def sound(topic) -> bytes:
 
 
 @st.composite
-def damaged(draw, data: bytes) -> bytes:
+def damaged(draw: st.DrawFn, data: bytes) -> bytes:
     """A message that was cut, lengthened, or had some of its bytes or lengths overwritten."""
     out = bytearray(data[: draw(st.integers(0, len(data)))] if draw(st.booleans()) else data)
     for at in draw(st.lists(st.integers(0, max(len(data) - 1, 0)), max_size=4)):
@@ -56,7 +57,7 @@ def damaged(draw, data: bytes) -> bytes:
 @pytest.mark.parametrize("topic", NUMBERS, ids=lambda topic: topic.kind.name)
 @settings(max_examples=300, deadline=None)
 @given(st.data())
-def test_any_bytes_give_numbers_or_a_reason(topic, data):
+def test_any_bytes_give_numbers_or_a_reason(topic: tc.Topic, data: st.DataObject) -> None:
     garbage = data.draw(st.one_of(st.binary(max_size=300), damaged(sound(topic))))
     names = topic.names(JOINTS)
     found = layout(topic, JOINTS).decode_one(garbage) or read_any(topic.kind, garbage, names)
@@ -70,19 +71,19 @@ def test_any_bytes_give_numbers_or_a_reason(topic, data):
 @given(st.one_of(st.binary(max_size=300), damaged(sound(topics.TELEOP_STATE))))
 @example(b"")
 @example(GARBAGE)
-def test_any_bytes_of_a_report_give_numbers_or_a_reason(garbage):
+def test_any_bytes_of_a_report_give_numbers_or_a_reason(garbage: bytes) -> None:
     found = read_numbers(garbage, topics.TELEOP_STATE.columns)
     assert isinstance(found, Refusal) or found[1].shape == (len(topics.TELEOP_STATE.columns),)
 
 
-def test_what_is_no_message_is_refused_as_such():
+def test_what_is_no_message_is_refused_as_such() -> None:
     assert read_any(Kind.POSE, b"\0\1\0\0abc") is Refusal.MALFORMED
     assert read_any(Kind.POSE, sound(topics.SLAVE_MEASURED_CP)[:-1]) is Refusal.MALFORMED
     assert read_numbers(GARBAGE, ("gain",)) is Refusal.MALFORMED
     assert read_numbers(report(0, "x", 0, "", {"gain": "abc"}), ("gain",)) is Refusal.WRONG_NAMES
 
 
-def test_a_message_that_is_padded_as_rclpy_does_is_one():
+def test_a_message_that_is_padded_as_rclpy_does_is_one() -> None:
     """A JointState of three empty lists of doubles: rclpy adds four bytes to it."""
     types = ros_types.typestore().types
     header = types["std_msgs/msg/Header"](types["builtin_interfaces/msg/Time"](1, 2), "base")
@@ -96,7 +97,7 @@ def test_a_message_that_is_padded_as_rclpy_does_is_one():
         ros_types.deserialise(data + bytes(9), "sensor_msgs/msg/JointState")
 
 
-def recorded(path, *, bad=(), good=3):
+def recorded(path: Path, *, bad: tuple[int, ...] = (), good: int = 3) -> Bag:
     """Recording of one pose topic in which messages number ``bad`` are no poses."""
     topic = topics.SLAVE_MEASURED_CP
     form = layout(topic, ())
@@ -108,7 +109,9 @@ def recorded(path, *, bad=(), good=3):
 
 
 @pytest.mark.parametrize("bad", [(0,), (2,), (1, 3), (0, 4)])
-def test_a_recording_is_read_without_its_malformed_messages(tmp_path, bad):
+def test_a_recording_is_read_without_its_malformed_messages(
+    tmp_path: Path, bad: tuple[int, ...]
+) -> None:
     bag = recorded(tmp_path / "bag", bad=bad)
     with pytest.warns(UserWarning, match=f"{len(bad)} of {3 + len(bad)} messages are left out"):
         series = bag.read("slave/measured_cp")
@@ -117,23 +120,23 @@ def test_a_recording_is_read_without_its_malformed_messages(tmp_path, bad):
     np.testing.assert_array_equal(series.values[:, 0], kept)
 
 
-def test_a_recording_of_malformed_messages_alone_is_refused(tmp_path):
+def test_a_recording_of_malformed_messages_alone_is_refused(tmp_path: Path) -> None:
     with pytest.raises(RecordingError, match=r"nothing to read.*3 of 3 messages"):
         recorded(tmp_path / "bag", bad=(0, 1, 2), good=0).read("slave/measured_cp")
 
 
-def test_a_sound_recording_is_read_without_a_word(tmp_path):
+def test_a_sound_recording_is_read_without_a_word(tmp_path: Path) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         assert len(recorded(tmp_path / "bag").read("slave/measured_cp")) == 3
 
 
 @pytest.fixture(scope="module")
-def session():
+def session() -> tc.Recording:
     return tc.run("coarse_box", duration=1.0)
 
 
-def copy_of(session, path, *, bad=()):
+def copy_of(session: tc.Recording, path: Path, *, bad: tuple[str, ...] = ()) -> tc.Recording:
     """The session on disk, with a malformed message amid those of the topics named ``bad``."""
     by_name = {topic.name: topic for topic in topics.ALL}
     given = set()
@@ -149,7 +152,9 @@ def copy_of(session, path, *, bad=()):
     return tc.open_recording(path)
 
 
-def test_a_malformed_message_on_every_topic_leaves_the_scores_as_they_were(session, tmp_path):
+def test_a_malformed_message_on_every_topic_leaves_the_scores_as_they_were(
+    session: tc.Recording, tmp_path: Path
+) -> None:
     whole = copy_of(session, tmp_path / "whole").score()
     with pytest.warns(UserWarning, match="left out"):
         score = copy_of(session, tmp_path / "bad", bad=SESSION_NAMES).score()

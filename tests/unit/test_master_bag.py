@@ -2,17 +2,21 @@
 
 import warnings
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
 import pytest
+from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 import teleop_core as tc
 from teleop_core.bags.memory import MemoryBag
 from teleop_core.bags.reader import Bag
+from teleop_core.bags.series import Series
 from teleop_core.bags.writer import BagWriter
 from teleop_core.graph.topics import MASTER_BUTTONS, MASTER_MEASURED_CP, Kind, Topic
+from teleop_core.kernels.geometry import Array
 from teleop_core.session.exchange import as_master_bag
 
 START_NS = 1_700_000_000_000_000_000
@@ -25,7 +29,13 @@ POSES = np.column_stack((0.02 * np.sin(T), 0.01 * T, 0.0 * T, TURNS.as_quat(scal
 PRESSED = np.zeros((2, 3))
 
 
-def bag(path, poses=POSES, stamps=STAMPS, topic=MASTER_MEASURED_CP, pressed=None):
+def bag(
+    path: Path,
+    poses: Array = POSES,
+    stamps: NDArray[np.int64] = STAMPS,
+    topic: Topic = MASTER_MEASURED_CP,
+    pressed: Array | None = None,
+) -> Path:
     """Recording of poses and, if wanted, of two presses."""
     topics = [topic] + ([MASTER_BUTTONS] if pressed is not None else [])
     with BagWriter(path, topics, ()) as writer:
@@ -36,7 +46,7 @@ def bag(path, poses=POSES, stamps=STAMPS, topic=MASTER_MEASURED_CP, pressed=None
     return path
 
 
-def converted(path):
+def converted(path: Path) -> tuple[MemoryBag, str]:
     """Bag in memory, and the note about it."""
     with pytest.warns(UserWarning, match=Path(path).name) as notes:
         found = as_master_bag(path)
@@ -44,11 +54,11 @@ def converted(path):
     return found, " ".join(str(note.message) for note in notes)
 
 
-def poses_of(found):
+def poses_of(found: Any) -> Series:
     return found.read(MASTER_MEASURED_CP)
 
 
-def test_a_sound_recording_is_taken_as_it_is(tmp_path):
+def test_a_sound_recording_is_taken_as_it_is(tmp_path: Path) -> None:
     path = bag(tmp_path / "bag", pressed=PRESSED)
     opened = Bag(path)
     with warnings.catch_warnings():
@@ -57,19 +67,19 @@ def test_a_sound_recording_is_taken_as_it_is(tmp_path):
         assert type(as_master_bag(path)) is Bag
 
 
-def test_a_recording_in_memory_is_taken_as_it_is(tmp_path):
+def test_a_recording_in_memory_is_taken_as_it_is(tmp_path: Path) -> None:
     found, _ = converted(bag(tmp_path / "bag", stamps=np.zeros(COUNT, np.int64)))
     assert as_master_bag(found) is found
 
 
 @pytest.mark.parametrize("stamp", [0, START_NS])
-def test_stamps_that_never_change_become_log_times(stamp, tmp_path):
+def test_stamps_that_never_change_become_log_times(stamp: int, tmp_path: Path) -> None:
     found, note = converted(bag(tmp_path / "bag", stamps=np.full(COUNT, stamp)))
     assert np.array_equal(poses_of(found).stamp_ns, LOGS)
     assert "time of recording" in note
 
 
-def test_nan_is_left_out_with_a_note(tmp_path):
+def test_nan_is_left_out_with_a_note(tmp_path: Path) -> None:
     poses = POSES.copy()
     poses[[3, 50], 1] = np.nan
     found, note = converted(bag(tmp_path / "bag", poses))
@@ -78,7 +88,7 @@ def test_nan_is_left_out_with_a_note(tmp_path):
     assert "2 with missing numbers left out" in note
 
 
-def test_quaternions_that_are_nearly_unit_are_made_so(tmp_path):
+def test_quaternions_that_are_nearly_unit_are_made_so(tmp_path: Path) -> None:
     poses = POSES.copy()
     poses[:, 3:] *= 1.02
     found, note = converted(bag(tmp_path / "bag", poses))
@@ -86,14 +96,14 @@ def test_quaternions_that_are_nearly_unit_are_made_so(tmp_path):
     assert np.allclose(poses_of(found).values, POSES, rtol=0, atol=1e-15)
 
 
-def test_a_topic_of_another_name_is_the_master(tmp_path):
+def test_a_topic_of_another_name_is_the_master(tmp_path: Path) -> None:
     other = Topic("stylus/pose", Kind.POSE)
     found, note = converted(bag(tmp_path / "bag", topic=other))
     assert np.allclose(poses_of(found).values, POSES, rtol=0, atol=1e-15)
     assert "stylus/pose" in note
 
 
-def test_every_arm_keeps_its_topic_and_stamps(tmp_path):
+def test_every_arm_keeps_its_topic_and_stamps(tmp_path: Path) -> None:
     left = MASTER_MEASURED_CP.of_arm("left")
     rotten = POSES.copy()
     rotten[7, 0] = np.nan
@@ -106,7 +116,7 @@ def test_every_arm_keeps_its_topic_and_stamps(tmp_path):
     assert len(poses_of(found)) == COUNT - 1
 
 
-def test_a_table_is_a_recording_too(tmp_path):
+def test_a_table_is_a_recording_too(tmp_path: Path) -> None:
     names = ["t", "x", "y", "z", "qw", "qx", "qy", "qz"]
     table = pd.DataFrame(np.column_stack((T, POSES)), columns=names)
     table.to_csv(tmp_path / "hand.csv", index=False)
@@ -114,7 +124,7 @@ def test_a_table_is_a_recording_too(tmp_path):
     assert np.allclose(poses_of(found).values, POSES, rtol=0, atol=1e-15)
 
 
-def test_what_cannot_be_read_is_told(tmp_path):
+def test_what_cannot_be_read_is_told(tmp_path: Path) -> None:
     with pytest.raises(tc.RecordingError, match="does not exist"):
         as_master_bag(tmp_path / "nothing")
     both = [Topic(f"{name}/pose", Kind.POSE) for name in "ab"]
@@ -124,7 +134,7 @@ def test_what_cannot_be_read_is_told(tmp_path):
         as_master_bag(tmp_path / "two")
 
 
-def test_replay_takes_a_bag_without_buttons_of_another_name_and_rate(tmp_path):
+def test_replay_takes_a_bag_without_buttons_of_another_name_and_rate(tmp_path: Path) -> None:
     path = bag(tmp_path / "bag", topic=Topic("stylus/pose", Kind.POSE))
     with pytest.warns(UserWarning, match="stylus/pose"):
         again = tc.replay(path)

@@ -1,6 +1,8 @@
 """Master bridge: a device's poses, buttons and forces, against scipy's rotations."""
 
+from collections.abc import Iterator, Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -9,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from present import present
 from teleop_core.base.errors import ParameterError
 from teleop_core.base.parameters import build
 from teleop_core.chain.mapping.parameters import AXES
@@ -18,6 +21,7 @@ from teleop_core.chain.master.master_bridge import (
     MasterBridge,
     MasterBridgeParameters,
 )
+from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot
 
 MASTERS = sorted((Path(__file__).parents[2] / "config" / "masters").glob("*.yaml"))
@@ -26,7 +30,7 @@ TURNED = ("+y", "+z", "+x")
 ROWS = np.array([[0, 1, 0], [0, 0, 1], [1, 0, 0]])  # of TURNED
 
 
-def frames():
+def frames() -> Iterator[tuple[str, str, str]]:
     """All right-handed triples of axes."""
     for x in AXES:
         for y in AXES:
@@ -35,7 +39,7 @@ def frames():
                     yield x, y, z
 
 
-def rows(axes):
+def rows(axes: tuple[str, str, str]) -> Any:
     matrix = np.zeros((3, 3))
     for row, axis in enumerate(axes):
         matrix[row, "xyz".index(axis[1])] = -1.0 if axis[0] == "-" else 1.0
@@ -45,44 +49,45 @@ def rows(axes):
 FRAMES = list(frames())
 
 
-def bridge(**values):
+def bridge(**values: Any) -> MasterBridge:
     return MasterBridge(MasterBridgeParameters(**values))
 
 
-def pose(place=(0.0, 0.0, 0.0), turn=None):
+def pose(place: Any = (0.0, 0.0, 0.0), turn: Rotation | None = None) -> Array:
     turn = Rotation.identity() if turn is None else turn
     return np.array([*place, *turn.as_quat(scalar_first=True)])
 
 
-def said(stage):
+def said(stage: MasterBridge) -> tuple[Array, Rotation]:
     found = np.array(stage.signals["master_measured_cp"])
     return found[:3], Rotation.from_quat(found[3:], scalar_first=True)
 
 
 @given(st.integers(0, 2**32 - 1))
-def test_a_pose_is_seen_in_the_axes_of_the_master_in_metres(seed):
+def test_a_pose_is_seen_in_the_axes_of_the_master_in_metres(seed: int) -> None:
     rng = np.random.default_rng(seed)
     base, stylus = (FRAMES[k] for k in rng.integers(0, 24, 2))
     stage = bridge(device_axes=base, stylus_axes=stylus, unit=0.001)
     place, turn = rng.uniform(-200.0, 200.0, 3), Rotation.random(rng=rng)
     assert stage.hear(pose(place, turn), NOW_NS, NOW_NS)
     at, turned = said(stage)
-    assert np.allclose(at, 1e-3 * rows(base) @ place, rtol=0, atol=1e-15)
-    expected = Rotation.from_matrix(rows(base) @ turn.as_matrix() @ rows(stylus).T)
+    assert np.allclose(at, 1e-3 * present(rows(base)) @ place, rtol=0, atol=1e-15)
+    expected = Rotation.from_matrix(rows(base) @ turn.as_matrix() @ present(rows(stylus)).T)
     assert (turned * expected.inv()).magnitude() < 1e-12
 
 
-def test_a_force_is_given_along_the_axes_of_the_device_and_never_above_its_bound():
+def test_a_force_is_given_along_the_axes_of_the_device_and_never_above_its_bound() -> None:
     stage = bridge(device_axes=TURNED, force_gain=0.5, largest_force=2.0)
     stage.hear(pose(), NOW_NS, NOW_NS)
     for asked in ([1.0, 0.0, 0.0], [0.5, -1.0, 2.0], [30.0, 0.0, -40.0]):
         stage.signals["master_servo_cf"][:3] = asked
+        expected: Any
         given_force, expected = stage.force(0.01, NOW_NS), 0.5 * ROWS.T @ asked
         expected *= min(1.0, 2.0 / np.linalg.norm(expected))
         assert np.allclose(given_force, expected, rtol=0, atol=1e-15)
 
 
-def test_what_the_device_does_and_what_it_feels_make_the_same_work_in_both_frames():
+def test_what_the_device_does_and_what_it_feels_make_the_same_work_in_both_frames() -> None:
     rng = np.random.default_rng(2)
     stage = bridge(device_axes=TURNED, unit=0.01)
     for k in range(20):
@@ -94,7 +99,7 @@ def test_what_the_device_does_and_what_it_feels_make_the_same_work_in_both_frame
 
 
 @pytest.mark.parametrize("late", ["force", "device", "never", "nan"])
-def test_a_device_is_given_no_force_where_either_side_is_silent(late):
+def test_a_device_is_given_no_force_where_either_side_is_silent(late: str) -> None:
     stage = bridge(force_timeout=0.1)
     if late != "never":
         stage.hear(pose(), NOW_NS, NOW_NS)
@@ -114,8 +119,8 @@ WRONG = {
 
 @pytest.mark.parametrize(("given_pose", "off_ns", "reason"), WRONG.values(), ids=WRONG)
 def test_a_pose_that_is_none_is_refused_counted_and_told_and_a_sound_one_ends_that(
-    given_pose, off_ns, reason
-):
+    given_pose: Array, off_ns: int, reason: str
+) -> None:
     stage = bridge()
     assert stage.hear(pose((0.1, 0.0, 0.0)), NOW_NS - 10_000_000, NOW_NS)
     before = stage.signals["master_measured_cp"].copy()
@@ -127,7 +132,7 @@ def test_a_pose_that_is_none_is_refused_counted_and_told_and_a_sound_one_ends_th
     assert not stage.concerns()
 
 
-def test_buttons_are_taken_from_where_they_are_and_missing_ones_are_released():
+def test_buttons_are_taken_from_where_they_are_and_missing_ones_are_released() -> None:
     stage = bridge(button_places=(2, -1, 0))
     assert stage.press([1, 1, 0])
     assert stage.signals["master_buttons"].tolist() == [0.0, 0.0, 1.0]
@@ -137,7 +142,7 @@ def test_buttons_are_taken_from_where_they_are_and_missing_ones_are_released():
     assert stage.refused == {"buttons": 1}
 
 
-def test_a_jointed_device_is_where_the_forward_kinematics_of_its_robot_says():
+def test_a_jointed_device_is_where_the_forward_kinematics_of_its_robot_says() -> None:
     robot = load_robot("scara")
     stage = bridge(
         pose_message=POSE_MESSAGES[-1], handle="scara", device_axes=TURNED,
@@ -164,7 +169,7 @@ def test_a_jointed_device_is_where_the_forward_kinematics_of_its_robot_says():
         ({"handle": "scara"}, "handle"),
     ],
 )
-def test_what_no_device_can_be_is_refused_by_its_name(values, name):
+def test_what_no_device_can_be_is_refused_by_its_name(values: Mapping[str, Any], name: str) -> None:
     with pytest.raises(ParameterError) as caught:
         MasterBridgeParameters(**values)
     assert caught.value.name == f"master_bridge.{name}"
@@ -174,22 +179,26 @@ def test_what_no_device_can_be_is_refused_by_its_name(values, name):
 
 
 @pytest.mark.parametrize("axes", FRAMES, ids="".join)
-def test_axes_and_unit_come_out_of_three_motions_that_are_not_quite_straight(axes):
+def test_axes_and_unit_come_out_of_three_motions_that_are_not_quite_straight(
+    axes: Any,
+) -> None:
     rng = np.random.default_rng(len(axes))
     for unit in UNITS:
-        ways = rows(axes) * 0.1 / unit  # of the device, for a way along x, y and z of the master
+        ways = (
+            present(rows(axes)) * 0.1 / unit
+        )  # of the device, for a way along x, y and z of the master
         ways = ways * rng.uniform(0.6, 1.5, (3, 1)) + rng.uniform(-0.02, 0.02, (3, 3)) / unit
         found = device_axes(ways)
         assert (found.axes, found.unit) == (axes, unit)
 
 
 @pytest.mark.parametrize("way", [(0.0, 0.0, 0.0), (0.1, 0.1, 0.0), (0.1, 0.07, 0.0)])
-def test_a_motion_that_is_no_straight_one_is_refused(way):
+def test_a_motion_that_is_no_straight_one_is_refused(way: tuple[float, float, float]) -> None:
     with pytest.raises(ParameterError, match="straighter"):
         axis_of(way)
 
 
-def test_two_motions_along_one_axis_and_left_handed_frames_are_refused():
+def test_two_motions_along_one_axis_and_left_handed_frames_are_refused() -> None:
     with pytest.raises(ParameterError, match="three motions along three axes"):
         device_axes([(0.1, 0.0, 0.0), (-0.1, 0.0, 0.0), (0.0, 0.0, 0.1)])
     with pytest.raises(ParameterError, match="right-handed"):
@@ -197,7 +206,7 @@ def test_two_motions_along_one_axis_and_left_handed_frames_are_refused():
 
 
 @pytest.mark.parametrize("file", MASTERS, ids=lambda path: path.stem)
-def test_the_configuration_of_each_device_has_parameters_that_exist(file):
+def test_the_configuration_of_each_device_has_parameters_that_exist(file: Path) -> None:
     groups = {k: v["ros__parameters"] for k, v in yaml.safe_load(file.read_text()).items()}
     made = build(MasterBridgeParameters, groups["master_bridge"])
     assert made.pose_topic

@@ -2,26 +2,31 @@
 
 import subprocess
 import sys
+from collections.abc import Callable, Iterator
 from itertools import repeat
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import coal
 import numpy as np
 import pytest
 import trimesh
+from trimesh import Trimesh
 
 import teleop_core as tc
 from led_tip import lead
+from present import present
 from teleop_core.bags import kept_files
 from teleop_core.base.errors import ParameterError, TeleopError
 from teleop_core.console.world_nodes import object_outline
+from teleop_core.kernels.geometry import Array
 from teleop_core.kernels.progress import in_work, told
 from teleop_core.kernels.store import prune, user_cache
 from teleop_core.robots import load_robot
 from teleop_core.session.configuration import configure
 from teleop_core.session.virtual import VirtualTime
 from teleop_core.slave.world import WORLD_OBJECTS, distance_grid
+from teleop_core.slave.world.distance_grid import DistanceGrid, GridRequest
 from teleop_core.slave.world.mesh import MeshParameters
 from teleop_core.slave.world.triangles import read_triangles, tree_of, write_distances
 
@@ -43,7 +48,7 @@ BOUNDS = {
 AWAY = 6e-3  # from the edges of the box, and from its ridges within [m]
 
 
-def solid(name):
+def solid(name: str) -> Trimesh:
     """Mesh of the shape of that name in the world, about its middle, in mm."""
     if name == "box":
         return trimesh.creation.box(BOX)
@@ -53,7 +58,7 @@ def solid(name):
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory):
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     """Meshes of the shapes in the world, and a cache of its own."""
     made = tmp_path_factory.mktemp("meshes")
     for name in BOUNDS:
@@ -64,13 +69,13 @@ def folder(tmp_path_factory):
         yield made
 
 
-def parameters(folder, name, **more):
+def parameters(folder: Path, name: str, **more: Any) -> MeshParameters:
     """Parameters of a mesh; that of a capsule is turned from z to y, as the world's lies."""
     angles = (0.5 * np.pi, 0.0, 0.0) if name == "capsule" else (0.0, 0.0, 0.0)
     return MeshParameters(**{"file": str(folder / f"{name}.stl"), "angles": angles} | more)
 
 
-def found(name, group, places):
+def found(name: str, group: object, places: Array) -> tuple[Array, Array]:
     """Distances (N,) and normals (N, 3) of an object at places (N, 3)."""
     part, normals = WORLD_OBJECTS.find(name), np.zeros((len(places), 3))
     shape = part.numbers(group)
@@ -79,7 +84,9 @@ def found(name, group, places):
 
 
 @pytest.mark.parametrize("name", BOUNDS)
-def test_a_fine_mesh_has_distance_and_normal_of_its_shape_within_the_bounds(name, folder):
+def test_a_fine_mesh_has_distance_and_normal_of_its_shape_within_the_bounds(
+    name: str, folder: Path
+) -> None:
     places = np.random.default_rng(1).uniform(-0.045, 0.045, (40_000, 3))
     wanted, outward = found(name, WORLD_OBJECTS.find(name).parameters(), places)
     is_compared = np.abs(wanted) < 3e-3
@@ -96,7 +103,7 @@ def test_a_fine_mesh_has_distance_and_normal_of_its_shape_within_the_bounds(name
 
 
 @pytest.mark.parametrize("name", BOUNDS)
-def test_inside_is_negative_and_outside_positive_everywhere(name, folder):
+def test_inside_is_negative_and_outside_positive_everywhere(name: str, folder: Path) -> None:
     """Also far beyond the grid."""
     places = np.random.default_rng(2).uniform(-1.0, 1.0, (4000, 3)) * 0.05
     places[:400] *= 20.0
@@ -109,7 +116,7 @@ def test_inside_is_negative_and_outside_positive_everywhere(name, folder):
     assert ((normal * outward).sum(axis=1) > 0.9)[is_far].all()
 
 
-def test_distances_at_the_nodes_are_those_of_a_library_of_others_with_the_right_sign():
+def test_distances_at_the_nodes_are_those_of_a_library_of_others_with_the_right_sign() -> None:
     """A ring, whose hole is outside, and a star of thin spikes, at whose tips many sides meet."""
     star = trimesh.creation.box((4.0, 4.0, 4.0)).subdivide().subdivide()
     star.vertices *= np.random.default_rng(3).uniform(2.0, 6.0, (len(star.vertices), 1))
@@ -141,7 +148,7 @@ def test_distances_at_the_nodes_are_those_of_a_library_of_others_with_the_right_
         assert min(solid_angles) < 1.0 < max(solid_angles)
 
 
-def loop(rng, middle):
+def loop(rng: np.random.Generator, middle: tuple[float, float, float]) -> Array:
     """A closed way (N, 3) [m] of a second to four, slow and fast, through an object's top."""
     share = np.linspace(0.0, 1.0, int(rng.integers(1000, 4000)))
     way = np.zeros((len(share), 3))
@@ -153,7 +160,9 @@ def loop(rng, middle):
 
 @pytest.mark.parametrize("friction", [0.0, 0.6])
 @pytest.mark.parametrize("name", ["box", "sphere"])
-def test_no_motion_gains_energy_from_a_mesh_whatever_edge_it_crosses(name, friction, folder):
+def test_no_motion_gains_energy_from_a_mesh_whatever_edge_it_crosses(
+    name: str, friction: float, folder: Path
+) -> None:
     """Tips that are led around closed ways, so fast and deep that they cross all its ridges."""
     rng, group = np.random.default_rng(5), parameters(folder, name)
     shares = []
@@ -170,7 +179,7 @@ def test_no_motion_gains_energy_from_a_mesh_whatever_edge_it_crosses(name, frict
     assert min(shares) > (0.0 if friction else -1e-3)
 
 
-def test_a_sliding_tip_feels_the_friction_of_the_analytic_shape(folder):
+def test_a_sliding_tip_feels_the_friction_of_the_analytic_shape(folder: Path) -> None:
     times = np.arange(4000) * 1e-3
     tilt, turn = 0.4 * np.sin(3.0 * times) + 1.0, 1.9 * times
     depth = 0.5e-3
@@ -185,7 +194,7 @@ def test_a_sliding_tip_feels_the_friction_of_the_analytic_shape(folder):
     assert np.linalg.norm(force - wanted, axis=1).max() < 0.015 * pushed
 
 
-def test_a_session_presses_a_mesh_of_a_block_as_it_does_the_block(folder):
+def test_a_session_presses_a_mesh_of_a_block_as_it_does_the_block(folder: Path) -> None:
     settings = ["world=mesh", f"world.mesh.file={folder / 'box.stl'}"]
     box, mesh = (VirtualTime(configure("palpation", settings=s)) for s in ([], settings))
     field = "slave_true_cf"
@@ -194,16 +203,16 @@ def test_a_session_presses_a_mesh_of_a_block_as_it_does_the_block(folder):
     assert np.abs(force - wanted).max() < 0.005
 
 
-def without(mesh, face):
+def without(mesh: Trimesh, face: int) -> Trimesh:
     mesh.update_faces(np.arange(len(mesh.faces)) != face)
     return mesh
 
 
-def flat():
+def flat() -> Trimesh:
     return trimesh.creation.box((20.0, 20.0, 1e-6))
 
 
-def turned():
+def turned() -> Trimesh:
     mesh = solid("box")
     mesh.faces[0] = mesh.faces[0][::-1]
     return mesh
@@ -221,7 +230,9 @@ def turned():
         (flat, "world.mesh.file", "encloses a volume"),
     ],
 )
-def test_a_mesh_that_encloses_nothing_is_refused_in_one_line(make, name, requirement, tmp_path):
+def test_a_mesh_that_encloses_nothing_is_refused_in_one_line(
+    make: Callable[..., Any], name: str, requirement: str, tmp_path: Path
+) -> None:
     make().export(tmp_path / "bad.obj")
     with pytest.raises(ParameterError, match=requirement) as caught:
         pressed(tmp_path / "bad.obj")
@@ -229,13 +240,13 @@ def test_a_mesh_that_encloses_nothing_is_refused_in_one_line(make, name, require
     assert "\n" not in str(caught.value)
 
 
-def pressed(file, *settings):
+def pressed(file: Path, *settings: str) -> VirtualTime:
     """Session that presses a mesh."""
     texts = ["world=mesh", f"world.mesh.file={file}", *settings]
     return VirtualTime(configure("palpation", settings=texts))
 
 
-def test_a_hole_is_told_by_the_middle_of_an_edge_along_it(tmp_path):
+def test_a_hole_is_told_by_the_middle_of_an_edge_along_it(tmp_path: Path) -> None:
     mesh = solid("box")
     corners = mesh.vertices[mesh.faces[3]]
     without(mesh, 3).export(tmp_path / "hole.stl")
@@ -247,7 +258,7 @@ def test_a_hole_is_told_by_the_middle_of_an_edge_along_it(tmp_path):
     assert np.linalg.norm(middles - place, axis=1).min() < 1e-3
 
 
-def test_a_mesh_that_is_inside_out_is_turned(folder, tmp_path):
+def test_a_mesh_that_is_inside_out_is_turned(folder: Path, tmp_path: Path) -> None:
     mesh = solid("box")
     mesh.invert()
     mesh.export(tmp_path / "inverted.stl")
@@ -259,14 +270,14 @@ def test_a_mesh_that_is_inside_out_is_turned(folder, tmp_path):
 
 @pytest.mark.parametrize("text", ["", "solid", "v 0 0 nothing\nf 1 1 1\n", "\x00" * 90])
 @pytest.mark.parametrize("ending", ["stl", "obj", "txt", "zip"])
-def test_what_is_no_mesh_is_refused_in_one_line(text, ending, tmp_path):
+def test_what_is_no_mesh_is_refused_in_one_line(text: str, ending: str, tmp_path: Path) -> None:
     file = tmp_path / f"none.{ending}"
     file.write_text(text)
     with pytest.raises(ParameterError, match=r"world\.mesh\.file is .*must be a mesh"):
         pressed(file)
 
 
-def test_a_mesh_that_does_not_fit_is_refused_with_what_would(folder):
+def test_a_mesh_that_does_not_fit_is_refused_with_what_would(folder: Path) -> None:
     file = folder / "box.stl"
     for settings, name, requirement in (
         (["world.mesh.scale=1.0"], "world.mesh.scale", "now 60 m long"),
@@ -286,12 +297,14 @@ def test_a_mesh_that_does_not_fit_is_refused_with_what_would(folder):
         pressed(file, f"world.place={place.tolist()}")
 
 
-def test_a_grid_is_made_once_and_kept_by_what_the_file_says(folder, tmp_path, monkeypatch):
+def test_a_grid_is_made_once_and_kept_by_what_the_file_says(
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     made, heard = [], []
     make = distance_grid._make
 
-    def counted(request):
+    def counted(request: GridRequest) -> DistanceGrid:
         made.append(request.step)
         return make(request)
 
@@ -308,21 +321,23 @@ def test_a_grid_is_made_once_and_kept_by_what_the_file_says(folder, tmp_path, mo
     assert len(made) == 2
     np.testing.assert_array_equal(heard[0], heard[2])
     assert len(heard[0]) != len(heard[3])
-    kept = list(user_cache("grids").iterdir())
+    kept = list(present(user_cache("grids")).iterdir())
     assert sorted(path.suffix for path in kept) == [".npz", ".npz"]
     kept[0].write_bytes(kept[0].read_bytes()[:1000])  # damaged: made again
     distance_grid._found.cache_clear()
     distance_grid.distance_grid(distance_grid.GridRequest(str(file), 1e-3, (0.0, 0.0, 0.0), 2e-3))
     assert prune(days=-1.0) >= 2
-    assert not list(user_cache("grids").iterdir())
+    assert not list(present(user_cache("grids")).iterdir())
     distance_grid._found.cache_clear()
 
 
-def test_who_waits_is_told_that_a_grid_is_made_and_how_far_it_is(folder, tmp_path, monkeypatch):
+def test_who_waits_is_told_that_a_grid_is_made_and_how_far_it_is(
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     seen = []
 
-    def watched(*arguments):
+    def watched(*arguments: Any) -> None:
         seen.append(in_work())
         write_distances(*arguments)
 
@@ -338,7 +353,7 @@ def test_who_waits_is_told_that_a_grid_is_made_and_how_far_it_is(folder, tmp_pat
     assert in_work() == ""
 
 
-def test_a_session_without_a_mesh_loads_no_reader_and_compiles_no_grid():
+def test_a_session_without_a_mesh_loads_no_reader_and_compiles_no_grid() -> None:
     code = (
         "import sys\n"
         "from teleop_core.session.configuration import configure\n"
@@ -351,25 +366,27 @@ def test_a_session_without_a_mesh_loads_no_reader_and_compiles_no_grid():
     subprocess.run([sys.executable, "-c", code], check=True, timeout=120)
 
 
-def gone(path):
+def gone(path: Path) -> None:
     path.unlink()
 
 
-def another(path):
+def another(path: Path) -> None:
     trimesh.creation.box((50.0, 50.0, 31.0)).export(path)
 
 
 @pytest.mark.parametrize("becomes", [gone, another])
-def test_a_recording_replays_to_the_bit_whatever_became_of_its_mesh(becomes, folder, tmp_path):
+def test_a_recording_replays_to_the_bit_whatever_became_of_its_mesh(
+    becomes: Callable[[Path], None], folder: Path, tmp_path: Path
+) -> None:
     recording, path = recorded(folder, tmp_path)
     before = recording["slave/true_cf"].values
     assert np.abs(before).max() > 0.1
     becomes(path)
-    again = tc.replay(recording.path)
+    again = tc.replay(present(recording.path))
     np.testing.assert_array_equal(again["slave/true_cf"].values, before)
 
 
-def recorded(folder, where):
+def recorded(folder: Path, where: Path) -> tuple[tc.Recording, Path]:
     """Recording of a session that presses a mesh, and that mesh."""
     path = where / "block.stl"
     path.write_bytes((folder / "box.stl").read_bytes())
@@ -379,8 +396,12 @@ def recorded(folder, where):
 
 @pytest.mark.parametrize(("becomes", "said"), [(gone, "is gone"), (another, "is another by now")])
 def test_a_mesh_too_large_to_keep_is_told_when_it_is_not_that_of_the_recording(
-    becomes, said, folder, tmp_path, monkeypatch
-):
+    becomes: Callable[[Path], None],
+    said: str,
+    folder: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     monkeypatch.setattr(kept_files, "_MOST", 10)
     with pytest.warns(UserWarning, match="only digests of block.stl"):
         recording, path = recorded(folder, tmp_path)
@@ -390,7 +411,7 @@ def test_a_mesh_too_large_to_keep_is_told_when_it_is_not_that_of_the_recording(
         assert kept_files.recorded_files(recording.metadata) == {}
 
 
-def test_the_page_draws_the_edges_and_sections_of_a_mesh_where_it_lies(folder):
+def test_the_page_draws_the_edges_and_sections_of_a_mesh_where_it_lies(folder: Path) -> None:
     robot, place = load_robot("rcrt1"), np.array((0.2, -0.2, -0.1))
     drawn = object_outline(
         {"kind": "mesh", "mesh.file": str(folder / "box.stl"), "place": tuple(place.tolist())},

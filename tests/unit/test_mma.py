@@ -1,33 +1,36 @@
 """MMA as a robot: Jacobian, rank, reach, torques for the hand, refusals."""
 
 import math
+from collections.abc import Mapping
 
 import numpy as np
 import pytest
 
 from teleop_core.base.errors import ParameterError, ShapeError, UnknownNameError
+from teleop_core.kernels.geometry import Array
 from teleop_core.robots import list_robots, load_robot
 from teleop_core.robots.mma import holding_torques
+from teleop_core.robots.robot import Robot
 
 MM = 1e-3
 
 
 @pytest.fixture(scope="module")
-def mma():
+def mma() -> Robot:
     return load_robot("mma")
 
 
-def random_readings(count, seed=0):
+def random_readings(count: int, seed: int = 0) -> Array:
     return np.random.default_rng(seed).uniform(-math.pi, math.pi, (count, 7))
 
 
-def test_mma_is_listed_with_seven_joints_and_one_turn_about_home(mma):
+def test_mma_is_listed_with_seven_joints_and_one_turn_about_home(mma: Robot) -> None:
     assert "mma" in list_robots()
     assert mma.n == 7
     assert np.allclose(mma.upper - mma.lower, 2.0 * math.pi, rtol=0, atol=1e-15)
 
 
-def test_jacobian_at_home_is_the_published_one(mma):
+def test_jacobian_at_home_is_the_published_one(mma: Robot) -> None:
     serial = [
         [71.27, 344.31, 156.85, 156.85, 51.16, 63.79, 0.0],
         [3.63, 0.0, 0.0, 0.0, -157.13, 0.0, -63.79],
@@ -42,7 +45,7 @@ def test_jacobian_at_home_is_the_published_one(mma):
     assert np.abs(mma.jacobian(mma.home) - wanted).max() < 1e-9
 
 
-def test_jacobian_is_the_finite_difference_of_the_pose(mma):
+def test_jacobian_is_the_finite_difference_of_the_pose(mma: Robot) -> None:
     step = 1e-6  # truncation 1e-12, rounding 1e-10
     for q in random_readings(50):
         pose, J = mma.fk(q), mma.jacobian(q)
@@ -55,31 +58,33 @@ def test_jacobian_is_the_finite_difference_of_the_pose(mma):
             assert np.abs(J[:, i] - (*rate[:3, 3], *spin)).max() < 1e-8
 
 
-def test_rank_falls_to_five_at_the_wrist_whatever_the_arm_does(mma):
+def test_rank_falls_to_five_at_the_wrist_whatever_the_arm_does(mma: Robot) -> None:
     for q in random_readings(20):
         q[4], q[5] = 0.5 * math.pi, -0.5 * math.pi
         assert np.linalg.svd(mma.jacobian(q), compute_uv=False)[-1] < 1e-12
 
 
-def test_stretched_elbow_alone_is_not_singular(mma):
+def test_stretched_elbow_alone_is_not_singular(mma: Robot) -> None:
     q = np.array([0.3, -1.2, 0.5, 0.0, 0.6, 0.7, 0.1])
     assert np.linalg.svd(mma.jacobian(q), compute_uv=False)[-1] > 1e-3
 
 
-def test_no_reading_takes_the_tool_out_of_the_published_reach(mma):
+def test_no_reading_takes_the_tool_out_of_the_published_reach(mma: Robot) -> None:
     poses = mma.fk(random_readings(20000))
     distance = np.linalg.norm(poses[:, :3, 3] - [0.0, 0.0, mma.geometry["d1"]], axis=1)
     assert distance.max() < 624.13 * MM
 
 
-def test_batches_agree_with_single_poses(mma):
+def test_batches_agree_with_single_poses(mma: Robot) -> None:
     readings = random_readings(5)
     batch = mma.fk(readings)
     for pose, q in zip(batch, readings, strict=True):
         assert np.array_equal(pose, mma.fk(q))
 
 
-def test_tool_force_is_held_by_the_transposed_jacobian_and_the_shoulder_residual(mma):
+def test_tool_force_is_held_by_the_transposed_jacobian_and_the_shoulder_residual(
+    mma: Robot,
+) -> None:
     q, wrench = mma.home + 0.1, np.array([1.0, -2.0, 3.0, 0.1, 0.2, -0.3])
     idle = holding_torques(mma, q, np.zeros(6))
     assert np.count_nonzero(idle) == 1
@@ -89,7 +94,7 @@ def test_tool_force_is_held_by_the_transposed_jacobian_and_the_shoulder_residual
     assert math.isclose(torques @ speeds, wrench @ (mma.jacobian(q) @ speeds), rel_tol=1e-12)
 
 
-def test_shoulder_torque_lifts_against_gravity(mma):
+def test_shoulder_torque_lifts_against_gravity(mma: Robot) -> None:
     level = mma.home.copy()
     level[1] = 0.0
     # Residual of the published spring in the worst pose, 1.011 N·m, towards smaller θ2.
@@ -105,12 +110,14 @@ def test_shoulder_torque_lifts_against_gravity(mma):
         ({"d1": math.nan}, ParameterError),
     ],
 )
-def test_impossible_geometry_is_refused(options, error):
+def test_impossible_geometry_is_refused(
+    options: Mapping[str, str | float], error: type[ParameterError]
+) -> None:
     with pytest.raises(error):
         load_robot("mma", **options)
 
 
-def test_bad_vectors_are_refused(mma):
+def test_bad_vectors_are_refused(mma: Robot) -> None:
     with pytest.raises(ShapeError):
         holding_torques(mma, np.zeros(6), np.zeros(6))
     with pytest.raises(ParameterError):

@@ -1,6 +1,7 @@
 """MMA shoulder balance: published torques and spring, and the load it leaves (H14-H19)."""
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -24,23 +25,23 @@ TENTH_OF_MILLINEWTON_METRE, TENTH_OF_MICROMETRE = 0.5e-4, 0.5e-7
 AT_45_DEGREES, LEVEL = math.radians(135.0), math.radians(90.0)
 
 
-def total():
+def total() -> float:
     return sum(MASSES.values())
 
 
-def test_masses_add_up_to_less_than_the_printed_total():  # H14
+def test_masses_add_up_to_less_than_the_printed_total() -> None:  # H14
     assert math.isclose(total(), 0.30736, abs_tol=1e-12)
     assert abs(total() - 0.31036) > 2.9e-3
 
 
-def test_gravity_torques_of_both_poses_are_the_published_ones():  # H15
+def test_gravity_torques_of_both_poses_are_the_published_ones() -> None:  # H15
     # 1.03497 is printed cut, 1.0349.
     first, second = gravity_torque(total(), ARM_AT_45_DEGREES), gravity_torque(total(), ARM_LEVEL)
     assert math.isclose(first, 1.03497, abs_tol=1e-5)
     assert math.isclose(second, 1.1926, abs_tol=TENTH_OF_MILLINEWTON_METRE)
 
 
-def test_spring_triangle_is_the_published_one():  # H16
+def test_spring_triangle_is_the_published_one() -> None:  # H16
     spring = ShoulderSpring()
     for value, printed in (
         (spring.length(AT_45_DEGREES), 51.7373e-3),
@@ -53,14 +54,14 @@ def test_spring_triangle_is_the_published_one():  # H16
     assert math.isclose(deflection, 12.139e-3, abs_tol=0.5e-6)
 
 
-def test_rate_from_the_printed_rounded_inputs_is_the_printed_one():  # H17
+def test_rate_from_the_printed_rounded_inputs_is_the_printed_one() -> None:  # H17
     rate = matching_rate(0.1577, 12.1392e-3, 19.7989e-3)
     # Seven digits printed from inputs of four to six; 0.01 N/m covers their rounding.
     assert math.isclose(rate, 656.146, abs_tol=0.01)
     assert math.isclose(1.15 * rate, 754.57, abs_tol=0.01)
 
 
-def test_rate_from_unrounded_inputs():  # H17
+def test_rate_from_unrounded_inputs() -> None:  # H17
     spring = ShoulderSpring()
     difference = gravity_torque(total(), ARM_LEVEL) - gravity_torque(total(), ARM_AT_45_DEGREES)
     deflection = spring.length(AT_45_DEGREES) - spring.length(LEVEL)
@@ -69,7 +70,7 @@ def test_rate_from_unrounded_inputs():  # H17
     assert math.isclose(1.15 * rate, 754.34, abs_tol=0.005)
 
 
-def test_coil_has_the_published_dimensions():  # H18
+def test_coil_has_the_published_dimensions() -> None:  # H18
     wound = coil()
     assert wound.turns == 13
     # The source cuts 3.695 to 3.69.
@@ -80,13 +81,13 @@ def test_coil_has_the_published_dimensions():  # H18
 
 
 @pytest.mark.parametrize(("modulus", "turns"), [(40.9e9, 13), (44.2e9, 13), (79.3e9, 24)])
-def test_thirteen_turns_ask_for_a_soft_wire(modulus, turns):
+def test_thirteen_turns_ask_for_a_soft_wire(modulus: float, turns: int) -> None:
     # 40.9 and 44.2 GPa are the rounded edges of 12.5 and 13.5 turns.
     assert abs(coil(shear_modulus=modulus).turns - turns) <= (0 if turns == 24 else 1)
     assert coil(shear_modulus=42.5e9).turns == 13
 
 
-def test_published_spring_leaves_most_of_the_load_in_both_poses():
+def test_published_spring_leaves_most_of_the_load_in_both_poses() -> None:
     load = shoulder_load(np.radians([-45.0, 0.0]))
     assert np.allclose(load.gravity, [1.03497, 1.1926], rtol=0, atol=TENTH_OF_MILLINEWTON_METRE)
     # 0.181 and 1.011 N·m in the notes to the source; its free length is cut to 51.73 mm.
@@ -94,14 +95,14 @@ def test_published_spring_leaves_most_of_the_load_in_both_poses():
     assert np.allclose(load.residual, [1.035, 1.011], rtol=0, atol=5e-4)
 
 
-def test_spring_that_balances_the_worst_pose_is_far_stiffer():
+def test_spring_that_balances_the_worst_pose_is_far_stiffer() -> None:
     rate = matching_rate(1.1926, 12.1392e-3, 19.7989e-3)
     assert math.isclose(rate, 4962.0, abs_tol=0.5)
     spring = ShoulderSpring(rate=rate, free_length=51.7373e-3)
     assert abs(shoulder_load(0.0, spring).residual) < 1e-4
 
 
-def test_spring_never_pulls():
+def test_spring_never_pulls() -> None:
     openings = np.linspace(0.0, math.pi, 50)
     torques = ShoulderSpring().torque(openings)
     assert (torques >= 0.0).all()
@@ -110,7 +111,7 @@ def test_spring_never_pulls():
 
 
 @pytest.mark.parametrize(("moment", "rate"), [(0.3, 100.0), (1.2, 656.0), (5.0, 20.0)])
-def test_cam_pulley_balances_the_link_everywhere(moment, rate):  # H19
+def test_cam_pulley_balances_the_link_everywhere(moment: float, rate: float) -> None:  # H19
     theta = np.linspace(0.05, math.pi - 0.05, 50)
     radius = cam_pulley_radius(theta, moment, rate)
     slope = 0.5 * math.sqrt(moment / rate) * np.cos(0.5 * theta)
@@ -121,7 +122,7 @@ def test_cam_pulley_balances_the_link_everywhere(moment, rate):  # H19
     assert np.allclose(tension * radius, moment * np.sin(theta), rtol=1e-12)
 
 
-def test_cam_profile_is_the_envelope_of_the_cable():  # H19
+def test_cam_profile_is_the_envelope_of_the_cable() -> None:  # H19
     theta = np.linspace(0.05, math.pi - 0.05, 50)
     distance, angle = cam_profile(theta, 1.2, 656.0)
     radius, step = cam_pulley_radius(theta, 1.2, 656.0), 1e-6
@@ -146,7 +147,7 @@ def test_cam_profile_is_the_envelope_of_the_cable():  # H19
         (lambda: cam_profile(1.0, 1.0, 0.0), "rate"),
     ],
 )
-def test_impossible_springs_are_refused(call, name):
+def test_impossible_springs_are_refused(call: Callable[..., object], name: str) -> None:
     with pytest.raises(ParameterError) as caught:
         call()
     assert caught.value.name == name

@@ -1,16 +1,19 @@
 """Inverse kinematics of the MMA: every branch, nearest solution, paths through singularities."""
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
 
+from present import present
 from teleop_core.base.errors import ParameterError
-from teleop_core.kernels.geometry import rotation, transform
+from teleop_core.kernels.geometry import Array, rotation, transform
 from teleop_core.robots import IkStatus, load_robot
 from teleop_core.robots.damped import is_near_singular, pose_error
-from teleop_core.robots.kinematics import REACHED
+from teleop_core.robots.kinematics import REACHED, IkResult
 from teleop_core.robots.mma_branches import branch, unwrapped
+from teleop_core.robots.robot import Robot
 
 DT = 0.001
 SOLVED = {IkStatus.FOLLOWED, IkStatus.NEAR_SINGULAR}
@@ -19,15 +22,15 @@ EXACT = 1e-12
 
 
 @pytest.fixture(scope="module")
-def mma():
+def mma() -> Any:
     return load_robot("mma")
 
 
-def readings(robot, count, seed=0):
+def readings(robot: Robot, count: int, seed: int = 0) -> Array:
     return np.random.default_rng(seed).uniform(robot.lower, robot.upper, (count, robot.n))
 
 
-def all_branches(robot, T, seed, degrees):
+def all_branches(robot: Robot, T: Array, seed: Array, degrees: float) -> Array:
     """Solutions inside the limits on a grid of θ10, by the closed form."""
     found, q = [], np.empty(7)
     for turn in np.radians(np.arange(-180.0, 180.0, degrees)):
@@ -39,25 +42,25 @@ def all_branches(robot, T, seed, degrees):
     return np.array(found)
 
 
-def joint_path(robot, start, end, samples=2000):
+def joint_path(robot: Robot, start: Array, end: Array, samples: int = 2000) -> tuple[Array, Array]:
     """Poses of a smooth joint path between two vectors [degrees], and its start [rad]."""
     start, end = np.radians(start), np.radians(end)
     share = 0.5 - 0.5 * np.cos(np.linspace(0.0, math.pi, samples))
     return robot.fk(start + share[:, None] * (end - start)), start
 
 
-def assert_path_is_safe(robot, seed, result):
+def assert_path_is_safe(robot: Robot, seed: Array, result: IkResult[Any]) -> None:
     """Joint speeds inside the drives' limits, joints inside theirs, all finite."""
     steps = np.abs(np.diff(np.vstack((seed, result.q)), axis=0))
-    assert (steps <= robot.drives.speed_limit * DT + 1e-15).all()
+    assert (steps <= present(robot.drives).speed_limit * DT + 1e-15).all()
     assert (result.q >= robot.lower).all()
     assert (result.q <= robot.upper).all()
 
 
 @pytest.mark.parametrize("model", ["A", "C"])
-def test_every_reachable_pose_is_solved_from_home(model):
+def test_every_reachable_pose_is_solved_from_home(model: str) -> None:
     robot = load_robot("mma", model=model)
-    result = robot.ik(robot.fk(readings(robot, 500)))
+    result: Any = robot.ik(robot.fk(readings(robot, 500)))
     assert set(result.status) <= SOLVED
     assert result.residual.max() <= REACHED
     assert (result.q >= robot.lower).all()
@@ -65,7 +68,7 @@ def test_every_reachable_pose_is_solved_from_home(model):
 
 
 @pytest.mark.parametrize("degrees", [0.5, 20.0])
-def test_seed_near_a_solution_gives_a_solution_at_least_as_near(mma, degrees):
+def test_seed_near_a_solution_gives_a_solution_at_least_as_near(mma: Any, degrees: float) -> None:
     q = readings(mma, 300, seed=1) * 0.7
     seeds = q + np.radians(np.random.default_rng(2).uniform(-degrees, degrees, q.shape))
     result = mma.ik(mma.fk(q), seeds)
@@ -76,7 +79,9 @@ def test_seed_near_a_solution_gives_a_solution_at_least_as_near(mma, degrees):
     assert (moves <= math.sqrt(7.0) * math.radians(degrees)).all()
 
 
-def test_solution_is_as_near_to_the_seed_as_the_best_of_a_fine_scan_of_all_branches(mma):
+def test_solution_is_as_near_to_the_seed_as_the_best_of_a_fine_scan_of_all_branches(
+    mma: Robot,
+) -> None:
     q, seeds = readings(mma, 30, seed=3), readings(mma, 30, seed=4)
     worse = []
     for T, seed in zip(mma.fk(q), seeds, strict=True):
@@ -87,12 +92,12 @@ def test_solution_is_as_near_to_the_seed_as_the_best_of_a_fine_scan_of_all_branc
     assert max(worse) < math.radians(10.0)
 
 
-def test_seed_that_already_reaches_the_pose_is_kept(mma):
+def test_seed_that_already_reaches_the_pose_is_kept(mma: Robot) -> None:
     for q in readings(mma, 50, seed=5):
         assert np.abs(mma.ik(mma.fk(q), q).q - q).max() < EXACT
 
 
-def test_closed_form_reaches_the_pose_on_all_eight_branches_for_any_turn(mma):
+def test_closed_form_reaches_the_pose_on_all_eight_branches_for_any_turn(mma: Robot) -> None:
     q, seen = np.empty(7), set()
     for n, true in enumerate(readings(mma, 300, seed=6)):
         T = mma.fk(true)
@@ -104,7 +109,7 @@ def test_closed_form_reaches_the_pose_on_all_eight_branches_for_any_turn(mma):
     assert seen == set(range(8))
 
 
-def test_one_of_the_closed_form_branches_is_the_joint_vector_that_made_the_pose(mma):
+def test_one_of_the_closed_form_branches_is_the_joint_vector_that_made_the_pose(mma: Robot) -> None:
     q, free = np.empty(7), np.array([[-np.inf] * 7, [np.inf] * 7])
     for true in readings(mma, 100, seed=7):
         T, nearest = mma.fk(true), math.inf
@@ -116,7 +121,7 @@ def test_one_of_the_closed_form_branches_is_the_joint_vector_that_made_the_pose(
         assert nearest < 1e-6
 
 
-def test_all_solutions_reach_the_pose_and_differ(mma):
+def test_all_solutions_reach_the_pose_and_differ(mma: Robot) -> None:
     for q in readings(mma, 50, seed=8):
         T = mma.fk(q)
         solutions = mma.ik_all(T)
@@ -127,13 +132,13 @@ def test_all_solutions_reach_the_pose_and_differ(mma):
                 assert np.abs(solution - other).max() > 1e-6
 
 
-def test_home_is_among_its_own_solutions(mma):
+def test_home_is_among_its_own_solutions(mma: Robot) -> None:
     # There axis 8 is square to the plane of the arm, and θ2 + θ3 is free.
     gaps = np.abs(mma.ik_all(mma.fk(mma.home)) - mma.home).max(axis=1)
     assert gaps.min() < 1e-7
 
 
-def test_no_solution_exists_beyond_the_reach(mma):
+def test_no_solution_exists_beyond_the_reach(mma: Robot) -> None:
     T = transform(np.eye(3), np.array([0.0, 0.65, 0.13777]))
     assert len(mma.ik_all(T)) == 0
     result = mma.ik(T)
@@ -142,7 +147,7 @@ def test_no_solution_exists_beyond_the_reach(mma):
     assert np.isfinite(result.q).all()
 
 
-def test_pose_that_only_the_limits_forbid_is_limited_not_unreachable(mma):
+def test_pose_that_only_the_limits_forbid_is_limited_not_unreachable(mma: Robot) -> None:
     T, residual, q = mma.fk(mma.home + 0.5), np.empty(2), np.empty(7)
     limits = np.stack((mma.home - 0.1, mma.home + 0.1, np.full(7, np.inf)))
     status = mma.kernels.ik(T, mma.home.copy(), limits, mma.geometry_row, q, residual)
@@ -151,7 +156,7 @@ def test_pose_that_only_the_limits_forbid_is_limited_not_unreachable(mma):
     assert (np.abs(q - mma.home) <= 0.1 + 1e-15).all()
 
 
-def test_seed_outside_the_limits_is_answered_inside_them(mma):
+def test_seed_outside_the_limits_is_answered_inside_them(mma: Robot) -> None:
     result = mma.ik(mma.fk(mma.home), mma.home + 7.0)
     assert (result.q >= mma.lower).all()
     assert (result.q <= mma.upper).all()
@@ -169,7 +174,9 @@ CROSSINGS = {
 
 @pytest.mark.parametrize("beside", [0.0, 1e-6, 0.01, 0.5, 3.0])
 @pytest.mark.parametrize("crossing", CROSSINGS)
-def test_path_through_or_beside_the_wrist_singularity_is_followed(mma, crossing, beside):
+def test_path_through_or_beside_the_wrist_singularity_is_followed(
+    mma: Robot, crossing: str, beside: float
+) -> None:
     start, end = (np.array(angles, float) for angles in CROSSINGS[crossing])
     shift = np.array([0.0, 0.0, 0.0, 0.0, beside, 0.5 * beside, 0.0])
     T, seed = joint_path(mma, start + shift, end + shift)
@@ -181,7 +188,7 @@ def test_path_through_or_beside_the_wrist_singularity_is_followed(mma, crossing,
     assert np.abs(np.diff(result.q, axis=0)).max() < 0.004
 
 
-def pose_along(T, direction, distance):
+def pose_along(T: Array, direction: Array, distance: float) -> Array:
     """Pose moved by a twist (6,), linear over 0.1 m, then angular."""
     angle = np.linalg.norm(direction[3:]) * distance
     axis = direction[3:] / np.linalg.norm(direction[3:])
@@ -192,7 +199,9 @@ def pose_along(T, direction, distance):
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_motion_goes_on_along_the_direction_that_a_singularity_has_lost(mma, sign):
+def test_motion_goes_on_along_the_direction_that_a_singularity_has_lost(
+    mma: Robot, sign: float
+) -> None:
     seed = np.radians([10.0, -80.0, 5.0, 85.0, 90.0, 90.0, 20.0])
     J = mma.jacobian(seed)
     J[:3] /= 0.1
@@ -205,7 +214,7 @@ def test_motion_goes_on_along_the_direction_that_a_singularity_has_lost(mma, sig
     assert result.residual.max() < 1e-3
 
 
-def test_arm_that_is_led_out_of_reach_comes_back(mma):
+def test_arm_that_is_led_out_of_reach_comes_back(mma: Robot) -> None:
     height = 0.3 * np.sin(np.linspace(0.0, math.pi, 2000))
     poses = np.repeat(mma.fk(mma.home)[None], 3000, axis=0)
     poses[:2000, 2, 3] += height
@@ -215,19 +224,19 @@ def test_arm_that_is_led_out_of_reach_comes_back(mma):
     assert result.status[-1] in SOLVED
 
 
-def test_wild_targets_never_move_a_joint_faster_than_its_drive(mma):
+def test_wild_targets_never_move_a_joint_faster_than_its_drive(mma: Robot) -> None:
     poses = mma.fk(readings(mma, 300, seed=9))
     result = mma.follow(poses, mma.home, DT)
     assert_path_is_safe(mma, mma.home, result)
     assert set(result.status) == {IkStatus.LIMITED}
 
 
-def test_unmoving_target_keeps_the_joints_still(mma):
+def test_unmoving_target_keeps_the_joints_still(mma: Robot) -> None:
     result = mma.follow(np.repeat(mma.fk(mma.home + 0.001)[None], 50, axis=0), mma.home, DT)
     assert np.ptp(result.q[5:], axis=0).max() == 0.0
 
 
-def test_closed_paths_let_the_elbow_drift_by_less_than_half_a_degree(mma):
+def test_closed_paths_let_the_elbow_drift_by_less_than_half_a_degree(mma: Robot) -> None:
     # Least joint motion does not bring a redundant arm back to the same joints; this is how much.
     phase = np.linspace(0.0, 2.0 * math.pi, 2000)
     poses = np.repeat(mma.fk(mma.home)[None], 2000, axis=0)
@@ -239,7 +248,7 @@ def test_closed_paths_let_the_elbow_drift_by_less_than_half_a_degree(mma):
     assert 0.0 < np.abs(result.q[-1] - mma.home).max() < math.radians(0.5)
 
 
-def test_status_tells_of_the_wrist_singularity(mma):
+def test_status_tells_of_the_wrist_singularity(mma: Robot) -> None:
     q = np.radians([10.0, -80.0, 5.0, 85.0, 90.0, 90.0, 20.0])
     assert mma.ik(mma.fk(q), q).status == IkStatus.NEAR_SINGULAR
     q[5] -= 0.5
@@ -247,12 +256,12 @@ def test_status_tells_of_the_wrist_singularity(mma):
 
 
 @pytest.mark.parametrize("bad", [np.diag([1.0, 1.0, -1.0, 1.0]), np.full((4, 4), np.nan)])
-def test_matrix_that_is_no_pose_is_refused(mma, bad):
+def test_matrix_that_is_no_pose_is_refused(mma: Robot, bad: Array) -> None:
     with pytest.raises(ParameterError):
         mma.ik(bad)
 
 
-def test_near_singular_is_a_smallest_singular_value_under_the_bound(mma):
+def test_near_singular_is_a_smallest_singular_value_under_the_bound(mma: Robot) -> None:
     for q in readings(mma, 300, seed=10):
         J = mma.jacobian(q)
         weighted = J / np.array([0.1] * 3 + [1.0] * 3)[:, None]
@@ -262,7 +271,7 @@ def test_near_singular_is_a_smallest_singular_value_under_the_bound(mma):
 
 
 @pytest.mark.parametrize("angle", [0.0, 1e-9, 1.0, math.pi - 1e-9, math.pi])
-def test_pose_error_is_the_weighted_distance_and_angle(angle):
+def test_pose_error_is_the_weighted_distance_and_angle(angle: float) -> None:
     here = transform(rotation("x", 0.3), np.zeros(3))
     there = transform(rotation("y", angle) @ here[:3, :3], np.array([0.0, 0.0, 0.05]))
     error = np.empty(6)

@@ -1,15 +1,17 @@
 """MMA tables and loop against the published numbers and other libraries (H1-H9, H20, H21)."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 import pinocchio
 import pytest
 import roboticstoolbox as rtb
+from pinocchio import Model
 
 from teleop_core.base.errors import ParameterError, ShapeError, UnknownNameError
-from teleop_core.kernels.geometry import rotation
+from teleop_core.kernels.geometry import Array, rotation
 from teleop_core.robots import load_robot
 from teleop_core.robots.dh import DhRow
 from teleop_core.robots.mma_models import (
@@ -20,6 +22,7 @@ from teleop_core.robots.mma_models import (
     passive_angles,
     readings_of_serial,
 )
+from teleop_core.robots.robot import Robot
 
 MM = 1e-3
 # The spec gives derived values to 0.01 mm and asks for 0.05 mm and 1e-4.
@@ -41,41 +44,41 @@ TABLE_4_7 = {
 
 
 @pytest.fixture(scope="module")
-def mma():
+def mma() -> Robot:
     return load_robot("mma")
 
 
-def serial_frames(mma, serial):
+def serial_frames(mma: Robot, serial: Sequence[float] | Array) -> dict[str, Array]:
     return frames(model_table("B", mma.geometry), serial)
 
 
-def random_readings(count, seed=0):
+def random_readings(count: int, seed: int = 0) -> Array:
     return np.random.default_rng(seed).uniform(-math.pi, math.pi, (count, 7))
 
 
-def tool_of_model(mma, q, model):
+def tool_of_model(mma: Robot, q: Array, model: str) -> Array:
     table = model_table(model, mma.geometry)
     return list(frames(table, joints_of_model(q, model)).values())[-1]
 
 
 @pytest.mark.parametrize("name", TABLE_4_7)
-def test_dummy_frames_at_home_stand_where_recomputed(mma, name):  # H1
+def test_dummy_frames_at_home_stand_where_recomputed(mma: Robot, name: str) -> None:  # H1
     origin = serial_frames(mma, SERIAL_HOME)[name][:3, 3]
     assert np.abs(origin - np.array(TABLE_4_7[name][2]) * MM).max() < PLACE
 
 
-def test_dummy_frames_turn_the_tool_by_half_a_turn_at_home(mma):  # H1
+def test_dummy_frames_turn_the_tool_by_half_a_turn_at_home(mma: Robot) -> None:  # H1
     tool = serial_frames(mma, SERIAL_HOME)["12"]
     assert np.abs(tool[:3, :3] - np.diag([-1.0, -1.0, 1.0])).max() < TURN
 
 
 @pytest.mark.parametrize("name", TABLE_4_7)
-def test_dummy_frames_at_home_agree_with_the_printed_table(mma, name):  # H2
+def test_dummy_frames_at_home_agree_with_the_printed_table(mma: Robot, name: str) -> None:  # H2
     origin = serial_frames(mma, SERIAL_HOME)[name][:3, 3]
     assert np.abs(origin - np.array(TABLE_4_7[name][0]) * MM).max() < PRINTED
 
 
-def test_conventional_table_at_home_gives_its_published_pose(mma):  # H3
+def test_conventional_table_at_home_gives_its_published_pose(mma: Robot) -> None:  # H3
     home = np.radians([0.0, -90.0, 90.0, 0.0, 0.0, -90.0, 90.0])
     chain = frames(model_table("A", mma.geometry), home)
     assert np.abs(chain["8"][:3, 3] - np.array([122.36, -35.07, 456.84]) * MM).max() < PLACE
@@ -83,34 +86,36 @@ def test_conventional_table_at_home_gives_its_published_pose(mma):  # H3
     assert np.abs(chain["4"][:3, 3] - np.array([160.76, 0.0, 325.23]) * MM).max() < PLACE
 
 
-def test_conventional_and_dummy_frames_share_increments_and_differ_by_a_quarter_turn(mma):
+def test_conventional_and_dummy_frames_share_increments_and_differ_by_a_quarter_turn(
+    mma: Robot,
+) -> None:
     quarter = rotation("z", -0.5 * math.pi)
     for q in random_readings(50):
         a, b = tool_of_model(mma, q, "A"), tool_of_model(mma, q, "B")
         assert np.abs(b[:3, :3] - a[:3, :3] @ quarter).max() < EXACT
 
 
-def test_conventional_description_is_the_handle_without_its_offsets(mma):
+def test_conventional_description_is_the_handle_without_its_offsets(mma: Robot) -> None:
     conventional = load_robot("mma", model="A")
     for q in random_readings(50):
         assert np.abs(conventional.fk(q) - tool_of_model(mma, q, "A")).max() < EXACT
 
 
-def test_hybrid_at_home_gives_the_published_pose_and_passive_angles(mma):  # H5
+def test_hybrid_at_home_gives_the_published_pose_and_passive_angles(mma: Robot) -> None:  # H5
     pose = mma.fk(mma.home)
     assert np.abs(pose[:3, 3] - np.array([3.63, -71.27, 482.08]) * MM).max() < PLACE
     assert np.abs(pose[:3, :3] - np.diag([-1.0, -1.0, 1.0])).max() < TURN
     assert np.allclose(np.degrees(passive_angles(mma.home)), [90.0, 90.0], atol=1e-9)
 
 
-def test_prototype_was_measured_within_three_millimetres_per_axis(mma):  # H6
+def test_prototype_was_measured_within_three_millimetres_per_axis(mma: Robot) -> None:  # H6
     chain = serial_frames(mma, SERIAL_HOME)
     gaps = np.array([chain[k][:3, 3] - np.array(v[1]) * MM for k, v in TABLE_4_7.items()])
     assert np.abs(gaps).max() < 2.8 * MM
     assert np.linalg.norm(gaps, axis=1).max() < 4.14 * MM
 
 
-def test_both_ways_round_the_parallelogram_meet(mma):  # H7
+def test_both_ways_round_the_parallelogram_meet(mma: Robot) -> None:  # H7
     q = np.radians([20.0, -80.0, -15.0, 75.0, 0.0, 0.0, 0.0])
     assert np.allclose(np.degrees(passive_angles(q)), [90.0, 90.0], atol=1e-9)
     loop = loop_closure(q, mma.geometry)
@@ -122,7 +127,7 @@ def test_both_ways_round_the_parallelogram_meet(mma):  # H7
     assert np.abs(loop.frame_4 - frame_4).max() < 1e-7
 
 
-def test_loop_closes_for_every_reading_and_any_split_of_the_short_side(mma):
+def test_loop_closes_for_every_reading_and_any_split_of_the_short_side(mma: Robot) -> None:
     for q, side in zip(random_readings(100), np.linspace(0.005, 0.06, 100), strict=True):
         loop = loop_closure(q, mma.geometry, side)
         assert np.abs(loop.along_link_3 - loop.along_link_3a).max() < EXACT
@@ -131,14 +136,14 @@ def test_loop_closes_for_every_reading_and_any_split_of_the_short_side(mma):
         assert np.abs(table["12"] - mma.fk(q)).max() < EXACT
 
 
-def test_closed_form_is_the_product_of_both_tables_for_random_readings(mma):  # H9
+def test_closed_form_is_the_product_of_both_tables_for_random_readings(mma: Robot) -> None:  # H9
     for q in random_readings(300):
         pose = mma.fk(q)
         assert np.abs(pose - tool_of_model(mma, q, "C")).max() < EXACT
         assert np.abs(pose - tool_of_model(mma, q, "B")).max() < EXACT
 
 
-def test_readings_and_serial_joints_are_inverse_maps():
+def test_readings_and_serial_joints_are_inverse_maps() -> None:
     for q in random_readings(20):
         assert np.allclose(readings_of_serial(joints_of_model(q, "B")), q, rtol=0, atol=1e-14)
 
@@ -151,7 +156,13 @@ def test_readings_and_serial_joints_are_inverse_maps():
         ((0, -60, 70, -10, 90, 0, 0), (-30, 70), (94.9177, -71.27, 429.0494), (0, 0, 1, 0)),
     ],
 )  # fmt: skip
-def test_further_points_of_the_specification(mma, serial, shared, place, quaternion):
+def test_further_points_of_the_specification(
+    mma: Robot,
+    serial: tuple[int, ...],
+    shared: tuple[int, int],
+    place: tuple[float, float, float],
+    quaternion: tuple[int, int, float, float],
+) -> None:
     serial = np.radians(np.array(serial, float))
     q = np.concatenate((serial[:2], np.radians(shared), serial[4:]))
     x, y, z, w = quaternion
@@ -161,7 +172,7 @@ def test_further_points_of_the_specification(mma, serial, shared, place, quatern
         assert np.abs(pose[:3, :3] - wanted).max() < TURN
 
 
-def test_printed_last_row_of_the_dummy_table_is_not_reproduced(mma):  # H20
+def test_printed_last_row_of_the_dummy_table_is_not_reproduced(mma: Robot) -> None:  # H20
     table = model_table("B", mma.geometry)
     last = DhRow(constants={**table.rows[-1].constants, "alpha": 0.5 * math.pi})
     wrong = frames(replace(table, rows=(*table.rows[:-1], last)), SERIAL_HOME)["12"][:3, 3]
@@ -169,13 +180,13 @@ def test_printed_last_row_of_the_dummy_table_is_not_reproduced(mma):  # H20
     assert np.linalg.norm(wrong - mma.fk(mma.home)[:3, 3]) > 50.0 * MM
 
 
-def test_signed_offsets_are_refused_by_the_closed_form():  # H21
+def test_signed_offsets_are_refused_by_the_closed_form() -> None:  # H21
     with pytest.raises(ParameterError) as caught:
         load_robot("mma", d7=-0.03507, d9=-0.03840)
     assert caught.value.name == "d7"
 
 
-def test_signed_offsets_would_move_the_tool(mma):  # H21
+def test_signed_offsets_would_move_the_tool(mma: Robot) -> None:  # H21
     row = mma.geometry_row.copy()
     names = list(mma.geometry)
     for name in ("d7", "d9"):
@@ -185,7 +196,7 @@ def test_signed_offsets_would_move_the_tool(mma):  # H21
     assert np.abs(pose[:2, 3] - np.array([80.43, -1.13]) * MM).max() < PLACE
 
 
-def test_tool_in_roboticstoolbox_is_the_same(mma):
+def test_tool_in_roboticstoolbox_is_the_same(mma: Robot) -> None:
     rows = model_table("B", mma.geometry).rows
     links = []
     for row in rows:
@@ -198,7 +209,7 @@ def test_tool_in_roboticstoolbox_is_the_same(mma):
         assert np.abs(rtb.DHRobot(links).fkine(joints).A - mma.fk(q)).max() < EXACT
 
 
-def pinocchio_model(mma):
+def pinocchio_model(mma: Robot) -> Model:
     """Serial model B from joint placements alone, without any D-H routine of ours."""
     model, parent, fixed = pinocchio.Model(), 0, pinocchio.SE3.Identity()
     for row in model_table("B", mma.geometry).rows:
@@ -215,7 +226,7 @@ def pinocchio_model(mma):
     return model
 
 
-def test_pose_and_jacobian_in_pinocchio_are_the_same(mma):
+def test_pose_and_jacobian_in_pinocchio_are_the_same(mma: Robot) -> None:
     model = pinocchio_model(mma)
     data, frame = model.createData(), model.getFrameId("tool")
     for q in random_readings(50):
@@ -230,7 +241,7 @@ def test_pose_and_jacobian_in_pinocchio_are_the_same(mma):
         assert np.abs(hybrid - mma.jacobian(q)).max() < EXACT
 
 
-def test_vectors_and_models_that_do_not_exist_are_refused(mma):
+def test_vectors_and_models_that_do_not_exist_are_refused(mma: Robot) -> None:
     with pytest.raises(ShapeError):
         joints_of_model(np.zeros((2, 7)), "B")
     with pytest.raises(UnknownNameError):

@@ -1,5 +1,6 @@
 """Mobility: the counts of the lectures and the thesis."""
 
+from collections.abc import Callable
 from itertools import pairwise
 
 import pytest
@@ -26,32 +27,38 @@ from teleop_core.robots.mobility import (
         pytest.param(6, 7, 6, 6, 6, id="PUMA 6R"),
     ],
 )
-def test_the_count_gives_the_published_freedoms(space, links, joints, freedoms, expected):
+def test_the_count_gives_the_published_freedoms(
+    space: int, links: int, joints: int, freedoms: int, expected: int
+) -> None:
     assert degrees_of_freedom(links, joints, freedoms, space=space) == expected
 
 
-def test_parallel_axes_counted_in_space_look_overconstrained():
+def test_parallel_axes_counted_in_space_look_overconstrained() -> None:
     assert degrees_of_freedom(4, 4, 4) == -2
 
 
 @pytest.mark.parametrize(("joints", "freedoms", "expected"), [(4, 1, 3), (9, 3, 6)])
-def test_passive_joints_are_those_without_a_motor(joints, freedoms, expected):
+def test_passive_joints_are_those_without_a_motor(
+    joints: int, freedoms: int, expected: int
+) -> None:
     # P5: four-bar and 3-RPS.
     assert passive_joints(joints, freedoms) == expected
 
 
 @pytest.mark.parametrize(("links", "joints", "expected"), [(10, 10, 1), (5, 5, 1), (14, 18, 5)])
-def test_independent_loops_of_mma_parallelogram_and_stewart_platform(links, joints, expected):
+def test_independent_loops_of_mma_parallelogram_and_stewart_platform(
+    links: int, joints: int, expected: int
+) -> None:
     # H13 and P6.
     assert independent_loops(links, joints) == expected
 
 
-def stewart_loop(first, second):
+def stewart_loop(first: int, second: int) -> list[int]:
     """Links of the loop through two legs: base 0, lower and upper leg halves, platform 13."""
     return [0, 1 + 2 * first, 2 + 2 * first, 13, 2 + 2 * second, 1 + 2 * second]
 
 
-def test_the_twelve_loops_of_the_stewart_platform_have_rank_five():
+def test_the_twelve_loops_of_the_stewart_platform_have_rank_five() -> None:
     edges = [edge for leg in range(6) for edge in pairwise([0, 1 + 2 * leg, 2 + 2 * leg, 13])]
     loops = [stewart_loop(i, i + gap) for gap in (1, 2, 3) for i in range(6 - gap)]
     assert len(loops) == 12
@@ -73,7 +80,9 @@ def test_the_twelve_loops_of_the_stewart_platform_have_rank_five():
         (lambda: loop_rank([(0, 1)], [[0, 1, 2]]), "loops"),
     ],
 )
-def test_counts_that_no_mechanism_has_are_refused_by_name(call, name):
+def test_counts_that_no_mechanism_has_are_refused_by_name(
+    call: Callable[..., object], name: str
+) -> None:
     with pytest.raises(ParameterError) as caught:
         call()
     assert caught.value.name == name

@@ -2,18 +2,23 @@
 
 import math
 import re
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from present import present
 from teleop_core.base.errors import ShapeError
 from teleop_core.base.parameters import build
 from teleop_core.graph.signals import DT, TICK_NS
 from teleop_core.graph.topics import NO_COMMAND_NS
-from teleop_core.kernels.geometry import rotation, transform
+from teleop_core.kernels.geometry import Array, rotation, transform
 from teleop_core.robots import load_robot
+from teleop_core.robots.robot import Robot
+from teleop_core.slave.motion_commands import MotionCommands
 from teleop_core.slave.operation import OperationParameters
 from teleop_core.slave.operation.states import Answer, State
 from teleop_core.slave.pair import ArmParameters, SimulatedArm
@@ -30,7 +35,7 @@ DIRECT = {"reference_filter.is_on": False}
 class Bench:
     """A slave at rest in the middle of its range, and the ticks it makes."""
 
-    def __init__(self, name="rcrt1", middle=MIDDLE, **values):
+    def __init__(self, name: str = "rcrt1", middle: Array = MIDDLE, **values: float | bool) -> None:
         given = (
             {"robot": name, "start_speed": 1.0, "start": tuple(np.asarray(middle).tolist())}
             | DIRECT
@@ -43,7 +48,7 @@ class Bench:
             self.run(100)
         self.run(200)
 
-    def run(self, ticks):
+    def run(self, ticks: int) -> Array:
         """Setpoints (ticks, n)."""
         found = np.empty((ticks, self.slave.robot.n))
         for i in range(ticks):
@@ -53,7 +58,7 @@ class Bench:
             found[i] = self.slave.signals["slave_setpoint_js"]
         return found
 
-    def follow(self, command, stamp_ns=None):
+    def follow(self, command: Array, stamp_ns: Any = None) -> Array:
         """One tick with a message of servo_jp."""
         row = self.slave.signals
         row["slave_servo_jp"] = command
@@ -61,36 +66,36 @@ class Bench:
         return self.run(1)[0]
 
     @property
-    def setpoint(self):
+    def setpoint(self) -> Array:
         return self.slave.signals["slave_setpoint_js"].copy()
 
     @property
-    def tip(self):
+    def tip(self) -> Array:
         return self.robot.fk(self.setpoint)
 
 
 @pytest.fixture
-def bench():
+def bench() -> Any:
     return Bench()
 
 
-def move_to_pose(motion, T):
+def move_to_pose(motion: MotionCommands, T: Array) -> Any:
     """Move to where the tip has a pose, as a session does with move_cp."""
     found = motion.solve(T)
     return found if isinstance(found, tuple) else motion.move(found)
 
 
-def insist_on_limits(robot, path):
+def insist_on_limits(robot: Robot, path: Array) -> None:
     """Speeds within the drives' and speed changes within twenty times what they can brake."""
     speed = np.diff(path, axis=0) / DT
-    assert (np.abs(speed) <= robot.drives.speed_limit * (1 + 1e-9)).all()
-    most = 20.0 * robot.drives.effort_limit / robot.drives.inertia
+    assert (np.abs(speed) <= present(robot.drives).speed_limit * (1 + 1e-9)).all()
+    most = 20.0 * present(robot.drives).effort_limit / present(robot.drives).inertia
     assert (np.abs(np.diff(speed, axis=0)) / DT <= most * (1 + 1e-6)).all()
     assert (path >= robot.lower).all()
     assert (path <= robot.upper).all()
 
 
-def test_a_move_goes_from_rest_to_rest_at_its_goal_and_tells_so(bench):
+def test_a_move_goes_from_rest_to_rest_at_its_goal_and_tells_so(bench: Bench) -> None:
     answer, _ = bench.motion.move(MIDDLE + SMALL)
     assert answer is Answer.DONE
     np.testing.assert_array_equal(bench.motion.goal, MIDDLE + SMALL)
@@ -106,8 +111,8 @@ def test_a_move_goes_from_rest_to_rest_at_its_goal_and_tells_so(bench):
     np.testing.assert_allclose(shares, shares[:, :1] * np.ones(6), atol=1e-9)
 
 
-def test_a_move_from_full_speed_brakes_first_and_jumps_in_nothing(bench):
-    speed = 0.8 * ARM.drives.speed_limit * np.array([1, 0, 0, 0, 0, 0])
+def test_a_move_from_full_speed_brakes_first_and_jumps_in_nothing(bench: Bench) -> None:
+    speed = 0.8 * present(ARM.drives).speed_limit * np.array([1, 0, 0, 0, 0, 0])
     path = []
     for _ in range(5):
         bench.motion.drive_joints(speed, bench.now_ns)
@@ -119,7 +124,7 @@ def test_a_move_from_full_speed_brakes_first_and_jumps_in_nothing(bench):
     np.testing.assert_array_equal(joined[-1], MIDDLE)
 
 
-def test_a_newer_move_takes_over_from_one_under_way(bench):
+def test_a_newer_move_takes_over_from_one_under_way(bench: Bench) -> None:
     bench.motion.move(MIDDLE + 4.0 * SMALL)
     path = [bench.run(150)]
     assert bench.motion.move(MIDDLE - SMALL)[0] is Answer.DONE
@@ -128,19 +133,19 @@ def test_a_newer_move_takes_over_from_one_under_way(bench):
     np.testing.assert_array_equal(bench.setpoint, MIDDLE - SMALL)
 
 
-def test_a_move_to_a_pose_brings_the_tip_there(bench):
+def test_a_move_to_a_pose_brings_the_tip_there(bench: Bench) -> None:
     goal = bench.tip @ transform(rotation("x", 0.05), np.array([0.01, -0.005, 0.008]))
     assert move_to_pose(bench.motion, goal)[0] is Answer.DONE
     bench.run(3000)
     np.testing.assert_allclose(bench.tip, goal, atol=1e-12)
 
 
-def test_a_pose_out_of_reach_is_refused_with_how_far_it_is(bench):
+def test_a_pose_out_of_reach_is_refused_with_how_far_it_is(bench: Bench) -> None:
     before, goal = bench.setpoint, bench.tip
     goal[0, 3] += 3.0
     answer, text = move_to_pose(bench.motion, goal)
     assert answer is Answer.REFUSED
-    assert float(re.search(r"nearer than ([\d.e+]+) mm", text)[1]) > 1000.0
+    assert float(present(re.search(r"nearer than ([\d.e+]+) mm", text))[1]) > 1000.0
     np.testing.assert_array_equal(bench.run(50)[-1], before)
 
 
@@ -152,27 +157,27 @@ def test_a_pose_out_of_reach_is_refused_with_how_far_it_is(bench):
         (np.full(6, np.inf), "NaN or infinite"),
     ],
 )
-def test_goals_that_the_joints_cannot_have_are_refused(bench, goal, why):
+def test_goals_that_the_joints_cannot_have_are_refused(bench: Bench, goal: Array, why: str) -> None:
     answer, text = bench.motion.move(goal)
     assert answer is Answer.REFUSED
     assert why in text
     assert bench.slave.server.operation["is_busy"] == 0.0
 
 
-def test_a_step_moves_by_that_much_from_the_setpoint(bench):
+def test_a_step_moves_by_that_much_from_the_setpoint(bench: Bench) -> None:
     bench.motion.move_by(SMALL)
     bench.run(2000)
     np.testing.assert_allclose(bench.setpoint, MIDDLE + SMALL, atol=1e-12)
 
 
 @pytest.mark.parametrize("command", ["move", "move_by"])
-def test_another_number_of_joints_is_wrong_use(bench, command):
+def test_another_number_of_joints_is_wrong_use(bench: Bench, command: str) -> None:
     with pytest.raises(ShapeError, match=r"must have shape \(6,\), has \(5,\)"):
         getattr(bench.motion, command)(np.zeros(5))
 
 
 @pytest.mark.parametrize("state", [State.DISABLED, State.PAUSED, State.FAULT])
-def test_nothing_is_moved_outside_enabled(bench, state):
+def test_nothing_is_moved_outside_enabled(bench: Bench, state: State) -> None:
     bench.slave.server.request(
         {"DISABLED": "disable", "PAUSED": "pause", "FAULT": "stop"}[state.name]
     )
@@ -188,8 +193,8 @@ def test_nothing_is_moved_outside_enabled(bench, state):
     np.testing.assert_array_equal(bench.run(100)[-1], before)
 
 
-def test_before_homing_is_done_no_motion_command_is_taken():
-    bench = Bench(**{"operation.starts_enabled": False})
+def test_before_homing_is_done_no_motion_command_is_taken() -> None:
+    bench = Bench(**dict[str, Any]({"operation.starts_enabled": False}))
     bench.slave.server.request("enable")
     assert bench.motion.move(MIDDLE)[0] is Answer.REFUSED
     assert "home first" in bench.motion.drive_joints(SMALL, bench.now_ns)[1]
@@ -203,7 +208,7 @@ def test_before_homing_is_done_no_motion_command_is_taken():
 
 
 @pytest.mark.parametrize("event", ["pause", "disable", "stop"])
-def test_a_state_that_stops_a_move_drops_it_for_good(bench, event):
+def test_a_state_that_stops_a_move_drops_it_for_good(bench: Bench, event: str) -> None:
     bench.motion.move(MIDDLE + 4.0 * SMALL)
     bench.run(200)
     bench.slave.server.request(event)
@@ -214,7 +219,7 @@ def test_a_state_that_stops_a_move_drops_it_for_good(bench, event):
     np.testing.assert_array_equal(bench.run(500)[-1], stopped)
 
 
-def test_joints_run_at_the_speed_asked_for_until_the_timeout_then_brake(bench):
+def test_joints_run_at_the_speed_asked_for_until_the_timeout_then_brake(bench: Bench) -> None:
     speed = np.array([0.1, -0.05, 0.01, 0.2, 0.1, -0.1])
     for _ in range(10):
         bench.motion.drive_joints(speed, bench.now_ns)
@@ -223,23 +228,27 @@ def test_joints_run_at_the_speed_asked_for_until_the_timeout_then_brake(bench):
     assert bench.motion.source == "velocity"
     silent = bench.run(500)
     moved = np.abs(np.diff(silent, axis=0)).max(axis=1) > 0.0
-    braking = np.max(np.abs(speed) * ARM.drives.inertia / ARM.drives.effort_limit) / DT
+    braking = (
+        np.max(np.abs(speed) * present(ARM.drives).inertia / present(ARM.drives).effort_limit) / DT
+    )
     # 50 ticks of the timeout were over when the listening began.
     assert TIMEOUT_TICKS - 52 <= np.flatnonzero(moved)[-1] <= TIMEOUT_TICKS - 48 + braking
     assert bench.motion.source == "nothing"
 
 
-def test_speeds_beyond_the_drives_are_cut_in_proportion(bench):
-    wild = 50.0 * ARM.drives.speed_limit * np.array([1, 0.5, 0, 0, 0, 0])
+def test_speeds_beyond_the_drives_are_cut_in_proportion(bench: Bench) -> None:
+    wild = 50.0 * present(ARM.drives).speed_limit * np.array([1, 0.5, 0, 0, 0, 0])
     bench.motion.drive_joints(wild, bench.now_ns)
     path = np.vstack((MIDDLE, bench.run(90)))
     insist_on_limits(ARM, path)
     speed = np.diff(path, axis=0)[-1] / DT
-    np.testing.assert_allclose(speed[:2], ARM.drives.speed_limit[:2] * [1.0, 0.5], rtol=1e-9)
+    np.testing.assert_allclose(
+        speed[:2], present(ARM.drives).speed_limit[:2] * [1.0, 0.5], rtol=1e-9
+    )
 
 
 @pytest.mark.parametrize("axis", range(6))
-def test_the_tip_runs_along_its_twist_and_no_other_way(bench, axis):
+def test_the_tip_runs_along_its_twist_and_no_other_way(bench: Bench, axis: int) -> None:
     twist = np.zeros(6)
     twist[axis] = 0.02 if axis < 3 else 0.1
     start = bench.tip
@@ -259,7 +268,7 @@ def test_the_tip_runs_along_its_twist_and_no_other_way(bench, axis):
     assert np.linalg.norm(start[:3, 3] - before[:3, 3]) < 0.006
 
 
-def test_a_tip_driven_to_the_end_of_a_joint_stops_on_its_line(bench):
+def test_a_tip_driven_to_the_end_of_a_joint_stops_on_its_line(bench: Bench) -> None:
     direction = ARM.jacobian(MIDDLE)[:3, 2]  # d3 outward, 61 mm before its end
     start, line = bench.tip[:3, 3], direction / np.linalg.norm(direction)
     path = []
@@ -273,7 +282,7 @@ def test_a_tip_driven_to_the_end_of_a_joint_stops_on_its_line(bench):
     assert np.linalg.norm(way - line * (way @ line)) < 2e-3
 
 
-def test_next_to_a_singularity_joints_keep_their_limits():
+def test_next_to_a_singularity_joints_keep_their_limits() -> None:
     straight = MIDDLE.copy()
     straight[4] = 1e-4  # axes 4 and 6 of the wrist nearly in line
     bench = Bench(middle=straight)
@@ -284,7 +293,7 @@ def test_next_to_a_singularity_joints_keep_their_limits():
     insist_on_limits(ARM, np.vstack(path))
 
 
-def test_a_robot_that_cannot_turn_its_tip_does_of_a_twist_what_it_can():
+def test_a_robot_that_cannot_turn_its_tip_does_of_a_twist_what_it_can() -> None:
     robot = load_robot("planar_3r")
     middle = 0.5 * (robot.start + robot.home)
     bench = Bench("planar_3r", middle=middle)
@@ -296,7 +305,9 @@ def test_a_robot_that_cannot_turn_its_tip_does_of_a_twist_what_it_can():
     assert bench.tip[0, 3] - before[0, 3] > 0.002
 
 
-def test_a_running_stream_is_not_taken_over_by_a_speed_and_a_speed_not_by_a_stream(bench):
+def test_a_running_stream_is_not_taken_over_by_a_speed_and_a_speed_not_by_a_stream(
+    bench: Bench,
+) -> None:
     for _ in range(20):
         bench.follow(MIDDLE + 1e-4)
     answer, text = bench.motion.drive_joints(SMALL, bench.now_ns)
@@ -310,7 +321,7 @@ def test_a_running_stream_is_not_taken_over_by_a_speed_and_a_speed_not_by_a_stre
     assert (ahead > 0.0).all()
 
 
-def test_a_move_takes_over_from_a_stream_which_is_followed_again_afterwards(bench):
+def test_a_move_takes_over_from_a_stream_which_is_followed_again_afterwards(bench: Bench) -> None:
     for _ in range(20):
         bench.follow(MIDDLE)
     bench.motion.move(MIDDLE + SMALL)
@@ -323,7 +334,7 @@ def test_a_move_takes_over_from_a_stream_which_is_followed_again_afterwards(benc
     np.testing.assert_allclose(bench.setpoint, MIDDLE + 0.99 * SMALL, atol=1e-9)
 
 
-def test_after_a_move_no_command_is_in_force(bench):
+def test_after_a_move_no_command_is_in_force(bench: Bench) -> None:
     bench.follow(MIDDLE)
     bench.run(1)
     assert bench.slave.signals["slave_setpoint_js_ns"] > NO_COMMAND_NS
@@ -333,7 +344,7 @@ def test_after_a_move_no_command_is_in_force(bench):
     np.testing.assert_array_equal(bench.setpoint, MIDDLE + SMALL)
 
 
-def test_steps_add_up_from_command_to_command(bench):
+def test_steps_add_up_from_command_to_command(bench: Bench) -> None:
     for _ in range(50):
         bench.motion.servo_by(0.001 * SMALL, bench.now_ns + TICK_NS)
         bench.run(5)
@@ -341,14 +352,14 @@ def test_steps_add_up_from_command_to_command(bench):
     np.testing.assert_allclose(bench.setpoint, MIDDLE + 0.05 * SMALL, atol=1e-12)
 
 
-def test_steps_that_come_within_one_tick_are_all_taken(bench):
+def test_steps_that_come_within_one_tick_are_all_taken(bench: Bench) -> None:
     for _ in range(5):
         bench.motion.servo_by(0.001 * SMALL, bench.now_ns + TICK_NS)
     bench.run(200)
     np.testing.assert_allclose(bench.setpoint, MIDDLE + 0.005 * SMALL, atol=1e-12)
 
 
-def test_steps_are_taken_after_references_of_the_topic(bench):
+def test_steps_are_taken_after_references_of_the_topic(bench: Bench) -> None:
     for _ in range(20):
         bench.follow(MIDDLE)
     old_ns = int(bench.slave.signals["slave_servo_jp_ns"])
@@ -360,7 +371,7 @@ def test_steps_are_taken_after_references_of_the_topic(bench):
     np.testing.assert_allclose(bench.setpoint, MIDDLE + 0.01 * SMALL, atol=1e-12)
 
 
-def test_references_by_command_are_followed_as_those_of_the_topic():
+def test_references_by_command_are_followed_as_those_of_the_topic() -> None:
     one, other = Bench(), Bench()
     for share in np.linspace(0.0, 0.2, 200):
         one.follow(MIDDLE + share * SMALL)
@@ -370,7 +381,7 @@ def test_references_by_command_are_followed_as_those_of_the_topic():
 
 
 @pytest.mark.parametrize("kind", ["move", "speed", "lone"])
-def test_hold_brakes_what_moves_and_stays(bench, kind):
+def test_hold_brakes_what_moves_and_stays(bench: Bench, kind: str) -> None:
     if kind == "move":
         bench.motion.move(MIDDLE + 4.0 * SMALL)
     elif kind == "speed":
@@ -388,7 +399,7 @@ def test_hold_brakes_what_moves_and_stays(bench, kind):
     assert np.abs(held - bench.motion.goal).max() == 0.0
 
 
-def test_after_a_pause_the_arm_stays_where_it_came_to_rest(bench):
+def test_after_a_pause_the_arm_stays_where_it_came_to_rest(bench: Bench) -> None:
     for share in np.linspace(0.0, 1.0, 200):
         bench.follow(MIDDLE + share * SMALL)
     bench.slave.server.request("pause")
@@ -414,32 +425,35 @@ COMMANDS = st.lists(
 
 @settings(max_examples=60, deadline=None)
 @given(commands=COMMANDS)
-def test_whatever_is_commanded_no_step_exceeds_the_limits_of_the_drives(commands):
+def test_whatever_is_commanded_no_step_exceeds_the_limits_of_the_drives(
+    commands: list[tuple[str, list[float], int]],
+) -> None:
     bench, path = SHARED, []
     bench.slave.reset()
     path.append(bench.run(3))
     for name, numbers, ticks in commands:
-        wild = np.array(numbers)
+        wild: Any = np.array(numbers)
         now_ns, motion = bench.now_ns, bench.motion
         if name == "stream":
             path.append(bench.follow(bench.setpoint + 0.02 * wild)[None])
         elif name in {"move", "pose", "joints", "tip", "step", "hold"}:
-            {
-                "move": lambda w=wild: motion.move(bench.setpoint + w),
-                "pose": lambda w=wild: move_to_pose(
-                    motion, bench.tip @ transform(rotation("z", w[3]), 0.1 * w[:3])
+            acts: dict[str, Callable[[], object]] = {
+                "move": lambda: motion.move(bench.setpoint + wild),
+                "pose": lambda: move_to_pose(
+                    motion, bench.tip @ transform(rotation("z", wild[3]), 0.1 * wild[:3])
                 ),
-                "joints": lambda w=wild, n=now_ns: motion.drive_joints(20.0 * w, n),
-                "tip": lambda w=wild, n=now_ns: motion.drive_tip(5.0 * w, n),
-                "step": lambda w=wild, n=now_ns: motion.servo_by(0.1 * w, n),
+                "joints": lambda: motion.drive_joints(20.0 * wild, now_ns),
+                "tip": lambda: motion.drive_tip(5.0 * wild, now_ns),
+                "step": lambda: motion.servo_by(0.1 * wild, now_ns),
                 "hold": motion.hold,
-            }[name]()
+            }
+            acts[name]()
         else:
             bench.slave.server.request(name)
         path.append(bench.run(ticks))
     joined = np.vstack(path)
     speed = np.diff(joined, axis=0) / DT
-    assert (np.abs(speed) <= ARM.drives.speed_limit * (1 + 1e-9)).all()
+    assert (np.abs(speed) <= present(ARM.drives).speed_limit * (1 + 1e-9)).all()
     assert ((joined >= ARM.lower) & (joined <= ARM.upper)).all()
     tips = np.array([ARM.fk(q)[:3, 3] for q in joined[::10]])
     most = bench.slave.server.parameters["tool_speed"] * 10 * DT
@@ -447,13 +461,13 @@ def test_whatever_is_commanded_no_step_exceeds_the_limits_of_the_drives(commands
     assert math.isfinite(np.abs(joined).sum())
 
 
-SHARED = Bench(**{"operation.longest_outage": 0.0})
+SHARED = Bench(**dict[str, Any]({"operation.longest_outage": 0.0}))
 
 
-def test_the_parameters_that_bound_motion_are_those_of_the_operation():
+def test_the_parameters_that_bound_motion_are_those_of_the_operation() -> None:
     slow = build(OperationParameters, {"tool_speed": 0.01})
     assert slow.tool_speed == 0.01
-    bench = Bench(**{"operation.tool_speed": 0.01})
+    bench = Bench(**dict[str, Any]({"operation.tool_speed": 0.01}))
     bench.motion.drive_tip([0.5, 0, 0, 0, 0, 0], bench.now_ns)
     tips = np.array([ARM.fk(q)[:3, 3] for q in bench.run(95)])
     fastest = np.linalg.norm(np.diff(tips, axis=0), axis=1).max() / DT

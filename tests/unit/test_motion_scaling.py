@@ -1,6 +1,7 @@
 """Motion scaling: published frame mapping and gain ratchet, clutch, modes, box and force."""
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,9 +15,10 @@ from teleop_core.chain.mapping.motion_scaling import (
     to_slave_axes,
 )
 from teleop_core.chain.mapping.parameters import FixtureParameters, MotionScalingParameters
-from teleop_core.chain.master.haptic_master import REST_POSITION, REST_TILT
+from teleop_core.chain.operators.rest import REST_POSITION, REST_TILT
 from teleop_core.graph.signals import TICK_NS
 from teleop_core.kernels.geometry import (
+    Array,
     quaternion_from_rotation,
     rotation,
     rotation_from_quaternion,
@@ -29,7 +31,7 @@ ROUNDING = 1e-14
 NANOMETRE = 1e-9
 
 
-def test_the_wall_stands_around_the_stylus_and_the_slave_goes_by_what_is_left_of_it():
+def test_the_wall_stands_around_the_stylus_and_the_slave_goes_by_what_is_left_of_it() -> None:
     desk = Desk(fixture=FixtureParameters(wall="soft"))
     desk.step()
     out, force = desk.row["master_filtered_out"], desk.row["master_servo_cf"]
@@ -53,7 +55,7 @@ def test_the_wall_stands_around_the_stylus_and_the_slave_goes_by_what_is_left_of
         assert not force.any()
 
 
-def mapped(stylus, tool_roll):
+def mapped(stylus: Array, tool_roll: float) -> Array:
     scaling = MotionScaling(MotionScalingParameters(tool_roll=tool_roll))
     quaternion, tool, out = np.empty(4), np.empty(4), np.empty((3, 3))
     quaternion_from_rotation(np.ascontiguousarray(stylus), quaternion)
@@ -62,22 +64,22 @@ def mapped(stylus, tool_roll):
     return out
 
 
-def slave_axes(master, **values):
+def slave_axes(master: tuple[float, float, float], **values: Any) -> Array:
     scaling, out = MotionScaling(MotionScalingParameters(**values)), np.empty(3)
     to_slave_axes(scaling.parameters, np.array(master), out)
     return out
 
 
-def test_identity_stylus_maps_to_the_published_rotation():  # case 17
+def test_identity_stylus_maps_to_the_published_rotation() -> None:  # case 17
     published = [[0, 0, 1], [-1, 0, 0], [0, -1, 0]]
     assert np.allclose(mapped(np.eye(3), 0.0), published, rtol=0, atol=ROUNDING)
 
 
-def test_place_maps_to_the_published_axes():  # case 17
+def test_place_maps_to_the_published_axes() -> None:  # case 17
     assert np.array_equal(slave_axes((1.0, 2.0, 3.0)), (-3.0, -1.0, 2.0))
 
 
-def test_every_stylus_attitude_maps_to_the_published_product():  # case 17
+def test_every_stylus_attitude_maps_to_the_published_product() -> None:  # case 17
     rng = np.random.default_rng(2)
     base = np.array([[0, 0, -1], [-1, 0, 0], [0, 1, 0]])
     for angles in rng.uniform(-3.0, 3.0, (50, 3)):
@@ -86,25 +88,25 @@ def test_every_stylus_attitude_maps_to_the_published_product():  # case 17
         assert np.allclose(mapped(stylus, 0.0), expected, rtol=0, atol=1e-13)
 
 
-def test_stylus_in_the_inkwell_points_the_tool_as_at_home():  # case 18
+def test_stylus_in_the_inkwell_points_the_tool_as_at_home() -> None:  # case 18
     tool = mapped(rotation("x", -23.4 * DEGREE), math.pi / 2)
     assert np.allclose(tool, HOME[:3, :3], rtol=0, atol=ROUNDING)
     out = slave_axes((0.0, -194.414, -416.901))
     assert np.allclose(out, (416.901, 0.0, -194.414), rtol=0, atol=ROUNDING)
 
 
-def test_without_the_tool_roll_the_tool_is_turned_by_a_right_angle_at_home():  # case 18
+def test_without_the_tool_roll_the_tool_is_turned_by_a_right_angle_at_home() -> None:  # case 18
     tool = mapped(rotation("x", -23.4 * DEGREE), 0.0)
     between = HOME[:3, :3].T @ tool
     assert np.allclose(between, rotation("z", -math.pi / 2), rtol=0, atol=ROUNDING)
 
 
-def test_other_sign_of_the_inkwell_tilt_points_the_tool_elsewhere():  # case 18
+def test_other_sign_of_the_inkwell_tilt_points_the_tool_elsewhere() -> None:  # case 18
     approach = mapped(rotation("x", 23.4 * DEGREE), math.pi / 2)[:, 2]
     assert math.isclose(math.acos(approach[2]) / DEGREE, 66.6, abs_tol=1e-9)
 
 
-def test_home_offset_is_the_published_one_and_its_corrected_form():  # case 19
+def test_home_offset_is_the_published_one_and_its_corrected_form() -> None:  # case 19
     inkwell = np.array(REST_POSITION) / MM
     printed_home = np.array([0.0, -194.414, -416.901])
     assert np.allclose(printed_home - inkwell, (0.0, -128.903, -328.787), rtol=0, atol=1e-9)
@@ -113,7 +115,7 @@ def test_home_offset_is_the_published_one_and_its_corrected_form():  # case 19
     assert np.allclose(np.array([-y, z, -x]) - inkwell, (0, -116.383, -332.218), atol=5e-4)
 
 
-def test_first_command_is_the_home_of_the_slave_and_moves_nothing():
+def test_first_command_is_the_home_of_the_slave_and_moves_nothing() -> None:
     desk = Desk()
     desk.turn = rotation("x", REST_TILT)
     assert np.array_equal(desk.step(), HOME[:3, 3])
@@ -123,7 +125,7 @@ def test_first_command_is_the_home_of_the_slave_and_moves_nothing():
     assert np.allclose(desk.attitude(), mapped(desk.turn, math.pi / 2), rtol=0, atol=ROUNDING)
 
 
-def test_gains_ratchet_the_slave_as_published():  # case 20
+def test_gains_ratchet_the_slave_as_published() -> None:  # case 20
     desk = Desk()
     start = desk.step()
     desk.step((10 * MM, 0, 0))
@@ -136,14 +138,14 @@ def test_gains_ratchet_the_slave_as_published():  # case 20
 
 
 @pytest.mark.parametrize("gain", [0.001, 0.3, 1.0, 10.0])
-def test_gain_scales_the_motion_of_the_hand(gain):
+def test_gain_scales_the_motion_of_the_hand(gain: float) -> None:
     desk = Desk(coarse_gain=gain, fine_gain=0.001)
     start = desk.step()
     end = desk.step((1 * MM, 2 * MM, 3 * MM))
     assert np.allclose(end - start, gain * np.array([-3, -1, 2]) * MM, rtol=0, atol=ROUNDING)
 
 
-def test_change_of_gain_at_run_time_moves_nothing():
+def test_change_of_gain_at_run_time_moves_nothing() -> None:
     desk = Desk()
     desk.step()
     before = desk.step((5 * MM, 0, 0))
@@ -152,7 +154,7 @@ def test_change_of_gain_at_run_time_moves_nothing():
     assert np.allclose(desk.step((MM, 0, 0)) - before, (0, -3 * MM, 0), rtol=0, atol=ROUNDING)
 
 
-def test_mode_parameter_switches_the_mode_at_run_time():
+def test_mode_parameter_switches_the_mode_at_run_time() -> None:
     desk = Desk()
     desk.step()
     desk.scaling.retune(MotionScalingParameters(plausible=ANY_HAND, mode="fine"))
@@ -160,7 +162,7 @@ def test_mode_parameter_switches_the_mode_at_run_time():
     assert (desk.state("is_fine"), desk.state("gain")) == (1.0, 0.1)
 
 
-def test_retuning_something_else_leaves_the_mode_of_the_button():
+def test_retuning_something_else_leaves_the_mode_of_the_button() -> None:
     desk = Desk()
     desk.step()
     desk.press("mode")
@@ -169,7 +171,7 @@ def test_retuning_something_else_leaves_the_mode_of_the_button():
     assert desk.state("is_fine") == 1.0
 
 
-def test_clutched_hand_moves_nothing_and_motion_goes_on_from_there():
+def test_clutched_hand_moves_nothing_and_motion_goes_on_from_there() -> None:
     desk = Desk()
     desk.step()
     before = desk.step((4 * MM, 0, 0))
@@ -183,7 +185,7 @@ def test_clutched_hand_moves_nothing_and_motion_goes_on_from_there():
     assert np.allclose(after - before, (0, -1 * MM, 0), rtol=0, atol=ROUNDING)
 
 
-def test_clutched_turning_moves_nothing_and_turning_goes_on_from_there():
+def test_clutched_turning_moves_nothing_and_turning_goes_on_from_there() -> None:
     desk = Desk()
     desk.step()
     desk.step(turn=rotation("x", 0.2))
@@ -200,7 +202,7 @@ def test_clutched_turning_moves_nothing_and_turning_goes_on_from_there():
     assert np.allclose(desk.attitude(), expected, rtol=0, atol=1e-13)
 
 
-def test_a_command_of_many_scaled_turns_stays_a_turn():
+def test_a_command_of_many_scaled_turns_stays_a_turn() -> None:
     desk = Desk(rotation_gain=0.5)
     for _ in range(5000):
         desk.step(turn=rotation("x", 0.3))
@@ -208,7 +210,7 @@ def test_a_command_of_many_scaled_turns_stays_a_turn():
     assert abs(size - 1.0) <= 2.0 * np.finfo(float).eps
 
 
-def test_clutching_without_turning_keeps_the_attitude_absolute():
+def test_clutching_without_turning_keeps_the_attitude_absolute() -> None:
     desk = Desk()
     desk.turn = rotation("x", REST_TILT)
     desk.step()
@@ -221,7 +223,7 @@ def test_clutching_without_turning_keeps_the_attitude_absolute():
     assert np.allclose(desk.attitude(), mapped(desk.turn, math.pi / 2), rtol=0, atol=1e-13)
 
 
-def test_slave_that_does_not_follow_holds_the_command_at_its_setpoint():
+def test_slave_that_does_not_follow_holds_the_command_at_its_setpoint() -> None:
     desk = Desk()
     desk.step()
     desk.step((5 * MM, 0, 0), does_follow=False)
@@ -233,7 +235,7 @@ def test_slave_that_does_not_follow_holds_the_command_at_its_setpoint():
     assert np.array_equal(desk.step(), stuck[:3])
 
 
-def test_hand_that_comes_back_after_a_pause_starts_from_where_the_slave_is():
+def test_hand_that_comes_back_after_a_pause_starts_from_where_the_slave_is() -> None:
     desk = Desk()
     desk.step()
     before = desk.step((5 * MM, 0, 0))
@@ -243,7 +245,7 @@ def test_hand_that_comes_back_after_a_pause_starts_from_where_the_slave_is():
     assert np.allclose(moved - before, (0, -1 * MM, 0), rtol=0, atol=ROUNDING)
 
 
-def test_pause_within_the_timeout_is_bridged():
+def test_pause_within_the_timeout_is_bridged() -> None:
     desk = Desk()
     desk.step()
     before = desk.step()
@@ -252,7 +254,7 @@ def test_pause_within_the_timeout_is_bridged():
 
 
 @pytest.mark.parametrize(("silent", "follows"), [(2, True), (3, False)])
-def test_slave_of_a_slow_master_may_be_silent_for_two_samples(silent, follows):
+def test_slave_of_a_slow_master_may_be_silent_for_two_samples(silent: int, follows: bool) -> None:
     desk = Desk()
     desk.step()
     for _ in range(1 + silent + 1):  # heard in the first; the last judges those before
@@ -260,7 +262,7 @@ def test_slave_of_a_slow_master_may_be_silent_for_two_samples(silent, follows):
     assert desk.state("is_following") == float(follows)
 
 
-def test_after_a_pause_of_the_master_the_command_is_where_the_slave_is_by_then():
+def test_after_a_pause_of_the_master_the_command_is_where_the_slave_is_by_then() -> None:
     desk = Desk()
     for _ in range(5):
         desk.step((1 * MM, 0, 0))
@@ -273,7 +275,7 @@ def test_after_a_pause_of_the_master_the_command_is_where_the_slave_is_by_then()
 
 
 @pytest.mark.parametrize("late", [2, 3, 40])
-def test_slave_follows_however_late_as_long_as_newer_commands_come_into_force(late):
+def test_slave_follows_however_late_as_long_as_newer_commands_come_into_force(late: int) -> None:
     desk, step_ns = Desk(), 80_000_000
     desk.step()
     stamps = [int(desk.row["master_measured_cp_ns"])]
@@ -287,7 +289,9 @@ def test_slave_follows_however_late_as_long_as_newer_commands_come_into_force(la
     assert desk.state("is_following") == 0.0
 
 
-def test_reset_starts_again_at_the_setpoint_with_the_box_off_and_the_mode_of_the_parameters():
+def test_reset_starts_again_at_the_setpoint_with_the_box_off_and_the_mode_of_the_parameters() -> (
+    None
+):
     desk = Desk()
     desk.step()
     desk.press("fixture")
@@ -298,7 +302,7 @@ def test_reset_starts_again_at_the_setpoint_with_the_box_off_and_the_mode_of_the
     assert (desk.state("is_fixture_on"), desk.state("is_fine")) == (0.0, 0.0)
 
 
-def test_change_of_the_tool_roll_turns_nothing():
+def test_change_of_the_tool_roll_turns_nothing() -> None:
     desk = Desk()
     desk.step(turn=rotation("x", 0.2))
     before = desk.attitude()
@@ -308,7 +312,7 @@ def test_change_of_the_tool_roll_turns_nothing():
 
 
 @pytest.mark.parametrize("button", ["fixture", "mode"])
-def test_button_that_stays_pressed_toggles_once(button):
+def test_button_that_stays_pressed_toggles_once(button: str) -> None:
     desk = Desk()
     desk.step()
     desk.hold(button)
@@ -318,7 +322,7 @@ def test_button_that_stays_pressed_toggles_once(button):
         assert desk.state(name) == 1.0
 
 
-def test_box_is_put_around_the_slave_where_the_button_was_pressed():
+def test_box_is_put_around_the_slave_where_the_button_was_pressed() -> None:
     desk = Desk(fixture=build(FixtureParameters, {"box.size": (0.01, 0.02, 0.03)}))
     desk.step()
     desk.step((2 * MM, 0, 0))
@@ -332,7 +336,7 @@ def test_box_is_put_around_the_slave_where_the_button_was_pressed():
     assert np.allclose(desk.box()[0], at_press, rtol=0, atol=NANOMETRE)
 
 
-def test_box_switched_on_while_clutched_stands_around_the_slave():
+def test_box_switched_on_while_clutched_stands_around_the_slave() -> None:
     desk = Desk(fixture=FixtureParameters(wall="soft"))
     held = desk.step()
     desk.hold("clutch")
@@ -349,7 +353,7 @@ def test_box_switched_on_while_clutched_stands_around_the_slave():
     assert math.isclose(desk.row["master_servo_cf"][0], -1.0, abs_tol=1e-9)
 
 
-def test_box_goes_with_the_hand_while_clutched_and_stays_at_the_slave():
+def test_box_goes_with_the_hand_while_clutched_and_stays_at_the_slave() -> None:
     desk = Desk()
     desk.step()
     desk.press("fixture")
@@ -365,7 +369,7 @@ def test_box_goes_with_the_hand_while_clutched_and_stays_at_the_slave():
     assert np.allclose(desk.box()[0], before, rtol=0, atol=NANOMETRE)
 
 
-def test_size_of_the_box_on_the_slave_follows_the_gain():
+def test_size_of_the_box_on_the_slave_follows_the_gain() -> None:
     desk = Desk()
     desk.step()
     desk.press("fixture")
@@ -374,7 +378,7 @@ def test_size_of_the_box_on_the_slave_follows_the_gain():
     assert np.allclose(desk.box()[1], 3 * MM, rtol=0, atol=ROUNDING)
 
 
-def test_second_press_takes_the_box_and_its_force_away():
+def test_second_press_takes_the_box_and_its_force_away() -> None:
     desk = Desk()
     desk.step()
     desk.press("fixture")
@@ -397,7 +401,7 @@ def test_second_press_takes_the_box_and_its_force_away():
         ("source", 16.5, -3.3),
     ],
 )
-def test_wall_pushes_the_hand_back(wall, mm, newton):
+def test_wall_pushes_the_hand_back(wall: str, mm: float, newton: float) -> None:
     desk = Desk(fixture=FixtureParameters(wall=wall))
     desk.step()
     desk.press("fixture")
@@ -406,7 +410,7 @@ def test_wall_pushes_the_hand_back(wall, mm, newton):
     assert np.allclose(desk.row["master_servo_cf"], expected, rtol=0, atol=1e-9)
 
 
-def test_fine_gain_above_the_coarse_one_is_refused():
+def test_fine_gain_above_the_coarse_one_is_refused() -> None:
     with pytest.raises(ParameterError) as error:
         MotionScalingParameters(coarse_gain=0.5, fine_gain=0.6)
     assert (error.value.name, error.value.value) == ("fine_gain", 0.6)

@@ -1,16 +1,19 @@
 """Operating states: one table, every state with every event, and what only a reset ends."""
 
 import itertools
+from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from present import present
 from teleop_core.base.errors import ParameterError, UnknownNameError
 from teleop_core.base.parameters import build
 from teleop_core.kernels import kernel
 from teleop_core.kernels.fields import record
+from teleop_core.kernels.geometry import Array
 from teleop_core.slave.operation import (
     Answer,
     Event,
@@ -41,11 +44,11 @@ EXPECTED = {
 
 
 @kernel
-def _change(s, event):
+def _change(s: OperatingState, event: int) -> int:
     return change(s, event)
 
 
-def make(state, **fields):
+def make(state: State, **fields: object) -> OperatingState:
     found = record(OperatingState)
     found["state"], found["is_homed"] = state, 1
     for name, value in fields.items():
@@ -54,7 +57,9 @@ def make(state, **fields):
 
 
 @pytest.mark.parametrize(("state", "event"), list(itertools.product(State, Event)))
-def test_every_state_takes_or_refuses_every_event_as_the_table_says(state, event):
+def test_every_state_takes_or_refuses_every_event_as_the_table_says(
+    state: State, event: Event
+) -> None:
     s = make(state)
     answer = Answer(_change(s, int(event)))
     expected = EXPECTED[event][state]
@@ -67,7 +72,7 @@ def test_every_state_takes_or_refuses_every_event_as_the_table_says(state, event
         assert "allowed in" in text
 
 
-def test_an_emergency_stop_is_ended_by_a_reset_and_an_enable_and_by_nothing_else():
+def test_an_emergency_stop_is_ended_by_a_reset_and_an_enable_and_by_nothing_else() -> None:
     for words in itertools.product(set(COMMANDS) - {"reset", "stop"}, repeat=3):
         s = make(E)
         _change(s, int(Event.STOP))
@@ -81,7 +86,7 @@ def test_an_emergency_stop_is_ended_by_a_reset_and_an_enable_and_by_nothing_else
     assert s["state"] == E
 
 
-def test_a_stop_that_is_still_pressed_cannot_be_reset():
+def test_a_stop_that_is_still_pressed_cannot_be_reset() -> None:
     s = make(E, is_pressed=1)
     _change(s, int(Event.STOP))
     assert Answer(_change(s, int(Event.RESET))) is Answer.STOPPED
@@ -89,7 +94,7 @@ def test_a_stop_that_is_still_pressed_cannot_be_reset():
     assert Answer(_change(s, int(Event.RESET))) is Answer.DONE
 
 
-def test_an_arm_that_is_not_at_rest_is_not_enabled():
+def test_an_arm_that_is_not_at_rest_is_not_enabled() -> None:
     s = make(D, is_moving=1)
     assert Answer(_change(s, int(Event.ENABLE))) is Answer.BRAKING
     assert s["state"] == D
@@ -97,7 +102,7 @@ def test_an_arm_that_is_not_at_rest_is_not_enabled():
 
 @settings(max_examples=300, deadline=None)
 @given(st.lists(st.sampled_from(list(Event)), max_size=60))
-def test_flags_agree_with_the_state_after_any_events(events):
+def test_flags_agree_with_the_state_after_any_events(events: list[Event]) -> None:
     s = make(D, is_homed=0)
     for event in events:
         _change(s, int(event))
@@ -107,13 +112,13 @@ def test_flags_agree_with_the_state_after_any_events(events):
         assert not s["is_stopped"] or s["state"] == F
 
 
-def test_unknown_commands_are_refused_by_name():
+def test_unknown_commands_are_refused_by_name() -> None:
     with pytest.raises(UnknownNameError, match="enable"):
         command_event("go")
 
 
 @pytest.mark.parametrize("text", ["stop", "stop@", "stop@x", "go@1", "stop@-1", "stop@nan"])
-def test_scripts_of_another_form_are_refused(text):
+def test_scripts_of_another_form_are_refused(text: str) -> None:
     with pytest.raises(ParameterError, match="command@seconds"):
         OperationParameters(events=(text,))
 
@@ -121,18 +126,25 @@ def test_scripts_of_another_form_are_refused(text):
 class Arm:
     """A slave under a stream of commands that swing about home."""
 
-    def __init__(self, *, seconds=0.0, law="pid", is_filtered=True, **operation):
+    def __init__(
+        self,
+        *,
+        seconds: float = 0.0,
+        law: str = "pid",
+        is_filtered: bool = True,
+        **operation: str | float | bool | tuple[str, str, str],
+    ) -> None:
         chosen = {"controller.kind": law, "reference_filter.is_on": is_filtered}
         given = {f"operation.{name}": value for name, value in operation.items()}
         start = {"robot": "rcrt1", "starts_at_home": True}
         self.slave = SimulatedArm(build(ArmParameters, start | chosen | given))
         self.row, self.ns = self.slave.signals, 10**9
-        self.limit = self.slave.robot.drives.speed_limit
+        self.limit = present(self.slave.robot.drives).speed_limit
         self.home = self.slave.robot.home
         self.setpoints = [np.array(self.row["slave_setpoint_js"])]
         self.run(seconds)
 
-    def run(self, seconds, *, commanded=True):
+    def run(self, seconds: float, *, commanded: bool = True) -> None:
         for _ in range(round(seconds * 1000)):
             self.ns += 10**6
             self.row["now_ns"] = self.ns
@@ -144,15 +156,15 @@ class Arm:
             self.setpoints.append(np.array(self.row["slave_setpoint_js"]))
 
     @property
-    def steps(self):
+    def steps(self) -> Array:
         return np.abs(np.diff(self.setpoints, axis=0)) / self.limit * 1e3
 
     @property
-    def state(self):
+    def state(self) -> State:
         return State(int(self.slave.server.operation["state"]))
 
 
-def test_a_slave_enables_and_homes_itself_unless_it_is_told_not_to():
+def test_a_slave_enables_and_homes_itself_unless_it_is_told_not_to() -> None:
     arm = Arm(seconds=0.01)
     assert (arm.state, arm.slave.server.operation["is_homed"]) == (E, 1.0)
     arm = Arm(seconds=1.0, starts_enabled=False)
@@ -168,7 +180,7 @@ def test_a_slave_enables_and_homes_itself_unless_it_is_told_not_to():
     assert arm.steps[-1].any()
 
 
-def test_homing_is_smooth_and_within_the_limits():
+def test_homing_is_smooth_and_within_the_limits() -> None:
     robot = "puma560"
     slave = SimulatedArm(
         ArmParameters(robot=robot, operation=OperationParameters(starts_enabled=False))
@@ -184,7 +196,7 @@ def test_homing_is_smooth_and_within_the_limits():
     assert slave.server.operation["is_homed"] == 1.0
     start = slave.server.parameters["start"]
     assert np.allclose(found[-1], start, rtol=0, atol=1e-12)
-    drives = slave.robot.drives
+    drives = present(slave.robot.drives)
     speed = np.abs(np.diff(found, axis=0)) / 1e-3
     rise = np.abs(np.diff(found, n=2, axis=0)) / 1e-6
     assert (speed <= drives.speed_limit * (1 + 1e-9)).all()
@@ -192,7 +204,7 @@ def test_homing_is_smooth_and_within_the_limits():
 
 
 @pytest.mark.parametrize("word", ["stop", "pause", "disable"])
-def test_nothing_moves_outside_enabled_however_one_got_there(word):
+def test_nothing_moves_outside_enabled_however_one_got_there(word: str) -> None:
     arm = Arm(seconds=1.13)
     assert arm.steps[-1].any()
     arm.slave.server.request(word)
@@ -203,7 +215,7 @@ def test_nothing_moves_outside_enabled_however_one_got_there(word):
     assert abs(arm.slave.simulated.arm.dq).max() < 1e-3 * arm.limit.max()
 
 
-def test_from_an_emergency_stop_the_setpoint_stands_still_in_the_next_tick():
+def test_from_an_emergency_stop_the_setpoint_stands_still_in_the_next_tick() -> None:
     arm = Arm(seconds=1.13)
     before = len(arm.setpoints)
     arm.slave.server.press(is_pressed=True, now_ns=arm.ns)
@@ -211,25 +223,25 @@ def test_from_an_emergency_stop_the_setpoint_stands_still_in_the_next_tick():
     assert not arm.steps[before - 1 :].any()
     values = arm.slave.server.operation
     assert values["is_stopped"] == 1.0
-    drives = arm.slave.robot.drives
+    drives = present(arm.slave.robot.drives)
     braking = (0.1 * 2 * np.pi * arm.limit / arm.limit.max()) / (
         drives.effort_limit / drives.inertia
     )
     assert 0.0 < values["rest_time"] <= braking.max() + 0.1  # and the loop comes to rest
 
 
-def test_brakes_stop_an_arm_no_farther_than_its_speed_needs():
+def test_brakes_stop_an_arm_no_farther_than_its_speed_needs() -> None:
     arm = Arm(seconds=1.13, standstill="brake")
     q, dq = arm.slave.simulated.arm.q.copy(), arm.slave.simulated.arm.dq.copy()
     arm.slave.server.request("stop")
     arm.run(0.5)
-    drives = arm.slave.robot.drives
+    drives = present(arm.slave.robot.drives)
     needed = 0.5 * dq**2 / (drives.effort_limit / drives.inertia) + np.abs(dq) * 1e-3
     assert (np.abs(arm.slave.simulated.arm.q - q) <= needed + 1e-6).all()
     assert not arm.row["slave_measured_js"][12:].any()
 
 
-def test_after_a_stop_the_arm_follows_again_without_a_jump():
+def test_after_a_stop_the_arm_follows_again_without_a_jump() -> None:
     arm = Arm(seconds=1.13)
     arm.slave.server.request("stop")
     arm.run(0.5)
@@ -241,18 +253,18 @@ def test_after_a_stop_the_arm_follows_again_without_a_jump():
     assert arm.steps.max() <= 1.0 + 1e-9
 
 
-def test_a_broken_stream_brakes_at_the_limits_of_the_drives():
+def test_a_broken_stream_brakes_at_the_limits_of_the_drives() -> None:
     arm = Arm(seconds=1.13)
     before = len(arm.setpoints)
     arm.run(0.3, commanded=False)
-    drives = arm.slave.robot.drives
+    drives = present(arm.slave.robot.drives)
     speed = np.abs(np.diff(arm.setpoints, axis=0))[before + 98] / 1e-3
     ticks = np.ceil(speed / (drives.effort_limit / drives.inertia) * 1e3).max()
     assert not arm.steps[before + 100 + int(ticks) :].any()
     assert arm.state is E
 
 
-def test_after_a_long_outage_motion_is_resumed_on_purpose_only():
+def test_after_a_long_outage_motion_is_resumed_on_purpose_only() -> None:
     arm = Arm(seconds=1.13, longest_outage=0.5)
     arm.run(0.7, commanded=False)
     assert arm.state is P
@@ -264,7 +276,7 @@ def test_after_a_long_outage_motion_is_resumed_on_purpose_only():
     assert arm.steps[-100:].any()
 
 
-def test_a_silent_heartbeat_is_a_stop():
+def test_a_silent_heartbeat_is_a_stop() -> None:
     arm = Arm(seconds=0.05, heartbeat=0.1)
     arm.slave.server.press(is_pressed=False, now_ns=arm.ns)
     arm.run(0.09)
@@ -276,15 +288,15 @@ def test_a_silent_heartbeat_is_a_stop():
     assert arm.slave.server.request("reset")[0] is Answer.DONE
 
 
-def test_a_script_commands_at_its_times():
+def test_a_script_commands_at_its_times() -> None:
     arm = Arm(seconds=0.5, events=("pause@0.2", "resume@0.4", "stop@0.45"))
-    still = ~arm.steps.any(axis=1)
+    still: Any = ~arm.steps.any(axis=1)
     assert still[240:398].all()
     assert not still[100:195].any()
     assert arm.state is F
 
 
-def test_a_stream_with_a_gap_before_its_last_command_pauses_the_arm_too():
+def test_a_stream_with_a_gap_before_its_last_command_pauses_the_arm_too() -> None:
     arm = Arm(seconds=1.0, longest_outage=0.5)
     arm.run(0.2, commanded=False)
     arm.run(0.001)
@@ -293,14 +305,16 @@ def test_a_stream_with_a_gap_before_its_last_command_pauses_the_arm_too():
 
 
 @pytest.mark.parametrize("word", ["stop", "heartbeat"])
-def test_no_session_can_have_an_emergency_stop_told_only(word):
+def test_no_session_can_have_an_emergency_stop_told_only(word: str) -> None:
     with pytest.raises(ParameterError, match="reported"):
         build(OperationParameters, {"reported": (word,)})
 
 
 @pytest.mark.parametrize("seconds", [0.03, 0.13, 0.27, 0.41, 0.66, 0.93, 1.21])
 @pytest.mark.parametrize("law", ["pid", "source_pid"])
-def test_resume_is_refused_while_a_joint_swings_though_it_stands_still_at_each_turn(law, seconds):
+def test_resume_is_refused_while_a_joint_swings_though_it_stands_still_at_each_turn(
+    law: str, seconds: float
+) -> None:
     arm = Arm(law=law, is_filtered=False, seconds=seconds)
     arm.slave.server.request("pause")
     while arm.slave.server.request("resume")[0] is Answer.BRAKING:
@@ -316,11 +330,11 @@ def test_resume_is_refused_while_a_joint_swings_though_it_stands_still_at_each_t
         paused.run(0.001)
 
 
-def test_an_arm_that_was_paused_while_it_homed_homes_when_it_is_resumed():
+def test_an_arm_that_was_paused_while_it_homed_homes_when_it_is_resumed() -> None:
     slave = SimulatedArm(ArmParameters(robot="puma560"))
     row, ns = slave.signals, 10**9
 
-    def run(ticks):
+    def run(ticks: int) -> None:
         nonlocal ns
         for _ in range(ticks):
             ns += 10**6
@@ -340,7 +354,7 @@ def test_an_arm_that_was_paused_while_it_homed_homes_when_it_is_resumed():
     )
 
 
-def test_unhome_and_disable_end_what_a_pause_left_of_homing():
+def test_unhome_and_disable_end_what_a_pause_left_of_homing() -> None:
     for ends in (Event.UNHOME, Event.DISABLE, Event.ENABLE):
         s = make(E, is_homed=0, is_homing=1, is_busy=1)
         for event in (Event.PAUSE, ends, Event.ENABLE, Event.PAUSE, Event.RESUME):

@@ -1,7 +1,9 @@
 """Operators: rest at the start, region kept, stops reached, samples followed, own ones at work."""
 
 import math
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,10 +16,11 @@ from teleop_core.base.parameters import NoParameters, build, parameter
 from teleop_core.chain.operators import OPERATORS, Operator, Setting, following, register_operator
 from teleop_core.chain.operators.parameters import OperatorParameters
 from teleop_core.chain.operators.shapes import PHASES, minimum_jerk
+from teleop_core.kernels.geometry import Array
 
 # Products of numbers below one.
 ROUNDING = 1e-15
-TICK = 1e-3
+TICK: Any = 1e-3
 CENTER, SIZE, TILT = (0.01, -0.02, 0.03), (0.03, 0.02, 0.04), (-0.5, 0.1, 0.2)
 POINTS = (0.01, 0.0, 0.0, 0.01, 0.02, 0.0, -0.01, 0.02, 0.03)
 TIMES = np.arange(0.0, 60.0, 0.01)
@@ -29,20 +32,22 @@ RECORDED[1][:, (0, 4)] = 0.02 * (1.0 - np.cos(np.maximum(RECORDED[0] - 0.5, 0.0)
 KINDS = ("random", "line", "circle", "points", "hold", "recorded")
 
 
-def path_of(kind, seed=1, **values):
+def path_of(kind: str, seed: int = 1, **values: float) -> Callable[[Array], tuple[Array, Array]]:
     """Sampler of an operator: times (N,) [s] to places (N, 3) [m] and turns (N, 3) [rad]."""
     motion = motion_of(kind, seed, **values)
 
-    def sample(times):
+    def sample(times: Array) -> tuple[Array, Array]:
         moves = motion(np.asarray(times))
         return moves[:, :3], moves[:, 3:]
 
     return sample
 
 
-def motion_of(kind, seed, **values):
+def motion_of(
+    kind: str, seed: int, **values: float | tuple[float, float, float]
+) -> Callable[..., Any]:
     if kind == "recorded":
-        return following("recorded", *RECORDED).make(NoParameters(), None)
+        return following("recorded", *RECORDED).make(NoParameters(), None)  # type: ignore[arg-type]
     given = {"center": CENTER, "size": SIZE, "tilt": TILT, "approach_time": 2.0, "period": 4.0}
     extra = {"points": POINTS} if kind == "points" else {}
     parameters = build(OperatorParameters, {"kind": kind, **given, **extra, **values})
@@ -52,7 +57,7 @@ def motion_of(kind, seed, **values):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_path_starts_at_rest_at_zero(kind):
+def test_path_starts_at_rest_at_zero(kind: str) -> None:
     places, turns = path_of(kind)(np.arange(4) * TICK)
     assert not places[0].any()
     assert not turns[0].any()
@@ -63,7 +68,7 @@ def test_path_starts_at_rest_at_zero(kind):
 
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("period", [0.5, 4.0])
-def test_path_never_jumps(kind, period):
+def test_path_never_jumps(kind: str, period: float) -> None:
     times = np.arange(0.0, 6.0, 1e-4)
     places, turns = path_of(kind, period=period)(times)
     # The fastest part makes 3.6 rounds per period: 45 rad/s around 20 mm and 0.2 rad.
@@ -72,7 +77,7 @@ def test_path_never_jumps(kind, period):
 
 
 @given(st.integers(0, 1000), st.floats(1.0, 20.0))
-def test_random_motion_stays_inside_its_region_and_uses_it(seed, period):
+def test_random_motion_stays_inside_its_region_and_uses_it(seed: int, period: float) -> None:
     path = path_of("random", seed, period=period, rotation=0.2)
     places, turns = path(TIMES[TIMES >= 3.0])
     offset, turn = np.abs(places - CENTER), np.abs(turns - TILT)
@@ -82,21 +87,21 @@ def test_random_motion_stays_inside_its_region_and_uses_it(seed, period):
     assert (turn.max(axis=0) > 0.1).all()
 
 
-def test_random_motion_does_not_repeat():
+def test_random_motion_does_not_repeat() -> None:
     places, _ = path_of("random")(np.arange(3.0, 60.0, 4.0))
     apart = np.linalg.norm(places[:, None] - places[None], axis=2)
     assert apart[np.triu_indices(len(places), 1)].min() > 1e-3
 
 
-def test_seed_decides_the_path():
+def test_seed_decides_the_path() -> None:
     first, again, other = (path_of("random", seed)(TIMES)[0] for seed in (1, 1, 2))
     assert np.array_equal(first, again)
     assert np.abs(first - other).max() > 1e-3
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_path_does_not_depend_on_how_it_is_sampled(kind):
-    times = np.arange(1, 3001) * TICK
+def test_path_does_not_depend_on_how_it_is_sampled(kind: str) -> None:
+    times: Any = np.arange(1, 3001) * TICK
     whole = path_of(kind)(times)
     path = path_of(kind)
     for start, stop in ((0, 1), (1, 8), (8, 1000), (1000, 3000)):
@@ -105,20 +110,20 @@ def test_path_does_not_depend_on_how_it_is_sampled(kind):
             assert np.array_equal(piece, all_of[start:stop])
 
 
-def test_line_runs_from_the_centre_to_its_other_end_and_back():
+def test_line_runs_from_the_centre_to_its_other_end_and_back() -> None:
     places, _ = path_of("line")(np.array([4.0, 6.0]))
     # 2 s of approach, then half a period each way.
     assert np.allclose(places[0], np.add(CENTER, SIZE), rtol=0, atol=ROUNDING)
     assert np.allclose(places[1], CENTER, rtol=0, atol=ROUNDING)
 
 
-def test_line_is_straight():
+def test_line_is_straight() -> None:
     places, _ = path_of("line")(TIMES[TIMES >= 2.0])
     offset = places - CENTER
     assert np.abs(np.cross(offset, SIZE)).max() < ROUNDING
 
 
-def test_circle_has_its_diameters_around_the_centre():
+def test_circle_has_its_diameters_around_the_centre() -> None:
     places, _ = path_of("circle")(TIMES[TIMES >= 3.0])
     offset = (places - CENTER) / (0.5 * np.array(SIZE))
     assert np.allclose(np.hypot(offset[:, 0], offset[:, 1]), 1.0, rtol=0, atol=1e-12)
@@ -126,7 +131,7 @@ def test_circle_has_its_diameters_around_the_centre():
 
 
 @pytest.mark.parametrize("period", [0.5, 2.0])
-def test_points_are_reached_in_turn_and_held_for_a_fifth_of_each_leg(period):
+def test_points_are_reached_in_turn_and_held_for_a_fifth_of_each_leg(period: float) -> None:
     path, stops = path_of("points", period=period), np.reshape(POINTS, (-1, 3))
     for leg, stop in enumerate(stops):
         share = np.array([0.8, 0.9, 0.999])
@@ -134,22 +139,22 @@ def test_points_are_reached_in_turn_and_held_for_a_fifth_of_each_leg(period):
         assert np.allclose(places, np.add(CENTER, stop), rtol=0, atol=ROUNDING), leg
 
 
-def test_hand_stays_at_the_last_point():
+def test_hand_stays_at_the_last_point() -> None:
     places, _ = path_of("points")(np.array([2.0 + 3 * 4.0, 100.0]))
     assert np.allclose(places, np.add(CENTER, POINTS[-3:]), rtol=0, atol=ROUNDING)
 
 
-def test_hold_stays_at_the_centre():
+def test_hold_stays_at_the_centre() -> None:
     places, _ = path_of("hold")(TIMES[TIMES >= 2.0])
     assert np.allclose(places, CENTER, rtol=0, atol=ROUNDING)
 
 
-def test_without_rotation_the_stylus_keeps_its_tilt():
+def test_without_rotation_the_stylus_keeps_its_tilt() -> None:
     _, turns = path_of("random", rotation=0.0)(TIMES[TIMES >= 2.0])
     assert np.allclose(turns, TILT, rtol=0, atol=ROUNDING)
 
 
-def test_recorded_path_is_followed_between_and_at_its_samples():
+def test_recorded_path_is_followed_between_and_at_its_samples() -> None:
     moves = np.hstack(path_of("recorded")(np.array([0.0, 1.23, 1.235, 5.0, 9.0])))
     at, recorded = RECORDED
     assert np.allclose(moves[1], recorded[123], rtol=0, atol=ROUNDING)
@@ -158,7 +163,7 @@ def test_recorded_path_is_followed_between_and_at_its_samples():
     assert at[123] == pytest.approx(1.23)
 
 
-def test_smooth_step_rests_at_both_ends():
+def test_smooth_step_rests_at_both_ends() -> None:
     shares = np.array([-1.0, 0.0, 1e-3, 0.5, 1.0 - 1e-3, 1.0, 2.0])
     steps = minimum_jerk(shares)
     assert np.array_equal(steps[[0, 1, 3, 5, 6]], [0.0, 0.0, 0.5, 1.0, 1.0])
@@ -168,13 +173,13 @@ def test_smooth_step_rests_at_both_ends():
 
 
 @pytest.mark.parametrize("points", [(), (0.1, 0.2), (0.1, 0.2, 0.3, 0.1)])
-def test_points_that_are_no_triples_are_refused(points):
+def test_points_that_are_no_triples_are_refused(points: tuple[float, ...]) -> None:
     with pytest.raises(ParameterError) as error:
         build(OperatorParameters, {"kind": "points", "points": points})
     assert (error.value.name, error.value.value) == ("operator.points", points)
 
 
-def test_recorded_path_without_a_recording_is_refused():
+def test_recorded_path_without_a_recording_is_refused() -> None:
     with pytest.raises(ParameterError) as error:
         build(OperatorParameters, {"kind": "bag"})
     assert error.value.name == "operator.bag"
@@ -183,7 +188,7 @@ def test_recorded_path_without_a_recording_is_refused():
 # Own operators.
 
 
-def samples(count=5, columns=9):
+def samples(count: int = 5, columns: int = 9) -> Any:
     rng = np.random.default_rng(3)
     rows = rng.uniform(-0.02, 0.02, (count, columns))
     rows[:, 6:] = rng.integers(0, 2, rows[:, 6:].shape)
@@ -191,9 +196,9 @@ def samples(count=5, columns=9):
 
 
 @pytest.mark.parametrize("columns", [3, 6, 9])
-def test_given_samples_are_followed_linearly_and_their_buttons_held(columns):
+def test_given_samples_are_followed_linearly_and_their_buttons_held(columns: int) -> None:
     times, rows = samples(columns=columns)
-    motion = following("mine", times, rows).make(NoParameters(), None)
+    motion = following("mine", times, rows).make(NoParameters(), None)  # type: ignore[arg-type]
     assert np.allclose(motion(times), rows, rtol=0, atol=ROUNDING)
     between = motion(times[:-1] + 0.25)
     middle = 0.5 * (rows[:-1] + rows[1:])
@@ -203,9 +208,9 @@ def test_given_samples_are_followed_linearly_and_their_buttons_held(columns):
     assert np.array_equal(rest, rows[[0, -1]])
 
 
-def test_given_samples_are_kept_whatever_their_owner_does_with_the_arrays():
+def test_given_samples_are_kept_whatever_their_owner_does_with_the_arrays() -> None:
     times, rows = samples()
-    motion = following("mine", times, rows).make(NoParameters(), None)
+    motion = following("mine", times, rows).make(NoParameters(), None)  # type: ignore[arg-type]
     before = motion(np.array([1.0]))
     rows[:] = 0.0
     assert np.array_equal(motion(np.array([1.0])), before)
@@ -223,7 +228,7 @@ BAD_SAMPLES = {
 
 
 @pytest.mark.parametrize("case", BAD_SAMPLES)
-def test_samples_that_are_no_motion_are_refused(case):
+def test_samples_that_are_no_motion_are_refused(case: str) -> None:
     times, rows, expected = BAD_SAMPLES[case]
     with pytest.raises(PartError) as error:
         following("mine", times, rows)
@@ -231,11 +236,11 @@ def test_samples_that_are_no_motion_are_refused(case):
     assert expected in error.value.expected
 
 
-def master_of(name, **values):
+def master_of(name: str, **values: float | tuple[float, float, float]) -> HeldMaster:
     return HeldMaster(build(OperatorParameters, {"kind": name, "patience": 0.0, **values}))
 
 
-def poses(master, ticks):
+def poses(master: HeldMaster, ticks: int) -> Array:
     out = np.empty((ticks, 10))
     for i in range(ticks):
         master.step()
@@ -243,20 +248,22 @@ def poses(master, ticks):
     return out
 
 
-def test_own_motion_moves_the_hand_as_the_built_in_one_of_the_same_formula(own_parts):
+def test_own_motion_moves_the_hand_as_the_built_in_one_of_the_same_formula(own_parts: None) -> None:
     setting = {"approach_time": 0.1, "rotation": 0.0, "period": 2.0}
     register_operator("mine", motion_of("line", 1, **setting, center=(0.0,) * 3, tilt=(0.0,) * 3))
     built_in = master_of("line", **setting, size=SIZE)
     assert np.array_equal(poses(master_of("mine"), 600), poses(built_in, 600))
 
 
-def test_operator_who_is_asked_tick_by_tick_moves_the_hand_to_the_same_bits(own_parts):
+def test_operator_who_is_asked_tick_by_tick_moves_the_hand_to_the_same_bits(
+    own_parts: None,
+) -> None:
     asked = []
 
-    def make(parameters, setting):
+    def make(parameters: NoParameters, setting: Setting) -> Callable[[Array], Array]:
         motion = motion_of("circle", 1)
 
-        def noted(times):
+        def noted(times: Array) -> Array:
             asked.append(len(times))
             return motion(times)
 
@@ -270,8 +277,8 @@ def test_operator_who_is_asked_tick_by_tick_moves_the_hand_to_the_same_bits(own_
     assert asked[1:] == [1] * 50
 
 
-def test_own_operator_presses_buttons_beside_those_of_the_parameters(own_parts):
-    def pressing(times):
+def test_own_operator_presses_buttons_beside_those_of_the_parameters(own_parts: None) -> None:
+    def pressing(times: Array) -> Array:
         rows = np.zeros((len(times), 9))
         rows[:, 6] = times > 0.0305
         return rows
@@ -281,14 +288,14 @@ def test_own_operator_presses_buttons_beside_those_of_the_parameters(own_parts):
     assert np.array_equal(np.flatnonzero(poses(master, 60)[:, 7]), np.arange(30, 60))
 
 
-def test_own_operator_is_made_with_its_parameters_the_seed_and_its_phases(own_parts):
+def test_own_operator_is_made_with_its_parameters_the_seed_and_its_phases(own_parts: None) -> None:
     @dataclass(frozen=True, kw_only=True)
     class Wanted:
         height: float = parameter(0.01, unit="m", doc="how high")
 
     made = []
 
-    def make(parameters, setting):
+    def make(parameters: Any, setting: Setting) -> Callable[..., Any]:
         made.append((parameters.height, setting.seed, setting.phases.shape))
         return lambda times: np.zeros((len(times), 3))
 
@@ -303,12 +310,15 @@ BAD_MOTIONS = {
     "answers one row": (lambda times: np.zeros(3), "not (3,)"),
     "answers no number": (lambda times: np.full((len(times), 3), np.nan), "at 0.001 s"),
     "answers words": (lambda times: "up", "numbers"),
-    "raises": (lambda times: {}["up"], "KeyError"),
+    "raises": (lambda times: {}["up"], "KeyError"),  # type: ignore[index]
 }
 
 
 @pytest.mark.parametrize("case", BAD_MOTIONS)
-def test_operator_who_answers_wrongly_is_refused_before_the_first_tick(own_parts, case):
+def test_operator_who_answers_wrongly_is_refused_before_the_first_tick(
+    own_parts: None, case: str
+) -> None:
+    motion: Any
     motion, expected = BAD_MOTIONS[case]
     register_operator("mine", motion)
     master = master_of("mine")
@@ -324,14 +334,16 @@ def test_operator_who_answers_wrongly_is_refused_before_the_first_tick(own_parts
     [({"make": 5}, "make can be called"), ({"ahead": 0}, ">= 1 tick"),
      ({"parameters": dict}, "dataclass")],
 )  # fmt: skip
-def test_operator_that_is_put_together_wrongly_is_refused(own_parts, values, expected):
-    parts = {"make": lambda parameters, setting: motion_of("hold", 1)}
+def test_operator_that_is_put_together_wrongly_is_refused(
+    own_parts: None, values: Mapping[str, int | type[object]], expected: str
+) -> None:
+    parts: dict[str, Any] = {"make": lambda parameters, setting: motion_of("hold", 1)}
     with pytest.raises(PartError) as error:
         register_operator("mine", Operator("mine", **{**parts, **values}))
     assert expected in error.value.expected
 
 
-def test_maker_of_another_signature_is_refused_with_the_one_expected(own_parts):
-    register_operator("mine", Operator("mine", lambda parameters: None))
+def test_maker_of_another_signature_is_refused_with_the_one_expected(own_parts: None) -> None:
+    register_operator("mine", Operator("mine", lambda parameters: None))  # type: ignore[arg-type, misc]
     with pytest.raises(PartError, match=r"make\(parameters, setting\)"):
         master_of("mine")

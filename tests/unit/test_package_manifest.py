@@ -2,10 +2,13 @@
 
 import ast
 import re
+from collections.abc import Iterator
 from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
+
+from present import present
 
 SOURCES = Path(__file__).resolve().parents[2] / "src"
 PACKAGES = ("teleop_core", "teleop_lab", "teleop_drill")
@@ -15,13 +18,13 @@ ROS = re.compile(
 NAMED_BY = {"pyyaml": "python3-yaml", "teleop_core": "teleop_core"}
 
 
-def manifest(package):
+def manifest(package: str) -> tuple[set[str], str]:
     text = (SOURCES / package / "package.xml").read_text()
     root = ElementTree.fromstring(text)
-    return {node.text for node in root if node.tag.endswith("depend")}, text
+    return {node.text or "" for node in root if node.tag.endswith("depend")}, text
 
 
-def imported(package):
+def imported(package: str) -> Iterator[str]:
     """Top-level names of all modules that sources import."""
     for file in (SOURCES / package / package).rglob("*.py"):
         for node in ast.walk(ast.parse(file.read_text())):
@@ -32,7 +35,7 @@ def imported(package):
 
 
 @pytest.mark.parametrize("package", PACKAGES)
-def test_every_ros_package_that_is_imported_is_declared(package):
+def test_every_ros_package_that_is_imported_is_declared(package: str) -> None:
     declared, _ = manifest(package)
     used = {name for name in imported(package) if ROS.fullmatch(name)}
     assert package == "teleop_lab" or "rclpy" in used
@@ -40,11 +43,11 @@ def test_every_ros_package_that_is_imported_is_declared(package):
 
 
 @pytest.mark.parametrize("package", PACKAGES)
-def test_every_python_dependency_is_declared_or_noted_as_one_of_pip(package):
+def test_every_python_dependency_is_declared_or_noted_as_one_of_pip(package: str) -> None:
     declared, text = manifest(package)
-    note = re.search(r"From pip.*?-->", text, re.DOTALL).group()
+    note = present(re.search(r"From pip.*?-->", text, re.DOTALL)).group()
     setup = (SOURCES / package / "setup.py").read_text()
-    listed = re.search(r"install_requires=\[(.*?)\]", setup, re.DOTALL)
+    listed = present(re.search(r"install_requires=\[(.*?)\]", setup, re.DOTALL))
     names = re.findall(r'"([a-z0-9_]+)', listed.group(1))
     assert "numpy" in names
     for name in names:

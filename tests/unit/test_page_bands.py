@@ -1,22 +1,25 @@
 """Bands of a page: when the slave was held back, against the state that was recorded."""
 
+from pathlib import Path
+from typing import Any
+
 import numpy as np
 import pytest
 
 from recipes import START_NS, Recipe, state
-from teleop_core.evaluation.bands import bands_of, merged, stretches_of
+from teleop_core.evaluation.bands import Band, bands_of, merged, stretches_of
 from teleop_core.evaluation.context import Context
 from teleop_core.evaluation.origin import read_origin
 from teleop_core.evaluation.state_history import NO_HISTORY, StateHistory, read_history
 from teleop_core.graph.signals import STATE_FIELDS, TICK_NS
-from teleop_core.graph.topics import TELEOP_STATE, Limit
+from teleop_core.graph.topics import TELEOP_STATE, Limit, Topic
 
 COUNT = 3000
 # Times are sums of float64 seconds.
 ROUNDING = 1e-9
 
 
-def bands(recipe, path):
+def bands(recipe: Recipe, path: Path) -> dict[str, Band]:
     bag = recipe.write(path)
     return {
         band.cause: band
@@ -24,18 +27,18 @@ def bands(recipe, path):
     }
 
 
-def told(at, **values):
+def told(at: int, **values: Any) -> tuple[Topic, int, bytes]:
     stamp_ns = START_NS + at * TICK_NS
     return TELEOP_STATE, stamp_ns, state(stamp_ns, **values)
 
 
-def history(rows):
+def history(rows: list[tuple[int, None]]) -> StateHistory:
     """History with one column, at whole milliseconds."""
     stamps = START_NS + np.array([at for at, _ in rows]) * TICK_NS
     return StateHistory(stamps, np.zeros((len(rows), len(STATE_FIELDS))))
 
 
-def test_each_cause_has_its_stretches(tmp_path):
+def test_each_cause_has_its_stretches(tmp_path: Path) -> None:
     recipe = Recipe(COUNT)
     recipe.singles += [
         told(500, limit=Limit.JOINT, limited_joint=2),
@@ -57,14 +60,14 @@ def test_each_cause_has_its_stretches(tmp_path):
         assert np.allclose(found[cause].stretches, stretches, rtol=0, atol=ROUNDING), cause
 
 
-def test_recording_that_does_not_tell_limits_has_no_bands(tmp_path):
+def test_recording_that_does_not_tell_limits_has_no_bands(tmp_path: Path) -> None:
     recipe = Recipe(COUNT)
     assert bands(recipe, tmp_path / "followed") == {}
     recipe.singles = []
     assert bands(recipe, tmp_path / "silent") == {}
 
 
-def test_every_cause_has_a_band_of_its_own_colour(tmp_path):
+def test_every_cause_has_a_band_of_its_own_colour(tmp_path: Path) -> None:
     recipe = Recipe(COUNT)
     causes = [limit for limit in Limit if limit is not Limit.NONE]
     recipe.singles += [
@@ -75,7 +78,7 @@ def test_every_cause_has_a_band_of_its_own_colour(tmp_path):
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_stretches_hold_just_the_times_at_which_it_is_so(seed):
+def test_stretches_hold_just_the_times_at_which_it_is_so(seed: int) -> None:
     rng = np.random.default_rng(seed)
     at = np.sort(rng.choice(np.arange(-50, COUNT + 50), 200, replace=False))
     is_so = rng.random(200) < 0.5
@@ -88,11 +91,11 @@ def test_stretches_hold_just_the_times_at_which_it_is_so(seed):
     assert np.array_equal(inside, expected)
 
 
-def test_no_history_has_no_stretches():
+def test_no_history_has_no_stretches() -> None:
     assert stretches_of(NO_HISTORY, np.empty(0, bool), 0, 10**9).shape == (0, 2)
 
 
-def test_merging_loses_no_stretch_and_joins_the_nearest():
+def test_merging_loses_no_stretch_and_joins_the_nearest() -> None:
     rng = np.random.default_rng(3)
     ends = np.cumsum(rng.exponential(0.01, 10_000)).reshape(-1, 2)
     few = merged(ends, 300)
@@ -104,6 +107,6 @@ def test_merging_loses_no_stretch_and_joins_the_nearest():
     assert closed.max() <= gaps.min()
 
 
-def test_few_stretches_stay_as_they_are():
+def test_few_stretches_stay_as_they_are() -> None:
     ends = np.array([[0.0, 0.1], [0.1004, 0.2]])
     assert merged(ends) is ends

@@ -2,21 +2,23 @@
 
 import base64
 import zlib
+from typing import Any
 
 import numpy as np
 import pytest
 
-from teleop_core.evaluation.packing import EXACT, FINEST_BITS, bits_within, pack
+from teleop_core.evaluation.packing import EXACT, FINEST_BITS, Packed, bits_within, pack
+from teleop_core.kernels.geometry import Array
 
 # Steps come out as decimal fractions; sums of half a million of them as float64.
 ROUNDING = 1e-6
 
 
-def inflated(text):
+def inflated(text: str) -> bytes:
     return zlib.decompress(base64.b64decode(text), -zlib.MAX_WBITS) if text else b""
 
 
-def unpacked(packed):
+def unpacked(packed: Packed) -> Array:
     """The numbers again, by sums over Python's integers."""
     data = inflated(packed.data)
     if packed.order == 0:
@@ -35,7 +37,7 @@ def unpacked(packed):
     return found
 
 
-def walk(count=20_000, seed=1):
+def walk(count: int = 20_000, seed: int = 1) -> Array:
     return 400.0 + np.cumsum(np.random.default_rng(seed).normal(scale=0.02, size=count))
 
 
@@ -54,14 +56,14 @@ def walk(count=20_000, seed=1):
     ],
 )
 @pytest.mark.parametrize("bits", [2.0, 5.0, 8.0])
-def test_unpacked_numbers_are_within_half_a_step(values, bits):
+def test_unpacked_numbers_are_within_half_a_step(values: Any, bits: float) -> None:
     packed = pack(values, bits)
     half = 0.5 * packed.step * (1.0 + ROUNDING) + 1e-12 * np.abs(values).max()
     assert packed.count == len(values)
     assert np.abs(unpacked(packed) - values).max() <= half
 
 
-def test_what_is_no_number_is_a_hole_and_nothing_else_is():
+def test_what_is_no_number_is_a_hole_and_nothing_else_is() -> None:
     values = walk(9000)
     values[:7] = values[100:250] = values[-1] = np.nan
     values[500], values[501] = np.inf, -np.inf
@@ -72,11 +74,11 @@ def test_what_is_no_number_is_a_hole_and_nothing_else_is():
 
 
 @pytest.mark.parametrize("values", [np.full(9000, np.nan), np.full(9, np.nan), np.empty(0)])
-def test_without_numbers_there_are_only_holes(values):
+def test_without_numbers_there_are_only_holes(values: Array) -> None:
     assert np.array_equal(unpacked(pack(values, 4.0)), values, equal_nan=True)
 
 
-def test_few_numbers_are_not_rounded():
+def test_few_numbers_are_not_rounded() -> None:
     values = 10.0 ** np.random.default_rng(5).uniform(-9, 9, EXACT)
     values[7] = np.nan
     assert np.array_equal(unpacked(pack(values, 2.0)), values, equal_nan=True)
@@ -84,7 +86,7 @@ def test_few_numbers_are_not_rounded():
 
 @pytest.mark.parametrize("bits", [3.0, 4.0, 6.0])
 @pytest.mark.parametrize("noise", ["normal", "laplace", "uniform"])
-def test_noise_takes_no_more_bits_than_allowed(bits, noise):
+def test_noise_takes_no_more_bits_than_allowed(bits: float, noise: str) -> None:
     values = np.cumsum(getattr(np.random.default_rng(4), noise)(size=200_000))
     packed = pack(values, bits)
     taken = 8 * len(base64.b64decode(packed.data)) / packed.count
@@ -92,25 +94,25 @@ def test_noise_takes_no_more_bits_than_allowed(bits, noise):
     assert taken >= bits - 2.0, "coarser than there is room for"
 
 
-def test_rounding_is_a_part_of_the_change_from_sample_to_sample():
+def test_rounding_is_a_part_of_the_change_from_sample_to_sample() -> None:
     values = walk()
     packed = pack(values, 5.0)
     assert packed.step <= 0.5 * np.abs(np.diff(values)).mean()
 
 
-def test_more_bits_than_the_finest_change_nothing():
+def test_more_bits_than_the_finest_change_nothing() -> None:
     assert pack(walk(), 30.0) == pack(walk(), FINEST_BITS)
 
 
 @pytest.mark.parametrize("period", [0.001, 0.008, 0.02, 1.0 / 30.0])
-def test_regular_times_take_next_to_nothing(period):
+def test_regular_times_take_next_to_nothing(period: float) -> None:
     times = np.arange(100_000) * period
     packed = pack(times, 4.0)
     assert np.abs(unpacked(packed) - times).max() <= 0.005 * period
     assert len(packed.data) < 12_000
 
 
-def test_steps_are_short_decimal_fractions():
+def test_steps_are_short_decimal_fractions() -> None:
     rng = np.random.default_rng(6)
     for scale in 10.0 ** rng.uniform(-7, 7, 100):
         step = pack(scale * walk(5000), 5.0).step
@@ -118,12 +120,12 @@ def test_steps_are_short_decimal_fractions():
         assert step == float(f"{step:.0e}")
 
 
-def test_large_numbers_are_unpacked_in_double_precision():
+def test_large_numbers_are_unpacked_in_double_precision() -> None:
     assert pack(1e9 + walk(), 6.0).wide
     assert not pack(walk(), 4.0).wide
 
 
-def test_all_arrays_together_fill_the_room_but_no_more():
+def test_all_arrays_together_fill_the_room_but_no_more() -> None:
     rng = np.random.default_rng(8)
     steps = np.repeat(rng.integers(0, 9, 3000), 100) * 0.055
     arrays = [walk(300_000, 1), walk(300_000, 2), rng.normal(size=300_000), steps]

@@ -1,6 +1,7 @@
 """Parameters: types, bounds, tuples, nested groups, relations, and what a refusal says."""
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import pytest
@@ -27,34 +28,36 @@ class Arm:
     tags: tuple[str, ...] = parameter((), choices=("a", "b"), doc="marks")
     spring: Spring = field(default_factory=Spring)
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         if self.slow > self.fast:
             raise ParameterError("slow", self.slow, f"<= fast {self.fast}")
 
 
-def refusal(values, prefix=""):
+def refusal(
+    values: Mapping[str, str | float | bool | tuple[str | float, ...] | None], prefix: str = ""
+) -> ParameterError:
     with pytest.raises(ParameterError) as error:
         build(Arm, values, prefix)
     return error.value
 
 
-def test_defaults_stand_where_nothing_is_said():
+def test_defaults_stand_where_nothing_is_said() -> None:
     assert build(Arm, {}) == Arm()
 
 
-def test_nested_groups_are_reached_by_dotted_names():
+def test_nested_groups_are_reached_by_dotted_names() -> None:
     arm = build(Arm, {"spring.stiffness": 10.0, "spring.rest": (0.1, 0.2), "count": 4})
     assert arm == Arm(count=4, spring=Spring(stiffness=10.0, rest=(0.1, 0.2)))
 
 
-def test_declarations_come_in_order_with_dotted_names():
+def test_declarations_come_in_order_with_dotted_names() -> None:
     names = [spec.name for spec in specs(Arm)]
     assert names == [
         "name", "count", "is_on", "slow", "fast", "tags", "spring.stiffness", "spring.rest",
     ]  # fmt: skip
 
 
-def test_declarations_carry_what_the_table_and_ros_need():
+def test_declarations_carry_what_the_table_and_ros_need() -> None:
     declared = {spec.name: spec for spec in specs(Arm)}
     stiffness, tags = declared["spring.stiffness"], declared["tags"]
     assert (stiffness.unit, stiffness.default, stiffness.kind) == ("N/m", 300.0, float)
@@ -63,7 +66,7 @@ def test_declarations_carry_what_the_table_and_ros_need():
     assert not stiffness.fixed
 
 
-def test_lists_serve_as_tuples():
+def test_lists_serve_as_tuples() -> None:
     assert build(Arm, {"spring.rest": [0.3, 0.4]}).spring.rest == (0.3, 0.4)
 
 
@@ -81,75 +84,77 @@ def test_lists_serve_as_tuples():
         ("tags", "a"),
     ],
 )
-def test_another_type_is_refused_by_name(name, value):
+def test_another_type_is_refused_by_name(
+    name: str, value: str | float | bool | tuple[float, int] | None
+) -> None:
     error = refusal({name: value})
     assert error.name == name
     assert "type" in error.requirement or "list" in error.requirement
 
 
-def test_whole_number_for_a_real_one_is_refused_with_the_way_out():
+def test_whole_number_for_a_real_one_is_refused_with_the_way_out() -> None:
     assert "1.0" in refusal({"slow": 1}).requirement
 
 
 @pytest.mark.parametrize("name", ["slow", "fast", "spring.stiffness"])
 @pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
-def test_nan_and_infinity_are_refused_with_and_without_bounds(name, value):
+def test_nan_and_infinity_are_refused_with_and_without_bounds(name: str, value: float) -> None:
     error = refusal({name: value})
     assert error.name == name
     assert "finite" in error.requirement
 
 
-def test_nan_inside_a_list_is_refused():
+def test_nan_inside_a_list_is_refused() -> None:
     assert refusal({"spring.rest": (0.0, math.nan)}).name == "spring.rest"
 
 
-def test_bounds_themselves_are_allowed():
+def test_bounds_themselves_are_allowed() -> None:
     assert build(Arm, {"spring.stiffness": 1.0}).spring.stiffness == 1.0
     assert build(Arm, {"spring.stiffness": 5000.0}).spring.stiffness == 5000.0
 
 
 @given(st.one_of(st.floats(max_value=math.nextafter(1.0, 0.0)), st.floats(min_value=5000.1)))
-def test_every_number_outside_the_bounds_is_refused_with_range_and_unit(value):
+def test_every_number_outside_the_bounds_is_refused_with_range_and_unit(value: float) -> None:
     error = refusal({"spring.stiffness": value})
     assert error.value == value
     assert "between 1 and 5000 N/m" in error.requirement
 
 
 @pytest.mark.parametrize("value", [(), (0.1,), (0.1, 0.2, 0.3)])
-def test_tuple_of_another_length_is_refused(value):
+def test_tuple_of_another_length_is_refused(value: tuple[float, ...]) -> None:
     assert "2 values" in refusal({"spring.rest": value}).requirement
 
 
-def test_each_element_of_a_tuple_is_held_to_the_bounds():
+def test_each_element_of_a_tuple_is_held_to_the_bounds() -> None:
     assert "at least -1 m" in refusal({"spring.rest": (0.0, -1.5)}).requirement
 
 
-def test_name_that_is_no_choice_is_refused_with_the_choices():
+def test_name_that_is_no_choice_is_refused_with_the_choices() -> None:
     error = refusal({"name": "middle"})
     assert isinstance(error, UnknownNameError)
     assert error.alternatives == ("left", "right")
 
 
-def test_choices_hold_for_each_element_of_a_tuple():
+def test_choices_hold_for_each_element_of_a_tuple() -> None:
     assert refusal({"tags": ("a", "c")}).value == "c"
 
 
 @pytest.mark.parametrize("name", ["nam", "spring", "spring.", "spring.stiff", "stiffness", ""])
-def test_unknown_name_is_refused_with_all_names(name):
+def test_unknown_name_is_refused_with_all_names(name: str) -> None:
     error = refusal({name: 1.0})
     assert isinstance(error, UnknownNameError)
     assert "spring.stiffness" in error.alternatives
 
 
-def test_broken_relation_between_values_is_refused():
+def test_broken_relation_between_values_is_refused() -> None:
     assert refusal({"slow": 0.6}).requirement == "<= fast 0.5"
 
 
-def test_relation_is_checked_against_the_values_given_together():
+def test_relation_is_checked_against_the_values_given_together() -> None:
     assert build(Arm, {"slow": 0.6, "fast": 0.7}).slow == 0.6
 
 
-def test_refusal_names_the_stage_too():
+def test_refusal_names_the_stage_too() -> None:
     assert refusal({"spring.stiffness": 0.0}, "master.").name == "master.spring.stiffness"
 
 
@@ -162,12 +167,14 @@ def test_refusal_names_the_stage_too():
         st.tuples(st.floats(-1.0, 10.0), st.floats(-1.0, 10.0)), st.integers(1, 1000),
     )
 )  # fmt: skip
-def test_values_of_a_group_build_it_again(values):
+def test_values_of_a_group_build_it_again(
+    values: Mapping[str, str | float | tuple[float, float]],
+) -> None:
     arm = build(Arm, values)
     assert build(Arm, values_of(arm)) == arm
 
 
-def test_field_of_a_type_that_no_parameter_can_have_is_a_programming_error():
+def test_field_of_a_type_that_no_parameter_can_have_is_a_programming_error() -> None:
     @dataclass(frozen=True)
     class Wrong:
         maybe: float | None = parameter(None, doc="")

@@ -4,7 +4,10 @@ import os
 import subprocess
 import sys
 import warnings
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, cast
 
 import pytest
 
@@ -25,11 +28,17 @@ from teleop_core.slave.controllers.pid import PID
 ECHO = Topic("test/echo", Kind.POSE, passed_on("slave/measured_cp"))
 
 
-def rest(parameters, state, signals, dt):
+def rest(parameters: Any, state: Any, signals: Any, dt: Any) -> None:
     """Step of a stage that does nothing."""
 
 
-def stage(name="echo", parameters=NoParameters, step=rest, reads=(SLAVE_MEASURED_CP,), **more):
+def stage(
+    name: str = "echo",
+    parameters: Any = NoParameters,
+    step: Callable[..., Any] = rest,
+    reads: tuple[Topic] = (SLAVE_MEASURED_CP,),
+    **more: Any,
+) -> Stage:
     return Stage(name, parameters, reads, (ECHO,), step=step, **more)
 
 
@@ -65,7 +74,7 @@ WRONG_GROUPS = {
 
 
 @pytest.mark.parametrize("group", WRONG_GROUPS)
-def test_wrong_declaration_of_a_parameter_is_refused_before_it_is_used(group):
+def test_wrong_declaration_of_a_parameter_is_refused_before_it_is_used(group: type[object]) -> None:
     kind, told = WRONG_GROUPS[group]
     for way in (lambda: list(specs(group)), lambda: build(group, {}), lambda: stage("own", group)):
         with pytest.raises(kind, match=told):
@@ -75,14 +84,16 @@ def test_wrong_declaration_of_a_parameter_is_refused_before_it_is_used(group):
 WAYS_IN = {
     "fixture": lambda group: register_fixture(replace(SPHERE, name="own", parameters=group)),
     "controller": lambda group: register_controller(replace(PID, name="own", parameters=group)),
-    "operator": lambda group: register_operator("own", Operator("own", lambda p, s: None, group)),
+    "operator": lambda group: register_operator("own", Operator("own", lambda p, s: None, group)),  # type: ignore[arg-type, return-value]
     "stage": lambda group: stage("own", group),
 }
 
 
 @pytest.mark.parametrize("kind", WAYS_IN)
 @pytest.mark.parametrize("group", [NoParameters(), TooFast(), dict], ids=repr)
-def test_group_that_is_no_dataclass_but_an_object_is_refused(own_parts, kind, group):
+def test_group_that_is_no_dataclass_but_an_object_is_refused(
+    own_parts: None, kind: str, group: NoParameters | TooFast | type[object]
+) -> None:
     with pytest.raises(
         PartError, match=f"^{kind} 'own' must be one whose parameters are a dataclas"
     ):
@@ -93,19 +104,23 @@ def test_group_that_is_no_dataclass_but_an_object_is_refused(own_parts, kind, gr
 
 
 @pytest.mark.parametrize("name", ["", "my fixture", "a.b", "a/b", "-a", "a=b", None, 5])
-def test_name_that_keys_and_files_cannot_hold_is_refused(own_parts, name):
+def test_name_that_keys_and_files_cannot_hold_is_refused(
+    own_parts: None, name: str | int | None
+) -> None:
     with pytest.raises(PartError, match="named by letters, digits, _ and -") as error:
-        register_fixture(replace(SPHERE, name=name))
+        register_fixture(replace(SPHERE, name=cast(str, name)))
     assert (error.value.kind, error.value.name) == ("fixture", name)
 
 
 @pytest.mark.parametrize("name", ["my_2nd", "my-cone", "Kegel", "größe"])
-def test_name_of_letters_digits_underscores_and_hyphens_is_taken(own_parts, name):
+def test_name_of_letters_digits_underscores_and_hyphens_is_taken(
+    own_parts: None, name: str
+) -> None:
     assert register_fixture(replace(SPHERE, name=name)).name == name
 
 
 @pytest.mark.parametrize("name", ["", "my-limit", "my limit", "2nd", "a.b"])
-def test_name_of_a_stage_that_is_no_identifier_is_refused(name):
+def test_name_of_a_stage_that_is_no_identifier_is_refused(name: str) -> None:
     with pytest.raises(PartError, match="a name of letters, digits and _"):
         stage(name)
 
@@ -117,8 +132,10 @@ def test_name_of_a_stage_that_is_no_identifier_is_refused(name):
 @pytest.mark.parametrize(
     "value", [SLAVE_SERVO_CP, "slave/servo_cp", ("slave/servo_cp",), [SLAVE_SERVO_CP], None]
 )
-def test_topics_of_a_stage_that_are_no_tuple_of_topics_are_refused_with_an_example(word, value):
-    given = {"reads": (SLAVE_MEASURED_CP,), "writes": (ECHO,), word: value}
+def test_topics_of_a_stage_that_are_no_tuple_of_topics_are_refused_with_an_example(
+    word: str, value: str | Sequence[str | Topic] | Topic | None
+) -> None:
+    given: dict[str, Any] = {"reads": (SLAVE_MEASURED_CP,), "writes": (ECHO,), word: value}
     with pytest.raises(PartError, match=rf"with {word} as a tuple of Topic, such as \(topics\."):
         Stage("echo", NoParameters, step=rest, **given)
 
@@ -126,11 +143,11 @@ def test_topics_of_a_stage_that_are_no_tuple_of_topics_are_refused_with_an_examp
 # Fields of a record.
 
 
-def misspells(p, s, row, dt):
+def misspells(p: Any, s: Any, row: Any, dt: Any) -> None:
     row.test_ehco[0] = 1.0
 
 
-def test_misspelt_field_of_a_plain_record_suggests_the_near_one():
+def test_misspelt_field_of_a_plain_record_suggests_the_near_one() -> None:
     row = records([("gain", "f8"), ("place", "f8", (3,))])[0]
     told = r"^record has no field 'gian'; did you mean 'gain'\? \(fields: gain, place\)$"
     with pytest.raises(AttributeError, match=told):
@@ -147,12 +164,12 @@ def test_misspelt_field_of_a_plain_record_suggests_the_near_one():
 
 
 @kernel
-def beyond_the_end(p, s, row, dt):
+def beyond_the_end(p: Any, s: Any, row: Any, dt: Any) -> None:
     for i in range(8):
         row.test_echo[i] = row.slave_measured_cp[i]
 
 
-def test_index_beyond_the_end_is_told_with_file_and_line_before_the_first_tick():
+def test_index_beyond_the_end_is_told_with_file_and_line_before_the_first_tick() -> None:
     line = beyond_the_end.py_func.__code__.co_firstlineno + 3
     told = rf"^stage 'echo' must be one that stays inside its arrays; index 7 is .*\.py:{line}\)$"
     with pytest.raises(PartError, match=told):
@@ -160,12 +177,12 @@ def test_index_beyond_the_end_is_told_with_file_and_line_before_the_first_tick()
 
 
 @kernel
-def counts(p, s, row, dt):
+def counts(p: Any, s: Any, row: Any, dt: Any) -> None:
     s.count += 1
     row.test_echo[0] = 1.0 / row.test_echo[1] + s.count
 
 
-def test_trial_of_a_step_leaves_no_trace():
+def test_trial_of_a_step_leaves_no_trace() -> None:
     with warnings.catch_warnings(record=True) as told:
         warnings.simplefilter("always")
         runner = stage(step=counts, state=(("count", "i8"),)).run(NoParameters())
@@ -197,7 +214,7 @@ for _ in range(3):
 
 
 @pytest.mark.skipif(not IS_COMPILED, reason="plain Python always checks")
-def test_index_that_goes_wrong_later_is_found_with_checks_compiled_in(tmp_path):
+def test_index_that_goes_wrong_later_is_found_with_checks_compiled_in(tmp_path: Path) -> None:
     (tmp_path / "later.py").write_text(LATER)
     errors = []
     for checks in ("0", "1", "0"):  # each finds its own kernels on the disk
@@ -213,7 +230,9 @@ def test_index_that_goes_wrong_later_is_found_with_checks_compiled_in(tmp_path):
 # Sessions and metrics.
 
 
-def test_parameter_of_a_stage_that_the_session_has_not_is_refused_with_the_way_out(own_parts):
+def test_parameter_of_a_stage_that_the_session_has_not_is_refused_with_the_way_out(
+    own_parts: None,
+) -> None:
     @dataclass(frozen=True, kw_only=True)
     class Limit:
         speed: float = parameter(0.1, unit="m/s", doc="of the tool")
@@ -226,14 +245,14 @@ def test_parameter_of_a_stage_that_the_session_has_not_is_refused_with_the_way_o
 
 
 class Nameless(Metric):
-    def add(self, window):
+    def add(self, window: Any) -> None:
         """Take nothing."""
 
-    def values(self):
+    def values(self) -> dict[Any, Any]:
         return {}
 
 
-@pytest.mark.parametrize("part", [Nameless, Nameless(None), object()], ids=["class", "one", "none"])
-def test_metric_class_without_a_name_or_no_class_is_refused(part):
+@pytest.mark.parametrize("part", [Nameless, Nameless(None), object()], ids=["class", "one", "none"])  # type: ignore[arg-type]
+def test_metric_class_without_a_name_or_no_class_is_refused(part: Any) -> None:
     with pytest.raises(PartError, match=r"^metric '\w+' must be .*(own name|a class below)"):
         evaluation.register_metric(part)

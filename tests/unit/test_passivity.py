@@ -1,7 +1,11 @@
 """Passivity: power of a port, energies that only grow, and laws over networks drawn at random."""
 
+from collections.abc import Callable, Iterator
+from typing import Any
+
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from teleop_core.base.parameters import NoParameters, build
 from teleop_core.chain.mapping.parameters import MotionScalingParameters
@@ -23,6 +27,7 @@ from teleop_core.chain.passivity.slave_side import PASSIVITY, PassivityParameter
 from teleop_core.chain.passivity.tank import tank_hand, tank_slave
 from teleop_core.chain.passivity.tdpa import tdpa_hand, tdpa_slave
 from teleop_core.graph.topics import ENERGY, OPERATION
+from teleop_core.kernels.geometry import Array
 from teleop_core.session.configuration import configure
 from teleop_core.session.virtual import VirtualTime
 
@@ -32,17 +37,17 @@ BOTH = ("teleop.stages=[network,passivity]", "feedback_timeout=1.0", "reach_forc
 TICK_NS = 1_000_000
 
 
-def pressing(*texts, ticks=12_000):
+def pressing(*texts: str, ticks: int = 12_000) -> NDArray[np.void]:
     """Signals of the scenario ``palpation`` with both ports."""
     return VirtualTime(configure("palpation", settings=[*BOTH, *texts])).run(ticks)
 
 
-def slave_port():
+def slave_port() -> Callable[[Array, Array], Array]:
     """The slave's side at rest, and a call that makes a tick with force (6,) and pose (7,)."""
     stage = PASSIVITY.run(PassivityParameters())
     row = stage.signals
 
-    def tick(force, pose):
+    def tick(force: Array, pose: Array) -> Array:
         now_ns = int(row["slave_measured_cp_ns"]) + TICK_NS
         row["slave_measured_cf"], row["slave_measured_cp"] = force, pose
         row["slave_measured_cf_ns"] = row["slave_measured_cp_ns"] = now_ns
@@ -52,7 +57,7 @@ def slave_port():
     return tick
 
 
-def moved(axis, way):
+def moved(axis: int, way: float) -> Array:
     """Pose (7,) that is a way [m] along an axis from the origin, or for 3 to 5 a turn [rad]."""
     pose = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
     if axis < 3:
@@ -64,7 +69,9 @@ def moved(axis, way):
 
 @pytest.mark.parametrize("along", range(6))
 @pytest.mark.parametrize("pushed", range(6))
-def test_the_power_of_the_slaves_port_is_each_force_times_its_own_speed(pushed, along):
+def test_the_power_of_the_slaves_port_is_each_force_times_its_own_speed(
+    pushed: int, along: int
+) -> None:
     """Force with speed and torque with turn, in J: 2 N over 1 mm are 2 mJ."""
     tick, force = slave_port(), np.zeros(6)
     force[pushed] = 2.0
@@ -80,7 +87,7 @@ def test_the_power_of_the_slaves_port_is_each_force_times_its_own_speed(pushed, 
     assert not back[others].any()
 
 
-def test_energies_at_the_hand_are_its_push_times_its_way_on_every_axis():
+def test_energies_at_the_hand_are_its_push_times_its_way_on_every_axis() -> None:
     rows = pressing("reflection.passivity=none", "operator.kind=circle", "world.material=silicone",
                     "operator.size=[0.006,0.02,0.006]")  # fmt: skip
     push, place = rows["master_servo_cf"][:-1, :3], rows["master_measured_cp"][:, :3]
@@ -93,7 +100,7 @@ def test_energies_at_the_hand_are_its_push_times_its_way_on_every_axis():
     np.testing.assert_allclose(told[-1, OUT], -work[work < 0.0].sum(), rtol=1e-9)
 
 
-def test_energies_that_are_lost_late_or_doubled_take_nothing_away():
+def test_energies_that_are_lost_late_or_doubled_take_nothing_away() -> None:
     rng, port, sent = np.random.default_rng(1), np.zeros(len(ENERGY)), []
     begin_round(port, 2.0, 1.0)
     for told in np.cumsum(rng.uniform(0.0, 1e-3, 200)):
@@ -109,7 +116,7 @@ def test_energies_that_are_lost_late_or_doubled_take_nothing_away():
     assert hear_energy(port, sent[-1]) == 0.0  # of another round
 
 
-def hand_port(rng, count=4000):
+def hand_port(rng: np.random.Generator, count: int = 4000) -> Iterator[tuple[Array, float, Array]]:
     """A hand that shakes under a push of 2 N and hears energy now and then: port, way, heard."""
     port, memory, numbers = np.zeros(len(ENERGY)), np.zeros(12), np.array([3e-4])
     begin_round(port, 2.0, 1.0)
@@ -126,7 +133,7 @@ def hand_port(rng, count=4000):
         yield port, way, push
 
 
-def test_the_hand_is_given_no_more_than_was_heard_and_what_it_put_in_and_did_not_tell():
+def test_the_hand_is_given_no_more_than_was_heard_and_what_it_put_in_and_did_not_tell() -> None:
     """At every sample, but for the 5 mN of an empty port on its way."""
     pushes = []
     for port, way, push in hand_port(np.random.default_rng(3)):
@@ -136,14 +143,18 @@ def test_the_hand_is_given_no_more_than_was_heard_and_what_it_put_in_and_did_not
     assert max(pushes) == 2.0
 
 
-def slave_law(numbers=(0.2, 0.03, 0.01, 1e-3, 2.0)):
+def slave_law(
+    numbers: tuple[float, ...] = (0.2, 0.03, 0.01, 1e-3, 2.0),
+) -> Callable[..., tuple[Array, float]]:
     """Calls of the slave's law of TDPA, 2 N against z: port and the command it gives."""
     port, memory, force = np.zeros(len(ENERGY)), np.zeros(12), np.zeros(6)
     begin_round(port, 2.0, 1.0)
     last = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
     force[2] = 2.0
 
-    def command(height, heard=0.0, into=0.0, out=0.0, push=2.0):
+    def command(
+        height: float, heard: float = 0.0, into: float = 0.0, out: float = 0.0, push: float = 2.0
+    ) -> tuple[Array, float]:
         force[2] = push
         given = np.array([0.0, 0.0, height, 1.0, 0.0, 0.0, 0.0])
         port[IN] += into
@@ -156,7 +167,7 @@ def slave_law(numbers=(0.2, 0.03, 0.01, 1e-3, 2.0)):
 
 
 @pytest.mark.parametrize("step", [1e-4, 9e-5])
-def test_a_command_goes_against_the_force_as_far_as_credit_and_hand_pay_for(step):
+def test_a_command_goes_against_the_force_as_far_as_credit_and_hand_pay_for(step: float) -> None:
     command, heard, rng = slave_law(), 0.0, np.random.default_rng(4)
     for k in range(400):
         gained = rng.choice([0.0, 1e-5])
@@ -170,7 +181,7 @@ def test_a_command_goes_against_the_force_as_far_as_credit_and_hand_pay_for(step
     assert height == pytest.approx(-step * k, abs=1e-6)
 
 
-def test_drift_goes_by_the_way_on_which_the_hand_comes_back_and_drives_the_arm_nowhere():
+def test_drift_goes_by_the_way_on_which_the_hand_comes_back_and_drives_the_arm_nowhere() -> None:
     command, step = slave_law(), 1e-4
     for k in range(300):
         height = command(-step * k)[1]
@@ -188,7 +199,9 @@ def test_drift_goes_by_the_way_on_which_the_hand_comes_back_and_drives_the_arm_n
 @pytest.mark.parametrize(
     ("moved", "met"), [((3e-3, 0, 0), 0), ((0, 0, -1e-3), 0), ((3e-3, 0, 1e-3), 1e-3)]
 )
-def test_only_the_way_against_its_drift_brings_the_hand_back(moved, met):
+def test_only_the_way_against_its_drift_brings_the_hand_back(
+    moved: tuple[float, int, float], met: float
+) -> None:
     port, last, air = np.zeros(len(ENERGY)), np.array([0.0, 0, 0, 1, 0, 0, 0]), np.zeros(6)
     begin_round(port, 2.0, 1.0)
     port[DRIFT + 2] = -5e-3
@@ -200,7 +213,7 @@ def test_only_the_way_against_its_drift_brings_the_hand_back(moved, met):
 
 
 @pytest.mark.parametrize("seed", range(20))
-def test_an_exact_arm_gives_a_spring_no_more_than_credit_however_the_hand_goes(seed):
+def test_an_exact_arm_gives_a_spring_no_more_than_credit_however_the_hand_goes(seed: int) -> None:
     """The tip is where its command is; the way of the last tick is counted with the next one."""
     rng, command, force = np.random.default_rng(seed), slave_law(), 0.0
     stiffness, height, tip, into, out = 10.0 ** rng.uniform(2.0, 4.0), 0.0, 0.0, 0.0, 0.0
@@ -213,10 +226,10 @@ def test_an_exact_arm_gives_a_spring_no_more_than_credit_however_the_hand_goes(s
         assert 0.5 * stiffness * (tip**2 - (before - tip) ** 2) <= 1.001e-3
 
 
-def test_a_touch_that_is_over_leaves_nothing_in_the_tank():
+def test_a_touch_that_is_over_leaves_nothing_in_the_tank() -> None:
     memory, port, push, still = np.zeros(12), np.zeros(len(ENERGY)), np.zeros(3), np.zeros(3)
 
-    def sample(wanted, last, moved):
+    def sample(wanted: float, last: float, moved: float) -> float:
         push[:] = wanted, 0.0, 0.0
         pushed, way = np.array([last, 0.0, 0.0]), np.array([moved, 0.0, 0.0])
         tank_hand(still, memory, pushed, way, way, still, port, port, push, 1.0, 1e-3)
@@ -276,7 +289,7 @@ def test_a_hand_with_a_tank_rests_on_steel_without_bouncing_near_and_far(late):
     assert gained(rows) < 0.3e-3
 
 
-def test_what_the_arm_lent_is_paid_back_before_the_hand_gets_any():
+def test_what_the_arm_lent_is_paid_back_before_the_hand_gets_any() -> None:
     command = slave_law()
     assert command(0.0, out=1e-3)[0][TOLD] == 0.0
     assert command(0.0, into=6e-4)[0][TOLD] == 0.0
@@ -285,8 +298,20 @@ def test_what_the_arm_lent_is_paid_back_before_the_hand_gets_any():
     assert command(0.0, heard=1e-3, into=1e-4)[0][TOLD] == pytest.approx(1.3e-3, rel=1e-12)
 
 
-def test_no_part_pushes_harder_than_allowed():
-    def rude(numbers, memory, last, moved, led, flow, heard, port, push, scale, period):
+def test_no_part_pushes_harder_than_allowed() -> None:
+    def rude(
+        numbers: Array,
+        memory: Array,
+        last: Array,
+        moved: Array,
+        led: Array,
+        flow: Array,
+        heard: Array,
+        port: Array,
+        push: Array,
+        scale: float,
+        period: float,
+    ) -> None:
         push *= 100.0
 
     register_passivity(Passivity("rude", NoParameters, rude))
@@ -296,7 +321,7 @@ def test_no_part_pushes_harder_than_allowed():
     assert force.max() == pytest.approx(1.5, rel=1e-9)
 
 
-def test_with_another_passivity_energies_begin_anew_while_a_session_runs():
+def test_with_another_passivity_energies_begin_anew_while_a_session_runs() -> None:
     session = VirtualTime(configure("palpation", settings=[*BOTH]))
     before = session.run(7500)
     assert before["master_energy"][-1, IN] > 1e-5
@@ -323,7 +348,9 @@ YIELDING = {
 """Settings of architectures before a slave that yields."""
 
 
-def drawn(rng, kind, architecture="position_force"):
+def drawn(
+    rng: np.random.Generator, kind: str, architecture: str = "position_force"
+) -> tuple[Any, ...]:
     """Settings of a session drawn at random: world, gains, hand and network."""
     stiffness = 10.0 ** rng.uniform(1.5, 4.7)
     there = rng.uniform(0.0, 0.5)
@@ -345,7 +372,7 @@ def drawn(rng, kind, architecture="position_force"):
     )  # fmt: skip
 
 
-def gained(rows):
+def gained(rows: Any) -> float:
     """Most that a touch gave the hand beyond what it took, but for 5 mN on its way [J]."""
     force, place = rows["master_servo_cf"][:-1, :3], rows["master_measured_cp"][:, :3]
     steps = np.diff(place, axis=0)
@@ -357,13 +384,13 @@ def gained(rows):
     return largest
 
 
-def fastest(rows):
+def fastest(rows: NDArray[np.void]) -> float:
     """Fastest that the hand gets [m/s] once it leads the slave."""
     places = rows["master_measured_cp"][5000:, :3]
     return np.linalg.norm(places[20:] - places[:-20], axis=1).max() / 0.02
 
 
-def check_ports(rows):
+def check_ports(rows: NDArray[np.void]) -> None:
     """Neither side heard more than the other told, and told no more than came in, in any round."""
     hand, slave = rows["master_energy"], rows["slave_energy"]
     for own, other in ((hand, slave), (slave, hand)):
@@ -375,7 +402,7 @@ def check_ports(rows):
             assert mine[:, HEARD].max() <= most
 
 
-def left_at_the_hand(rows, scale):
+def left_at_the_hand(rows: Any, scale: float) -> float:
     """Least that the hand's port had left to give in a touch, by forces and places alone [J]."""
     hand, force = rows["master_energy"], rows["master_servo_cf"][:-1, :3]
     steps = np.diff(rows["master_measured_cp"][:, :3], axis=0)
@@ -393,7 +420,9 @@ def left_at_the_hand(rows, scale):
 @pytest.mark.slow
 @pytest.mark.parametrize("architecture", ["position_force", "three_channel", "four_channel"])
 @pytest.mark.parametrize("kind", ["tank", "tdpa"])
-def test_no_network_and_no_world_makes_passivity_give_the_hand_energy(kind, architecture):
+def test_no_network_and_no_world_makes_passivity_give_the_hand_energy(
+    kind: str, architecture: str
+) -> None:
     """Delay to 1 s there and back, jitter, loss to a half, 30 N/m to 50 kN/m, any grip."""
     rng = np.random.default_rng(7)
     for _ in range(10):
@@ -411,19 +440,21 @@ def test_no_network_and_no_world_makes_passivity_give_the_hand_energy(kind, arch
             assert left_at_the_hand(rows, scale) > -3.3 * STEP, texts
 
 
-def steel(kind):
+def steel(kind: str) -> float:
     """Fastest hand [m/s] that presses steel, of which it hears 50 ms later."""
     late = ("network.there.least_delay=0.025", "network.back.least_delay=0.025")
     return fastest(pressing(f"reflection.passivity={kind}", "world.material=steel", *late))
 
 
-def test_steel_throws_a_hand_50_ms_away_and_passivity_keeps_it():
+def test_steel_throws_a_hand_50_ms_away_and_passivity_keeps_it() -> None:
     assert steel("none") > 0.15
     assert steel("tdpa") < 0.06
 
 
 @pytest.mark.parametrize("kind", ["tank", "tdpa"])
-def test_four_channels_100_ms_away_give_the_hand_no_energy_and_the_slave_none_that_is_unpaid(kind):
+def test_four_channels_100_ms_away_give_the_hand_no_energy_and_the_slave_none_that_is_unpaid(
+    kind: str,
+) -> None:
     late = ("network.there.least_delay=0.05", "network.back.least_delay=0.05")
     rows = pressing(
         f"reflection.passivity={kind}", *YIELDING["four_channel"], "world.material=silicone", *late

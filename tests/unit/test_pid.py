@@ -1,6 +1,8 @@
 """PID: poles where they are claimed, no windup, no derivative kick."""
 
 import math
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import pytest
@@ -8,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.linalg import expm
 
+from teleop_core.kernels.geometry import Array
 from teleop_core.robots.rcrt1_dynamics import DRIVES
 from teleop_core.slave.controllers.pid import critically_damped_gains, pid_step
 
@@ -16,7 +19,13 @@ GAINS = np.stack(critically_damped_gains(DRIVES.inertia, DRIVES.viscous, DRIVES.
 AXES = range(6)
 
 
-def run(errors, gains=(2.0, 0.0, 0.0), limit=math.inf, memory=None, feedforward=0.0):
+def run(
+    errors: Any,
+    gains: Sequence[float] | Array = (2.0, 0.0, 0.0),
+    limit: float = math.inf,
+    memory: Array | None = None,
+    feedforward: float = 0.0,
+) -> tuple[Array, Array]:
     """Efforts for a sequence of errors, and the memory after it."""
     memory = np.array([0.0, -errors[0], 0.0]) if memory is None else memory
     row = np.array(gains, dtype=float)
@@ -24,13 +33,13 @@ def run(errors, gains=(2.0, 0.0, 0.0), limit=math.inf, memory=None, feedforward=
     return np.array(efforts), memory
 
 
-def loop_matrix(axis):
+def loop_matrix(axis: int) -> Array:
     """One tick of an axis under its PID, linear: states q, dq, integral, last q, its rate."""
     inertia, viscous = DRIVES.inertia[axis], DRIVES.viscous[axis]
     plant = np.array([[0, 1, 0], [0, -viscous / inertia, 1 / inertia], [0, 0, 0]])
     one_tick = expm(plant * DT)
 
-    def tick(state):
+    def tick(state: Array) -> Array:
         memory = state[2:].copy()
         effort = pid_step(0.0, state[0], GAINS[axis], memory, 0.0, math.inf, DT)
         moved = one_tick @ np.array([state[0], state[1], effort])
@@ -40,7 +49,9 @@ def loop_matrix(axis):
 
 
 @given(st.floats(1e-4, 50.0), st.floats(0.0, 1.0), st.floats(1.0, 300.0))
-def test_gains_put_three_poles_at_the_bandwidth(inertia, friction_share, bandwidth):
+def test_gains_put_three_poles_at_the_bandwidth(
+    inertia: float, friction_share: float, bandwidth: float
+) -> None:
     viscous = friction_share * 3.0 * inertia * bandwidth
     kp, ki, kd = critically_damped_gains(
         np.array([inertia]), np.array([viscous]), np.array([bandwidth])
@@ -50,13 +61,13 @@ def test_gains_put_three_poles_at_the_bandwidth(inertia, friction_share, bandwid
     assert np.allclose(polynomial, wanted, rtol=1e-12, atol=0)
 
 
-def test_friction_that_damps_more_than_wanted_leaves_no_derivative_gain():
+def test_friction_that_damps_more_than_wanted_leaves_no_derivative_gain() -> None:
     _, _, kd = critically_damped_gains(np.array([1.0]), np.array([100.0]), np.array([10.0]))
     assert kd[0] == 0.0
 
 
 @pytest.mark.parametrize("axis", AXES)
-def test_sampled_loop_of_every_axis_is_stable_and_well_damped(axis):
+def test_sampled_loop_of_every_axis_is_stable_and_well_damped(axis: int) -> None:
     poles = np.linalg.eigvals(loop_matrix(axis))
     poles = np.log(poles[np.abs(poles) > 1e-6].astype(complex)) / DT
     slow = poles[np.abs(poles) < 2.0 * DRIVES.bandwidth[axis]]
@@ -69,7 +80,7 @@ def test_sampled_loop_of_every_axis_is_stable_and_well_damped(axis):
 
 
 @pytest.mark.parametrize("axis", AXES)
-def test_axis_returns_from_a_displacement_without_swinging(axis):
+def test_axis_returns_from_a_displacement_without_swinging(axis: int) -> None:
     state, trace, matrix = np.array([1.0, 0, 0, 1.0, 0]), [], loop_matrix(axis)
     for _ in range(1000):
         state = matrix @ state
@@ -80,24 +91,24 @@ def test_axis_returns_from_a_displacement_without_swinging(axis):
 
 
 @pytest.mark.parametrize("axis", AXES)
-def test_a_step_of_the_setpoint_gives_the_derivative_no_kick(axis):
+def test_a_step_of_the_setpoint_gives_the_derivative_no_kick(axis: int) -> None:
     memory, gains = np.zeros(3), GAINS[axis].copy()
     gains[:2] = 0.0
     assert pid_step(1.0, 0.0, gains, memory, 0.0, math.inf, DT) == 0.0
 
 
-def test_proportional_part_is_immediate():
+def test_proportional_part_is_immediate() -> None:
     efforts, _ = run([0.5, -0.25])
     assert np.array_equal(efforts, (1.0, -0.5))
 
 
-def test_integral_part_sums_the_error_over_time():
+def test_integral_part_sums_the_error_over_time() -> None:
     efforts, memory = run([0.5] * 1000, gains=(0.0, 2.0, 0.0))
     assert math.isclose(efforts[-1], 2.0 * 0.5 * 1.0, rel_tol=1e-12)
     assert math.isclose(memory[0], 1.0, rel_tol=1e-12)
 
 
-def test_derivative_part_reaches_the_rate_of_the_error_within_ten_ticks():
+def test_derivative_part_reaches_the_rate_of_the_error_within_ten_ticks() -> None:
     errors = np.arange(20) * DT * 3.0
     efforts, _ = run(errors, gains=(0.0, 0.0, 2.0))
     # The filter halves what is missing in every tick.
@@ -105,7 +116,7 @@ def test_derivative_part_reaches_the_rate_of_the_error_within_ten_ticks():
     assert (np.diff(efforts[1:]) > 0.0).all()
 
 
-def test_feedforward_is_added_before_the_limit():
+def test_feedforward_is_added_before_the_limit() -> None:
     efforts, _ = run([0.5], feedforward=3.0, limit=3.5)
     assert efforts[0] == 3.5
     assert run([0.5], feedforward=3.0)[0][0] == 4.0
@@ -115,13 +126,17 @@ efforts_and_gains = st.tuples(st.floats(0.0, 1e4), st.floats(0.0, 1e5), st.float
 
 
 @given(st.lists(st.floats(-10.0, 10.0), min_size=1, max_size=50), efforts_and_gains)
-def test_effort_never_exceeds_the_limit(errors, gains):
+def test_effort_never_exceeds_the_limit(
+    errors: list[float], gains: tuple[float, float, float]
+) -> None:
     efforts, _ = run(errors, gains, limit=5.9)
     assert np.abs(efforts).max() <= 5.9
 
 
 @given(st.lists(st.floats(-1.0, 1.0), min_size=1, max_size=300), st.sampled_from(list(AXES)))
-def test_integral_never_grows_beyond_what_the_drive_can_give(errors, axis):
+def test_integral_never_grows_beyond_what_the_drive_can_give(
+    errors: list[float], axis: int
+) -> None:
     limit, memory = DRIVES.effort_limit[axis], np.zeros(3)
     for error in np.repeat(errors, 3):
         pid_step(0.0, -error, GAINS[axis], memory, 0.0, limit, DT)
@@ -132,7 +147,7 @@ def test_integral_never_grows_beyond_what_the_drive_can_give(errors, axis):
 
 
 @pytest.mark.parametrize("axis", AXES)
-def test_integral_stands_still_while_a_constant_error_saturates_the_drive(axis):
+def test_integral_stands_still_while_a_constant_error_saturates_the_drive(axis: int) -> None:
     limit = DRIVES.effort_limit[axis]
     error = 2.0 * limit / GAINS[axis, 0]
     _, memory = run([error] * 10_000, GAINS[axis], limit)
@@ -140,7 +155,7 @@ def test_integral_stands_still_while_a_constant_error_saturates_the_drive(axis):
 
 
 @pytest.mark.parametrize("axis", AXES)
-def test_drive_leaves_saturation_as_soon_as_the_error_turns(axis):
+def test_drive_leaves_saturation_as_soon_as_the_error_turns(axis: int) -> None:
     limit = DRIVES.effort_limit[axis]
     error = 2.0 * limit / GAINS[axis, 0]
     _, memory = run([error] * 10_000, GAINS[axis], limit)
@@ -148,13 +163,13 @@ def test_drive_leaves_saturation_as_soon_as_the_error_turns(axis):
     assert (efforts == -limit).all()
 
 
-def test_without_the_hold_the_integral_would_wind_up():
+def test_without_the_hold_the_integral_would_wind_up() -> None:
     # What ten seconds of the same error would have left in a plain integral of axis 1.
     error = 2.0 * DRIVES.effort_limit[0] / GAINS[0, 0]
     assert GAINS[0, 1] * error * 10.0 > 50 * DRIVES.effort_limit[0]
 
 
-def test_integral_may_shrink_while_the_drive_is_saturated():
+def test_integral_may_shrink_while_the_drive_is_saturated() -> None:
     memory = np.array([100.0, 0.1, 0.0])
     pid_step(0.0, 0.1, np.array([1.0, 50.0, 0.0]), memory, 0.0, 5.9, DT)
     assert memory[0] < 100.0

@@ -1,6 +1,7 @@
 """Planning: excerpts of paths, maps of axes, placements as parameters, and the walk itself."""
 
 import shlex
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -35,7 +36,7 @@ def walker(path: AskedPath, robot: str = "puma560") -> Walker:
     return Walker(path, MotionScalingParameters(), solving)
 
 
-def test_an_excerpt_has_no_more_samples_a_second_than_asked_and_keeps_the_buttons():
+def test_an_excerpt_has_no_more_samples_a_second_than_asked_and_keeps_the_buttons() -> None:
     stamps, poses = moves(PEOPLE["pen"], 20.0)
     pressed = np.zeros((len(stamps), 3))
     pressed[3001:3003, 0] = 1.0
@@ -47,7 +48,7 @@ def test_an_excerpt_has_no_more_samples_a_second_than_asked_and_keeps_the_button
     assert np.count_nonzero(np.diff(part.buttons[:, 0])) == 2
 
 
-def test_an_excerpt_of_a_long_path_is_stretches_of_all_of_it():
+def test_an_excerpt_of_a_long_path_is_stretches_of_all_of_it() -> None:
     path = path_of("motion_capture", 60.0)
     part = path.excerpt(100.0, 1_000)
     assert len(part) <= 1_000
@@ -56,13 +57,13 @@ def test_an_excerpt_of_a_long_path_is_stretches_of_all_of_it():
     assert part.time[-1] > 0.95 * path.time[-1]
 
 
-def test_a_path_that_is_short_enough_is_not_cut():
+def test_a_path_that_is_short_enough_is_not_cut() -> None:
     path = path_of("da_vinci_30", 5.0)
     assert path.limited(1_000) is path
     assert len(path.limited(50)) <= 52
 
 
-def test_stamps_that_come_twice_are_one_sample():
+def test_stamps_that_come_twice_are_one_sample() -> None:
     stamps, poses = moves(PEOPLE["da_vinci_30"], 5.0)
     stamps[7] = stamps[6]
     path = asked_path(recorded(stamps, poses).bag)
@@ -70,19 +71,19 @@ def test_stamps_that_come_twice_are_one_sample():
     assert (np.diff(path.stamp_ns) > 0).all()
 
 
-def test_a_single_pose_is_no_motion():
+def test_a_single_pose_is_no_motion() -> None:
     stamps, poses = moves(PEOPLE["da_vinci_30"], 5.0)
     with pytest.raises(tc.RecordingError, match="fewer than two poses"):
         asked_path(recorded(stamps[:1], poses[:1]).bag)
 
 
-def test_there_are_24_turns_and_all_are_maps_that_parameters_take():
+def test_there_are_24_turns_and_all_are_maps_that_parameters_take() -> None:
     assert len(set(turns())) == 24
     for axes in turns():
         MotionScalingParameters(axes=axes)
 
 
-def test_a_placement_is_the_same_as_file_as_texts_and_as_settings(tmp_path):
+def test_a_placement_is_the_same_as_file_as_texts_and_as_settings(tmp_path: Path) -> None:
     placement = Placement(
         robot="puma560", start=START,
         axes=("+y", "-x", "+z"), coarse_gain=0.3, fine_gain=0.03, rotation_gain=0.25,
@@ -100,7 +101,7 @@ def test_a_placement_is_the_same_as_file_as_texts_and_as_settings(tmp_path):
         assert taken == placement
 
 
-def test_a_placement_that_needs_no_change_is_written_too(tmp_path):
+def test_a_placement_that_needs_no_change_is_written_too(tmp_path: Path) -> None:
     found = lab.reach(tc.run("fine_box", duration=2.0), share=0.01)
     assert found.is_given
     file = tmp_path / "reach.yaml"
@@ -109,14 +110,14 @@ def test_a_placement_that_needs_no_change_is_written_too(tmp_path):
     assert tc.configuration(files=[file]).group("slave").start == tuple(start)
 
 
-def test_a_placement_of_an_arm_leaves_the_other_arms_alone():
+def test_a_placement_of_an_arm_leaves_the_other_arms_alone() -> None:
     settings = GIVEN.settings("left") | {"left/motion_scaling.coarse_gain": 0.5}
     made = tc.configuration(arms=["right", "left"], robot="puma560", settings=settings)
     assert made.group("motion_scaling", "left").coarse_gain == 0.5
     assert made.group("motion_scaling").coarse_gain == 1.0
 
 
-def test_an_aimed_tool_turns_as_the_hand_does_wherever_axes_allow_it():
+def test_an_aimed_tool_turns_as_the_hand_does_wherever_axes_allow_it() -> None:
     robot, rng = tc.load_robot("puma560"), np.random.default_rng(6)
     tool = robot.fk(robot.start)[:3, :3]
     for axes in turns()[::5]:
@@ -132,7 +133,7 @@ def test_an_aimed_tool_turns_as_the_hand_does_wherever_axes_allow_it():
         assert aim.misfit(aim.aimed(GIVEN)) <= np.radians(5.0) + 1e-3
 
 
-def test_no_tool_is_aimed_worse_than_a_cube_allows():
+def test_no_tool_is_aimed_worse_than_a_cube_allows() -> None:
     robot = tc.load_robot("puma560")
     for stylus in Rotation.random(50, rng=np.random.default_rng(3)):
         aim = Aim(robot, np.roll(stylus.as_quat(), 1), GIVEN)
@@ -140,7 +141,7 @@ def test_no_tool_is_aimed_worse_than_a_cube_allows():
         assert aim.misfit(aim.aimed(GIVEN)) <= np.arccos(3**-0.5) + np.radians(5.1)
 
 
-def test_a_walk_tells_the_same_of_a_path_that_was_walked_before():
+def test_a_walk_tells_the_same_of_a_path_that_was_walked_before() -> None:
     walks = walker(path_of("da_vinci_36", 10.0))
     first = walks.walk(GIVEN)
     other = MotionScalingParameters(coarse_gain=3.0, rotation_gain=0.5)
@@ -151,7 +152,7 @@ def test_a_walk_tells_the_same_of_a_path_that_was_walked_before():
     assert walks.share(GIVEN) == first.share
 
 
-def test_shares_and_causes_add_up_to_one():
+def test_shares_and_causes_add_up_to_one() -> None:
     walked = walker(path_of("da_vinci_36", 20.0), "rcrt1")
     start = tuple(tc.load_robot("rcrt1").start.tolist())
     found = walked.walk(Placement.of(MotionScalingParameters(), PUMA, start))
@@ -159,14 +160,14 @@ def test_shares_and_causes_add_up_to_one():
     assert abs(found.share + sum(found.causes.values()) - 1.0) < 1e-12
 
 
-def test_time_for_the_joints_only_helps_a_path_that_is_not_cut():
+def test_time_for_the_joints_only_helps_a_path_that_is_not_cut() -> None:
     walks = walker(path_of("motion_capture", 20.0))
     slow, fast = (walks.walk(GIVEN, is_cut=False, is_fast=f) for f in (False, True))
     assert slow.share < fast.share
     np.testing.assert_allclose(slow.asked, fast.asked, atol=1e-12)
 
 
-def test_nothing_moves_over_a_gap_of_the_recording():
+def test_nothing_moves_over_a_gap_of_the_recording() -> None:
     stamps, poses = moves(PEOPLE["motion_capture"], 20.0)
     kept = np.r_[0:700, 1300:2000]  # six seconds are missing
     walks = walker(asked_path(recorded(stamps[kept], poses[kept]).bag))
@@ -176,7 +177,7 @@ def test_nothing_moves_over_a_gap_of_the_recording():
 
 
 @pytest.mark.skipif(not IS_COMPILED, reason="looks at 100 000 poses")
-def test_roomy_postures_begin_with_the_start_and_have_room():
+def test_roomy_postures_begin_with_the_start_and_have_room() -> None:
     robot = tc.load_robot("rcrt1")
     postures = roomy_postures(robot, 8)
     np.testing.assert_array_equal(postures[0], robot.start)

@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 from teleop_core.chain.mapping.motion_scaling import MOTION_SCALING
 from teleop_core.chain.mapping.parameters import MotionScalingParameters
 from teleop_core.graph.signals import TICK_NS
+from teleop_core.kernels.geometry import Array
 
 REST = np.array([0.0, -0.1, 0.1, 1.0, 0.0, 0.0, 0.0])
 
@@ -15,13 +16,13 @@ REST = np.array([0.0, -0.1, 0.1, 1.0, 0.0, 0.0, 0.0])
 class Hand:
     """Motion scaling under a hand, with a slave that has every command in force at once."""
 
-    def __init__(self, period_ns=TICK_NS):
+    def __init__(self, period_ns: int = TICK_NS) -> None:
         self.stage = MOTION_SCALING.run(MotionScalingParameters())
         self.row, self.now_ns, self.period_ns = self.stage.signals, 10**9, period_ns
         self.row["slave_setpoint_cp"] = [0.3, 0.0, 0.2, 1.0, 0.0, 0.0, 0.0]
         self.has_buttons = True
 
-    def give(self, pose):
+    def give(self, pose: Array) -> Array:
         """Command (7,) after one sample of the hand."""
         row = self.row
         self.now_ns += self.period_ns
@@ -34,18 +35,18 @@ class Hand:
         row["slave_setpoint_cp"], row["slave_setpoint_cp_ns"] = command, self.now_ns
         return command
 
-    def rest(self, ticks=50, pose=REST):
+    def rest(self, ticks: int = 50, pose: Array = REST) -> Array:
         """Command after some samples in one place."""
         for _ in range(ticks):
             command = self.give(pose)
         return command
 
 
-def moved(pose, by):
+def moved(pose: Array, by: list[float]) -> Array:
     return np.array([*(pose[:3] + np.asarray(by)), *pose[3:]])
 
 
-def test_a_hand_that_moves_moves_the_command():
+def test_a_hand_that_moves_moves_the_command() -> None:
     hand = Hand()
     before = hand.rest()
     for k in range(100):
@@ -54,7 +55,7 @@ def test_a_hand_that_moves_moves_the_command():
 
 
 @pytest.mark.parametrize("period_ns", [TICK_NS, 10 * TICK_NS])
-def test_a_teleport_moves_nothing_and_the_hand_is_followed_from_there(period_ns):
+def test_a_teleport_moves_nothing_and_the_hand_is_followed_from_there(period_ns: int) -> None:
     hand = Hand(period_ns)
     before = hand.rest()
     there = moved(REST, [0.1, 0.0, 0.0])
@@ -65,7 +66,7 @@ def test_a_teleport_moves_nothing_and_the_hand_is_followed_from_there(period_ns)
     assert np.linalg.norm(after[:3] - before[:3]) == pytest.approx(19 * 2e-4, rel=1e-6)
 
 
-def test_a_hand_that_moves_on_after_a_teleport_loses_that_step_and_the_next():
+def test_a_hand_that_moves_on_after_a_teleport_loses_that_step_and_the_next() -> None:
     hand = Hand()
     before = hand.rest()
     there = moved(REST, [0.1, 0.0, 0.0])
@@ -80,7 +81,9 @@ def test_a_hand_that_moves_on_after_a_teleport_loses_that_step_and_the_next():
         st.tuples(*[st.floats(allow_nan=False, allow_infinity=False)] * 3), min_size=1, max_size=20
     )
 )
-def test_wild_samples_move_no_farther_than_a_hand_could_and_leave_numbers(samples):
+def test_wild_samples_move_no_farther_than_a_hand_could_and_leave_numbers(
+    samples: list[tuple[float, float, float]],
+) -> None:
     hand = Hand()
     before = hand.rest()
     for place in samples:
@@ -90,7 +93,7 @@ def test_wild_samples_move_no_farther_than_a_hand_could_and_leave_numbers(sample
     assert np.linalg.norm(after[:3] - before[:3]) <= len(samples) * 3.0 * 1e-3 + 1e-12
 
 
-def test_huge_numbers_for_twenty_samples_leave_the_session_as_it_was():
+def test_huge_numbers_for_twenty_samples_leave_the_session_as_it_was() -> None:
     hand = Hand()
     before = hand.rest()
     for _ in range(20):
@@ -99,7 +102,7 @@ def test_huge_numbers_for_twenty_samples_leave_the_session_as_it_was():
     assert "no hand can make" in hand.stage.concerns()[0]
 
 
-def test_a_spun_stylus_does_not_spin_the_tool():
+def test_a_spun_stylus_does_not_spin_the_tool() -> None:
     hand = Hand()
     before = hand.rest()
     spun = np.array([*REST[:3], 0.0, 1.0, 0.0, 0.0])
@@ -107,7 +110,7 @@ def test_a_spun_stylus_does_not_spin_the_tool():
     assert np.allclose(hand.rest(pose=spun), before, rtol=0, atol=1e-12)
 
 
-def test_buttons_that_fall_silent_hold_as_a_clutch_does():
+def test_buttons_that_fall_silent_hold_as_a_clutch_does() -> None:
     hand = Hand()
     hand.rest()
     hand.has_buttons = False
@@ -118,7 +121,7 @@ def test_buttons_that_fall_silent_hold_as_a_clutch_does():
     assert "buttons fell silent" in hand.stage.concerns()[0]
 
 
-def test_masters_that_send_buttons_where_they_change_only_are_followed():
+def test_masters_that_send_buttons_where_they_change_only_are_followed() -> None:
     hand = Hand()
     hand.rest(ticks=3)
     hand.has_buttons = False

@@ -3,6 +3,7 @@
 import ast
 import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -48,7 +49,7 @@ def mistakes(text: str, file: str = "text") -> list[str]:
     return found
 
 
-def _look(node: ast.AST, file: str, *, is_compiled: bool, found: list[str]) -> None:
+def _look(node: Any, file: str, *, is_compiled: bool, found: list[str]) -> None:
     if isinstance(node, ast.FunctionDef):
         decorators = {ast.unparse(each) for each in node.decorator_list}
         is_compiled = is_compiled or bool(decorators & {"kernel", "inner"})
@@ -74,7 +75,7 @@ def _mistake(node: ast.AST, is_compiled: bool) -> str:
     return ""
 
 
-def test_nothing_that_decides_bits_calls_blas_or_a_vectorised_function():
+def test_nothing_that_decides_bits_calls_blas_or_a_vectorised_function() -> None:
     files = [file for room in ROOMS for file in sorted((PACKAGE / room).glob("**/*.py"))]
     files += [PACKAGE / room for room in ROOMS if room.endswith(".py")]
     names = [file.relative_to(PACKAGE).as_posix() for file in files]
@@ -102,14 +103,14 @@ def test_nothing_that_decides_bits_calls_blas_or_a_vectorised_function():
         ("@kernel\ndef f(x):\n    return np.dot(x, x)", "np.dot"),
     ],
 )
-def test_the_rule_finds_what_it_is_for(text, what):
+def test_the_rule_finds_what_it_is_for(text: str, what: str) -> None:
     assert any(what in mistake for mistake in mistakes(text))
 
 
 @pytest.mark.parametrize(
     "text", ["y = x**2 + x**0.5", "@kernel\ndef f(x):\n    return x**3", "@cache\ndef f(): pass"]
 )
-def test_the_rule_lets_pass_what_rounds_alike(text):
+def test_the_rule_lets_pass_what_rounds_alike(text: str) -> None:
     assert mistakes(text) == []
 
 
@@ -117,13 +118,13 @@ def test_the_rule_lets_pass_what_rounds_alike(text):
     ("a", "b"),
     [((3,), (3,)), ((4, 3), (3,)), ((3,), (3, 5)), ((7, 2, 3), (7, 3, 4)), ((2, 3), (7, 3, 3))],
 )
-def test_products_are_those_of_numpy(a, b):
+def test_products_are_those_of_numpy(a: tuple[int, ...], b: tuple[int, ...]) -> None:
     rng = np.random.default_rng(1)
     left, right = rng.normal(size=a), rng.normal(size=b)
     np.testing.assert_allclose(product(left, right), left @ right, rtol=0.0, atol=1e-14)
 
 
-def test_lengths_dots_and_functions_are_those_of_numpy():
+def test_lengths_dots_and_functions_are_those_of_numpy() -> None:
     rng = np.random.default_rng(2)
     x, y = rng.normal(size=(2, 5, 4))
     np.testing.assert_allclose(length(x), np.linalg.norm(x, axis=1), rtol=1e-15)
@@ -133,7 +134,7 @@ def test_lengths_dots_and_functions_are_those_of_numpy():
     assert arctangent(1.0, np.zeros(2)).tolist() == [0.5 * math.pi] * 2
 
 
-def test_an_inverse_motion_leads_back():
+def test_an_inverse_motion_leads_back() -> None:
     from teleop_core.kernels.geometry import rotation, transform
 
     there = transform(rotation("x", 0.7), np.array([0.1, -0.2, 0.3]))

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from teleop_core.slave.operation.presses import Presses
 
 
-def told(presses, *messages, sender=b"a"):
+def told(presses: Presses, *messages: tuple[int, bool], sender: bytes = b"a") -> list[bool]:
     """States that messages (number, is_pressed) of a sender add, in order."""
     return [
         said for number, is_pressed in messages
@@ -15,28 +15,28 @@ def told(presses, *messages, sender=b"a"):
     ]  # fmt: skip
 
 
-def test_every_message_of_an_unbroken_row_is_said_once():
+def test_every_message_of_an_unbroken_row_is_said_once() -> None:
     assert told(Presses(), (1, False), (2, True), (3, False)) == [False, True, False]
 
 
-def test_a_message_that_arrives_through_two_readers_counts_once_in_whatever_order():
+def test_a_message_that_arrives_through_two_readers_counts_once_in_whatever_order() -> None:
     presses = Presses()
     assert told(presses, (1, True), (2, False), (1, True), (2, False)) == [True, False]
 
 
-def test_a_missing_message_counts_as_a_press():
+def test_a_missing_message_counts_as_a_press() -> None:
     presses = Presses()
     assert told(presses, (1, False), (3, False)) == [False, True, False]
     assert presses.lost == 1
 
 
-def test_a_sender_that_is_found_late_has_lost_nothing():
+def test_a_sender_that_is_found_late_has_lost_nothing() -> None:
     presses = Presses()
     assert told(presses, (5000, False), (5001, False)) == [False, False]
     assert presses.lost == 0
 
 
-def test_after_a_standstill_all_that_a_new_sender_said_before_counts_as_a_press():
+def test_after_a_standstill_all_that_a_new_sender_said_before_counts_as_a_press() -> None:
     presses = Presses()
     assert presses.take(b"a", 4, is_pressed=False, stood_still=True) == (True, False)
     assert presses.lost == 3
@@ -44,33 +44,35 @@ def test_after_a_standstill_all_that_a_new_sender_said_before_counts_as_a_press(
     assert presses.take(b"b", 1, is_pressed=False, stood_still=True) == (False,)
 
 
-def test_a_message_that_was_lost_before_the_first_of_its_sender_counts_as_a_press():
+def test_a_message_that_was_lost_before_the_first_of_its_sender_counts_as_a_press() -> None:
     presses = Presses()
     assert presses.lose(0) == ()
     assert (*presses.lose(3), *told(presses, (4, False))) == (True, False)
     assert (presses.lose(3), presses.lose(4), presses.lost) == ((), (True,), 4)
 
 
-def test_what_numbers_tell_of_one_sender_hides_no_loss_that_the_middleware_alone_knows():
+def test_what_numbers_tell_of_one_sender_hides_no_loss_that_the_middleware_alone_knows() -> None:
     presses = Presses()
     told(presses, (1, False), (9, False))
     assert (presses.lose(2), presses.lose(2), presses.lost) == ((True,), (), 7)
 
 
-def test_senders_do_not_fill_the_gaps_of_each_other():
+def test_senders_do_not_fill_the_gaps_of_each_other() -> None:
     presses = Presses()
     told(presses, (1, False))
     told(presses, (1, False), (2, False), sender=b"b")
     assert told(presses, (3, False)) == [True, False]
 
 
-def test_messages_without_numbers_are_all_taken():
+def test_messages_without_numbers_are_all_taken() -> None:
     presses = Presses()
     assert told(presses, (0, True), (0, False), (0, True)) == [True, False, True]
 
 
 @given(st.lists(st.booleans(), min_size=1, max_size=50), st.data())
-def test_no_press_is_lost_whatever_is_lost_between_two_messages_that_arrive(states, data):
+def test_no_press_is_lost_whatever_is_lost_between_two_messages_that_arrive(
+    states: list[bool], data: st.DataObject
+) -> None:
     arrive = data.draw(st.lists(st.booleans(), min_size=len(states), max_size=len(states)))
     arrive[0] = arrive[-1] = True  # the sender is known before, and heard again
     messages = [(n + 1, s) for n, s in enumerate(states) if arrive[n]]

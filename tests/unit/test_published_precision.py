@@ -1,10 +1,12 @@
 """Published precision and accuracy tables: our forward kinematics reproduces their errors."""
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
 
+from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot
 from teleop_lab.fitting.rest_table import PUBLISHED
 
@@ -37,7 +39,7 @@ PRINTED = 0.5e-3
 CUT = 1.05e-3
 
 
-def errors(point, target=None):
+def errors(point: int, target: tuple[float, ...] | None = None) -> tuple[Array, Array]:
     """Printed and recomputed errors (10,) of one point [mm]."""
     rows = TABLE[TABLE["point"] == point]
     joints = np.stack([rows[name] for name in ARM.joint_names], axis=1)
@@ -50,18 +52,18 @@ def errors(point, target=None):
     return printed, np.linalg.norm(off, axis=1) * 1e3
 
 
-def statistics(values):
+def statistics(values: Array) -> Any:
     rms = math.sqrt(np.mean(values**2))
     return rms, np.std(values, ddof=1), values.max(), values.min()
 
 
 @pytest.mark.parametrize("point", TARGETS)
-def test_joint_logs_give_the_printed_errors(point):  # case 13
+def test_joint_logs_give_the_printed_errors(point: int) -> None:  # case 13
     printed, computed = errors(point)
     assert np.allclose(computed, printed, rtol=0, atol=LOG_DIGITS)
 
 
-def test_row_5_of_table_7_4_is_printed_ten_times_too_small():  # misprint 19
+def test_row_5_of_table_7_4_is_printed_ten_times_too_small() -> None:  # misprint 19
     row = TABLE[(TABLE["point"] == 4) & (TABLE["run"] == 5)]
     assert row["printed_error"][0] == 0.010e-3
     assert abs(errors(4)[1][4] - 0.099) < PRINTED
@@ -74,26 +76,28 @@ def test_row_5_of_table_7_4_is_printed_ten_times_too_small():  # misprint 19
         (5, (-QUARTER, 143.715 * DEGREE, 375.0, 1.4, 1.4, 1.4)),
     ],
 )
-def test_printed_targets_of_two_points_do_not_reproduce(point, printed_target):  # case 13
+def test_printed_targets_of_two_points_do_not_reproduce(
+    point: int, printed_target: tuple[float, ...]
+) -> None:  # case 13
     printed, computed = errors(point, printed_target)
     worst = np.abs(computed - printed).max()
     assert 9 * LOG_DIGITS < worst < 0.040
 
 
-def test_printed_extension_of_point_2_is_25_mm_off_its_table():  # misprint 7
+def test_printed_extension_of_point_2_is_25_mm_off_its_table() -> None:  # misprint 7
     _, computed = errors(2, (QUARTER, 2 * QUARTER, 375.0, 1.4, 1.4, 1.4))
     assert computed.min() > 24.9
 
 
 @pytest.mark.parametrize("point", TARGETS)
-def test_statistics_of_the_printed_errors_are_those_of_table_7_7(point):  # case 14
+def test_statistics_of_the_printed_errors_are_those_of_table_7_7(point: int) -> None:  # case 14
     rms, *others = statistics(errors(point)[0])
     assert np.allclose(others, SUMMARY[point][1:], rtol=0, atol=CUT)
     if point != 4:
         assert abs(rms - SUMMARY[point][0]) < CUT
 
 
-def test_rms_of_point_4_was_computed_with_the_misprinted_row():  # misprint 19
+def test_rms_of_point_4_was_computed_with_the_misprinted_row() -> None:  # misprint 19
     with_misprint, corrected = errors(4)[0], errors(4)[0]
     with_misprint[4] = 0.010
     assert abs(statistics(with_misprint)[0] - SUMMARY[4][0]) < 1.1 * PRINTED
@@ -101,18 +105,18 @@ def test_rms_of_point_4_was_computed_with_the_misprinted_row():  # misprint 19
 
 
 @pytest.mark.parametrize("point", TARGETS)
-def test_statistics_from_the_joint_logs_are_those_of_table_7_7(point):  # case 14
+def test_statistics_from_the_joint_logs_are_those_of_table_7_7(point: int) -> None:  # case 14
     computed = statistics(errors(point)[1])
     assert np.allclose(computed, SUMMARY[point], rtol=0, atol=LOG_DIGITS)
 
 
-def test_standard_deviation_divides_by_one_less_than_the_runs():  # case 14
+def test_standard_deviation_divides_by_one_less_than_the_runs() -> None:  # case 14
     with_n = np.std(errors(1)[0])
     assert abs(statistics(errors(1)[0])[1] - 0.039) < CUT
     assert abs(with_n - 0.039) > CUT
 
 
-def test_precision_is_the_largest_error_and_repeatability_two_deviations_of_point_2():
+def test_precision_is_the_largest_error_and_repeatability_two_deviations_of_point_2() -> None:
     printed = {point: errors(point)[0] for point in TARGETS}
     worst = max(printed, key=lambda point: printed[point].max())
     assert worst == 3  # misprint 17: the text says point 2
@@ -132,7 +136,7 @@ ACCURACY = {"x": (0.316, 0.293, 0.50), "y": (0.847, 0.562, 1.19), "z": (0.991, 0
 
 
 @pytest.mark.parametrize("axis", ACCURACY)
-def test_accuracy_tables_have_the_published_statistics(axis):  # case 16
+def test_accuracy_tables_have_the_published_statistics(axis: str) -> None:  # case 16
     error = DESIRED - MEASURED[axis]
     rms, deviation, largest, _ = statistics(np.abs(error))
     deviation = np.std(error, ddof=1)
@@ -142,5 +146,5 @@ def test_accuracy_tables_have_the_published_statistics(axis):  # case 16
     assert math.isclose(largest, ACCURACY[axis][2], abs_tol=5e-3)
 
 
-def test_text_understates_the_largest_error_on_z():  # misprint 19: 1.75 mm
+def test_text_understates_the_largest_error_on_z() -> None:  # misprint 19: 1.75 mm
     assert np.abs(DESIRED - MEASURED["z"]).max() == 2.0

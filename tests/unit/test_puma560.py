@@ -1,24 +1,26 @@
 """PUMA 560: the lecture's matrices, eight branches, an independent oracle, three singularities."""
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 import pytest
 import roboticstoolbox as rtb
 
-from teleop_core.kernels.geometry import rotation, transform
+from present import present
+from teleop_core.kernels.geometry import Array, rotation, transform
 from teleop_core.robots import IkStatus, load_robot
-from teleop_core.robots.dh import load_table, parse_table
+from teleop_core.robots.dh import DhTable, load_table, parse_table
 
 ARM = load_robot("puma560")
 ROUNDING = 1e-14  # ten products of numbers of size one
 DEGREE = math.pi / 180.0
 DT = 1e-3
 A2, A3, D3, D4 = ARM.geometry_row
-STEP = ARM.drives.speed_limit * DT * (1.0 + 1e-9)
+STEP = present(ARM.drives).speed_limit * DT * (1.0 + 1e-9)
 
 
-def table(a2, a3, d3, d4):
+def table(a2: float, a3: float, d3: float, d4: float) -> DhTable:
     """Section 3 of the spec, as a table."""
     rows = [(0, 0, 0), (-90, 0, 0), (0, a2, d3), (-90, a3, d4), (90, 0, 0), (-90, 0, 0)]
     return parse_table(
@@ -31,7 +33,7 @@ def table(a2, a3, d3, d4):
     )
 
 
-def printed_links(q):
+def printed_links(q: Array) -> Array:
     """D4: the six link matrices of the lecture, row 2 of 5_6T repaired."""
     (c1, c2, c3, c4, c5, c6), (s1, s2, s3, s4, s5, s6) = np.cos(q), np.sin(q)
     last = [0, 0, 0, 1]
@@ -47,24 +49,24 @@ def printed_links(q):
     )
 
 
-def product(matrices):
+def product(matrices: Array) -> Array:
     out = np.eye(4)
     for matrix in matrices:
         out = out @ matrix
     return out
 
 
-def random_joints(count=100):
+def random_joints(count: int = 100) -> Array:
     return np.random.default_rng(1).uniform(ARM.lower, ARM.upper, (count, 6))
 
 
-def test_d4_link_matrices_are_the_lectures_with_the_repair():
+def test_d4_link_matrices_are_the_lectures_with_the_repair() -> None:
     for q in random_joints():
         links = table(A2, A3, D3, D4).link_transforms(q)
         assert np.abs(links - printed_links(q)).max() < ROUNDING
 
 
-def test_d5_arm_and_wrist_products_are_the_lectures_with_d4_for_d6():
+def test_d5_arm_and_wrist_products_are_the_lectures_with_d4_for_d6() -> None:
     for q in random_joints():
         (c1, c2, _, c4, c5, c6), (s1, s2, _, s4, s5, s6) = np.cos(q), np.sin(q)
         c23, s23 = math.cos(q[1] + q[2]), math.sin(q[1] + q[2])
@@ -86,20 +88,20 @@ def test_d5_arm_and_wrist_products_are_the_lectures_with_d4_for_d6():
         assert np.abs(ARM.fk(q) - product(links)).max() < ROUNDING
 
 
-def test_the_second_row_as_printed_would_not_be_a_rotation():
+def test_the_second_row_as_printed_would_not_be_a_rotation() -> None:
     # Spec section 9, item 1: negative case.
     printed = printed_links(np.full(6, 0.3))[5].copy()
     printed[1, :3] = (math.sin(0.3), math.cos(0.3), 0.0)
     assert abs(np.linalg.det(printed[:3, :3])) < 0.1
 
 
-def test_d6_zero_pose_with_round_lengths():
+def test_d6_zero_pose_with_round_lengths() -> None:
     pose = load_robot("puma560", a2=0.43, a3=0.02, d3=0.15, d4=0.43).fk(np.zeros(6))
     assert np.abs(pose[:3, 3] - (0.45, 0.15, -0.43)).max() < ROUNDING
     assert np.abs(pose[:3, :3] - np.diag([1.0, -1.0, -1.0])).max() < ROUNDING
 
 
-def test_the_wrist_centre_is_where_the_spec_derives_it():
+def test_the_wrist_centre_is_where_the_spec_derives_it() -> None:
     for q in random_joints():
         u = A2 * math.cos(q[1]) + A3 * math.cos(q[1] + q[2]) - D4 * math.sin(q[1] + q[2])
         c1, s1 = math.cos(q[0]), math.sin(q[0])
@@ -107,7 +109,7 @@ def test_the_wrist_centre_is_where_the_spec_derives_it():
         assert np.abs(ARM.fk(q)[:3, 3] - (c1 * u - s1 * D3, s1 * u + c1 * D3, z)).max() < ROUNDING
 
 
-def test_the_example_table_is_this_arm():
+def test_the_example_table_is_this_arm() -> None:
     arm = load_table("config/robots/puma560.yaml").robot()
     for q in random_joints():
         assert np.abs(arm.fk(q) - ARM.fk(q)).max() < ROUNDING
@@ -117,7 +119,7 @@ def test_the_example_table_is_this_arm():
     assert np.abs(arm.home - ARM.home).max() < ROUNDING
 
 
-def test_roboticstoolbox_agrees_on_its_own_puma_of_another_convention():
+def test_roboticstoolbox_agrees_on_its_own_puma_of_another_convention() -> None:
     # Its zeros differ (standard table, joint 1 half a turn on, tool rolled) and its base is on the
     # floor; lengths are of the same reference.
     peer = rtb.models.DH.Puma560()
@@ -128,7 +130,7 @@ def test_roboticstoolbox_agrees_on_its_own_puma_of_another_convention():
         assert np.abs(ours[:3, 3] - theirs[:3, 3]).max() < 1e-12
 
 
-def test_lengths_and_joint_ranges_are_those_that_roboticstoolbox_quotes():
+def test_lengths_and_joint_ranges_are_those_that_roboticstoolbox_quotes() -> None:
     peer = rtb.models.DH.Puma560()
     assert (peer.links[1].a, peer.links[2].a, peer.links[2].d, peer.links[3].d) == (A2, A3, D3, D4)
     shift = np.array([0.0, math.pi, 0.0, 0.0, 0.0, 0.0])
@@ -136,7 +138,7 @@ def test_lengths_and_joint_ranges_are_those_that_roboticstoolbox_quotes():
     assert np.abs(ARM.upper - (peer.qlim[1] - shift)).max() < ROUNDING
 
 
-def test_the_eight_branches_are_different_and_in_the_documented_order():
+def test_the_eight_branches_are_different_and_in_the_documented_order() -> None:
     q = np.array([0.4, -0.6, -0.9, 0.5, 0.7, 0.3])
     solutions = ARM.ik_all(ARM.fk(q))
     assert len({tuple(np.round(row, 6)) for row in solutions}) == 8
@@ -149,7 +151,7 @@ def test_the_eight_branches_are_different_and_in_the_documented_order():
     assert (np.sin(solutions[1::2, 4]) <= 0.0).all()
 
 
-def test_a_straight_wrist_has_valid_branches_and_keeps_the_seed_of_joint_4():
+def test_a_straight_wrist_has_valid_branches_and_keeps_the_seed_of_joint_4() -> None:
     rng = np.random.default_rng(3)
     for q in random_joints(300):
         q[4] = 0.0
@@ -166,7 +168,7 @@ def test_a_straight_wrist_has_valid_branches_and_keeps_the_seed_of_joint_4():
         assert result.residual.max() < 1e-9
 
 
-def test_the_cylinder_around_axis_1_and_a_folded_arm_cannot_be_reached():
+def test_the_cylinder_around_axis_1_and_a_folded_arm_cannot_be_reached() -> None:
     inside = transform(np.eye(3), np.array([0.1, 0.0, 0.3]))
     assert len(ARM.ik_all(inside)) == 0
     assert ARM.ik(inside).status is IkStatus.UNREACHABLE
@@ -175,7 +177,7 @@ def test_the_cylinder_around_axis_1_and_a_folded_arm_cannot_be_reached():
     assert ARM.ik(at_shoulder).status is IkStatus.UNREACHABLE
 
 
-def test_a_pose_that_only_limits_forbid_is_limited_and_its_residual_says_by_how_much():
+def test_a_pose_that_only_limits_forbid_is_limited_and_its_residual_says_by_how_much() -> None:
     q = ARM.home.copy()
     q[0] = 175.0 * DEGREE
     result = ARM.ik(ARM.fk(q), np.array([2.7, -0.8, -0.8, 0.0, 0.8, 0.0]))
@@ -186,14 +188,14 @@ def test_a_pose_that_only_limits_forbid_is_limited_and_its_residual_says_by_how_
     assert (result.q <= ARM.upper).all()
 
 
-def turned_tool(pose, angles, tilt):
+def turned_tool(pose: Array, angles: Array, tilt: float) -> Array:
     """Poses with the tool swung about its y axis by angles [rad] and tilted about x."""
     swung = [pose[:3, :3] @ rotation("y", a) @ rotation("x", tilt) for a in angles]
     return np.array([transform(turn, pose[:3, 3]) for turn in swung])
 
 
 @pytest.mark.parametrize("tilt", [0.0, 1e-12, 1e-9, 1e-6, 1e-4, 1e-3, 1e-2, -0.1])
-def test_the_wrist_passes_through_and_beside_its_singularity_without_a_halt(tilt):
+def test_the_wrist_passes_through_and_beside_its_singularity_without_a_halt(tilt: float) -> None:
     straight = ARM.home.copy()
     straight[4] = 0.0
     path = turned_tool(ARM.fk(straight), np.linspace(0.4, -0.4, 2000), tilt)
@@ -210,7 +212,7 @@ def test_the_wrist_passes_through_and_beside_its_singularity_without_a_halt(tilt
     assert result.residual[:, 0].max() < 0.01
 
 
-def test_a_slow_path_through_the_straight_wrist_has_no_error_at_all():
+def test_a_slow_path_through_the_straight_wrist_has_no_error_at_all() -> None:
     straight = ARM.home.copy()
     straight[4] = 0.0
     path = turned_tool(ARM.fk(straight), np.linspace(0.2, -0.2, 2001), 0.0)
@@ -220,14 +222,16 @@ def test_a_slow_path_through_the_straight_wrist_has_no_error_at_all():
     assert np.abs(np.diff(result.q, axis=0)).max() < 1e-3
 
 
-def line(pose, start, end, count):
+def line(
+    pose: Array, start: Sequence[float] | Array, end: Sequence[float] | Array, count: int
+) -> Array:
     out = np.repeat(pose[None], count, axis=0)
     out[:, :3, 3] = np.linspace(start, end, count)
     return out
 
 
 @pytest.mark.parametrize("beyond", [1.001, 1.05, 1.4])
-def test_reaching_out_beyond_the_stretched_arm_and_back_keeps_the_elbow(beyond):
+def test_reaching_out_beyond_the_stretched_arm_and_back_keeps_the_elbow(beyond: float) -> None:
     q = np.array([0.1, -0.5, -1.3, 0.2, 0.7, 0.1])
     pose = ARM.fk(q)
     reach = math.hypot(A2 + math.hypot(A3, D4), D3)
@@ -243,7 +247,7 @@ def test_reaching_out_beyond_the_stretched_arm_and_back_keeps_the_elbow(beyond):
 
 
 @pytest.mark.parametrize("offset", [0.0, 0.05, D3 - 1e-3, D3, D3 + 1e-6, D3 + 1e-3, 0.2, 0.3])
-def test_a_path_over_axis_1_keeps_its_speeds_and_goes_on_behind(offset):
+def test_a_path_over_axis_1_keeps_its_speeds_and_goes_on_behind(offset: float) -> None:
     pose = transform(rotation("y", math.pi), np.zeros(3))
     path = line(pose, (0.4, offset, 0.5), (-0.4, offset, 0.5), 3000)
     path = np.concatenate((path, path[-1:].repeat(3000, axis=0)))

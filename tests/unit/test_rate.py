@@ -25,14 +25,14 @@ def schedule(time: FakeTime, **options: int) -> Schedule:
     return Schedule(time.clock, time.sleep, **options)
 
 
-def test_ticks_are_one_period_apart_from_the_start():
+def test_ticks_are_one_period_apart_from_the_start() -> None:
     time = FakeTime()
     ticks = schedule(time)
     assert [list(ticks.due()) for _ in range(3)] == [[6 * MS], [7 * MS], [8 * MS]]
     assert (ticks.counts.ticks, ticks.counts.late, ticks.counts.missed) == (3, 0, 0)
 
 
-def test_lateness_does_not_add_up():
+def test_lateness_does_not_add_up() -> None:
     time = FakeTime(*[300_000] * 1000)
     ticks = schedule(time)
     for _ in range(1000):
@@ -41,14 +41,14 @@ def test_lateness_does_not_add_up():
     assert ticks.counts.late == 0
 
 
-def test_a_wake_up_later_than_half_a_period_counts_as_late():
+def test_a_wake_up_later_than_half_a_period_counts_as_late() -> None:
     time = FakeTime(600_000)
     ticks = schedule(time)
     assert list(ticks.due()) == [6 * MS]
     assert (ticks.counts.late, ticks.counts.missed) == (1, 0)
 
 
-def test_missed_ticks_are_made_up_for_each_with_its_own_time():
+def test_missed_ticks_are_made_up_for_each_with_its_own_time() -> None:
     time = FakeTime(3 * MS)
     ticks = schedule(time)
     assert list(ticks.due()) == [6 * MS, 7 * MS, 8 * MS, 9 * MS]
@@ -57,7 +57,7 @@ def test_missed_ticks_are_made_up_for_each_with_its_own_time():
     assert (counts.ticks, counts.missed, counts.caught_up, counts.dropped) == (5, 3, 3, 0)
 
 
-def test_beyond_the_bound_the_oldest_ticks_are_dropped_and_counted():
+def test_beyond_the_bound_the_oldest_ticks_are_dropped_and_counted() -> None:
     time = FakeTime(10 * MS)
     ticks = schedule(time, max_catch_up=4)
     assert list(ticks.due()) == [k * MS for k in range(12, 17)]
@@ -67,7 +67,7 @@ def test_beyond_the_bound_the_oldest_ticks_are_dropped_and_counted():
 
 
 @pytest.mark.parametrize("max_catch_up", [0, 1, 7, 100])
-def test_ticks_and_dropped_ones_are_the_elapsed_periods(max_catch_up):
+def test_ticks_and_dropped_ones_are_the_elapsed_periods(max_catch_up: int) -> None:
     delays = [k * k * 37_000 % 9_000_000 for k in range(500)]
     time = FakeTime(*delays)
     ticks = schedule(time, max_catch_up=max_catch_up)
@@ -79,13 +79,13 @@ def test_ticks_and_dropped_ones_are_the_elapsed_periods(max_catch_up):
     assert counts.missed == counts.caught_up + counts.dropped
 
 
-def test_a_sleep_that_ends_early_is_slept_again():
+def test_a_sleep_that_ends_early_is_slept_again() -> None:
     time = FakeTime(-400_000)
     assert list(schedule(time).due()) == [6 * MS]
     assert time.now_ns == 6 * MS
 
 
-def test_starting_again_forgets_the_time_in_between():
+def test_starting_again_forgets_the_time_in_between() -> None:
     time = FakeTime()
     ticks = schedule(time)
     ticks.due()
@@ -95,7 +95,7 @@ def test_starting_again_forgets_the_time_in_between():
     assert ticks.counts.missed == 0
 
 
-def test_recent_numbers_replace_the_oldest():
+def test_recent_numbers_replace_the_oldest() -> None:
     recent = Recent(3)
     assert recent.summary() == (0.0, 0.0, 0.0)
     for number in (100.0, 1.0, 2.0, 3.0):

@@ -1,6 +1,8 @@
 """RCRT-1 kinematics: published poses, misprints, four branches, singularities, limits."""
 
 import math
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
@@ -8,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from teleop_core.base.errors import ParameterError, ShapeError, UnknownNameError
-from teleop_core.kernels.geometry import roll_pitch_yaw, rotation, transform
+from teleop_core.kernels.geometry import Array, roll_pitch_yaw, rotation, transform
 from teleop_core.robots import IkStatus, load_robot
 from teleop_core.robots.rcrt1_hardware import tendon_joint_angles, tendon_motor_angles
 
@@ -47,14 +49,16 @@ ROLL_PITCH_YAW = {
 }
 
 
-def joints(theta1, theta2, d3, theta4, theta5, theta6):
+def joints(
+    theta1: int, theta2: float, d3: int, theta4: float, theta5: float, theta6: float
+) -> Array:
     """Joint vector from degrees and mm."""
     angles = np.array([theta1, theta2, 0.0, theta4, theta5, theta6]) * DEGREE
     angles[2] = d3 * MM
     return angles
 
 
-def inside_limits(count, seed=1):
+def inside_limits(count: int, seed: int = 1) -> Array:
     rng = np.random.default_rng(seed)
     # 10 mm of d3 is left out: there the wrist centre is at the shoulder.
     low = np.where(np.arange(6) == 2, 0.01, ARM.lower)
@@ -62,13 +66,13 @@ def inside_limits(count, seed=1):
 
 
 @st.composite
-def legal_joints(draw):
+def legal_joints(draw: st.DrawFn) -> Array:
     shares = [draw(st.floats(0.0, 1.0)) for _ in range(6)]
     low = np.where(np.arange(6) == 2, 0.01, ARM.lower)
     return low + np.array(shares) * (ARM.upper - low)
 
 
-def standard_link(theta, d, alpha, a4_32=None):
+def standard_link(theta: float, d: float, alpha: float, a4_32: float | None = None) -> Array:
     """Distal Denavit-Hartenberg matrix Rz(theta) Tz(d) Rx(alpha)."""
     out = transform(rotation("z", theta) @ rotation("x", alpha), np.array([0.0, 0.0, d]))
     if a4_32 is not None:
@@ -76,7 +80,7 @@ def standard_link(theta, d, alpha, a4_32=None):
     return out
 
 
-def denavit_hartenberg(q, a4_32=-1.0):
+def denavit_hartenberg(q: Array, a4_32: float = -1.0) -> Array:
     quarter = math.pi / 2
     table = (
         (q[0], 0.0, -quarter, None), (q[1], 0.0, quarter, None), (0.0, q[2], 0.0, None),
@@ -85,7 +89,7 @@ def denavit_hartenberg(q, a4_32=-1.0):
     return np.linalg.multi_dot([standard_link(*row) for row in table])
 
 
-def modified_denavit_hartenberg(q):
+def modified_denavit_hartenberg(q: Array) -> Array:
     """The same numbers read as the heading of the printed table says: Rx(alpha) Rz(theta) Tz(d)."""
     quarter = math.pi / 2
     alphas, thetas = (-quarter, quarter, 0, -quarter, quarter, 0), (q[0], q[1], 0.0, *q[3:])
@@ -97,7 +101,7 @@ def modified_denavit_hartenberg(q):
     return out
 
 
-def printed_fk(q):
+def printed_fk(q: Array) -> tuple[Array, Array]:
     """Equation 4.4.1 with its misprints: s6 and c6 swapped in n, a_x in p_y and p_z."""
     c, s = np.cos(q), np.sin(q)
     c1, c2, c4, c5, c6 = c[0], c[1], c[3], c[4], c[5]
@@ -108,33 +112,33 @@ def printed_fk(q):
     return n, np.array([c1 * s2 * q[2], s1 * s2 * q[2], c2 * q[2]]) + L6 * a_x
 
 
-def test_standard_table_gives_the_forward_kinematics():  # case 1
+def test_standard_table_gives_the_forward_kinematics() -> None:  # case 1
     for q in inside_limits(200):
         # 1e-12 is the bound of the case; lengths are in metres.
         assert np.allclose(denavit_hartenberg(q), ARM.fk(q), rtol=0, atol=1e-12)
 
 
-def test_printed_sign_in_the_fourth_link_gives_wrong_poses():  # case 1, misprint 3
+def test_printed_sign_in_the_fourth_link_gives_wrong_poses() -> None:  # case 1, misprint 3
     q = joints(*PUBLISHED[3][0])
     wrong = denavit_hartenberg(q, a4_32=1.0)
     assert abs(np.linalg.det(wrong[:3, :3]) - 1.0) > 0.5
     assert np.linalg.norm(wrong[:3, 3] - ARM.fk(q)[:3, 3]) > 1e-3
 
 
-def test_table_read_as_modified_convention_points_home_straight_up():  # misprint 1
+def test_table_read_as_modified_convention_points_home_straight_up() -> None:  # misprint 1
     wrong = modified_denavit_hartenberg(ARM.home)
     assert np.allclose(wrong[:3, 3], (0.0, 0.0, 0.458), rtol=0, atol=ROUNDING)
     assert np.linalg.norm(wrong[:3, 3] - ARM.fk(ARM.home)[:3, 3]) > 0.4
 
 
-def test_home_is_where_the_joint_table_puts_it():  # case 2
+def test_home_is_where_the_joint_table_puts_it() -> None:  # case 2
     pose = ARM.fk(ARM.home)
     # Half of the last digit given.
     assert np.allclose(pose[:3, 3] / MM, (420.3316, 0.0, -181.8937), rtol=0, atol=5e-5)
     assert np.allclose(pose[:3, :3], rotation("y", 113.4 * DEGREE), rtol=0, atol=ROUNDING)
 
 
-def test_printed_cartesian_home_is_another_pose_than_the_joint_table():  # misprint 2
+def test_printed_cartesian_home_is_another_pose_than_the_joint_table() -> None:  # misprint 2
     printed = np.array([416.901, 0.0, -194.414]) * MM
     assert 12.9 * MM < np.linalg.norm(ARM.fk(ARM.home)[:3, 3] - printed) < 13.1 * MM
     # It lies 460 mm out, 2 mm beyond the reach of 421 + 37 mm.
@@ -149,14 +153,16 @@ def test_printed_cartesian_home_is_another_pose_than_the_joint_table():  # mispr
         ((0, 90, 300, 90, 90, 0), (300, 37, 0), (0, 1, 0)),  # case 5
     ],
 )
-def test_right_angled_postures_have_the_tip_where_a_ruler_would(posture, tip, approach):
+def test_right_angled_postures_have_the_tip_where_a_ruler_would(
+    posture: tuple[int, ...], tip: tuple[int, int, int], approach: tuple[int, int, int]
+) -> None:
     pose = ARM.fk(joints(*posture))
     assert np.allclose(pose[:3, 3] / MM, tip, rtol=0, atol=1e-11)
     assert np.allclose(pose[:3, 2], approach, rtol=0, atol=ROUNDING)
 
 
 @pytest.mark.parametrize("point", PUBLISHED)
-def test_published_poses_reproduce(point):  # case 7
+def test_published_poses_reproduce(point: int) -> None:  # case 7
     posture, tip = PUBLISHED[point]
     pose = ARM.fk(joints(*posture))
     # The case's own tolerances: matrices are printed to three digits, tips to 1 µm.
@@ -165,26 +171,26 @@ def test_published_poses_reproduce(point):  # case 7
 
 
 @pytest.mark.parametrize("point", [1, 2, 5])
-def test_printed_wrist_angles_of_three_points_do_not_reproduce(point):  # misprint 7
+def test_printed_wrist_angles_of_three_points_do_not_reproduce(point: int) -> None:  # misprint 7
     theta1, theta2, d3 = PUBLISHED[point][0][:3]
     wrong = ARM.fk(joints(theta1, theta2, d3, 85.944, 88.868, 80.214))
     assert np.abs(wrong[:3, :3] - ROTATIONS[point]).max() > 0.05
 
 
-def test_printed_height_of_point_6_is_100_mm_off():  # misprint 7
+def test_printed_height_of_point_6_is_100_mm_off() -> None:  # misprint 7
     height = ARM.fk(joints(*PUBLISHED[6][0]))[2, 3] / MM
     assert abs(height - -388.104) > 99.9
 
 
 @pytest.mark.parametrize("point", ROLL_PITCH_YAW)
-def test_fixed_angles_of_the_published_poses_reproduce(point):  # case 8
+def test_fixed_angles_of_the_published_poses_reproduce(point: int) -> None:  # case 8
     angles = roll_pitch_yaw(ARM.fk(joints(*PUBLISHED[point][0]))[:3, :3])
     # Half of the last digit given; -156.14 has two.
     tolerance = 5e-3 if point == 1 else 5.1e-4
     assert np.allclose(angles / DEGREE, ROLL_PITCH_YAW[point], rtol=0, atol=tolerance)
 
 
-def test_printed_element_formulas_are_off_by_centimetres():  # misprint 4
+def test_printed_element_formulas_are_off_by_centimetres() -> None:  # misprint 4
     worst_place, worst_axis = 0.0, 0.0
     for q in inside_limits(200):
         pose, (n, place) = ARM.fk(q), printed_fk(q)
@@ -194,12 +200,12 @@ def test_printed_element_formulas_are_off_by_centimetres():  # misprint 4
     assert worst_axis > 1.0
 
 
-def test_poses_of_a_batch_equal_the_single_ones():
+def test_poses_of_a_batch_equal_the_single_ones() -> None:
     batch = inside_limits(20)
     assert np.array_equal(ARM.fk(batch), [ARM.fk(q) for q in batch])
 
 
-def test_jacobian_is_the_slope_of_the_pose():
+def test_jacobian_is_the_slope_of_the_pose() -> None:
     h = 1e-6
     for q in inside_limits(50):
         pose, numeric = ARM.fk(q), np.empty((6, 6))
@@ -214,13 +220,13 @@ def test_jacobian_is_the_slope_of_the_pose():
         assert np.allclose(ARM.jacobian(q), numeric, rtol=0, atol=1e-9)
 
 
-def test_determinant_of_the_jacobian_is_the_published_product():  # case 12
+def test_determinant_of_the_jacobian_is_the_published_product() -> None:  # case 12
     for q in inside_limits(200):
         product = q[2] ** 2 * math.sin(q[1]) * math.sin(q[4])
         assert math.isclose(np.linalg.det(ARM.jacobian(q)), product, rel_tol=1e-9, abs_tol=1e-15)
 
 
-def test_all_four_branches_reach_the_pose_and_one_is_the_joints():  # case 9
+def test_all_four_branches_reach_the_pose_and_one_is_the_joints() -> None:  # case 9
     worst_pose, worst_joint = 0.0, 0.0
     for q in inside_limits(2_000, seed=9):
         pose = ARM.fk(q)
@@ -233,7 +239,7 @@ def test_all_four_branches_reach_the_pose_and_one_is_the_joints():  # case 9
     assert worst_joint < 1e-11
 
 
-def test_ik_next_to_the_joints_gives_them_back_for_20_000_poses():  # case 9
+def test_ik_next_to_the_joints_gives_them_back_for_20_000_poses() -> None:  # case 9
     batch = inside_limits(20_000, seed=10)
     answer = ARM.ik(ARM.fk(batch), batch)
     near = np.abs(np.sin(batch[:, 4])) < 0.02
@@ -243,7 +249,7 @@ def test_ik_next_to_the_joints_gives_them_back_for_20_000_poses():  # case 9
     assert np.abs(answer.q - batch).max() < 1e-10
 
 
-def test_four_branches_are_the_arm_behind_and_the_wrist_flipped():
+def test_four_branches_are_the_arm_behind_and_the_wrist_flipped() -> None:
     q = joints(30, 70, 300, 40, 50, 60)
     front, flipped, behind, _ = ARM.ik_all(ARM.fk(q))
     turn = math.pi
@@ -252,7 +258,7 @@ def test_four_branches_are_the_arm_behind_and_the_wrist_flipped():
     assert np.allclose(behind[:3], (q[0] - turn, -q[1], q[2]), rtol=0, atol=1e-12)
 
 
-def test_at_the_wrist_singularity_joint_4_keeps_its_value_and_joint_6_turns():  # case 11
+def test_at_the_wrist_singularity_joint_4_keeps_its_value_and_joint_6_turns() -> None:  # case 11
     turned = ARM.home + np.array([0, 0, 0, 0, 0, 0.4])
     answer = ARM.ik(ARM.fk(turned))
     assert answer.status is IkStatus.NEAR_SINGULAR
@@ -263,7 +269,9 @@ def test_at_the_wrist_singularity_joint_4_keeps_its_value_and_joint_6_turns():  
     assert math.isclose(answer.q[5], 0.1, abs_tol=1e-9)
 
 
-def test_roll_that_joint_6_cannot_do_alone_at_the_wrist_singularity_is_shared_with_joint_4():
+def test_roll_that_joint_6_cannot_do_alone_at_the_wrist_singularity_is_shared_with_joint_4() -> (
+    None
+):
     rng = np.random.default_rng(4)
     for roll, seed4 in rng.uniform(ARM.lower[3], ARM.upper[3], (500, 2)):
         total = roll + rng.uniform(ARM.lower[5], ARM.upper[5])
@@ -274,7 +282,7 @@ def test_roll_that_joint_6_cannot_do_alone_at_the_wrist_singularity_is_shared_wi
 
 
 @given(legal_joints(), legal_joints())
-def test_answer_is_inside_the_limits_and_says_how_far_off_it_is(q, seed):
+def test_answer_is_inside_the_limits_and_says_how_far_off_it_is(q: Array, seed: Array) -> None:
     pose = ARM.fk(q)
     answer = ARM.ik(pose, seed)
     assert ((answer.q >= ARM.lower) & (answer.q <= ARM.upper)).all()
@@ -290,7 +298,9 @@ def test_answer_is_inside_the_limits_and_says_how_far_off_it_is(q, seed):
     st.lists(st.floats(-3.0, 3.0), min_size=3, max_size=3),
     legal_joints(),
 )
-def test_no_finite_pose_makes_a_nan_or_leaves_the_limits(place, turn, seed):
+def test_no_finite_pose_makes_a_nan_or_leaves_the_limits(
+    place: list[float], turn: list[float], seed: Array
+) -> None:
     matrix = rotation("x", turn[0]) @ rotation("y", turn[1]) @ rotation("z", turn[2])
     answer = ARM.ik(transform(matrix, np.array(place)), seed)
     assert np.isfinite(answer.q).all()
@@ -300,13 +310,15 @@ def test_no_finite_pose_makes_a_nan_or_leaves_the_limits(place, turn, seed):
 
 @pytest.mark.parametrize("size", [0.0, 5e-324, 1e-200, 1e200, 1.7e308])
 @pytest.mark.parametrize("direction", [(1, 0, 0), (0, 1, 0), (0, 0, -1), (1, 1, 1)])
-def test_smallest_and_largest_places_give_finite_joints(size, direction):
+def test_smallest_and_largest_places_give_finite_joints(
+    size: float, direction: tuple[int, int, int]
+) -> None:
     answer = ARM.ik(transform(np.eye(3), size * np.array(direction, dtype=float)))
     assert np.isfinite(answer.q).all()
     assert not np.isnan(answer.residual).any()
 
 
-def test_pose_beyond_the_reach_is_unreachable_and_the_arm_points_there():
+def test_pose_beyond_the_reach_is_unreachable_and_the_arm_points_there() -> None:
     pose = ARM.fk(joints(20, 100, 400, 10, 20, 30))
     pose[:3, 3] *= 2.0
     answer = ARM.ik(pose)
@@ -325,14 +337,16 @@ def test_pose_beyond_the_reach_is_unreachable_and_the_arm_points_there():
         ((10, 90, 300, 10, 85, 30), 4, 80),
     ],
 )
-def test_pose_past_a_joint_limit_is_limited_and_stays_at_the_limit(posture, joint, bound):
+def test_pose_past_a_joint_limit_is_limited_and_stays_at_the_limit(
+    posture: tuple[int, ...], joint: int, bound: int
+) -> None:
     answer = ARM.ik(ARM.fk(joints(*posture)))
     assert answer.status is IkStatus.LIMITED
     assert math.isclose(answer.q[joint], bound * DEGREE, abs_tol=1e-12)
     assert answer.residual.max() > 1e-3
 
 
-def test_wrist_branch_inside_the_limits_wins_over_a_nearer_one_outside():
+def test_wrist_branch_inside_the_limits_wins_over_a_nearer_one_outside() -> None:
     q = joints(10, 90, 300, -150, 40, 100)
     # The other wrist branch is (30, -40, -80); only this seed is nearer to it.
     seed = joints(10, 90, 300, 20, -30, -70)
@@ -344,16 +358,16 @@ def test_wrist_branch_inside_the_limits_wins_over_a_nearer_one_outside():
     assert np.allclose(ARM.ik(ARM.fk(q), seed).q, q, rtol=0, atol=1e-12)
 
 
-def test_without_a_seed_the_answer_is_the_one_next_to_home():
+def test_without_a_seed_the_answer_is_the_one_next_to_home() -> None:
     pose = ARM.fk(joints(20, 100, 400, 10, 20, 30))
     assert np.array_equal(ARM.ik(pose).q, ARM.ik(pose, ARM.home).q)
 
 
-def test_batch_with_one_seed_or_one_for_each_equals_single_answers():
+def test_batch_with_one_seed_or_one_for_each_equals_single_answers() -> None:
     batch, seeds = inside_limits(50, seed=2), inside_limits(50, seed=3)
     poses = ARM.fk(batch)
     for seed_of, given_seeds in ((lambda i: seeds[i], seeds), (lambda i: seeds[0], seeds[0])):
-        together = ARM.ik(poses, given_seeds)
+        together: Any = ARM.ik(poses, given_seeds)
         for i, pose in enumerate(poses):
             alone = ARM.ik(pose, seed_of(i))
             assert np.array_equal(together.q[i], alone.q)
@@ -361,15 +375,15 @@ def test_batch_with_one_seed_or_one_for_each_equals_single_answers():
             assert np.array_equal(together.residual[i], alone.residual)
 
 
-def test_empty_batch_has_empty_answers():
-    answer = ARM.ik(np.empty((0, 4, 4)))
+def test_empty_batch_has_empty_answers() -> None:
+    answer: Any = ARM.ik(np.empty((0, 4, 4)))
     assert answer.q.shape == (0, 6)
     assert answer.status.shape == (0,)
     assert ARM.fk(np.empty((0, 6))).shape == (0, 4, 4)
 
 
 @given(st.floats(0.0, 0.05), legal_joints())
-def test_shoulder_offset_keeps_the_inverse_an_inverse(offset, q):
+def test_shoulder_offset_keeps_the_inverse_an_inverse(offset: float, q: Array) -> None:
     # With an offset the wrist centre stays off the axis of joint 1.
     arm = load_robot("rcrt1", d2=offset, L6=0.05)
     pose = arm.fk(q)
@@ -378,21 +392,21 @@ def test_shoulder_offset_keeps_the_inverse_an_inverse(offset, q):
 
 
 @pytest.mark.parametrize("method", ["ik", "ik_all"])
-def test_pose_that_is_not_rigid_is_refused(method):
+def test_pose_that_is_not_rigid_is_refused(method: str) -> None:
     for bad in (np.zeros((4, 4)), 2.0 * np.eye(4), np.diag([1.0, 1.0, -1.0, 1.0])):
         with pytest.raises(ParameterError):
             getattr(ARM, method)(bad)
 
 
 @pytest.mark.parametrize("method", ["ik", "ik_all"])
-def test_pose_with_nan_is_refused(method):
+def test_pose_with_nan_is_refused(method: str) -> None:
     bad = ARM.fk(ARM.home)
     bad[0, 3] = math.nan
     with pytest.raises(ParameterError):
         getattr(ARM, method)(bad)
 
 
-def test_bad_pose_in_a_batch_is_named_by_its_index():
+def test_bad_pose_in_a_batch_is_named_by_its_index() -> None:
     poses = ARM.fk(inside_limits(3))
     poses[2, 0, 0] += 0.1
     with pytest.raises(ParameterError) as error:
@@ -400,7 +414,7 @@ def test_bad_pose_in_a_batch_is_named_by_its_index():
     assert error.value.name == "T[2]"
 
 
-def test_seed_with_nan_is_refused():
+def test_seed_with_nan_is_refused() -> None:
     with pytest.raises(ParameterError):
         ARM.ik(ARM.fk(ARM.home), np.full(6, math.nan))
 
@@ -415,36 +429,36 @@ def test_seed_with_nan_is_refused():
         lambda: ARM.ik(np.stack([np.eye(4)] * 3), np.zeros((2, 6))),
     ],
 )
-def test_array_of_another_shape_is_refused(call):
+def test_array_of_another_shape_is_refused(call: Callable[..., object]) -> None:
     with pytest.raises(ShapeError):
         call()
 
 
-def test_limits_and_home_cannot_be_changed_through_the_robot():
+def test_limits_and_home_cannot_be_changed_through_the_robot() -> None:
     for array in (ARM.lower, ARM.upper, ARM.home):
         with pytest.raises(ValueError, match="read-only"):
             array[0] = 1.0
 
 
 @pytest.mark.parametrize("length", [-0.01, 1.5, math.nan, math.inf])
-def test_impossible_length_is_refused_by_its_symbol(length):
+def test_impossible_length_is_refused_by_its_symbol(length: float) -> None:
     with pytest.raises(ParameterError) as error:
         load_robot("rcrt1", L6=length)
     assert error.value.name == "L6"
 
 
-def test_unknown_symbol_is_refused_with_the_symbols():
+def test_unknown_symbol_is_refused_with_the_symbols() -> None:
     with pytest.raises(UnknownNameError) as error:
         load_robot("rcrt1", L7=0.1)
     assert error.value.alternatives == ("L6", "d2")
 
 
-def test_published_numbers_have_no_tendon_coupling():
+def test_published_numbers_have_no_tendon_coupling() -> None:
     angles = np.array([0.3, -0.4])
     assert np.array_equal(tendon_motor_angles(angles), angles)
 
 
-def test_tendon_ratios_of_the_printed_radii_pull_both_motors():
+def test_tendon_ratios_of_the_printed_radii_pull_both_motors() -> None:
     # r5* = 3.5, r5 = 2.5, r6* = 1.8, r6 = 2.5 mm.
     ratios = {"ratio5": 2.5 / 3.5, "ratio6": 2.5 / 1.8, "coupling": 2.5 / 1.8}
     motors = tendon_motor_angles(np.array([0.7, 0.0]), **ratios)
@@ -455,7 +469,9 @@ def test_tendon_ratios_of_the_printed_radii_pull_both_motors():
     st.lists(st.floats(-3.0, 3.0), min_size=2, max_size=2),
     st.floats(0.1, 5.0), st.floats(-5.0, -0.1), st.floats(-3.0, 3.0),
 )  # fmt: skip
-def test_joint_angles_come_back_from_the_motor_angles(angles, ratio5, ratio6, coupling):
+def test_joint_angles_come_back_from_the_motor_angles(
+    angles: list[float], ratio5: float, ratio6: float, coupling: float
+) -> None:
     ratios = {"ratio5": ratio5, "ratio6": ratio6, "coupling": coupling}
     back = tendon_joint_angles(tendon_motor_angles(np.array(angles), **ratios), **ratios)
     # Products up to 15 divided by ratios down to 0.1.
@@ -464,7 +480,7 @@ def test_joint_angles_come_back_from_the_motor_angles(angles, ratio5, ratio6, co
 
 @pytest.mark.parametrize("name", ["ratio5", "ratio6"])
 @pytest.mark.parametrize("ratio", [0.0, math.nan])
-def test_tendon_ratio_that_turns_nothing_is_refused(name, ratio):
+def test_tendon_ratio_that_turns_nothing_is_refused(name: str, ratio: float) -> None:
     for convert in (tendon_motor_angles, tendon_joint_angles):
         with pytest.raises(ParameterError) as error:
             convert(np.zeros(2), **{name: ratio})

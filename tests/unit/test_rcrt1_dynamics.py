@@ -1,13 +1,18 @@
 """RCRT-1 dynamics: closed form against a Lagrangian, pinocchio and energy; the drive table."""
 
 import math
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import pinocchio
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from numpy.typing import ArrayLike
+from pinocchio import Inertia, Model
 
+from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot, rcrt1_dynamics
 from teleop_core.robots.rcrt1_dynamics import DRIVES, LINKS, link_row
 from teleop_core.slave.joints import integrate
@@ -32,7 +37,16 @@ states = st.tuples(
 )  # fmt: skip
 
 
-def pseudo_inertia(mass, center, ixx, iyy, izz, ixy, ixz, iyz):
+def pseudo_inertia(
+    mass: float,
+    center: tuple[float, float, float],
+    ixx: float,
+    iyy: float,
+    izz: float,
+    ixy: float,
+    ixz: float,
+    iyz: float,
+) -> Array:
     """Pseudo-inertia (4, 4) about the link frame's origin, products as +∫xy dm."""
     out = np.diag([(-ixx + iyy + izz) / 2, (ixx - iyy + izz) / 2, (ixx + iyy - izz) / 2, mass])
     out[0, 1] = out[1, 0] = ixy
@@ -56,7 +70,7 @@ PSEUDO = (
 )  # fmt: skip
 
 
-def links(q):
+def links(q: Sequence[float] | Array) -> tuple[Array, Array, Array]:
     """Link matrices A1, A2, A3; also of complex joints."""
     c1, s1, c2, s2 = np.cos(q[0]), np.sin(q[0]), np.cos(q[1]), np.sin(q[1])
     zero, one = 0.0 * q[0], 1.0 + 0.0 * q[0]
@@ -66,7 +80,7 @@ def links(q):
     return a1, a2, a3
 
 
-def derivative(q, link, joint):
+def derivative(q: Sequence[float] | Array, link: int, joint: int) -> Array:
     """U: derivative of the pose of frame ``link`` by ``joint``, both from 0."""
     out = np.eye(4)
     for i, a in enumerate(links(q)[: link + 1]):
@@ -74,7 +88,7 @@ def derivative(q, link, joint):
     return out if joint <= link else 0.0 * out
 
 
-def lagrangian_inertia(q):
+def lagrangian_inertia(q: Any) -> Any:
     """D of the recipe A.3.1, motors left out; also of complex joints."""
     out = np.zeros((3, 3), dtype=np.asarray(q).dtype)
     for i in range(3):
@@ -85,7 +99,7 @@ def lagrangian_inertia(q):
     return out
 
 
-def lagrangian_velocity_effort(q, dq):
+def lagrangian_velocity_effort(q: Array, dq: Array) -> Array:
     """Christoffel form of h; the slopes of D by complex steps, exact to rounding."""
     slopes = np.empty((3, 3, 3))
     for m in range(3):
@@ -96,14 +110,14 @@ def lagrangian_velocity_effort(q, dq):
     return rate @ dq - 0.5 * np.array([dq @ slopes[m] @ dq for m in range(3)])
 
 
-def potential(q):
+def potential(q: Any) -> Any:
     """Potential energy of links 2 and 3; also of complex joints."""
     a1, a2, a3 = links(q)
     height = (a1 @ a2 @ PSEUDO[1])[2, 3] + (a1 @ a2 @ a3 @ PSEUDO[2])[2, 3]
     return LINKS["g"] * height
 
 
-def lagrangian_gravity(q):
+def lagrangian_gravity(q: Array) -> Array:
     out = np.empty(3)
     for m in range(3):
         step = np.array(q, dtype=complex)
@@ -112,52 +126,54 @@ def lagrangian_gravity(q):
     return out
 
 
-def inertia(q, row=ROW):
+def inertia(q: Sequence[float] | Array, row: Array = ROW) -> Array:
     out = np.empty((3, 3))
     rcrt1_dynamics.inertia_matrix(np.asarray(q, dtype=float), row, out)
     return out
 
 
-def velocity_effort(q, dq):
+def velocity_effort(q: Array, dq: Array) -> Array:
     out = np.empty(3)
     rcrt1_dynamics.velocity_effort(np.asarray(q), np.asarray(dq), ROW, out)
     return out
 
 
-def gravity(q, row=ROW):
+def gravity(q: ArrayLike, row: Array = ROW) -> Array:
     out, joints = np.empty(6), np.zeros(6)
     joints[:3] = q
     rcrt1_dynamics.gravity_effort(joints, row, out)
     return out
 
 
-def acceleration(q, dq, effort):
+def acceleration(q: Array, dq: Array, effort: Array) -> Array:
     out = np.empty(6)
     rcrt1_dynamics.acceleration(q, dq, effort, ROW, out)
     return out
 
 
 @given(states)
-def test_inertia_is_that_of_the_lagrangian(state):  # case 27
+def test_inertia_is_that_of_the_lagrangian(state: tuple[float, ...]) -> None:  # case 27
     q = np.array(state[:3])
     assert np.allclose(inertia(q), lagrangian_inertia(q) + MOTORS, rtol=0, atol=ROUNDING)
 
 
 @given(states)
-def test_velocity_effort_is_that_of_the_lagrangian(state):  # case 27
+def test_velocity_effort_is_that_of_the_lagrangian(state: tuple[float, ...]) -> None:  # case 27
     q, dq = np.array(state[:3]), np.array(state[3:])
     expected = lagrangian_velocity_effort(q, dq)
     assert np.allclose(velocity_effort(q, dq), expected, rtol=0, atol=ROUNDING)
 
 
 @given(states)
-def test_gravity_is_the_slope_of_the_potential_energy(state):  # case 27
+def test_gravity_is_the_slope_of_the_potential_energy(state: tuple[float, ...]) -> None:  # case 27
     q = np.array(state[:3])
     # Torques up to 10 N·m.
     assert np.allclose(gravity(q)[:3], lagrangian_gravity(q), rtol=0, atol=10 * ROUNDING)
 
 
-def test_printed_inertia_and_velocity_terms_are_not_those_of_the_lagrangian():  # misprints 9-11
+def test_printed_inertia_and_velocity_terms_are_not_those_of_the_lagrangian() -> (
+    None
+):  # misprints 9-11
     q, dq = np.array([0.3, 1.2, 0.3]), np.array([0.5, -0.7, 0.4])
     s2, c2, d3 = math.sin(q[1]), math.cos(q[1]), q[2]
     reach = LINKS["I3xx"] + LINKS["m3"] * d3 * (d3 + 2 * LINKS["G3z"])
@@ -179,25 +195,36 @@ def test_printed_inertia_and_velocity_terms_are_not_those_of_the_lagrangian():  
         (90.0, 0.264245, -5.9046),
     ],
 )
-def test_gravity_torque_is_the_published_one_for_both_readings_of_g3z(theta2, g3z, torque):
+def test_gravity_torque_is_the_published_one_for_both_readings_of_g3z(
+    theta2: float, g3z: float, torque: float
+) -> None:
     # Case 25; half of the last digit given.
     effort = gravity((0.0, theta2 * DEGREE, 0.421), link_row(G3z=g3z))
     assert math.isclose(effort[1], torque, abs_tol=5e-5)
 
 
-def test_gravity_at_home_pulls_joint_3_out_with_the_published_force():  # case 25
+def test_gravity_at_home_pulls_joint_3_out_with_the_published_force() -> None:  # case 25
     effort = gravity((0.0, 113.4 * DEGREE, 0.421))
     assert math.isclose(effort[2], -3.0740, abs_tol=5e-5)
     assert not effort[[0, 3, 4, 5]].any()
 
 
-def test_static_moment_of_the_four_bar_adds_to_axis_2():
+def test_static_moment_of_the_four_bar_adds_to_axis_2() -> None:
     effort = gravity((0.0, math.pi / 2, 0.3), link_row(m2b_L0b=0.02))
     added = effort[1] - gravity((0.0, math.pi / 2, 0.3))[1]
     assert math.isclose(added, -9.81 * 0.02, abs_tol=ROUNDING)
 
 
-def spatial_inertia(mass, center, ixx, iyy, izz, ixy, ixz, iyz):
+def spatial_inertia(
+    mass: float,
+    center: Any,
+    ixx: float,
+    iyy: float,
+    izz: float,
+    ixy: float,
+    ixz: float,
+    iyz: float,
+) -> Inertia:
     """pinocchio's inertia, about the centre of mass, from moments about the frame's origin."""
     center = np.array(center)
     about_origin = np.array([[ixx, -ixy, -ixz], [-ixy, iyy, -iyz], [-ixz, -iyz, izz]])
@@ -205,7 +232,7 @@ def spatial_inertia(mass, center, ixx, iyy, izz, ixy, ixz, iyz):
     return pinocchio.Inertia(mass, center, about_origin - shift)
 
 
-def pinocchio_model():
+def pinocchio_model() -> Model:
     """The same arm as a chain Rz, Ry, Pz; frame 2 and 3 as in the source, motors as armature."""
     model = pinocchio.Model()
     model.gravity.linear = np.array([0.0, 0.0, -LINKS["g"]])
@@ -237,7 +264,9 @@ PINOCCHIO = pinocchio_model()
 
 
 @given(states, st.tuples(*[st.floats(-6.0, 6.0)] * 2, st.floats(-25.0, 25.0)))
-def test_accelerations_are_pinocchios(state, drive):
+def test_accelerations_are_pinocchios(
+    state: tuple[float, ...], drive: tuple[float, float, float]
+) -> None:
     q, dq, effort = np.zeros(6), np.zeros(6), np.zeros(6)
     q[:3], dq[:3], effort[:3] = state[:3], state[3:], drive
     expected = pinocchio.aba(PINOCCHIO, PINOCCHIO.createData(), q[:3], dq[:3], effort[:3])
@@ -246,14 +275,14 @@ def test_accelerations_are_pinocchios(state, drive):
 
 
 @given(states)
-def test_gravity_is_pinocchios(state):
+def test_gravity_is_pinocchios(state: tuple[float, ...]) -> None:
     q = np.array(state[:3])
     expected = pinocchio.computeGeneralizedGravity(PINOCCHIO, PINOCCHIO.createData(), q)
     assert np.allclose(gravity(q)[:3], expected, rtol=0, atol=10 * ROUNDING)
 
 
 @given(states)
-def test_effort_and_acceleration_are_inverse_to_each_other(state):
+def test_effort_and_acceleration_are_inverse_to_each_other(state: tuple[float, ...]) -> None:
     q, dq = np.zeros(6), np.zeros(6)
     q[:3], dq[:3] = state[:3], state[3:]
     wanted = np.array([1.0, -2.0, 0.5, 3.0, -4.0, 5.0])
@@ -263,11 +292,11 @@ def test_effort_and_acceleration_are_inverse_to_each_other(state):
     assert np.allclose(acceleration(q, dq, effort), wanted, rtol=0, atol=1e-11)
 
 
-def energy(q, dq):
+def energy(q: Array, dq: Array) -> float:
     return 0.5 * dq[:3] @ inertia(q) @ dq[:3] + potential(q)
 
 
-def swing(steps, ticks=400):
+def swing(steps: int, ticks: int = 400) -> tuple[Array, Array]:
     """Joints and speeds after free motion from a tilted posture, without any friction."""
     q, dq = np.array([0.0, 1.2, 0.3, 0, 0, 0]), np.array([1.5, -1.0, 0.05, 0, 0, 0])
     slave = SlaveSim(SlaveSimParameters())
@@ -279,7 +308,7 @@ def swing(steps, ticks=400):
     return q, dq
 
 
-def test_free_motion_without_friction_keeps_its_energy():
+def test_free_motion_without_friction_keeps_its_energy() -> None:
     start = energy(np.array([0.0, 1.2, 0.3]), np.array([1.5, -1.0, 0.05]))
     q, dq = swing(2)
     kinetic = energy(q, dq) - potential(q)
@@ -289,25 +318,25 @@ def test_free_motion_without_friction_keeps_its_energy():
     assert math.isclose(energy(q, dq), start, abs_tol=1e-10)
 
 
-def test_axis_1_keeps_its_momentum_without_friction():
+def test_axis_1_keeps_its_momentum_without_friction() -> None:
     before = inertia([0.0, 1.2, 0.3])[0] @ [1.5, -1.0, 0.05]
     q, dq = swing(2)
     assert math.isclose(inertia(q)[0] @ dq[:3], before, abs_tol=1e-10)
 
 
 @given(states)
-def test_inertia_is_positive_definite_over_the_whole_workspace(state):
+def test_inertia_is_positive_definite_over_the_whole_workspace(state: Any) -> None:
     assert np.linalg.eigvalsh(inertia(state[:3]))[0] > 0.05
 
 
-def test_inertia_of_the_drive_table_is_that_of_the_arm_at_home():
+def test_inertia_of_the_drive_table_is_that_of_the_arm_at_home() -> None:
     at_home = np.diag(inertia(load_robot("rcrt1").home))
     # The table rounds to three or four digits.
     assert np.allclose(DRIVES.inertia[:3], at_home, rtol=5e-3, atol=0)
     assert np.array_equal(DRIVES.inertia[3:], [LINKS["J4"], LINKS["J5"], LINKS["J6"]])
 
 
-def test_encoder_steps_are_the_published_resolutions():  # case 15
+def test_encoder_steps_are_the_published_resolutions() -> None:  # case 15
     degrees = DRIVES.encoder_step[[0, 1, 3, 4, 5]] / DEGREE
     # Half of the last printed digit.
     assert np.allclose(degrees[:2], 1.0e-3, rtol=0, atol=5e-8)
@@ -315,33 +344,33 @@ def test_encoder_steps_are_the_published_resolutions():  # case 15
     assert math.isclose(DRIVES.encoder_step[2] / 1e-3, 1.316e-4, abs_tol=5e-8)
 
 
-def test_printed_resolutions_of_axis_3_are_a_hundred_and_ten_times_off():  # misprint 14
+def test_printed_resolutions_of_axis_3_are_a_hundred_and_ten_times_off() -> None:  # misprint 14
     micrometres = DRIVES.encoder_step[2] / 1e-6
     screw_degrees = 360.0 / (3.71 * 2048)
     assert math.isclose(13.161 / micrometres, 100.0, rel_tol=1e-3)
     assert math.isclose(screw_degrees / 4.738e-3, 10.0, rel_tol=1e-3)
 
 
-def test_tip_resolution_at_full_reach_is_the_published_one():  # case 15
+def test_tip_resolution_at_full_reach_is_the_published_one() -> None:  # case 15
     turning = 460.0 * DRIVES.encoder_step[:2]
     combined = math.sqrt(turning @ turning + (DRIVES.encoder_step[2] / 1e-3) ** 2)
     assert np.allclose(turning, 8.029e-3, rtol=0, atol=5e-7)
     assert math.isclose(combined, 11.355e-3, abs_tol=5e-7)
 
 
-def test_encoder_steps_are_those_of_the_published_logs():
+def test_encoder_steps_are_those_of_the_published_logs() -> None:
     # θ5 and θ6 of tables 7.1-7.6 step by 4.04e-5 rad, θ1 and θ2 by 1.745e-5 rad.
     assert np.allclose(DRIVES.encoder_step[4:], 4.04e-5, rtol=0, atol=5e-8)
     assert np.allclose(DRIVES.encoder_step[:2], 1.745e-5, rtol=0, atol=5e-9)
 
 
-def test_speed_limits_are_those_of_the_motors():
+def test_speed_limits_are_those_of_the_motors() -> None:
     degrees = DRIVES.speed_limit[[0, 1, 3, 4, 5]] / DEGREE
     assert np.allclose(degrees, (180.0, 180.0, 421.3, 781.6, 781.6), rtol=0, atol=0.05)
     assert math.isclose(DRIVES.speed_limit[2] / 1e-3, 61.99, abs_tol=5e-3)
 
 
-def test_force_limit_of_joint_3_is_what_its_torque_lifts_through_the_screw():
+def test_force_limit_of_joint_3_is_what_its_torque_lifts_through_the_screw() -> None:
     diameter, lead, friction = 7e-3, 1e-3, 0.01687
     lifting = diameter / 2 * (lead + friction * math.pi * diameter)
     factor = lifting / (math.pi * diameter - friction * lead)
@@ -351,7 +380,7 @@ def test_force_limit_of_joint_3_is_what_its_torque_lifts_through_the_screw():
     assert math.isclose(LINKS["J3"], 6.627e-7 * (2 * math.pi / lead) ** 2, rel_tol=1e-12)
 
 
-def test_drives_hold_the_arm_against_gravity_everywhere():
+def test_drives_hold_the_arm_against_gravity_everywhere() -> None:
     rng = np.random.default_rng(5)
     arm = load_robot("rcrt1")
     for q in rng.uniform(arm.lower[:3], arm.upper[:3], (500, 3)):

@@ -1,6 +1,8 @@
 """The RCRT-1 of table A.1, mended, in engines by others: sympy's Lagrangian, MuJoCo, pinocchio."""
 
 import math
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -9,8 +11,10 @@ import pytest
 import sympy
 from hypothesis import given
 from hypothesis import strategies as st
+from pinocchio import Model
 from scipy.integrate import solve_ivp
 
+from teleop_core.kernels.geometry import Array
 from teleop_core.robots import rcrt1_dynamics
 from teleop_core.robots.rcrt1_dynamics import LINKS, link_inertias, link_row
 
@@ -34,14 +38,19 @@ states = st.tuples(
 )  # fmt: skip
 
 
-def central(mass, center, moments, products):
+def central(
+    mass: float,
+    center: tuple[float, float, float],
+    moments: tuple[float, float, float],
+    products: tuple[float, float, float],
+) -> Array:
     """Tensor (3, 3) about the centre of mass, by the parallel-axis theorem."""
     c, (xy, xz, yz) = np.array(center), products
     tensor = np.diag(moments) - np.array([[0, xy, xz], [xy, 0, yz], [xz, yz, 0]])
     return tensor - mass * (c @ c * np.eye(3) - np.outer(c, c))
 
 
-def ours(state):
+def ours(state: Sequence[float] | Array) -> Array:
     q, dq, effort, out = np.zeros(6), np.zeros(6), np.zeros(6), np.empty(6)
     q[:3], dq[:3], effort[:3] = state[:3], state[3:6], state[6:]
     rcrt1_dynamics.acceleration(q, dq, effort, ROW, out)
@@ -58,11 +67,13 @@ BODY = """
 </body>"""
 
 
-def numbers(values):
+def numbers(values: Sequence[float] | Array) -> str:
     return " ".join(repr(float(value)) for value in values)
 
 
-def mujoco_xml(table):
+def mujoco_xml(
+    table: Any,
+) -> str:
     """The arm as nested bodies; body 1 keeps axes along the base's, so its row is turned."""
     # Frame 1 to base axes at rest: x1 = x0, y1 = -z0, z1 = y0.
     turn = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
@@ -88,7 +99,7 @@ def mujoco_xml(table):
 MODEL = mujoco.MjModel.from_xml_string(mujoco_xml(TABLE))
 
 
-def mujoco_acceleration(state):
+def mujoco_acceleration(state: tuple[float, ...]) -> Array:
     data = mujoco.MjData(MODEL)
     data.qpos[:], data.qvel[:], data.qfrc_applied[:] = state[:3], state[3:6], state[6:]
     mujoco.mj_forward(MODEL, data)
@@ -96,11 +107,11 @@ def mujoco_acceleration(state):
 
 
 @given(states)
-def test_accelerations_are_mujocos(state):
+def test_accelerations_are_mujocos(state: tuple[float, ...]) -> None:
     assert np.allclose(ours(state), mujoco_acceleration(state), rtol=0, atol=AGREE)
 
 
-def test_mujoco_refuses_link_3_with_the_product_as_printed():
+def test_mujoco_refuses_link_3_with_the_product_as_printed() -> None:
     printed = (*TABLE[:2], (*TABLE[2][:3], (0.0, 3.0e-3, 0.0)))
     with pytest.raises(ValueError, match=r"(?s)positive eigenvalues.*link3"):
         mujoco.MjModel.from_xml_string(mujoco_xml(printed))
@@ -109,7 +120,7 @@ def test_mujoco_refuses_link_3_with_the_product_as_printed():
 # --- pinocchio -------------------------------------------------------------------------------
 
 
-def pinocchio_model():
+def pinocchio_model() -> Model:
     """Joints in the source's own frames: standard Denavit-Hartenberg transforms after each."""
     model, parent, place = pinocchio.Model(), 0, pinocchio.SE3.Identity()
     model.gravity.linear = np.array([0.0, 0.0, -LINKS["g"]])
@@ -129,7 +140,7 @@ PINOCCHIO = pinocchio_model()
 
 
 @given(states)
-def test_accelerations_are_pinocchios_in_the_frames_of_the_source(state):
+def test_accelerations_are_pinocchios_in_the_frames_of_the_source(state: tuple[float, ...]) -> None:
     q, dq, effort = np.array(state[:3]), np.array(state[3:6]), np.array(state[6:])
     expected = pinocchio.aba(PINOCCHIO, PINOCCHIO.createData(), q, dq, effort)
     assert np.allclose(ours(state), expected, rtol=0, atol=AGREE)
@@ -138,7 +149,7 @@ def test_accelerations_are_pinocchios_in_the_frames_of_the_source(state):
 # --- sympy -----------------------------------------------------------------------------------
 
 
-def symbolic_lagrangian():
+def symbolic_lagrangian() -> Callable[..., object]:
     """D, h and c (3 entries) of the kinetic and potential energy of three rigid bodies."""
     q = sympy.symbols("q1:4")
     dq = sympy.symbols("v1:4")
@@ -168,11 +179,14 @@ def symbolic_lagrangian():
     return sympy.lambdify((q, dq), (D, h, c), "numpy", cse=True)
 
 
-LAGRANGIAN = symbolic_lagrangian()
+LAGRANGIAN: Any = symbolic_lagrangian()
 
 
 @given(states)
-def test_closed_form_is_the_lagrangian_of_three_rigid_bodies(state):
+def test_closed_form_is_the_lagrangian_of_three_rigid_bodies(state: Any) -> None:
+    D: Any
+    h: Any
+    c: Any
     D, h, c = LAGRANGIAN(state[:3], state[3:6])
     joints, speed = np.array([*state[:3], 0.0, 0.0, 0.0]), np.array([*state[3:6], 0.0, 0.0, 0.0])
     inertia, velocity, gravity = np.empty((3, 3)), np.empty(3), np.empty(6)
@@ -188,7 +202,7 @@ def test_closed_form_is_the_lagrangian_of_three_rigid_bodies(state):
 # --- laws ------------------------------------------------------------------------------------
 
 
-def test_axes_1_and_2_act_on_each_other_as_much_as_the_table_says():
+def test_axes_1_and_2_act_on_each_other_as_much_as_the_table_says() -> None:
     angles = np.radians(np.linspace(50.0, 160.0, 1001))
     D, coupling = np.empty((3, 3)), []
     for angle in angles:
@@ -198,7 +212,7 @@ def test_axes_1_and_2_act_on_each_other_as_much_as_the_table_says():
     assert math.isclose(max(coupling), 7.1e-4, abs_tol=5e-6)
 
 
-def test_the_mended_sign_raises_the_inertia_of_axis_1_at_home():
+def test_the_mended_sign_raises_the_inertia_of_axis_1_at_home() -> None:
     D, home = np.empty((3, 3)), np.array([0.0, math.radians(113.4), 0.421, 0, 0, 0])
     rcrt1_dynamics.inertia_matrix(home, ROW, D)
     mended = D[0, 0]
@@ -206,11 +220,12 @@ def test_the_mended_sign_raises_the_inertia_of_axis_1_at_home():
     assert math.isclose(mended / D[0, 0] - 1.0, 0.037, abs_tol=5e-4)
 
 
-def test_free_motion_keeps_energy_and_the_momentum_of_axis_1():
-    def rate(_, y):
+def test_free_motion_keeps_energy_and_the_momentum_of_axis_1() -> None:
+    def rate(_: float, y: Array) -> Array:
         return np.concatenate((y[3:], ours([*y, 0.0, 0.0, 0.0])))
 
-    def conserved(y):
+    def conserved(y: Array) -> tuple[float, float]:
+        D: Any
         D, _, _ = LAGRANGIAN(y[:3], y[3:])
         height = TABLE[1][0] * potential_height(y[1], TABLE[1][1])
         height += TABLE[2][0] * potential_height(y[1], np.add(TABLE[2][1], (0, 0, y[2])))
@@ -224,11 +239,11 @@ def test_free_motion_keeps_energy_and_the_momentum_of_axis_1():
     assert abs(end[4] - start[4]) > 0.1
 
 
-def potential_height(angle, point):
+def potential_height(angle: float, point: Sequence[float] | Array) -> Any:
     return -math.sin(angle) * point[0] + math.cos(angle) * point[2]
 
 
-def test_links_of_the_robot_are_those_of_the_table():
+def test_links_of_the_robot_are_those_of_the_table() -> None:
     for link, row in zip(link_inertias(), TABLE, strict=True):
         mass, center, *rest = row
         assert link.mass == mass

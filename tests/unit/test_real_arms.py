@@ -2,12 +2,16 @@
 
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pinocchio
 import pytest
+from pinocchio import Data, Model
 
+from present import present
 from real_arms import ARMS, urdf_of
+from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot
 from teleop_core.robots.chain_dynamics import inertia_matrix, inverse_dynamics
 
@@ -31,14 +35,14 @@ ROUNDED = {
 }
 
 
-def model_of(text, q):
+def model_of(text: str, q: Array) -> tuple[Model, Data, Array]:
     """Model, data and configuration of pinocchio; joints that turn without end have limits."""
     model = pinocchio.buildModelFromXML(text.replace('type="continuous"', 'type="revolute"'))
     return model, model.createData(), q
 
 
 @pytest.mark.parametrize("name", ARMS)
-def test_pose_and_jacobian_are_those_of_pinocchio(name, tmp_path):
+def test_pose_and_jacobian_are_those_of_pinocchio(name: str, tmp_path: Path) -> None:
     robot, rng = load(name, tmp_path), np.random.default_rng(1)
     for q in rng.uniform(robot.lower, robot.upper, (20, robot.n)):
         model, data, theirs = model_of(urdf_of(name), q)
@@ -51,19 +55,23 @@ def test_pose_and_jacobian_are_those_of_pinocchio(name, tmp_path):
 
 
 @pytest.mark.parametrize("name", WEIGHED)
-def test_efforts_weights_and_inertias_are_those_of_pinocchio(name, tmp_path):
+def test_efforts_weights_and_inertias_are_those_of_pinocchio(name: str, tmp_path: Path) -> None:
     path, rng = tmp_path / "arm.urdf", np.random.default_rng(2)
     path.write_text(urdf_of(name, effort=1e4))
     task = "x y z rx ry" if name == "so101" else ""
     robot = load_robot(str(path), tip="tip", task=task, dynamics="links")
-    row, effort, M = robot.dynamics.parameters.copy(), np.empty(robot.n), np.empty((robot.n,) * 2)
+    row, effort, M = (
+        present(robot.dynamics).parameters.copy(),
+        np.empty(robot.n),
+        np.empty((robot.n,) * 2),
+    )
     for q in rng.uniform(robot.lower, robot.upper, (10, robot.n)):
         model, data, theirs = model_of(urdf_of(name), q)
         dq, ddq, given = rng.normal(size=(3, robot.n))
         inverse_dynamics(q, dq, ddq, row, effort)
         expected = pinocchio.rnea(model, data, theirs, dq, ddq)
         np.testing.assert_allclose(effort, expected, rtol=0.0, atol=1e-10 * abs(expected).max())
-        robot.dynamics.gravity(q, row, effort)
+        present(robot.dynamics).gravity(q, row, effort)
         expected = pinocchio.computeGeneralizedGravity(model, data, theirs)
         np.testing.assert_allclose(
             effort, expected, rtol=0.0, atol=1e-10 * (1 + abs(expected).max())
@@ -71,18 +79,20 @@ def test_efforts_weights_and_inertias_are_those_of_pinocchio(name, tmp_path):
         inertia_matrix(q, row, M)
         expected = pinocchio.crba(model, data, theirs)
         np.testing.assert_allclose(M, expected, rtol=0.0, atol=1e-10 * expected.max())
-        robot.dynamics.acceleration(q, dq, given, row, effort)
+        present(robot.dynamics).acceleration(q, dq, given, row, effort)
         expected = pinocchio.aba(model, data, theirs, dq, given)
         np.testing.assert_allclose(effort, expected, rtol=0.0, atol=1e-10 * abs(expected).max())
 
 
 @pytest.mark.parametrize("name", [name for name in ARMS if "class" in ARMS[name]])
-def test_the_class_is_that_of_ssik_wherever_we_have_a_closed_form(name, tmp_path):
+def test_the_class_is_that_of_ssik_wherever_we_have_a_closed_form(
+    name: str, tmp_path: Path
+) -> None:
     ours = ROUNDED.get(name, OURS.get(ARMS[name]["class"], "search"))
     assert load(name, tmp_path).solution.startswith(ours)
 
 
-def test_there_are_72_arms_of_ssik_and_twelve_that_the_issue_names():
+def test_there_are_72_arms_of_ssik_and_twelve_that_the_issue_names() -> None:
     assert sum("class" in arm for arm in ARMS.values()) == 72
     assert set(TWELVE) <= set(ARMS)
     assert all(arm["source"] for arm in ARMS.values())
@@ -90,20 +100,24 @@ def test_there_are_72_arms_of_ssik_and_twelve_that_the_issue_names():
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ARMS)
-def test_every_pose_is_solved_from_home_and_from_beside(name, tmp_path):
+def test_every_pose_is_solved_from_home_and_from_beside(name: Any, tmp_path: Path) -> None:
     assert solved(load(name, tmp_path), 100) == (100.0, 100.0)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ARMS)
-def test_no_path_flips_or_outruns_a_drive_and_none_stops_without_a_reason(name, tmp_path):
+def test_no_path_flips_or_outruns_a_drive_and_none_stops_without_a_reason(
+    name: Any, tmp_path: Path
+) -> None:
     path = lines(load(name, tmp_path), 10)
     assert (path.too_fast, path.unexplained) == (0, 0)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", TWELVE)
-def test_an_arm_goes_on_through_the_singular_posture_of_its_wrist(name, tmp_path):
+def test_an_arm_goes_on_through_the_singular_posture_of_its_wrist(
+    name: str, tmp_path: Path
+) -> None:
     path = wrists(load(name, tmp_path), 10)
     assert path is None or (path.too_fast, path.arrived) == (0, path.count)
 
@@ -114,8 +128,8 @@ MISSED = (("yam", 2231), ("yumi_left", 4416), ("fr3", 1482), ("xmatesr3", 46))
 
 @pytest.mark.parametrize(("name", "place"), MISSED)
 def test_poses_beside_singular_postures_and_limits_are_reached_by_longer_searches(
-    name, place, tmp_path
-):
+    name: str, place: int, tmp_path: Path
+) -> None:
     robot, rng = load(name, tmp_path), np.random.default_rng(1)
     q = rng.uniform(robot.lower, robot.upper, (5000, robot.n))[place]
     assert robot.ik(robot.fk(q)).residual.max() < 1e-9

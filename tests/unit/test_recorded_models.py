@@ -195,7 +195,7 @@ STATE = {"is_fixture_on": 1.0} | {
 
 def read_markers(markers: list[Marker]) -> Any:
     data = marker_message(1_500_000_001, markers)
-    message = TYPES.deserialize_cdr(data, "visualization_msgs/msg/MarkerArray")
+    message: Any = TYPES.deserialize_cdr(data, "visualization_msgs/msg/MarkerArray")
     # Byte for byte what another serialiser makes of it.
     assert bytes(TYPES.serialize_cdr(message, "visualization_msgs/msg/MarkerArray")) == data
     return message.markers

@@ -3,8 +3,9 @@
 import resource
 import shutil
 import signal
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -22,13 +23,13 @@ SECONDS = 4
 MS = 1_000_000
 
 
-def second(number: int) -> dict:
+def second(number: int) -> Any:
     times = np.arange(number * 1000, (number + 1) * 1000) * MS
     values = np.random.default_rng(number).normal(size=(1000, TOPIC.width(6)))
     return {TOPIC: (times, values, times)}
 
 
-def record(path: Path, meanwhile, **options) -> str:
+def record(path: Path, meanwhile: Callable[..., object], **options: Any) -> str:
     """Record some seconds, do something before the last, and return what the writer told."""
     writer = BagWriter(path, [TOPIC], JOINTS, compression="none", **options)
     for number in range(SECONDS):
@@ -48,20 +49,20 @@ def assert_holds(path: Path, count: int = SECONDS * 1000) -> None:
         assert sum(1 for _ in reader.messages()) == count
 
 
-def test_a_moved_directory_is_finished_where_it_is_and_its_new_place_told(tmp_path):
+def test_a_moved_directory_is_finished_where_it_is_and_its_new_place_told(tmp_path: Path) -> None:
     told = record(tmp_path / "bag", lambda path: path.rename(tmp_path / "elsewhere"))
     assert f"all 4000 messages are in {tmp_path / 'elsewhere'}" in told
     assert "\n" not in told
     assert_holds(tmp_path / "elsewhere")
 
 
-def test_a_removed_directory_is_made_again_with_every_message(tmp_path):
+def test_a_removed_directory_is_made_again_with_every_message(tmp_path: Path) -> None:
     told = record(tmp_path / "bag", shutil.rmtree)
     assert "was removed meanwhile, and is there again with all 4000 messages" in told
     assert_holds(tmp_path / "bag")
 
 
-def test_a_removed_directory_whose_name_is_taken_is_made_beside_it(tmp_path):
+def test_a_removed_directory_whose_name_is_taken_is_made_beside_it(tmp_path: Path) -> None:
     def replace(path: Path) -> None:
         shutil.rmtree(path)
         path.write_text("taken")
@@ -71,7 +72,7 @@ def test_a_removed_directory_whose_name_is_taken_is_made_beside_it(tmp_path):
     assert_holds(tmp_path / "bag_rescued")
 
 
-def test_metadata_that_cannot_be_written_cost_no_message(tmp_path):
+def test_metadata_that_cannot_be_written_cost_no_message(tmp_path: Path) -> None:
     told = record(tmp_path / "bag", lambda path: (path / "metadata.yaml").mkdir())
     assert "holds all 4000 messages" in told
     assert f"`teleop recover {tmp_path / 'bag'}/bag_0.mcap` completes it" in told
@@ -81,7 +82,7 @@ def test_metadata_that_cannot_be_written_cost_no_message(tmp_path):
     assert_holds(out)
 
 
-def test_a_file_moved_into_another_recording_leaves_that_one_alone(tmp_path):
+def test_a_file_moved_into_another_recording_leaves_that_one_alone(tmp_path: Path) -> None:
     with BagWriter(tmp_path / "other", [TOPIC], JOINTS) as writer:
         writer.write_block(second(0))
     before = (tmp_path / "other" / "metadata.yaml").read_bytes()
@@ -106,7 +107,9 @@ def file_limit() -> Iterator[None]:
 
 
 @pytest.mark.parametrize("room", [10, 2000, 20_000, 100_000])
-def test_a_full_disk_costs_no_message_that_was_written_whole(file_limit, tmp_path, room):
+def test_a_full_disk_costs_no_message_that_was_written_whole(
+    file_limit: None, tmp_path: Path, room: int
+) -> None:
     """However little room is left: chunks are whole, and recover finds them all."""
 
     def fill(path: Path) -> None:

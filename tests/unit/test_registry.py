@@ -1,6 +1,9 @@
 """Registry: parts by name, each name once, nothing imported before it is asked for."""
 
 import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -14,17 +17,17 @@ from teleop_core.slave.controllers import CONTROLLERS
 BUILT_IN = {"here": "teleop_core.graph.topics:ALL", "json": "json:loads"}
 
 
-def registry(trial=None, **builtin):
+def registry(trial: Callable[[object], None] | None = None, **builtin: Any) -> Registry[Any]:
     return Registry("part", "parts_of_nobody", {**BUILT_IN, **builtin}, check, trial)
 
 
-def check(name, part):
+def check(name: str, part: object) -> object:
     if part is None:
         raise PartError("part", name, "something")
     return part
 
 
-def installed(folder, monkeypatch, *entries):
+def installed(folder: Path, monkeypatch: pytest.MonkeyPatch, *entries: str) -> None:
     """Let a distribution with entry points be found, as if it were installed."""
     made = folder / "own_parts-1.0.dist-info"
     made.mkdir()
@@ -37,21 +40,21 @@ def installed(folder, monkeypatch, *entries):
     monkeypatch.delitem(sys.modules, "own_module", raising=False)
 
 
-def test_part_is_found_by_the_name_it_was_added_under():
+def test_part_is_found_by_the_name_it_was_added_under() -> None:
     parts, part = registry(), object()
     assert parts.add("mine", part) is part
     assert parts.find("mine") is part
     assert parts.names() == ("here", "json", "mine")
 
 
-def test_unknown_name_is_refused_with_the_known_ones():
+def test_unknown_name_is_refused_with_the_known_ones() -> None:
     with pytest.raises(UnknownNameError) as error:
         registry().find("there")
     assert error.value.alternatives == ("here", "json")
 
 
 @pytest.mark.parametrize("name", ["here", "mine"])
-def test_name_that_is_used_already_is_refused(name):
+def test_name_that_is_used_already_is_refused(name: str) -> None:
     parts = registry()
     parts.add("mine", object())
     with pytest.raises(PartError) as error:
@@ -59,13 +62,13 @@ def test_name_that_is_used_already_is_refused(name):
     assert (error.value.kind, error.value.name) == ("part", name)
 
 
-def test_same_part_may_be_added_again():
+def test_same_part_may_be_added_again() -> None:
     parts, part = registry(), object()
     parts.add("mine", part)
     assert parts.add("mine", part) is part
 
 
-def test_added_part_may_be_replaced_and_a_built_in_one_may_not():
+def test_added_part_may_be_replaced_and_a_built_in_one_may_not() -> None:
     parts = registry()
     parts.add("mine", object())
     second = object()
@@ -75,7 +78,7 @@ def test_added_part_may_be_replaced_and_a_built_in_one_may_not():
         parts.add("here", second, replace=True)
 
 
-def test_added_part_can_be_removed_and_a_built_in_one_cannot():
+def test_added_part_can_be_removed_and_a_built_in_one_cannot() -> None:
     parts = registry()
     parts.add("mine", object())
     parts.remove("mine")
@@ -85,8 +88,8 @@ def test_added_part_can_be_removed_and_a_built_in_one_cannot():
             parts.remove(name)
 
 
-def test_part_that_fails_its_trial_is_not_added():
-    def trial(part):
+def test_part_that_fails_its_trial_is_not_added() -> None:
+    def trial(part: object) -> None:
         raise PartError("part", "mine", "better")
 
     parts = registry(trial)
@@ -95,7 +98,9 @@ def test_part_that_fails_its_trial_is_not_added():
     assert "mine" not in parts.names()
 
 
-def test_nothing_is_imported_before_it_is_asked_for(tmp_path, monkeypatch):
+def test_nothing_is_imported_before_it_is_asked_for(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     installed(tmp_path, monkeypatch, "cone = own_module:CONE")
     parts = registry()
     assert parts.names() == ("here", "json", "cone")
@@ -103,7 +108,9 @@ def test_nothing_is_imported_before_it_is_asked_for(tmp_path, monkeypatch):
     assert parts.find("cone") == "cone"
 
 
-def test_installed_part_that_cannot_be_loaded_is_refused_in_one_line(tmp_path, monkeypatch):
+def test_installed_part_that_cannot_be_loaded_is_refused_in_one_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     installed(tmp_path, monkeypatch, "broken = broken_module:CONE", "gone = own_module:SPHERE")
     parts = registry()
     for name, reason in (("broken", "RuntimeError"), ("gone", "AttributeError")):
@@ -113,7 +120,9 @@ def test_installed_part_that_cannot_be_loaded_is_refused_in_one_line(tmp_path, m
         assert "\n" not in str(error.value)
 
 
-def test_installed_part_that_takes_a_built_in_name_is_refused(tmp_path, monkeypatch):
+def test_installed_part_that_takes_a_built_in_name_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     installed(tmp_path, monkeypatch, "here = own_module:CONE")
     with pytest.raises(PartError, match="named once") as error:
         registry().names()
@@ -124,7 +133,7 @@ def test_installed_part_that_takes_a_built_in_name_is_refused(tmp_path, monkeypa
     ("parts", "name"),
     [(FIXTURES, "box"), (CONTROLLERS, "pid"), (OPERATORS, "line"), (STAGES, "slave_sim")],
 )
-def test_name_of_a_built_in_part_is_taken_on_every_seam(parts, name):
+def test_name_of_a_built_in_part_is_taken_on_every_seam(parts: Registry[Any], name: str) -> None:
     other = next(parts.find(found) for found in parts if found != name)
     with pytest.raises(PartError) as error:
         parts.add(name, other)
@@ -132,13 +141,13 @@ def test_name_of_a_built_in_part_is_taken_on_every_seam(parts, name):
 
 
 @pytest.mark.parametrize("parts", [FIXTURES, CONTROLLERS, OPERATORS, STAGES])
-def test_object_that_is_no_such_part_is_refused_on_every_seam(parts):
+def test_object_that_is_no_such_part_is_refused_on_every_seam(parts: Registry[Any]) -> None:
     with pytest.raises(PartError, match="int") as error:
         parts.add("mine", 5)
     assert (error.value.kind, error.value.name) == (parts.kind, "mine")
 
 
 @pytest.mark.parametrize("parts", [FIXTURES, CONTROLLERS, OPERATORS, STAGES])
-def test_every_built_in_part_is_one(parts):
+def test_every_built_in_part_is_one(parts: Registry[Any]) -> None:
     for name in parts:
         assert parts.find(name) is parts.find(name)

@@ -1,6 +1,8 @@
 """Remote hand: smooth, late by what is stated, bounded; a grip is relative, silence lets go."""
 
 import threading
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 import pytest
@@ -8,12 +10,14 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from present import present
 from teleop_core.base.errors import ShapeError, UnknownNameError
 from teleop_core.base.parameters import specs
 from teleop_core.chain.mapping.plausibility import PlausibilityParameters
 from teleop_core.chain.master.operator import RunningOperator
 from teleop_core.chain.operators.remote import AHEAD, RemoteHand, RemoteParameters
 from teleop_core.chain.operators.rest import rest_pose
+from teleop_core.kernels.geometry import Array
 from teleop_core.session.configuration import configure
 
 DT = 1e-3
@@ -23,7 +27,7 @@ coordinate = st.floats(-0.3, 0.3)
 place = st.tuples(coordinate, coordinate, coordinate)
 
 
-def pose(way=(0.0, 0.0, 0.0), turn=(0.0, 0.0, 0.0)):
+def pose(way: Any = (0.0, 0.0, 0.0), turn: Sequence[float] | Array = (0.0, 0.0, 0.0)) -> Array:
     """Pose that is a way [m] and a turn in the base [rad] from the rest."""
     x, y, z, w = (Rotation.from_rotvec(turn) * Rotation.from_quat(REST[[4, 5, 6, 3]])).as_quat()
     return np.array([*(REST[:3] + way), w, x, y, z])
@@ -32,11 +36,13 @@ def pose(way=(0.0, 0.0, 0.0), turn=(0.0, 0.0, 0.0)):
 class Run:
     """A hand that is asked as the operator asks it, some ticks at a time."""
 
-    def __init__(self, hand=None, **parameters):
+    def __init__(self, hand: RemoteHand | None = None, **parameters: float) -> None:
         self.hand = hand or RemoteHand(RemoteParameters(**parameters))
         self.rows, self.last = np.zeros((0, 13)), 0.0
 
-    def for_time(self, duration, wanted=None, period=0.02):
+    def for_time(
+        self, duration: float, wanted: Callable[..., Any] | None = None, period: float = 0.02
+    ) -> Array:
         """Go on; ``wanted(time)`` says what pose comes every so often, or None for silence."""
         due = 0.0
         for _ in range(round(duration / DT / AHEAD)):
@@ -46,20 +52,20 @@ class Run:
                     self.hand.want(given)
                     self.last = self.time
                 due = self.time + period
-            times = (len(self.rows) + 1 + np.arange(AHEAD)) * DT
+            times: Any = (len(self.rows) + 1 + np.arange(AHEAD)) * DT
             self.rows = np.vstack((self.rows, self.hand.motion(times)))
         return self.rows
 
     @property
-    def time(self):
+    def time(self) -> float:
         return len(self.rows) * DT
 
     @property
-    def way(self):
+    def way(self) -> Array:
         return self.rows[:, :3]
 
 
-def test_before_the_first_pose_the_stylus_rests_and_the_clutch_is_pressed():
+def test_before_the_first_pose_the_stylus_rests_and_the_clutch_is_pressed() -> None:
     rows = Run().for_time(0.1)
     assert (rows[:, :6] == 0.0).all()
     assert (rows[:, 6] == 1.0).all()
@@ -67,7 +73,7 @@ def test_before_the_first_pose_the_stylus_rests_and_the_clutch_is_pressed():
 
 
 @pytest.mark.parametrize("delay", [0.02, 0.045, 0.2])
-def test_the_stylus_is_behind_a_steady_motion_by_the_stated_delay(delay):
+def test_the_stylus_is_behind_a_steady_motion_by_the_stated_delay(delay: float) -> None:
     speed, run = 0.1, Run(delay=delay)
     run.for_time(1.0 + 10 * delay, lambda t: pose([speed * t, 0.0, 0.0]), period=0.0)
     behind = np.arange(1, len(run.way) + 1) * DT - run.way[:, 0] / speed
@@ -76,7 +82,7 @@ def test_the_stylus_is_behind_a_steady_motion_by_the_stated_delay(delay):
 
 
 @pytest.mark.parametrize("delay", [0.02, 0.045, 0.2])
-def test_the_stylus_turns_behind_a_steady_turn_by_the_stated_delay(delay):
+def test_the_stylus_turns_behind_a_steady_turn_by_the_stated_delay(delay: float) -> None:
     speed, run = 1.0, Run(delay=delay)
     run.for_time(0.4 + 10 * delay, lambda t: pose(turn=[0.0, 0.0, speed * t]), period=0.0)
     w, x, y, z = run.hand.pose[3:]
@@ -88,7 +94,9 @@ def test_the_stylus_turns_behind_a_steady_turn_by_the_stated_delay(delay):
 
 @given(place, place, st.floats(0.0, 3.0))
 @example((0.3, 0.3, 0.3), (-0.3, -0.3, -0.3), 3.0)
-def test_no_jump_of_what_is_wanted_ever_passes(first, second, angle):
+def test_no_jump_of_what_is_wanted_ever_passes(
+    first: tuple[float, float, float], second: tuple[float, float, float], angle: float
+) -> None:
     p = RemoteParameters()
     run = Run()
     run.for_time(0.04, lambda t: pose())
@@ -108,7 +116,9 @@ def test_no_jump_of_what_is_wanted_ever_passes(first, second, angle):
 @given(
     place, st.floats(0.01, 0.2), st.floats(0.05, 2.5), st.floats(2.0, 500.0),
 )  # fmt: skip
-def test_the_stylus_never_goes_beyond_a_place_that_it_is_sent_to(way, delay, speed, acceleration):
+def test_the_stylus_never_goes_beyond_a_place_that_it_is_sent_to(
+    way: tuple[float, float, float], delay: float, speed: float, acceleration: float
+) -> None:
     run = Run(delay=delay, speed=speed, acceleration=acceleration)
     run.for_time(0.04, lambda t: pose())
     run.for_time(1.0, lambda t: pose(way))
@@ -118,16 +128,18 @@ def test_the_stylus_never_goes_beyond_a_place_that_it_is_sent_to(way, delay, spe
     assert np.diff(along).min() >= -1e-9
 
 
-def test_the_bounds_are_such_that_every_sample_is_plausible():
+def test_the_bounds_are_such_that_every_sample_is_plausible() -> None:
     upper = {spec.name: spec.upper for spec in specs(RemoteParameters)}
     hand = PlausibilityParameters()
-    assert upper["speed"] < hand.speed
-    assert upper["acceleration"] < hand.acceleration
-    assert upper["turn_speed"] < hand.turn
+    assert present(upper["speed"]) < hand.speed
+    assert present(upper["acceleration"]) < hand.acceleration
+    assert present(upper["turn_speed"]) < hand.turn
 
 
 @given(place)
-def test_a_grip_takes_its_first_pose_as_where_the_stylus_is(where):
+def test_a_grip_takes_its_first_pose_as_where_the_stylus_is(
+    where: tuple[float, float, float],
+) -> None:
     run = Run()
     run.for_time(0.1, lambda t: pose(where, [0.3, 0.0, 0.0]))
     assert np.abs(run.rows[:, :6]).max() < 1e-12
@@ -138,7 +150,7 @@ def test_a_grip_takes_its_first_pose_as_where_the_stylus_is(where):
     np.testing.assert_allclose(run.hand.pose, pose([0.01, 0.0, -0.02], [0.0, 0.0, 0.2]), atol=1e-6)
 
 
-def test_silence_presses_the_clutch_in_time_and_brings_the_stylus_to_rest():
+def test_silence_presses_the_clutch_in_time_and_brings_the_stylus_to_rest() -> None:
     run = Run(timeout=0.1)
     run.for_time(0.5, lambda t: pose([0.2 * t, 0.0, 0.0]))
     run.for_time(1.0)
@@ -152,7 +164,7 @@ def test_silence_presses_the_clutch_in_time_and_brings_the_stylus_to_rest():
     assert np.abs(np.diff(velocity)).max() / DT <= RemoteParameters().acceleration * (1.0 + 1e-6)
 
 
-def test_the_next_pose_is_a_new_grip_that_releases_the_clutch_and_does_not_move():
+def test_the_next_pose_is_a_new_grip_that_releases_the_clutch_and_does_not_move() -> None:
     run = Run()
     run.for_time(0.5, lambda t: pose([0.02 * t, 0.0, 0.0]))
     run.for_time(1.0)
@@ -162,7 +174,7 @@ def test_the_next_pose_is_a_new_grip_that_releases_the_clutch_and_does_not_move(
     assert (run.rows[count:, 6] == 0.0).all()
 
 
-def test_letting_go_is_at_once_and_the_next_pose_is_a_new_grip_however_soon_it_comes():
+def test_letting_go_is_at_once_and_the_next_pose_is_a_new_grip_however_soon_it_comes() -> None:
     run = Run()
     run.for_time(0.5, lambda t: pose())
     run.hand.let_go()
@@ -175,7 +187,7 @@ def test_letting_go_is_at_once_and_the_next_pose_is_a_new_grip_however_soon_it_c
     assert np.abs(run.rows[:, :6]).max() < 1e-12
 
 
-def test_a_pose_that_is_older_than_the_timeout_is_no_grip():
+def test_a_pose_that_is_older_than_the_timeout_is_no_grip() -> None:
     run = Run()
     run.for_time(0.5)
     run.hand.want(pose(), time=0.1)
@@ -196,7 +208,7 @@ def test_a_pose_that_is_older_than_the_timeout_is_no_grip():
         [1e308, -1e308, 1e308, 1, 0, 0, 0],
     ],
 )  # fmt: skip
-def test_what_is_no_pose_is_refused_counted_and_counts_as_silence(bad):
+def test_what_is_no_pose_is_refused_counted_and_counts_as_silence(bad: list[float]) -> None:
     run = Run()
     run.for_time(0.1, lambda t: pose())
     assert run.hand.want(np.array(bad)) is False
@@ -207,12 +219,12 @@ def test_what_is_no_pose_is_refused_counted_and_counts_as_silence(bad):
     assert np.abs(run.rows[:, :6]).max() < 1e-12
 
 
-def test_a_pose_of_another_shape_is_an_error():
+def test_a_pose_of_another_shape_is_an_error() -> None:
     with pytest.raises(ShapeError, match=r"pose must have shape \(7,\), has \(2, 7\)"):
         RemoteHand().want(np.zeros((2, 7)))
 
 
-def test_what_a_caller_does_with_a_pose_later_changes_nothing():
+def test_what_a_caller_does_with_a_pose_later_changes_nothing() -> None:
     run, mine = Run(), pose()
     run.hand.want(mine)
     mine[:] = np.nan
@@ -223,7 +235,7 @@ def test_what_a_caller_does_with_a_pose_later_changes_nothing():
 
 
 @given(st.integers(1, 4), st.booleans())
-def test_every_tap_is_seen_as_one_press(taps, is_held):
+def test_every_tap_is_seen_as_one_press(taps: int, is_held: bool) -> None:
     run = Run()
     for _ in range(taps):
         run.hand.tap("fixture")
@@ -237,7 +249,9 @@ def test_every_tap_is_seen_as_one_press(taps, is_held):
 @given(
     st.lists(st.tuples(st.floats(1e-3, 1.0), st.booleans()), min_size=1, max_size=30),
 )
-def test_every_press_is_seen_also_where_the_time_between_two_was_slept_through(turns):
+def test_every_press_is_seen_also_where_the_time_between_two_was_slept_through(
+    turns: list[tuple[float, bool]],
+) -> None:
     hand, now, shown, presses, was_down = RemoteHand(), 0.0, [], 0, False
     for gap, is_down in [*turns, *[(0.2, False)] * 60]:  # in the end there is time for all
         presses += is_down and not was_down
@@ -249,7 +263,7 @@ def test_every_press_is_seen_also_where_the_time_between_two_was_slept_through(t
     assert shown[-1] == 0.0
 
 
-def test_a_pressed_clutch_leaves_the_stylus_to_the_hand():
+def test_a_pressed_clutch_leaves_the_stylus_to_the_hand() -> None:
     run = Run()
     run.hand.press("clutch")
     run.for_time(0.5, lambda t: pose([0.02 * t, 0.0, 0.0]))
@@ -259,12 +273,12 @@ def test_a_pressed_clutch_leaves_the_stylus_to_the_hand():
     assert run.for_time(0.02)[-1, 6] == 0.0
 
 
-def test_a_button_that_there_is_not_is_named_with_those_there_are():
+def test_a_button_that_there_is_not_is_named_with_those_there_are() -> None:
     with pytest.raises(UnknownNameError, match="clutch, fixture, mode"):
         RemoteHand().press("gripper")
 
 
-def test_a_hand_that_wants_too_far_waits_at_the_end_of_the_workspace_and_comes_back():
+def test_a_hand_that_wants_too_far_waits_at_the_end_of_the_workspace_and_comes_back() -> None:
     low, high = REST[:3] - 0.05, REST[:3] + 0.01
     run = Run(RemoteHand(RemoteParameters(), room=(low, high)))
     run.for_time(0.1, lambda t: pose())
@@ -274,11 +288,11 @@ def test_a_hand_that_wants_too_far_waits_at_the_end_of_the_workspace_and_comes_b
     np.testing.assert_allclose(run.way[-1], [0.005, 0.0, 0.0], atol=1e-6)
 
 
-def test_poses_may_come_from_another_thread():
+def test_poses_may_come_from_another_thread() -> None:
     # The ticks pass faster than real time: what is a slow thread must not count as silence.
     run, is_over = Run(timeout=5.0), threading.Event()
 
-    def feed():
+    def feed() -> None:
         while not is_over.is_set():
             run.hand.want(pose([0.01, 0.0, 0.0], [0.1, 0.0, 0.0]))
             run.hand.want(pose())
@@ -296,12 +310,12 @@ def test_poses_may_come_from_another_thread():
     assert run.hand.refused == 0
 
 
-def test_the_operator_gives_the_hand_within_the_workspace_of_its_device():
+def test_the_operator_gives_the_hand_within_the_workspace_of_its_device() -> None:
     master = RunningOperator(configure(settings=["operator=remote"]).groups["operator"])
     assert master.ahead == AHEAD
     hand, device = master.hand, master._fixed.device
     assert isinstance(hand, RemoteHand)
-    times = np.arange(1, 5) * DT
+    times: Any = np.arange(1, 5) * DT
     for k in range(500):
         hand.want(pose([5.0 * (k > 0), 0.0, 0.0]))
         hand.motion(times + 4 * k * DT)
@@ -309,19 +323,19 @@ def test_the_operator_gives_the_hand_within_the_workspace_of_its_device():
     assert hand.pose[0] == pytest.approx(middle[0] + 0.5 * device.workspace[0], abs=1e-6)
 
 
-def test_an_operator_that_is_no_person_has_no_hand():
+def test_an_operator_that_is_no_person_has_no_hand() -> None:
     assert RunningOperator(configure(settings=["operator=hold"]).groups["operator"]).hand is None
 
 
-def test_a_hand_draws_for_the_operator_what_its_motion_says():
+def test_a_hand_draws_for_the_operator_what_its_motion_says() -> None:
     master = RunningOperator(configure(settings=["operator=remote"]).groups["operator"])
-    twin = RemoteHand(room=master.hand.room)
+    twin = RemoteHand(room=present(master.hand).room)
     for k in range(200):
         for hand in (master.hand, twin):
-            hand.want(pose([1e-4 * k, 0.0, -2e-5 * k], [0.0, 2e-3 * k, 0.0]))
+            present(hand).want(pose([1e-4 * k, 0.0, -2e-5 * k], [0.0, 2e-3 * k, 0.0]))
         master.prepare(1)
         wanted = np.array(master._wanted[1 : AHEAD + 1])
-        rows = twin.motion((AHEAD * k + 1 + np.arange(AHEAD)) * DT)
+        rows = twin.motion(np.asarray((AHEAD * k + 1 + np.arange(AHEAD)) * DT, np.float64))
         np.testing.assert_allclose(wanted["wanted"] - REST[:3], rows[:, :3], atol=1e-15)
         np.testing.assert_array_equal(wanted["buttons"], rows[:, 6:9])
         start = Rotation.from_quat(REST[[4, 5, 6, 3]])

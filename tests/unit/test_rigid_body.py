@@ -5,7 +5,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from present import present
 from teleop_core.kernels import pointer
+from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot
 from teleop_core.robots.drives import ACCELERATION
 from teleop_core.robots.rcrt1_dynamics import (
@@ -23,7 +25,7 @@ FORWARD = pointer(DYNAMICS.acceleration, ACCELERATION)
 ROUNDING = 1e-9
 
 
-def model(q, dq):
+def model(q: Array, dq: Array) -> tuple[Array, Array]:
     out = np.empty(42)
     write_model(FORWARD, ROW, q, dq, out)
     return out[:6], out[6:].reshape(6, 6)
@@ -33,7 +35,7 @@ angles = st.lists(st.floats(-1.5, 1.5), min_size=6, max_size=6).map(np.array)
 
 
 @given(angles, angles)
-def test_model_of_the_arm_is_its_closed_form(q, dq):
+def test_model_of_the_arm_is_its_closed_form(q: Array, dq: Array) -> None:
     q[2] = 0.35 + 0.01 * q[2]
     bias, inertia = model(q, dq)
     D, h, c = np.empty((3, 3)), np.empty(3), np.empty(6)
@@ -45,7 +47,7 @@ def test_model_of_the_arm_is_its_closed_form(q, dq):
 
 
 @given(angles, angles, angles)
-def test_model_and_forward_dynamics_undo_each_other(q, dq, wanted):
+def test_model_and_forward_dynamics_undo_each_other(q: Array, dq: Array, wanted: Array) -> None:
     q[2] = 0.35 + 0.01 * q[2]
     bias, inertia = model(q, dq)
     found = np.empty(6)
@@ -54,7 +56,7 @@ def test_model_and_forward_dynamics_undo_each_other(q, dq, wanted):
 
 
 @given(st.integers(1, 9), st.integers(0, 2**32 - 1))
-def test_inverse_of_a_positive_definite_matrix_is_that_of_lapack(n, seed):
+def test_inverse_of_a_positive_definite_matrix_is_that_of_lapack(n: int, seed: int) -> None:
     root = np.random.default_rng(seed).normal(size=(n, n))
     A = root @ root.T + 0.1 * np.eye(n)
     found = A.copy()
@@ -63,11 +65,13 @@ def test_inverse_of_a_positive_definite_matrix_is_that_of_lapack(n, seed):
 
 
 @pytest.mark.parametrize("name", ["scara", "puma560", "stewart", "three_finger_hand"])
-def test_model_of_axes_that_do_not_act_on_each_other_is_their_inertia(name):
+def test_model_of_axes_that_do_not_act_on_each_other_is_their_inertia(name: str) -> None:
     robot = load_robot(name)
     n, dynamics = robot.n, robot.dynamics
     out = np.empty(n + n * n)
-    forward = pointer(dynamics.acceleration, ACCELERATION)
-    write_model(forward, dynamics.parameters.copy(), robot.home.copy(), np.ones(n), out)
+    forward = pointer(present(dynamics).acceleration, ACCELERATION)
+    write_model(forward, present(dynamics).parameters.copy(), robot.home.copy(), np.ones(n), out)
     assert np.array_equal(out[:n], np.zeros(n))
-    assert np.allclose(out[n:].reshape(n, n), np.diag(robot.drives.inertia), rtol=1e-14, atol=0)
+    assert np.allclose(
+        out[n:].reshape(n, n), np.diag(present(robot.drives).inertia), rtol=1e-14, atol=0
+    )

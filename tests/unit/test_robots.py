@@ -1,12 +1,16 @@
 """Robots as parts: what one caller writes no other sees, and names lead to robots."""
 
 import dataclasses
+from collections.abc import Callable, Mapping
 from dataclasses import fields
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 import yaml
 
+from present import present
 from teleop_core.base.errors import (
     ParameterError,
     PartError,
@@ -14,6 +18,7 @@ from teleop_core.base.errors import (
     ShapeError,
     UnknownNameError,
 )
+from teleop_core.kernels.geometry import Array
 from teleop_core.robots import (
     ROBOTS,
     IkStatus,
@@ -31,11 +36,11 @@ from teleop_core.robots.drives import ENTRIES, Drives, electric_cylinders, geare
 robots = pytest.mark.parametrize("name", list_robots())
 
 
-def arrays_of(robot):
+def arrays_of(robot: Robot) -> dict[str, Array]:
     """Every public array of a robot, by name."""
     found = {name: getattr(robot, name) for name in ("lower", "upper", "home", "geometry_row")}
     found |= {"limits()": robot.limits(), "limits(dt)": robot.limits(1e-3)}
-    for part in (robot.drives, robot.dynamics):
+    for part in (present(robot.drives), present(robot.dynamics)):
         values = {entry.name: getattr(part, entry.name) for entry in fields(part)}
         found |= {k: value for k, value in values.items() if isinstance(value, np.ndarray)}
     return found
@@ -44,15 +49,15 @@ def arrays_of(robot):
 # What is shared is read-only, what is writable is the caller's.
 
 
-def test_a_robot_whose_drives_are_stopped_stops_no_other():
-    speed = load_robot("rcrt1").drives.speed_limit.copy()
+def test_a_robot_whose_drives_are_stopped_stops_no_other() -> None:
+    speed = present(load_robot("rcrt1").drives).speed_limit.copy()
     with pytest.raises(ValueError, match="read-only"):
-        load_robot("rcrt1").drives.speed_limit[:] = 0.0
-    assert np.array_equal(load_robot("rcrt1").drives.speed_limit, speed)
+        present(load_robot("rcrt1").drives).speed_limit[:] = 0.0
+    assert np.array_equal(present(load_robot("rcrt1").drives).speed_limit, speed)
 
 
 @robots
-def test_two_loads_share_no_array_that_can_be_written(name):
+def test_two_loads_share_no_array_that_can_be_written(name: str) -> None:
     one, two = arrays_of(load_robot(name)), arrays_of(load_robot(name))
     for entry, array in one.items():
         if array.flags.writeable:
@@ -61,7 +66,7 @@ def test_two_loads_share_no_array_that_can_be_written(name):
 
 @pytest.mark.slow
 @robots
-def test_writing_what_can_be_written_changes_no_answer(name):
+def test_writing_what_can_be_written_changes_no_answer(name: Any) -> None:
     robot = load_robot(name)
     pose = robot.fk(robot.home)
     before = robot.fk(robot.home), robot.ik(pose).q, robot.limits(1e-3), robot.jacobian(robot.home)
@@ -73,16 +78,16 @@ def test_writing_what_can_be_written_changes_no_answer(name):
 
 
 @robots
-def test_tables_of_a_robot_are_read_only(name):
+def test_tables_of_a_robot_are_read_only(name: str) -> None:
     arrays = arrays_of(load_robot(name))
     for entry in set(arrays) - {"geometry_row", "limits()", "limits(dt)"}:
         assert not arrays[entry].flags.writeable, entry
     with pytest.raises(TypeError):
-        load_robot(name).geometry["L6"] = 1.0
+        load_robot(name).geometry["L6"] = 1.0  # type: ignore[index]
 
 
-def test_a_table_of_drives_keeps_what_it_was_made_with():
-    values = {name: np.ones(2) for name in ENTRIES}
+def test_a_table_of_drives_keeps_what_it_was_made_with() -> None:
+    values: dict[str, Any] = {name: np.ones(2) for name in ENTRIES}
     drives = Drives(**values)
     values["inertia"][:] = 7.0
     assert np.array_equal(drives.inertia, [1.0, 1.0])
@@ -90,7 +95,7 @@ def test_a_table_of_drives_keeps_what_it_was_made_with():
 
 
 @robots
-def test_no_kernel_is_compiled_a_second_time_for_arrays_that_cannot_be_written(name):
+def test_no_kernel_is_compiled_a_second_time_for_arrays_that_cannot_be_written(name: str) -> None:
     robot = load_robot(name)
     pose = robot.fk(robot.home)
     robot.ik(pose)
@@ -105,7 +110,7 @@ def test_no_kernel_is_compiled_a_second_time_for_arrays_that_cannot_be_written(n
 
 # Robots by name, by file, by hand.
 
-TABLE = {
+TABLE: Any = {
     "name": "my_arm",
     "convention": "modified",
     "angles": "degrees",
@@ -119,27 +124,29 @@ TABLE = {
 
 
 @pytest.fixture
-def registered(monkeypatch):
+def registered(monkeypatch: pytest.MonkeyPatch) -> Callable[..., object]:
     """Register robots that are forgotten after the test."""
     for store in ("_parts", "_own"):
         monkeypatch.setattr(ROBOTS, store, getattr(ROBOTS, store).copy())
     return register_robot
 
 
-def test_a_registered_robot_loads_by_its_name_and_is_listed(registered):
+def test_a_registered_robot_loads_by_its_name_and_is_listed(
+    registered: Callable[..., object],
+) -> None:
     arm = registered(robot_from_table(TABLE))
     assert load_robot("my_arm") is arm
     assert "my_arm" in list_robots()
 
 
-def test_a_registered_table_loads_as_a_robot(registered):
+def test_a_registered_table_loads_as_a_robot(registered: Callable[..., object]) -> None:
     registered(parse_table(TABLE), "arm_of_mine")
     assert load_robot("arm_of_mine").joint_names == ("q1", "q2", "slide")
 
 
-def test_a_registered_function_gets_the_geometry(registered):
+def test_a_registered_function_gets_the_geometry(registered: Callable[..., object]) -> None:
     @registered
-    def long_arm(reach=0.4):
+    def long_arm(reach: float = 0.4) -> Robot:
         rows = [{**TABLE["rows"][0]}, {**TABLE["rows"][1], "a": reach}, TABLE["rows"][2]]
         return robot_from_table({**TABLE, "rows": rows})
 
@@ -150,7 +157,7 @@ def test_a_registered_function_gets_the_geometry(registered):
     assert caught.value.alternatives == ("reach",)
 
 
-def test_a_name_is_used_once_unless_a_cell_is_run_again(registered):
+def test_a_name_is_used_once_unless_a_cell_is_run_again(registered: Callable[..., object]) -> None:
     registered(robot_from_table(TABLE))
     with pytest.raises(PartError, match="my_arm"):
         registered(robot_from_table(TABLE))
@@ -160,81 +167,95 @@ def test_a_name_is_used_once_unless_a_cell_is_run_again(registered):
     assert load_robot("my_arm") is second
 
 
-def needs_a_length(length):
+def needs_a_length(length: Any) -> Robot:
     return robot_from_table(TABLE)
 
 
 @pytest.mark.parametrize("part", [3, "rcrt1", Robot, needs_a_length, lambda: 3])
-def test_what_is_no_robot_is_refused_by_name(registered, part):
+def test_what_is_no_robot_is_refused_by_name(
+    registered: Callable[..., object], part: str | int | Callable[..., object] | type[Robot]
+) -> None:
     with pytest.raises(PartError) as caught:
         registered(part, "mine")
     assert (caught.value.kind, "mine" not in list_robots()) == ("robot", True)
 
 
-def crank_fk(q, geometry, T):
+def crank_fk(q: Array, geometry: Array, T: Array) -> None:
     c, s = np.cos(q[0]), np.sin(q[0])
     T[:] = np.eye(4)
     T[:2, :2], T[:2, 3] = [[c, -s], [s, c]], (geometry[0] * c, geometry[0] * s)
 
 
-def crank_jacobian(q, geometry, J):
+def crank_jacobian(q: Array, geometry: Array, J: Array) -> None:
     J[:] = 0.0
     J[:2, 0], J[5, 0] = (-geometry[0] * np.sin(q[0]), geometry[0] * np.cos(q[0])), 1.0
 
 
-def crank_ik(T, seed, limits, geometry, q, residual):
+def crank_ik(
+    T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual: Array
+) -> IkStatus:
     wanted = np.arctan2(T[1, 3], T[0, 3])
     q[0] = np.clip(wanted, limits[0, 0], limits[1, 0])
     residual[:] = 0.0
     return IkStatus.FOLLOWED
 
 
-def crank_ik_all(T, geometry, solutions):
+def crank_ik_all(T: Array, geometry: Array, solutions: Array) -> int:
     solutions[0, 0] = np.arctan2(T[1, 3], T[0, 3])
     return 1
 
 
-def crank(reach=0.3, **kernels):
-    plain = {"fk": crank_fk, "jacobian": crank_jacobian, "ik": crank_ik, "ik_all": crank_ik_all}
+def crank(reach: float = 0.3, **kernels: Callable[..., object]) -> Robot:
+    plain: dict[str, Any] = {
+        "fk": crank_fk,
+        "jacobian": crank_jacobian,
+        "ik": crank_ik,
+        "ik_all": crank_ik_all,
+    }
     return Robot(
-        name="crank", joint_names=("q",), lower=[-1.0], upper=[1.0], home=[0.0],
+        name="crank", joint_names=("q",), lower=np.array([-1.0]),
+        upper=np.array([1.0]), home=np.array([0.0]),
         geometry={"reach": reach}, kernels=Kernels(**(plain | kernels)), drives=geared_motors(1),
     )  # fmt: skip
 
 
-def test_a_robot_of_plain_python_functions_answers_like_any_other(registered):
+def test_a_robot_of_plain_python_functions_answers_like_any_other(
+    registered: Callable[..., object],
+) -> None:
     registered(crank)
     robot = load_robot("crank", reach=0.5)
     angles = np.linspace(-0.5, 0.5, 9)[:, None]
     assert np.allclose(robot.ik_batch(robot.fk(angles)).q, angles)
     assert robot.ik(robot.fk([0.3])).status is IkStatus.FOLLOWED
-    assert robot.dynamics.parameters == robot.drives.inertia
+    assert present(robot.dynamics).parameters == present(robot.drives).inertia
 
 
-def test_an_error_in_a_plain_function_reaches_the_caller_of_a_batch():
-    def fk(q, geometry, T):
+def test_an_error_in_a_plain_function_reaches_the_caller_of_a_batch() -> None:
+    def fk(q: Array, geometry: Array, T: Array) -> None:
         raise ZeroDivisionError(q[0])
 
     with pytest.raises(ZeroDivisionError):
         crank(fk=fk).fk(np.zeros((3, 1)))
 
 
-def test_a_robot_with_a_wrong_kernel_is_refused_before_anything_runs(registered):
-    def ik(T, seed, q):
+def test_a_robot_with_a_wrong_kernel_is_refused_before_anything_runs(
+    registered: Callable[..., object],
+) -> None:
+    def ik(T: Array, seed: Array, q: Any) -> int:
         return 0
 
     with pytest.raises(PartError, match="crank"):
         registered(crank(ik=ik))
 
 
-def test_ready_robots_take_no_geometry(registered):
+def test_ready_robots_take_no_geometry(registered: Callable[..., object]) -> None:
     registered(robot_from_table(TABLE))
     with pytest.raises(ParameterError) as caught:
         load_robot("my_arm", a2=1.0)
     assert caught.value.name == "geometry"
 
 
-def test_the_path_of_a_table_is_a_robot(tmp_path):
+def test_the_path_of_a_table_is_a_robot(tmp_path: Path) -> None:
     path = tmp_path / "my_arm.yaml"
     path.write_text(yaml.safe_dump(TABLE), encoding="utf-8")
     robot = load_robot_set(str(path), ())
@@ -244,7 +265,7 @@ def test_the_path_of_a_table_is_a_robot(tmp_path):
         load_robot(str(tmp_path / "other.yml"))
 
 
-def test_unknown_names_list_the_alternatives():
+def test_unknown_names_list_the_alternatives() -> None:
     with pytest.raises(UnknownNameError) as caught:
         load_robot("r2d2")
     assert caught.value.alternatives == list_robots()
@@ -253,7 +274,7 @@ def test_unknown_names_list_the_alternatives():
 # What a robot says of itself.
 
 
-def test_a_robot_is_one_line_at_the_prompt_and_a_table_in_a_notebook():
+def test_a_robot_is_one_line_at_the_prompt_and_a_table_in_a_notebook() -> None:
     arm = robot_from_table(TABLE)
     assert repr(arm) == (
         "Robot 'my_arm', 3 joints [rad, m]: q1 -2.618…2.618, q2 -2.094…2.094, slide -0.1…0.1"
@@ -263,16 +284,16 @@ def test_a_robot_is_one_line_at_the_prompt_and_a_table_in_a_notebook():
     assert "slide" in html
 
 
-def test_robots_with_names_from_elsewhere_cannot_write_into_the_page():
+def test_robots_with_names_from_elsewhere_cannot_write_into_the_page() -> None:
     arm = robot_from_table({**TABLE, "name": "<script>"})
     assert "<script>" not in arm._repr_html_()
 
 
 @pytest.mark.parametrize("name", ["rcrt1", "puma560"])
-def test_a_robot_says_which_of_its_drives_are_assumed(name):
+def test_a_robot_says_which_of_its_drives_are_assumed(name: str) -> None:
     robot = load_robot(name)
     assert robot.drives_are_assumed
-    assert ("speed_limit" in robot.drives.assumed) == (name == "puma560")
+    assert ("speed_limit" in present(robot.drives).assumed) == (name == "puma560")
 
 
 @pytest.mark.parametrize(
@@ -285,7 +306,7 @@ def test_a_robot_says_which_of_its_drives_are_assumed(name):
         ({"drives": electric_cylinders(2)}, ShapeError),
     ],
 )
-def test_a_robot_whose_vectors_do_not_fit_is_refused(change, error):
+def test_a_robot_whose_vectors_do_not_fit_is_refused(change: Mapping[str, Any], error: Any) -> None:
     with pytest.raises(error) as caught:
         dataclasses.replace(robot_from_table({**TABLE, "rows": TABLE["rows"][:1]}), **change)
     assert caught.value.name == next(iter(change))
@@ -301,7 +322,7 @@ def test_a_robot_whose_vectors_do_not_fit_is_refused(change, error):
         ({"assumed": ("mass",)}, UnknownNameError),
     ],
 )
-def test_impossible_drives_are_refused_by_entry(change, error):
+def test_impossible_drives_are_refused_by_entry(change: Any, error: Any) -> None:
     with pytest.raises(error) as caught:
         Drives(**({name: [1.0] for name in ENTRIES} | change))
     assert caught.value.name == next(iter(change))

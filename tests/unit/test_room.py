@@ -1,73 +1,142 @@
-"""Room: small arrays of a kernel's own, which end with it."""
+"""Room: a start posture has room in all directions, and the rule is what the constants say."""
+
+import dataclasses
+import math
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
-from teleop_core.base.errors import KernelError
-from teleop_core.kernels import IS_COMPILED, kernel
-from teleop_core.kernels.room import room
+import teleop_core as tc
+from teleop_core.base.errors import ParameterError, ShapeError
+from teleop_core.kernels import IS_COMPILED
+from teleop_core.robots import IkStatus
+from teleop_core.robots.dh import robot_from_table
+from teleop_core.robots.room import room, samples, start_posture
 
-compiled_only = pytest.mark.skipif(not IS_COMPILED, reason="looks at compiled code")
-
-
-@kernel
-def squares(values, out):
-    own = room(3)
-    for i in range(3):
-        own[i] = values[i] * values[i]
-    for i in range(3):
-        out[i] += own[i]
-
-
-@kernel
-def doubly(values, table):
-    first, second = room(3), room(3, 3)
-    for i in range(3):
-        first[i] = 0.0
-        for k in range(3):
-            second[i, k] = values[i] * values[k]
-    for _ in range(2):
-        squares(values, first)
-    for i in range(3):
-        for k in range(3):
-            table[i, k] = first[i] if i == k else second[i, k]
-    return second.shape[0] + second.size
+TABLES = Path(__file__).resolve().parents[2] / "config/robots"
+walks_far = pytest.mark.skipif(not IS_COMPILED, reason="looks at 100 000 poses")
+FROZEN = ("rcrt1", "puma560", "mma", "scara_stewart")
+ROOMY = ("scara", "planar_3r", "five_axis", "stewart", "rps3", "three_finger_hand")
+ONE_AXIS = ("four_bar", "parallelogram")
+# Constants are written with four digits.
+ROUNDED = 6e-5
+ARM: dict[str, Any] = {
+    "name": "arm",
+    "convention": "modified",
+    "angles": "degrees",
+    "task": ["x", "y"],
+    "rows": [
+        {"theta": "q", "lower": -150, "upper": 150, "home": 0},
+        {"a": 0.4, "theta": "q", "lower": -150, "upper": 150, "home": 0},
+        {"a": 0.3},
+    ],
+}
 
 
-def gives():
-    own = room(3)
-    own[0] = 1.0
-    return own
+def with_starts(*starts: float) -> tc.Robot:
+    rows = [dict(row) for row in ARM["rows"]]
+    for row, start in zip(rows, starts, strict=False):
+        row["start"] = start
+    return robot_from_table({**ARM, "rows": rows})
 
 
-def test_a_kernel_computes_in_its_room_what_plain_python_does():
-    values = np.array([1.0, -2.0, 3.0])
-    compiled, plain = np.zeros((3, 3)), np.zeros((3, 3))
-    assert doubly(values, compiled) == doubly.py_func(values, plain) == 12
-    np.testing.assert_array_equal(compiled, plain)
-    assert np.diag(plain).tolist() == [2.0, 8.0, 18.0]
+@walks_far
+@pytest.mark.parametrize("name", FROZEN)
+def test_the_start_in_the_file_is_what_the_rule_says(name: str) -> None:
+    robot = tc.load_robot(name)
+    np.testing.assert_allclose(start_posture(robot), robot.start, rtol=0, atol=ROUNDED)
 
 
-@compiled_only
-def test_a_kernel_with_room_takes_no_memory():
-    fresh = kernel(doubly.py_func)
-    fresh._has_cache = True  # what is kept on the disk cannot be looked at
-    fresh(np.ones(3), np.zeros((3, 3)))
-    text = fresh.inspect_llvm(fresh.signatures[0])
-    body = text[text.index("define") :].split("\n}\n")[0]
-    assert "NRT_" not in body
+@pytest.mark.parametrize("name", [*FROZEN, *ROOMY])
+def test_from_the_start_the_tool_goes_far_in_every_direction(name: str) -> None:
+    robot = tc.load_robot(name)
+    metres, radians = room(robot, robot.start)
+    reach = np.linalg.norm(
+        robot.solve_fk_batch(samples(robot), search=False).T[:, :3, 3], axis=1
+    ).max()
+    assert metres >= reach / 16
+    assert radians >= math.radians(29.9)
 
 
-@compiled_only
-def test_room_cannot_be_returned():
-    with pytest.raises(KernelError, match="its room ends with it"):
-        kernel(gives)()
+@pytest.mark.parametrize("name", [*ROOMY, *ONE_AXIS])
+def test_a_home_with_room_is_the_start(name: str) -> None:
+    robot = tc.load_robot(name)
+    np.testing.assert_array_equal(robot.start, robot.home)
 
 
-@compiled_only
-def test_sizes_of_room_are_written_as_numbers():
-    def grows(count):
-        return room(count)[0]
+@pytest.mark.parametrize("name", ["rcrt1", "puma560"])
+def test_at_the_start_the_tool_points_as_at_home(name: str) -> None:
+    robot = tc.load_robot(name)
+    held, at_home = robot.fk(robot.start)[:3, :3], robot.fk(robot.home)[:3, :3]
+    np.testing.assert_allclose(held, at_home, atol=3e-4)  # four digits of six joints
 
-    with pytest.raises(KernelError):
-        kernel(grows)(3)
+
+@pytest.mark.parametrize("name", ["rcrt1", "puma560", "scara"])
+def test_the_room_is_walked_in_any_direction_without_a_limit(name: str) -> None:
+    robot, rng = tc.load_robot(name), np.random.default_rng(4)
+    metres, begin = room(robot, robot.start).metres, robot.fk(robot.start)
+    for _ in range(20):
+        way = rng.normal(size=3)
+        shares = np.linspace(0.0, 0.75, 200)[:, None]  # between two directions that were walked
+        path = np.repeat(begin[None], 200, axis=0)
+        path[:, :3, 3] += shares * metres * way / np.linalg.norm(way)
+        answer = robot.follow(path, robot.start, dt=1.0)
+        assert (answer.status == IkStatus.FOLLOWED).all()
+
+
+def test_a_joint_on_its_stop_leaves_no_room() -> None:
+    robot = tc.load_robot("rcrt1")
+    q = robot.start.copy()
+    q[2] = robot.upper[2]
+    assert room(robot, q).metres == 0.0
+
+
+@walks_far
+def test_a_stretched_arm_starts_bent() -> None:
+    robot = robot_from_table(ARM)
+    assert room(robot, robot.home).metres == 0.0
+    assert abs(robot.start[1]) > math.radians(30.0)
+    assert room(robot, robot.start).metres > 0.1
+    assert room(robot, robot.start).radians == math.inf  # it controls x and y alone
+
+
+@walks_far
+def test_another_length_makes_another_start() -> None:
+    robot = tc.load_robot("rcrt1", L6=0.3)
+    assert not np.array_equal(robot.start, tc.load_robot("rcrt1").start)
+    assert ((robot.lower <= robot.start) & (robot.start <= robot.upper)).all()
+
+
+def test_a_table_states_its_own_start() -> None:
+    np.testing.assert_allclose(with_starts(10.0, 60.0).start, np.radians([10.0, 60.0]))
+    np.testing.assert_allclose(with_starts(10.0).start, np.radians([10.0, 0.0]))
+
+
+@pytest.mark.parametrize("name", ["rcrt1", "puma560"])
+def test_the_table_of_an_arm_starts_where_the_built_in_one_does(name: str) -> None:
+    table = tc.load_robot(str(TABLES / f"{name}.yaml"))
+    np.testing.assert_allclose(table.start, tc.load_robot(name).start, rtol=0, atol=2e-4)
+
+
+def test_a_start_outside_the_limits_is_refused() -> None:
+    with pytest.raises(ParameterError, match="row 2 start"):
+        with_starts(0.0, 151.0)
+    robot = robot_from_table(ARM)
+    with pytest.raises(ParameterError) as error:
+        dataclasses.replace(robot, start=robot.upper + 1.0)
+    assert error.value.name == "start"
+    with pytest.raises(ShapeError):
+        dataclasses.replace(robot, start=np.zeros(3))
+
+
+@walks_far
+def test_a_start_is_nobody_elses_to_change() -> None:
+    mine = np.radians([10.0, 60.0])
+    robot = dataclasses.replace(robot_from_table(ARM), start=mine)
+    mine[:] = 0.0
+    np.testing.assert_allclose(robot.start, np.radians([10.0, 60.0]))
+    for start in (robot.start, tc.load_robot("rcrt1").start, robot_from_table(ARM).start):
+        with pytest.raises(ValueError, match="read-only"):
+            start[0] = 1.0

@@ -7,7 +7,7 @@ import pytest
 import roboticstoolbox as rtb
 
 from teleop_core.base.errors import ClosureError, ParameterError, ShapeError, UnknownNameError
-from teleop_core.kernels.geometry import rotation, transform
+from teleop_core.kernels.geometry import Array, rotation, transform
 from teleop_core.robots import FkStatus, IkStatus, list_robots, load_robot
 from teleop_core.robots.rps3 import Assembly, assembly_modes, joint_points, leg_coordinates
 from teleop_core.robots.rps3_loop import constraints
@@ -19,20 +19,20 @@ PRINTED = 6e-7
 SOLVED = 1e-9
 
 
-def tilted(rng, most=0.6):
+def tilted(rng: np.random.Generator, most: float = 0.6) -> Array:
     """Height and tilt without torsion: what the robot controls."""
     angle, heading = rng.uniform(0.0, most), rng.uniform(-math.pi, math.pi)
     R = rotation("z", heading) @ rotation("y", angle) @ rotation("z", -heading)
     return transform(R, np.array([0.0, 0.0, rng.uniform(0.9, 1.3)]))
 
 
-def test_loop_equations_have_rank_three_over_angles_and_lengths():
+def test_loop_equations_have_rank_three_over_angles_and_lengths() -> None:
     gap, G, H = np.empty(3), np.empty((3, 3)), np.empty((3, 3))
     constraints(np.array([1.2, 1.0, 0.9]), np.radians([60.0, 70.0, 80.0]), B, A, gap, G, H)
     assert np.linalg.matrix_rank(np.hstack((G, H))) == 3
 
 
-def test_loop_equations_are_the_distances_of_the_ball_joints_with_their_slopes():
+def test_loop_equations_are_the_distances_of_the_ball_joints_with_their_slopes() -> None:
     rng, step = np.random.default_rng(1), 1e-6
     gap, G, H = np.empty(3), np.empty((3, 3)), np.empty((3, 3))
     ahead, behind, unused = np.empty(3), np.empty(3), np.empty((3, 3))
@@ -52,7 +52,7 @@ def test_loop_equations_are_the_distances_of_the_ball_joints_with_their_slopes()
             assert np.allclose(H[:, i], (ahead - behind) / (2.0 * step), atol=1e-8)
 
 
-def test_ball_joints_are_those_of_the_specification_and_give_the_legs_back():
+def test_ball_joints_are_those_of_the_specification_and_give_the_legs_back() -> None:
     lengths, angles = [1.2, 1.0, 0.9], np.radians([60.0, 70.0, 80.0])
     S = joint_points(lengths, angles, b=B)
     printed = [
@@ -66,7 +66,7 @@ def test_ball_joints_are_those_of_the_specification_and_give_the_legs_back():
     assert np.allclose(back[1], angles, atol=1e-14)
 
 
-def test_leg_chain_of_the_denavit_hartenberg_table_ends_at_the_ball_joint():
+def test_leg_chain_of_the_denavit_hartenberg_table_ends_at_the_ball_joint() -> None:
     chain = rtb.DHRobot([rtb.RevoluteMDH(), rtb.PrismaticMDH(alpha=-math.pi / 2)])
     rng = np.random.default_rng(2)
     for _ in range(10):
@@ -81,7 +81,7 @@ def test_leg_chain_of_the_denavit_hartenberg_table_ends_at_the_ball_joint():
             assert not np.allclose(spoken[:3, 3], S[i], atol=1e-3)
 
 
-def test_equal_legs_lift_the_platform_level_as_the_specification_says():
+def test_equal_legs_lift_the_platform_level_as_the_specification_says() -> None:
     modes = assembly_modes([1.2, 1.2, 1.2], b=B, a=A)
     level = np.abs(np.degrees(modes.angles) - 65.375682).max(axis=1)
     k = int(level.argmin())
@@ -91,7 +91,7 @@ def test_equal_legs_lift_the_platform_level_as_the_specification_says():
     assert np.allclose(load_robot("rps3").fk([1.2] * 3), modes.transforms[k], atol=SOLVED)
 
 
-def test_assembly_modes_close_the_loop_come_in_mirrored_pairs_and_are_at_most_sixteen():
+def test_assembly_modes_close_the_loop_come_in_mirrored_pairs_and_are_at_most_sixteen() -> None:
     rng, counts = np.random.default_rng(3), set()
     for _ in range(60):
         lengths = rng.uniform(0.5, 1.8, 3)
@@ -108,7 +108,7 @@ def test_assembly_modes_close_the_loop_come_in_mirrored_pairs_and_are_at_most_si
 
 
 @pytest.mark.parametrize("lengths", [(1.2, 1.2, 1.2), (1.2, 1.0, 0.9), (0.7, 0.9, 1.5)])
-def test_no_assembly_mode_is_missed(lengths):
+def test_no_assembly_mode_is_missed(lengths: tuple[float, float, float]) -> None:
     # Independent search: Newton steps of plain NumPy from many random leg angles.
     rng = np.random.default_rng(4)
     legs = np.array(lengths)
@@ -126,7 +126,7 @@ def test_no_assembly_mode_is_missed(lengths):
     assert reached > 100
 
 
-def test_legs_that_cannot_meet_are_a_status_with_a_finite_pose_and_no_pose_of_fk():
+def test_legs_that_cannot_meet_are_a_status_with_a_finite_pose_and_no_pose_of_fk() -> None:
     modes = assembly_modes([0.1, 0.1, 5.0], b=B, a=A)
     assert modes.status == Assembly.CANNOT_ASSEMBLE
     assert modes.angles.shape == (0, 3)
@@ -137,7 +137,7 @@ def test_legs_that_cannot_meet_are_a_status_with_a_finite_pose_and_no_pose_of_fk
         load_robot("rps3").fk([0.1, 0.1, 5.0])
 
 
-def test_the_robot_reaches_height_and_tilt_and_leaves_the_rest_as_residual():
+def test_the_robot_reaches_height_and_tilt_and_leaves_the_rest_as_residual() -> None:
     robot, rng = load_robot("rps3"), np.random.default_rng(5)
     assert robot.task_mask == (False, False, True, True, True, False)
     for _ in range(200):
@@ -156,7 +156,7 @@ def test_the_robot_reaches_height_and_tilt_and_leaves_the_rest_as_residual():
         assert math.isclose(result.residual[0], gap, abs_tol=1e-12)
 
 
-def test_poses_and_legs_are_inverse_to_each_other_and_found_among_the_modes():
+def test_poses_and_legs_are_inverse_to_each_other_and_found_among_the_modes() -> None:
     robot, rng = load_robot("rps3"), np.random.default_rng(6)
     q = rng.uniform(1.05, 1.35, (100, 3))
     poses = robot.fk(q)
@@ -169,7 +169,7 @@ def test_poses_and_legs_are_inverse_to_each_other_and_found_among_the_modes():
         assert np.allclose(robot.ik_all(T), [legs], atol=SOLVED)
 
 
-def test_jacobian_is_the_finite_difference():
+def test_jacobian_is_the_finite_difference() -> None:
     robot, rng, step = load_robot("rps3"), np.random.default_rng(7), 1e-6
     for q in rng.uniform(1.0, 1.4, (10, 3)):
         J, T = robot.jacobian(q), robot.fk(q)
@@ -181,14 +181,14 @@ def test_jacobian_is_the_finite_difference():
             assert np.allclose(J[3:, leg], [spin[2, 1], spin[0, 2], spin[1, 0]], atol=1e-7)
 
 
-def test_strokes_stop_the_legs():
+def test_strokes_stop_the_legs() -> None:
     robot = load_robot("rps3")
     result = robot.ik(transform(np.eye(3), np.array([0.0, 0.0, 3.0])))
     assert result.status == IkStatus.LIMITED
     assert np.allclose(result.q, robot.upper)
 
 
-def test_along_a_path_that_tilts_over_and_back_the_legs_keep_their_step():
+def test_along_a_path_that_tilts_over_and_back_the_legs_keep_their_step() -> None:
     robot, step = load_robot("rps3"), 0.01
     limits = robot.limits()
     limits[2] = step
@@ -204,7 +204,7 @@ def test_along_a_path_that_tilts_over_and_back_the_legs_keep_their_step():
     assert np.allclose(q, np.hypot(1.09, B - A), atol=1e-9)
 
 
-def test_bad_questions_are_refused():
+def test_bad_questions_are_refused() -> None:
     assert "rps3" in list_robots()
     with pytest.raises(ParameterError):
         assembly_modes([1.0, 1.0, 0.0], b=B, a=A)

@@ -1,6 +1,7 @@
 """Runner: what a session in virtual time records, and under which stamps."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -17,7 +18,7 @@ HOME = load_robot("rcrt1").home.tolist()
 DELAY_TICKS = 20
 
 
-def test_setpoints_are_recorded_with_the_stamp_of_the_command_in_force(tmp_path):
+def test_setpoints_are_recorded_with_the_stamp_of_the_command_in_force(tmp_path: Path) -> None:
     settings = ["duration=0.5", f"slave.start={HOME}"]
     settings.append(f"teleop.delays=[slave/servo_jp={DELAY_TICKS * 1e-3}]")
     simulate(configure(settings=settings), tmp_path / "bag")
@@ -30,7 +31,7 @@ def test_setpoints_are_recorded_with_the_stamp_of_the_command_in_force(tmp_path)
         assert np.array_equal(bag.read(topic).stamp_ns, sampled), topic.name
 
 
-def test_recording_of_before_is_read_and_replayed_from_where_it_began(tmp_path):
+def test_recording_of_before_is_read_and_replayed_from_where_it_began(tmp_path: Path) -> None:
     # Its configuration has former names: path, pid, fixture.size.
     bag = Bag(Path(__file__).parents[2] / "bags" / "example")
     assert "path.kind" in bag.metadata["configuration"]
@@ -52,12 +53,12 @@ def test_recording_of_before_is_read_and_replayed_from_where_it_began(tmp_path):
     assert np.linalg.norm(before - after, axis=1).max() < beyond
 
 
-def test_arms_that_begin_farther_away_are_waited_for_before_the_recorded_hand_moves():
+def test_arms_that_begin_farther_away_are_waited_for_before_the_recorded_hand_moves() -> None:
     at_home = api.run("coarse_box", duration=1.0, slave__start=HOME)
     again = api.replay(at_home)
     for topic in ("slave/setpoint_js", "slave/measured_cp"):
         assert np.array_equal(again[topic].values, at_home[topic].values)
-    elsewhere = {"slave.start": [], "slave.starts_at_home": False}
+    elsewhere: dict[str, Any] = {"slave.start": [], "slave.starts_at_home": False}
     later = api.replay(at_home, settings=elsewhere)
     state, first_ns = at_home["teleop/state"], int(at_home["master/measured_cp"].stamp_ns[0])
     follows_ns = int(state.stamp_ns[np.argmax(state["is_following"] > 0.0)])

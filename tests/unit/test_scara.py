@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 
+from present import present
 from teleop_core.kernels.geometry import rotation, transform
 from teleop_core.robots import IkStatus, load_robot
 from teleop_core.robots.dh import load_table, parse_table
@@ -16,7 +17,7 @@ PRINTED = 5e-7
 DT = 1e-3
 
 
-def test_the_product_of_the_table_is_the_lectures():
+def test_the_product_of_the_table_is_the_lectures() -> None:
     arm = load_table("config/robots/scara.yaml").robot()
     rng = np.random.default_rng(1)
     for q in rng.uniform(ARM.lower, ARM.upper, (100, 4)):
@@ -30,7 +31,7 @@ def test_the_product_of_the_table_is_the_lectures():
         assert np.abs(arm.fk(q) - expected).max() < ROUNDING
 
 
-def test_d9_numbers_and_the_other_elbow():
+def test_d9_numbers_and_the_other_elbow() -> None:
     q = np.array([25.0 * DEGREE, 50.0 * DEGREE, 0.12, -30.0 * DEGREE])
     pose = ARM.fk(q)
     assert np.abs(pose[:3, 3] - (0.440169, 0.458825, -0.12)).max() < PRINTED
@@ -42,12 +43,12 @@ def test_d9_numbers_and_the_other_elbow():
     assert np.abs(second / scale - other).max() < PRINTED
 
 
-def test_a_positive_d3_lowers_the_tool():
+def test_a_positive_d3_lowers_the_tool() -> None:
     up, down = (ARM.fk([0.1, 0.2, d3, 0.0])[2, 3] for d3 in (0.05, 0.15))
     assert down == pytest.approx(up - 0.1)
 
 
-def test_h11_proximal_and_distal_tables_of_the_thesis_are_one_arm():
+def test_h11_proximal_and_distal_tables_of_the_thesis_are_one_arm() -> None:
     # Singh 2014, tables 3.1 and 3.3: theta2 and d3 change sign, d2 = d5 = 0.
     distal = parse_table(
         {
@@ -94,7 +95,7 @@ def test_h11_proximal_and_distal_tables_of_the_thesis_are_one_arm():
         assert np.abs(one.fk(q) - three.fk(q)).max() < ROUNDING
 
 
-def test_tilt_is_left_as_residual_and_the_rest_is_followed():
+def test_tilt_is_left_as_residual_and_the_rest_is_followed() -> None:
     q = np.array([0.3, 0.8, 0.1, -0.4])
     pose = ARM.fk(q)
     pose[:3, :3] = pose[:3, :3] @ rotation("x", 0.2)
@@ -106,7 +107,7 @@ def test_tilt_is_left_as_residual_and_the_rest_is_followed():
     assert ARM.task_mask == (True, True, True, False, False, True)
 
 
-def test_a_height_beyond_the_slide_is_limited_not_unreachable():
+def test_a_height_beyond_the_slide_is_limited_not_unreachable() -> None:
     pose = ARM.fk([0.3, 0.8, 0.2, 0.0])
     pose[2, 3] = -0.25
     result = ARM.ik(pose)
@@ -115,7 +116,7 @@ def test_a_height_beyond_the_slide_is_limited_not_unreachable():
     assert result.q[2] == 0.2
 
 
-def test_the_tool_turns_on_over_a_whole_turn_without_unwinding():
+def test_the_tool_turns_on_over_a_whole_turn_without_unwinding() -> None:
     q = ARM.home.copy()
     turns = np.linspace(-math.pi, math.pi, 4001)
     poses = np.array([transform(rotation("z", a), ARM.fk(q)[:3, 3]) for a in turns])
@@ -126,13 +127,13 @@ def test_the_tool_turns_on_over_a_whole_turn_without_unwinding():
 
 
 @pytest.mark.parametrize("y", [0.0, 1e-9, 1e-3, 0.1, 0.3])
-def test_lines_beside_the_column_keep_speeds_and_go_on(y):
+def test_lines_beside_the_column_keep_speeds_and_go_on(y: float) -> None:
     x = np.concatenate((np.linspace(0.5, -0.5, 4000), np.full(2000, -0.5)))
     poses = np.array([transform(np.eye(3), np.array([value, y, -0.1])) for value in x])
     seed = ARM.ik(poses[0]).q
     result = ARM.follow(poses, seed, DT)
     steps = np.abs(np.diff(np.vstack((seed, result.q)), axis=0))
-    assert (steps <= ARM.drives.speed_limit * DT * (1.0 + 1e-9)).all()
+    assert (steps <= present(ARM.drives).speed_limit * DT * (1.0 + 1e-9)).all()
     assert np.isfinite(result.residual).all()
     assert (result.q >= ARM.lower).all()
     assert (result.q <= ARM.upper).all()

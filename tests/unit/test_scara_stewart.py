@@ -1,15 +1,20 @@
 """SCARA + Stewart hybrid: the published example, both elbows and headings, paths, way back."""
 
 import math
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 import pytest
 import roboticstoolbox as rtb
 from scipy.spatial.transform import Rotation
 
+from present import present
 from teleop_core.base.errors import ParameterError, UnknownNameError
-from teleop_core.kernels.geometry import rotation, transform
+from teleop_core.kernels.geometry import Array, rotation, transform
 from teleop_core.robots import IkStatus, list_robots, load_robot
+from teleop_core.robots.kinematics import IkResult
+from teleop_core.robots.robot import Robot
 from teleop_core.robots.stewart import Layout
 from teleop_core.session.configuration import configure
 from teleop_core.session.virtual import VirtualTime
@@ -20,16 +25,21 @@ PRINTED_M, PRINTED_DEG = 1e-6, 2e-4
 # Leg errors of rounding, over the square of the tilt by which similar hexagons see a turn.
 SOLVED = 1e-9
 PAIRS = {"sigma_b": math.radians(15.0), "sigma_m": math.radians(15.0)}
-ROBOTS = [{}, {"heading": "carried"}, PAIRS, {**PAIRS, "heading": "carried"}]
+ROBOTS: Sequence[dict[str, Any]] = [
+    {},
+    {"heading": "carried"},
+    PAIRS,
+    {**PAIRS, "heading": "carried"},
+]
 
 
-def attitude(alpha, beta, gamma):
+def attitude(alpha: float, beta: float, gamma: float) -> Array:
     """The source's product Rx Ry Rz, angles in degrees."""
     a, b, c = np.radians([alpha, beta, gamma])
     return rotation("x", a) @ rotation("y", b) @ rotation("z", c)
 
 
-def poses(rng, count, tilt=40.0):
+def poses(rng: np.random.Generator, count: int, tilt: float = 40.0) -> Iterator[Array]:
     """Poses with the SCARA inside its ring, platform turned up to ``tilt`` about each axis."""
     for _ in range(count):
         R = attitude(*rng.uniform(-tilt, tilt, 3))
@@ -42,31 +52,33 @@ EXAMPLE = transform(attitude(30.0, 0.0, 0.0), np.array([0.933013, 0.20, 0.436603
 EXAMPLE_LEGS = [0.223607, 0.267095, 0.267095, 0.223607, 0.191569, 0.191569]
 
 
-def assert_path_is_followed_within_the_drives(robot, path, seed, dt=1e-3):
+def assert_path_is_followed_within_the_drives(
+    robot: Robot, path: Array, seed: Array, dt: float = 1e-3
+) -> IkResult[Any]:
     result = robot.follow(path, seed=seed, dt=dt)
     steps = np.abs(np.diff(np.vstack((seed, result.q)), axis=0))
-    assert (steps <= robot.drives.speed_limit * dt * (1.0 + 1e-9)).all()
+    assert (steps <= present(robot.drives).speed_limit * dt * (1.0 + 1e-9)).all()
     assert (result.q >= robot.lower).all()
     assert (result.q <= robot.upper).all()
     assert np.isfinite(result.residual).all()
     return result
 
 
-def test_published_example_has_the_published_legs_and_joints():
+def test_published_example_has_the_published_legs_and_joints() -> None:
     q = load_robot("scara_stewart").ik_all(EXAMPLE)[0]
     assert np.allclose(q[3:], EXAMPLE_LEGS, atol=PRINTED_M)
     assert np.allclose(np.degrees(q[:2]), [0.0, 30.0], atol=PRINTED_DEG)
     assert math.isclose(q[2], 0.15, abs_tol=PRINTED_M)
 
 
-def test_the_other_elbow_of_the_published_example():
+def test_the_other_elbow_of_the_published_example() -> None:
     q = load_robot("scara_stewart").ik_all(EXAMPLE)
     assert len(q) == 2
     assert np.allclose(np.degrees(q[1, :2]), [30.0, -30.0], atol=PRINTED_DEG)
     assert np.allclose(q[1, 2:], q[0, 2:], atol=1e-15)
 
 
-def test_forward_kinematics_of_the_published_joints_is_the_published_tip():
+def test_forward_kinematics_of_the_published_joints_is_the_published_tip() -> None:
     robot = load_robot("scara_stewart")
     legs = robot.ik_all(EXAMPLE)[0, 3:]
     T = robot.fk([0.0, math.radians(30.0), 0.15, *legs])
@@ -74,7 +86,7 @@ def test_forward_kinematics_of_the_published_joints_is_the_published_tip():
     assert np.allclose(T[:3, :3], attitude(30.0, 0.0, 0.0), atol=SOLVED)
 
 
-def test_tool_offset_uses_the_printed_product_and_not_the_printed_name():
+def test_tool_offset_uses_the_printed_product_and_not_the_printed_name() -> None:
     robot = load_robot("scara_stewart", l1=0.5, l2=0.5)
     R = attitude(10.0, 20.0, -15.0)
     T = transform(R, np.array([0.8, 0.0, 0.5]))
@@ -90,26 +102,26 @@ def test_tool_offset_uses_the_printed_product_and_not_the_printed_name():
     assert np.allclose(0.1 * fixed_axes[:, 2], [0.02804036, -0.02549077, 0.09254166], atol=1e-8)
 
 
-def test_tool_offset_and_scara_tip_of_the_published_example():
+def test_tool_offset_and_scara_tip_of_the_published_example() -> None:
     # K2 and K3: P_STWR and what is left to the SCARA.
     offset = np.array([0.0, 0.0, 0.2]) + 0.1 * EXAMPLE[:3, 2]
     assert np.allclose(offset, [0.0, -0.05, 0.286603], atol=PRINTED_M)
     assert np.allclose(EXAMPLE[:3, 3] - offset, [0.933013, 0.25, 0.15], atol=PRINTED_M)
 
 
-def test_level_platform_has_equal_legs():
+def test_level_platform_has_equal_legs() -> None:
     q = load_robot("scara_stewart").ik_all(transform(np.eye(3), np.array([0.7, 0.0, 0.5])))[0]
     assert np.allclose(q[3:], 0.2236068, atol=5e-8)
 
 
-def test_legs_numbered_from_sixty_degrees_would_not_be_the_published_ones():
+def test_legs_numbered_from_sixty_degrees_would_not_be_the_published_ones() -> None:
     angles = np.radians([60.0, 120.0, 180.0, 240.0, 300.0, 360.0])
     layout = Layout.circular(0.2, angles, 0.1, angles)
     legs = layout.legs(transform(attitude(30.0, 0.0, 0.0), np.array([0.0, 0.0, 0.2])))
     assert np.allclose(legs, [0.2671, 0.2671, 0.2236, 0.1916, 0.1916, 0.2236], atol=5e-5)
 
 
-def test_rejected_sign_of_equation_fifteen_ends_elsewhere():
+def test_rejected_sign_of_equation_fifteen_ends_elsewhere() -> None:
     robot = load_robot("scara_stewart")
     q = robot.ik_all(EXAMPLE)[0]
     q[0] = math.radians(-150.0)
@@ -117,14 +129,14 @@ def test_rejected_sign_of_equation_fifteen_ends_elsewhere():
     assert np.allclose(tip[:2], [-0.6830, -0.6830], atol=5e-5)
 
 
-def test_base_bolted_to_link_two_moves_the_published_tip():
+def test_base_bolted_to_link_two_moves_the_published_tip() -> None:
     carried = load_robot("scara_stewart", heading="carried")
     legs = load_robot("scara_stewart").ik_all(EXAMPLE)[0, 3:]
     T = carried.fk([0.0, math.radians(30.0), 0.15, *legs])
     assert np.allclose(T[:3, 3], [0.95801270, 0.20669873, 0.43660254], atol=PRINTED_M)
 
 
-def test_scara_part_is_the_chain_of_its_denavit_hartenberg_rows():
+def test_scara_part_is_the_chain_of_its_denavit_hartenberg_rows() -> None:
     # Unequal links tell the printed l2 of equation 3 from the l1 that is meant.
     robot = load_robot("scara_stewart", l1=0.6, l2=0.35, h1=0.1, heading="carried")
     chain = rtb.DHRobot(
@@ -138,7 +150,7 @@ def test_scara_part_is_the_chain_of_its_denavit_hartenberg_rows():
 
 
 @pytest.mark.parametrize("options", ROBOTS)
-def test_forward_of_inverse_is_the_pose_for_both_elbows(options):
+def test_forward_of_inverse_is_the_pose_for_both_elbows(options: Mapping[str, str | float]) -> None:
     robot, rng = load_robot("scara_stewart", **options), np.random.default_rng(1)
     for T in poses(rng, 500):
         solutions = robot.ik_all(T)
@@ -148,7 +160,7 @@ def test_forward_of_inverse_is_the_pose_for_both_elbows(options):
 
 
 @pytest.mark.parametrize("options", ROBOTS)
-def test_inverse_takes_the_elbow_next_to_the_seed(options):
+def test_inverse_takes_the_elbow_next_to_the_seed(options: Mapping[str, str | float]) -> None:
     robot, rng = load_robot("scara_stewart", **options), np.random.default_rng(2)
     found = 0
     for T in poses(rng, 200, tilt=20.0):
@@ -162,7 +174,7 @@ def test_inverse_takes_the_elbow_next_to_the_seed(options):
     assert found > 250
 
 
-def test_a_general_scara_with_unequal_links_and_a_raised_base():
+def test_a_general_scara_with_unequal_links_and_a_raised_base() -> None:
     robot = load_robot("scara_stewart", l1=0.6, l2=0.35, h1=0.1)
     rng = np.random.default_rng(3)
     for theta2 in (0.5, 2.5, -0.5, -2.5):  # where l1 + l2 cos(theta2) is of both signs, l1 < l2 too
@@ -176,7 +188,9 @@ def test_a_general_scara_with_unequal_links_and_a_raised_base():
 
 
 @pytest.mark.parametrize("options", ROBOTS)
-def test_jacobian_is_the_finite_difference_where_all_legs_count(options):
+def test_jacobian_is_the_finite_difference_where_all_legs_count(
+    options: Mapping[str, str | float],
+) -> None:
     robot, rng, step = load_robot("scara_stewart", **options), np.random.default_rng(4), 1e-6
     T0 = robot.fk(robot.home)
     for _ in range(5):
@@ -194,7 +208,7 @@ def test_jacobian_is_the_finite_difference_where_all_legs_count(options):
             assert np.allclose(J[:, joint], numeric, atol=1e-4, rtol=1e-5)
 
 
-def test_out_of_the_ring_is_unreachable_and_finite():
+def test_out_of_the_ring_is_unreachable_and_finite() -> None:
     robot = load_robot("scara_stewart")
     R = attitude(20.0, 0.0, 0.0)
     T = transform(R, np.array([1.3, 0.0, 0.4]) + 0.1 * R[:, 2])
@@ -209,7 +223,7 @@ def test_out_of_the_ring_is_unreachable_and_finite():
     assert uneven.ik(inside).status == IkStatus.UNREACHABLE
 
 
-def test_a_platform_tilted_too_far_is_limited_to_the_nearest_tilt():
+def test_a_platform_tilted_too_far_is_limited_to_the_nearest_tilt() -> None:
     robot = load_robot("scara_stewart")
     for alpha, missing in ((100.0, 25.0), (170.0, 95.0)):
         R = attitude(alpha, 0.0, 0.0)
@@ -220,7 +234,7 @@ def test_a_platform_tilted_too_far_is_limited_to_the_nearest_tilt():
         assert math.isclose(math.degrees(angle), missing, abs_tol=1e-6)
 
 
-def test_a_platform_upside_down_is_limited_and_finite():
+def test_a_platform_upside_down_is_limited_and_finite() -> None:
     robot = load_robot("scara_stewart")
     for R in (attitude(180.0, 0.0, 0.0), attitude(180.0, 0.0, 40.0)):
         result = robot.ik(transform(R, np.array([0.6, 0.0, 0.3])))
@@ -229,7 +243,7 @@ def test_a_platform_upside_down_is_limited_and_finite():
         assert robot.fk(result.q)[2, 2] < 0.3
 
 
-def test_similar_hexagons_hide_the_turn_of_a_level_platform_and_say_so():
+def test_similar_hexagons_hide_the_turn_of_a_level_platform_and_say_so() -> None:
     robot = load_robot("scara_stewart")
     left, right = (
         transform(rotation("z", angle), np.array([0.6, 0.0, 0.5])) for angle in (0.3, -0.3)
@@ -245,7 +259,7 @@ def test_similar_hexagons_hide_the_turn_of_a_level_platform_and_say_so():
         assert np.allclose(paired.fk(result.q), T, atol=SOLVED)
 
 
-def test_the_turn_of_the_published_layout_is_known_as_the_square_of_the_tilt():
+def test_the_turn_of_the_published_layout_is_known_as_the_square_of_the_tilt() -> None:
     robot = load_robot("scara_stewart")
     error = 1e-7  # of one leg [m]
     for alpha in (1.0, 5.0, 30.0):
@@ -258,7 +272,7 @@ def test_the_turn_of_the_published_layout_is_known_as_the_square_of_the_tilt():
         assert np.isfinite(robot.jacobian(q)).all()
 
 
-def test_in_pairs_the_platform_shifts_with_a_leg_and_in_line_its_centre_is_held():
+def test_in_pairs_the_platform_shifts_with_a_leg_and_in_line_its_centre_is_held() -> None:
     q = load_robot("scara_stewart").home.copy()
     q[3:] += 1e-3
     held = load_robot("scara_stewart").solve_fk(q).T
@@ -273,7 +287,9 @@ def test_in_pairs_the_platform_shifts_with_a_leg_and_in_line_its_centre_is_held(
 
 @pytest.mark.parametrize("heading", ["fixed", "carried"])
 @pytest.mark.parametrize("beside", [0.0, 1e-6, -1e-6, 0.02, -0.02])
-def test_a_path_over_the_axis_of_joint_one_goes_on_at_the_other_side(heading, beside):
+def test_a_path_over_the_axis_of_joint_one_goes_on_at_the_other_side(
+    heading: str, beside: float
+) -> None:
     robot = load_robot("scara_stewart", heading=heading)
     R = attitude(30.0, 0.0, 0.0)
     x = np.concatenate((np.linspace(0.4, -0.4, 4000), np.full(4000, -0.4)))
@@ -288,7 +304,7 @@ def test_a_path_over_the_axis_of_joint_one_goes_on_at_the_other_side(heading, be
 
 @pytest.mark.parametrize("heading", ["fixed", "carried"])
 @pytest.mark.parametrize("reach", [0.9999, 1.0, 1.05])
-def test_a_path_to_the_stretched_arm_and_back_keeps_its_elbow(heading, reach):
+def test_a_path_to_the_stretched_arm_and_back_keeps_its_elbow(heading: str, reach: float) -> None:
     robot = load_robot("scara_stewart", heading=heading)
     R = attitude(0.0, 25.0, 0.0)
     x = 0.8 + (reach - 0.8) * np.sin(np.linspace(0.0, math.pi, 6000))
@@ -304,7 +320,7 @@ def test_a_path_to_the_stretched_arm_and_back_keeps_its_elbow(heading, reach):
 
 
 @pytest.mark.parametrize("options", ROBOTS)
-def test_a_path_through_the_level_platform_goes_on(options):
+def test_a_path_through_the_level_platform_goes_on(options: Mapping[str, str | float]) -> None:
     robot = load_robot("scara_stewart", **options)
     angles = np.linspace(30.0, -30.0, 3000)
     path = np.array(
@@ -320,7 +336,7 @@ def test_a_path_through_the_level_platform_goes_on(options):
     assert np.abs(np.diff(result.q, n=2, axis=0)).max() < 1e-5
 
 
-def test_legs_that_are_held_back_slow_down_together():
+def test_legs_that_are_held_back_slow_down_together() -> None:
     robot = load_robot("scara_stewart")
     start = robot.home
     T = robot.fk(start)
@@ -329,11 +345,11 @@ def test_legs_that_are_held_back_slow_down_together():
     wanted = robot.ik(T, seed=start).q - start
     moved = result.q[0] - start
     assert result.status[0] == IkStatus.LIMITED
-    assert math.isclose(np.abs(moved[3:]).max(), robot.drives.speed_limit[3] * 1e-3)
+    assert math.isclose(np.abs(moved[3:]).max(), present(robot.drives).speed_limit[3] * 1e-3)
     assert np.allclose(moved[3:] / wanted[3:], moved[3] / wanted[3])
 
 
-def test_it_is_a_slave_with_nine_actuators_and_a_home_it_can_hold():
+def test_it_is_a_slave_with_nine_actuators_and_a_home_it_can_hold() -> None:
     robot = load_robot("scara_stewart")
     assert "scara_stewart" in list_robots()
     assert robot.n == 9
@@ -349,7 +365,7 @@ def test_it_is_a_slave_with_nine_actuators_and_a_home_it_can_hold():
 
 @pytest.mark.slow
 @pytest.mark.parametrize("options", ["", "heading=carried", "sigma_b=0.26, sigma_m=0.26"])
-def test_nine_simulated_actuators_follow_the_master_in_the_graph(options):
+def test_nine_simulated_actuators_follow_the_master_in_the_graph(options: str) -> None:
     settings = ["robot=scara_stewart", f"geometry=[{options}]"]
     session = VirtualTime(configure(settings=settings))
     session.run(session.lead + 500)  # to where the slave starts, and half a second of rest
@@ -364,16 +380,16 @@ def test_nine_simulated_actuators_follow_the_master_in_the_graph(options):
     assert 2.0 * np.arccos(np.minimum(between, 1.0)).max() < math.radians(0.5)
 
 
-def test_bad_options_and_lengths_are_refused():
+def test_bad_options_and_lengths_are_refused() -> None:
     with pytest.raises(UnknownNameError) as refusal:
         load_robot("scara_stewart", heading="floating")
     assert refusal.value.alternatives == ("fixed", "carried")
     with pytest.raises(UnknownNameError):
         load_robot("scara_stewart", r_s=0.1)
     for symbol in ("l1", "r_b", "w_z"):
-        with pytest.raises(ParameterError) as refusal:
+        with pytest.raises(ParameterError) as refused:
             load_robot("scara_stewart", **{symbol: 0.0})
-        assert refusal.value.name == symbol
+        assert refused.value.name == symbol
     with pytest.raises(ParameterError):
         load_robot("scara_stewart", sigma_b=1.0)
     with pytest.raises(ParameterError):

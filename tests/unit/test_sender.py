@@ -1,5 +1,7 @@
 """Sender: one owner per topic; losses, told by numbers; floods; stamps that say nothing."""
 
+from typing import Any
+
 import pytest
 
 from teleop_core.bags.messages import Refusal
@@ -9,13 +11,18 @@ MS, SECOND = 1_000_000, 1_000_000_000
 BEGIN = 77 * SECOND
 
 
-def feed(sender, numbers, begin=BEGIN, name=b"first"):
+def feed(
+    sender: Sender, numbers: list[int] | range, begin: int = BEGIN, name: bytes = b"first"
+) -> list[Refusal | None]:
     """What is answered to messages of a publisher, a millisecond apart."""
     return [sender.admit(name, n, begin + i * MS) for i, n in enumerate(numbers)]
 
 
-def feed_in_turn(sender, first, second):
+def feed_in_turn(
+    sender: Sender, first: list[int] | range, second: list[int] | range
+) -> tuple[list[None], list[Refusal]]:
     """What is answered to two publishers that send in turn: to the first, to the second."""
+    answers: Any
     answers = [], []
     for i, pair in enumerate(zip(first, second, strict=True)):
         for name, number, known in zip((b"first", b"second"), pair, answers, strict=True):
@@ -23,33 +30,35 @@ def feed_in_turn(sender, first, second):
     return answers
 
 
-def test_a_sender_of_consecutive_numbers_is_the_owner_and_loses_nothing():
+def test_a_sender_of_consecutive_numbers_is_the_owner_and_loses_nothing() -> None:
     sender = Sender()
     assert feed(sender, range(40, 240)) == [None] * 200
     assert (sender.gaps, sender.owners, sender.conflict) == (0, 1, False)
 
 
-def test_numbers_that_are_missing_are_counted():
+def test_numbers_that_are_missing_are_counted() -> None:
     sender = Sender()
     assert feed(sender, [1, 2, 5, 6, 16]) == [None] * 5
     assert sender.gaps == 2 + 9
 
 
-def test_thousands_that_were_lost_in_a_stall_are_counted():
+def test_thousands_that_were_lost_in_a_stall_are_counted() -> None:
     sender = Sender()
     feed(sender, [1, 2, 3])
     assert sender.admit(b"first", 2003, BEGIN + 3 * MS) is None
     assert sender.gaps == 1999
 
 
-def test_a_message_that_was_overtaken_on_the_way_is_the_owners_and_no_loss():
+def test_a_message_that_was_overtaken_on_the_way_is_the_owners_and_no_loss() -> None:
     sender = Sender()
     assert feed(sender, [1, 2, 4, 3, 5]) == [None] * 5
     assert (sender.gaps, sender.conflict) == (1, False)
 
 
 @pytest.mark.parametrize("begin", [1, 41, 5000, 90_000])
-def test_a_second_publisher_is_refused_whatever_its_numbers_and_the_first_one_goes_on(begin):
+def test_a_second_publisher_is_refused_whatever_its_numbers_and_the_first_one_goes_on(
+    begin: int,
+) -> None:
     sender = Sender()
     first, second = feed_in_turn(sender, range(40, 140), range(begin, begin + 100))
     assert first == [None] * 100
@@ -57,7 +66,7 @@ def test_a_second_publisher_is_refused_whatever_its_numbers_and_the_first_one_go
     assert (sender.owners, sender.gaps, sender.conflict) == (1, 0, True)
 
 
-def test_a_topic_goes_to_another_once_its_owner_is_silent():
+def test_a_topic_goes_to_another_once_its_owner_is_silent() -> None:
     sender = Sender(silence=0.5)
     feed(sender, range(1000, 1010))
     later = BEGIN + 9 * MS
@@ -68,7 +77,7 @@ def test_a_topic_goes_to_another_once_its_owner_is_silent():
     assert feed(sender, [1010], later + 504 * MS) == [Refusal.SECOND_PUBLISHER]
 
 
-def test_a_topic_goes_to_another_at_once_if_the_publisher_of_its_owner_is_gone():
+def test_a_topic_goes_to_another_at_once_if_the_publisher_of_its_owner_is_gone() -> None:
     sender = Sender()
     feed(sender, [1000, 1001])
     assert feed(sender, [1], name=b"second") == [Refusal.SECOND_PUBLISHER]
@@ -77,7 +86,7 @@ def test_a_topic_goes_to_another_at_once_if_the_publisher_of_its_owner_is_gone()
     assert not sender.conflict
 
 
-def test_a_conflict_stays_until_it_is_forgotten():
+def test_a_conflict_stays_until_it_is_forgotten() -> None:
     sender = Sender()
     feed_in_turn(sender, [1000, 1001], [1, 2])
     assert sender.conflict
@@ -88,7 +97,7 @@ def test_a_conflict_stays_until_it_is_forgotten():
     assert feed(sender, [7, 8], BEGIN + 2 * SECOND, b"second") == [None, None]
 
 
-def test_a_flood_is_refused_beyond_its_rate_second_by_second():
+def test_a_flood_is_refused_beyond_its_rate_second_by_second() -> None:
     sender = Sender(limit=100)
     answers = feed(sender, range(1, 1001))
     assert answers[:100] == [None] * 100
@@ -97,13 +106,13 @@ def test_a_flood_is_refused_beyond_its_rate_second_by_second():
     assert again == [None] * 10
 
 
-def test_a_middleware_without_numbers_loses_nothing_that_could_be_told():
+def test_a_middleware_without_numbers_loses_nothing_that_could_be_told() -> None:
     sender = Sender()
     assert feed(sender, [0] * 50) == [None] * 50
     assert (sender.gaps, sender.conflict) == (0, False)
 
 
-def test_stamps_of_a_clock_that_is_ahead_are_told_as_such():
+def test_stamps_of_a_clock_that_is_ahead_are_told_as_such() -> None:
     sender = Sender()
     sender.note_stamp(BEGIN + 1300 * MS, BEGIN)
     (told,) = sender.concerns("master/measured_cp")
@@ -112,7 +121,7 @@ def test_stamps_of_a_clock_that_is_ahead_are_told_as_such():
     assert sender.concerns("master/measured_cp") == []
 
 
-def test_stamps_that_are_zero_or_stand_still_or_go_back_are_told_with_what_to_do():
+def test_stamps_that_are_zero_or_stand_still_or_go_back_are_told_with_what_to_do() -> None:
     sender = Sender()
     told = {}
     for name, stamp, last in (("zero", 0, 0), ("frozen", 5, 5), ("back", 4, 5)):
@@ -124,7 +133,7 @@ def test_stamps_that_are_zero_or_stand_still_or_go_back_are_told_with_what_to_do
     assert (sender.repeats, sender.reordered) == (2, 1)
 
 
-def test_ages_begin_anew_after_a_step_of_the_clock():
+def test_ages_begin_anew_after_a_step_of_the_clock() -> None:
     sender = Sender()
     sender.note_stamp(BEGIN, BEGIN - 3 * SECOND)
     sender.clear_ages()

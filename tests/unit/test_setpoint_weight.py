@@ -1,6 +1,7 @@
 """Setpoint weight of the PID: no step overshoots, on any axis, of any size, saturated or not."""
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -9,10 +10,13 @@ from hypothesis import strategies as st
 from scipy.linalg import expm
 from scipy.signal import lsim
 
+from present import present
 from teleop_core.base.parameters import build
 from teleop_core.graph.signals import DT, TICK_NS
 from teleop_core.kernels import kernel
+from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot
+from teleop_core.robots.robot import Robot
 from teleop_core.slave.controllers.pid import PID, THIRD, PidParameters, pid_control, pid_step
 from teleop_core.slave.pair import ArmParameters, SimulatedArm
 from teleop_core.slave.slave import ReferenceFilterParameters
@@ -27,15 +31,23 @@ SAMPLED = 1.5e-3
 class Axis:
     """One axis of a drive table under its PID: exact between ticks, with limit and encoder."""
 
-    def __init__(self, robot, axis, weight, *, is_limited=True, is_rounded=True):
-        drives = robot.drives
+    def __init__(
+        self,
+        robot: Robot,
+        axis: int,
+        weight: float,
+        *,
+        is_limited: bool = True,
+        is_rounded: bool = True,
+    ) -> None:
+        drives = present(robot.drives)
         self.gains = PID.gains(PidParameters(setpoint_weight=weight), robot, drives.viscous)[[axis]]
         inertia, viscous = drives.inertia[axis], drives.viscous[axis]
         self.step = expm(DT * np.array([[0, 1, 0], [0, -viscous / inertia, 1 / inertia], [0] * 3]))
         self.limit = np.array([drives.effort_limit[axis] if is_limited else 1e300])
         self.count = drives.encoder_step[axis] if is_rounded else 0.0
 
-    def answer(self, goal, ticks):
+    def answer(self, goal: float, ticks: int) -> Array:
         """Positions (ticks,) after a step of the setpoint from rest at 0."""
         trace = np.empty(ticks)
         answer(self.gains, self.step, self.limit, self.count, goal, trace)
@@ -43,7 +55,7 @@ class Axis:
 
 
 @kernel
-def answer(gains, step, limit, count, goal, trace):
+def answer(gains: Any, step: Array, limit: Array, count: float, goal: float, trace: Array) -> None:
     """Write positions of one axis under the law, tick by tick; a count of 0 rounds nothing."""
     memory, effort, setpoint = np.zeros((1, 4)), np.zeros(1), np.full(1, goal)
     seen, zero, q, dq = np.zeros(1), np.zeros(1), 0.0, 0.0
@@ -57,9 +69,9 @@ def answer(gains, step, limit, count, goal, trace):
 
 
 @pytest.mark.parametrize(("name", "axis"), AXES)
-def test_step_of_any_size_never_passes_its_goal(name, axis):
+def test_step_of_any_size_never_passes_its_goal(name: str, axis: int) -> None:
     robot = ROBOTS[name]
-    count, whole = robot.drives.encoder_step[axis], robot.upper[axis] - robot.lower[axis]
+    count, whole = present(robot.drives).encoder_step[axis], robot.upper[axis] - robot.lower[axis]
     for size in (count, 10 * count, 1e3 * count, 0.01 * whole, 0.1 * whole, whole):
         for sign in (-1.0, 1.0):
             ends = sign * Axis(robot, axis, THIRD).answer(sign * size, 800)
@@ -67,17 +79,17 @@ def test_step_of_any_size_never_passes_its_goal(name, axis):
 
 
 @pytest.mark.parametrize(("name", "axis"), AXES)
-def test_saturated_step_arrives_too(name, axis):
+def test_saturated_step_arrives_too(name: str, axis: int) -> None:
     robot = ROBOTS[name]
     whole = robot.upper[axis] - robot.lower[axis]
     trace = Axis(robot, axis, THIRD).answer(whole, 8000)
-    assert abs(trace[-1] - whole) <= robot.drives.encoder_step[axis]
+    assert abs(trace[-1] - whole) <= present(robot.drives).encoder_step[axis]
     largest_gain = Axis(robot, axis, THIRD).gains[0, 0] * THIRD
-    assert largest_gain * whole > robot.drives.effort_limit[axis]  # it was saturated
+    assert largest_gain * whole > present(robot.drives).effort_limit[axis]  # it was saturated
 
 
 @pytest.mark.parametrize(("name", "axis"), AXES)
-def test_whole_setpoint_overshoots_by_a_fifth_as_its_zero_says(name, axis):
+def test_whole_setpoint_overshoots_by_a_fifth_as_its_zero_says(name: str, axis: int) -> None:
     free = {"is_limited": False, "is_rounded": False}
     whole, third = (Axis(ROBOTS[name], axis, b, **free).answer(1.0, 500) for b in (1.0, THIRD))
     assert 0.10 < whole.max() - 1.0 < 0.27
@@ -85,9 +97,9 @@ def test_whole_setpoint_overshoots_by_a_fifth_as_its_zero_says(name, axis):
 
 
 @pytest.mark.parametrize(("name", "axis"), AXES)
-def test_answer_with_a_third_is_that_of_two_poles(name, axis):
+def test_answer_with_a_third_is_that_of_two_poles(name: str, axis: int) -> None:
     robot = ROBOTS[name]
-    pole = robot.drives.bandwidth[axis]
+    pole = present(robot.drives).bandwidth[axis]
     found = Axis(robot, axis, THIRD, is_limited=False, is_rounded=False).answer(1.0, 300)
     times = np.arange(0, 301) * DT
     _, wanted, _ = lsim(([pole**2], [1.0, 2.0 * pole, pole**2]), np.ones(301), times)
@@ -102,7 +114,9 @@ def test_answer_with_a_third_is_that_of_two_poles(name, axis):
     st.floats(0.0, 1.0),
     st.floats(0.0, 1.0),
 )
-def test_effort_is_that_of_the_textbook_s_weighted_law(setpoints, weight, place):
+def test_effort_is_that_of_the_textbook_s_weighted_law(
+    setpoints: list[float], weight: float, place: float
+) -> None:
     kp, ki, kd = 50.0, 400.0, 2.0
     gains, memory, effort = np.array([[kp, ki, kd, weight]]), np.zeros((1, 4)), np.zeros(1)
     total, one = 0.0, np.ones(1)
@@ -119,10 +133,12 @@ def test_effort_is_that_of_the_textbook_s_weighted_law(setpoints, weight, place)
     st.lists(st.tuples(st.floats(-3.0, 3.0), st.floats(-3.0, 3.0)), min_size=1, max_size=60),
     st.sampled_from(range(6)),
 )
-def test_whole_setpoint_is_the_law_without_weights_to_the_bit(pairs, axis):
+def test_whole_setpoint_is_the_law_without_weights_to_the_bit(
+    pairs: list[tuple[float, float]], axis: int
+) -> None:
     robot = ROBOTS["rcrt1"]
-    gains = PID.gains(PidParameters(), robot, robot.drives.viscous)[[axis]].copy()
-    limit, memory, plain = robot.drives.effort_limit[[axis]], np.zeros((1, 4)), np.zeros(3)
+    gains = PID.gains(PidParameters(), robot, present(robot.drives).viscous)[[axis]].copy()
+    limit, memory, plain = present(robot.drives).effort_limit[[axis]], np.zeros((1, 4)), np.zeros(3)
     effort = np.empty(1)
     for setpoint, measured in pairs:
         pid_control(
@@ -134,16 +150,17 @@ def test_whole_setpoint_is_the_law_without_weights_to_the_bit(pairs, axis):
     assert np.array_equal(memory[0, :3], plain)
 
 
-def test_without_integral_action_the_weight_leaves_the_law_as_it_is():
+def test_without_integral_action_the_weight_leaves_the_law_as_it_is() -> None:
     efforts = []
     for weight in (1.0, THIRD):
         gains, memory, effort = np.array([[50.0, 0.0, 2.0, weight]]), np.zeros((1, 4)), np.zeros(1)
-        pid_control(gains, memory, *np.array([[0.3], [0.1], [0.2], [9.0]]), DT, effort)
+        a, b, c, d = np.array([[0.3], [0.1], [0.2], [9.0]])
+        pid_control(gains, memory, a, b, c, d, DT, effort)
         efforts.append(effort[0])
     assert efforts[0] == efforts[1]
 
 
-def slave_step_trace(name, axis, size):
+def slave_step_trace(name: Any, axis: Any, size: Any) -> Array:
     """Ways (ticks,) of an axis of the ideal plant after a step, with the reference filter off."""
     robot = ROBOTS[name]
     start = robot.home.copy()
@@ -162,8 +179,8 @@ def slave_step_trace(name, axis, size):
     slave.signals["slave_measured_js"][: robot.n] = start
     slave.simulated.arm.memory[:] = 0.0
     PID.begin(slave.simulated.arm.memory, start, np.zeros(robot.n))
-    row, reach = slave.signals, 0.099 * robot.drives.speed_limit[axis]
-    ticks = int(800 + 1100 * size / robot.drives.speed_limit[axis])
+    row, reach = slave.signals, 0.099 * present(robot.drives).speed_limit[axis]
+    ticks = int(800 + 1100 * size / present(robot.drives).speed_limit[axis])
     goal, trace = start.copy(), np.empty(ticks)
     for k in range(ticks):
         # As far as a command may be from the one before.
@@ -178,9 +195,11 @@ def slave_step_trace(name, axis, size):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("name", "axis"), [(n, a) for n, a in AXES if n != "rps3" and a < 3])
-def test_slave_passes_its_goal_by_no_more_than_what_dry_friction_leaves(name, axis):
+def test_slave_passes_its_goal_by_no_more_than_what_dry_friction_leaves(
+    name: Any, axis: Any
+) -> None:
     robot = ROBOTS[name]
-    drives = robot.drives
+    drives = present(robot.drives)
     count, whole = drives.encoder_step[axis], 0.9 * (robot.upper[axis] - robot.lower[axis])
     spring = 3.0 * drives.bandwidth[axis] ** 2 * drives.inertia[axis]
     for size in (count, 100 * count, 0.05 * whole, whole):

@@ -1,6 +1,7 @@
 """Kernels of a wheel are loaded where the processor can run them, and compiled elsewhere."""
 
 import importlib.util
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -60,7 +61,7 @@ pytestmark = [
 
 
 @pytest.fixture(scope="module")
-def shipped(tmp_path_factory):
+def shipped(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
     """Sources with the kernels of the script, as a wheel holds them; and what the script prints."""
     tree = wheels.copied(wheels.CORE, tmp_path_factory.mktemp("wheel") / "tree")
     compiled = wheels.run(tree, None, SCRIPT).split()
@@ -73,7 +74,7 @@ def shipped(tmp_path_factory):
 
 
 @pytest.fixture
-def tree(shipped):
+def tree(shipped: tuple[Path, str]) -> Iterator[Path]:
     """The sources, left as they were."""
     root, _ = shipped
     before = {file: file.read_bytes() for file in root.rglob("*") if file.is_file()}
@@ -85,24 +86,26 @@ def tree(shipped):
         file.write_bytes(content)
 
 
-def _kept(tree):
+def _kept(tree: Path) -> list[Path]:
     return list(tree.rglob("__pycache__/*.nb?"))
 
 
 @pytest.mark.parametrize("tier", [None, V3, V2])
-def test_shipped_kernels_are_loaded_and_give_the_bits_of_compiled_ones(shipped, tree, tier):
+def test_shipped_kernels_are_loaded_and_give_the_bits_of_compiled_ones(
+    shipped: tuple[Path, str], tree: Path, tier: str | None
+) -> None:
     count, bits = wheels.run(tree, tier, SCRIPT).split()
     assert (count, bits) == ("0", shipped[1])
     assert not _kept(tree)
 
 
-def test_best_tier_of_the_processor_comes_first_and_own_files_have_none(tree):
+def test_best_tier_of_the_processor_comes_first_and_own_files_have_none(tree: Path) -> None:
     assert wheels.run(tree, None, PLACES).split() == [V3, V2]
     assert wheels.run(tree, V2, PLACES).split() == [V2]
     assert wheels.run(tree, "generic", PLACES).split() == []
 
 
-def test_kernels_that_were_compiled_here_come_before_shipped_ones(tree):
+def test_kernels_that_were_compiled_here_come_before_shipped_ones(tree: Path) -> None:
     place = tree / "teleop_core/kernels" / FOLDER.name
     assert wheels.run(tree, None, READ).split()[2:] == ["True", "False"]
     place.rename(place.with_name("away"))
@@ -113,7 +116,9 @@ def test_kernels_that_were_compiled_here_come_before_shipped_ones(tree):
 
 
 @pytest.mark.parametrize("content", [b"", b"no kernel"])
-def test_kernels_are_compiled_where_shipped_ones_are_broken(shipped, tree, content):
+def test_kernels_are_compiled_where_shipped_ones_are_broken(
+    shipped: tuple[Path, str], tree: Path, content: bytes
+) -> None:
     for file in (tree / "teleop_core/kernels" / FOLDER.name).rglob("*.nbc"):
         file.write_bytes(content)
     count, bits = wheels.run(tree, None, SCRIPT).split()
@@ -121,7 +126,7 @@ def test_kernels_are_compiled_where_shipped_ones_are_broken(shipped, tree, conte
     assert bits == shipped[1]
 
 
-def test_kernels_of_a_changed_source_are_compiled(shipped, tree):
+def test_kernels_of_a_changed_source_are_compiled(shipped: tuple[Path, str], tree: Path) -> None:
     source = tree / "teleop_core/kernels/geometry.py"
     source.write_text(source.read_text() + "\n# changed\n")
     count, bits = wheels.run(tree, None, SCRIPT).split()

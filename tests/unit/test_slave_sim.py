@@ -1,19 +1,24 @@
 """Slave simulator: exact where it can be, within its limits, calm at rest, safe on bad commands."""
 
 import math
+from collections.abc import Mapping
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from numpy.typing import NDArray
 from scipy.linalg import expm
 from scipy.signal import lfilter
 
+from present import present
 from teleop_core.base.errors import ParameterError
 from teleop_core.base.parameters import build
 from teleop_core.graph.signals import DT, TICK_NS
 from teleop_core.kernels import pointer
+from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot
 from teleop_core.robots.drives import ACCELERATION, independent_acceleration
 from teleop_core.slave.commands import CommandStatus
@@ -25,7 +30,7 @@ from teleop_core.slave.slave import ReferenceFilterParameters
 from teleop_core.slave.slave_sim import ControllerParameters, SlaveSim, SlaveSimParameters
 
 ARM = load_robot("rcrt1")
-DRIVES = ARM.drives
+DRIVES = present(ARM.drives)
 AT_HOME = tuple(ARM.home.tolist())
 COUNT = DRIVES.encoder_step
 # Well inside the limits and off the singularities.
@@ -34,7 +39,7 @@ TIMEOUT_TICKS = 100
 JOINTS = range(6)
 
 
-def pid(**values):
+def pid(**values: tuple[float, ...]) -> ControllerParameters:
     """Controller parameters with some of the PID's."""
     return build(ControllerParameters, {f"pid.{name}": value for name, value in values.items()})
 
@@ -42,11 +47,11 @@ def pid(**values):
 class Bench:
     """A slave and the ticks that its commands come in."""
 
-    def __init__(self, **values):
+    def __init__(self, **values: Any) -> None:
         self.slave = SimulatedArm(ArmParameters(**{"start": AT_HOME} | values))
         self.row, self.now_ns = self.slave.signals, 0
 
-    def tick(self, command=None, stamp_ns=None):
+    def tick(self, command: Array | None = None, stamp_ns: int | None = None) -> CommandStatus:
         """One tick, with a command or without; returns the status."""
         self.now_ns += TICK_NS
         if command is not None:
@@ -56,7 +61,7 @@ class Bench:
         self.slave.step()
         return CommandStatus(self.row["command_status"])
 
-    def trace(self, command, ticks):
+    def trace(self, command: Array, ticks: int) -> tuple[Array, Array]:
         """True joints (ticks, 6) and efforts (ticks, 6) under a constant command."""
         joints, efforts = np.empty((ticks, 6)), np.empty((ticks, 6))
         for i in range(ticks):
@@ -64,18 +69,18 @@ class Bench:
             joints[i], efforts[i] = self.joints, self.row["slave_measured_js"][12:]
         return joints, efforts
 
-    def go_to(self, goal, ticks=3000):
+    def go_to(self, goal: Array, ticks: int = 3000) -> None:
         start = self.row["slave_setpoint_js"].copy()
         for share in np.linspace(0.0, 1.0, ticks - 1000):
             self.tick(start + share * (goal - start))
         self.trace(goal, 1000)
 
     @property
-    def joints(self):
+    def joints(self) -> Array:
         return self.slave.simulated.arm.q.copy()
 
     @property
-    def setpoint(self):
+    def setpoint(self) -> Array:
         return self.row["slave_setpoint_js"].copy()
 
 
@@ -84,7 +89,7 @@ class Bench:
 SPIN = pointer(independent_acceleration, ACCELERATION)
 
 
-def one_tick_error(rate, steps):
+def one_tick_error(rate: float, steps: int) -> float:
     """Error of position and speed, relative to the start speed, of a joint that friction stops."""
     q, dq, effort = np.zeros(6), np.ones(6), np.full(6, 0.3 * rate)
     slave = SlaveSim(SlaveSimParameters())
@@ -105,7 +110,7 @@ def one_tick_error(rate, steps):
     return max(abs(q[0] - exact[0]) / 1e-3, abs(dq[0] - exact[1]))
 
 
-def test_error_against_the_exact_solution_falls_with_the_fourth_power_of_the_steps():
+def test_error_against_the_exact_solution_falls_with_the_fourth_power_of_the_steps() -> None:
     errors = [one_tick_error(1000.0, steps) for steps in (1, 2, 4, 8, 16)]
     order = np.log2(np.divide(errors[:-1], errors[1:]))
     # Classical Runge-Kutta is of fourth order; large steps still carry the fifth.
@@ -113,7 +118,7 @@ def test_error_against_the_exact_solution_falls_with_the_fourth_power_of_the_ste
     assert (order < 4.7).all()
 
 
-def test_default_steps_resolve_the_stiffest_friction_of_the_arm():
+def test_default_steps_resolve_the_stiffest_friction_of_the_arm() -> None:
     # Dry friction grows through zero speed like viscous friction of coulomb / friction_speed.
     rates = (DRIVES.viscous + DRIVES.coulomb / DRIVES.friction_speed) / DRIVES.inertia
     steps = ArmParameters().integration_steps
@@ -123,7 +128,7 @@ def test_default_steps_resolve_the_stiffest_friction_of_the_arm():
     assert one_tick_error(rates.max(), steps) < bound
 
 
-def test_more_steps_change_the_path_of_the_arm_less_and_less():
+def test_more_steps_change_the_path_of_the_arm_less_and_less() -> None:
     slave, ends = SlaveSim(SlaveSimParameters()), []
     arm = slave.arm
     effort = np.array([2.0, -3.0, 5.0, 0.05, 0.03, 0.02])
@@ -146,7 +151,7 @@ def test_more_steps_change_the_path_of_the_arm_less_and_less():
 # At rest.
 
 
-def test_arm_that_starts_at_home_in_balance_does_not_move():
+def test_arm_that_starts_at_home_in_balance_does_not_move() -> None:
     bench = Bench()
     joints, _ = bench.trace(ARM.home, 2000)
     # Home is no whole number of counts; the integral settles inside one.
@@ -155,12 +160,12 @@ def test_arm_that_starts_at_home_in_balance_does_not_move():
 
 
 @pytest.mark.parametrize("compensation", ["published", "all", "none"])
-def test_arm_starts_in_balance_whatever_is_compensated(compensation):
+def test_arm_starts_in_balance_whatever_is_compensated(compensation: str) -> None:
     joints, _ = Bench(gravity_compensation=compensation).trace(ARM.home, 500)
     assert (np.abs(joints - ARM.home) <= COUNT).all()
 
 
-def test_arm_without_any_command_holds_home():
+def test_arm_without_any_command_holds_home() -> None:
     bench = Bench()
     for _ in range(500):
         bench.tick()
@@ -169,7 +174,7 @@ def test_arm_without_any_command_holds_home():
 
 @pytest.mark.parametrize("joint", JOINTS)
 @pytest.mark.parametrize("sign", [-1, 1])
-def test_step_through_the_filter_overshoots_by_less_than_a_count(joint, sign):
+def test_step_through_the_filter_overshoots_by_less_than_a_count(joint: int, sign: int) -> None:
     bench, goal = Bench(), MIDDLE.copy()
     bench.go_to(MIDDLE)
     goal[joint] += sign * (0.004 if joint == 2 else 0.2)
@@ -179,13 +184,13 @@ def test_step_through_the_filter_overshoots_by_less_than_a_count(joint, sign):
     assert abs(joints[-1, joint] - goal[joint]) <= COUNT[joint]
 
 
-def test_gravity_is_held_to_a_count_without_any_compensation():
+def test_gravity_is_held_to_a_count_without_any_compensation() -> None:
     bench = Bench(gravity_compensation="none")
     bench.go_to(MIDDLE)
     assert (np.abs(bench.joints - MIDDLE) <= COUNT).all()
 
 
-def test_compensation_keeps_axis_2_nearer_to_a_moving_setpoint():
+def test_compensation_keeps_axis_2_nearer_to_a_moving_setpoint() -> None:
     squares = {}
     for compensation in ("none", "published"):
         # At constant speed and without friction, so that gravity is what has to be followed.
@@ -203,7 +208,7 @@ def test_compensation_keeps_axis_2_nearer_to_a_moving_setpoint():
 # Limits.
 
 
-def test_command_filter_kicks_no_further_than_a_tick_at_full_speed():
+def test_command_filter_kicks_no_further_than_a_tick_at_full_speed() -> None:
     bench = Bench(operation=OperationParameters(acceleration_share=1000.0, tool_speed=10.0))
     bench.go_to(MIDDLE)
     before = bench.setpoint
@@ -213,7 +218,7 @@ def test_command_filter_kicks_no_further_than_a_tick_at_full_speed():
     assert np.allclose(step, np.minimum(0.1 * 0.05, 1e-3) * DRIVES.speed_limit, rtol=1e-6, atol=0)
 
 
-def test_setpoint_that_starts_to_move_kicks_the_drive_no_more_than_its_speed_does():
+def test_setpoint_that_starts_to_move_kicks_the_drive_no_more_than_its_speed_does() -> None:
     bench = Bench()
     bench.go_to(MIDDLE)
     rest = bench.row["slave_measured_js"][12:].copy()
@@ -233,7 +238,7 @@ bounded_joints = st.tuples(*[st.floats(-1.0, 1.0)] * 6).map(np.array)
 
 @given(st.lists(bounded_joints, min_size=1, max_size=10))
 @settings(max_examples=20)
-def test_drives_and_setpoint_keep_their_limits_under_any_commands(shares):
+def test_drives_and_setpoint_keep_their_limits_under_any_commands(shares: list[Array]) -> None:
     bench, last = Bench(), ARM.home.copy()
     for share in shares:
         command = bench.slave.server.state["command"] + 0.099 * share * DRIVES.speed_limit
@@ -250,7 +255,7 @@ def test_drives_and_setpoint_keep_their_limits_under_any_commands(shares):
 
 
 @pytest.mark.parametrize("joint", JOINTS)
-def test_long_move_runs_at_the_speed_limit_and_recovers_without_windup(joint):
+def test_long_move_runs_at_the_speed_limit_and_recovers_without_windup(joint: int) -> None:
     bench, goal, fastest = Bench(), MIDDLE.copy(), 0.0
     bench.go_to(MIDDLE)
     target = min(MIDDLE[joint] + 0.5 * DRIVES.speed_limit[joint], ARM.upper[joint] - 1e-3)
@@ -264,7 +269,7 @@ def test_long_move_runs_at_the_speed_limit_and_recovers_without_windup(joint):
     assert abs(joints[-1, joint] - target) <= COUNT[joint]
 
 
-def test_integral_stays_bounded_while_an_overload_holds_the_arm_back():
+def test_integral_stays_bounded_while_an_overload_holds_the_arm_back() -> None:
     # A friction far above the rated torque, as of an arm that is caught: the setpoint goes, it
     # cannot.
     told = OperationParameters(reported=("tracking", "tip", "effort"))
@@ -281,7 +286,7 @@ def test_integral_stays_bounded_while_an_overload_holds_the_arm_back():
     assert joints[:, 0].max() <= goal[0] + 0.25 * 0.2
 
 
-def test_an_effort_that_was_a_fault_is_none_any_more_after_a_reset():
+def test_an_effort_that_was_a_fault_is_none_any_more_after_a_reset() -> None:
     others = OperationParameters(reported=("tracking", "tip", "overspeed"))
     bench = Bench(operation=others)
     bench.slave.simulated.parameters["coulomb"][0] = 20.0  # as of an arm that is caught
@@ -301,7 +306,7 @@ def test_an_effort_that_was_a_fault_is_none_any_more_after_a_reset():
 # Encoders.
 
 
-def test_readings_are_whole_counts_within_half_a_count_of_the_joints():
+def test_readings_are_whole_counts_within_half_a_count_of_the_joints() -> None:
     bench = Bench()
     for k in range(300):
         before = bench.joints
@@ -313,7 +318,7 @@ def test_readings_are_whole_counts_within_half_a_count_of_the_joints():
         assert (off <= 0.5 * COUNT * (1 + 1e-9)).all()
 
 
-def test_poses_are_those_of_setpoint_and_readings():
+def test_poses_are_those_of_setpoint_and_readings() -> None:
     bench = Bench()
     bench.go_to(MIDDLE)
     row = bench.row
@@ -326,7 +331,7 @@ def test_poses_are_those_of_setpoint_and_readings():
     assert row["now_ns"] - read_ns == TICK_NS
 
 
-def test_measured_speed_follows_the_motion():
+def test_measured_speed_follows_the_motion() -> None:
     bench = Bench()
     bench.go_to(MIDDLE)
     for k in range(500):
@@ -335,7 +340,7 @@ def test_measured_speed_follows_the_motion():
     assert math.isclose(bench.row["slave_measured_js"][6], 0.5, abs_tol=5e-3)
 
 
-def test_measured_speed_is_that_of_the_encoders_through_a_low_pass_of_5_ms():
+def test_measured_speed_is_that_of_the_encoders_through_a_low_pass_of_5_ms() -> None:
     rows, rest = wander(Bench()), np.round(ARM.home / COUNT) * COUNT
     rate = np.diff(rows["slave_measured_js"][:, :6], axis=0, prepend=rest[np.newaxis]) / DT
     share = DT / (DT + 5e-3)
@@ -348,14 +353,14 @@ def test_measured_speed_is_that_of_the_encoders_through_a_low_pass_of_5_ms():
 # Commands.
 
 
-def test_command_is_fresh_until_the_timeout_and_stale_after_it():
+def test_command_is_fresh_until_the_timeout_and_stale_after_it() -> None:
     bench = Bench()
     assert bench.tick(ARM.home) is CommandStatus.FRESH
     statuses = [bench.tick() for _ in range(TIMEOUT_TICKS + 1)]
     assert statuses == [CommandStatus.FRESH] * TIMEOUT_TICKS + [CommandStatus.STALE]
 
 
-def test_lone_command_is_reached_and_held():
+def test_lone_command_is_reached_and_held() -> None:
     bench = Bench(operation=OperationParameters(longest_outage=0.0))
     bench.go_to(MIDDLE)
     for _ in range(TIMEOUT_TICKS + 1):
@@ -370,7 +375,7 @@ def test_lone_command_is_reached_and_held():
 
 
 @pytest.mark.parametrize("joint", JOINTS)
-def test_jump_is_refused_counted_and_not_followed(joint):
+def test_jump_is_refused_counted_and_not_followed(joint: int) -> None:
     bench, calm = Bench(), Bench()
     bench.go_to(MIDDLE)
     calm.go_to(MIDDLE)
@@ -383,13 +388,13 @@ def test_jump_is_refused_counted_and_not_followed(joint):
     assert np.array_equal(bench.joints, calm.joints)
 
 
-def test_largest_step_that_is_no_jump_is_followed():
+def test_largest_step_that_is_no_jump_is_followed() -> None:
     bench = Bench()
     bench.go_to(MIDDLE)
     assert bench.tick(MIDDLE + 0.0999 * DRIVES.speed_limit) is CommandStatus.FRESH
 
 
-def test_slave_resumes_when_the_command_comes_back_near():
+def test_slave_resumes_when_the_command_comes_back_near() -> None:
     bench = Bench()
     bench.go_to(MIDDLE)
     for _ in range(300):
@@ -400,7 +405,7 @@ def test_slave_resumes_when_the_command_comes_back_near():
     assert (np.abs(bench.joints - near) <= COUNT).all()
 
 
-def test_refused_commands_do_not_count_as_fresh_ones():
+def test_refused_commands_do_not_count_as_fresh_ones() -> None:
     bench = Bench()
     bench.tick(ARM.home)
     far = ARM.home - 0.5 * DRIVES.speed_limit
@@ -411,7 +416,7 @@ def test_refused_commands_do_not_count_as_fresh_ones():
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf, 1e300])
 @pytest.mark.parametrize("joint", JOINTS)
-def test_command_that_is_no_number_is_refused_and_harms_nothing(joint, bad):
+def test_command_that_is_no_number_is_refused_and_harms_nothing(joint: int, bad: float) -> None:
     bench = Bench()
     bench.tick(ARM.home)
     command = ARM.home.copy()
@@ -423,14 +428,14 @@ def test_command_that_is_no_number_is_refused_and_harms_nothing(joint, bad):
     assert np.isfinite(efforts).all()
 
 
-def test_old_stamps_are_not_taken_again():
+def test_old_stamps_are_not_taken_again() -> None:
     bench = Bench()
     bench.go_to(MIDDLE)
     bench.tick(MIDDLE + 0.05 * DRIVES.speed_limit, stamp_ns=bench.now_ns - 10 * TICK_NS)
     assert np.array_equal(bench.slave.server.state["command"], MIDDLE)
 
 
-def test_a_stamp_from_the_future_does_not_shut_out_the_commands_after_it():
+def test_a_stamp_from_the_future_does_not_shut_out_the_commands_after_it() -> None:
     bench = Bench()
     bench.go_to(MIDDLE)
     bench.tick(MIDDLE, stamp_ns=bench.now_ns + 3600 * 10**9)
@@ -440,13 +445,13 @@ def test_a_stamp_from_the_future_does_not_shut_out_the_commands_after_it():
     assert np.array_equal(bench.slave.server.state["target"], goal)
 
 
-def test_command_outside_the_limits_is_followed_up_to_them():
+def test_command_outside_the_limits_is_followed_up_to_them() -> None:
     bench = Bench()
     bench.tick(ARM.home + np.array([0, 0, 1e-3, 0, 0, 0]))
     assert bench.slave.server.state["command"][2] == ARM.upper[2]
 
 
-def test_stamp_of_the_command_in_force_is_passed_on():
+def test_stamp_of_the_command_in_force_is_passed_on() -> None:
     bench = Bench()
     bench.tick(ARM.home, stamp_ns=1234)
     assert bench.row["slave_setpoint_js_ns"] == 1234
@@ -457,7 +462,7 @@ def test_stamp_of_the_command_in_force_is_passed_on():
 # Repeating and retuning.
 
 
-def wander(bench, ticks=800):
+def wander(bench: Bench, ticks: int = 800) -> NDArray[np.void]:
     out = []
     for k in range(ticks):
         swing = np.sin(1e-3 * k * np.array([2, 3, 1, 5, 4, 6]))
@@ -466,11 +471,11 @@ def wander(bench, ticks=800):
     return np.array(out)
 
 
-def test_same_commands_give_the_same_bits():
+def test_same_commands_give_the_same_bits() -> None:
     assert np.array_equal(wander(Bench()), wander(Bench()))
 
 
-def test_reset_repeats_the_motion_to_the_bit():
+def test_reset_repeats_the_motion_to_the_bit() -> None:
     bench = Bench()
     first = wander(bench)
     bench.slave.reset()
@@ -492,7 +497,9 @@ def test_reset_repeats_the_motion_to_the_bit():
         {"integration_steps": 8},
     ],
 )
-def test_retuning_at_rest_moves_the_arm_by_a_few_counts_at_most(values):
+def test_retuning_at_rest_moves_the_arm_by_a_few_counts_at_most(
+    values: Mapping[str, Any],
+) -> None:
     bench = Bench()
     bench.go_to(MIDDLE)
     bench.slave.retune(ArmParameters(**values))
@@ -502,12 +509,12 @@ def test_retuning_at_rest_moves_the_arm_by_a_few_counts_at_most(values):
 
 
 @pytest.mark.parametrize("bandwidth", [(10.0,) * 6, tuple((0.5 * DRIVES.bandwidth).tolist())])
-def test_gains_that_change_in_motion_make_no_step_of_effort(bandwidth):
+def test_gains_that_change_in_motion_make_no_step_of_effort(bandwidth: tuple[float, ...]) -> None:
     bench = Bench(start=tuple(MIDDLE.tolist()))
     bench.go_to(MIDDLE)
     way = np.array([0.05, 0.05, 0.01, 0.05, 0.05, 0.05])
 
-    def moved(count):
+    def moved(count: int) -> Array:
         """Efforts (count, n) while all joints swing, which they begin where they are fastest."""
         efforts = []
         for _ in range(count):
@@ -527,7 +534,7 @@ def test_gains_that_change_in_motion_make_no_step_of_effort(bandwidth):
 
 
 @pytest.mark.parametrize("law", CONTROLLERS.names())
-def test_gains_that_change_before_the_first_tick_count_from_the_begin(law):
+def test_gains_that_change_before_the_first_tick_count_from_the_begin(law: str) -> None:
     soft = {"start": AT_HOME, "controller.kind": law}
     soft |= {f"controller.{law}.bandwidth": tuple((0.5 * DRIVES.bandwidth).tolist())}
     changed = SimulatedArm(build(ArmParameters, soft | {f"controller.{law}.bandwidth": ()}))
@@ -545,21 +552,21 @@ def test_gains_that_change_before_the_first_tick_count_from_the_begin(law):
 
 @pytest.mark.parametrize("length", [1, 5, 7])
 @pytest.mark.parametrize("name", ["viscous", "coulomb"])
-def test_list_of_another_length_than_the_joints_is_refused(name, length):
+def test_list_of_another_length_than_the_joints_is_refused(name: str, length: int) -> None:
     with pytest.raises(ParameterError) as error:
-        SimulatedArm(ArmParameters(**{name: (1.0,) * length}))
+        SimulatedArm(ArmParameters(**dict[str, Any]({name: (1.0,) * length})))
     assert error.value.name == f"slave_sim.{name}"
 
 
 @pytest.mark.parametrize("name", ["bandwidth", "kp", "ki", "kd"])
-def test_gains_of_another_length_than_the_joints_are_refused(name):
+def test_gains_of_another_length_than_the_joints_are_refused(name: str) -> None:
     with pytest.raises(ParameterError) as error:
         SimulatedArm(ArmParameters(controller=pid(**{name: (1.0,) * 5})))
     assert error.value.name == f"slave_sim.controller.pid.{name}"
 
 
-def test_refused_retuning_changes_nothing():
-    bench = Bench()
+def test_refused_retuning_changes_nothing() -> None:
+    bench: Any = Bench()
     before, gains = bench.slave.simulated.parameters.copy(), bench.slave.simulated.arm.gains.copy()
     wrong = ArmParameters(viscous=(1.0,) * 6, controller=pid(kp=(1.0,) * 5))
     with pytest.raises(ParameterError):

@@ -20,7 +20,9 @@ VOLUMES = {
 
 
 @pytest.mark.parametrize("solid", VOLUMES, ids=lambda solid: solid.kind)
-def test_triangles_of_a_solid_face_outwards_and_enclose_its_volume_about_its_centre(solid):
+def test_triangles_of_a_solid_face_outwards_and_enclose_its_volume_about_its_centre(
+    solid: Solid,
+) -> None:
     points, faces = mesh_of(solid, 64)
     a, b, c = points[faces].transpose(1, 0, 2) - HERE[:3]
     volumes = np.einsum("ij,ij->i", a, np.cross(b, c)) / 6.0  # of pyramids over the centre
@@ -30,7 +32,7 @@ def test_triangles_of_a_solid_face_outwards_and_enclose_its_volume_about_its_cen
     np.testing.assert_allclose(centre, 0.0, atol=1e-9)
 
 
-def test_points_are_posed_as_by_rotations():
+def test_points_are_posed_as_by_rotations() -> None:
     rng = np.random.default_rng(1)
     turns = Rotation.random(20, random_state=rng)
     points, places = rng.normal(size=(2, 20, 3))
@@ -38,7 +40,7 @@ def test_points_are_posed_as_by_rotations():
     np.testing.assert_allclose(posed(points, poses), places + turns.apply(points), atol=1e-12)
 
 
-def test_mesh_of_a_robot_has_all_solids_in_the_order_of_its_bodies():
+def test_mesh_of_a_robot_has_all_solids_in_the_order_of_its_bodies() -> None:
     bodies = bodies_of(load_robot("rcrt1"))
     mesh = robot_mesh(bodies)
     assert set(mesh.body) == {i for i, body in enumerate(bodies.bodies) if body.solids}
@@ -47,7 +49,7 @@ def test_mesh_of_a_robot_has_all_solids_in_the_order_of_its_bodies():
     assert (mesh.body[mesh.faces] == mesh.body[mesh.faces[:, :1]]).all()
 
 
-def test_numbers_packed_to_a_step_take_few_bytes_and_keep_it():
+def test_numbers_packed_to_a_step_take_few_bytes_and_keep_it() -> None:
     values = np.cumsum(np.random.default_rng(2).normal(scale=1e-3, size=5000))
     packed = pack_to(values, 1e-5)
     assert packed.step == 1e-5

@@ -5,8 +5,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from present import present
 from teleop_core.base.errors import ParameterError
 from teleop_core.base.parameters import build
+from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot
 from teleop_core.slave.controllers.source_pid import SOURCE_PID, SourcePidParameters, loaded_axes
 
@@ -14,14 +16,14 @@ ARM = load_robot("rcrt1")
 DT = 1e-3
 
 
-def gains(**parameters):
+def gains(**parameters: tuple[float, ...]) -> Array:
     made = build(SourcePidParameters, parameters)
-    return np.ascontiguousarray(SOURCE_PID.gains(made, ARM, ARM.drives.viscous))
+    return np.ascontiguousarray(SOURCE_PID.gains(made, ARM, present(ARM.drives).viscous))
 
 
 @settings(max_examples=50, deadline=None)
 @given(st.lists(st.tuples(st.floats(-0.1, 0.1), st.floats(-0.1, 0.1)), min_size=2, max_size=30))
-def test_efforts_are_those_of_the_printed_equations(samples):
+def test_efforts_are_those_of_the_printed_equations(samples: list[tuple[float, float]]) -> None:
     table, memory, effort = gains(ki=(3.0,) * 6), np.zeros((6, 2)), np.zeros(6)
     integral, last = np.zeros(6), np.zeros(6)
     push, limit = np.full(6, 0.25), np.full(6, np.inf)
@@ -35,22 +37,22 @@ def test_efforts_are_those_of_the_printed_equations(samples):
         assert np.allclose(effort, expected, rtol=1e-12, atol=1e-12)
 
 
-def test_only_the_axis_that_gravity_loads_unrelieved_has_integral_action():
+def test_only_the_axis_that_gravity_loads_unrelieved_has_integral_action() -> None:
     assert np.array_equal(loaded_axes(ARM), [False, False, True, False, False, False])
     assert np.array_equal(gains()[:, 1] > 0.0, loaded_axes(ARM))
 
 
 @pytest.mark.parametrize("joint", range(6))
-def test_closed_loop_poles_are_equal_and_real(joint):
+def test_closed_loop_poles_are_equal_and_real(joint: int) -> None:
     kp, ki, kd = gains()[joint]
-    inertia, viscous = ARM.drives.inertia[joint], ARM.drives.viscous[joint]
+    inertia, viscous = present(ARM.drives).inertia[joint], present(ARM.drives).viscous[joint]
     polynomial = [inertia, kd + viscous, kp] + ([ki] if ki > 0.0 else [])
     poles = np.roots(polynomial)
     # Roundings of a double and a triple root.
-    assert np.allclose(poles, -ARM.drives.bandwidth[joint], rtol=1e-4)
+    assert np.allclose(poles, -present(ARM.drives).bandwidth[joint], rtol=1e-4)
 
 
-def test_a_constant_error_without_integral_action_gives_a_constant_effort():
+def test_a_constant_error_without_integral_action_gives_a_constant_effort() -> None:
     table, memory, effort = gains(ki=(0.0,) * 6), np.zeros((6, 2)), np.zeros(6)
     off, zero, limit = np.full(6, 0.01), np.zeros(6), np.full(6, np.inf)
     SOURCE_PID.begin(memory, np.zeros(6), np.ones(6))  # what held the arm is let go
@@ -61,6 +63,6 @@ def test_a_constant_error_without_integral_action_gives_a_constant_effort():
     assert np.allclose(found[1:], table[:, 0] * 0.01, rtol=1e-12)
 
 
-def test_lists_of_another_length_are_refused():
+def test_lists_of_another_length_are_refused() -> None:
     with pytest.raises(ParameterError, match=r"source_pid\.kp"):
         gains(kp=(1.0, 2.0))

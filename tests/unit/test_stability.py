@@ -12,7 +12,7 @@ PUBLISHED = {0.0: 24_200.0, 0.02: 708.0, 0.05: 394.0, 0.1: 318.0, 0.2: 301.0}
 """Of a hand of 0.25 kg held with 300 N/m and 12 N·s/m [N/m]."""
 
 
-def largest_root(grip, delay, stiffness, dt=1e-3):
+def largest_root(grip: Grip, delay: float, stiffness: float, dt: float = 1e-3) -> float:
     """Growth [1/s] of the hand before a spring whose force is held for a tick, by its matrix."""
     ticks = round(delay / dt)
     a = np.array([[0.0, 1.0], [-grip.stiffness / grip.mass, -grip.damping / grip.mass]])
@@ -36,37 +36,39 @@ def largest_root(grip, delay, stiffness, dt=1e-3):
 
 
 @pytest.mark.parametrize("delay", DELAYS)
-def test_the_exact_boundary_is_the_published_one(delay):
+def test_the_exact_boundary_is_the_published_one(delay: float) -> None:
     assert exact_boundary(MEDIUM, delay) == pytest.approx(PUBLISHED[delay], rel=5e-3)
 
 
 @pytest.mark.parametrize("grip", GRIPS.values(), ids=GRIPS)
 @pytest.mark.parametrize("delay", DELAYS)
-def test_the_exact_boundary_is_where_the_roots_of_the_sampled_hand_leave_the_circle(grip, delay):
+def test_the_exact_boundary_is_where_the_roots_of_the_sampled_hand_leave_the_circle(
+    grip: Grip, delay: float
+) -> None:
     exact = exact_boundary(grip, delay)
     assert largest_root(grip, delay, 0.98 * exact) < 0.0 < largest_root(grip, delay, 1.02 * exact)
 
 
 @pytest.mark.parametrize("grip", GRIPS.values(), ids=GRIPS)
 @pytest.mark.parametrize("delay", DELAYS[1:])
-def test_our_hand_and_mapping_swing_up_where_the_exact_axis_does(grip, delay):
+def test_our_hand_and_mapping_swing_up_where_the_exact_axis_does(grip: Grip, delay: float) -> None:
     exact = exact_boundary(grip, delay)
     assert growth(grip, delay, 0.9 * exact) < 0.0 < growth(grip, delay, 1.1 * exact)
 
 
-def test_the_boundary_that_is_found_lies_where_nothing_grows():
+def test_the_boundary_that_is_found_lies_where_nothing_grows() -> None:
     found = found_boundary(MEDIUM, 0.02)
     assert abs(growth(MEDIUM, 0.02, found)) < 0.05
     assert growth(MEDIUM, 0.02, 0.97 * found) < 0.0 < growth(MEDIUM, 0.02, 1.03 * found)
 
 
-def test_a_heavier_hand_stands_a_late_spring_no_better_but_a_damped_one_does():
+def test_a_heavier_hand_stands_a_late_spring_no_better_but_a_damped_one_does() -> None:
     heavy, damped = Grip(0.5, 300.0, 12.0), Grip(0.25, 300.0, 24.0)
     assert exact_boundary(heavy, 0.05) < exact_boundary(MEDIUM, 0.05)
     assert exact_boundary(damped, 0.05) > exact_boundary(MEDIUM, 0.05)
 
 
-def test_force_throws_a_hand_above_its_boundary_but_not_with_a_tank_or_by_a_soft_spring():
+def test_force_throws_a_hand_above_its_boundary_but_not_with_a_tank_or_by_a_soft_spring() -> None:
     bench, force = Bench(), ("position_force", "none")
     found = chain_boundary(bench, MEDIUM, 0.05, force)
     assert 600.0 < found < 1200.0

@@ -5,6 +5,7 @@ import signal
 import subprocess
 import sys
 import tempfile
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -12,19 +13,21 @@ import pytest
 from patience import wait_until
 from teleop_core.base.errors import SessionError
 from teleop_core.nodes.children import environment
-from teleop_core.nodes.starter import LOST, Starter
+from teleop_core.nodes.starter import LOST, Started, Starter
 
 PATIENCE = 60.0
 
 
 @pytest.fixture(scope="module")
-def starter():
+def starter() -> Iterator[Starter]:
     with Starter("", environment()) as made:
         yield made
 
 
 @pytest.fixture
-def start(starter, tmp_path, monkeypatch):
+def start(
+    starter: Starter, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> Iterator[Callable[..., Started]]:
     """Start something, with a file ``given`` beside those for what it writes."""
     monkeypatch.chdir(tmp_path)
     with (tmp_path / "written").open("wb") as written, tempfile.TemporaryFile() as given:
@@ -32,17 +35,19 @@ def start(starter, tmp_path, monkeypatch):
         given.flush()
         files = {"out": written.fileno(), "err": written.fileno(), "given": given.fileno()}
 
-        def started(*command, main="", **env):
+        def started(*command: str, main: str = "", **env: str) -> Started:
             return starter.start(command, os.environ | env, files, main=main)
 
         yield started
 
 
-def written(tmp_path):
+def written(tmp_path: Path) -> str:
     return (tmp_path / "written").read_text()
 
 
-def test_a_program_has_the_words_environment_folder_and_files_that_it_was_given(start, tmp_path):
+def test_a_program_has_the_words_environment_folder_and_files_that_it_was_given(
+    start: Callable[..., Started], tmp_path: Path
+) -> None:
     text = (
         "import os, sys; print(os.environ['COLOUR'], os.getcwd(), open(sys.argv[1]).read(), "
         "'numba' in sys.modules)"
@@ -52,13 +57,15 @@ def test_a_program_has_the_words_environment_folder_and_files_that_it_was_given(
     assert written(tmp_path) == f"blue {tmp_path} what was given False\n"
 
 
-def test_a_copy_runs_what_it_is_told_with_nothing_on_its_standard_input(start, tmp_path):
+def test_a_copy_runs_what_it_is_told_with_nothing_on_its_standard_input(
+    start: Callable[..., Started], tmp_path: Path
+) -> None:
     process = start("a copy", main="code:interact", PYTHON_BASIC_REPL="1")
     assert process.wait(PATIENCE) == 0  # at the end of the input
     assert "InteractiveConsole" in written(tmp_path)
 
 
-def test_a_copy_is_found_by_what_it_runs(start):
+def test_a_copy_is_found_by_what_it_runs(start: Callable[..., Started]) -> None:
     process = start("teleop_core.nodes", "slave", main="signal:pause")
     title = Path(f"/proc/{process.pid}/cmdline")
     wait_until(lambda: " slave" in title.read_text().replace("\0", " "), "its title", PATIENCE)
@@ -75,18 +82,20 @@ def test_a_copy_is_found_by_what_it_runs(start):
     ],
 )
 def test_the_code_of_a_copy_is_told_and_what_it_raised_is_written(
-    start, tmp_path, main, code, words
-):
+    start: Callable[..., Started], tmp_path: Path, main: str, code: int, words: str
+) -> None:
     assert start("teleop_core.nodes", "nobody", main=main).wait(PATIENCE) == code
     assert words in written(tmp_path)
 
 
-def test_a_program_that_there_is_not_ends_with_its_reason(start, tmp_path):
+def test_a_program_that_there_is_not_ends_with_its_reason(
+    start: Callable[..., Started], tmp_path: Path
+) -> None:
     assert start("/no/such/program").wait(PATIENCE) == 1
     assert "FileNotFoundError" in written(tmp_path)
 
 
-def test_a_process_is_known_to_run_until_a_signal_ends_it(start):
+def test_a_process_is_known_to_run_until_a_signal_ends_it(start: Callable[..., Started]) -> None:
     process = start(sys.executable, "-c", "import signal; signal.pause()")
     with pytest.raises(subprocess.TimeoutExpired):
         process.wait(0.0)
@@ -97,7 +106,9 @@ def test_a_process_is_known_to_run_until_a_signal_ends_it(start):
     assert process.poll() == -signal.SIGKILL
 
 
-def test_what_a_starter_that_was_killed_has_started_goes_on_and_nobody_knows_its_end(tmp_path):
+def test_what_a_starter_that_was_killed_has_started_goes_on_and_nobody_knows_its_end(
+    tmp_path: Path,
+) -> None:
     waits = (sys.executable, "-c", "import signal; signal.pause()")
     with Starter("", environment()) as starter, (tmp_path / "log").open("wb") as log:
         files = {"out": log.fileno(), "err": log.fileno()}
@@ -109,10 +120,10 @@ def test_what_a_starter_that_was_killed_has_started_goes_on_and_nobody_knows_its
             starter.start(waits, os.environ, files)
 
 
-def test_a_starter_that_cannot_load_says_why():
+def test_a_starter_that_cannot_load_says_why() -> None:
     with Starter("robot: [", environment()) as broken:
 
-        def wait():
+        def wait() -> None:
             while not broken.is_ready(PATIENCE):
                 pass
 
@@ -120,7 +131,7 @@ def test_a_starter_that_cannot_load_says_why():
             wait()
 
 
-def test_a_starter_that_gets_no_further_is_given_up(tmp_path):
+def test_a_starter_that_gets_no_further_is_given_up(tmp_path: Path) -> None:
     with Starter("", environment(), patience=0.5) as starter, (tmp_path / "log").open("wb") as log:
         os.kill(starter.pid, signal.SIGSTOP)
         try:

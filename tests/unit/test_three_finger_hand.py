@@ -1,31 +1,36 @@
 """Three-fingered hand: fingers both ways, contact points and object pose both ways, grasps."""
 
 import math
+from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 import pytest
 import roboticstoolbox as rtb
 
 from teleop_core.base.errors import ParameterError, ShapeError, UnknownNameError
-from teleop_core.kernels.geometry import rotation, transform
+from teleop_core.kernels.geometry import Array, rotation, transform
 from teleop_core.robots import IkStatus, list_robots, load_robot
 from teleop_core.robots.hand_fingers import finger_point
+from teleop_core.robots.robot import Robot
 from teleop_core.robots.three_finger_hand import Grasp, Hand
 
 SOLVED = 1e-9
 
 
 @pytest.fixture(scope="module")
-def robot():
+def robot() -> Any:
     return load_robot("three_finger_hand")
 
 
 @pytest.fixture(scope="module")
-def hand(robot):
+def hand(robot: Robot) -> Any:
     return Hand(robot.geometry)
 
 
-def moves(robot, rng, count, shift=0.006, turn=0.25):
+def moves(
+    robot: Robot, rng: np.random.Generator, count: int, shift: float = 0.006, turn: float = 0.25
+) -> Iterator[Array]:
     """Object poses around home."""
     T = robot.fk(robot.home)
     for _ in range(count):
@@ -35,7 +40,7 @@ def moves(robot, rng, count, shift=0.006, turn=0.25):
         yield transform(R, T[:3, 3] + rng.uniform(-shift, shift, 3))
 
 
-def test_three_distances_between_contacts_leave_six_freedoms(robot, hand):
+def test_three_distances_between_contacts_leave_six_freedoms(robot: Robot, hand: Hand) -> None:
     slopes = np.array(
         [
             (hand.slip(robot.home + change) - hand.slip(robot.home - change)) / 2e-6
@@ -45,12 +50,12 @@ def test_three_distances_between_contacts_leave_six_freedoms(robot, hand):
     assert 9 - np.linalg.matrix_rank(slopes, tol=1e-6) == 6
 
 
-def test_finger_of_the_specification():
-    point = finger_point(*np.radians([20.0, 35.0, -50.0]), (1.0, 0.6, 0.4))
+def test_finger_of_the_specification() -> None:
+    point = finger_point(np.radians(20.0), np.radians(35.0), np.radians(-50.0), (1.0, 0.6, 0.4))
     assert np.allclose(point, [1.764613, 0.642266, 0.240618], atol=6e-7)
 
 
-def test_finger_is_the_chain_of_its_denavit_hartenberg_table():
+def test_finger_is_the_chain_of_its_denavit_hartenberg_table() -> None:
     rng = np.random.default_rng(1)
     for _ in range(20):
         links, q = rng.uniform(0.2, 1.0, 3), rng.uniform(-3.0, 3.0, 3)
@@ -61,21 +66,25 @@ def test_finger_is_the_chain_of_its_denavit_hartenberg_table():
                 rtb.RevoluteMDH(a=links[1]),
             ]
         )
-        point = finger_point(*q, tuple(links))
+        point = finger_point(q[0], q[1], q[2], tuple(links))
         assert np.allclose(point, (chain.fkine(q).A @ [links[2], 0.0, 0.0, 1.0])[:3], atol=1e-14)
 
 
-def test_fingers_stand_where_the_lecture_puts_them(robot, hand):
-    q = np.array([0.2, 0.3, -0.4] * 3)
+def test_fingers_stand_where_the_lecture_puts_them(robot: Any, hand: Any) -> None:
+    q: Any = np.array([0.2, 0.3, -0.4] * 3)
+    g: Any
     points, g = hand.contact_points(q), robot.geometry
-    local = np.array(finger_point(*q[:3], (g["l11"], g["l12"], g["l13"])))
+    local: Any
+    local = np.array(finger_point(q[0], q[1], q[2], (g["l11"], g["l12"], g["l13"])))
     assert np.allclose(points[0], local + np.array([0.0, -g["d"], g["h"]]), atol=1e-15)
     assert np.allclose(points[1], local + np.array([0.0, g["d"], g["h"]]), atol=1e-15)
     assert np.allclose(points[2], rotation("y", g["gamma"]) @ local, atol=1e-15)
 
 
 @pytest.mark.parametrize("finger", [1, 2, 3])
-def test_every_finger_solution_touches_the_point_and_the_original_is_among_them(finger):
+def test_every_finger_solution_touches_the_point_and_the_original_is_among_them(
+    finger: int,
+) -> None:
     hand, rng = Hand({"l31": 0.02, "l12": 0.06}), np.random.default_rng(2)
     counts = set()
     for q in rng.uniform(-3.0, 3.0, (500, 9)):
@@ -93,11 +102,11 @@ def test_every_finger_solution_touches_the_point_and_the_original_is_among_them(
     assert 4 in counts
 
 
-def test_a_point_out_of_reach_has_no_finger_solution(hand):
+def test_a_point_out_of_reach_has_no_finger_solution(hand: Hand) -> None:
     assert hand.finger_solutions(1, [1.0, 0.0, 0.0]).shape == (0, 3)
 
 
-def test_object_pose_and_contact_points_are_inverse_to_each_other(robot, hand):
+def test_object_pose_and_contact_points_are_inverse_to_each_other(robot: Robot, hand: Hand) -> None:
     rng = np.random.default_rng(3)
     for T in moves(robot, rng, 50, shift=0.5, turn=3.0):
         points = hand.contacts_of(T)
@@ -106,7 +115,7 @@ def test_object_pose_and_contact_points_are_inverse_to_each_other(robot, hand):
         assert np.allclose(hand.object_pose(points), T, atol=1e-12)
 
 
-def test_all_joint_vectors_of_a_pose_hold_the_object_there(robot, hand):
+def test_all_joint_vectors_of_a_pose_hold_the_object_there(robot: Robot, hand: Hand) -> None:
     rng, most = np.random.default_rng(4), 0
     for T in moves(robot, rng, 30):
         solutions = robot.ik_all(T)
@@ -117,13 +126,13 @@ def test_all_joint_vectors_of_a_pose_hold_the_object_there(robot, hand):
     assert most >= 8
 
 
-def test_all_sixty_four_branches_appear_for_long_outer_links():
+def test_all_sixty_four_branches_appear_for_long_outer_links() -> None:
     long = {f"l{i}{k}": v for i in (1, 2, 3) for k, v in ((1, 0.01), (2, 0.09), (3, 0.08))}
     robot = load_robot("three_finger_hand", **long, side=0.06)
     assert len(robot.ik_all(robot.fk(robot.home))) == 64
 
 
-def test_inverse_follows_the_object_next_to_the_seed(robot, hand):
+def test_inverse_follows_the_object_next_to_the_seed(robot: Robot, hand: Hand) -> None:
     rng = np.random.default_rng(5)
     for T in moves(robot, rng, 300):
         result = robot.ik(T)
@@ -137,7 +146,7 @@ def test_inverse_follows_the_object_next_to_the_seed(robot, hand):
         assert math.isclose(np.abs(result.q - robot.home).max(), nearest, abs_tol=SOLVED)
 
 
-def test_jacobian_is_the_finite_difference(robot):
+def test_jacobian_is_the_finite_difference(robot: Robot) -> None:
     rng, step = np.random.default_rng(6), 1e-6
     for T in moves(robot, rng, 10):
         q = robot.ik(T).q
@@ -150,7 +159,7 @@ def test_jacobian_is_the_finite_difference(robot):
             assert np.allclose(J[3:, joint], [spin[2, 1], spin[0, 2], spin[1, 0]], atol=1e-8)
 
 
-def test_six_actuated_joints_fix_the_other_three(robot, hand):
+def test_six_actuated_joints_fix_the_other_three(robot: Robot, hand: Hand) -> None:
     rng = np.random.default_rng(7)
     for T in moves(robot, rng, 50):
         q = robot.ik(T).q.reshape(3, 3)
@@ -160,7 +169,7 @@ def test_six_actuated_joints_fix_the_other_three(robot, hand):
         assert np.allclose(hand.object_pose(hand.contact_points(result.q)), T, atol=1e-8)
 
 
-def test_fingers_spread_too_far_cannot_hold_and_say_so(robot, hand):
+def test_fingers_spread_too_far_cannot_hold_and_say_so(robot: Robot, hand: Hand) -> None:
     actuated = np.array([[-1.3, 0.5], [1.3, 0.5], [0.0, -1.5]])
     result = hand.hold(actuated, np.zeros(3))
     assert result.status == Grasp.CANNOT_HOLD
@@ -168,7 +177,7 @@ def test_fingers_spread_too_far_cannot_hold_and_say_so(robot, hand):
     assert result.residual > 1e-3
 
 
-def test_an_object_out_of_reach_is_unreachable_with_finite_joints(robot):
+def test_an_object_out_of_reach_is_unreachable_with_finite_joints(robot: Robot) -> None:
     T = robot.fk(robot.home)
     T[0, 3] += 0.2
     result = robot.ik(T)
@@ -180,7 +189,9 @@ def test_an_object_out_of_reach_is_unreachable_with_finite_joints(robot):
 
 
 @pytest.mark.parametrize("out", [0.02, 0.04, 0.1])
-def test_a_path_to_straight_fingers_and_back_returns_to_the_same_grasp(robot, out):
+def test_a_path_to_straight_fingers_and_back_returns_to_the_same_grasp(
+    robot: Robot, out: float
+) -> None:
     home, step = robot.fk(robot.home), 0.02
     limits = robot.limits()
     limits[2] = step
@@ -199,7 +210,7 @@ def test_a_path_to_straight_fingers_and_back_returns_to_the_same_grasp(robot, ou
 
 
 @pytest.mark.parametrize("beside", [0.0, 1e-6, -1e-6, 0.003])
-def test_a_path_over_a_finger_axis_keeps_its_steps_and_goes_on(beside):
+def test_a_path_over_a_finger_axis_keeps_its_steps_and_goes_on(beside: float) -> None:
     # Contact 1 passes over the axis of joint 1 of finger 1 and comes back.
     robot = load_robot("three_finger_hand")
     base = np.array([0.0, -robot.geometry["d"], robot.geometry["h"]])
@@ -221,7 +232,7 @@ def test_a_path_over_a_finger_axis_keeps_its_steps_and_goes_on(beside):
     assert np.allclose(robot.fk(q), home, atol=1e-6)
 
 
-def test_bad_hands_and_questions_are_refused(robot, hand):
+def test_bad_hands_and_questions_are_refused(robot: Robot, hand: Hand) -> None:
     assert "three_finger_hand" in list_robots()
     for symbol, value in (("l12", 0.0), ("side", -1.0), ("side", 1.0), ("d", math.inf)):
         with pytest.raises(ParameterError) as refusal:

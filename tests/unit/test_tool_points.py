@@ -1,13 +1,18 @@
 """Points along a tool: forces and torques of a line of contacts, on the arm and by its energy."""
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
+from numpy.typing import ArrayLike
 
 from free_tool import drag, fly
+from present import present
 from teleop_core.base.errors import ParameterError
+from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot
+from teleop_core.robots.robot import Robot
 from teleop_core.session.configuration import configure
 from teleop_core.session.virtual import VirtualTime
 from teleop_core.slave.slave_sim import SlaveSim
@@ -17,14 +22,16 @@ from teleop_core.slave.world.hole import HoleParameters
 STILL = np.zeros((1, 6))
 
 
-def pushed(begin, axis, name="plane", parameters=None, **numbers):
+def pushed(
+    begin: ArrayLike, axis: ArrayLike, name: str = "plane", parameters: Any = None, **numbers: Any
+) -> Array:
     """Wrench (6,) [N, N·m] on a tool that stands still, of points without friction."""
     return drag(begin, axis, STILL, name, parameters, **numbers)[0][0]
 
 
 @pytest.mark.parametrize("radius", [0.0, 0.003])
 @pytest.mark.parametrize("tilt", [0.0, 0.05, 1.2, -0.3])
-def test_force_and_torque_are_the_sums_over_all_points(tilt, radius):
+def test_force_and_torque_are_the_sums_over_all_points(tilt: float, radius: float) -> None:
     """Of springs that push along z, each where its ball is deepest."""
     axis = np.array([math.cos(tilt), 0.0, math.sin(tilt)])
     tip = np.array([0.01, 0.02, -0.002])
@@ -37,7 +44,7 @@ def test_force_and_torque_are_the_sums_over_all_points(tilt, radius):
     np.testing.assert_allclose(found, expected, atol=1e-12)
 
 
-def test_a_line_of_points_as_long_as_nothing_is_one_point_as_stiff_as_all():
+def test_a_line_of_points_as_long_as_nothing_is_one_point_as_stiff_as_all() -> None:
     one, five = (
         drag((0.0, 0.0, 1e-3), (0.6, 0.0, -0.8), np.tile((2e-5, 0, -2e-5, 0, 0, 0), (200, 1)),
              points=count, tool_length=0.0, world_friction=0.3, world_stiffness=1000.0 / count)[0]
@@ -47,7 +54,7 @@ def test_a_line_of_points_as_long_as_nothing_is_one_point_as_stiff_as_all():
     np.testing.assert_allclose(five, one, atol=1e-12)
 
 
-def test_a_ball_touches_as_a_point_does_a_radius_nearer():
+def test_a_ball_touches_as_a_point_does_a_radius_nearer() -> None:
     ball = pushed((0.0, 0.0, 0.004), (0.0, 0.0, -1.0), points=1, tool_radius=0.005)
     assert ball[2] == pytest.approx(1.0)
     steps = np.tile((1e-5, 0.0, 0.0, 0.0, 0.0, 0.0), (100, 1))
@@ -57,11 +64,11 @@ def test_a_ball_touches_as_a_point_does_a_radius_nearer():
     assert dragged[-1, 4] == pytest.approx(0.005 * 0.2)  # friction acts below the ball's middle
 
 
-def test_a_ball_that_rolls_is_not_held_and_one_that_spins_in_place_is():
+def test_a_ball_that_rolls_is_not_held_and_one_that_spins_in_place_is() -> None:
     radius, rate = 0.005, 0.01
     roll = np.tile((radius * rate, 0.0, 0.0, 0.0, rate, 0.0), (50, 1))
     spin = roll * (0, 0, 0, 0, 1, 0)
-    numbers = {"points": 1, "tool_radius": radius, "world_friction": 0.5}
+    numbers: dict[str, Any] = {"points": 1, "tool_radius": radius, "world_friction": 0.5}
     rolled, spun = (
         drag((0.0, 0.0, 0.004), (0.0, 1.0, 0.0), steps, **numbers)[0] for steps in (roll, spin)
     )
@@ -69,7 +76,7 @@ def test_a_ball_that_rolls_is_not_held_and_one_that_spins_in_place_is():
     assert spun[-1, 0] == pytest.approx(0.5)
 
 
-def test_each_point_has_its_own_bristle():
+def test_each_point_has_its_own_bristle() -> None:
     """A tool that spins about its middle, flat on a plane: friction turns, and does not push."""
     axis, half = np.array([1.0, 0.0, 0.0]), 0.02  # long beside a bristle's bend of 0.3 mm
     rate, steps = 2e-3, np.zeros((200, 6))
@@ -87,7 +94,7 @@ def test_each_point_has_its_own_bristle():
     assert about_middle[2] == pytest.approx(-0.3 * 1.0 * distances.sum(), rel=1e-3)
 
 
-def after_a_tick(robot, texts):
+def after_a_tick(robot: Robot, texts: list[str]) -> tuple[Array, Array]:
     """Speeds (n,) of an arm a tick after rest at its start, and what its tip felt there (6,)."""
     zero = [0.0] * robot.n
     settings = [f"robot={robot.name}", f"slave_sim.coulomb={zero}", *texts]
@@ -99,7 +106,7 @@ def after_a_tick(robot, texts):
 
 
 @pytest.mark.parametrize("name", ["rcrt1", "puma560"])
-def test_an_arm_feels_force_and_torque_through_its_transposed_jacobian(name):
+def test_an_arm_feels_force_and_torque_through_its_transposed_jacobian(name: str) -> None:
     robot = load_robot(name)
     T, J = robot.fk(robot.start), robot.jacobian(robot.start)
     behind = T[:3, 3] - 0.04 * T[:3, 2]
@@ -116,13 +123,15 @@ def test_an_arm_feels_force_and_torque_through_its_transposed_jacobian(name):
     np.testing.assert_allclose(felt[3:], np.cross(arm, -0.8 * side), atol=1e-6)
     found = [np.zeros(robot.n), np.zeros(robot.n)]
     for net, ddq in zip((np.zeros(robot.n), J.T @ felt), found, strict=True):
-        model = robot.dynamics
+        model = present(robot.dynamics)
         model.acceleration(robot.start.copy(), np.zeros(robot.n), net, model.parameters.copy(), ddq)
     wanted = 1e-3 * (found[1] - found[0])
     np.testing.assert_allclose(moved - free, wanted, atol=0.07 * np.abs(wanted).max())
 
 
-def wandering(seed, ticks, size=4e-3, turn=0.1, slower=1.0):
+def wandering(
+    seed: int, ticks: int, size: float = 4e-3, turn: float = 0.1, slower: float = 1.0
+) -> tuple[Array, Array]:
     """First place (3,) and steps (ticks, 6) of a tool that wanders and turns."""
     rng, times = np.random.default_rng(seed), 1e-3 / slower * np.arange(ticks + 1)
     rates, phases = rng.uniform(0.3, 2.0, (4, 6)), rng.uniform(0.0, 2.0 * np.pi, (4, 6))
@@ -141,7 +150,9 @@ SOLIDS = {
 """Where a tool wanders, its axis, the object's shape, and the tool's radius."""
 
 
-def gained(name, seed, ticks, points, slower=1.0):
+def gained(
+    name: str, seed: int, ticks: int, points: int, slower: float = 1.0
+) -> tuple[float, float]:
     """Energy that an object gave a wandering tool beyond what it took, and work turned over [J]."""
     middle, axis, parameters, radius = SOLIDS[name]
     begin, steps = wandering(seed, ticks, slower=slower)
@@ -154,7 +165,7 @@ def gained(name, seed, ticks, points, slower=1.0):
 
 @pytest.mark.parametrize("points", [1, 5])
 @pytest.mark.parametrize("name", SOLIDS)
-def test_no_contact_makes_energy_in_hundreds_of_random_motions(name, points):
+def test_no_contact_makes_energy_in_hundreds_of_random_motions(name: str, points: int) -> None:
     """But what a surface and a Jacobian that stand still for a tick add to the work in it.
 
     A wall that turns much in a tick, as near the axis of a hole, adds the most.
@@ -167,7 +178,7 @@ def test_no_contact_makes_energy_in_hundreds_of_random_motions(name, points):
 
 
 @pytest.mark.parametrize("name", SOLIDS)
-def test_what_ticks_add_falls_with_the_way_in_a_tick(name):
+def test_what_ticks_add_falls_with_the_way_in_a_tick(name: str) -> None:
     fast, slow = (
         np.sum([gained(name, seed, round(500 * slower), 5, slower) for seed in range(0, 40, 4)],
                axis=0)
@@ -179,7 +190,9 @@ def test_what_ticks_add_falls_with_the_way_in_a_tick(name):
 
 @pytest.mark.parametrize("damping", [0.0, 1.0])
 @pytest.mark.parametrize("seed", range(4))
-def test_a_rod_that_tumbles_onto_a_plane_never_has_more_energy_than_at_first(seed, damping):
+def test_a_rod_that_tumbles_onto_a_plane_never_has_more_energy_than_at_first(
+    seed: int, damping: float
+) -> None:
     rng = np.random.default_rng(seed)
     axis = rng.normal(size=3)
     flight = fly(
@@ -198,7 +211,7 @@ def test_a_rod_that_tumbles_onto_a_plane_never_has_more_energy_than_at_first(see
         assert energy[-1] > 0.95 * energy[0]
 
 
-def test_several_points_or_a_radius_are_refused_for_needles_and_buttons():
+def test_several_points_or_a_radius_are_refused_for_needles_and_buttons() -> None:
     for text in ("world.tool_points=2", "world.tool_radius=0.001"):
         for more in ("world=button", "world.puncture_force=1.0"):
             with pytest.raises(ParameterError, match=r"that of a needle"):
@@ -208,7 +221,7 @@ def test_several_points_or_a_radius_are_refused_for_needles_and_buttons():
             configure("free_motion", settings=[text])
 
 
-def test_a_tool_whose_shaft_begins_in_an_object_is_refused_with_its_depth():
+def test_a_tool_whose_shaft_begins_in_an_object_is_refused_with_its_depth() -> None:
     robot = load_robot("rcrt1")
     T = robot.fk(robot.home)
     texts = ["world=sphere", f"world.place={(T[:3, 3] - 0.03 * T[:3, 2]).tolist()}",
@@ -222,7 +235,7 @@ def test_a_tool_whose_shaft_begins_in_an_object_is_refused_with_its_depth():
         )
 
 
-def test_the_gap_to_an_object_below_is_that_of_the_whole_tool():
+def test_the_gap_to_an_object_below_is_that_of_the_whole_tool() -> None:
     tip = load_robot("rcrt1").fk(load_robot("rcrt1").start)
     for points, radius in ((1, 0.0), (1, 0.004), (3, 0.004)):
         texts = ["world=plane", "world.gap=0.02", f"world.tool_radius={radius}",

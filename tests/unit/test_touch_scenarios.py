@@ -1,16 +1,22 @@
 """Scenarios of touch: ``wall`` and ``contour`` from approach to retreat, by force and by score."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
 import teleop_core as tc
+from present import present
+from teleop_core.kernels.geometry import Array
 
 WALL, BALL, RADIUS = 0.24, np.array((0.25, -0.2357, -0.105)), 0.03
 STIFFNESS = {"wall": 20_000.0, "contour": 1000.0}
 
 
 @pytest.fixture(scope="module", params=STIFFNESS)
-def session(request, tmp_path_factory):
+def session(
+    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
+) -> tuple[str, tc.Recording, Array, Array]:
     """Name of a scenario, its recording, forces (N, 3) [N] and places (N, 3) [m] of the tip."""
     recording = tc.run(request.param, out=tmp_path_factory.mktemp(request.param) / "bag")
     force, place = recording["slave/true_cf"], recording["slave/true_cp"]
@@ -20,7 +26,7 @@ def session(request, tmp_path_factory):
     return request.param, recording, force.values[last, :3], place.values[:, :3]
 
 
-def normals(name, places):
+def normals(name: str, places: Array) -> tuple[Array, Array]:
     """Ways (N, 3) out of the object, and distances (N,) [m] of places outside it."""
     if name == "wall":
         return np.tile((1.0, 0.0, 0.0), (len(places), 1)), places[:, 0] - WALL
@@ -29,9 +35,11 @@ def normals(name, places):
     return ways / distances[:, None], distances - RADIUS
 
 
-def test_the_tip_approaches_slides_in_one_touch_and_retreats(session):
+def test_the_tip_approaches_slides_in_one_touch_and_retreats(
+    session: tuple[str, tc.Recording, Array, Array],
+) -> None:
     name, _, force, place = session
-    is_touching = force.any(axis=1)
+    is_touching: Any = force.any(axis=1)
     begin, end = np.flatnonzero(is_touching)[[0, -1]]
     assert is_touching[begin : end + 1].all()
     assert 4000 < begin < end < len(force) - 1000
@@ -40,7 +48,9 @@ def test_the_tip_approaches_slides_in_one_touch_and_retreats(session):
     assert outside[-1] > 5e-3
 
 
-def test_it_slides_along_the_surface_as_far_as_the_hand_leads_it(session):
+def test_it_slides_along_the_surface_as_far_as_the_hand_leads_it(
+    session: tuple[str, tc.Recording, Array, Array],
+) -> None:
     name, _, force, place = session
     way = place[force.any(axis=1)]
     if name == "wall":
@@ -52,7 +62,9 @@ def test_it_slides_along_the_surface_as_far_as_the_hand_leads_it(session):
         assert np.ptp(way[:, 1]) < 1e-3
 
 
-def test_the_push_is_that_of_the_surface_within_its_friction(session):
+def test_the_push_is_that_of_the_surface_within_its_friction(
+    session: tuple[str, tc.Recording, Array, Array],
+) -> None:
     name, _, force, place = session
     out, outside = normals(name, place)
     along = np.einsum("ij,ij->i", force, out)
@@ -64,7 +76,7 @@ def test_the_push_is_that_of_the_surface_within_its_friction(session):
     assert np.median(across[along > 0.0]) > 0.2 * friction * np.median(along[along > 0.0])
 
 
-def test_while_it_slides_the_push_is_even(session):
+def test_while_it_slides_the_push_is_even(session: tuple[str, tc.Recording, Array, Array]) -> None:
     name, _, force, _ = session
     size = np.linalg.norm(force, axis=1)
     begin, end = np.flatnonzero(size)[[0, -1]]
@@ -73,7 +85,7 @@ def test_while_it_slides_the_push_is_even(session):
     assert low < sliding.min() < sliding.max() < high
 
 
-def test_the_surface_takes_energy(session):
+def test_the_surface_takes_energy(session: tuple[str, tc.Recording, Array, Array]) -> None:
     _, _, force, place = session
     power = np.einsum("ij,ij->i", 0.5 * (force[1:] + force[:-1]), np.diff(place, axis=0))
     given_to_it = np.cumsum(power)
@@ -81,7 +93,7 @@ def test_the_surface_takes_energy(session):
     assert given_to_it.max() <= 1e-3 * np.abs(power).sum()
 
 
-def test_the_score_tells_the_touch(session):
+def test_the_score_tells_the_touch(session: tuple[str, tc.Recording, Array, Array]) -> None:
     _, recording, force, _ = session
     score, size = recording.score(), np.linalg.norm(force, axis=1)
     assert score.value("touch.count") == 1
@@ -89,8 +101,8 @@ def test_the_score_tells_the_touch(session):
     assert score.value("touch.share") == pytest.approx(np.mean(size > 0.0), abs=0.01)
 
 
-def test_it_is_replayed_to_the_bit(session):
+def test_it_is_replayed_to_the_bit(session: tuple[str, tc.Recording, Array, Array]) -> None:
     _, recording, _, _ = session
-    again = tc.replay(recording.path)
+    again = tc.replay(present(recording.path))
     for topic in ("slave/true_cf", "slave/true_cp"):
         np.testing.assert_array_equal(again[topic].values, recording[topic].values)

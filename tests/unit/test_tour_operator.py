@@ -1,11 +1,15 @@
 """Tour: stops in order, rests, a smooth line through all points, times set apart."""
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.interpolate import CubicHermiteSpline
 
+from present import present
 from teleop_core.base.errors import ParameterError
 from teleop_core.base.parameters import build
 from teleop_core.chain.operators import OPERATORS, Setting
@@ -21,7 +25,7 @@ seconds = st.floats(0.1, 5.0)
 
 
 @given(seconds, st.floats(0.0, 5.0), seconds)
-def test_tour_rests_at_each_point_in_turn(leg, rest, trace):
+def test_tour_rests_at_each_point_in_turn(leg: float, rest: float, trace: float) -> None:
     p = TourParameters(points=POINTS, leg_time=leg, rest_time=rest, trace_time=trace)
     for k, stop in enumerate(STOPS):
         end = (k + 1) * (leg + rest)
@@ -30,7 +34,9 @@ def test_tour_rests_at_each_point_in_turn(leg, rest, trace):
 
 
 @given(seconds, st.floats(0.01, 5.0), seconds)
-def test_tour_goes_on_without_a_jump_and_ends_at_its_first_point(leg, rest, trace):
+def test_tour_goes_on_without_a_jump_and_ends_at_its_first_point(
+    leg: float, rest: float, trace: float
+) -> None:
     p = TourParameters(points=POINTS, leg_time=leg, rest_time=rest, trace_time=trace)
     end = p.visit_time + trace
     times = np.linspace(0.0, end + 1.0, 20_001)
@@ -45,7 +51,7 @@ def test_tour_goes_on_without_a_jump_and_ends_at_its_first_point(leg, rest, trac
     assert np.abs(places[-1] - STOPS[0]).max() < ROUNDING
 
 
-def test_line_is_scipys_cubic_with_the_slopes_of_catmull_and_rom():
+def test_line_is_scipys_cubic_with_the_slopes_of_catmull_and_rom() -> None:
     share = np.linspace(0.0, 1.0, 301)
     knots = np.linspace(0.0, 1.0, len(STOPS))
     slopes = np.gradient(STOPS, knots, axis=0)
@@ -53,12 +59,14 @@ def test_line_is_scipys_cubic_with_the_slopes_of_catmull_and_rom():
     assert np.abs(through(STOPS, share) - expected).max() < 1e-16 * 100
 
 
-def test_line_meets_every_point():
+def test_line_meets_every_point() -> None:
     share = np.linspace(0.0, 1.0, len(STOPS))
     assert np.abs(through(STOPS, share) - STOPS).max() < ROUNDING
 
 
-def motion(leg=1.0, period=8.0, rotation=0.3):
+def motion(
+    leg: float = 1.0, period: float = 8.0, rotation: float = 0.3
+) -> tuple[Callable[..., Any], float]:
     common = build(
         OperatorParameters,
         {"kind": "tour", "tour.points": POINTS, "tour.leg_time": leg, "period": period,
@@ -66,11 +74,15 @@ def motion(leg=1.0, period=8.0, rotation=0.3):
     )  # fmt: skip
     part = OPERATORS.find("tour")
     phases = np.random.default_rng(1).uniform(0.0, 6.0, PHASES)
-    setting = Setting(common=common, phases=phases, seed=1)
-    return part.make(common.kind.parameters, setting), part.length(common.kind.parameters, setting)
+    setting: Any = Setting(common=common, phases=phases, seed=1)
+    return part.make(common.kind.parameters, setting), present(part.length)(
+        common.kind.parameters, setting
+    )
 
 
-def test_turning_of_the_stylus_does_not_depend_on_the_time_of_a_leg_nor_places_on_its_period():
+def test_turning_of_the_stylus_does_not_depend_on_the_time_of_a_leg_nor_places_on_its_period() -> (
+    None
+):
     times = np.linspace(0.0, 9.0, 500)
     base = motion()[0](times)
     slower, calmer = motion(leg=2.0)[0](times), motion(period=30.0)[0](times)
@@ -80,11 +92,11 @@ def test_turning_of_the_stylus_does_not_depend_on_the_time_of_a_leg_nor_places_o
     assert not np.allclose(calmer[:, 3:6], base[:, 3:6])
 
 
-def test_session_lasts_as_long_as_the_tour():
+def test_session_lasts_as_long_as_the_tour() -> None:
     assert motion()[1] == pytest.approx(1.0 + 4 * (1.0 + 0.6) + 13.8)
 
 
-def test_points_that_are_not_triples_are_refused_and_none_at_all_too():
+def test_points_that_are_not_triples_are_refused_and_none_at_all_too() -> None:
     with pytest.raises(ParameterError, match=r"operator\.tour\.points"):
         TourParameters(points=(0.1, 0.2))
     part = OPERATORS.find("tour")
@@ -93,7 +105,7 @@ def test_points_that_are_not_triples_are_refused_and_none_at_all_too():
         part.make(TourParameters(), setting)
 
 
-def test_scenario_has_24_different_points_and_takes_the_published_time():
+def test_scenario_has_24_different_points_and_takes_the_published_time() -> None:
     made = configure("points24")
     p = made.group("operator").kind.parameters
     assert len({tuple(stop) for stop in p.stops.tolist()}) == 24

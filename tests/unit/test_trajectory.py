@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from teleop_core.base.errors import ParameterError, ShapeError
+from teleop_core.kernels.geometry import Array
 from teleop_core.robots.rcrt1_dynamics import DRIVES
 from teleop_core.slave.trajectory import cubic_move, shortest_move_time
 
@@ -16,14 +17,14 @@ ROUNDING = 1e-12
 joints = st.lists(st.floats(-3.0, 3.0), min_size=6, max_size=6).map(np.array)
 
 
-def test_cubic_passes_the_published_places_and_speeds():  # case 24
+def test_cubic_passes_the_published_places_and_speeds() -> None:  # case 24
     times = np.array([0.0, 0.25, 0.5, 0.75, 1.0])
     place, speed = cubic_move(np.array([0.0]), np.array([45.0]), 1.0, times)
     assert np.allclose(place[:, 0], [0.0, 7.03125, 22.5, 37.96875, 45.0], atol=ROUNDING)
     assert np.allclose(speed[:, 0], [0.0, 50.625, 67.5, 50.625, 0.0], atol=ROUNDING)
 
 
-def test_printed_cubic_coefficient_misses_the_end_of_a_two_second_move():  # misprint 8
+def test_printed_cubic_coefficient_misses_the_end_of_a_two_second_move() -> None:  # misprint 8
     travel, move_time = 45.0, 2.0
     printed_a2, printed_a3 = 3.0 * travel / move_time**2, -2.0 * travel / move_time**2
     printed_end = printed_a2 * move_time**2 + printed_a3 * move_time**3
@@ -33,7 +34,9 @@ def test_printed_cubic_coefficient_misses_the_end_of_a_two_second_move():  # mis
 
 
 @given(joints, joints, st.floats(0.1, 20.0))
-def test_moves_rest_at_both_ends_and_outside_them(start, end, move_time):
+def test_moves_rest_at_both_ends_and_outside_them(
+    start: Array, end: Array, move_time: float
+) -> None:
     times = np.array([-1.0, 0.0, move_time, move_time + 1.0])
     place, speed = cubic_move(start, end, move_time, times)
     assert np.allclose(place, [start, start, end, end], rtol=0.0, atol=ROUNDING)
@@ -41,14 +44,14 @@ def test_moves_rest_at_both_ends_and_outside_them(start, end, move_time):
 
 
 @given(joints, joints, st.floats(0.1, 20.0))
-def test_joints_keep_their_proportion_all_along(start, end, move_time):
+def test_joints_keep_their_proportion_all_along(start: Array, end: Array, move_time: float) -> None:
     place, _ = cubic_move(start, end, move_time, np.linspace(0.0, move_time, 11))
     share = np.linspace(0.0, 1.0, 11)
     share = 3.0 * share**2 - 2.0 * share**3
     assert np.allclose(place, start + share[:, None] * (end - start), rtol=0.0, atol=ROUNDING)
 
 
-def test_speed_is_the_slope_of_the_place():
+def test_speed_is_the_slope_of_the_place() -> None:
     start, end, move_time, h = np.zeros(2), np.array([1.0, -2.0]), 1.7, 1e-5
     middle = np.linspace(0.1, 1.6, 16)
     before, after = (cubic_move(start, end, move_time, middle + d)[0] for d in (-h, h))
@@ -58,7 +61,9 @@ def test_speed_is_the_slope_of_the_place():
 
 
 @given(joints, joints)
-def test_shortest_time_brings_one_joint_to_its_limit_and_none_beyond(start, end):
+def test_shortest_time_brings_one_joint_to_its_limit_and_none_beyond(
+    start: Array, end: Array
+) -> None:
     move_time = shortest_move_time(start, end, DRIVES.speed_limit)
     if move_time < 1e-9:
         return
@@ -67,7 +72,7 @@ def test_shortest_time_brings_one_joint_to_its_limit_and_none_beyond(start, end)
     assert math.isclose(share.max(), 1.0, rel_tol=ROUNDING)
 
 
-def test_published_moves_need_at_least_half_a_second():  # misprint 16: 0.15 s is printed
+def test_published_moves_need_at_least_half_a_second() -> None:  # misprint 16: 0.15 s is printed
     home = np.array([0.0, math.radians(113.4), 0.421, 0.0, 0.0, 0.0])
     point3 = np.array([-math.pi / 6, math.radians(110.0), 0.4, *[math.pi / 4] * 3])
     point4 = np.array([-math.pi / 6, math.radians(130.0), 0.35, *[math.pi / 4] * 3])
@@ -76,7 +81,7 @@ def test_published_moves_need_at_least_half_a_second():  # misprint 16: 0.15 s i
     assert math.isclose(shortest_move_time(home, point4, DRIVES.speed_limit), 1.72, abs_tol=5e-3)
 
 
-def test_move_to_where_the_arm_is_takes_no_time_and_stays():
+def test_move_to_where_the_arm_is_takes_no_time_and_stays() -> None:
     here = np.array([0.3, -0.2])
     move_time = shortest_move_time(here, here, np.ones(2))
     place, speed = cubic_move(here, here, move_time, np.array([0.0, 1.0]))
@@ -86,20 +91,20 @@ def test_move_to_where_the_arm_is_takes_no_time_and_stays():
 
 
 @pytest.mark.parametrize("move_time", [0.0, -1.0, math.nan, math.inf])
-def test_impossible_move_time_is_refused(move_time):
+def test_impossible_move_time_is_refused(move_time: float) -> None:
     with pytest.raises(ParameterError) as error:
         cubic_move(np.zeros(2), np.ones(2), move_time, np.zeros(1))
     assert error.value.name == "move_time"
 
 
 @pytest.mark.parametrize("limit", [0.0, -1.0, math.nan])
-def test_speed_limit_that_allows_no_motion_is_refused(limit):
+def test_speed_limit_that_allows_no_motion_is_refused(limit: float) -> None:
     with pytest.raises(ParameterError) as error:
         shortest_move_time(np.zeros(2), np.ones(2), np.array([1.0, limit]))
     assert error.value.name == "speed_limit"
 
 
-def test_vectors_of_different_lengths_are_refused():
+def test_vectors_of_different_lengths_are_refused() -> None:
     with pytest.raises(ShapeError) as error:
         cubic_move(np.zeros(2), np.zeros(3), 1.0, np.zeros(1))
     assert (error.value.name, error.value.expected, error.value.received) == ("end", (2,), (3,))

@@ -5,18 +5,22 @@ import math
 import os
 import subprocess
 import sys
+from collections.abc import Callable, Mapping
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from numpy.typing import NDArray
 from scipy.linalg import solve_discrete_are
 from scipy.signal import butter, freqz, iirnotch, sosfreqz
 
 import teleop_core as tc
 from forgotten_parts import own_parts  # noqa: F401
+from present import present
 from teleop_core.base.errors import ParameterError, PartError
 from teleop_core.base.parameters import NoParameters, build
 from teleop_core.chain.filters import LONGEST_NS, MEMORY, TREMOR_FILTERS
@@ -34,6 +38,7 @@ from teleop_core.evaluation.motion_measures import tremor_power, velocities
 from teleop_core.graph.graph import build_graph
 from teleop_core.graph.topics import MASTER_CONTACT
 from teleop_core.kernels import kernel
+from teleop_core.kernels.geometry import Array
 from teleop_core.session.configuration import configure
 from teleop_core.session.virtual import VirtualTime
 
@@ -42,12 +47,12 @@ KINDS = ("notch", "band_stop", "kalman", "wflc")
 periods = st.sampled_from([5e-4, 1e-3, 2e-3, 1 / 300, 0.01])
 
 
-def numbers_of(kind, **given):
+def numbers_of(kind: str, **given: float) -> Array:
     part = TREMOR_FILTERS.find(kind)
     return part.numbers_of(build(part.parameters, given))
 
 
-def filtered(kind, values, period=1e-3, **given):
+def filtered(kind: str, values: Any, period: float = 1e-3, **given: float) -> tuple[Array, Array]:
     """A coordinate behind a filter that begins at its first value, and what it remembers then."""
     part, memory = TREMOR_FILTERS.find(kind), np.zeros(MEMORY)
     numbers = numbers_of(kind, **given)
@@ -55,14 +60,14 @@ def filtered(kind, values, period=1e-3, **given):
     return np.append(0.0, out) + values[0], memory
 
 
-def response(kind, count, period, **given):
+def response(kind: str, count: int, period: float, **given: float) -> Array:
     """Answer (count,) to one sample of 1 after a sample of 0."""
     values = np.zeros(count + 1)
     values[1] = 1.0
     return filtered(kind, values, period, **given)[0][1:]
 
 
-def amplitude_and_delay(values, times, frequency):
+def amplitude_and_delay(values: Array, times: Any, frequency: float) -> tuple[float, float]:
     """Of the line of a frequency [Hz] in a signal: its length, and its delay to a sine [s]."""
     wave = 2.0 * np.exp(-2j * np.pi * frequency * times)
     line = (values * wave).mean()
@@ -75,20 +80,22 @@ def amplitude_and_delay(values, times, frequency):
 @pytest.mark.parametrize("kind", KINDS)
 @settings(max_examples=20, deadline=None)
 @given(place=st.floats(-1.0, 1.0), period=periods)
-def test_a_hand_that_rests_passes_to_the_bit(kind, place, period):
+def test_a_hand_that_rests_passes_to_the_bit(kind: str, place: float, period: float) -> None:
     out, _ = filtered(kind, np.full(200, place), period)
     assert (out == place).all()
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_step_is_followed_to_its_end(kind):
+def test_a_step_is_followed_to_its_end(kind: str) -> None:
     values = np.full(8000, 0.05)
     values[0] = 0.0
     out, _ = filtered(kind, values)
     assert out[-1] == pytest.approx(0.05, abs=1e-10)
 
 
-def exact(kind, given, frequencies, period):
+def exact(
+    kind: str, given: dict[str, float], frequencies: Array, period: float
+) -> NDArray[np.complex128]:
     """What scipy says of a filter at some frequencies [Hz]."""
     rate = 1.0 / period
     if kind == "notch":
@@ -98,7 +105,7 @@ def exact(kind, given, frequencies, period):
     return sosfreqz(butter(2, edges, "bandstop", output="sos", fs=rate), frequencies, fs=rate)[1]
 
 
-def measured(kind, given, frequencies, period):
+def measured(kind: str, given: dict[str, float], frequencies: Array, period: float) -> Any:
     """The same of ours, from its answer to a single sample."""
     answer = response(kind, round(6.0 / period), period, **given)
     times = period * np.arange(len(answer))
@@ -115,13 +122,15 @@ def measured(kind, given, frequencies, period):
         ("band_stop", {"low": 5.0, "high": 15.0}),
     ],
 )
-def test_the_frequency_response_is_that_of_scipy(kind, given, period):
+def test_the_frequency_response_is_that_of_scipy(
+    kind: str, given: dict[str, float], period: float
+) -> None:
     frequencies = np.array([0.1, 0.5, 1.0, 2.0, 5.0, 7.9, 9.8, 10.0, 12.5, 20.0, 40.0])
     expected = exact(kind, given, frequencies, period)
     np.testing.assert_allclose(measured(kind, given, frequencies, period), expected, atol=1e-9)
 
 
-def steady_gain(numbers, period):
+def steady_gain(numbers: Array, period: float) -> Array:
     """Gain (2,) of the filter that is optimal for ever, by scipy."""
     q, r = numbers[0] ** 2, numbers[1] ** 2 / period
     transition, seen = np.array([[1.0, period], [0.0, 1.0]]), np.array([[1.0, 0.0]])
@@ -138,7 +147,9 @@ def steady_gain(numbers, period):
 
 @pytest.mark.parametrize("period", [1e-3, 0.01])
 @pytest.mark.parametrize("given", [{}, {"acceleration_noise": 1.0, "reading_noise": 1e-4}])
-def test_the_gain_of_the_kalman_filter_becomes_that_of_the_riccati_equation(given, period):
+def test_the_gain_of_the_kalman_filter_becomes_that_of_the_riccati_equation(
+    given: dict[str, float], period: float
+) -> None:
     numbers = numbers_of("kalman", **given)
     values = np.zeros(round(8.0 / period))
     _, memory = filtered("kalman", values, period, **given)
@@ -148,18 +159,18 @@ def test_the_gain_of_the_kalman_filter_becomes_that_of_the_riccati_equation(give
     np.testing.assert_allclose(memory[:2] - before, steady_gain(numbers, period), rtol=1e-6)
 
 
-def test_the_kalman_filter_follows_a_hand_that_begins_at_speed_at_once():
+def test_the_kalman_filter_follows_a_hand_that_begins_at_speed_at_once() -> None:
     times = np.arange(500) * 1e-3
     out, _ = filtered("kalman", 0.2 * times)
     assert np.abs(out - 0.2 * times).max() < 2e-4
     assert np.abs(out - 0.2 * times)[100:].max() < 1e-6
 
 
-def cosine_filter(kind):
+def cosine_filter(kind: str) -> Callable[[float, float], tuple[float, float]]:
     """Response of a filter at some frequencies [Hz]: measured, for the one that learns too."""
     times = 1e-3 * np.arange(40_000)
 
-    def at(frequency, size):
+    def at(frequency: float, size: float) -> tuple[float, float]:
         out, _ = filtered(kind, size * np.sin(2.0 * np.pi * frequency * times))
         return amplitude_and_delay(out[20_000:], times[20_000:], frequency)
 
@@ -173,13 +184,13 @@ DELAY_MS = {"notch": 15.9, "band_stop": 9.4, "kalman": 1.1, "wflc": 0.3}
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_tremor_of_10_hz_is_taken_out_as_far_as_stated(kind):
+def test_a_tremor_of_10_hz_is_taken_out_as_far_as_stated(kind: str) -> None:
     left, _ = cosine_filter(kind)(10.0, 1e-4)
     assert left <= 1e-4 * LEFT[kind]
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_slow_motion_passes_as_large_as_it_is_with_the_delay_stated(kind):
+def test_slow_motion_passes_as_large_as_it_is_with_the_delay_stated(kind: str) -> None:
     size, delay = cosine_filter(kind)(0.5, 0.02)
     assert size == pytest.approx(0.02, rel=0.02)
     assert 1e3 * delay == pytest.approx(DELAY_MS[kind], abs=0.3)
@@ -187,14 +198,16 @@ def test_slow_motion_passes_as_large_as_it_is_with_the_delay_stated(kind):
 
 @pytest.mark.parametrize("frequency", [7.0, 8.0, 10.0, 12.0, 13.0])
 @pytest.mark.parametrize("period", [1e-3, 0.005])
-def test_the_learning_filter_finds_a_tremor_of_any_frequency_and_subtracts_it(frequency, period):
+def test_the_learning_filter_finds_a_tremor_of_any_frequency_and_subtracts_it(
+    frequency: float, period: float
+) -> None:
     times = period * np.arange(round(20.0 / period))
     out, memory = filtered("wflc", 1e-4 * np.sin(2.0 * np.pi * frequency * times), period)
     assert 10.0 + memory[RATE] / (2.0 * np.pi) == pytest.approx(frequency, abs=0.05)
     assert np.abs(out[-round(2.0 / period) :]).max() < 2e-6
 
 
-def test_the_learning_filter_subtracts_a_tremor_whose_frequency_changes():
+def test_the_learning_filter_subtracts_a_tremor_whose_frequency_changes() -> None:
     times = 1e-3 * np.arange(30_000)
     phase = 2.0 * np.pi * (9.0 * times + 0.5 * 0.1 * times**2)  # from 9 to 12 Hz
     out, _ = filtered("wflc", 1e-4 * np.sin(phase))
@@ -203,7 +216,7 @@ def test_the_learning_filter_subtracts_a_tremor_whose_frequency_changes():
     assert out[10_000:].std() < 0.2 * 1e-4 * math.sqrt(0.5)
 
 
-def bits():
+def bits() -> str:
     """Digest of what all filters and the stage make of a hand that pauses and is thrown about."""
     digest, places = hashlib.sha256(), hand(800)
     places[500:] += 0.1
@@ -214,7 +227,7 @@ def bits():
     return digest.hexdigest()
 
 
-def test_kernels_have_the_same_bits_as_plain_python():
+def test_kernels_have_the_same_bits_as_plain_python() -> None:
     text = "import test_tremor_filters as t; print(t.bits())"
     here = Path(__file__).parent
     found = subprocess.run(
@@ -228,13 +241,18 @@ def test_kernels_have_the_same_bits_as_plain_python():
 # -- the stage -------------------------------------------------------------------------------------
 
 
-def stage(kind="band_stop", **given):
+def stage(kind: str = "band_stop", **given: object) -> RunningTremorFilter:
     """The stage at work; double underscores in names stand for dots."""
     named = {name.replace("__", "."): value for name, value in given.items()}
     return RunningTremorFilter(build(TremorFilterParameters, {"kind": kind, **named}))
 
 
-def through(runner, places, period_ns=MS, first_ns=MS):
+def through(
+    runner: RunningTremorFilter,
+    places: Any,
+    period_ns: int = MS,
+    first_ns: int = MS,
+) -> Array:
     """Filtered places (N, 3) of a master that is at places (N, 3), sample by sample."""
     row, found = runner.signals, []
     for i, place in enumerate(places):
@@ -245,7 +263,7 @@ def through(runner, places, period_ns=MS, first_ns=MS):
     return np.array(found)
 
 
-def hand(count, period=1e-3, seed=1):
+def hand(count: int, period: float = 1e-3, seed: int = 1) -> Array:
     """Places (count, 3) [m] of a hand that moves and trembles."""
     times, rng = period * np.arange(count), np.random.default_rng(seed)
     phases = rng.uniform(0.0, 6.0, (2, 3))
@@ -254,7 +272,7 @@ def hand(count, period=1e-3, seed=1):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_each_coordinate_is_filtered_by_itself_from_its_first_reading_on(kind):
+def test_each_coordinate_is_filtered_by_itself_from_its_first_reading_on(kind: str) -> None:
     places = hand(2000)
     out = through(stage(kind), places)
     for axis in range(3):
@@ -265,7 +283,7 @@ def test_each_coordinate_is_filtered_by_itself_from_its_first_reading_on(kind):
     np.testing.assert_allclose(moved, out + 0.3, atol=1e-9)
 
 
-def test_the_orientation_passes():
+def test_the_orientation_passes() -> None:
     runner = stage()
     row, rng = runner.signals, np.random.default_rng(3)
     for tick in range(1, 50):
@@ -277,14 +295,14 @@ def test_the_orientation_passes():
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_samples_of_any_period_are_filtered_alike(kind):
+def test_samples_of_any_period_are_filtered_alike(kind: str) -> None:
     often, seldom = hand(6000), hand(1200, 0.005)
     fine, coarse = through(stage(kind), often), through(stage(kind), seldom, 5 * MS)
     assert np.abs(coarse - fine[::5])[600:].max() < 5e-5
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_longer_period_is_split_on_a_straight_line(kind):
+def test_a_longer_period_is_split_on_a_straight_line(kind: str) -> None:
     assert LONGEST_NS == 10 * MS
     places = hand(100, 0.04)
     split = [places[0]]
@@ -296,7 +314,7 @@ def test_a_longer_period_is_split_on_a_straight_line(kind):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_pause_begins_anew_at_the_reading_and_a_shorter_one_does_not(kind):
+def test_a_pause_begins_anew_at_the_reading_and_a_shorter_one_does_not(kind: str) -> None:
     places, runner = hand(2000), stage(kind)
     through(runner, places)
     after = through(runner, places[:500] + 0.01, first_ns=2301 * MS)
@@ -310,7 +328,9 @@ def test_a_pause_begins_anew_at_the_reading_and_a_shorter_one_does_not(kind):
 @pytest.mark.parametrize("kind", KINDS)
 @settings(max_examples=15, deadline=None)
 @given(far=st.floats(0.004, 0.5), ticks=st.integers(1, 40))
-def test_a_teleport_passes_as_it_is_and_nothing_rings_after_it(kind, far, ticks):
+def test_a_teleport_passes_as_it_is_and_nothing_rings_after_it(
+    kind: str, far: float, ticks: int
+) -> None:
     """There and back: each jump is that of the readings, and each beginning a fresh one."""
     places = np.zeros((300, 3))
     places[100 : 100 + ticks, 1] = far
@@ -324,14 +344,16 @@ def test_a_teleport_passes_as_it_is_and_nothing_rings_after_it(kind, far, ticks)
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_hand_that_is_thrown_elsewhere_is_followed_from_there_as_from_the_first_reading(kind):
+def test_a_hand_that_is_thrown_elsewhere_is_followed_from_there_as_from_the_first_reading(
+    kind: str,
+) -> None:
     places, runner = hand(1500), stage(kind)
     places[700:] += 0.2
     out = through(runner, places)
     np.testing.assert_array_equal(out[700:], through(stage(kind), places[700:]))
 
 
-def commands(runner, places):
+def commands(runner: RunningTremorFilter, places: Array) -> Array:
     """What the mapping commands (N, 3) behind a filter, with a slave that is where it is led."""
     scaling = MOTION_SCALING.run(MotionScalingParameters())
     row, found = scaling.signals, []
@@ -351,7 +373,7 @@ def commands(runner, places):
 @pytest.mark.parametrize("kind", KINDS)
 @settings(max_examples=10, deadline=None)
 @given(far=st.floats(0.01, 0.5), ticks=st.integers(1, 40))
-def test_a_teleport_of_a_resting_hand_moves_no_command(kind, far, ticks):
+def test_a_teleport_of_a_resting_hand_moves_no_command(kind: str, far: float, ticks: int) -> None:
     places = np.tile([0.0, -0.1, 0.1], (300, 1))
     places[100 : 100 + ticks, 0] += far
     found = commands(stage(kind), places)
@@ -359,7 +381,9 @@ def test_a_teleport_of_a_resting_hand_moves_no_command(kind, far, ticks):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_teleport_of_a_hand_that_moves_shifts_the_command_by_no_more_than_its_lag(kind):
+def test_a_teleport_of_a_hand_that_moves_shifts_the_command_by_no_more_than_its_lag(
+    kind: str,
+) -> None:
     """The slave goes on as if nothing had been, from where it is."""
     places = hand(2000)
     thrown = places.copy()
@@ -373,7 +397,9 @@ def test_a_teleport_of_a_hand_that_moves_shifts_the_command_by_no_more_than_its_
 @settings(max_examples=30, deadline=None)
 @given(places=st.lists(st.tuples(*[st.floats()] * 3), min_size=1, max_size=20),
        period_ns=st.sampled_from([0, -MS, MS, 40 * MS, 2**40]))  # fmt: skip
-def test_wild_samples_at_any_times_leave_numbers_and_no_trace(kind, places, period_ns):
+def test_wild_samples_at_any_times_leave_numbers_and_no_trace(
+    kind: str, places: list[tuple[float, float, float]], period_ns: int
+) -> None:
     runner = stage(kind)
     assert np.isfinite(through(runner, places, period_ns, 2**50)).all()
     runner.reset()
@@ -382,7 +408,7 @@ def test_wild_samples_at_any_times_leave_numbers_and_no_trace(kind, places, peri
 
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
-def test_what_is_not_finite_never_comes_out_and_changes_nothing(kind, bad):
+def test_what_is_not_finite_never_comes_out_and_changes_nothing(kind: str, bad: float) -> None:
     places = hand(600)
     broken = places.copy()
     broken[300, 1] = bad
@@ -396,7 +422,7 @@ def test_what_is_not_finite_never_comes_out_and_changes_nothing(kind, bad):
     assert first.tolist() == [[0, 0, 0], [0.1, 0.2, 0.3]]
 
 
-def test_a_reading_of_the_same_stamp_changes_nothing_and_an_older_one_begins_anew():
+def test_a_reading_of_the_same_stamp_changes_nothing_and_an_older_one_begins_anew() -> None:
     runner, places = stage(), hand(500)
     before = through(runner, places)[-1]
     again = through(runner, places[-1:] + 1e-3, first_ns=500 * MS)
@@ -406,7 +432,7 @@ def test_a_reading_of_the_same_stamp_changes_nothing_and_an_older_one_begins_ane
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_reset_and_a_second_run_give_the_same_bits(kind):
+def test_a_reset_and_a_second_run_give_the_same_bits(kind: str) -> None:
     places, runner = hand(800), stage(kind)
     first = through(runner, places)
     runner.reset()
@@ -416,7 +442,9 @@ def test_a_reset_and_a_second_run_give_the_same_bits(kind):
 
 
 @pytest.mark.parametrize("other", [{"kind": "notch", "notch.quality": 3.0}, {"kind": "kalman"}])
-def test_new_parameters_take_over_without_a_jump_and_then_act_alone(other):
+def test_new_parameters_take_over_without_a_jump_and_then_act_alone(
+    other: Mapping[str, str | float],
+) -> None:
     runner, places = stage("notch"), hand(4000)
     out = [through(runner, places[:1000])]
     runner.retune(build(TremorFilterParameters, other))
@@ -427,7 +455,7 @@ def test_new_parameters_take_over_without_a_jump_and_then_act_alone(other):
     np.testing.assert_allclose(joined[3000:], through(fresh, places)[3000:], atol=2e-6)
 
 
-def test_the_same_parameters_again_change_no_bit():
+def test_the_same_parameters_again_change_no_bit() -> None:
     runner, places = stage(), hand(1000)
     out = [through(runner, places[:500])]
     runner.retune(build(TremorFilterParameters, {"kind": "band_stop"}))
@@ -435,7 +463,7 @@ def test_the_same_parameters_again_change_no_bit():
     np.testing.assert_array_equal(np.concatenate(out), through(stage(), places))
 
 
-def test_edges_that_enclose_no_band_are_refused():
+def test_edges_that_enclose_no_band_are_refused() -> None:
     with pytest.raises(ParameterError, match="> low") as caught:
         stage("band_stop", band_stop__low=12.0, band_stop__high=9.0)
     assert caught.value.name == "high"
@@ -444,7 +472,7 @@ def test_edges_that_enclose_no_band_are_refused():
 # -- in a session ----------------------------------------------------------------------------------
 
 
-def test_the_mapping_reads_the_filtered_stylus_and_the_operator_the_stylus_itself():
+def test_the_mapping_reads_the_filtered_stylus_and_the_operator_the_stylus_itself() -> None:
     graph = build_graph(stages=["tremor_filter"])
     at_port = {link.reader.name: link.topic.name for link in graph.links
                if link.port.name == "master/measured_cp"}  # fmt: skip
@@ -459,7 +487,9 @@ def test_the_mapping_reads_the_filtered_stylus_and_the_operator_the_stylus_itsel
 
 @pytest.mark.parametrize("period", [1e-3, 6e-3, 8e-3, 0.01])
 @pytest.mark.parametrize("frequency", [3.0, 15.0, 25.0])
-def test_the_widest_notch_that_is_taken_comes_to_rest_at_any_period(frequency, period):
+def test_the_widest_notch_that_is_taken_comes_to_rest_at_any_period(
+    frequency: float, period: float
+) -> None:
     least = max(0.3, frequency * 1e-9 * LONGEST_NS / 0.45)
     with pytest.raises(ParameterError, match="quality"):
         build(TREMOR_FILTERS.find("notch").parameters,
@@ -469,14 +499,14 @@ def test_the_widest_notch_that_is_taken_comes_to_rest_at_any_period(frequency, p
     assert np.abs(answer[-100:]).max() < 1e-9
 
 
-def session(*given, scenario="human"):
+def session(*given: str, scenario: str = "human") -> VirtualTime:
     return VirtualTime(configure(scenario, settings=["teleop.stages=[tremor_filter]", *given]))
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_the_slave_trembles_less_and_a_second_run_has_the_same_bits(kind):
+def test_the_slave_trembles_less_and_a_second_run_has_the_same_bits(kind: str) -> None:
     first, second = (session(f"tremor_filter.kind={kind}").run(13_000) for _ in range(2))
-    for name in first.dtype.names:
+    for name in present(first.dtype.names):
         np.testing.assert_array_equal(first[name], second[name])
     assert (first["master_filtered_cp_ns"] == first["master_measured_cp_ns"]).all()
     both = first["master_filtered_cp"][:, :3] + first["master_filtered_out"]
@@ -486,7 +516,7 @@ def test_the_slave_trembles_less_and_a_second_run_has_the_same_bits(kind):
     assert calm < 0.4 * trembling
 
 
-def touches(scenario, seconds, *given):
+def touches(scenario: str, seconds: float, *given: Any) -> Any:
     """Energies of the contacts of a session: shares given back."""
     rows = session(*given, scenario=scenario).run(round(1000 * seconds))
     contact = rows["master_contact"]
@@ -498,23 +528,23 @@ def touches(scenario, seconds, *given):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_wall_gives_back_no_more_than_it_took_whatever_filters_the_slave(kind):
+def test_a_wall_gives_back_no_more_than_it_took_whatever_filters_the_slave(kind: str) -> None:
     shares = touches("fine_box", 30.0, f"tremor_filter.kind={kind}")
     assert len(shares) >= 5
     assert shares.max() < 1.0
 
 
 @pytest.mark.slow
-def test_a_tank_pays_by_the_way_of_the_stylus_itself():
+def test_a_tank_pays_by_the_way_of_the_stylus_itself() -> None:
     tissue = ("world.material=silicone", "reflection.passivity=tank")
     shares = touches("palpation", 24.0, *tissue)
     assert len(shares) >= 3
     assert shares.max() < 1.06  # a tank that goes by the filtered stylus gives back 3.8
 
 
-def test_a_filter_of_ones_own_is_one_call_and_a_wrong_one_is_refused(own_parts):  # noqa: F811
+def test_a_filter_of_ones_own_is_one_call_and_a_wrong_one_is_refused(own_parts: None) -> None:  # noqa: F811
     @kernel
-    def half(numbers, memory, value, period):
+    def half(numbers: Any, memory: Any, value: Any, period: Any) -> Any:
         memory[0] += 0.5 * (value - memory[0])
         return memory[0]
 
@@ -524,7 +554,7 @@ def test_a_filter_of_ones_own_is_one_call_and_a_wrong_one_is_refused(own_parts):
     wrong = {
         "not finite": lambda n, m, v, t: math.nan if v else 0.0,
         "not at rest": lambda n, m, v, t: v + 1.0,
-        "raises": lambda n, m, v, t: {}["none"],
+        "raises": lambda n, m, v, t: {}["none"],  # type: ignore[index]
         "writes": lambda n, m, v, t: m[40],
     }
     for name, broken in wrong.items():
@@ -532,8 +562,8 @@ def test_a_filter_of_ones_own_is_one_call_and_a_wrong_one_is_refused(own_parts):
             tc.register_tremor_filter(tc.TremorFilter(name.replace(" ", "_"), NoParameters, broken))
 
 
-def test_a_filter_of_ones_own_that_runs_away_begins_anew(own_parts):  # noqa: F811
-    def runs_away(numbers, memory, value, period):
+def test_a_filter_of_ones_own_that_runs_away_begins_anew(own_parts: None) -> None:  # noqa: F811
+    def runs_away(numbers: Array, memory: Array, value: float, period: float) -> float:
         memory[0] += 1.0
         return math.inf if memory[0] > 100.0 else value
 
@@ -547,28 +577,30 @@ def test_a_filter_of_ones_own_that_runs_away_begins_anew(own_parts):  # noqa: F8
 
 @pytest.mark.parametrize("delay", [-0.02, 0.0, 0.0123, 0.08])
 @pytest.mark.parametrize("gain", [0.9, 1.0, 1.1])
-def test_the_score_finds_a_delay_and_a_gain(delay, gain):
+def test_the_score_finds_a_delay_and_a_gain(delay: float, gain: float) -> None:
     rng = np.random.default_rng(6)
     rates, phases = rng.uniform(0.5, 12.0, 40), rng.uniform(0.0, 6.0, (40, 3))
     times = np.arange(2000) / SAMPLED
 
-    def at(moments):
+    def at(moments: Array) -> Array:
         return np.sin(moments[:, None, None] * rates[:, None] + phases).sum(axis=1)
 
     found = passage(velocities(at(times)), gain * velocities(at(times - delay)))
     assert found == pytest.approx((delay, gain), abs=1e-3)
 
 
-def test_without_motion_there_is_no_delay():
+def test_without_motion_there_is_no_delay() -> None:
     assert passage(np.zeros((600, 3)), np.zeros((600, 3))) is None
     assert passage(np.ones((20, 3)), np.ones((20, 3))) is None
 
 
-def test_the_score_says_what_the_stage_did_and_nothing_without_it():
+def test_the_score_says_what_the_stage_did_and_nothing_without_it() -> None:
     score = tc.run("human", duration=20.0, stages="tremor_filter").score()
-    assert 40.0 < score.value("tremor_filter.before_um") < 80.0
-    assert 0.2 < score.value("tremor_filter.left_share") < 0.5
-    after = score.value("tremor_filter.before_um") * score.value("tremor_filter.left_share")
+    assert 40.0 < present(score.value("tremor_filter.before_um")) < 80.0
+    assert 0.2 < present(score.value("tremor_filter.left_share")) < 0.5
+    after = present(score.value("tremor_filter.before_um")) * present(
+        score.value("tremor_filter.left_share")
+    )
     assert score.value("tremor_filter.after_um") == pytest.approx(after)
     assert score.value("tremor_filter.delay_ms") == pytest.approx(9.5, abs=0.5)
     assert score.value("tremor_filter.gain") == pytest.approx(1.0, abs=0.01)
@@ -581,5 +613,5 @@ def test_the_score_says_what_the_stage_did_and_nothing_without_it():
     assert plain.value("tremor_filter.delay_ms") is None
 
 
-def test_the_stage_is_not_part_of_a_session_unless_asked_for():
+def test_the_stage_is_not_part_of_a_session_unless_asked_for() -> None:
     assert TREMOR_FILTER.name not in {stage.name for stage in build_graph().stages}

@@ -1,11 +1,15 @@
 """Two clocks: the slave's side has a clock of its own, and nothing but its stamps tells so."""
 
+from pathlib import Path
+from typing import Any
+
 import numpy as np
 import pytest
 
 import teleop_core as tc
 from teleop_core.bags.reader import Bag
 from teleop_core.graph.signals import TICK_NS
+from teleop_core.kernels.geometry import Array
 from teleop_core.session.configuration import configure
 from teleop_core.session.virtual import VirtualTime
 from teleop_core.slave.pair import ArmParameters, SimulatedArm
@@ -15,7 +19,7 @@ STAMPED_THERE = ("network_measured_cp_ns", "network_measured_cf_ns", "network_sl
 """What the slave samples: the rest of what comes back has the stamp of a command."""
 
 
-def session(*given, scenario="palpation", stages="[network]"):
+def session(*given: str, scenario: str = "palpation", stages: str = "[network]") -> Any:
     """Session whose sides are 50 ms apart, there and back."""
     settings = [f"teleop.stages={stages}", "network.there.least_delay=0.05",
                 "network.back.least_delay=0.05", *given]  # fmt: skip
@@ -25,8 +29,8 @@ def session(*given, scenario="palpation", stages="[network]"):
 @pytest.mark.parametrize(("offset", "drift"), [(0.5, 100.0), (-0.5, -100.0), (3600.0, 0.0)])
 @pytest.mark.parametrize("stages", ["[network]", "[network, passivity]"])
 def test_a_session_with_two_clocks_moves_as_one_with_a_single_clock_to_the_bit(
-    offset, drift, stages
-):
+    offset: float, drift: float, stages: str
+) -> None:
     felt = ["reflection.architecture=position_force"]
     plain = session(*felt, stages=stages)
     plain, ticks = plain.run(plain.lead + 7000), plain.lead + 7000
@@ -48,9 +52,11 @@ def test_a_session_with_two_clocks_moves_as_one_with_a_single_clock_to_the_bit(
         assert (other[name][~has_come] <= stamps[~has_come]).all() or offset > 0.0
 
 
-def test_the_age_that_is_scored_is_the_true_one_whatever_the_slaves_clock_says(tmp_path):
-    given = {"stages": "network", "duration": 5.0, "preset": "own"}
-    found = []
+def test_the_age_that_is_scored_is_the_true_one_whatever_the_slaves_clock_says(
+    tmp_path: Path,
+) -> None:
+    given: dict[str, Any] = {"stages": "network", "duration": 5.0, "preset": "own"}
+    found: Any = []
     for name, clock in (("one", {}), ("two", {"clock_offset": 0.5, "clock_drift": 100.0})):
         settings = {f"network.{key}": value for key, value in clock.items()}
         settings |= {"network.there.least_delay": 0.03, "network.back.least_delay": 0.2}
@@ -66,10 +72,10 @@ def test_the_age_that_is_scored_is_the_true_one_whatever_the_slaves_clock_says(t
 
 
 @pytest.mark.parametrize("ahead", [-3600.0, -0.5, 0.5])
-def test_a_slave_follows_commands_of_another_clock_as_those_of_its_own(ahead):
+def test_a_slave_follows_commands_of_another_clock_as_those_of_its_own(ahead: float) -> None:
     """Up to a second ahead, from where on a stamp counts as wrong."""
 
-    def setpoints(ahead_ns, drift):
+    def setpoints(ahead_ns: int, drift: float) -> tuple[Array, Array]:
         slave = SimulatedArm(ArmParameters(start_speed=1.0))
         row, begin, found = slave.signals, 4_000 * 10**9, []
         slave.step()
@@ -95,7 +101,7 @@ def test_a_slave_follows_commands_of_another_clock_as_those_of_its_own(ahead):
     assert np.abs(own - drifting).max() < 1e-4
 
 
-def behind(there, back, *given):
+def behind(there: float, back: float, *given: str) -> tuple[Array, Array]:
     """Session of 10 s over these delays [s]: whether it follows, and setpoint from command [m]."""
     delays = (f"network.there.least_delay={there}", f"network.back.least_delay={back}")
     run = session(*delays, *given, "slave.starts_at_home=true", scenario="free_motion")
@@ -107,7 +113,7 @@ def behind(there, back, *given):
 
 
 @pytest.mark.parametrize(("there", "back"), [(0.35, 0.35), (0.1, 0.6), (0.6, 0.1)])
-def test_a_slave_is_followed_whose_answer_takes_700_ms(there, back):
+def test_a_slave_is_followed_whose_answer_takes_700_ms(there: float, back: float) -> None:
     following, off = behind(there, back, "network.clock_offset=0.5", "network.clock_drift=100")
     assert following[3000:].all()
     _, near = behind(0.0, 0.0)

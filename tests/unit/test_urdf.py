@@ -1,6 +1,7 @@
 """URDFs of all robots load in a physics engine, which places their links as their bodies are."""
 
 from pathlib import Path
+from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
@@ -8,6 +9,7 @@ import pinocchio
 import pytest
 
 import teleop_core as tc
+from present import present
 from teleop_core.cli import main
 from teleop_core.kernels.geometry import rotations_from_quaternions
 from teleop_core.robots import rcrt1_dynamics
@@ -27,7 +29,7 @@ def relative(parent: np.ndarray, child: np.ndarray) -> np.ndarray:
     return np.concatenate((turn.T @ (child[:3] - parent[:3]), quaternion))
 
 
-def placed(xml: str, joints: dict[str, float], poses: dict[str, np.ndarray]) -> dict[str, object]:
+def placed(xml: str, joints: dict[str, float], poses: dict[str, np.ndarray]) -> dict[str, Any]:
     """Placements of all links by Pinocchio, with joints by name and floating links where told."""
     model = pinocchio.buildModelFromXML(xml, True)  # with joints that follow others
     tree = {j.get("name"): j for j in ElementTree.fromstring(xml).iter("joint")}
@@ -35,7 +37,9 @@ def placed(xml: str, joints: dict[str, float], poses: dict[str, np.ndarray]) -> 
     for index in range(1, model.njoints):
         name, at = model.names[index], model.joints[index].idx_q
         if tree[name].get("type") == "floating":
-            ends = [tree[name].find(end).get("link") for end in ("parent", "child")]
+            ends = [
+                present(present(tree[name].find(end)).get("link")) for end in ("parent", "child")
+            ]
             q[at : at + 7] = relative(*(poses[end] for end in ends))
         elif tree[name].find("mimic") is None:
             q[at] = joints[name]
@@ -66,8 +70,8 @@ def test_all_joints_of_a_serial_robot_are_real_with_its_limits(name: str) -> Non
     assert tuple(model.names)[1:] == robot.joint_names
     assert model.lowerPositionLimit == pytest.approx(robot.lower, abs=0.0)
     assert model.upperPositionLimit == pytest.approx(robot.upper, abs=0.0)
-    assert model.velocityLimit == pytest.approx(robot.drives.speed_limit, abs=0.0)
-    assert model.effortLimit == pytest.approx(robot.drives.effort_limit, abs=0.0)
+    assert model.velocityLimit == pytest.approx(present(robot.drives).speed_limit, abs=0.0)
+    assert model.effortLimit == pytest.approx(present(robot.drives).effort_limit, abs=0.0)
 
 
 def test_a_robot_with_loops_keeps_the_joints_that_move_one_body() -> None:
@@ -90,7 +94,9 @@ def test_our_own_reader_finds_the_same_tip_and_limits(name: str, tmp_path: Path)
     read = tc.load_robot(str(path), tip="tip")
     assert read.joint_names == robot.joint_names
     np.testing.assert_array_equal(read.limits(1.0), robot.limits(1.0))
-    np.testing.assert_array_equal(read.drives.effort_limit, robot.drives.effort_limit)
+    np.testing.assert_array_equal(
+        present(read.drives).effort_limit, present(robot.drives).effort_limit
+    )
     q = np.random.default_rng(3).uniform(robot.lower, robot.upper, (200, robot.n))
     np.testing.assert_allclose(read.fk(q), robot.fk(q), rtol=0.0, atol=1e-9)
 
@@ -102,7 +108,7 @@ def read_model(robot: tc.Robot) -> pinocchio.Model:
 @pytest.mark.parametrize("d2", [0.0, 0.05])
 def test_the_inertia_and_weight_of_the_rcrt1_are_those_of_its_equations(d2: float) -> None:
     robot, D, weight = tc.load_robot("rcrt1", d2=d2), np.empty((3, 3)), np.empty(6)
-    model, row = read_model(robot), robot.dynamics.parameters.copy()
+    model, row = read_model(robot), present(robot.dynamics).parameters.copy()
     motors = [rcrt1_dynamics.LINKS[f"J{i}"] for i in range(1, 4)]  # no URDF holds these
     for q in np.random.default_rng(4).uniform(robot.lower, robot.upper, (200, 6)):
         rcrt1_dynamics.inertia_matrix(q, row, D)
@@ -114,33 +120,33 @@ def test_the_inertia_and_weight_of_the_rcrt1_are_those_of_its_equations(d2: floa
         # The published equations leave out the offset, by which links 2 and 3 are off axis 1.
         beside = (rcrt1_dynamics.LINKS["m2"] + rcrt1_dynamics.LINKS["m3"]) * d2**2
         assert found[0, 0] == pytest.approx(D[0, 0] + beside, abs=1e-9)
-        robot.dynamics.gravity(q, row, weight)
+        present(robot.dynamics).gravity(q, row, weight)
         found = pinocchio.computeGeneralizedGravity(model, model.createData(), q)
         np.testing.assert_allclose(found, weight, rtol=0.0, atol=1e-9)
 
 
 def test_the_rcrt1_accelerates_as_its_file_does_with_its_motors() -> None:
     robot, found = tc.load_robot("rcrt1"), np.empty(6)
-    model, row = read_model(robot), robot.dynamics.parameters.copy()
+    model, row = read_model(robot), present(robot.dynamics).parameters.copy()
     model.armature = np.array([rcrt1_dynamics.LINKS[f"J{i}"] for i in range(1, 7)])
     rng, data = np.random.default_rng(6), model.createData()
     for q in rng.uniform(robot.lower, robot.upper, (100, 6)):
         dq, effort = rng.normal(size=(2, 6)) * (1.0, 1.0, 0.2, 0.0, 0.0, 0.0)
-        robot.dynamics.acceleration(q, dq, effort, row, found)
+        present(robot.dynamics).acceleration(q, dq, effort, row, found)
         expected = pinocchio.aba(model, data, q, dq, effort)
         np.testing.assert_allclose(found[:3], expected[:3], rtol=1e-9, atol=1e-9)
 
 
 def test_an_arm_of_links_is_written_with_the_links_that_were_read() -> None:
     robot = tc.load_robot(EXAMPLE, tip="tool0", dynamics="links")
-    model, row = read_model(robot), robot.dynamics.parameters.copy()
+    model, row = read_model(robot), present(robot.dynamics).parameters.copy()
     row[-6:] = 0.0  # the motors
     M, weight = np.empty((6, 6)), np.empty(6)
     for q in np.random.default_rng(5).uniform(robot.lower, robot.upper, (50, 6)):
         inertia_matrix(q, row, M)
         found = pinocchio.crba(model, model.createData(), q)
         np.testing.assert_allclose(np.triu(found), np.triu(M), rtol=0.0, atol=1e-9)
-        robot.dynamics.gravity(q, row, weight)
+        present(robot.dynamics).gravity(q, row, weight)
         found = pinocchio.computeGeneralizedGravity(model, model.createData(), q)
         np.testing.assert_allclose(found, weight, rtol=0.0, atol=1e-9)
 
@@ -206,8 +212,14 @@ def test_a_body_that_follows_one_joint_is_a_mimic_and_one_of_two_joints_floats()
     xml = ElementTree.fromstring(urdf_of(tc.load_robot("parallelogram")))
     followers = {j.get("name"): j.find("mimic") for j in xml.iter("joint")}
     coupler, rocker = followers["theta1_coupler"], followers["theta1_rocker"]
-    assert (coupler.get("joint"), float(coupler.get("multiplier"))) == ("theta1", -1.0)
-    assert (rocker.get("joint"), float(rocker.get("multiplier"))) == ("theta1", 1.0)
+    assert (present(coupler).get("joint"), float(present(present(coupler).get("multiplier")))) == (
+        "theta1",
+        -1.0,
+    )
+    assert (present(rocker).get("joint"), float(present(present(rocker).get("multiplier")))) == (
+        "theta1",
+        1.0,
+    )
     for name, floats in (("mma", 2), ("four_bar", 2)):
         xml = ElementTree.fromstring(urdf_of(tc.load_robot(name)))
         assert sum(j.get("type") == "floating" for j in xml.iter("joint")) == floats

@@ -1,13 +1,16 @@
 """Drives of a URDF from a YAML file: above what the URDF says, kept by recordings."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 import yaml
 
 import teleop_core as tc
+from present import present
 from teleop_core.base.errors import ParameterError, RecordingError, UnknownNameError
+from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot
 from teleop_core.robots.drives import ENTRIES
 
@@ -16,32 +19,36 @@ JOINTS = ("waist", "shoulder", "elbow", "roll", "pitch", "turn")
 FULL = dict(zip(ENTRIES, (0.4, 12.0, 3.0, 0.02, 90.0, 1.5, 1e-5, 70.0), strict=True))
 
 
-def arm(folder, content, **geometry):
+def arm(folder: Path, content: str | dict[str, dict[str, float]], **geometry: str) -> tc.Robot:
     path = folder / "drives.yaml"
     path.write_text(content if isinstance(content, str) else yaml.safe_dump(content))
     return load_robot(URDF, tip="tool0", drives=str(path), **geometry)
 
 
-def test_entries_of_the_file_stand_above_those_of_the_urdf_and_all_others_stay(tmp_path):
+def test_entries_of_the_file_stand_above_those_of_the_urdf_and_all_others_stay(
+    tmp_path: Path,
+) -> None:
     plain, found = load_robot(URDF, tip="tool0").drives, arm(tmp_path, {"elbow": FULL}).drives
     elbow = JOINTS.index("elbow")
-    for name, column in found.entries().items():
-        expected = plain.entries()[name].copy()
-        expected[elbow] = FULL[name] + (plain.inertia[elbow] if name == "inertia" else 0.0)
+    for name, column in present(found).entries().items():
+        expected = present(plain).entries()[name].copy()
+        expected[elbow] = FULL[name] + (present(plain).inertia[elbow] if name == "inertia" else 0.0)
         np.testing.assert_allclose(column, expected, rtol=1e-12)
-    assert found.assumed == plain.assumed
+    assert present(found).assumed == present(plain).assumed
 
 
-def test_what_the_file_states_of_every_joint_is_assumed_no_more(tmp_path):
+def test_what_the_file_states_of_every_joint_is_assumed_no_more(tmp_path: Path) -> None:
     for entry in ENTRIES:
-        before = set(load_robot(URDF, tip="tool0").drives.assumed)
-        after = arm(tmp_path, {joint: {entry: FULL[entry]} for joint in JOINTS}).drives.assumed
+        before = set(present(load_robot(URDF, tip="tool0").drives).assumed)
+        after = present(
+            arm(tmp_path, {joint: {entry: FULL[entry]} for joint in JOINTS}).drives
+        ).assumed
         assert set(after) == before - {entry}
     full = arm(tmp_path, dict.fromkeys(JOINTS, FULL))
     assert not full.drives_are_assumed
 
 
-def test_a_motor_adds_its_inertia_to_that_of_the_links_in_either_model(tmp_path):
+def test_a_motor_adds_its_inertia_to_that_of_the_links_in_either_model(tmp_path: Path) -> None:
     q, still = np.array((0.1, 0.4, -0.8, 0.3, 0.5, 0.2)), np.zeros(6)
     motors = np.array((0.4, 0.3, 0.2, 0.1, 0.08, 0.05))
     content = {name: {"inertia": float(m)} for name, m in zip(JOINTS, motors, strict=True)}
@@ -49,7 +56,7 @@ def test_a_motor_adds_its_inertia_to_that_of_the_links_in_either_model(tmp_path)
         plain = load_robot(URDF, tip="tool0", dynamics=dynamics)
         found = arm(tmp_path, content, dynamics=dynamics)
 
-        def inertia(robot, place=place):
+        def inertia(robot: tc.Robot, place: Array = place) -> Array:
             rest = robot.forward_dynamics(place, still, still)
             rows = [robot.forward_dynamics(place, still, e) - rest for e in np.eye(6)]
             return np.linalg.inv(np.array(rows))
@@ -72,18 +79,22 @@ WRONG = {
 
 
 @pytest.mark.parametrize(("content", "kind", "told"), WRONG.values(), ids=WRONG)
-def test_a_mistake_is_told_in_one_line(content, kind, told, tmp_path):
+def test_a_mistake_is_told_in_one_line(
+    content: str, kind: type[tc.TeleopError], told: str, tmp_path: Path
+) -> None:
     with pytest.raises(kind, match=told) as caught:
         arm(tmp_path, content)
     assert "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize("is_gone", [False, True])
-def test_a_recording_is_replayed_with_its_drives_whatever_became_of_their_file(is_gone, tmp_path):
+def test_a_recording_is_replayed_with_its_drives_whatever_became_of_their_file(
+    is_gone: bool, tmp_path: Path
+) -> None:
     arm(tmp_path, {"waist": {"speed_limit": 0.05}, "shoulder": {"viscous": 30.0}})
     path = tmp_path / "drives.yaml"
     geometry = ["tip=tool0", f"drives = {path}"]
-    session = {"duration": 0.5, "robot": URDF, "geometry": geometry}
+    session: dict[str, Any] = {"duration": 0.5, "robot": URDF, "geometry": geometry}
     recording = tc.run("coarse_box", out=tmp_path / "bag", **session)
     before = recording["slave/measured_js"].values
     assert not np.array_equal(
@@ -91,6 +102,8 @@ def test_a_recording_is_replayed_with_its_drives_whatever_became_of_their_file(i
         tc.run("coarse_box", **session | {"geometry": ["tip=tool0"]})["slave/measured_js"].values,
     )
     path.unlink() if is_gone else path.write_text("{}")
-    again = tc.replay(recording.path, out=tmp_path / "again")
+    again = tc.replay(present(recording.path), out=tmp_path / "again")
     np.testing.assert_array_equal(again["slave/measured_js"].values, before)
-    np.testing.assert_array_equal(tc.replay(again.path)["slave/measured_js"].values, before)
+    np.testing.assert_array_equal(
+        tc.replay(present(again.path))["slave/measured_js"].values, before
+    )

@@ -2,6 +2,8 @@
 
 import io
 import json
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -19,7 +21,7 @@ FINE = {
 }  # fmt: skip
 
 
-def test_a_drift_is_named_before_the_share_that_was_followed():
+def test_a_drift_is_named_before_the_share_that_was_followed() -> None:
     drifted = FINE | {"reach.followed_share": 0.94, "asked_error_mm.max": 67.0,
                       "reach.joint_share": 0.06}  # fmt: skip
     found = verdict_of(drifted)
@@ -42,14 +44,16 @@ def test_a_drift_is_named_before_the_share_that_was_followed():
         ({"position_error_mm.rms": 4.0}, "position_error_mm.rms", "4 mm RMS"),
     ],
 )  # fmt: skip
-def test_whatever_is_worst_comes_first(changes, worst, text):
+def test_whatever_is_worst_comes_first(
+    changes: dict[str, float], worst: str | None, text: str
+) -> None:
     found = verdict_of(FINE | changes)
     assert found.worst == worst
     assert found.text.startswith(text)
 
 
 @pytest.fixture(scope="module")
-def drifting(tmp_path_factory):
+def drifting(tmp_path_factory: pytest.TempPathFactory) -> tc.Recording:
     """A hand that is too fast for the arm."""
     times = np.linspace(0.0, 4.0, 401)
     way = 0.2 * np.sin(0.25 * np.pi * times) ** 2
@@ -58,7 +62,7 @@ def drifting(tmp_path_factory):
     return tc.run(operator=hand, duration=9.0, out=path)
 
 
-def test_one_line_opens_table_json_page_and_python(drifting, tmp_path):
+def test_one_line_opens_table_json_page_and_python(drifting: Any, tmp_path: Path) -> None:
     text = drifting.score().verdict.text
     assert text.startswith("followed ")
     shown = io.StringIO()
@@ -75,7 +79,9 @@ def test_one_line_opens_table_json_page_and_python(drifting, tmp_path):
     assert text in repr(drifting.score())
 
 
-def test_rows_that_say_nothing_and_figures_nobody_compares_stay_out(drifting, tmp_path):
+def test_rows_that_say_nothing_and_figures_nobody_compares_stay_out(
+    drifting: Any, tmp_path: Path
+) -> None:
     shown = io.StringIO()
     evaluate_bags([drifting.path], None, tmp_path / "page.html", Console(file=shown, width=100))
     for absent in ("0/0/0", " – ", "slave outside", "Vongbunyong", "agrees"):
@@ -85,7 +91,7 @@ def test_rows_that_say_nothing_and_figures_nobody_compares_stay_out(drifting, tm
     assert "published" not in table
 
 
-def test_scores_are_a_row_of_a_data_frame_each(drifting):
+def test_scores_are_a_row_of_a_data_frame_each(drifting: tc.Recording) -> None:
     score = drifting.score()
     values = score.to_dict()
     assert values["position_error_mm.rms"] == score.position_error_mm.rms

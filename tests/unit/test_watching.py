@@ -7,11 +7,14 @@ import subprocess
 import sys
 import threading
 import time
+from collections.abc import Callable, Iterator
+from typing import Any
 
 import psutil
 import pytest
 from numba import njit
 
+from present import present
 from teleop_core.kernels import IS_COMPILED
 from teleop_core.kernels.progress import compiled_count, is_compiling
 from teleop_core.nodes.chances import Chances
@@ -20,7 +23,7 @@ from teleop_core.nodes.parent import VARIABLE, Parent
 
 
 @pytest.fixture
-def pair():
+def pair() -> Iterator[tuple[socket.socket, socket.socket]]:
     """Both ends of a line."""
     ours, theirs = socket.socketpair()
     yield ours, theirs
@@ -28,10 +31,10 @@ def pair():
     theirs.close()
 
 
-def test_a_loop_that_never_comes_back_is_left_behind_and_says_where_it_is():
+def test_a_loop_that_never_comes_back_is_left_behind_and_says_where_it_is() -> None:
     is_inside, may_go = threading.Event(), threading.Event()
 
-    def stand_still():
+    def stand_still() -> None:
         is_inside.set()
         may_go.wait()
 
@@ -48,10 +51,10 @@ def test_a_loop_that_never_comes_back_is_left_behind_and_says_where_it_is():
     assert not loop.is_alive
 
 
-def test_a_loop_that_works_stops_after_its_turn():
+def test_a_loop_that_works_stops_after_its_turn() -> None:
     count, ready = [], threading.Event()
 
-    def turn():
+    def turn() -> None:
         count.append(1)
         if len(count) == 10:
             ready.set()
@@ -65,7 +68,9 @@ def test_a_loop_that_works_stops_after_its_turn():
     assert loop.is_ready
 
 
-def test_the_end_of_the_parent_is_known_at_once(pair, monkeypatch):
+def test_the_end_of_the_parent_is_known_at_once(
+    pair: tuple[socket.socket, socket.socket], monkeypatch: pytest.MonkeyPatch
+) -> None:
     ours, theirs = pair
     monkeypatch.setenv(VARIABLE, str(theirs.detach()))
     parent = Parent.of_environment()
@@ -81,12 +86,14 @@ def test_the_end_of_the_parent_is_known_at_once(pair, monkeypatch):
     parent.close()
 
 
-def test_a_process_that_was_started_by_hand_has_no_parent(monkeypatch):
+def test_a_process_that_was_started_by_hand_has_no_parent(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv(VARIABLE, raising=False)
     assert Parent.of_environment() is None
 
 
-def test_a_parent_that_does_not_listen_holds_nobody_up(pair):
+def test_a_parent_that_does_not_listen_holds_nobody_up(
+    pair: tuple[socket.socket, socket.socket],
+) -> None:
     parent = Parent(pair[1])
     for _ in range(100_000):
         parent.tell("at work")
@@ -94,15 +101,15 @@ def test_a_parent_that_does_not_listen_holds_nobody_up(pair):
 
 
 @pytest.mark.skipif(not IS_COMPILED, reason="nothing is compiled")
-def test_kernels_that_are_compiled_are_counted():
+def test_kernels_that_are_compiled_are_counted() -> None:
     before = compiled_count()
 
     @njit
-    def inner(x):
+    def inner(x: float) -> Any:
         return x + 1.0
 
     @njit
-    def outer(x):
+    def outer(x: float) -> Any:
         return inner(x) * 2.0
 
     assert not is_compiling()
@@ -112,18 +119,18 @@ def test_kernels_that_are_compiled_are_counted():
 
 
 @pytest.fixture
-def processor():
+def processor() -> Iterator[Callable[..., subprocess.Popen[str]]]:
     """One processor that processes of the test share; starts them, and ends them afterwards."""
     running, first = [], min(os.sched_getaffinity(0))
 
-    def start(program, policy=os.SCHED_OTHER):
-        def settle():
+    def start(program: str, policy: int = os.SCHED_OTHER) -> Any:
+        def settle() -> None:
             os.sched_setaffinity(0, {first})
             os.sched_setscheduler(0, policy, os.sched_param(0))
 
         command = [sys.executable, "-S", "-c", f"print(flush=True)\n{program}"]
         made = subprocess.Popen(command, preexec_fn=settle, stdout=subprocess.PIPE)  # noqa: PLW1509
-        assert made.stdout.readline()
+        assert present(made.stdout).readline()
         running.append(made)
         return made
 
@@ -131,10 +138,10 @@ def processor():
     for process in running:
         process.kill()
         process.wait()
-        process.stdout.close()
+        present(process.stdout).close()
 
 
-def share(chances, seconds=2.0, period=0.05):
+def share(chances: Chances, seconds: float = 2.0, period: float = 0.05) -> float:
     """Share of some time that a process could have worked."""
     begin, had = time.monotonic(), -chances.look()
     while time.monotonic() - begin < seconds:
@@ -146,14 +153,18 @@ def share(chances, seconds=2.0, period=0.05):
 ENDLESS, ASLEEP = "while True: pass", "import time; time.sleep(1000)"
 
 
-def test_a_process_that_gets_no_processor_has_no_chance(processor):
+def test_a_process_that_gets_no_processor_has_no_chance(
+    processor: Callable[..., subprocess.Popen[str]],
+) -> None:
     starved = processor(ENDLESS, os.SCHED_IDLE)
     processor(ENDLESS)
     assert share(Chances(starved.pid)) < 0.3
 
 
 @pytest.mark.parametrize("is_stopped", [False, True], ids=["asleep", "stopped"])
-def test_a_process_that_does_nothing_could_have_worked(processor, is_stopped):
+def test_a_process_that_does_nothing_could_have_worked(
+    processor: Callable[..., subprocess.Popen[str]], is_stopped: bool
+) -> None:
     idle = processor(ASLEEP)
     processor(ENDLESS)
     if is_stopped:
@@ -163,7 +174,9 @@ def test_a_process_that_does_nothing_could_have_worked(processor, is_stopped):
     assert share(Chances(idle.pid)) > 0.7
 
 
-def test_what_a_thread_runs_counts_though_it_waits_for_others_in_between(processor):
+def test_what_a_thread_runs_counts_though_it_waits_for_others_in_between(
+    processor: Callable[..., subprocess.Popen[str]],
+) -> None:
     busy = processor(ENDLESS)
     processor(ENDLESS)
     chances, process = Chances(busy.pid, worker=busy.pid), psutil.Process(busy.pid)
@@ -175,7 +188,9 @@ def test_what_a_thread_runs_counts_though_it_waits_for_others_in_between(process
     assert had > 0.7 * ran
 
 
-def test_who_looks_late_counts_a_fifth_of_a_second_alone(processor):
+def test_who_looks_late_counts_a_fifth_of_a_second_alone(
+    processor: Callable[..., subprocess.Popen[str]],
+) -> None:
     chances = Chances(processor(ASLEEP).pid)
     chances.look()
     time.sleep(1.0)  # what is measured, not a wait

@@ -1,7 +1,10 @@
 """Waves: energy on its way, networks that only lose it, and what a hand feels of the world."""
 
+from typing import Any
+
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from teleop_core.base.errors import ParameterError
 from teleop_core.chain.passivity.port import (
@@ -20,6 +23,7 @@ from teleop_core.chain.passivity.port import (
 from teleop_core.chain.passivity.wave import draw, wave_hand, wave_slave
 from teleop_core.graph.topics import ENERGY
 from teleop_core.kernels import kernel
+from teleop_core.kernels.geometry import Array
 from teleop_core.session.configuration import configure
 from teleop_core.session.virtual import VirtualTime
 
@@ -31,7 +35,18 @@ SLAVE = np.array([0.2, 5e-3, 0.01, 2e-3, 1.0])
 
 
 @kernel
-def drive(ways, there, back, stiffness, preload, impedance, slave, hand, arm, seen):
+def drive(
+    ways: Array,
+    there: Array | NDArray[np.int64],
+    back: NDArray[np.int64],
+    stiffness: float,
+    preload: float,
+    impedance: float,
+    slave: Array,
+    hand: Array,
+    arm: Array,
+    seen: Array,
+) -> None:
     """Lead an arm that lags before a spring below z = 0; write both ports and what is seen.
 
     ``ways`` (N, 3) are of the hand [m]; ``there`` and ``back`` (N,) the number of the row that
@@ -84,7 +99,7 @@ def drive(ways, there, back, stiffness, preload, impedance, slave, hand, arm, se
         seen[n, 3], seen[n, 4], seen[n, 5] = given[2], tip[2], force
 
 
-def motion(rng, count=3000):
+def motion(rng: np.random.Generator, count: int = 3000) -> Array:
     """Ways (N, 3) of a hand that goes to and fro and trembles, in steps of the reading [m]."""
     time = DT * np.arange(count + 1)[:, None]
     place = np.zeros((count + 1, 3))
@@ -94,12 +109,12 @@ def motion(rng, count=3000):
     return np.diff(np.round(place / STEP) * STEP, axis=0)
 
 
-def constant(delay, count=3000):
+def constant(delay: int, count: int = 3000) -> NDArray[np.int64]:
     """Numbers of the rows that are seen at each tick, so many ticks late."""
     return np.maximum(np.arange(count) - delay, -1)
 
 
-def shaken(rng, count=3000):
+def shaken(rng: np.random.Generator, count: int = 3000) -> NDArray[np.int64]:
     """The same of a network that loses to a half, and delays each packet by another time."""
     sent = np.flatnonzero(rng.random(count) > rng.choice([0.0, 0.1, 0.5]))
     due = sent + rng.integers(1, 500) + rng.geometric(rng.choice([1.0, 0.3, 0.03]), len(sent))
@@ -109,7 +124,13 @@ def shaken(rng, count=3000):
     return np.maximum.accumulate(seen)
 
 
-def driven(ways, there, back, stiffness=200.0, preload=0.0):
+def driven(
+    ways: Array,
+    there: NDArray[np.int64],
+    back: NDArray[np.int64],
+    stiffness: float = 200.0,
+    preload: float = 0.0,
+) -> tuple[Array, Array, Array]:
     """Ports of hand and arm (N, columns), and what is seen, of :func:`drive`."""
     hand, arm = np.zeros((2, len(ways), len(ENERGY)))
     seen = np.zeros((len(ways), 6))
@@ -117,12 +138,12 @@ def driven(ways, there, back, stiffness=200.0, preload=0.0):
     return hand, arm, seen
 
 
-def held(hand, arm):
+def held(hand: Array, arm: Array) -> Array:
     """Energy [J] that went in at both ports and did not come out, at each tick."""
     return hand[:, IN] - hand[:, OUT] + arm[:, IN] - arm[:, OUT]
 
 
-def in_flight(rows, delay):
+def in_flight(rows: Array, delay: int) -> Array:
     """Half the integral of the squares of the waves on their way from a port [J], at each tick."""
     waves = np.diff(rows[:, WAVE : WAVE + 3], axis=0, prepend=0.0) / DT
     gone = np.cumsum(0.5 * DT * (waves**2).sum(axis=1))
@@ -130,7 +151,7 @@ def in_flight(rows, delay):
 
 
 @pytest.mark.parametrize("delay", [1, 50, 350])
-def test_the_two_port_holds_half_the_squares_of_the_waves_on_their_way(delay):
+def test_the_two_port_holds_half_the_squares_of_the_waves_on_their_way(delay: int) -> None:
     """And what either side was paid and did not send: at any tick, of any motion, to 1e-12 J."""
     ways = motion(np.random.default_rng(delay))
     hand, arm, seen = driven(ways, constant(delay), constant(delay), preload=1.0)
@@ -141,7 +162,7 @@ def test_the_two_port_holds_half_the_squares_of_the_waves_on_their_way(delay):
     np.testing.assert_allclose(seen[:, :2], 0.0, atol=1e-12)  # what comes is given at once
 
 
-def test_no_network_and_no_spring_makes_the_two_port_give_more_than_it_took():
+def test_no_network_and_no_spring_makes_the_two_port_give_more_than_it_took() -> None:
     """Loss to a half, delay to 1 s there and back, any jitter, old rows again, 10 N/m to 50 kN/m.
 
     The hand's port alone may owe one step of its reading under the largest push, 0.18 mJ.
@@ -160,7 +181,7 @@ def test_no_network_and_no_spring_makes_the_two_port_give_more_than_it_took():
         assert np.all(np.diff(arm[:, TOLD]) >= 0.0)
 
 
-def test_a_wave_is_given_with_no_more_energy_than_it_has_and_whole_with_what_it_brought():
+def test_a_wave_is_given_with_no_more_energy_than_it_has_and_whole_with_what_it_brought() -> None:
     rng, wave = np.random.default_rng(5), np.zeros(3)
     for haste in (np.inf, 0.01, 1e-4):
         for _ in range(200):
@@ -178,7 +199,7 @@ def test_a_wave_is_given_with_no_more_energy_than_it_has_and_whole_with_what_it_
                 np.testing.assert_allclose(given, whole, rtol=1e-9)
 
 
-def test_half_of_all_packets_lost_leave_no_drift_in_the_air():
+def test_half_of_all_packets_lost_leave_no_drift_in_the_air() -> None:
     """Without the slave's making up: integrals travel."""
     ways = motion(np.random.default_rng(6))
     ways[2000:] = 0.0
@@ -196,7 +217,9 @@ def test_half_of_all_packets_lost_leave_no_drift_in_the_air():
 
 
 @pytest.mark.parametrize("delay", [1, 100])
-def test_a_hand_at_rest_feels_the_force_of_the_tip_and_a_spring_of_impedance_over_delay(delay):
+def test_a_hand_at_rest_feels_the_force_of_the_tip_and_a_spring_of_impedance_over_delay(
+    delay: int,
+) -> None:
     """At rest the tip stays behind the hand by force times delay over impedance."""
     ways = np.zeros((6000, 3))
     ways[:1000, 2] = -1.1e-5
@@ -208,7 +231,7 @@ def test_a_hand_at_rest_feels_the_force_of_the_tip_and_a_spring_of_impedance_ove
     assert -arm[-1, DRIFT + 2] == pytest.approx(behind, abs=0.03 * behind + 7e-4)
 
 
-def pressing(*texts, ticks=12_000, scenario="palpation"):
+def pressing(*texts: str, ticks: int = 12_000, scenario: str = "palpation") -> NDArray[np.void]:
     """Signals of ``palpation`` with waves and both stages."""
     stages = "teleop.stages=[network,passivity]"
     settings = (stages, "feedback_timeout=1.0", "reach_force.is_on=false", "gimbal_noise=0.0",
@@ -216,12 +239,12 @@ def pressing(*texts, ticks=12_000, scenario="palpation"):
     return VirtualTime(configure(scenario, settings=[*settings, *texts])).run(ticks)
 
 
-def late(delay):
+def late(delay: float) -> Any:
     """Settings of a network that takes so long there and back each [s]."""
     return tuple(f"network.{way}.least_delay={delay}" for way in ("there", "back"))
 
 
-def held_in_rounds(rows):
+def held_in_rounds(rows: NDArray[np.void]) -> Array:
     """Energy of the two-port [J] where both sides count the same round."""
     hand, arm = rows["master_energy"], rows["slave_energy"]
     return held(hand, arm)[(hand[:, ROUND] == arm[:, ROUND]) & (hand[:, LAW] == arm[:, LAW])]
@@ -229,7 +252,7 @@ def held_in_rounds(rows):
 
 @pytest.mark.parametrize("delay", [0.1, 0.35])
 @pytest.mark.parametrize("material", ["tissue", "steel"])
-def test_palpation_stays_calm_over_200_and_700_ms(material, delay):
+def test_palpation_stays_calm_over_200_and_700_ms(material: str, delay: float) -> None:
     rows = pressing(f"world.material={material}", *late(delay))
     place = rows["master_measured_cp"][5000:, :3]
     assert np.linalg.norm(place[20:] - place[:-20], axis=1).max() / 0.02 < 0.07
@@ -238,7 +261,7 @@ def test_palpation_stays_calm_over_200_and_700_ms(material, delay):
     assert rows["slave_energy"][-1, OUT] > 0.0
 
 
-def test_the_hand_feels_the_tips_force_in_its_own_axes_and_scale():
+def test_the_hand_feels_the_tips_force_in_its_own_axes_and_scale() -> None:
     """One and a half of the force at half the motion, in and out, where the drag cancels."""
     texts = ("position_force.force_gain=1.5", "coarse_gain=0.5", "world.place=[0.25,-0.235,-0.066]")
     rows = pressing(*texts, ticks=20_000)
@@ -252,14 +275,14 @@ def test_the_hand_feels_the_tips_force_in_its_own_axes_and_scale():
     assert held_in_rounds(rows).min() > -1e-5
 
 
-def test_a_hand_that_is_clutched_leads_nothing():
+def test_a_hand_that_is_clutched_leads_nothing() -> None:
     rows = pressing("buttons.clutch=[4.5,5.5]", ticks=9500)
     clutched = np.flatnonzero(rows["master_buttons"][:, 0] > 0.0)[100:]
     assert np.ptp(rows["master_measured_cp"][clutched, :3], axis=0).max() > 0.02
     assert np.ptp(rows["passivity_servo_cp"][clutched, :3], axis=0).max() < 2e-3  # what was owed
 
 
-def test_a_hand_that_moves_without_leading_feels_no_drag_and_sends_no_wave():
+def test_a_hand_that_moves_without_leading_feels_no_drag_and_sends_no_wave() -> None:
     port, memory, push, still = np.zeros(len(ENERGY)), np.zeros(12), np.zeros(3), np.zeros(3)
     begin_round(port, 3.0, 1.0)
     for leads in (0.0, 1.0):
@@ -274,6 +297,6 @@ def test_a_hand_that_moves_without_leading_feels_no_drag_and_sends_no_wave():
     assert push[0] < 0.0
 
 
-def test_waves_without_the_slaves_side_are_refused_with_what_they_need():
+def test_waves_without_the_slaves_side_are_refused_with_what_they_need() -> None:
     with pytest.raises(ParameterError, match=r"teleop.stages=\[passivity\]"):
         configure("palpation", settings=["reflection.passivity=wave"])

@@ -2,6 +2,8 @@
 
 import tracemalloc
 import warnings
+from collections.abc import Iterator
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -40,7 +42,7 @@ def moved(recording: tc.Recording, late_ns: int, which: int = -1) -> tc.Recordin
 
 
 @pytest.fixture(autouse=True)
-def memory():
+def memory() -> Iterator[None]:
     tracemalloc.start()
     yield
     _, peak = tracemalloc.get_traced_memory()
@@ -49,14 +51,18 @@ def memory():
 
 
 @pytest.mark.parametrize("late", LATER)
-def test_a_late_last_stamp_is_left_out_of_the_replay_and_told(session, late):
+def test_a_late_last_stamp_is_left_out_of_the_replay_and_told(
+    session: tc.Recording, late: str
+) -> None:
     with pytest.warns(UserWarning, match="its 1 samples more than 60 s apart"):
         again = tc.replay(moved(session, LATER[late]))
     assert again.duration == pytest.approx(session.duration, abs=2.5)
 
 
 @pytest.mark.parametrize("late", LATER)
-def test_scores_frames_and_copies_of_it_cost_what_its_samples_cost(session, late, tmp_path):
+def test_scores_frames_and_copies_of_it_cost_what_its_samples_cost(
+    session: tc.Recording, late: str, tmp_path: Path
+) -> None:
     strayed = moved(session, LATER[late])
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
@@ -68,17 +74,19 @@ def test_scores_frames_and_copies_of_it_cost_what_its_samples_cost(session, late
     assert len(saved[topics[0]]) == len(strayed[topics[0]])
 
 
-def test_a_stamp_in_the_middle_that_is_late_does_not_move_the_others(session):
+def test_a_stamp_in_the_middle_that_is_late_does_not_move_the_others(session: tc.Recording) -> None:
     with pytest.warns(UserWarning, match="left out"):
         again = tc.replay(moved(session, HOUR, which=700))
     assert again.duration == pytest.approx(session.duration, abs=2.5)
 
 
-def test_a_hand_that_rests_for_most_of_a_minute_is_replayed_through_the_rest(tmp_path):
+def test_a_hand_that_rests_for_most_of_a_minute_is_replayed_through_the_rest(
+    tmp_path: Path,
+) -> None:
     stamps = np.array([0, 1, 2, 50_000, 50_001]) * 1_000_000
     assert replayed_span(tmp_path, MASTER_MEASURED_CP.name, stamps) == (0, 50_001_000_000)
 
 
-def test_a_recording_without_a_readable_sample_is_refused(tmp_path):
+def test_a_recording_without_a_readable_sample_is_refused(tmp_path: Path) -> None:
     with pytest.raises(RecordingError, match="no readable sample"):
         replayed_span(tmp_path, MASTER_MEASURED_CP.name, np.empty(0, np.int64))

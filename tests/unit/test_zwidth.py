@@ -4,8 +4,10 @@ import itertools
 
 import pytest
 
+from present import present
 from teleop_lab import experiments
 from teleop_lab.experiments.one_axis import Grip, exact_boundary, sampled_boundary
+from teleop_lab.experiments.outcome import Outcome, Row
 from teleop_lab.experiments.sampled_wall import (
     Loop,
     Wall,
@@ -33,31 +35,35 @@ FINE_TICKS, SESSION_TICKS = "device in ticks of 0.1 ms", "device in a session's 
 
 
 @pytest.fixture(scope="module")
-def outcome():
+def outcome() -> Outcome:
     return experiments.run("zwidth")
 
 
-def rows(outcome, *parts):
+def rows(outcome: Outcome, *parts: str) -> list[Row]:
     return [row for row in outcome.rows if all(part in row.group for part in parts)]
 
 
 # Stability.
 
 
-def test_our_device_stands_a_late_wall_as_the_linear_law_says(outcome):
+def test_our_device_stands_a_late_wall_as_the_linear_law_says(outcome: Outcome) -> None:
     found = rows(outcome, "linear law", "B = 0", FINE_TICKS)
     assert len(found) == len(LATE)
     assert all(row.agrees for row in found)
 
 
 @pytest.mark.parametrize("damping", WALL_DAMPINGS)
-def test_our_device_stands_the_wall_of_the_exact_axis_with_a_damper_too(outcome, damping):
+def test_our_device_stands_the_wall_of_the_exact_axis_with_a_damper_too(
+    outcome: Outcome, damping: float
+) -> None:
     found = rows(outcome, "exact sampled axis", f"B = {damping:g}", "0.1 ms")
     assert len(found) == len(LATE)
-    assert all(abs(row.difference) < 0.06 * row.published for row in found)
+    assert all(abs(present(row.difference)) < 0.06 * present(row.published) for row in found)
 
 
-def test_what_misses_is_the_device_in_whole_ticks_and_the_law_with_a_damper(outcome):
+def test_what_misses_is_the_device_in_whole_ticks_and_the_law_with_a_damper(
+    outcome: Outcome,
+) -> None:
     missed = {(row.group, row.quantity) for row in outcome.rows if row.agrees is False}
     whole = f"stable, linear law of Gil 2009, B = 0 N·s/m, {SESSION_TICKS}"
     damped = f"stable, linear law of Gil 2009, B = 5 N·s/m, {FINE_TICKS}"
@@ -68,22 +74,22 @@ def test_what_misses_is_the_device_in_whole_ticks_and_the_law_with_a_damper(outc
     }
 
 
-def test_more_delay_never_allows_a_stiffer_wall(outcome):
+def test_more_delay_never_allows_a_stiffer_wall(outcome: Outcome) -> None:
     for row in rows(outcome, "stable"):
         same = [other for other in outcome.rows if other.group == row.group]
         for soon, late in itertools.pairwise(same):
-            assert late.published < soon.published
-            assert late.predicted < soon.predicted
+            assert present(late.published) < present(soon.published)
+            assert present(late.predicted) < present(soon.predicted)
 
 
 @pytest.mark.parametrize("late", [0, 1, 2])
-def test_in_ticks_of_a_session_a_wall_is_felt_a_quarter_of_a_tick_early(late):
+def test_in_ticks_of_a_session_a_wall_is_felt_a_quarter_of_a_tick_early(late: int) -> None:
     found = wall_boundary(BARE, 0.0, late, 1)
     assert found == pytest.approx(linear_law(2.0, 0.0, 1e-3 * late - 0.25e-3), rel=0.03)
 
 
 @pytest.mark.parametrize("damping", WALL_DAMPINGS)
-def test_a_wall_swings_up_above_the_exact_boundary_and_down_below_it(damping):
+def test_a_wall_swings_up_above_the_exact_boundary_and_down_below_it(damping: float) -> None:
     exact = sampled_boundary(BARE, 1, damping)
     below, above = (wall_growth(BARE, Wall(share * exact, damping, 1)) for share in (0.9, 1.1))
     assert below < 0.0 < above
@@ -91,7 +97,9 @@ def test_a_wall_swings_up_above_the_exact_boundary_and_down_below_it(damping):
 
 @pytest.mark.parametrize("grip", GRIPS.values(), ids=GRIPS)
 @pytest.mark.parametrize("late", [0, 1, 20, 100])
-def test_a_sampled_axis_has_the_boundary_of_one_that_is_late_by_half_a_tick_more(grip, late):
+def test_a_sampled_axis_has_the_boundary_of_one_that_is_late_by_half_a_tick_more(
+    grip: Grip, late: int
+) -> None:
     assert sampled_boundary(grip, late) == pytest.approx(
         exact_boundary(grip, 1e-3 * late), rel=0.02
     )
@@ -103,8 +111,8 @@ def test_a_sampled_axis_has_the_boundary_of_one_that_is_late_by_half_a_tick_more
 @pytest.mark.parametrize(("damping", "wall_damping"), DAMPINGS)
 @pytest.mark.parametrize("speed", [1e-3, 0.03, 0.3])
 def test_a_passive_wall_gives_no_energy_in_any_press_and_a_stiffer_one_does(
-    damping, wall_damping, speed
-):
+    damping: float, wall_damping: float, speed: float
+) -> None:
     law = passive_law(damping, wall_damping)
     soft, stiff = (
         max(
@@ -116,13 +124,13 @@ def test_a_passive_wall_gives_no_energy_in_any_press_and_a_stiffer_one_does(
 
 
 @pytest.mark.parametrize("length", [1, 2, 3, 10])
-def test_a_press_gives_energy_from_the_stiffness_of_its_law_on_at_every_speed(length):
+def test_a_press_gives_energy_from_the_stiffness_of_its_law_on_at_every_speed(length: int) -> None:
     law = press_law(5.0, 3.0, length)
     for speed in (1e-3, 0.03, 0.3):
         assert passive_boundary(5.0, 3.0, length, speed) == pytest.approx(law, rel=5e-3)
 
 
-def test_a_wall_gives_energy_long_before_it_diverges():
+def test_a_wall_gives_energy_long_before_it_diverges() -> None:
     loose = GRIPS["loose"]
     assert passive_law(loose.damping, loose.damping) == 0.0
     assert press_energy(loose.damping, Wall(100.0, loose.damping), 1, 0.05) > 0.0
@@ -134,14 +142,16 @@ def test_a_wall_gives_energy_long_before_it_diverges():
 
 
 @pytest.mark.parametrize(("friction", "resolution"), DEVICES)
-def test_friction_holds_a_device_between_steps_up_to_its_law(friction, resolution):
+def test_friction_holds_a_device_between_steps_up_to_its_law(
+    friction: float, resolution: float
+) -> None:
     law = quiet_law(friction, resolution)
     below, above = Wall(0.97 * law), Wall(1.03 * law)
     assert not any(is_restless(below, friction, resolution, push) for push in PUSHES)
     assert any(is_restless(above, friction, resolution, push) for push in PUSHES)
 
 
-def test_a_restless_wall_pushes_by_one_step_of_its_force():
+def test_a_restless_wall_pushes_by_one_step_of_its_force() -> None:
     friction, resolution = DEVICES[0]
     wall = Wall(1.1 * quiet_law(friction, resolution))
     loop = Loop(Grip(0.045, 1.0, 0.1), wall, 1, friction=friction, position_resolution=resolution)
@@ -150,14 +160,14 @@ def test_a_restless_wall_pushes_by_one_step_of_its_force():
     assert max(forces) - min(forces) == pytest.approx(wall.stiffness * resolution, rel=1e-9)
 
 
-def test_the_law_of_our_own_device_is_the_one_that_the_walls_know(outcome):
+def test_the_law_of_our_own_device_is_the_one_that_the_walls_know(outcome: Outcome) -> None:
     row = rows(outcome, "rests")[0]
     assert row.published == pytest.approx(9454.5)
     assert row.agrees
     assert any("assumed" in note for note in outcome.notes)
 
 
-def test_figures_of_zwidth_have_numbers_and_words(outcome):
+def test_figures_of_zwidth_have_numbers_and_words(outcome: Outcome) -> None:
     assert len(outcome.figures) == 2
     for figure in outcome.figures:
         assert figure.sentence.endswith(".")
