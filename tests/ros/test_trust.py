@@ -97,15 +97,15 @@ def test_a_second_master_is_refused_and_the_first_one_goes_on(peer: "Peer") -> N
 
 
 def test_a_recorder_tells_how_much_of_a_node_that_starts_again_came_before_it_knew_of_it(
-    peer, tmp_path, request
-):
+    peer: "Peer", tmp_path: Path, request: pytest.FixtureRequest
+) -> None:
     peer.start("recorder", out=str(tmp_path / "bag"))
     topic = topics.MASTER_MEASURED_CP
     first = peer.publisher(topic)
     data = layout(topic, ()).encode_one(1, np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]))
     begin = time.monotonic()
 
-    def heard_for_longer_than_discovery_takes():
+    def heard_for_longer_than_discovery_takes() -> bool:
         first.publish(data)
         received = peer.status("recorder").number(f"received.{topic.name}")
         return received > 0 and time.monotonic() > begin + 1e-9 * DISCOVERY_NS
@@ -121,7 +121,7 @@ def test_a_recorder_tells_how_much_of_a_node_that_starts_again_came_before_it_kn
     assert second.get_subscription_count() == 0
     lost = f"lost.{topic.name}"
 
-    def told():
+    def told() -> Any:
         second.publish(data)
         status = peer.status("recorder")
         return status if status.number(lost) >= unheard else None

@@ -1,13 +1,15 @@
 """Borrowing: kernels that look at arrays count no holders, and what others make is freed."""
 
 import sys
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
-from numba.core.runtime import _nrt_python, rtsys
+from numba.core import runtime
 
 from teleop_core.kernels import IS_COMPILED, inner, kernel
+from teleop_core.kernels.geometry import Array
 
 pytestmark = pytest.mark.skipif(not IS_COMPILED, reason="looks at compiled code")
 
@@ -15,12 +17,12 @@ pytestmark = pytest.mark.skipif(not IS_COMPILED, reason="looks at compiled code"
 class Arm(NamedTuple):
     """What a kernel is handed."""
 
-    q: np.ndarray
-    table: np.ndarray
+    q: Array
+    table: Array
 
 
 @inner
-def shifted(q, by):
+def shifted(q: Array, by: float) -> Array:
     found = np.empty(q.shape[0])
     for i in range(q.shape[0]):
         found[i] = q[i] + by
@@ -28,12 +30,12 @@ def shifted(q, by):
 
 
 @inner
-def first_row(arm):
+def first_row(arm: Arm) -> Any:
     return arm.table[0]
 
 
 @inner
-def total(q):
+def total(q: Array) -> float:
     found = 0.0
     for i in range(len(q)):
         found += q[i]
@@ -41,7 +43,7 @@ def total(q):
 
 
 @kernel
-def looks(arm):
+def looks(arm: Arm) -> float:
     found = 0.0
     for row in arm.table:
         found += total(row[1:]) + total(arm.q)
@@ -50,7 +52,7 @@ def looks(arm):
 
 
 @kernel
-def makes(arm):
+def makes(arm: Arm) -> float:
     found = 0.0
     for i in range(arm.q.shape[0]):
         found += total(shifted(arm.q, float(i)))
@@ -58,40 +60,40 @@ def makes(arm):
 
 
 @kernel
-def adds(arm):
+def adds(arm: Arm) -> Any:
     both = arm.q + arm.table[0]
     return both[0]
 
 
 @kernel
-def picks(arm):
+def picks(arm: Arm) -> float:
     return total(arm.q[arm.q > 0.0])
 
 
 @kernel
-def hands_on(arm):
+def hands_on(arm: Arm) -> float:
     return total(first_row(arm))
 
 
 @kernel
-def gives(arm):
+def gives(arm: Arm) -> Array:
     return arm.q
 
 
-def arm():
+def arm() -> Arm:
     return Arm(np.arange(4.0), np.arange(12.0).reshape(3, 4))
 
 
-def code_of(function, *arguments):
+def code_of(function: Any, *arguments: object) -> str:
     """Code of a kernel that is compiled anew: what is kept on the disk cannot be looked at."""
-    fresh = kernel(function.py_func)
+    fresh: Any = kernel(function.py_func)
     fresh._has_cache = True
     fresh(*arguments)
-    text = fresh.inspect_llvm(fresh.signatures[0])
-    return text[text.index("define") :].split("\n}\n")[0]
+    text: str = fresh.inspect_llvm(fresh.signatures[0])
+    return text[text.index("define") :].split("\n}\n", maxsplit=1)[0]
 
 
-def test_a_kernel_that_only_looks_at_arrays_counts_no_holders():
+def test_a_kernel_that_only_looks_at_arrays_counts_no_holders() -> None:
     own = arm()
     assert looks(own) == 6.0 + 22.0 + 38.0 - 12.0 + 3 * 6.0
     assert "NRT_incref" not in code_of(looks, arm())
@@ -99,7 +101,9 @@ def test_a_kernel_that_only_looks_at_arrays_counts_no_holders():
 
 
 @pytest.mark.parametrize("function", [looks, makes, adds, picks, hands_on, gives])
-def test_calls_leave_their_arguments_with_the_holders_that_they_had(function):
+def test_calls_leave_their_arguments_with_the_holders_that_they_had(
+    function: Callable[[Arm], object],
+) -> None:
     own = arm()
     function(own)
     before = [sys.getrefcount(array) for array in own]
@@ -109,22 +113,23 @@ def test_calls_leave_their_arguments_with_the_holders_that_they_had(function):
 
 
 @pytest.mark.parametrize("function", [looks, makes, adds, picks, hands_on])
-def test_arrays_that_a_kernel_makes_are_freed(function):
+def test_arrays_that_a_kernel_makes_are_freed(function: Callable[[Arm], object]) -> None:
     own = arm()
     function(own)
-    was_on = _nrt_python.memsys_stats_enabled()
-    _nrt_python.memsys_enable_stats()
-    before = rtsys.get_allocation_stats()
+    memory: Any = runtime
+    was_on = memory._nrt_python.memsys_stats_enabled()
+    memory._nrt_python.memsys_enable_stats()
+    before = memory.rtsys.get_allocation_stats()
     for _ in range(50):
         function(own)
-    after = rtsys.get_allocation_stats()
+    after = memory.rtsys.get_allocation_stats()
     if not was_on:
-        _nrt_python.memsys_disable_stats()
+        memory._nrt_python.memsys_disable_stats()
     assert after.alloc - before.alloc == after.free - before.free
     assert after.mi_alloc - before.mi_alloc == after.mi_free - before.mi_free
 
 
-def test_an_array_that_was_handed_through_outlives_the_call():
+def test_an_array_that_was_handed_through_outlives_the_call() -> None:
     own = arm()
     found = gives(own)
     del own

@@ -3,8 +3,8 @@
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from functools import partial
 from enum import Enum
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -435,7 +435,7 @@ def test_the_tables_have_a_row_for_each_fault() -> None:
     assert len(markdown(found).splitlines()) == 5
 
 
-def test_what_the_recorder_tells_that_it_lost_is_counted_by_topic_and_time(tmp_path):
+def test_what_the_recorder_tells_that_it_lost_is_counted_by_topic_and_time(tmp_path: Path) -> None:
     second, name = 1_000_000_000, SLAVE_SETPOINT_JS.name
     with BagWriter(tmp_path / "bag", (DIAGNOSTICS,), {}) as writer:
         for at, lost in ((1, 5), (2, 5), (3, 40), (4, 40), (8, 90)):

@@ -51,13 +51,17 @@ def test_ten_contacts_700_ms_away_leave_less_drift_than_the_goal_with_tdpa(
     assert found.leaving.min() > 2e-3  # in touch the command is held back
 
 
-def test_a_command_that_nothing_holds_back_has_no_drift_but_gives_more_energy(steel):
+def test_a_command_that_nothing_holds_back_has_no_drift_but_gives_more_energy(
+    steel: dict[str, Drift],
+) -> None:
     assert steel["none"].peak == 0.0
     assert steel["none"].given > 5.0 * steel["tank"].given > 5.0 * steel["tdpa"].given
     assert steel["wave"].given < 0.0  # its dampers take energy
 
 
-def test_a_tank_holds_a_command_back_before_steel_and_leaves_no_drift_either(steel):
+def test_a_tank_holds_a_command_back_before_steel_and_leaves_no_drift_either(
+    steel: dict[str, Drift],
+) -> None:
     assert len(steel["tank"].left) == CONTACTS  # no drive had to give all it has
     assert steel["tank"].peak > 2e-3
     assert 1e3 * steel["tank"].left.max() < GOAL_MM

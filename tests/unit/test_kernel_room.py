@@ -1,17 +1,20 @@
 """Room: small arrays of a kernel's own, which end with it."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
 from teleop_core.base.errors import KernelError
 from teleop_core.kernels import IS_COMPILED, kernel
+from teleop_core.kernels.geometry import Array
 from teleop_core.kernels.room import room
 
 compiled_only = pytest.mark.skipif(not IS_COMPILED, reason="looks at compiled code")
 
 
 @kernel
-def squares(values, out):
+def squares(values: Array, out: Array) -> None:
     own = room(3)
     for i in range(3):
         own[i] = values[i] * values[i]
@@ -20,7 +23,7 @@ def squares(values, out):
 
 
 @kernel
-def doubly(values, table):
+def doubly(values: Array, table: Array) -> int:
     first, second = room(3), room(3, 3)
     for i in range(3):
         first[i] = 0.0
@@ -34,13 +37,13 @@ def doubly(values, table):
     return second.shape[0] + second.size
 
 
-def gives():
+def gives() -> Array:
     own = room(3)
     own[0] = 1.0
     return own
 
 
-def test_a_kernel_computes_in_its_room_what_plain_python_does():
+def test_a_kernel_computes_in_its_room_what_plain_python_does() -> None:
     values = np.array([1.0, -2.0, 3.0])
     compiled, plain = np.zeros((3, 3)), np.zeros((3, 3))
     assert doubly(values, compiled) == doubly.py_func(values, plain) == 12
@@ -49,8 +52,8 @@ def test_a_kernel_computes_in_its_room_what_plain_python_does():
 
 
 @compiled_only
-def test_a_kernel_with_room_takes_no_memory():
-    fresh = kernel(doubly.py_func)
+def test_a_kernel_with_room_takes_no_memory() -> None:
+    fresh: Any = kernel(doubly.py_func)
     fresh._has_cache = True  # what is kept on the disk cannot be looked at
     fresh(np.ones(3), np.zeros((3, 3)))
     text = fresh.inspect_llvm(fresh.signatures[0])
@@ -59,15 +62,15 @@ def test_a_kernel_with_room_takes_no_memory():
 
 
 @compiled_only
-def test_room_cannot_be_returned():
+def test_room_cannot_be_returned() -> None:
     with pytest.raises(KernelError, match="its room ends with it"):
         kernel(gives)()
 
 
 @compiled_only
-def test_sizes_of_room_are_written_as_numbers():
-    def grows(count):
-        return room(count)[0]
+def test_sizes_of_room_are_written_as_numbers() -> None:
+    def grows(count: int) -> float:
+        return float(room(count)[0])
 
     with pytest.raises(KernelError):
         kernel(grows)(3)

@@ -240,7 +240,9 @@ def test_a_touch_that_is_over_leaves_nothing_in_the_tank() -> None:
     assert sample(1.0, 0.0, 1e-3) < 0.01
 
 
-def test_a_tank_lets_a_command_go_against_the_force_the_slower_the_larger_that_is_and_stops_it():
+def test_a_tank_lets_a_command_go_against_the_force_the_slower_the_larger_that_is_and_stops() -> (
+    None
+):
     stops = PassivityParameters().stop_force
     for size in (0.5, 2.0, stops, 3.0 * stops):
         numbers = np.array([0.2, 5e-3, 0.01, 0.0, 1.0, stops])
@@ -257,7 +259,7 @@ def test_a_tank_lets_a_command_go_against_the_force_the_slower_the_larger_that_i
             last = command
 
 
-def test_drift_of_a_tank_is_gone_once_the_hand_is_back_where_the_arm_waits():
+def test_drift_of_a_tank_is_gone_once_the_hand_is_back_where_the_arm_waits() -> None:
     numbers, still = np.array([0.2, 5e-3, 0.01, 0.0, 1.0, 5.0]), np.zeros(3)
     port, last = np.zeros(len(ENERGY)), moved(2, 0.0)
     for place, force in [*((-1e-4 * k, 9.0) for k in range(100)), *((-1e-2, 9.0),) * 9,
@@ -269,7 +271,7 @@ def test_drift_of_a_tank_is_gone_once_the_hand_is_back_where_the_arm_waits():
     assert np.linalg.norm(port[DRIFT : DRIFT + 3]) < 1e-12
 
 
-def presses(rows):
+def presses(rows: Any) -> int:
     """Stretches in which the tip is pressed, breaks of 50 ms and less left out."""
     force = np.linalg.norm(rows["slave_measured_cf"][:, :3], axis=1)
     on = np.flatnonzero(force > 0.05)
@@ -278,7 +280,7 @@ def presses(rows):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("late", [0.0, 0.35])
-def test_a_hand_with_a_tank_rests_on_steel_without_bouncing_near_and_far(late):
+def test_a_hand_with_a_tank_rests_on_steel_without_bouncing_near_and_far(late: float) -> None:
     """The hand of the scenario presses four or five times in 20 s."""
     rows = pressing(
         "reflection.passivity=tank", "world.material=steel", f"network.there.least_delay={late}",

@@ -131,13 +131,13 @@ def test_masters_that_send_buttons_where_they_change_only_are_followed() -> None
     assert not np.allclose(first, last)
 
 
-def way(hand, ticks):
+def way(hand: Hand, ticks: int) -> float:
     """Way of the command while the hand goes on, 0.1 m/s [m]."""
     places = [hand.give(moved(REST, [1e-4 * k, 0.0, 0.0]))[:3] for k in range(ticks)]
-    return np.linalg.norm(np.ptp(places, axis=0))
+    return float(np.linalg.norm(np.ptp(places, axis=0)))
 
 
-def test_buttons_that_fall_silent_just_after_a_pause_of_the_hand_hold_as_a_clutch_does():
+def test_buttons_that_fall_silent_just_after_a_pause_of_the_hand_hold_as_a_clutch_does() -> None:
     hand = Hand()
     hand.rest()
     hand.now_ns += 2_000_000_000  # in which no pose could be used, while buttons came
@@ -149,7 +149,7 @@ def test_buttons_that_fall_silent_just_after_a_pause_of_the_hand_hold_as_a_clutc
     assert hand.row["teleop_state"][1] == 1.0
 
 
-def test_a_master_that_comes_to_send_buttons_where_they_change_only_is_followed_then():
+def test_a_master_that_comes_to_send_buttons_where_they_change_only_is_followed_then() -> None:
     hand = Hand()
     hand.rest()
     hand.has_buttons = False
