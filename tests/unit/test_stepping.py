@@ -7,6 +7,7 @@ import pytest
 
 import teleop_core as tc
 from present import present
+from teleop_core.base.errors import ShapeError
 from teleop_core.slave.operation import State
 
 KINDS: Any = {
@@ -52,3 +53,14 @@ def test_what_a_program_says_between_two_steps_holds_from_the_next_one_on() -> N
     still = own.step()
     assert still["slave_operation"][0] == State.FAULT
     np.testing.assert_array_equal(own.step()["slave_setpoint_js"], still["slave_setpoint_js"])
+
+
+def test_rows_that_are_filled_again_hold_what_new_ones_would() -> None:
+    own, again = (session("coarse") for _ in range(2))
+    rows = again.rows(50)
+    for _ in range(3):
+        assert again.run(50, rows) is rows
+        assert rows.tobytes() == own.run(50).tobytes()
+    for wrong in (again.rows(49), np.zeros(50)):
+        with pytest.raises(ShapeError, match="rows of this session"):
+            again.run(50, wrong)

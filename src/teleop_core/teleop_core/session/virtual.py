@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from teleop_core.base.errors import PartError
+from teleop_core.base.errors import PartError, ShapeError
 from teleop_core.chain.operators.parameters import insist_on_virtual
 from teleop_core.graph.graph import BUILT_IN
 from teleop_core.graph.signals import TICK_NS, assign
@@ -120,8 +120,13 @@ class VirtualTime:
 
         Raises:
             TeleopError: A part cannot go on, or writes NaN.
+            ShapeError: ``out`` has other rows.
         """
-        return self._run(self.rows(ticks) if out is None else out, None)
+        if out is None:
+            out = self.rows(ticks)
+        elif out.shape != (ticks,) or out.dtype != self._dtype:
+            raise ShapeError("out, rows of this session", (ticks,), out.shape)
+        return self._run(out, None)
 
     def step(self) -> np.void:
         """Next tick: its row, as of :meth:`run`, to the same bits."""
