@@ -61,6 +61,7 @@ def test_rows_that_are_filled_again_hold_what_new_ones_would() -> None:
     for _ in range(3):
         assert again.run(50, rows) is rows
         assert rows.tobytes() == own.run(50).tobytes()
+    wrong: Any
     for wrong in (again.rows(49), np.zeros(50)):
         with pytest.raises(ShapeError, match="rows of this session"):
             again.run(50, wrong)
