@@ -2,10 +2,14 @@
 
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
+from teleop_core.chain.fixtures import FIXTURES
+from teleop_core.commands.compiling import configured_job, phases_of
 from teleop_core.kernels import IS_COMPILED
+from teleop_core.session.virtual import VirtualTime
 
 SESSION = """
 from teleop_core.session import api
@@ -30,3 +34,11 @@ def test_what_was_compiled_ahead_no_scenario_compiles_again() -> None:
         done = subprocess.run(command, capture_output=True, text=True, timeout=600, check=False)
         assert done.returncode == 0, done.stderr
         assert told in ("", done.stdout)
+
+
+def test_every_part_that_is_compiled_ahead_makes_a_session(tmp_path: Path) -> None:
+    jobs = [job for jobs in phases_of(is_all=True) for job in jobs]
+    shapes = {setting.partition("=")[2] for _, setting, _ in jobs if "fixture=" in setting}
+    assert shapes == set(FIXTURES)
+    for job in jobs:
+        VirtualTime(configured_job(job, tmp_path))

@@ -4,8 +4,12 @@ import argparse
 from collections.abc import Iterator, Sequence
 from os import sched_getaffinity
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from teleop_core.commands.arguments import command
+
+if TYPE_CHECKING:
+    from teleop_core.session.configuration import Configuration
 
 _EPILOG = """\
 a session compiles what it needs and is not there yet; compiled before, it starts at once:
@@ -15,6 +19,8 @@ a session compiles what it needs and is not there yet; compiled before, it start
 _FIRST = "coarse_box"
 Job = tuple[str, str, str]
 """Scenario, setting or nothing, stage or nothing for the whole session."""
+_MESH = "OFF\n4 4 6\n0 0 0\n90 90 0\n90 0 90\n0 90 90\n3 0 2 1\n3 0 1 3\n3 0 3 2\n3 1 2 3\n"
+"""A closed surface of four triangles [mm], for parts that need a file."""
 
 
 def add(commands: argparse._SubParsersAction) -> None:  # type: ignore[type-arg]
@@ -31,7 +37,7 @@ def _run(arguments: argparse.Namespace) -> int:
     from teleop_core.commands.progress import shown_progress
     from teleop_core.kernels.store import prune
 
-    phases = list(_phases(is_all=arguments.all))
+    phases = list(phases_of(is_all=arguments.all))
     total, done, compiled = sum(map(len, phases)), 0, 0
     workers = ProcessPoolExecutor(len(sched_getaffinity(0)), get_context("spawn"))
     with shown_progress("kernels") as progress, workers:
@@ -45,8 +51,10 @@ def _run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _phases(*, is_all: bool) -> Iterator[Sequence[Job]]:
+def phases_of(*, is_all: bool) -> Iterator[Sequence[Job]]:
     """Jobs to be done side by side, one group after the other: later ones find what is there."""
+    from importlib.util import find_spec
+
     from teleop_core.chain.fixtures import FIXTURES
     from teleop_core.graph.graph import BUILT_IN
     from teleop_core.graph.layers import list_scenarios
@@ -58,13 +66,36 @@ def _phases(*, is_all: bool) -> Iterator[Sequence[Job]]:
     yield [(_FIRST, "", "")]
     yield [(scenario, "", "") for scenario in list_scenarios() if scenario != _FIRST]
     if is_all:
+        shapes = [name for name in FIXTURES if find_spec("trimesh") or not _reads_a_file(name)]
         for key, parts in (
-            ("robot", ROBOTS),
-            ("controller", CONTROLLERS),
-            ("plant", PLANTS),
-            ("fixture", FIXTURES),
-        ):
+            ("robot", ROBOTS), ("controller", CONTROLLERS), ("plant", PLANTS), ("fixture", shapes),
+        ):  # fmt: skip
             yield [(_FIRST, f"{key}={name}", "") for name in parts]
+
+
+def _reads_a_file(shape: str) -> bool:
+    from teleop_core.chain.fixtures import FIXTURES
+
+    return hasattr(FIXTURES.find(shape).parameters, "file")
+
+
+def configured_job(job: Job, folder: Path) -> "Configuration":
+    """Configuration of a short session that needs a job's kernels.
+
+    Args:
+        job: See :data:`Job`.
+        folder: Where a part that needs a file finds one.
+    """
+    from teleop_core.session import api
+
+    scenario, setting, _ = job
+    key, _, name = setting.partition("=")
+    texts = [setting] if setting else []
+    if key == "fixture" and _reads_a_file(name):
+        mesh = folder / "mesh.off"
+        mesh.write_text(_MESH, encoding="ascii")
+        texts.append(f"fixture.{name}.file={mesh}")
+    return api.configuration(scenario, texts=["teleop.duration=0.01", *texts])
 
 
 def _compile(job: Job, is_replayed: bool) -> int:
@@ -76,17 +107,15 @@ def _compile(job: Job, is_replayed: bool) -> int:
     from teleop_core.kernels.progress import compiled_count
     from teleop_core.session import api
 
-    scenario, setting, stage = job
-    before = compiled_count()
-    texts = [setting] if setting else []
-    configuration = api.configuration(scenario, texts=["teleop.duration=0.01", *texts])
-    if stage:
-        runner = STAGES.find(stage).run(configuration.groups[stage], DT)
-        runner.load()
-        if (motion := getattr(runner, "motion", None)) is not None:
-            motion.load()  # commands, which a live slave takes
-        return compiled_count() - before
+    before, stage = compiled_count(), job[-1]
     with tempfile.TemporaryDirectory() as folder:
+        configuration = configured_job(job, Path(folder))
+        if stage:
+            runner = STAGES.find(stage).run(configuration.groups[stage], DT)
+            runner.load()
+            if (motion := getattr(runner, "motion", None)) is not None:
+                motion.load()  # commands, which a live slave takes
+            return compiled_count() - before
         recording = Path(folder) / "recording"
         api.run(configuration, out=recording)
         if is_replayed:
