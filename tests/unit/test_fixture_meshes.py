@@ -121,6 +121,7 @@ def test_a_hand_in_a_mesh_of_a_box_is_held_and_scored_as_in_the_box_though_the_f
     [
         ("mesh", {}, "fixture.mesh.file", "a file with a mesh"),
         ("keep_out_mesh", {"file": "none.stl"}, "fixture.keep_out_mesh.file", "No such file"),
+        ("mesh", {"file": __file__}, "fixture.mesh.file", "a mesh that can be read"),
         ("mesh", {"file": "ball", "place": (0.02, 0.0, 0.0)}, "fixture.mesh.place",
          "lies inside of the mesh; it is 0.005 m off"),
         ("keep_out_mesh", {"file": "ball", "place": (0.01, 0.0, 0.0)},

@@ -162,7 +162,7 @@ def _read(request: GridRequest, path: Path) -> Triangles:
         return read_heights(path, path.read_bytes(), request.scale, request.step)
     x, y, z = request.angles
     turned = product(rotation("z", z), product(rotation("y", y), rotation("x", x)))
-    return read_triangles(path, path.read_bytes(), request.scale * turned)
+    return read_triangles(path, path.read_bytes(), request.scale * turned, request.group)
 
 
 def _nodes(size: Array, step: float) -> list[int]:

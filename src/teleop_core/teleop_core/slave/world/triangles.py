@@ -13,7 +13,6 @@ from teleop_core.kernels import inner, kernel
 from teleop_core.kernels.geometry import Array
 from teleop_core.kernels.portable import arctangent, dot, length, product
 
-FILE = "world.mesh.file"
 _FLAT = 1e-6  # share of the cube around it that a mesh must fill
 _LEAF = 4  # triangles in a leaf of the tree, at least
 
@@ -30,7 +29,7 @@ class Triangles(NamedTuple):
     faces: NDArray[np.int64]
 
 
-def read_triangles(path: Path, data: bytes, placed: Array) -> Triangles:
+def read_triangles(path: Path, data: bytes, placed: Array, group: str = "world.mesh") -> Triangles:
     """Read a mesh and make sure that it encloses a volume.
 
     A mesh that is inside out is turned.
@@ -39,12 +38,14 @@ def read_triangles(path: Path, data: bytes, placed: Array) -> Triangles:
         path: Its name, for what is said, and for the format.
         data: What the file holds.
         placed: From the file's axes to those of the object (3, 3), scale included [m].
+        group: Parameters of the object, by which an error names its file.
 
     Raises:
         ParameterError: It is no mesh, has a hole or no volume; a hole is told by the middle of an
             edge along it, in the units of the file.
         TeleopError: The library that reads it is not installed.
     """
+    name = f"{group}.file"
     try:
         import trimesh
     except ImportError as error:
@@ -55,20 +56,20 @@ def read_triangles(path: Path, data: bytes, placed: Array) -> Triangles:
         points, faces = np.array(mesh.vertices, np.float64), np.array(mesh.faces, np.int64)
     except Exception as error:  # of a foreign reader, of a file that anybody wrote
         text = f"a mesh that can be read, such as STL or OBJ ({type(error).__name__}: {error})"
-        raise ParameterError(FILE, str(path), text) from error
+        raise ParameterError(name, str(path), text) from error
     faces = faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)]
     if not (len(faces) and np.isfinite(points).all()):
-        raise ParameterError(FILE, str(path), "a mesh of triangles with finite corners")
-    _check_closed(path, points, faces)
+        raise ParameterError(name, str(path), "a mesh of triangles with finite corners")
+    _check_closed(name, path, points, faces)
     points = product(points - 0.5 * (points.min(axis=0) + points.max(axis=0)), placed.T)
     a, b, c = points[faces].transpose(1, 0, 2)
     volume = float(dot(a, np.cross(b, c)).sum()) / 6.0
     if abs(volume) <= _FLAT * math.pow(np.ptp(points, axis=0).max(), 3.0):
-        raise ParameterError(FILE, str(path), "a mesh that encloses a volume; this one is flat")
+        raise ParameterError(name, str(path), "a mesh that encloses a volume; this one is flat")
     return Triangles(points, faces if volume > 0.0 else np.ascontiguousarray(faces[:, ::-1]))
 
 
-def _check_closed(path: Path, points: Array, faces: NDArray[np.int64]) -> None:
+def _check_closed(name: str, path: Path, points: Array, faces: NDArray[np.int64]) -> None:
     """Make sure that every edge is run through once in each direction.
 
     Raises:
@@ -92,7 +93,7 @@ def _check_closed(path: Path, points: Array, faces: NDArray[np.int64]) -> None:
         f"a closed mesh; {wrong.get(sides, f'{sides} triangles meet')} at the edge whose middle is "
         f"{[float(f'{x:.6g}') for x in place]} in the file"
     )
-    raise ParameterError(FILE, str(path), text)
+    raise ParameterError(name, str(path), text)
 
 
 def edges_of(faces: NDArray[np.int64]) -> NDArray[np.int64]:
