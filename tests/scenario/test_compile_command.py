@@ -36,6 +36,7 @@ def test_what_was_compiled_ahead_no_scenario_compiles_again() -> None:
         assert told in ("", done.stdout)
 
 
+@pytest.mark.slow
 def test_every_part_that_is_compiled_ahead_makes_a_session(tmp_path: Path) -> None:
     jobs = [job for jobs in phases_of(is_all=True) for job in jobs]
     shapes = {setting.partition("=")[2] for _, setting, _ in jobs if "fixture=" in setting}
