@@ -1,4 +1,4 @@
-"""Everything taken from inside numba, which may change in any version: here and in ``borrowing``.
+"""What is taken from inside numba and may change in any version: here, ``borrowing`` and ``room``.
 
 The public part of numba has no way to stamp a cache, to compile without a wrapper for Python, to
 count literals as plain numbers, or to say in one line what is wrong with a function.
@@ -35,7 +35,7 @@ from numba.extending import overload
 from numba.np import arrayobj
 
 from teleop_core import __version__
-from teleop_core.kernels import borrowing, store
+from teleop_core.kernels import borrowing, room, store
 from teleop_core.kernels.borrowing import Pipeline
 from teleop_core.kernels.callables import entry_of
 from teleop_core.kernels.dependencies import digest, source_digest
@@ -306,7 +306,7 @@ class _Cache(FunctionCache):
 
 def _cache(function: Any) -> Any:
     """Cache on disk of a function; none where it has no source file to stand beside."""
-    files = (__file__, borrowing.__file__, digest.__code__.co_filename)
+    files = (__file__, borrowing.__file__, room.__file__, digest.__code__.co_filename)
     own = [source_digest(file) for file in files]
     config: Any = numba.config
     checked = str(config.BOUNDSCHECK)  # NUMBA_BOUNDSCHECK=1 makes other code
