@@ -71,15 +71,15 @@ _CLOSED = """            try:
             except RecordingError:
                 self.exit_code = self.exit_code or 1  # the log"""
 _LATE = """self._held = [*getattr(self, "_held", []),
-                      *((now_ns, one) for one in self._stop.take())]
-        ready = [one for at, one in self._held if now_ns - at >= 20_000_000]
-        self._held = [(at, one) for at, one in self._held if now_ns - at < 20_000_000]
-        for is_pressed in ready:"""
+                      *((now_ns, one) for one in self._stop.take(now_ns))]
+            ready = [one for at, one in self._held if now_ns - at >= 20_000_000]
+            self._held = [(at, one) for at, one in self._held if now_ns - at < 20_000_000]
+            for is_pressed in ready:"""
 MUTANTS = (
     _mutant("stop_ignored", "nobody hears the stop button", _SLAVE,
-            "in self._stop.take():", "in ():", "stop_topic"),
+            "in self._stop.take(now_ns, is_idle=is_idle):", "in ():", "stop_topic"),
     _mutant("stop_late", "the stop button is heard 20 ms late", _SLAVE,
-            "for is_pressed in self._stop.take():", _LATE, "stop_topic"),
+            "for is_pressed in self._stop.take(now_ns, is_idle=is_idle):", _LATE, "stop_topic"),
     _mutant("stop_unlatched", "a released stop button enables the arm", _STAGE,
             "            self.request(Event.STOP)\n", _RELEASED, "stop_latched"),
     Mutant("press_lost", "the stop button's reader keeps one message",
@@ -87,6 +87,14 @@ MUTANTS = (
              "history=HistoryPolicy.KEEP_LAST, depth=1,"),
             ("slave/operation/presses.py", "missing = max(0, number - last - 1)", "missing = 0")),
            ("stop_brief",)),
+    _mutant("released_by_others", "any button releases the stop", "slave/operation/presses.py",
+            "self._holders.pop(sender, None)", "self._holders.clear()", "stop_two"),
+    _mutant("reset_while_pressed", "a pressed stop can be reset", "slave/operation/states.py",
+            "event == _RESET and s.is_pressed:", "event == _RESET and s.is_pressed > 1:",
+            "stop_latched"),
+    _mutant("overspeed_off", "no joint is too fast", _WATCH,
+            "fast = p.overspeed * p.speed_limit[i]", "fast = 1e9 * p.speed_limit[i]",
+            "overspeed"),
     _mutant("stop_soft", "a stop brakes as softly as a pause", _STEP,
             "AT_ONCE if s.state == _FAULT else AT_LIMITS", "AT_LIMITS", "stop_topic"),
     _mutant("reset_not_needed", "enable ends a stop without reset", "slave/operation/states.py",

@@ -40,7 +40,7 @@ def play(slave: SimulatedArm, words: Any) -> None:
         elif isinstance(word, Fault):
             slave.server.fail(word, 1.0, 0.5)
         elif isinstance(word, bool):
-            slave.server.press(is_pressed=word, now_ns=ns)
+            slave.server.press(is_pressed=word, heard_ns=ns)
         for _ in range(ticks):
             ns += 10**6
             before = np.array(row["slave_setpoint_js"])

@@ -81,7 +81,7 @@ class Chaos:
             fault = Fault(int(rng.integers(1, len(Fault))))
             self.slave.server.fail(fault, float(rng.uniform(0, 10)), 1.0)
         elif kind == 6:
-            self.slave.server.press(is_pressed=bool(rng.integers(2)), now_ns=self.ns)
+            self.slave.server.press(is_pressed=bool(rng.integers(2)), heard_ns=self.ns)
         elif kind == 7:
             self.ns += int(rng.integers(0, 2 * 10**8))  # the loop stood still
         else:
@@ -89,7 +89,7 @@ class Chaos:
 
     def recover(self) -> None:
         """Do what a person does to go on."""
-        self.slave.server.press(is_pressed=False, now_ns=self.ns)
+        self.slave.server.press(is_pressed=False, heard_ns=self.ns)
         for word in ("reset", "enable", "resume", "home"):
             if word != "home" or not self.row["slave_operation"][1]:
                 self.slave.server.request(word)

@@ -15,7 +15,7 @@ from std_srvs.srv import Trigger
 from teleop_core.graph.topics import SLAVE_OPERATION, SLAVE_SERVO_JP, SLAVE_SETPOINT_JS
 from teleop_core.nodes.operation import STOP_TOPIC, StopButton
 from teleop_core.robots import load_robot
-from teleop_core.slave.operation import State
+from teleop_core.slave.operation import Fault, State
 
 if TYPE_CHECKING:
     from ros.conftest import Peer
@@ -211,7 +211,7 @@ def still_slave(peer: "Peer", button: Publisher) -> Callable[[], Any]:
     return stand_still
 
 
-@pytest.mark.parametrize("released", [35, 6000])
+@pytest.mark.parametrize("released", [15, 35, 6000])
 def test_a_press_while_the_slave_stands_still_stops_the_arm(
     peer: "Peer", button: Publisher, still_slave: Callable[[], Any], released: int
 ) -> None:
@@ -231,3 +231,66 @@ def test_a_button_that_was_pressed_before_the_slave_began_stops_it(peer: "Peer")
     assert not command(peer, "reset")[0]
     button.say(is_pressed=False)
     go_on(peer)
+
+
+def test_a_stop_is_released_by_the_button_that_pressed_it_alone(
+    peer: "Peer", button: Publisher
+) -> None:
+    other = peer.node.create_publisher(Bool, STOP_TOPIC, 10)
+    peer.wait(lambda: other.get_subscription_count() == 2, "both readers of the other button")
+    for one in (button, other):
+        one.publish(Bool(data=False))
+    button.publish(Bool(data=True))
+    peer.wait(lambda: state(peer) is State.FAULT, "FAULT")
+    for _ in range(5):
+        other.publish(Bool(data=False))
+        ok, text = command(peer, "reset")
+        assert not ok
+        assert "still pressed" in text
+        assert "peer" in text  # who presses
+    assert float(operation(peer)["is_pressed"]) == 1.0
+    button.publish(Bool(data=False))
+    peer.wait(lambda: float(operation(peer)["is_pressed"]) == 0.0, "released")
+    assert command(peer, "reset")[0]
+
+
+def test_release_overrides_a_button_that_is_gone_names_it_and_lets_reset_follow_at_once(
+    peer: "Peer", button: Publisher
+) -> None:
+    button.publish(Bool(data=True))
+    peer.wait(lambda: state(peer) is State.FAULT, "FAULT")
+    peer.node.destroy_publisher(button)
+    ok, text = command(peer, "release")
+    assert ok
+    assert "overrides" in text
+    assert "peer" in text
+    assert command(peer, "reset")[0]  # no wait: the arm itself took the release
+    assert "no stop button" in command(peer, "release")[1]
+
+
+def test_each_button_that_was_heard_has_its_own_heartbeat(peer: "Peer") -> None:
+    peer.start("slave", operation__heartbeat=0.5)
+    buttons = [peer.node.create_publisher(Bool, STOP_TOPIC, 100) for _ in range(2)]
+    peer.wait(lambda: all(b.get_subscription_count() == 2 for b in buttons), "both buttons")
+
+    def beat(*alive: Publisher, until: Callable[[], Any], what: str) -> None:
+        def turn() -> Any:
+            for one in alive:
+                one.publish(Bool(data=False))
+            time.sleep(0.02)  # the rate of heartbeats, not a wait
+            return until()
+
+        peer.wait(turn, what)
+
+    def is_enabled() -> bool:
+        for name in () if state(peer) is State.ENABLED else ("reset", "enable"):
+            command(peer, name)
+        return state(peer) is State.ENABLED
+
+    beat(*buttons, until=is_enabled, what="enabled: both beat")
+    silent = time.monotonic()
+    beat(buttons[0], until=lambda: state(peer) is State.FAULT, what="FAULT: one is silent")
+    assert time.monotonic() - silent > 0.4
+    assert float(operation(peer)["fault"]) == Fault.HEARTBEAT
+    assert not command(peer, "reset")[0]
+    beat(*buttons, until=is_enabled, what="enabled: both beat again")

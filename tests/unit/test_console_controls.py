@@ -8,21 +8,22 @@ import pytest
 import teleop_core as tc
 from teleop_core.base.errors import PartError
 from teleop_core.console.controls import CONTROLS, commands, register_control
+from teleop_core.slave.operation.states import AT_REST_ONLY, STILL_PRESSED
 
 
 class Asked:
     """A session that takes what it is told, after it was asked some times whether it rests."""
 
-    def __init__(self, moving: int = 0) -> None:
+    def __init__(self, moving: int = 0, why: str = "") -> None:
         self.words: list[tuple[str, str]] = []
         self.pressed: list[bool] = []
         self.buttons: list[tuple[str, str]] = []
-        self._moving = moving
+        self._moving, self._why = moving, why
 
     def command(self, word: str, arm: str = "") -> tuple[bool, str]:
         self.words.append((word, arm))
         self._moving -= 1
-        return self._moving < 0, f"{word}: {'done' if self._moving < 0 else 'not at rest yet'}"
+        return self._moving < 0, f"{word}: {'done' if self._moving < 0 else self._why}"
 
     def press(self, *, is_pressed: bool) -> None:
         self.pressed.append(is_pressed)
@@ -39,8 +40,9 @@ def test_initialize_lets_the_stop_go_and_then_resets_enables_and_homes() -> None
     assert [is_taken for is_taken, _ in answers] == [True] * 3
 
 
-def test_an_arm_that_is_coming_to_rest_is_asked_again() -> None:
-    session: Any = Asked(moving=2)
+@pytest.mark.parametrize("why", [AT_REST_ONLY, STILL_PRESSED])
+def test_an_arm_that_comes_to_rest_or_hears_of_a_release_soon_is_asked_again(why: str) -> None:
+    session: Any = Asked(moving=2, why=why)
     assert commands("enable")(session, "") == [(True, "enable: done")]
     assert len(session.words) == 3
 

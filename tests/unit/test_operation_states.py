@@ -218,7 +218,7 @@ def test_nothing_moves_outside_enabled_however_one_got_there(word: str) -> None:
 def test_from_an_emergency_stop_the_setpoint_stands_still_in_the_next_tick() -> None:
     arm = Arm(seconds=1.13)
     before = len(arm.setpoints)
-    arm.slave.server.press(is_pressed=True, now_ns=arm.ns)
+    arm.slave.server.press(is_pressed=True, heard_ns=arm.ns)
     arm.run(1.0)
     assert not arm.steps[before - 1 :].any()
     values = arm.slave.server.operation
@@ -278,13 +278,13 @@ def test_after_a_long_outage_motion_is_resumed_on_purpose_only() -> None:
 
 def test_a_silent_heartbeat_is_a_stop() -> None:
     arm = Arm(seconds=0.05, heartbeat=0.1)
-    arm.slave.server.press(is_pressed=False, now_ns=arm.ns)
+    arm.slave.server.press(is_pressed=False, heard_ns=arm.ns)
     arm.run(0.09)
     assert arm.state is E
     arm.run(0.03)
     assert arm.state is F
     assert arm.slave.server.request("reset")[0] is Answer.STOPPED
-    arm.slave.server.press(is_pressed=False, now_ns=arm.ns)
+    arm.slave.server.press(is_pressed=False, heard_ns=arm.ns)
     assert arm.slave.server.request("reset")[0] is Answer.DONE
 
 

@@ -11,7 +11,7 @@ def told(presses: Presses, *messages: tuple[int, bool], sender: bytes = b"a") ->
     """States that messages (number, is_pressed) of a sender add, in order."""
     return [
         said for number, is_pressed in messages
-        for said in presses.take(sender, number, is_pressed=is_pressed)
+        for said in presses.take(sender, number, 0, is_pressed=is_pressed)
     ]  # fmt: skip
 
 
@@ -30,31 +30,68 @@ def test_a_missing_message_counts_as_a_press() -> None:
     assert presses.lost == 1
 
 
-def test_a_sender_that_is_found_late_has_lost_nothing() -> None:
+def test_what_a_button_said_before_it_is_heard_counts_as_a_press() -> None:
     presses = Presses()
-    assert told(presses, (5000, False), (5001, False)) == [False, False]
+    assert told(presses, (4, False), (5, False)) == [True, False, False]
+    assert told(presses, (1, False), sender=b"b") == [False]
+    assert presses.lost == 3
+
+
+def test_what_a_button_said_before_it_is_heard_is_nothing_to_an_idle_listener() -> None:
+    presses = Presses()
+    assert presses.take(b"a", 5000, 0, is_pressed=False, is_idle=True) == (False,)
+    assert presses.take(b"a", 5001, 0, is_pressed=False) == (False,)
     assert presses.lost == 0
 
 
-def test_after_a_standstill_all_that_a_new_sender_said_before_counts_as_a_press() -> None:
+def test_only_the_button_that_presses_releases() -> None:
     presses = Presses()
-    assert presses.take(b"a", 4, is_pressed=False, stood_still=True) == (True, False)
-    assert presses.lost == 3
-    assert presses.take(b"a", 5, is_pressed=False, stood_still=True) == (False,)
-    assert presses.take(b"b", 1, is_pressed=False, stood_still=True) == (False,)
+    assert told(presses, (1, True)) == [True]
+    assert told(presses, (1, False), (2, True), (3, False), sender=b"b") == [True, True, True]
+    assert presses.holders == (b"a",)
+    assert told(presses, (2, False)) == [False]
+    assert not presses.holders
+
+
+def test_a_best_effort_button_is_released_by_itself_alone() -> None:
+    presses = Presses()
+    assert presses.overhear(b"a", 0, is_pressed=True) == (True,)
+    assert told(presses, (1, False), sender=b"b") == [True]
+    assert presses.overhear(b"b", 0, is_pressed=True) == ()  # heard by another reader already
+    assert presses.overhear(b"a", 0, is_pressed=False) == (False,)
+
+
+def test_a_release_of_all_overrides_every_button_and_misses_none_that_it_overrode() -> None:
+    presses = Presses()
+    presses.take(b"a", 1, 10, is_pressed=True)
+    presses.take(b"b", 1, 20, is_pressed=False)
+    assert (presses.heard_ns, presses.silent(20)) == (10, (b"a",))
+    presses.release()
+    assert (presses.holders, presses.heard_ns) == ((), None)
+    assert presses.take(b"b", 2, 30, is_pressed=False) == (False,)
+    assert presses.take(b"a", 2, 40, is_pressed=True) == (True,)
+
+
+def test_every_button_that_was_heard_has_its_own_deadline() -> None:
+    presses = Presses()
+    for time in range(0, 100, 10):
+        presses.take(b"a", time // 10 + 1, time, is_pressed=False)
+        if time < 30:
+            presses.take(b"b", time // 10 + 1, time, is_pressed=False)
+    assert (presses.heard_ns, presses.silent(50)) == (20, (b"b",))
 
 
 def test_a_message_that_was_lost_before_the_first_of_its_sender_counts_as_a_press() -> None:
     presses = Presses()
     assert presses.lose(0) == ()
-    assert (*presses.lose(3), *told(presses, (4, False))) == (True, False)
-    assert (presses.lose(3), presses.lose(4), presses.lost) == ((), (True,), 4)
+    assert presses.lose(3) == (True, False)
+    assert (presses.lose(3), presses.lose(4), presses.lost) == ((), (True, False), 4)
 
 
 def test_what_numbers_tell_of_one_sender_hides_no_loss_that_the_middleware_alone_knows() -> None:
     presses = Presses()
     told(presses, (1, False), (9, False))
-    assert (presses.lose(2), presses.lose(2), presses.lost) == ((True,), (), 7)
+    assert (presses.lose(2), presses.lose(2), presses.lost) == ((True, False), (), 7)
 
 
 def test_senders_do_not_fill_the_gaps_of_each_other() -> None:

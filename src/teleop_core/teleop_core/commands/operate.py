@@ -17,6 +17,7 @@ stops all arms of all `teleop live` sessions of this machine, or of one ROS doma
   teleop stop --domain 42
 the stop is latched. To go on: release it, reset and enable each arm:
   teleop operate release reset enable
+release overrides every stop button that is pressed, and names it
 """
 _OPERATE = """\
 without commands it says how the arms are; commands are sent one after the other:
@@ -98,10 +99,6 @@ def _operate(arguments: argparse.Namespace) -> int:
         with one as operator:
             names = [arguments.arm] if arguments.arm is not None else list(operator.look())
             for word in arguments.words:
-                if word == "release":
-                    operator.release()
-                    print("release: the emergency stop is not pressed")
-                    continue
                 for name in names:
                     is_done, text = operator.command(word, name)
                     print(f"{name or 'arm'}: {text}")

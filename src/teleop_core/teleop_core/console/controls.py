@@ -12,6 +12,7 @@ from teleop_core.base.errors import PartError
 from teleop_core.base.registry import Registry
 from teleop_core.console.link import ArmView, Link, View
 from teleop_core.console.status import alive, fixture_text, mode_text
+from teleop_core.slave.operation.states import AT_REST_ONLY, STILL_PRESSED
 
 Answers = Sequence[tuple[bool, str]]
 """What became of each thing that was asked: whether it was done, and a line about it."""
@@ -63,7 +64,8 @@ def _insist(link: Link, word: str, arm: str) -> tuple[bool, str]:
     until = time.monotonic() + _PATIENCE
     while True:
         is_taken, text = link.command(word, arm)
-        if is_taken or "rest" not in text or time.monotonic() > until:
+        is_passing = AT_REST_ONLY in text or STILL_PRESSED in text  # a release may be on its way
+        if is_taken or not is_passing or time.monotonic() > until:
             return is_taken, text
         time.sleep(_PAUSE)
 

@@ -13,13 +13,13 @@ STATE_COMMANDS = (
 """What an arm in operation is told, by name; see :mod:`teleop_core.slave.operation`."""
 OPERATION = (
     "state", "is_homed", "is_busy", "is_stopped", "fault", "fault_joint", "fault_value",
-    "fault_bound", "rest_time", "travel", "is_braked",
+    "fault_bound", "rest_time", "travel", "is_braked", "is_pressed",
 )  # fmt: skip
 """Numbers of ``slave/operation``: :class:`~teleop_core.slave.operation.State`, flags,
 :class:`~teleop_core.slave.operation.Fault`, the joint that it is about (-1: none), what was found
 and what it must not exceed; since it last had to stop: the time until it was at rest [s] and how
 far the tip got meanwhile [m], both 0 until then; whether its drives are to be off and brakes to
-hold it."""
+hold it; whether a stop button is still pressed, or missed."""
 
 
 class Quality(Enum):

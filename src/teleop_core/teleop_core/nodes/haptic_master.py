@@ -3,7 +3,14 @@
 from typing import Any
 
 from teleop_core.chain.master.haptic_master import HapticMasterParameters
-from teleop_core.graph.topics import HAND_SERVO_CP, MASTER_CONTACT, MASTER_SERVO_CF, Topic
+from teleop_core.graph.topics import (
+    HAND_SERVO_CP,
+    MASTER_CONTACT,
+    MASTER_SERVO_CF,
+    OPERATION,
+    SLAVE_OPERATION,
+    Topic,
+)
 from teleop_core.nodes.crtk import Condition, OperatingState, is_installed
 from teleop_core.nodes.operation import StopInput
 from teleop_core.nodes.ticking import TickingNode
@@ -75,6 +82,7 @@ class CrtkMaster:
 
 
 _MOST = MASTER_CONTACT.columns.index("largest_force")
+_PRESSED = OPERATION.index("is_pressed")
 
 
 class HapticMasterNode(TickingNode):
@@ -87,6 +95,7 @@ class HapticMasterNode(TickingNode):
         self.stage.reset()
         self._stop, self._crtk = StopInput(self), CrtkMaster(self)
         self._force = self.stage.signals[MASTER_SERVO_CF.field]
+        self._operation = self.stage.signals[SLAVE_OPERATION.field]
 
     def stop(self) -> None:
         """Forget the force: the next activation starts without."""
@@ -104,11 +113,18 @@ class HapticMasterNode(TickingNode):
             if entry.age() > self.parameters.force_timeout:
                 entry.zero()
         for pressed in self._stop.take():
-            self.stage.press(is_pressed=pressed)
-            self._crtk.press(is_pressed=pressed)
+            self._press(is_pressed=pressed)
+        was_pressed = self._operation[_PRESSED]
         super().read_ports(trigger)
+        if was_pressed and not self._operation[_PRESSED]:  # released, or overridden at the slave
+            self._stop.release()
+            self._press(is_pressed=False)
         if not self._crtk.is_enabled:
             self._force[:] = 0.0
+
+    def _press(self, *, is_pressed: bool) -> None:
+        self.stage.press(is_pressed=is_pressed)
+        self._crtk.press(is_pressed=is_pressed)
 
     def concerns(self) -> list[str]:
         """A stylus that nobody holds; motors that are too warm."""

@@ -47,7 +47,7 @@ class Commanders:
             if entry.subscription is None or not self._is_command(entry.topic.name):
                 continue
             name = f"/{entry.topic.name}"
-            senders = sorted(map(_full, self._node.get_publishers_info_by_topic(name)))
+            senders = sorted(map(full_name, self._node.get_publishers_info_by_topic(name)))
             before, self._known[name] = self._known.get(name, []), senders
             if senders != before:
                 found.append(f"{name} comes from {' and '.join(senders) or 'nobody any more'}")
@@ -59,5 +59,6 @@ class Commanders:
         )
 
 
-def _full(info: Any) -> str:
+def full_name(info: Any) -> str:
+    """Node of an endpoint, with its namespace."""
     return f"{info.node_namespace.rstrip('/')}/{info.node_name}"

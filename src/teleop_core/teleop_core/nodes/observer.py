@@ -65,6 +65,7 @@ class Observer(Guest):
 
     def take(self) -> bool:
         """Take all reports that have come; whether there were any."""
+        self._button.beat()
         is_new = False
         while (taken := self._reports.take()) is not None:
             try:
@@ -80,7 +81,7 @@ class Observer(Guest):
         return is_new
 
     def press(self, *, is_pressed: bool = True) -> None:
-        """Press the emergency stop of all arms, or release it; from any thread."""
+        """Press the emergency stop of all arms, or let this button go; from any thread."""
         self._button.say(is_pressed=is_pressed)
 
     def senders(self, topic: str) -> int:

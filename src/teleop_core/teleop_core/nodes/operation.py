@@ -1,23 +1,26 @@
 """Operation on topics and services: the emergency stop of all arms, and the commands of each."""
 
-import math
 import time
+from collections.abc import Callable, Iterable
+from functools import partial
 from typing import Any, Protocol
 
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from std_msgs.msg import Bool
 from std_srvs.srv import Trigger
 
+from teleop_core.nodes.news import full_name
 from teleop_core.nodes.taking import Taker
 from teleop_core.slave.operation.presses import Presses
 from teleop_core.slave.operation.states import COMMANDS, Answer
 
 STOP_TOPIC = "/teleop/stop"
 """Emergency stop of all arms, std_msgs/Bool: true stops; false says that it is alive."""
+RELEASE = "release"
+"""Service that overrides stop buttons which are pressed; it is no command of the arm's state."""
 _EVERY = 4
-_STANDSTILL, _AFTER = 0.1, 1.0
-"""Time between two looks that is a standstill, and in which it may have lost a button's first
-messages after that [s]."""
+_BEAT = 0.1
+"""A button of this package that has spoken says its state again so often [s]."""
 _BYTES = 5
 """A Bool as CDR: four bytes of encapsulation, one of data."""
 _RELIABLE, _BEST_EFFORT = ReliabilityPolicy.RELIABLE, ReliabilityPolicy.BEST_EFFORT
@@ -46,7 +49,8 @@ class StopButton:
     def __init__(self, node: Any) -> None:
         profile = QoSProfile(depth=1, reliability=_RELIABLE, durability=_LATCHED)
         self._own = node.create_publisher(Bool, STOP_TOPIC, profile)
-        self._is_released = False
+        self._is_pressed: bool | None = None
+        self._said = 0.0
 
     def say(self, *, is_pressed: bool) -> None:
         """Say that it is pressed, or that it is not; from any thread.
@@ -54,9 +58,20 @@ class StopButton:
         A release is said once: the middleware sends the last message again until it has arrived,
         and one that is missing before it would count as a press.
         """
-        if self._is_released and not is_pressed:
+        if self._is_pressed is False and not is_pressed:
             return
-        self._is_released = not is_pressed
+        self._say(is_pressed)
+
+    def beat(self) -> None:
+        """Say its state again, if it has one and the last time is a while ago.
+
+        A slave with a heartbeat misses every button that it has heard.
+        """
+        if self._is_pressed is not None and time.monotonic() - self._said > _BEAT:
+            self._say(self._is_pressed)
+
+    def _say(self, is_pressed: bool) -> None:
+        self._is_pressed, self._said = is_pressed, time.monotonic()
         self._own.publish(Bool(data=is_pressed))
 
     @property
@@ -69,86 +84,160 @@ class StopInput:
     """The emergency stop, looked at in every tick: 1 µs, and no executor on the way.
 
     The first reader is looked at in every tick, the two others in every fourth. No press is lost:
-    readers keep all messages, a missing message counts as a press
-    (:class:`~teleop_core.slave.operation.presses.Presses`), and a :class:`StopButton` that was
-    pressed before it was found tells so. What is missing shows in the numbers of messages, and in
-    the account of the first reader, which hears all who send reliably. A process that stands still
-    as a button is found may lose its first messages, and neither tells: a button that the first
-    reader hears for the first time soon after a standstill, and not from its first message on,
-    counts as pressed. The second reader hears what was said long ago, too.
+    readers keep all messages, and what is missing counts as a press
+    (:class:`~teleop_core.slave.operation.presses.Presses`), by the numbers of messages and by the
+    account of the first reader, which hears all who send reliably. The second reader hears what was
+    said long ago, too.
 
     Args:
         node: Node that owns it.
+
+    Attributes:
+        has_new: Whether a button was heard for the first time; set it back before :meth:`learn`.
     """
 
     def __init__(self, node: Any) -> None:
+        self._node, self.has_new = node, False
         self._takers = [Taker(node, Bool, STOP_TOPIC, stop_profile(*kind)) for kind in _READERS]
         self._presses, self._ticks = Presses(), 0
-        self._looked, self._still = math.inf, -math.inf  # times of the last look, and standstill
+        self._names: dict[bytes, str] = {}
 
-    def take(self) -> list[bool]:
-        """What was said since the last call, oldest first: pressed or not; mostly nothing."""
+    def take(self, now_ns: int = 0, *, is_idle: bool = False) -> list[bool]:
+        """What the stop was since the last call, oldest first: pressed or not; mostly nothing.
+
+        Args:
+            now_ns: Time, of any clock that never goes back [ns].
+            is_idle: Whether a press before the first message of a new button stops nothing.
+        """
         found: list[bool] = []
         self._ticks += 1
-        now, before = time.monotonic(), self._looked
-        self._looked = now
-        if now - before > _STANDSTILL:
-            self._still = now
-        stood_still = now - self._still < _AFTER
+        presses, best_effort = self._presses, self._takers[-1]
         for taker in self._takers if self._ticks % _EVERY == 0 else self._takers[:1]:
             while (taken := taker.take()) is not None:
                 if len(taken.data) < _BYTES:
                     continue
+                self.has_new = self.has_new or not presses.knows(taken.sender)
                 is_pressed = taken.data[_BYTES - 1] != 0
-                if taker is not self._takers[-1]:
-                    found += self._presses.take(
-                        taken.sender, taken.number, is_pressed=is_pressed,
-                        stood_still=stood_still and taker is self._takers[0],
-                    )  # fmt: skip
-                elif not self._presses.knows(taken.sender):
-                    found.append(is_pressed)
-        return [*self._presses.lose(self._takers[0].lost), *found]
+                if taker is best_effort:
+                    found += presses.overhear(taken.sender, now_ns, is_pressed=is_pressed)
+                else:
+                    found += presses.take(
+                        taken.sender, taken.number, now_ns, is_pressed=is_pressed, is_idle=is_idle
+                    )
+        return [*presses.lose(self._takers[0].lost), *found]
+
+    @property
+    def heard_ns(self) -> int | None:
+        """Time of the last message of the button that has been silent longest [ns]."""
+        return self._presses.heard_ns
 
     @property
     def lost(self) -> int:
         """Messages of stop buttons that were lost; each counted as a press."""
         return self._presses.lost
 
+    def holders(self, silent_since_ns: int = 0) -> tuple[bytes, ...]:
+        """Buttons that hold the stop pressed, or have been silent since then [ns]."""
+        presses = self._presses
+        return tuple(dict.fromkeys((*presses.holders, *presses.silent(silent_since_ns))))
+
+    def learn(self) -> None:
+        """Look up the names of new buttons before they are gone; takes longer than a tick."""
+        self._look_up()
+
+    def names(self, buttons: Iterable[bytes]) -> str:
+        """Names of buttons, for people; takes longer than a tick."""
+        there = self._look_up()
+        return " and ".join(
+            self._names.get(one, "a button") + ("" if one in there else " (gone)")
+            for one in buttons
+        )  # fmt: skip
+
+    def unheard(self) -> str:
+        """Names of buttons whose state nobody knows; takes longer than a tick.
+
+        They are there, have said nothing yet, and do not repeat their state for late readers.
+        """
+        return " and ".join(
+            name
+            for one, (name, is_latched) in self._look_up().items()
+            if not (is_latched or self._presses.knows(one))
+        )
+
+    def release(self) -> None:
+        """Override all buttons that hold the stop pressed, or are missed."""
+        self._presses.release()
+
     def close(self) -> None:
         """Stop listening."""
         for taker in self._takers:
             taker.close()
 
+    def _look_up(self) -> dict[bytes, tuple[str, bool]]:
+        """Name of each button that is there, and whether it tells its state to who comes late."""
+        there = {
+            bytes(info.endpoint_gid): (
+                full_name(info), info.qos_profile.durability == _LATCHED
+            )
+            for info in self._node.get_publishers_info_by_topic(STOP_TOPIC)
+        }  # fmt: skip
+        self._names |= {sender: name for sender, (name, _) in there.items()}
+        return there
+
 
 class Commanded(Protocol):
-    """What takes commands by name; the answer comes with a text."""
+    """What takes commands by name, of which the answer comes with a text, and the stop."""
 
     def request(self, event: str) -> tuple[Answer, str]:
-        """Take one."""
+        """Take a command."""
+
+    def press(self, *, is_pressed: bool, heard_ns: int) -> None:
+        """Take what stop buttons said."""
 
 
 class CommandServices:
-    """Services ``slave/enable``, ``slave/stop``, … of one arm, all std_srvs/Trigger.
+    """Services ``slave/enable``, ``slave/stop``, … and ``slave/release`` of one arm.
+
+    All are std_srvs/Trigger. ``slave/release`` overrides the stop buttons that are pressed or
+    missed, and its answer names them; the stop stays latched until ``slave/reset``.
 
     Args:
         node: Node that owns them; its ``lock`` is held while a command is taken.
         arm: What takes the commands.
+        stop: Its emergency stop.
+        holders: Which buttons hold the stop now.
     """
 
-    def __init__(self, node: Any, arm: Commanded) -> None:
-        self._node, self._arm = node, arm
+    def __init__(
+        self, node: Any, arm: Commanded, stop: StopInput, holders: Callable[[], tuple[bytes, ...]]
+    ) -> None:
+        self._node, self._arm, self._stop, self._holders = node, arm, stop, holders
+        calls = {name: partial(self._command, name) for name in COMMANDS}
         self._own = [
-            node.create_service(Trigger, f"slave/{name}", self._callback(name)) for name in COMMANDS
+            node.create_service(Trigger, f"slave/{name}", call)
+            for name, call in (calls | {RELEASE: self._release}).items()
         ]
 
-    def _callback(self, name: str) -> Any:
-        def answer(_: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-            with self._node.lock:
-                found, text = self._arm.request(name)
-            response.success, response.message = found in {Answer.DONE, Answer.ALREADY}, text
-            return response
+    def _command(
+        self, name: str, _: Trigger.Request, response: Trigger.Response
+    ) -> Trigger.Response:
+        with self._node.lock:
+            found, text = self._arm.request(name)
+            holders = self._holders() if found is Answer.STOPPED else ()
+        if holders:
+            names = self._stop.names(holders)
+            text += f"; {names} presses it, and `teleop operate release` overrides that"
+        response.success, response.message = found in {Answer.DONE, Answer.ALREADY}, text
+        return response
 
-        return answer
+    def _release(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        with self._node.lock:
+            holders = self._holders()
+            self._stop.release()
+            self._arm.press(is_pressed=False, heard_ns=int(self._node.row["now_ns"]))
+        done = f"overrides {self._stop.names(holders)}" if holders else "no stop button is pressed"
+        response.success, response.message = True, f"{RELEASE}: {done}"
+        return response
 
     def close(self) -> None:
         """Withdraw them."""

@@ -105,19 +105,16 @@ class RemoteControl(Guest):
             raise SessionError(f"{what} the stop on ROS domain {self.domain}")
         return self.arms
 
-    def release(self) -> None:
-        """Say that the emergency stop is not pressed; what it stopped stays stopped."""
-        self.look()
-        self._until(lambda: self._button.listeners > 0, must=False)
-        self._button.say(is_pressed=False)
-        self.listen()
-
     def go_on(self) -> list[str]:
-        """Release the stop, and reset and enable, or resume, every arm; what they answer.
+        """Reset and enable, or resume, every arm; what they answer.
 
-        An arm that was stopped before it was homed homes then.
+        An arm that was stopped before it was homed homes then. An arm whose stop is being released
+        is waited for; one whose stop stays pressed says who presses it.
         """
-        self.release()
+        self.look()
+        self._until(
+            lambda: not any(arm.values["is_pressed"] for arm in self.arms.values()), must=False
+        )
         told = []
         for arm, state in self.arms.items():
             words = ["resume"] if state.values["state"] == State.PAUSED else ["reset", "enable"]
@@ -139,7 +136,8 @@ class RemoteControl(Guest):
         """Send a state command to an arm; whether it was taken, and the arm's answer.
 
         Args:
-            name: One of :data:`~teleop_core.slave.operation.states.COMMANDS`.
+            name: One of :data:`~teleop_core.slave.operation.states.COMMANDS`, or ``release``, which
+                overrides the stop buttons that are pressed.
             arm: Its namespace.
 
         Raises:

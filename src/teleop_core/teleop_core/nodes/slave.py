@@ -8,6 +8,7 @@ from teleop_core.graph.signals import TICK_NS
 from teleop_core.graph.topics import SLAVE_MEASURED_JS, SLAVE_SERVO_JP
 from teleop_core.nodes.crtk_slave import CrtkSlave
 from teleop_core.nodes.operation import CommandServices, StopInput
+from teleop_core.nodes.sender import SECOND_NS
 from teleop_core.nodes.ticking import TickingNode
 from teleop_core.slave.commands import CommandStatus
 from teleop_core.slave.operation import Fault, State, operation_text
@@ -31,7 +32,8 @@ class SlaveNode(TickingNode):
     def setup(self, parameters: SlaveParameters) -> None:
         """Make the slave, open its topics, and listen to the emergency stop and to commands."""
         super().setup(parameters)
-        self._stop, self._commands = StopInput(self), CommandServices(self, self.stage)
+        self._stop = StopInput(self)
+        self._commands = CommandServices(self, self.stage, self._stop, self._holders)
         self._crtk = CrtkSlave(self, self.stage)
         self._told_state = int(State.DISABLED)
 
@@ -65,10 +67,14 @@ class SlaveNode(TickingNode):
 
     def advance(self, now_ns: int) -> None:
         """Take the emergency stop, then make one step, also of many that are to be made up for."""
-        for is_pressed in self._stop.take():
-            with self.lock:
-                self.stage.press(is_pressed=is_pressed, now_ns=now_ns)
-        super().advance(now_ns)
+        with self.lock:  # over both: a reset between them would find a silent button released
+            is_idle = self._state[0] == State.DISABLED
+            for is_pressed in self._stop.take(now_ns, is_idle=is_idle):
+                heard_ns = self._stop.heard_ns
+                self.stage.press(
+                    is_pressed=is_pressed, heard_ns=now_ns if heard_ns is None else heard_ns
+                )
+            self.stage.step()
 
     def _look(self) -> None:
         """Find the faults that only a node can see."""
@@ -78,6 +84,9 @@ class SlaveNode(TickingNode):
         self._seen, self._missed = counts, counts.missed
         if 0.0 < longest < missed:
             self._fail(Fault.STALL, missed, longest)
+        if self._stop.has_new and self.executor is not None:
+            self._stop.has_new = False
+            self.executor.create_task(self._stop.learn)
         self._turns += 1
         if self._turns % _SELDOM == 0:
             self._look_around()
@@ -96,6 +105,12 @@ class SlaveNode(TickingNode):
         if floods > self._floods:
             self._floods = floods
             self._fail(Fault.FLOOD)
+
+    def _holders(self) -> tuple[bytes, ...]:
+        """Stop buttons that are pressed, or missed."""
+        heartbeat_ns = round(self.parameters.operation.heartbeat * SECOND_NS)
+        since_ns = int(self.row["now_ns"]) - heartbeat_ns if heartbeat_ns else 0
+        return self._stop.holders(since_ns)
 
     def _fail(self, fault: Fault, value: float = 0.0, bound: float = 0.0) -> None:
         with self.lock:
@@ -119,7 +134,16 @@ class SlaveNode(TickingNode):
         log.error(text) if is_bad else log.info(text)
 
     def concerns(self) -> list[str]:
-        """A slave that holds still because nothing sound tells it where to go, or where it is."""
+        """Reasons why it holds still; stop buttons that may be pressed without its knowing."""
+        return [*self._standstills(), *self._unknown_buttons()]
+
+    def _unknown_buttons(self) -> list[str]:
+        unheard = self._stop.unheard()
+        if not unheard:
+            return []
+        return [f"{unheard} has not said yet whether the stop is pressed: press and release it"]
+
+    def _standstills(self) -> list[str]:
         if not self._is_told:
             return ["waits for slave/measured_js: nobody says where the arm is"]
         status, values = CommandStatus(self.row["command_status"]), self.stage.operation
@@ -146,4 +170,6 @@ class SlaveNode(TickingNode):
         text = operation_text(self.stage.operation, self.stage.robot.joint_names)
         jumped = {"refused.slave/servo_jp.jump": str(self.stage.refused)}
         lost = {"stop_messages_lost": str(self._stop.lost)}
+        if holders := self._holders():
+            lost["stop_pressed_by"] = self._stop.names(holders)
         return {**jumped, **lost, "operation": text, **self._crtk.values()}

@@ -256,16 +256,20 @@ class Slave(RunningStage):
         asked = command_event(event) if isinstance(event, str) else event
         before = State(int(self.state["state"]))
         answer = Answer(_request(self.parameters, self.state, int(asked)))
-        return answer, answer_text(asked, answer, before)
+        text = answer_text(asked, answer, before)
+        if asked is Event.ENABLE and answer is Answer.DONE and not self.state["is_homed"]:
+            text += "; it is not homed: home next"
+        return answer, text
 
-    def press(self, *, is_pressed: bool, now_ns: int) -> None:
-        """Take a message of the stop button: pressed, or not; either way it is alive.
+    def press(self, *, is_pressed: bool, heard_ns: int) -> None:
+        """Take what stop buttons said: whether any of them holds the stop pressed.
 
         Args:
-            is_pressed: Whether it is.
-            now_ns: Time [ns].
+            is_pressed: Whether one does.
+            heard_ns: Time of the last message of the button that has been silent longest [ns]; the
+                heartbeat counts from then.
         """
-        self.state["is_pressed"], self.state["heard_ns"] = is_pressed, now_ns
+        self.state["is_pressed"], self.state["heard_ns"] = is_pressed, heard_ns
         if is_pressed:
             self.request(Event.STOP)
 

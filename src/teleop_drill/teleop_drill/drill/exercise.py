@@ -102,8 +102,8 @@ class Rig(Protocol):
     def now_ns(self) -> int:
         """Time [ns]."""
 
-    def press(self, *, is_pressed: bool) -> None:
-        """Send a message of the stop button."""
+    def press(self, *, is_pressed: bool, button: int = 0) -> None:
+        """Send a message of a stop button: the first one, or another."""
 
     def command(self, name: str) -> bool:
         """Ask the slave for something by service; whether it was done."""
@@ -179,6 +179,7 @@ class Exercise:
         allowed: Time for which it may go on as it moves [s], before it has to brake.
         stands: Time for which an arm that goes on may stand still all the same [s].
         gap: Time for which commands may be missing that the arm makes up for [s].
+        said: What the arm must have answered, as :meth:`Rig.note` took it; empty: anything.
         told: Time after which ``slave/operation`` tells the state or the fault [s]; None: never.
         warns: Whether a node must warn of it in ``diagnostics``.
         hand_speed: Largest speed of the hand, or of what leads the tip in its place [m/s].
@@ -203,6 +204,7 @@ class Exercise:
     allowed: Time = command_timeout
     stands: Time = never
     gap: Time = never
+    said: str = ""
     told: Time | None = None
     warns: bool = False
     hand_speed: float = SPEED

@@ -16,7 +16,14 @@ from weakref import WeakKeyDictionary
 from teleop_core.base.errors import PartError
 from teleop_core.base.parameters import NoParameters
 from teleop_core.graph.stage import STAGES, RunningStage, Stage, register_stage
-from teleop_core.graph.topics import SLAVE_SERVO_CP, Kind, Topic, passed_on
+from teleop_core.graph.topics import (
+    OPERATION,
+    SLAVE_OPERATION,
+    SLAVE_SERVO_CP,
+    Kind,
+    Topic,
+    passed_on,
+)
 from teleop_core.kernels.geometry import Array
 from teleop_core.slave.slave_sim import SlaveSim
 
@@ -24,8 +31,10 @@ VARIABLE = "TELEOP_DRILL"
 """Environment variable with the name of the file that says what is to break."""
 STAGE_NAME = "drill_stage"
 _FORM = struct.Struct("<qq")
-WORKS, HANGS, RAISES, STICKS = 0, 1, 2, 3
-"""What the stage does; or what the joints do, which no parameter of a session can make stick."""
+WORKS, HANGS, RAISES, STICKS, RACES = 0, 1, 2, 3, 4
+"""What the stage does; or what the joints do, which no parameter of a session makes stick or race.
+"""
+_BRAKED = OPERATION.index("is_braked")
 _TURN = 5e-3  # from one look of the joints at what they do to the next [s]
 
 
@@ -95,7 +104,8 @@ def _step_clock(control: Control) -> None:
 class _Joints:
     """Joints of all simulated slaves of the process: they stick as long as they are told to.
 
-    Their dry friction is then twice what the drives can give, as under a load far too heavy.
+    Their dry friction is then twice what the drives can give, as under a load far too heavy. Or the
+    first one races: it is pushed to twice its speed until the brakes hold it.
     """
 
     def __init__(self, control: Control) -> None:
@@ -130,6 +140,9 @@ class _Joints:
                     friction[:] = 2.0 * slave.parameters["effort_limit"]
                 elif before is not None:
                     friction[:], self._slaves[slave] = before, None
+                is_braked = slave.signals[SLAVE_OPERATION.field][_BRAKED] > 0.0
+                if self._control.word == RACES and not is_braked:
+                    slave.arm.dq[0] = 2.0 * slave.parameters["speed_limit"][0]
 
 
 def _install() -> None:

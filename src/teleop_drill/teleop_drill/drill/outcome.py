@@ -64,6 +64,8 @@ class Outcome:
         if asked.faults and self.fault not in asked.faults:
             wanted = " or ".join(fault.word for fault in asked.faults)
             found.append(f"told {self.fault.word}, not {wanted}")
+        if asked.said and self.note != asked.said:
+            found.append(f"answered {self.note or 'nothing'!r}, not {asked.said!r}")
         found += [one.failure for one in self.measures.values() if one.failure]
         if not self.is_recorded:
             found.append(f"recording: {self.recording}")

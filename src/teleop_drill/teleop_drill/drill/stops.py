@@ -1,17 +1,22 @@
 """Exercises with what people do: stop buttons, their silence, wrong parameters."""
 
+import math
 from functools import partial
 
 from teleop_core.slave.operation import Fault, State
 from teleop_drill.drill import hand
 from teleop_drill.drill.exercise import Cure, Exercise, Motion, Rig, Time, after, at_once
-from teleop_drill.drill.inside import STICKS, WORKS
+from teleop_drill.drill.inside import RACES, STICKS, WORKS
 
 HEARTBEAT = 0.5
 """Silence of the stop button that counts as pressed, while it is drilled [s]."""
 _SERVICE = 0.02
 """What a service may take to reach the arm's loop through the executors of both sides [s]."""
+_RACE = 0.1
+"""Time in which a joint at twice its speed is to be found: the drill pushes it every 5 ms [s]."""
 _STILL = 0.3  # less than what pauses the arm [s]
+_BEAT = 0.02  # from one message of a stop button to the next [s]
+_REFUSED = "refused"
 _ROUNDS = 2.0  # within this time [s] the circle of the hand has pulled every way
 
 
@@ -51,13 +56,18 @@ def _disable(rig: Rig) -> None:
 
 
 def _miss_heartbeat(rig: Rig) -> None:
+    """Two buttons beat; then one of them alone."""
     for count in range(20):
-        rig.press(is_pressed=False)
-        rig.wait(0.02)
+        for button in (1, 0):
+            rig.press(is_pressed=False, button=button)
+        rig.wait(_BEAT)
         if count == 1:
             rig.set("slave", "operation.heartbeat", HEARTBEAT)
     rig.press(is_pressed=False)
     rig.mark()
+    for _ in range(round(2.0 * HEARTBEAT / _BEAT)):
+        rig.press(is_pressed=False, button=1)
+        rig.wait(_BEAT)
 
 
 def _hear_again(rig: Rig) -> None:
@@ -65,20 +75,34 @@ def _hear_again(rig: Rig) -> None:
     _release(rig)
 
 
+def _note_answer(rig: Rig, *, is_taken: bool) -> None:
+    rig.note("taken" if is_taken else _REFUSED)
+
+
 def _press_while_masked(rig: Rig) -> None:
-    """Press, then claim that it is released and ask for motion, without a reset."""
-    rig.mark()
+    """Press and ask for a reset; then release, and ask for motion without a reset."""
     rig.press(is_pressed=True)
     rig.wait(0.5)  # until it is at rest: before, enable is refused anyway
+    is_taken = rig.command("reset")
     rig.press(is_pressed=False)
-    is_taken = rig.command("enable") or rig.command("resume")
-    rig.note("taken" if is_taken else "refused")
+    is_taken = rig.command("enable") or rig.command("resume") or is_taken
+    _note_answer(rig, is_taken=is_taken)
+
+
+def _press_two(rig: Rig) -> None:
+    """Press one button, and say with another one that it is released."""
+    rig.press(is_pressed=False, button=1)  # it is known before
+    rig.press(is_pressed=True)
+    rig.wait(0.5)
+    rig.press(is_pressed=False, button=1)
+    rig.wait(0.1)
+    _note_answer(rig, is_taken=rig.command("reset"))
 
 
 def _resume_early(rig: Rig) -> None:
     """Pause and resume in one breath: the second comes while the arm brakes."""
     rig.mark()
-    rig.note("taken" if rig.commands("pause", "resume")[1] else "refused")
+    _note_answer(rig, is_taken=rig.commands("pause", "resume")[1])
 
 
 def _hold_fast(fault: Fault, rig: Rig) -> None:
@@ -89,6 +113,15 @@ def _hold_fast(fault: Fault, rig: Rig) -> None:
         rig.set("slave", "operation.tip_error", 0.5 * hand.RADIUS)
     rig.mark()
     rig.control(STICKS)
+
+
+def _run_away(rig: Rig) -> None:
+    """A drive that obeys nobody: one joint races, and its speed alone may stop the arm."""
+    rig.set(
+        "slave", "operation.reported", [one.word for one in _STUCK if one is not Fault.OVERSPEED]
+    )
+    rig.mark()
+    rig.control(RACES)
 
 
 def _let_go(rig: Rig) -> None:
@@ -117,14 +150,14 @@ def _take_bad_gains(rig: Rig) -> None:
     """A bandwidth at which no sampled loop at 1 kHz is stable."""
     rig.mark()
     is_taken = rig.set("slave_sim", "controller.pid.bandwidth", [3000.0] * len(rig.setpoint()))
-    rig.note("taken" if is_taken else "refused")
+    _note_answer(rig, is_taken=is_taken)
 
 
 def _take_slack_gains(rig: Rig) -> None:
     """A bandwidth at which the arm follows nothing."""
     rig.mark()
     is_taken = rig.set("slave_sim", "controller.pid.bandwidth", [0.1] * len(rig.setpoint()))
-    rig.note("taken" if is_taken else "refused")
+    _note_answer(rig, is_taken=is_taken)
 
 
 def _take_good_gains(rig: Rig) -> None:
@@ -148,16 +181,23 @@ STOPS = (
         told=after(_SERVICE),
     ),
     Exercise(
-        name="stop_latched", text="stop released, enable and resume without reset",
-        inject=_press_while_masked, undo=_release,
+        name="stop_latched",
+        text="reset while the stop is pressed; then released, enable and resume without reset",
+        inject=_press_while_masked, undo=_release, said=_REFUSED,
         states=(State.FAULT,), faults=(Fault.STOP,), cures=(Cure.RESET,), allowed=at_once,
         told=at_once,
     ),
     Exercise(
-        name="heartbeat", text="stop button falls silent (heartbeat 0.5 s)",
+        name="stop_two", text="stop pressed by one button, released by another, reset",
+        inject=_press_two, undo=_release, said=_REFUSED,
+        states=(State.FAULT,), faults=(Fault.STOP,), cures=(Cure.RESET,), allowed=at_once,
+        told=at_once,
+    ),
+    Exercise(
+        name="heartbeat", text="one stop button of two falls silent (heartbeat 0.5 s)",
         inject=_miss_heartbeat, undo=_hear_again,
         states=(State.FAULT,), faults=(Fault.HEARTBEAT,), cures=(Cure.RESET,),
-        allowed=after(HEARTBEAT), told=after(HEARTBEAT), watch=2.0 * HEARTBEAT,
+        allowed=after(HEARTBEAT), told=after(HEARTBEAT),
     ),
     Exercise(
         name="disable", text="disabled by service", inject=_disable,
@@ -166,20 +206,26 @@ STOPS = (
     ),
     Exercise(
         name="resume_early", text="paused, and resumed before it is at rest",
-        inject=_resume_early, states=(State.PAUSED,), cures=(Cure.RESUME,),
+        inject=_resume_early, states=(State.PAUSED,), cures=(Cure.RESUME,), said=_REFUSED,
         allowed=after(_SERVICE), told=after(_SERVICE),
     ),
     _stuck(Fault.TRACKING, lambda _: _ROUNDS),
     _stuck(Fault.TIP, lambda _: _ROUNDS),
     _stuck(Fault.EFFORT, lambda numbers: numbers.effort_time + 0.25 * _ROUNDS),
     Exercise(
+        name="overspeed", text="a joint runs away; overspeed alone may stop it",
+        inject=_run_away, undo=_let_go, motion=Motion.LED, states=(State.FAULT,),
+        faults=(Fault.OVERSPEED,), cures=(Cure.RESET,), told=after(_RACE), hand_speed=math.inf,
+        breaks_simulator=True,
+    ),
+    Exercise(
         name="wild_gains", text="gains that are unstable at 1 kHz", inject=_take_bad_gains,
-        undo=_take_good_gains, motion=Motion.GOES_ON, states=(State.ENABLED,),
+        undo=_take_good_gains, motion=Motion.GOES_ON, states=(State.ENABLED,), said=_REFUSED,
         cures=(Cure.NOTHING,),
     ),
     Exercise(
         name="slack_gains", text="gains that follow nothing", inject=_take_slack_gains,
-        undo=_take_good_gains, motion=Motion.GOES_ON, watch=2.0,
+        undo=_take_good_gains, motion=Motion.GOES_ON, watch=2.0, said=_REFUSED,
     ),
 )  # fmt: skip
 """What people do, rightly and wrongly."""

@@ -84,10 +84,7 @@ class LiveRig:
         self._node, self._own = (self._make_node("drill"), self._make_node("drill_hand"))
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self._node)
-        self._stop = self._node.create_publisher(  # as anybody's button, which keeps no state
-            Bool, STOP_TOPIC, 100,
-            event_callbacks=PublisherEventCallbacks(use_default_callbacks=False),
-        )  # fmt: skip
+        self._buttons: dict[int, Any] = {}
         self._speeds = self._node.create_publisher(JointState, "/slave/servo_jv", 10)
         self._services = {
             name: self._node.create_client(Trigger, f"/slave/{name}") for name in COMMANDS
@@ -298,14 +295,19 @@ class LiveRig:
                 self.mark()
         return self._intruders[topic.name]
 
-    def press(self, *, is_pressed: bool) -> None:
-        """Send a message of the stop button."""
-        deadline = time.monotonic() + _FOUND
-        while self._stop.get_subscription_count() == 0 and time.monotonic() < deadline:
+    def press(self, *, is_pressed: bool, button: int = 0) -> None:
+        """Send a message of a stop button: the first one, or another."""
+        if button not in self._buttons:  # as anybody's, which keeps no state
+            self._buttons[button] = self._node.create_publisher(
+                Bool, STOP_TOPIC, 100,
+                event_callbacks=PublisherEventCallbacks(use_default_callbacks=False),
+            )  # fmt: skip
+        own, deadline = self._buttons[button], time.monotonic() + _FOUND
+        while own.get_subscription_count() == 0 and time.monotonic() < deadline:
             time.sleep(2e-3)
         if is_pressed:
             self.mark()
-        self._stop.publish(Bool(data=is_pressed))
+        own.publish(Bool(data=is_pressed))
 
     # -- services --------------------------------------------------------------------------------
 

@@ -1,18 +1,26 @@
-"""Presses: what messages of emergency stop buttons say, so that no press of one is lost."""
+"""Presses: which emergency stop buttons hold the stop pressed, so that no press is lost."""
 
 
 class Presses:
-    """Orders the messages of all stop buttons, and takes a lost message as a press.
+    """State of every stop button that was heard, and of the stop that all of them share.
 
-    Every sender numbers its messages, 1 for the first. A number that is left out belongs to a
-    message that was lost, by a full queue, by a process that stood still, or on the way; it may
-    have been a press, so it counts as one. Of a sender that is heard for the first time all before
-    may have been said long ago; it counts where the listener stood still meanwhile, for it may have
-    been sent to it then. A message that arrives twice, through two readers, counts once.
+    The stop is pressed while at least one button holds it. A button holds it from its press to its
+    own release: what another button says releases nothing. :meth:`release` overrides them all.
+
+    Every button numbers its messages, 1 for the first. A missing number belongs to a message that
+    was lost: by a full queue, by a process that stood still, or on the way. It may have been a
+    press, so it counts as one. What a button said before it is heard for the first time may have
+    been sent to this listener too, so messages before the first one count as missing, unless the
+    listener is idle. A message that arrives twice, through two readers, counts once.
+
+    Methods that take a message return what the stop is after it, oldest first: a press alone
+    (True), followed by False where no button holds the stop any more.
     """
 
     def __init__(self) -> None:
         self._last: dict[bytes, int] = {}
+        self._heard_ns: dict[bytes, int] = {}
+        self._holders: dict[bytes, None] = {}  # in the order of their presses
         self._missing = self._told = 0
 
     @property
@@ -20,46 +28,86 @@ class Presses:
         """Messages that were lost so far, by their numbers or by the middleware's account."""
         return max(self._missing, self._told)
 
+    @property
+    def holders(self) -> tuple[bytes, ...]:
+        """Buttons that hold the stop pressed, in the order of their presses."""
+        return tuple(self._holders)
+
+    @property
+    def heard_ns(self) -> int | None:
+        """Time of the last message of the button that is silent longest [ns]; None without one."""
+        return min(self._heard_ns.values(), default=None)
+
+    def silent(self, since_ns: int) -> tuple[bytes, ...]:
+        """Buttons that have said nothing since a time [ns]."""
+        return tuple(one for one, heard_ns in self._heard_ns.items() if heard_ns < since_ns)
+
     def lose(self, count: int) -> tuple[bool, ...]:
-        """States of the button that the middleware's own account of lost messages adds.
+        """Take the middleware's own account of lost messages; nobody knows whose they were.
 
         Args:
-            count: Messages that it has lost so far, of all senders.
+            count: Messages that it has lost so far, of all buttons.
 
         Returns:
-            A press if these are more than at the last call; otherwise nothing. A loss that the
-            numbers told too may give a second press: taking it off the account could hide the loss
-            of another sender.
+            A press, if these are more than at the last call. A loss that the numbers told too may
+            give a second press: subtracting it could hide a loss of another button.
         """
         is_new = count > self._told
         self._told = count
-        return (True,) if is_new else ()
+        return self._pressed() if is_new else ()
 
     def take(
-        self, sender: bytes, number: int, *, is_pressed: bool, stood_still: bool = False
+        self, sender: bytes, number: int, now_ns: int, *, is_pressed: bool, is_idle: bool = False
     ) -> tuple[bool, ...]:
-        """States of the button, oldest first, that a message of a reliable sender adds.
+        """Take a message of a reliable button.
 
         Args:
-            sender: Identity of the sender.
-            number: Number of the message at its sender, 1 for the first; 0 where the middleware
+            sender: Identity of the button.
+            number: Number of the message at its button, 1 for the first; 0 where the middleware
                 does not number messages.
+            now_ns: Time [ns], of any clock that never goes back.
             is_pressed: What the message says.
-            stood_still: Whether the listener has just stood still.
+            is_idle: Whether a press that a person made before this button was heard for the first
+                time stops nothing: the arm is disabled.
 
         Returns:
-            Nothing for a message that was taken already; a press first where messages are missing
-            before this one. Of a sender that is heard for the first time nothing is missing, but
-            after a standstill all before.
+            Nothing for a message that was taken already.
         """
-        last = self._last.get(sender, 0 if stood_still else number - 1)
+        last = self._last.get(sender, number - 1 if is_idle else 0)
         if 0 < number <= last:
             return ()
         self._last[sender] = number
         missing = max(0, number - last - 1)
         self._missing += missing
-        return (True, is_pressed) if missing else (is_pressed,)
+        said = self._note(sender, now_ns, is_pressed=is_pressed)
+        return (True, *said) if missing else said
+
+    def overhear(self, sender: bytes, now_ns: int, *, is_pressed: bool) -> tuple[bool, ...]:
+        """Take a message of a best-effort button, whose losses nobody counts.
+
+        Args:
+            sender: Identity of the button; one that :meth:`take` knows is passed over.
+            now_ns: As there.
+            is_pressed: What the message says.
+        """
+        return () if sender in self._last else self._note(sender, now_ns, is_pressed=is_pressed)
+
+    def release(self) -> None:
+        """Override all buttons: none holds the stop, and none is missed before it speaks again."""
+        self._holders.clear()
+        self._heard_ns.clear()
 
     def knows(self, sender: bytes) -> bool:
-        """Whether a reliable message of this sender has been taken."""
-        return sender in self._last
+        """Whether this button has been heard."""
+        return sender in self._heard_ns or sender in self._last
+
+    def _note(self, sender: bytes, now_ns: int, *, is_pressed: bool) -> tuple[bool, ...]:
+        self._heard_ns[sender] = now_ns
+        if is_pressed:
+            self._holders[sender] = None
+            return (True,)
+        self._holders.pop(sender, None)
+        return (bool(self._holders),)
+
+    def _pressed(self) -> tuple[bool, ...]:
+        return (True,) if self._holders else (True, False)

@@ -14,14 +14,19 @@ def operation_text(values: Mapping[str, float], joint_names: tuple[str, ...] = (
         joint_names: Names of the joints; without them they are counted from 1.
     """
     state = State(int(values["state"]))
-    homed = "homed" if values["is_homed"] else "not homed"
+    is_waiting = state is State.ENABLED and not values["is_homed"]
+    homed = "homed" if values["is_homed"] else f"not homed{'; home next' if is_waiting else ''}"
     doing = "moving to its goal" if values["is_busy"] else homed
     text = f"{state.name}, {doing}"
     fault = Fault(int(values["fault"]))
     if fault is Fault.NONE:
         return text
     reason = fault_text(fault, values, joint_names)
-    cure = {State.FAULT: "; reset, then enable", State.PAUSED: "; resume to go on"}.get(state, "")
+    release = "release the stop, " if values["is_pressed"] else ""
+    home = ", then home" if not values["is_homed"] else ""
+    cure = {
+        State.FAULT: f"; {release}reset, then enable{home}", State.PAUSED: "; resume to go on",
+    }.get(state, "")  # fmt: skip
     return f"{text}: {reason}{cure}"
 
 

@@ -173,6 +173,10 @@ AT_REST_ONLY = "the arm is not at rest yet; try again"
 """End of the answer to a command that an arm takes at rest only."""
 
 
+STILL_PRESSED = "the emergency stop is still pressed"
+"""Part of the answer to a reset while a stop button is pressed, or missed."""
+
+
 def answer_text(event: Event, answer: Answer, state: State) -> str:
     """What became of an event, in words that say what would help.
 
@@ -187,8 +191,9 @@ def answer_text(event: Event, answer: Answer, state: State) -> str:
     if answer is Answer.ALREADY:
         return f"{name}: nothing to do, it is {state.name}"
     if answer is Answer.STOPPED:
-        pressed = "release the emergency stop, then reset" if event is Event.RESET else "reset"
-        return f"{name} refused: an emergency stop is latched; {pressed} first"
+        if event is Event.RESET:
+            return f"{name} refused: {STILL_PRESSED}; release it first"
+        return f"{name} refused: an emergency stop is latched; reset first"
     if answer is Answer.BRAKING:
         return f"{name} refused: {AT_REST_ONLY}"
     allowed = [other.name for other in State if TABLE[other, event] >= 0]

@@ -237,4 +237,4 @@ def tell(p: ServerParameters, s: ServerState, row: Array) -> None:
     row[4], row[5], row[6], row[7] = s.fault, s.fault_joint, s.fault_value, s.fault_bound
     row[8] = s.rest_time if s.is_resting else 0.0
     row[9] = s.travel if s.is_resting else 0.0
-    row[10] = is_braked(p, s)
+    row[10], row[11] = is_braked(p, s), s.is_pressed
