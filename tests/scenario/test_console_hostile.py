@@ -1,7 +1,10 @@
 """Hostile pages: nothing that they send moves an arm that they do not drive, or stops the stop."""
 
 import logging
+import socket
+import threading
 from collections.abc import Callable
+from contextlib import ExitStack
 from typing import Any
 
 import pytest
@@ -14,7 +17,9 @@ import hostile
 from browser import until
 from desk import Desk, shown
 from page_client import PageClient, ask
-from teleop_core.console.filter import BURST, FLOOD
+from teleop_core.console.connection import Crowd
+from teleop_core.console.filter import BURST, FLOOD, Budget
+from teleop_core.console.front import WAITING
 from teleop_core.console.server import ConsoleServer
 
 # viser warns of what is queued for a page that leaves at this moment.
@@ -120,7 +125,89 @@ def test_refusals_are_counted_and_each_kind_is_said_once(caplog: pytest.LogCaptu
     assert len(said) == len(counts)
 
 
-def test_the_stop_is_nobodys_where_there_is_no_session() -> None:
+def test_a_stop_before_there_is_a_session_is_told_so_and_stays_on_offer() -> None:
     with ConsoleServer(0) as server:
         assert ask(server.port, "/stop", Teleop_Page="new")[0] == 409
-        assert ask(server.port, "/alive", Teleop_Page="new")[1]["can_stop"] is False
+        assert ask(server.port, "/alive", Teleop_Page="new")[1]["can_stop"] is True
+
+
+def test_stop_is_sent_while_the_loop_that_serves_the_pages_is_busy(
+    served: tuple[ConsoleServer, Desk, PageClient],
+) -> None:
+    server, desk, _ = served
+    loop: Any = server.viser._websock_server._background_event_loop
+    is_busy, goes_on = threading.Event(), threading.Event()
+
+    def work() -> None:
+        is_busy.set()
+        goes_on.wait(60)
+
+    loop.call_soon_threadsafe(work)
+    assert is_busy.wait(60)
+    try:
+        pressed = desk.stops
+        assert ask(server.port, "/stop", Teleop_Page="new")[0] == 204
+        assert desk.stops == pressed + 1
+        assert ask(server.port, "/alive", Teleop_Page="new")[0] == 200
+    finally:
+        goes_on.set()
+
+
+def test_stop_is_sent_beside_requests_that_begin_and_never_end(
+    served: tuple[ConsoleServer, Desk, PageClient],
+) -> None:
+    server, desk, _ = served
+    with ExitStack() as guests:
+        for begun in (b"", b"GET /st", b"GET /stop HTTP/1.1\r\nHost: ") * (WAITING // 2):
+            guest = guests.enter_context(socket.create_connection(("127.0.0.1", server.port)))
+            guest.sendall(begun)
+        pressed = desk.stops
+        assert ask(server.port, "/stop", Teleop_Page="new")[0] == 204
+        assert desk.stops == pressed + 1
+    with PageClient(server.port) as page:
+        page.sync()
+
+
+@pytest.mark.parametrize("line", [b"GET /stop HTTP/1.0", b"POST /stop HTTP/1.1", b"GET  /stop"])
+def test_malformed_request_for_the_stop_is_none_and_ends_nothing(
+    served: tuple[ConsoleServer, Desk, PageClient], line: bytes
+) -> None:
+    server, desk, _ = served
+    pressed = desk.stops
+    with socket.create_connection(("127.0.0.1", server.port), timeout=30) as guest:
+        guest.sendall(line + b"\r\nTeleop-Page: new\r\n\r\n")
+        guest.shutdown(socket.SHUT_WR)
+        while guest.recv(4096):
+            pass
+    assert desk.stops == pressed
+    assert ask(server.port, "/stop", Teleop_Page="new")[0] == 204
+
+
+def test_pages_that_send_too_much_together_lose_the_one_that_sends_most() -> None:
+    crowd = Crowd()
+    pages = [Talker(crowd) for _ in range(16)]
+    for count in range(200):
+        for one in pages[1:]:
+            one.say(2)
+        pages[0].say(1 if count % 2 else 0)
+    assert not pages[0].is_cut
+    assert any(one.is_cut for one in pages)
+
+
+class Talker:
+    """A page that is heard until it is cut."""
+
+    def __init__(self, crowd: Crowd) -> None:
+        self.budget, self.is_cut, self.said = Budget(clock=lambda: 0.0), False, 0
+        self._crowd: Any = crowd
+        self._crowd.pages.add(self)
+
+    def say(self, frames: int) -> None:
+        if not self.is_cut:
+            self.said += frames
+            self.budget.spend(frames, 0)
+            self._crowd.spend(frames, 0)
+
+    def cut(self) -> None:
+        self.is_cut = True
+        self._crowd.pages.discard(self)

@@ -1,11 +1,13 @@
 """The page's emergency stop: in view at any scroll, and seen by all pages when pressed."""
 
+import threading
 from collections.abc import Iterator
 from typing import Any
 
 import pytest
 
 from headless import Headless
+from teleop_core.console.app import splash
 from teleop_core.console.server import ConsoleServer
 
 pytest.importorskip("viser")
@@ -99,3 +101,20 @@ def test_every_page_looks_stopped_whoever_pressed_and_says_when_the_console_is_g
         tab.until(STOPPED)
         desk.press(is_pressed=False)
     tab.shows("NO CONNECTION")
+
+
+def test_stop_is_in_the_page_before_there_is_an_arm_and_stops_it_as_soon_as_there_is(
+    tab: Any,
+) -> None:
+    pressed = threading.Event()
+    with ConsoleServer(0) as server, splash(server) as say:
+        tab.visit(server.url)
+        tab.until(STOP)
+        say("looks for an arm …")
+        tab.shows("looks for an arm …")
+        tab.click("EMERGENCY STOP")
+        tab.shows("No arm is there yet")
+        assert not pressed.is_set()
+        server.answers.stop = pressed.set
+        assert pressed.wait(60)
+        assert all("409" in fault for fault in tab.faults())  # what it was answered before

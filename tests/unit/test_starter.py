@@ -2,6 +2,7 @@
 
 import os
 import signal
+import socket
 import subprocess
 import sys
 import tempfile
@@ -139,3 +140,16 @@ def test_a_starter_that_gets_no_further_is_given_up(tmp_path: Path) -> None:
                 starter.start(["true"], os.environ, {"out": log.fileno(), "err": log.fileno()})
         finally:
             os.kill(starter.pid, signal.SIGCONT)
+
+
+def test_a_signal_to_a_process_that_has_ended_unheard_is_nothing() -> None:
+    gone = subprocess.Popen([sys.executable, "-c", ""])
+    gone.wait()
+    ours, theirs = socket.socketpair()
+    with theirs:
+        theirs.send(str(gone.pid).encode())
+        started = Started(ours)
+        assert started.poll() is None  # the starter has not told of the end yet
+        started.send_signal(signal.SIGTERM)
+        theirs.send(b"-9")
+        assert started.wait(PATIENCE) == -signal.SIGKILL

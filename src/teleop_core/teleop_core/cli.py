@@ -11,7 +11,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any, NoReturn
 
-from teleop_core.base.errors import TeleopError
+from teleop_core.base.errors import SessionError, TeleopError
 from teleop_core.base.texts import one_line
 from teleop_core.commands import (
     compiling,
@@ -266,10 +266,15 @@ def _live(arguments: argparse.Namespace) -> int:
 
     configuration = configured(arguments)
     is_composed = bool(arguments.composed)
-    ros_module("live").live(
-        configuration, arguments.out, Console(), is_composed=is_composed,
-        without=arguments.without,
-    )  # fmt: skip
+    try:
+        ros_module("live").live(
+            configuration, arguments.out, Console(), is_composed=is_composed,
+            without=arguments.without,
+        )  # fmt: skip
+    except SessionError:
+        if (arguments.out / "metadata.yaml").exists():
+            print(done(arguments.out, "recorded until it ended"))
+        raise
     print(done(arguments.out, "recorded"))
     return 0
 

@@ -4,6 +4,7 @@ import argparse
 import time
 import webbrowser
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -89,6 +90,8 @@ def _attach(arguments: argparse.Namespace, server: "ConsoleServer") -> None:
     ros_module("console_link")
     from teleop_core.nodes.children import environment
     from teleop_core.nodes.console_link import LiveLink
+    from teleop_core.nodes.guest import Guest
+    from teleop_core.nodes.operation import StopButton
     from teleop_core.nodes.sessions import domains
 
     environment()
@@ -96,11 +99,15 @@ def _attach(arguments: argparse.Namespace, server: "ConsoleServer") -> None:
     if len(found) > 1:
         named = ", ".join(map(str, found))
         raise ParameterError("--domain", None, f"one of {named}: several sessions run here")
-    with splash(server) as say:
-        say("looks for an arm …")
-        link = LiveLink(found[0] if found else 0)
-    with link:
-        Console(server, link).run(lambda: False)
+    domain = found[0] if found else 0
+    with Guest("teleop_console_stop", domain, start_parameter_services=False) as guest:
+        button = StopButton(guest.node)
+        server.answers.stop = partial(button.say, is_pressed=True)
+        with splash(server) as say:
+            say("looks for an arm …")
+            link = LiveLink(domain, button=button)
+        with link:
+            Console(server, link).run(lambda: False)
 
 
 def _drive(arguments: argparse.Namespace, server: "ConsoleServer") -> None:
@@ -130,6 +137,7 @@ def _drive(arguments: argparse.Namespace, server: "ConsoleServer") -> None:
         with splash(server) as say:
             configuration = _configured(arguments, texts)
             session = ConsoleSession(configuration, out, _both(say), arguments.without)
+            server.answers.stop = partial(session.button.say, is_pressed=True)
             try:
                 link = session.link()
             except BaseException:

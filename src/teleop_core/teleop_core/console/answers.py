@@ -1,8 +1,9 @@
 """Answers: what the server says beside viser's page: signs of life, the stop, style and script.
 
-The emergency stop does not go through viser: its button is our own, always in view, and its press a
-request of its own, which is answered when the stop has been sent. So it works while the page's
-connection is lost, flooded or being opened again, and the page knows whether it was heard.
+The emergency stop does not go through viser: its button is our own, in view from the page's first
+byte, and its press a request of its own, which is answered when the stop has been sent. So it works
+while the page's connection is lost, flooded or being opened again, and the page knows whether it
+was heard.
 """
 
 import gzip
@@ -27,7 +28,7 @@ OWN_PAGE = "Teleop-Page"
 PRESS = "Teleop-Press"
 """Header with the name of a press: one that is said again, unanswered, is the same."""
 _SCRIPT = Path(__file__).with_name("page.js")
-_FURNITURE = b'<link rel="stylesheet" href="teleop.css"><script src="teleop.js"></script></head>'
+_FURNITURE = b'<head><link rel="stylesheet" href="teleop.css"><script src="teleop.js"></script>'
 
 
 @dataclass(frozen=True)
@@ -35,14 +36,16 @@ class Situation:
     """What every page shows beside viser's elements.
 
     Attributes:
-        can_stop: Whether there is something to stop.
+        can_stop: Whether a stop is of any use: not where a recording is shown.
         is_stopped: Whether an emergency stop is in force.
         text: What has happened, and what to do next; empty if nothing has.
+        doing: What is going on before there is a session to see; empty once there is.
     """
 
-    can_stop: bool = False
+    can_stop: bool = True
     is_stopped: bool = False
     text: str = ""
+    doing: str = ""
 
 
 class Answers:
@@ -76,10 +79,14 @@ class Answers:
         """A page has gone."""
         self._pages = {name: known for name, known in self._pages.items() if known != page}
 
-    def to(self, request: Request) -> Response | None:
-        """Answer to a request; None if it is not ours to answer."""
-        answer = self._paths.get(urlsplit(request.path).path)
-        return None if answer is None or request.is_socket else answer(request)
+    @property
+    def paths(self) -> frozenset[str]:
+        """Paths of the requests that are ours to answer."""
+        return frozenset(self._paths)
+
+    def to(self, request: Request) -> Response:
+        """Answer to a request for one of :attr:`paths`; from any thread."""
+        return self._paths[urlsplit(request.path).path](request)
 
     def furnish(self, request: Request, response: Response) -> None:
         """Add our style and script to viser's page."""
@@ -87,7 +94,7 @@ class Answers:
             return
         is_packed = response.headers.get("Content-Encoding") == "gzip"
         page = gzip.decompress(response.body) if is_packed else bytes(response.body)
-        page = page.replace(b"</head>", _FURNITURE, 1)
+        page = page.replace(b"<head>", _FURNITURE, 1)  # before viser's own script, which is long
         response.body = gzip.compress(page, 1) if is_packed else page
         del response.headers["Content-Length"]
         response.headers["Content-Length"] = str(len(response.body))
@@ -95,32 +102,33 @@ class Answers:
     def _alive(self, request: Request) -> Response:
         names = request.header(OWN_PAGE)
         if len(names) != 1:
-            return _answer(http.HTTPStatus.FORBIDDEN)
+            return answer_of(http.HTTPStatus.FORBIDDEN)
         page = self._pages.get(names[0], -1)
         self._drivers.heard(page)
         told = {**asdict(self.situation), "drives": self._drivers.may_drive(page)}
-        return _answer(http.HTTPStatus.OK, json.dumps(told).encode(), "application/json")
+        return answer_of(http.HTTPStatus.OK, json.dumps(told).encode(), "application/json")
 
     def _stop(self, request: Request) -> Response:
         if len(request.header(OWN_PAGE)) != 1:
-            return _answer(http.HTTPStatus.FORBIDDEN)
+            return answer_of(http.HTTPStatus.FORBIDDEN)
         if self.stop is None:
-            return _answer(http.HTTPStatus.CONFLICT)
+            return answer_of(http.HTTPStatus.CONFLICT)
         press = next(iter(request.header(PRESS)), None)
         if press is None or press not in self._heard:
             self.stop()
             self._heard.append(press)
-        return _answer(http.HTTPStatus.NO_CONTENT)
+        return answer_of(http.HTTPStatus.NO_CONTENT)
 
 
 def _script(_: Request) -> Response:
-    return _answer(http.HTTPStatus.OK, _SCRIPT.read_bytes(), "text/javascript; charset=utf-8")
+    return answer_of(http.HTTPStatus.OK, _SCRIPT.read_bytes(), "text/javascript; charset=utf-8")
 
 
 def _style(_: Request) -> Response:
-    return _answer(http.HTTPStatus.OK, style().encode(), "text/css; charset=utf-8")
+    return answer_of(http.HTTPStatus.OK, style().encode(), "text/css; charset=utf-8")
 
 
-def _answer(status: http.HTTPStatus, body: bytes = b"", kind: str = "text/plain") -> Response:
+def answer_of(status: http.HTTPStatus, body: bytes = b"", kind: str = "text/plain") -> Response:
+    """A response with its headers."""
     headers = Headers({"Content-Type": kind, "Content-Length": str(len(body))})
     return Response(status.value, status.phrase, headers, body)

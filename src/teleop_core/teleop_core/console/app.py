@@ -53,7 +53,10 @@ class Console:
         self.panel = Panel(server.viser, link, drivers, renew, of_session)
         self.panel.settings.on_change(self.scene.retune)
         self._visitors = Visitors(server.viser, drivers, self.scene)
-        server.answers.stop = self._stop if link.is_live else None
+        if link.is_live:
+            server.answers.stop = self._stop
+        else:
+            server.answers.situation = Situation(can_stop=False)
         if link.is_live:
             with self.panel.stylus_folder:
                 arms = tuple(arm.name for arm in link.arms)
@@ -126,20 +129,21 @@ def give_way() -> None:
 
 @contextmanager
 def splash(server: ConsoleServer) -> Iterator[Callable[[str], None]]:
-    """Show on an empty page what is going on, line by line, until there is something to show."""
+    """Show on an empty page what is going on until there is something to show."""
     gui = server.viser.gui
     gui.reset()
     server.viser.scene.reset()
-    lines: list[str] = []
-    text = gui.add_markdown("**starting …**")
+    answers = server.answers
 
     def say(line: str) -> None:
-        lines.append(line)
-        with suppress(Exception):  # the page is showing something else by now
-            text.content = "**starting …**\n\n" + "\n\n".join(lines[-8:])
+        if answers.situation.doing:  # else the page is showing something else by now
+            answers.situation = Situation(doing=line)
 
-    yield say
-    gui.reset()
+    answers.situation = Situation(doing="starting …")
+    try:
+        yield say
+    finally:
+        answers.situation = Situation()
 
 
 def replay(server: ConsoleServer, path: Path) -> None:

@@ -11,6 +11,8 @@ STUCK = 10.0
 """Time in which a page must have taken something of what waits for it [s]."""
 OPENING = 32
 """Connections that may be opening or fetching files at once; the oldest gives way."""
+ALL = 3.0
+"""What all pages of a server may send together, in budgets of one."""
 _PART = 4096  # bytes that are looked at before the budget is asked again
 
 
@@ -27,50 +29,73 @@ class Gate(Protocol):
         """Take note of a connection that becomes a page."""
 
 
+class Crowd:
+    """All connections of one server, and what all its pages may send together.
+
+    Attributes:
+        opening: Connections that are no page yet, the oldest first.
+        pages: Those that are.
+    """
+
+    def __init__(self) -> None:
+        self.opening: dict[Connection, None] = {}
+        self.pages: set[Connection] = set()
+        self._budget = Budget(ALL)
+
+    def spend(self, frames: int, size: int) -> None:
+        """Take some frames and bytes off; beyond that the page that sends most is cut."""
+        if not self._budget.spend(frames, size) and self.pages:
+            self._budget = Budget(ALL)
+            min(self.pages, key=lambda page: page.budget.left).cut()
+
+
 class Connection(ws.ServerConnection):
     """A connection that is filtered, and that ends when it floods or stands still.
 
     It ends when the other side takes nothing for :data:`STUCK` seconds, sends more than its
-    :class:`~teleop_core.console.filter.Budget`, or has not become a page while :data:`OPENING`
-    newer ones have come. Of each of viser's two queues one message can wait here, and the newest of
+    :class:`~teleop_core.console.filter.Budget`, sends most of all pages when these send more than
+    the budget of the :class:`Crowd`, or has not become a page while :data:`OPENING` newer ones have
+    come. Of each of viser's two queues one message can wait here, and the newest of
     each kind wait in the queues: so what a slow page costs is bounded, and what a dead one costs
     ends.
 
     Args:
         gate: Decides about its messages.
-        opening: Connections of the same server that are no page yet, the oldest first.
+        crowd: Connections of the same server.
         arguments: As the library gives them.
         options: As the library gives them.
 
     Attributes:
+        budget: What it may still send.
         silent_until: Time of the loop until which its page is told nothing more [s].
     """
 
-    def __init__(
-        self, *arguments: Any, gate: Gate, opening: dict["Connection", None], **options: Any
-    ) -> None:
+    def __init__(self, *arguments: Any, gate: Gate, crowd: Crowd, **options: Any) -> None:
         super().__init__(*arguments, **options)
-        self._gate, self._opening, self._budget = gate, opening, Budget()
+        self._gate, self._crowd, self.budget = gate, crowd, Budget()
         self._is_cut = False
         self.silent_until = 0.0
 
     def connection_made(self, transport: Any) -> None:
         """Begin; the oldest that is still opening gives way if there are too many."""
         super().connection_made(transport)
-        self._opening[self] = None
-        if len(self._opening) > OPENING:
-            oldest = next(iter(self._opening))
-            del self._opening[oldest]
+        opening = self._crowd.opening
+        opening[self] = None
+        if len(opening) > OPENING:
+            oldest = next(iter(opening))
+            del opening[oldest]
             oldest.transport.abort()
 
     def connection_lost(self, exc: Exception | None) -> None:
         """End."""
-        self._opening.pop(self, None)
+        self._crowd.opening.pop(self, None)
+        self._crowd.pages.discard(self)
         super().connection_lost(exc)
 
     def start_keepalive(self) -> None:
         """The handshake is done: it is a page now."""
-        self._opening.pop(self, None)
+        self._crowd.opening.pop(self, None)
+        self._crowd.pages.add(self)
         self._gate.come(self)
         super().start_keepalive()
 
@@ -103,11 +128,18 @@ class Connection(ws.ServerConnection):
             watch.end()
 
     def _spend(self, frames: int, size: int) -> bool:
-        if not self._is_cut and not self._budget.spend(frames, size):
-            self._is_cut = True
-            self._gate.cut(self)
-            self.transport.abort()
+        if not self._is_cut and not self.budget.spend(frames, size):
+            self.cut()
+        if not self._is_cut:
+            self._crowd.spend(frames, size)
         return not self._is_cut
+
+    def cut(self) -> None:
+        """End it at once, for a flood."""
+        self._is_cut = True
+        self._crowd.pages.discard(self)
+        self._gate.cut(self)
+        self.transport.abort()
 
 
 class _Watch:

@@ -233,20 +233,27 @@ def _is_unit(wxyz: tuple[float, ...]) -> bool:
 
 
 class Budget:
-    """Frames and bytes that one page may still send.
+    """Frames and bytes that one page, or all of them, may still send.
 
     Args:
+        share: In shares of what one page may send.
         clock: Monotonic time [s].
     """
 
-    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
-        self._clock, self._since = clock, clock()
-        self._frames, self._bytes = BURST, BYTES_BURST
+    def __init__(self, share: float = 1.0, clock: Callable[[], float] = time.monotonic) -> None:
+        self._clock, self._since, self._share = clock, clock(), share
+        self._frames, self._bytes = share * BURST, share * BYTES_BURST
 
     def spend(self, frames: int, size: int) -> bool:
         """Take some frames and bytes off; whether there were as many."""
         now = self._clock()
         passed, self._since = now - self._since, now
-        self._frames = min(BURST, self._frames + RATE * passed) - frames
-        self._bytes = min(BYTES_BURST, self._bytes + BYTES_RATE * passed) - size
-        return self._frames >= 0.0 and self._bytes >= 0.0
+        most, more = self._share, self._share * passed
+        self._frames = min(most * BURST, self._frames + more * RATE) - frames
+        self._bytes = min(most * BYTES_BURST, self._bytes + more * BYTES_RATE) - size
+        return self.left >= 0.0
+
+    @property
+    def left(self) -> float:
+        """What is left, the lesser share of frames and bytes: 1 for all, negative for none."""
+        return min(self._frames / BURST, self._bytes / BYTES_BURST) / self._share

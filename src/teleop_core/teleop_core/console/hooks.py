@@ -30,10 +30,11 @@ from websockets.http11 import Request, Response
 from websockets.typing import Data, Subprotocol
 
 from teleop_core.base.errors import SessionError
-from teleop_core.console.answers import Answers
-from teleop_core.console.connection import Connection, Gate
+from teleop_core.console.answers import Answers, answer_of
+from teleop_core.console.connection import Connection, Crowd, Gate
 from teleop_core.console.drivers import Drivers
 from teleop_core.console.filter import FLOOD, LARGEST, NO_VALUE, WATCHES, Filter, Sets, decode
+from teleop_core.console.front import Front
 from teleop_core.console.guard import HEADERS, Guard
 from teleop_core.console.guard import Request as Asked
 
@@ -98,15 +99,21 @@ class Server(viser.ViserServer):
         self, opened: socket, guard: Guard, drivers: Drivers, answers: Answers, label: str
     ) -> None:
         host, port = opened.getsockname()[:2]
+        self._front = Front(opened, answers.paths, partial(_answered, guard, answers))
         self._drivers, self._public = drivers, set[str]()
         self.filter = Filter(self, drivers.may_drive, _logger().warning)
         rich.get_console().quiet = True  # which viser alone writes to here
-        with _STARTING, _opening(_server_at(opened, guard, answers, self)):
+        with _STARTING, _opening(_server_at(self._front.passed_on, guard, answers, self)):
             super().__init__(host=host, port=port, label=label, verbose=False)
         for message in (_messages.ShareUrlRequest, _messages.ShareUrlDisconnect):
             self._websock_server.unregister_handler(message)
         self.gui.configure_theme(show_logo=False, show_share_button=False)
         self._tell(answers)
+
+    def stop(self) -> None:
+        """End the server."""
+        self._front.close()
+        super().stop()
 
     def request_share_url(self, verbose: bool = True) -> str | None:
         """Never: it would lead whoever knows the address around the guard."""
@@ -249,12 +256,12 @@ def _server_at(
         **options: Unpack[ServeOptions],
     ) -> ws.serve:
         options["max_size"] = LARGEST
-        opening: dict[Connection, None] = {}
+        crowd = Crowd()
         return _Serving(
             handler,
             sock=opened,
             process_request=_guarded(process_request, guard, answers),
-            create_connection=partial(Connection, gate=gate, opening=opening),  # type: ignore[arg-type]
+            create_connection=partial(Connection, gate=gate, crowd=crowd),  # type: ignore[arg-type]
             logger=_logger(),
             **options,
         )
@@ -281,15 +288,25 @@ class _Serving(ws.serve):
         await super().__aexit__(exc_type, exc_value, traceback)
 
 
+def _answered(guard: Guard, answers: Answers, request: Request) -> Response:
+    """Our own answer to a request, or a refusal."""
+    asked = Asked(request.path, False, request.headers.get_all)
+    if reason := guard.refusal(asked):
+        return answer_of(http.HTTPStatus.FORBIDDEN, f"{reason}\n".encode())
+    response = answers.to(asked)
+    _harden(response.headers, request.headers["Host"], guard)
+    return response
+
+
 def _guarded(answer: Answer, guard: Guard, answers: Answers) -> Answer:
-    """Answer of viser to a request, our own, or a refusal."""
+    """Answer of viser to a request, or a refusal."""
 
     def guarded(connection: ws.ServerConnection, request: Request) -> Response | None:
         headers = request.headers
         asked = Asked(request.path, bool(headers.get_all("Upgrade")), headers.get_all)
         if reason := guard.refusal(asked):
             return connection.respond(http.HTTPStatus.FORBIDDEN, f"{reason}\n")
-        response = answers.to(asked) or answer(connection, request)
+        response = answer(connection, request)
         if response is not None:
             answers.furnish(asked, response)
             _harden(response.headers, headers["Host"], guard)

@@ -69,6 +69,10 @@ body { font: var(--t-text)/1.45 system-ui, -apple-system, "Segoe UI", Roboto, sa
   box-shadow: 0 1px 4px rgba(0,0,0,.3); touch-action: manipulation; user-select: none; }
 #t-stop:hover { filter: brightness(1.08); } #t-stop:active { filter: brightness(0.85); }
 #t-stop:focus-visible { outline: 3px solid var(--t-color-text); outline-offset: 2px; }
+#t-starting { position: fixed; inset: 0; z-index: 9999; display: flex; align-items: center;
+  justify-content: center; background: var(--t-color-ground); color: var(--t-color-text);
+  font-size: var(--t-head); padding: 16px; box-sizing: border-box; text-align: center; }
+#t-starting[hidden] { display: none; }
 #t-banner { display: none; position: fixed; top: 0; left: 0; z-index: 10001;
   box-sizing: border-box; padding: 10px 16px; font-size: var(--t-head); line-height: 1.4;
   background: var(--t-stop); color: #fff; }

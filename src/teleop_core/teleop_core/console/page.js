@@ -1,11 +1,11 @@
 // The emergency stop and the banner of every page, and its signs of life.
 //
-// They are elements of their own on top of viser's: in view whatever is scrolled or folded, and
-// they speak to the server by requests of their own.
+// They are elements of their own on top of viser's: in view from the first byte, whatever is loaded,
+// scrolled or folded, and they speak to the server by requests of their own.
 (() => {
   'use strict';
   const PERIOD = 1000, AGAIN = 200, TRIES = 50; // ms, ms, number
-  let connected = true, pressed = false, shown = {};
+  let connected = true, pressed = false, shown = { can_stop: true, doing: 'starting …' };
 
   const ask = (path, more = {}) => fetch(path, {
     headers: { 'Teleop-Page': window.teleopPage || 'new', ...more }, cache: 'no-store',
@@ -16,7 +16,9 @@
   const safety = document.createElement('div');
   const stop = document.createElement('button');
   const banner = document.createElement('div');
-  safety.id = 't-safety'; safety.hidden = true;
+  const starting = document.createElement('div');
+  safety.id = 't-safety';
+  starting.id = 't-starting';
   stop.id = 't-stop'; stop.textContent = 'EMERGENCY STOP';
   stop.title = 'stops all arms at once; the space key too';
   banner.id = 't-banner'; banner.setAttribute('role', 'alert');
@@ -25,6 +27,7 @@
   function show() {
     const [head, text] = pressed === 'unheard'
       ? ['STOP NOT CONFIRMED', 'The console does not answer. Use the emergency stop of the machine.']
+      : pressed === 'early' ? ['EMERGENCY STOP', 'No arm is there yet. It is stopped as soon as it is.']
       : !connected ? ['NO CONNECTION', 'What you see is old. The arm holds while nobody drives.']
       : shown.is_stopped || pressed ? ['EMERGENCY STOP', shown.text || 'All arms are being stopped.']
       : ['', ''];
@@ -39,23 +42,28 @@
       banner.replaceChildren(strong, text);
     }
     safety.hidden = !shown.can_stop;
+    starting.textContent = shown.doing;
+    starting.hidden = !shown.doing;
     const seen = document.querySelector('canvas')?.getBoundingClientRect();
     if (seen) banner.style.width = `${seen.width}px`; // the panel beside it stays in view
   }
 
   async function press() {
-    if (!shown.can_stop || pressed === true) return;
+    if (!shown.can_stop || pressed) return;
     pressed = true;
     show();
     const name = crypto.getRandomValues(new Uint32Array(2)).join('-'); // said again, it is one press
-    for (let i = 0; i < TRIES; i++) {
+    for (let i = 0; i < TRIES || pressed === 'early'; i++) {
       try {
-        if ((await ask('stop', { 'Teleop-Press': name })).ok) { await look(); pressed = false; return; }
-      } catch { /* asked again */ }
-      if (i === 4) { pressed = 'unheard'; show(); }
+        const answer = await ask('stop', { 'Teleop-Press': name });
+        if (answer.ok) { await look(); break; }
+        if (answer.status === 409) pressed = 'early'; // nothing is there to stop yet
+      } catch { if (i >= 4) pressed = 'unheard'; }
+      show();
       await wait(AGAIN);
     }
     pressed = false;
+    show();
   }
 
   async function look() {
@@ -68,6 +76,8 @@
 
   const types = (element) => element.closest && element.closest(
     'input:not([type=checkbox]):not([type=radio]):not([type=range]), textarea, [contenteditable=true]');
+  document.documentElement.append(banner, safety, starting); // before the page has a body
+  show();
   stop.addEventListener('pointerdown', press);
   stop.addEventListener('click', press);
   addEventListener('keydown', (event) => {
@@ -79,8 +89,6 @@
   addEventListener('keyup', (event) => { // a focused button would take it for a click
     if (event.code === 'Space' && !types(event.target) && shown.can_stop) event.preventDefault();
   }, true);
-  addEventListener('DOMContentLoaded', async () => {
-    document.body.append(banner, safety);
-    for (;;) { await look(); await wait(PERIOD); }
-  });
+  addEventListener('DOMContentLoaded', () => document.body.append(banner, safety, starting));
+  (async () => { for (;;) { await look(); await wait(PERIOD); } })();
 })();

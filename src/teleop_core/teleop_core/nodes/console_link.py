@@ -34,6 +34,7 @@ from teleop_core.graph.topics import (
 from teleop_core.kernels.geometry import Array
 from teleop_core.nodes.display import SEEN, displayed
 from teleop_core.nodes.observer import WARNING, Observer
+from teleop_core.nodes.operation import StopButton
 from teleop_core.nodes.parameter_client import ParameterClient, ParameterEvents, call
 from teleop_core.nodes.streams import Subscription, message_type
 from teleop_core.robots import load_robot_set
@@ -92,6 +93,7 @@ class LiveLink(Observer):
         domain: ROS domain of the session.
         title: What it is called.
         patience: Time in which an arm must be found [s].
+        button: Stop button that may have been pressed before the arm was found; None: a new one.
 
     Raises:
         SessionError: There is no arm on this domain, or one does not say which robot it is.
@@ -99,8 +101,11 @@ class LiveLink(Observer):
 
     is_live = True
 
-    def __init__(self, domain: int, title: str = "", patience: float = PATIENCE) -> None:
-        super().__init__(domain, "teleop_console", start_parameter_services=False)
+    def __init__(
+        self, domain: int, title: str = "", patience: float = PATIENCE,
+        button: StopButton | None = None,
+    ) -> None:  # fmt: skip
+        super().__init__(domain, "teleop_console", button, start_parameter_services=False)
         self.domain = domain
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self.node)

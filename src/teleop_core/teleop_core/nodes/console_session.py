@@ -9,8 +9,10 @@ from rich.console import Console
 from teleop_core.base.errors import SessionError, TeleopError
 from teleop_core.nodes.children import environment
 from teleop_core.nodes.console_link import LiveLink
+from teleop_core.nodes.guest import Guest
 from teleop_core.nodes.interrupt import Interrupt
 from teleop_core.nodes.live import live
+from teleop_core.nodes.operation import StopButton
 from teleop_core.session.configuration import Configuration
 
 _LOOK = 1.0  # for the arm, between looks whether the session has ended [s]
@@ -50,6 +52,7 @@ class ConsoleSession:
 
     Attributes:
         domain: Its ROS domain.
+        button: Its stop button, which works before there is an arm.
     """
 
     def __init__(
@@ -60,6 +63,8 @@ class ConsoleSession:
         self._configuration, self._out, self._without = configuration, out, without
         self._console = Console(file=_Lines(say), width=200)  # type: ignore[arg-type]
         self._interrupt, self._error = Interrupt(), ""
+        self._guest = Guest("teleop_console_stop", self.domain, start_parameter_services=False)
+        self.button = StopButton(self._guest.node)
         self._thread = threading.Thread(target=self._run, name="session")
         self._thread.start()
 
@@ -102,7 +107,8 @@ class ConsoleSession:
         """
         while True:
             try:
-                return LiveLink(self.domain, self._configuration.scenario, patience=_LOOK)
+                title = self._configuration.scenario
+                return LiveLink(self.domain, title, patience=_LOOK, button=self.button)
             except SessionError:
                 self.check()
                 if self.is_over:
@@ -112,3 +118,4 @@ class ConsoleSession:
         """End it in order; its recording is closed."""
         self._interrupt.ask()
         self._thread.join(_END_PATIENCE)
+        self._guest.close()

@@ -38,6 +38,7 @@ class Observer(Guest):
     Args:
         domain: ROS domain.
         name: What its node is called.
+        button: Stop button of its own, which outlives it; None: it makes one.
         options: Further ones of the node, as rclpy has them.
 
     Attributes:
@@ -45,12 +46,18 @@ class Observer(Guest):
         malformed: Messages that were no reports.
     """
 
-    def __init__(self, domain: int, name: str = "teleop_live", **options: Any) -> None:
+    def __init__(
+        self,
+        domain: int,
+        name: str = "teleop_live",
+        button: StopButton | None = None,
+        **options: Any,
+    ) -> None:
         super().__init__(name, domain, **options)
         self.statuses: dict[str, Status] = {}
         self.malformed = 0
         self._reports = Subscription(self.node, DIAGNOSTICS, f"/{DIAGNOSTICS.name}", 100)
-        self._button = StopButton(self.node)
+        self._button = button or StopButton(self.node)
         self._waiter = Waiter(self._context, self._reports)
 
     def close(self) -> None:

@@ -25,6 +25,7 @@ import threading
 import time
 import traceback
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from importlib import import_module
 from typing import IO, Any, cast
 
@@ -191,7 +192,8 @@ class Started:
     def send_signal(self, number: int) -> None:
         """Send a signal, unless it has ended."""
         if self.poll() is None:
-            os.kill(self.pid, number)
+            with suppress(ProcessLookupError):  # it has, and the starter is about to tell
+                os.kill(self.pid, number)
 
     def terminate(self) -> None:
         """Ask it to end."""

@@ -1,0 +1,207 @@
+"""Front: accepts the connections of the page's server, and answers the emergency stop by itself.
+
+Messages of pages are worked off by one event loop, in which a stop would wait behind all of them.
+So a thread of its own accepts the connections. Requests for the stop and signs of life it answers
+at once; every other connection goes on to the event loop as it came.
+"""
+
+import selectors
+import socket
+import threading
+import time
+from collections import deque
+from collections.abc import Callable
+from contextlib import suppress
+from typing import Any
+from urllib.parse import urlsplit
+
+from websockets.exceptions import SecurityError
+from websockets.http11 import Request as Head
+from websockets.http11 import Response
+from websockets.streams import StreamReader
+
+WAITING = 64
+"""Connections that may be open without having said what they want; the oldest gives way."""
+PATIENCE = 10.0
+"""Time in which a connection must have said what it wants [s]."""
+_LARGEST = 16 * 1024  # bytes of a request's head
+_LOOK = 0.5  # s, between looks at those that say nothing
+_SOON = 0.02  # s, between looks at a request that has begun
+_BACKLOG = 64
+_MALFORMED = (EOFError, SecurityError, ValueError, NotImplementedError)
+
+Answer = Callable[[Head], Response]
+
+
+class Front:
+    """Listening socket whose connections a thread looks at first.
+
+    Args:
+        opened: Socket that listens; it is closed at the end.
+        paths: Paths of requests that are answered here.
+        answer: Answers one of these requests; called in the thread of this object.
+
+    Attributes:
+        passed_on: Socket for an event loop: it accepts the connections that are passed on.
+    """
+
+    def __init__(self, opened: socket.socket, paths: frozenset[str], answer: Answer) -> None:
+        self._opened, self._paths, self._answer = opened, paths, answer
+        self._waiting: dict[socket.socket, float] = {}  # until when
+        self._partial: set[socket.socket] = set()  # of these, those that have begun to say it
+        inner, self._told = socket.socketpair()
+        self.passed_on = PassedOn(inner, opened.getsockname())
+        self._told.setblocking(False)
+        self._selector = selectors.DefaultSelector()
+        self._selector.register(opened, selectors.EVENT_READ)
+        self._is_closed = False
+        self._thread = threading.Thread(target=self._run, name="console front", daemon=True)
+        self._thread.start()
+
+    def close(self) -> None:
+        """Accept nobody any more."""
+        self._is_closed = True
+        self._thread.join()
+        for one in (self._opened, self._told, *self._waiting):
+            one.close()
+        self._selector.close()
+
+    def _run(self) -> None:
+        while not self._is_closed:
+            partial = tuple(self._partial)
+            for key, _ in self._selector.select(_SOON if partial else _LOOK):
+                if key.fileobj is self._opened:
+                    self._accept()
+                else:
+                    self._look(key.fileobj)
+            for one in partial:
+                if one in self._partial:  # it may have given way
+                    self._look(one)
+            now = time.monotonic()
+            for one in [one for one, until in self._waiting.items() if until < now]:
+                self._drop(one)
+
+    def _accept(self) -> None:
+        try:
+            one, _ = self._opened.accept()
+        except OSError:  # it has left already, or this process has too many files open
+            time.sleep(_SOON)
+            return
+        one.setblocking(False)
+        if len(self._waiting) >= WAITING:
+            self._drop(next(iter(self._waiting)))
+        self._waiting[one] = time.monotonic() + PATIENCE
+        self._selector.register(one, selectors.EVENT_READ)
+
+    def _look(self, one: Any) -> None:
+        """Look at what has come of a request, without taking it."""
+        try:
+            data = one.recv(_LARGEST, socket.MSG_PEEK)
+        except OSError:
+            data = b""
+        line, is_line, _ = data.partition(b"\r\n")
+        is_ours = bool(is_line) and _path(line) in self._paths
+        is_whole = b"\r\n\r\n" in data if is_ours else bool(is_line)
+        if not data:
+            self._drop(one)
+        elif not is_whole and len(data) < _LARGEST:
+            if one not in self._partial:  # it would be readable all the time
+                self._selector.unregister(one)
+                self._partial.add(one)
+        elif is_ours:
+            self._forget(one)
+            self._reply(one, data)
+        else:
+            self._forget(one)
+            self._pass_on(one)
+
+    def _reply(self, one: socket.socket, data: bytes) -> None:
+        with one, suppress(OSError, *_MALFORMED):
+            one.recv(_LARGEST)
+            response = self._answer(_parsed(data))
+            response.headers["Connection"] = "close"
+            one.sendall(response.serialize())
+
+    def _pass_on(self, one: socket.socket) -> None:
+        self.passed_on.waiting.append(one)
+        with suppress(OSError):  # it has many to take already
+            self._told.send(b"\0")
+
+    def _forget(self, one: socket.socket) -> None:
+        del self._waiting[one]
+        if one in self._partial:
+            self._partial.discard(one)
+        else:
+            self._selector.unregister(one)
+
+    def _drop(self, one: socket.socket) -> None:
+        self._forget(one)
+        one.close()
+
+
+class PassedOn(socket.socket):
+    """Socket that an event loop takes for one that listens; it accepts what a front passes on.
+
+    Args:
+        inner: Becomes readable with every connection that is passed on; taken over.
+        address: Address of the socket that really listens.
+
+    Attributes:
+        waiting: Connections that are passed on.
+    """
+
+    def __init__(self, inner: socket.socket, address: Any) -> None:
+        super().__init__(inner.family, inner.type, inner.proto, inner.detach())
+        self.setblocking(False)
+        self.waiting: deque[socket.socket] = deque()
+        self._address = address
+
+    def listen(self, backlog: int = _BACKLOG, /) -> None:
+        """Nothing is to be done: another socket listens."""
+
+    def getsockname(self) -> Any:
+        """Address of that other socket."""
+        return self._address
+
+    def accept(self) -> tuple[socket.socket, Any]:
+        """Next connection.
+
+        Raises:
+            BlockingIOError: None waits.
+        """
+        if self.waiting:
+            with suppress(BlockingIOError):
+                self.recv(1)
+            one = self.waiting.popleft()
+            return one, self._address
+        self.recv(_LARGEST)  # told, but taken already; raises where nothing is told
+        raise BlockingIOError
+
+    def close(self) -> None:
+        """Close it, and what nobody has taken."""
+        while self.waiting:
+            self.waiting.popleft().close()
+        super().close()
+
+
+def _parsed(data: bytes) -> Head:
+    """Head of a request."""
+    reader = StreamReader()
+    reader.feed_data(data)
+    reader.feed_eof()
+    parsing = Head.parse(reader.read_line)
+    try:
+        next(parsing)
+    except StopIteration as end:
+        request: Head = end.value
+        return request
+    raise EOFError
+
+
+def _path(line: bytes) -> str:
+    """Path of a request's first line; empty if it has none."""
+    words = line.split(b" ")
+    try:
+        return urlsplit(words[1].decode("ascii")).path if len(words) == 3 else ""
+    except ValueError:
+        return ""
