@@ -197,9 +197,9 @@ def test_pages_that_send_too_much_together_lose_the_one_that_sends_most() -> Non
 class Talker:
     """A page that is heard until it is cut."""
 
-    def __init__(self, crowd: Crowd) -> None:
+    def __init__(self, crowd: Any) -> None:
         self.budget, self.is_cut, self.said = Budget(clock=lambda: 0.0), False, 0
-        self._crowd: Any = crowd
+        self._crowd = crowd
         self._crowd.pages.add(self)
 
     def say(self, frames: int) -> None:
