@@ -39,6 +39,7 @@ from teleop_core.base.parameters import specs
 from teleop_core.graph.graph import BUILT_IN, RECORDER_NAME
 from teleop_core.graph.topics import Topic
 from teleop_core.nodes.children import environment, free_domain
+from teleop_core.nodes.crews import Processes
 from teleop_core.nodes.interrupt import Interrupt
 from teleop_core.nodes.live import live
 from teleop_core.nodes.observer import Observer
@@ -460,7 +461,7 @@ def composed_session(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., 
 
 def run_until(
     peer: Peer, until: Callable[[], Any], out: Path, configuration: Configuration,
-    *, is_composed: bool = False,
+    processes: Processes = Processes.SIDES,
 ) -> tuple[Bag, str]:  # fmt: skip
     """Run a live session until something is so; its recording, and what was shown of it.
 
@@ -471,7 +472,7 @@ def run_until(
     show, interrupt = Console(file=io.StringIO(), width=200), Interrupt()
     with ThreadPoolExecutor() as pool:
         session = pool.submit(
-            live, configuration, out, show, is_composed=is_composed, interrupt=interrupt
+            live, configuration, out, show, processes=processes, interrupt=interrupt
         )
 
         def reached() -> Any:
@@ -497,7 +498,7 @@ def session_until(
     monkeypatch.setenv("ROS_DOMAIN_ID", peer.domain)
 
     def run(
-        configuration: Configuration, until: Callable[[], Any], **options: bool
+        configuration: Configuration, until: Callable[[], Any], **options: Processes
     ) -> tuple[Bag, str]:
         return run_until(peer, until, tmp_path / "bag", configuration, **options)
 

@@ -13,6 +13,7 @@ from teleop_core.bags.reader import Bag
 from teleop_core.bags.transforms import TF
 from teleop_core.evaluation import scores
 from teleop_core.graph import topics
+from teleop_core.nodes.crews import Processes
 from teleop_core.robots import load_robot
 from teleop_core.session.configuration import configure
 
@@ -78,19 +79,21 @@ def test_a_recorder_in_a_namespace_records_the_topics_of_its_arm(
 @pytest.mark.slow
 @pytest.mark.alone
 @pytest.mark.parametrize(
-    "is_composed",
-    # Fourteen processes need more than two processors: the law is tested composed.
+    "processes",
+    # Fourteen processes need more than two processors.
     [
-        pytest.param(False, id="processes", marks=pytest.mark.soak),
-        pytest.param(True, id="composed"),
+        Processes.SIDES,
+        pytest.param(Processes.NODES, marks=pytest.mark.soak),
+        Processes.ONE,
     ],
 )
 def test_two_arms_are_recorded_together_and_scored_one_by_one(
-    peer: "Peer", session_until: Callable[..., tuple[Bag, str]], is_composed: bool
+    peer: "Peer", session_until: Callable[..., tuple[Bag, str]], processes: Processes
 ) -> None:
     robots = {"": "rcrt1", "left": "puma560"}
     # In processes of their own, on two processors, an arm that hears too seldom of its hand holds.
-    moving = topics.SLAVE_MEASURED_JS if is_composed else topics.MASTER_MEASURED_CP
+    is_slow = processes is Processes.NODES
+    moving = topics.MASTER_MEASURED_CP if is_slow else topics.SLAVE_MEASURED_JS
     listeners = {arm: peer.listen(moving.of_arm(arm)) for arm in robots}
     settings = [
         "teleop.arms=[right, left]",
@@ -109,7 +112,7 @@ def test_two_arms_are_recorded_together_and_scored_one_by_one(
         moved = [has_moved(listener) for listener in listeners.values()]
         return all(moved) and peer.has_recorded(enough)
 
-    bag, text = session_until(configuration, is_under_way, is_composed=is_composed)
+    bag, text = session_until(configuration, is_under_way, processes=processes)
     assert all(f"{arm}slave is ready" in text for arm in ("", "left/"))
     for arm, robot in robots.items():
         assert all(bag.topics[t.of_arm(arm).name].count > 100 for t in topics.STREAMS), arm

@@ -23,6 +23,7 @@ from teleop_core.base.errors import ParameterError, RecordingError, SessionError
 from teleop_core.graph import topics
 from teleop_core.graph.graph import BUILT_IN, RECORDER_NAME
 from teleop_core.graph.topics import STREAMS
+from teleop_core.nodes.crews import Processes
 from teleop_core.nodes.live import live
 from teleop_core.nodes.play import play
 from teleop_core.session.configuration import Configuration, configure
@@ -103,7 +104,7 @@ def test_a_node_that_dies_is_named_and_the_recording_is_closed(tmp_path: Path) -
 
     killer = threading.Thread(target=kill_when_running, daemon=True)
     killer.start()
-    with pytest.raises(SessionError, match="inverse_kinematics ended with signal SIGKILL"):
+    with pytest.raises(SessionError, match="hand_side ended with signal SIGKILL"):
         live(quick(600.0), tmp_path / "bag", show)
     killer.join()
     assert children() == []
@@ -112,7 +113,7 @@ def test_a_node_that_dies_is_named_and_the_recording_is_closed(tmp_path: Path) -
 
 def test_a_node_that_cannot_start_is_named_with_its_reason(tmp_path: Path) -> None:
     wrong = configure("coarse_box", settings=["operator=bag", "operator.bag=/no/such/bag"])
-    with pytest.raises(SessionError, match=r"(?s)operator ended with exit code 2.*no/such"):
+    with pytest.raises(SessionError, match=r"(?s)hand_side ended with exit code 2.*no/such"):
         live(wrong, tmp_path / "bag", console())
     assert children() == []
 
@@ -125,7 +126,7 @@ def test_ctrl_c_ends_a_session_with_a_closed_recording(tmp_path: Path) -> None:
         os.kill(os.getpid(), signal.SIGINT)
 
     threading.Thread(target=press_when_running, daemon=True).start()
-    live(quick(600.0), tmp_path / "bag", show, is_composed=True)
+    live(quick(600.0), tmp_path / "bag", show, processes=Processes.ONE)
     assert "stopped" in show.file.getvalue()
     assert children() == []
     assert Bag(tmp_path / "bag").topics["slave/measured_js"].count > 0

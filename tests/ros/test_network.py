@@ -17,6 +17,7 @@ from teleop_core.graph.topics import (
     SLAVE_SETPOINT_CP,
     SLAVE_SETPOINT_JS,
 )
+from teleop_core.nodes.crews import Processes
 from teleop_core.session.configuration import configure
 
 if TYPE_CHECKING:
@@ -77,9 +78,9 @@ def test_a_foreign_publisher_is_behind_the_network_and_nothing_comes_before_its_
     assert sender.sent_ns[last] < set_ns + 50 * MS < max(sender.sent_ns.values())
 
 
-@pytest.mark.parametrize("is_composed", [True, False], ids=["composed", "processes"])
+@pytest.mark.parametrize("processes", [Processes.ONE, Processes.SIDES])
 def test_a_slave_is_led_across_a_network_and_the_recording_tells_the_age(
-    peer: "Peer", session_until: Callable[..., tuple[Bag, str]], is_composed: bool
+    peer: "Peer", session_until: Callable[..., tuple[Bag, str]], processes: Processes
 ) -> None:
     settings = [
         "teleop.stages=[network]", "network.there.least_delay=0.2", "network.back.least_delay=0.2",
@@ -93,7 +94,7 @@ def test_a_slave_is_led_across_a_network_and_the_recording_tells_the_age(
         return len(q) > 1000 and np.abs(q[-1] - q[0]).max() > 2e-3
 
     bag, text = session_until(
-        configure("free_motion", settings=settings), is_led, is_composed=is_composed
+        configure("free_motion", settings=settings), is_led, processes=processes
     )
     assert "not newer" not in text, text  # what did not arrive anew is not sent again
     series = bag.read(NETWORK_SERVO_CP.name)

@@ -16,6 +16,7 @@ from teleop_core.bags.reader import Bag
 from teleop_core.graph import topics
 from teleop_core.kernels.geometry import Array, pose_from_transform, rotation, transform
 from teleop_core.nodes.children import environment
+from teleop_core.nodes.crews import Processes
 from teleop_core.robots import list_robots, load_robot
 from teleop_core.robots.robot import Robot
 from teleop_core.session.configuration import configure
@@ -61,7 +62,7 @@ def short_session(
                 begin = slave.number("ticks")
             return begin is not None and slave.number("ticks") > begin + 2000
 
-        bag, _ = session_until(configuration, has_led, is_composed=True)
+        bag, _ = session_until(configuration, has_led, processes=Processes.ONE)
         session = VirtualTime(configuration)
         measured = bag.read(topics.SLAVE_MEASURED_JS)
         wanted = session.run(2000)["slave_measured_js"]

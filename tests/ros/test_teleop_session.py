@@ -21,6 +21,7 @@ from teleop_core.graph import topics
 from teleop_core.graph.graph import BUILT_IN, RECORDER_NAME
 from teleop_core.graph.layers import RealTimeParameters
 from teleop_core.graph.topics import STREAMS
+from teleop_core.nodes.crews import Processes
 from teleop_core.nodes.real_time import apply_options, is_priority_granted
 from teleop_core.robots import load_robot
 from teleop_core.session.configuration import configure
@@ -148,7 +149,9 @@ def test_live_composed_records_all_topics_at_times_that_rise_from_stage_to_stage
 ) -> None:
     enough = {topic.name: 1500 for topic in STREAMS}
     configuration = configure("coarse_box", settings=["teleop.duration=600.0"])
-    bag, text = session_until(configuration, lambda: peer.has_recorded(enough), is_composed=True)
+    bag, text = session_until(
+        configuration, lambda: peer.has_recorded(enough), processes=Processes.ONE
+    )
     assert all(f"{name} is ready" in text for name in NODES)
     for topic in STREAMS:
         assert bag.topics[topic.name].count > 1500, topic.name

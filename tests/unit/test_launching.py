@@ -25,8 +25,17 @@ def parameters(process: Process) -> dict[str, dict[str, str | float | bool | lis
     return {name: node["ros__parameters"] for name, node in content.items()}
 
 
-def test_a_session_is_one_process_per_node_with_the_recorder_first() -> None:
-    found = processes(given())
+def test_a_session_has_a_process_for_each_side_with_the_recorder_first() -> None:
+    recorder, slave, hand = processes(given())
+    assert recorder.name == "recorder"
+    assert {slave.executable, hand.executable} == {"teleop_session"}
+    assert set(slave.arguments) == {"slave", "slave_sim"}
+    assert {*slave.arguments, *hand.arguments} == STAGES
+    assert (hand.respawns, slave.respawns) == (True, False)
+
+
+def test_a_session_may_have_a_process_for_each_node_with_the_recorder_first() -> None:
+    found = processes(given(processes="nodes"))
     assert found[0].name == "recorder"
     assert {process.name for process in found} == STAGES | {"recorder"}
     assert {process.namespace for process in found} == {"/"}
@@ -37,22 +46,23 @@ def test_a_session_is_one_process_per_node_with_the_recorder_first() -> None:
     [("", "", ""), ("", "lab", "/lab"), ("/left", "", "/left"), ("/left", "/lab/", "/left/lab")],
 )
 def test_every_node_finds_its_parameters_where_it_is(outer: str, own: str, where: str) -> None:
-    for process in processes(given(namespace=own), outer):
+    for process in processes(given(namespace=own, processes="nodes"), outer):
         full = f"{process.namespace.rstrip('/')}/{process.name}"
         assert full == f"{where}/{process.name}"
         assert full in parameters(process)
 
 
-def test_one_process_holds_all_nodes_if_composed() -> None:
-    (process,) = processes(given(composed="true", namespace="lab"))
+def test_one_process_may_hold_all_nodes_but_the_recorder() -> None:
+    _, process = processes(given(processes="one", namespace="lab"))
     assert (process.executable, process.name) == ("teleop_session", "")
+    assert set(process.arguments) == STAGES
     assert process.namespace == "/lab"
     assert {f"/lab/{name}" for name in STAGES | {"recorder"}} <= set(parameters(process))
 
 
 def test_nothing_records_where_it_is_not_wanted() -> None:
     assert "recorder" not in {process.name for process in processes(given(record="false"))}
-    (process,) = processes(given(record="false", composed="1"))
+    (process,) = processes(given(record="false", processes="one"))
     assert parameters(process)["/recorder"]["autostart"] is False
 
 
@@ -61,7 +71,7 @@ def test_a_robot_is_that_of_all_stages_of_its_arm() -> None:
     assert {one[f"/{name}"]["robot"] for name in ("slave", "slave_sim", "inverse_kinematics")} == {
         "puma560"
     }
-    both = processes(given(TWO_ARMS, right_robot="puma560"))
+    both = processes(given(TWO_ARMS, right_robot="puma560", processes="nodes"))
     two = parameters(both[0])
     assert two["/slave_sim"]["robot"] == "rcrt1"
     assert two["/right/slave_sim"]["robot"] == "puma560"
@@ -69,7 +79,7 @@ def test_a_robot_is_that_of_all_stages_of_its_arm() -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "value"), [("log_level", "loud"), ("record", "perhaps"), ("composed", "")]
+    ("name", "value"), [("log_level", "loud"), ("record", "perhaps"), ("processes", "")]
 )
 def test_an_argument_of_no_meaning_is_refused(name: str, value: str) -> None:
     with pytest.raises(ParameterError, match=name):
@@ -100,7 +110,7 @@ def test_a_launch_file_declares_its_arguments_and_starts_its_nodes(
         monkeypatch.setitem(sys.modules, name, module)
     made = runpy.run_path(str(LAUNCH / f"{file}.launch.py"))["generate_launch_description"]()
     assert set(declared) == set(COMMON) | set(own)
-    values = declared | {"ros_namespace": "/lab", "log_level": "warn"}
+    values = declared | {"processes": "nodes", "ros_namespace": "/lab", "log_level": "warn"}
     made[-1](SimpleNamespace(launch_configurations=values))
     assert len(started) == count
     assert all(node["package"] == "teleop_core" for node in started)

@@ -161,8 +161,14 @@ def _add_live(commands: Any) -> None:
     live = command(commands, "live", _live, "run and record a session as ROS 2 nodes")
     session_arguments(live)
     live.add_argument(
-        "--composed", action="store_true", help="all nodes in one process: the fastest session"
-    )
+        "--processes", choices=("sides", "nodes", "one"), default="sides",
+        help="the hand's side and the slave's side (default), a process for each node, to replace "
+        "or kill one, or one for all, which is fastest; the recorder is always apart",
+    )  # fmt: skip
+    live.add_argument(
+        "--composed", action="store_const", dest="processes", const="one",
+        help="the same as --processes one",
+    )  # fmt: skip
     without_argument(live)
 
 
@@ -265,12 +271,12 @@ def _live(arguments: argparse.Namespace) -> int:
     from rich.console import Console
 
     configuration = configured(arguments)
-    is_composed = bool(arguments.composed)
+    module = ros_module("live")
+    processes = module.Processes(arguments.processes)
     try:
-        ros_module("live").live(
-            configuration, arguments.out, Console(), is_composed=is_composed,
-            without=arguments.without,
-        )  # fmt: skip
+        module.live(
+            configuration, arguments.out, Console(), processes=processes, without=arguments.without
+        )
     except SessionError:
         if (arguments.out / "metadata.yaml").exists():
             print(done(arguments.out, "recorded until it ended"))

@@ -9,7 +9,7 @@ import subprocess
 import sys
 import tempfile
 from collections import deque
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from typing import IO, Any, cast
 
@@ -17,6 +17,7 @@ from teleop_core.base.errors import SessionError
 from teleop_core.nodes.chances import Chances
 from teleop_core.nodes.discovery import choose_transport
 from teleop_core.nodes.parent import VARIABLE
+from teleop_core.nodes.start import SESSION
 from teleop_core.nodes.starter import NODE, Starter
 
 # Not by SIGINT, which a process that a shell started in the background ignores, and its children.
@@ -88,6 +89,8 @@ class Child:
         env: Its environment.
         starter: Who starts it.
         command: What it runs in place of the node of that name.
+        nodes: Nodes that it holds; more than one, or of another name, make it a side.
+        files: Further files that it gets, by the names that stand for them in ``env``.
 
     Attributes:
         name: As given.
@@ -97,7 +100,8 @@ class Child:
 
     def __init__(
         self, name: str, parameters: IO[Any], env: dict[str, str], starter: Starter,
-        command: Sequence[str] = (),
+        command: Sequence[str] = (), nodes: Sequence[str] = (),
+        files: Mapping[str, int] | None = None,
     ) -> None:  # fmt: skip
         arm, _, stage = name.rpartition("/")
         self.name, self.doing = name, "starting"
@@ -107,10 +111,13 @@ class Child:
         self._text = b""
         # Closed with us: nobody else knows its name.
         self._log = cast("IO[bytes]", tempfile.TemporaryFile())  # noqa: SIM115
-        ours = [stage, "--ros-args", "--params-file", "/dev/fd/<parameters>"]
-        ours += ["-r", f"__ns:=/{arm}"] if arm else []
+        is_side = bool(nodes) and tuple(nodes) != (name,)
+        ours = [SESSION, *nodes] if is_side else [stage]
+        ours += ["--ros-args", "--params-file", "/dev/fd/<parameters>"]
+        ours += ["-r", f"__ns:=/{arm}"] if arm and not is_side else []
         log = self._log.fileno()
-        files = {"out": log, "err": log, "line": theirs.fileno(), "parameters": parameters.fileno()}
+        files = {"out": log, "err": log, "line": theirs.fileno(),
+                 "parameters": parameters.fileno(), **(files or {})}  # fmt: skip
         with theirs:
             self._process = starter.start(
                 command or ["teleop_core.nodes", *ours], env | {VARIABLE: "<line>"}, files,

@@ -9,6 +9,7 @@ from rich.console import Console
 from teleop_core.base.errors import SessionError, TeleopError
 from teleop_core.nodes.children import environment
 from teleop_core.nodes.console_link import LiveLink
+from teleop_core.nodes.crews import Processes
 from teleop_core.nodes.guest import Guest
 from teleop_core.nodes.interrupt import Interrupt
 from teleop_core.nodes.live import live
@@ -78,7 +79,7 @@ class ConsoleSession:
         try:
             live(
                 self._configuration, self._out, self._console,
-                is_composed=not self._without, without=self._without, interrupt=self._interrupt,
+                processes=Processes.ONE, without=self._without, interrupt=self._interrupt,
                 domain=self.domain,
             )  # fmt: skip
         except TeleopError as error:

@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Any
 
 from teleop_core.base.errors import ParameterError
 from teleop_core.graph.graph import RECORDER_NAME
+from teleop_core.nodes.crews import Processes, crews
 from teleop_core.nodes.files import temporary_file
 from teleop_core.nodes.live import parameter_file
-from teleop_core.nodes.start import SESSION as SESSION_NODE
+from teleop_core.nodes.start import SESSION
 from teleop_core.session.configuration import configure
 
 if TYPE_CHECKING:
@@ -23,12 +24,12 @@ COMMON = {
     "scenario": ("coarse_box", "one of `teleop scenarios`"),
     "params_file": ("", "ROS 2 parameter file over the scenario"),
     "namespace": ("", "where all nodes and topics are, below that of an including launch file"),
-    "composed": ("false", "whether one process holds all nodes, which is fastest"),
+    "processes": ("sides", "sides: the hand's and the slave's; nodes: one each; one: for all"),
     "record": ("true", "whether the recorder records from the start"),
     "out": ("", "directory of the recording; empty: bags/ and the time"),
     "respawn": (
         "true",
-        "whether a node that ends is started again; never the slave and the recorder",
+        "whether a process that ends is started again; never that of the slave or the recorder",
     ),
     "log_level": ("info", "one of " + ", ".join(LOG_LEVELS)),
 }
@@ -88,15 +89,18 @@ def processes(given: Mapping[str, str], namespace: str = "") -> list[Process]:
     is_recorded = _truth("record", given["record"])
     text = parameter_file(configuration, given["out"], where, starts_recorder=is_recorded)
     file = temporary_file(text)
-    if _truth("composed", given["composed"]):
-        return [Process(SESSION_NODE, (), "", f"/{where}", file, level)]
-    names = [member.name for member in reversed(configuration.graph.members)]
+    if given["processes"] not in set(Processes):
+        raise ParameterError("processes", given["processes"], f"one of {', '.join(Processes)}")
+    recorder, shared = crews(configuration.graph, Processes(given["processes"]))
     found = []
-    for full in [RECORDER_NAME, *names] if is_recorded else names:
-        arm, _, stage = full.rpartition("/")
-        below = "/".join(filter(None, (where, arm)))
-        respawns = _truth("respawn", given["respawn"]) and stage not in _ONCE
-        found.append(Process("stage", (stage,), stage, f"/{below}", file, level, respawns))
+    for nodes in [*recorder.values()] * is_recorded + [*reversed(shared.values())]:
+        stages = {full.rpartition("/")[2] for full in nodes}
+        arm, _, stage = nodes[0].rpartition("/")
+        below = "/".join(filter(None, (where, arm if len(nodes) == 1 else "")))
+        respawns = _truth("respawn", given["respawn"]) and not stages & {*_ONCE}
+        name, executable = (stage, "stage") if len(nodes) == 1 else ("", SESSION)
+        words = (stage,) if len(nodes) == 1 else nodes
+        found.append(Process(executable, words, name, f"/{below}", file, level, respawns))
     return found
 
 

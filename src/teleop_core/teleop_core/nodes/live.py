@@ -1,9 +1,10 @@
 """Live session: the graph as one process per node, started, watched, recorded and stopped."""
 
+import os
 import tempfile
 import time
 from collections.abc import Collection, Mapping
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from copy import deepcopy
 from pathlib import Path
 from typing import IO, Any
@@ -11,19 +12,21 @@ from typing import IO, Any
 import yaml
 from rich.console import Console
 
-from teleop_core.base.errors import ParameterError, RecordingError, SessionError, UnknownNameError
+from teleop_core.base.errors import RecordingError, SessionError
 from teleop_core.base.texts import printable
-from teleop_core.graph.graph import HAND, RECORDER_NAME, Graph
+from teleop_core.graph.graph import HAND, RECORDER_NAME
 from teleop_core.graph.layers import SESSION
 from teleop_core.graph.topics import SLAVE_SETPOINT_JS
 from teleop_core.nodes.children import Child, end_all, environment
+from teleop_core.nodes.crews import Crew, Processes, crews
+from teleop_core.nodes.feed import READS, WRITES, Pipe, fed_topics, variable
 from teleop_core.nodes.interrupt import Interrupt
 from teleop_core.nodes.keys import Keys
 from teleop_core.nodes.leftovers import remove_leftovers
 from teleop_core.nodes.observer import WARNING, Observer, Status
+from teleop_core.nodes.real_time import is_priority_granted
 from teleop_core.nodes.remote_control import RemoteControl
 from teleop_core.nodes.sessions import announced
-from teleop_core.nodes.start import SESSION as SESSION_NODE
 from teleop_core.nodes.starter import START_TIMEOUT, Starter
 from teleop_core.session.configuration import Configuration
 from teleop_core.session.links import link_texts
@@ -39,36 +42,19 @@ _LOOK = 0.5
 """Whoever sends setpoints this soon after processes were started is not one of them [s]."""
 _ALONE = 1.0
 """Who has been alone in its domain for this long, all at work, owns it; later ones end [s]."""
-_TRANSPORT = {False: 1.4e-3, True: 0.3e-3}
-"""From a sample of the device to its force and back, in processes of their own and composed [s],
-as `make bench` measures: two of the three hops from master to slave."""
+
+_TRANSPORT = dict.fromkeys(Processes, 0.3e-3) | {Processes.NODES: 1.4e-3}
+"""From a sample of the device to its force and back [s], as `make bench` measures: within a process
+on the hand's side, or two of the three hops from master to slave."""
+_PRIORITY = 20
+"""SCHED_FIFO priority of loops where a session does not name one and the system grants it."""
 _NEWS_PERIOD = 5.0  # from line to line about a node that is long in starting [s]
-Crew = dict[str, tuple[str, ...]]
-"""Processes that are started together, each with its nodes."""
-
-
-def _crews(graph: Graph, *, is_composed: bool, without: Collection[str] = ()) -> tuple[Crew, ...]:
-    """Processes of a graph: the recorder before the others, or all in one.
-
-    Raises:
-        UnknownNameError: A node that is to be left out is not there.
-        ParameterError: It shares a process with others.
-    """
-    names = tuple(member.name for member in graph.members)
-    for name in without:
-        if name not in names:
-            raise UnknownNameError("node of the session", name, names)
-    if is_composed:
-        if without:
-            raise ParameterError("--without", ", ".join(without), "a process for each node")
-        return ({SESSION_NODE: (*names, RECORDER_NAME)},)
-    own: Crew = {name: (name,) for name in names if name not in without}
-    return ({RECORDER_NAME: (RECORDER_NAME,)}, own)
 
 
 def live(
-    configuration: Configuration, out: Path, console: Console, *, is_composed: bool = False,
-    without: Collection[str] = (), interrupt: Interrupt | None = None, domain: int | None = None,
+    configuration: Configuration, out: Path, console: Console, *,
+    processes: Processes = Processes.SIDES, without: Collection[str] = (),
+    interrupt: Interrupt | None = None, domain: int | None = None,
 ) -> None:  # fmt: skip
     """Run and record a session as ROS 2 nodes, for the configured duration or until Ctrl-C.
 
@@ -76,7 +62,7 @@ def live(
         configuration: What runs, and for how long.
         out: Directory of the recording, made here.
         console: Where the progress is shown.
-        is_composed: Whether all nodes share one process, in place of one each.
+        processes: How the nodes are shared out.
         without: Nodes that are not started: others stand in their place, such as an arm bridge in
             that of ``slave_sim``.
         interrupt: What ends it from another thread; None for signals alone.
@@ -85,34 +71,55 @@ def live(
     Raises:
         RecordingError: The directory exists.
         UnknownNameError: A node that is to be left out is not there.
-        ParameterError: It shares a process with others.
         SessionError: The ROS domain has a session already; or a node did not start, died or
             hangs, and then the recording is closed nevertheless.
     """
     out = Path(out).absolute()
     if out.exists():
         raise RecordingError(out, "exists already; choose another --out")
-    crews = _crews(configuration.graph, is_composed=is_composed, without=without)
+    shared = crews(configuration.graph, processes, without)
     env = environment(domain)
     remove_leftovers()
     interrupt = interrupt or Interrupt()
     # A file without a name: there is nothing to remove, however this ends.
     with (
         tempfile.TemporaryFile("w+") as parameters,
-        Starter("" if is_composed else configuration.text(), env) as starter,
+        Starter("" if processes is Processes.ONE else configuration.text(), env) as starter,
+        ExitStack() as pipes,
         interrupt.caught(),
         announced(int(env["ROS_DOMAIN_ID"])),
         Observer(int(env["ROS_DOMAIN_ID"])) as observer,
     ):
-        parameters.write(parameter_file(configuration, str(out)))
+        priority = _priority(configuration, processes)
+        parameters.write(parameter_file(configuration, str(out), priority=priority))
         parameters.flush()
         session = _Session(configuration, console, observer, parameters, env, interrupt, starter)
-        session.crews = crews
+        session.crews = shared
+        if processes is not Processes.NODES:
+            session.feed(pipes)
         session.tell_where(out)
-        for note in notes_of(configuration, transport=_TRANSPORT[is_composed]):
+        for note in notes_of(configuration, transport=_TRANSPORT[processes]):
             session.say(f"note: {note}")
+        if priority == 0 and processes is not Processes.NODES:
+            session.say(f"note: {_UNGRANTED}")
         with Keys(observer.press) as keys:
             session.run(keys)
+
+
+_UNGRANTED = (
+    "the system grants no SCHED_FIFO, so loops share processors fairly and are late more often; "
+    "grant it with an rtprio line in /etc/security/limits.conf"
+)
+
+
+def _priority(configuration: Configuration, processes: Processes) -> int | None:
+    """Priority of the loops; None: as configured.
+
+    Processes for each node need more than two processors together, so that theirs stays 0.
+    """
+    if configuration.groups[SESSION].real_time.priority or processes is Processes.NODES:
+        return None
+    return _PRIORITY if is_priority_granted(_PRIORITY) else 0
 
 
 class _Session:
@@ -135,7 +142,23 @@ class _Session:
         self._starter = starter
         self._children: dict[str, Child] = {}
         self._ready = 0.0
-        self.crews = _crews(self._graph, is_composed=False)
+        self.crews = crews(self._graph)
+        self._pipes: dict[str, tuple[str, dict[str, int]]] = {}
+        self._ends = ExitStack()
+
+    def feed(self, stack: ExitStack) -> None:
+        """Lead a pipe from every process to the recorder; the stack holds our ends meanwhile."""
+        self._ends = stack
+        read: dict[str, Pipe] = {}
+        files: dict[str, int] = {}
+        for process, nodes in self.crews[-1].items():
+            names = fed_topics(self._graph, nodes)
+            ends = os.pipe()
+            for end in ends:
+                stack.callback(os.close, end)
+            read[process], files[process] = Pipe(f"<{process}>", names), ends[0]
+            self._pipes[process] = variable(Pipe("<feed>", names)), {"feed": ends[1]}
+        self._pipes[RECORDER_NAME] = variable(*read.values()), files
 
     def tell_where(self, out: Path) -> None:
         """Say how others find the nodes, and where they are recorded."""
@@ -162,6 +185,7 @@ class _Session:
             self._await_starter()
             for crew in self.crews:
                 self._start(crew)
+            self._ends.close()
             if self._keys.is_there:
                 self.say("space stops all arms; e lets them go on")
             self._await_operator()
@@ -182,7 +206,12 @@ class _Session:
 
     def _start(self, crew: Crew) -> None:
         for name in crew:
-            self._children[name] = Child(name, self._parameters, self._env, self._starter)
+            text, files = self._pipes.get(name, ("", {}))
+            variable = READS if name == RECORDER_NAME else WRITES
+            env = self._env | ({variable: text} if text else {})
+            self._children[name] = Child(
+                name, self._parameters, env, self._starter, nodes=crew[name], files=files
+            )
         waiting = [node for nodes in crew.values() for node in nodes]
         home = {node: name for name, nodes in crew.items() for node in nodes}
         progress = _Progress(self._children)
@@ -344,8 +373,9 @@ class _Progress:
 
 
 def parameter_file(
-    configuration: Configuration, out: str, namespace: str = "", *, starts_recorder: bool = True
-) -> str:
+    configuration: Configuration, out: str, namespace: str = "", *, starts_recorder: bool = True,
+    priority: int | None = None,
+) -> str:  # fmt: skip
     """Parameters of all nodes as a ROS 2 parameter file; ``out`` is that of the recorder.
 
     Every node is named with its namespace. What feeds its ports, where that is not the topic of
@@ -355,12 +385,15 @@ def parameter_file(
         configuration: The session.
         out: Directory of the recording; empty: bags/ and the time.
         namespace: Where all nodes are, without slashes before and after it.
+        priority: Priority of the loops; None: as configured.
         starts_recorder: Whether the recorder configures and activates itself.
     """
     text, graph = configuration.text(), configuration.graph
     content: dict[str, Any] = yaml.safe_load(text)
     session = content.pop(SESSION)
     shared = {k: v for k, v in session["ros__parameters"].items() if k.startswith("real_time.")}
+    if priority is not None:
+        shared["real_time.priority"] = priority
     for node in content.values():
         node["ros__parameters"] |= deepcopy(shared)  # rcl cannot read YAML's aliases
     for member in graph.members:
@@ -368,7 +401,7 @@ def parameter_file(
             content[member.name]["ros__parameters"]["links"] = links
     recorder = content[RECORDER_NAME]["ros__parameters"]
     recorder["out"], recorder["configuration"] = out, text
-    recorder["scenario"] = configuration.scenario
+    recorder["scenario"], recorder["real_time.priority"] = configuration.scenario, 0
     if not starts_recorder:
         recorder["autostart"] = False
     place = f"/{namespace}" if namespace else ""

@@ -22,6 +22,7 @@ from teleop_core.graph.stage import Stage
 from teleop_core.graph.topics import DIAGNOSTICS, Quality, Topic
 from teleop_core.nodes.base import SUCCESS, CoreNode
 from teleop_core.nodes.display import LiveDisplay
+from teleop_core.nodes.feed import READS, FeedReader, pipes_of_environment
 from teleop_core.nodes.files import graph_of, session_of
 from teleop_core.nodes.markers import LiveMarkers
 from teleop_core.nodes.model import LiveModel, ModelTopics
@@ -57,14 +58,15 @@ class RecorderParameters(RecordingParameters):
 class _Channel:
     """One recorded topic: how much came, and how much the middleware lost on the way."""
 
-    def __init__(self, node: CoreNode, topic: Topic) -> None:
+    def __init__(self, node: CoreNode, topic: Topic, *, is_fed: bool = False) -> None:
         self.topic, self._node = topic, node
         self.received = self.lost = 0
         self._numbers: dict[bytes, int] = {}  # the last one of each publisher
         self._since_ns = 0  # since when it listens
         self._given: deque[Arrival] = deque()
         self._subscription: Subscription | None = None
-        self._inside_ns: int | None = None
+        self._inside_ns: int | None = 0 if is_fed else None
+        self._taken = 0  # number of the last message of a feed
         self._follow()
 
     def join(self, is_inside: bool) -> None:
@@ -78,6 +80,12 @@ class _Channel:
         It came when it was given to the next stage, before it was published.
         """
         self._given.append((sent_ns, self.topic, data, sent_ns))
+
+    def take(self, number: int, data: bytes, sent_ns: int) -> None:
+        """Take a message of a feed, by its number there."""
+        self.lost += max(0, number - self._taken - 1)
+        self._taken = number
+        self.give(data, sent_ns)
 
     def drain(self, came: list[Arrival]) -> None:
         """Append what has come since the last call."""
@@ -133,6 +141,7 @@ class RecorderNode(CoreNode):
         self.channels: dict[str, _Channel] = {}
         self._graph = graph
         self.patience = 10.0  # a slow disk is no reason to end a session
+        self._feeds: list[FeedReader] = []
         self.stages: dict[str, Any] = {}
         """Parameters of the stages of the process, by their names in the graph."""
         self._writing = threading.Lock()  # held while something is written, or the file changes
@@ -202,7 +211,12 @@ class RecorderNode(CoreNode):
 
     def start(self) -> None:
         """Open the topics; latched ones send what they have."""
-        self.channels = {topic.name: _Channel(self, topic) for topic in self._recorded}
+        feeds = pipes_of_environment(READS)
+        fed = {name for feed in feeds for name in feed.names}
+        self.channels = {
+            topic.name: _Channel(self, topic, is_fed=topic.name in fed) for topic in self._recorded
+        }
+        self._feeds = [FeedReader(feed, self.channels) for feed in feeds]
 
     def turn(self) -> None:
         """Record what has come."""
@@ -220,6 +234,8 @@ class RecorderNode(CoreNode):
         finally:
             for channel in self.channels.values():
                 channel.close()
+            for feed in self._feeds:
+                feed.close()
 
     def teardown(self) -> None:
         """Finish the recording."""
@@ -245,6 +261,8 @@ class RecorderNode(CoreNode):
 
     def _drain(self) -> None:
         came: list[Arrival] = []
+        for feed in self._feeds:
+            feed.drain()
         for channel in self.channels.values():
             channel.drain(came)
         came.sort(key=lambda message: message[0])

@@ -5,6 +5,7 @@
 """
 
 import sys
+from itertools import takewhile
 from pathlib import Path
 
 from teleop_core.base.errors import TeleopError
@@ -46,11 +47,13 @@ def _start() -> int:
     if name == SESSION:
         from teleop_core.nodes.teleop_session import TeleopSession
 
-        sys.argv[:], names = taken_names(sys.argv)
-        if "__node" in names:
+        sys.argv[:], given = taken_names(sys.argv)
+        if "__node" in given:
             text = "its nodes keep the names of their stages"
-            print(f"{SESSION}: not named {names['__node']}: {text}", file=sys.stderr)
-        return run(lambda: TeleopSession(names.get("__ns", "").strip("/")))
+            print(f"{SESSION}: not named {given['__node']}: {text}", file=sys.stderr)
+        names = list(takewhile(lambda word: word[:1] != "-", sys.argv[1:]))
+        del sys.argv[1 : 1 + len(names)]
+        return run(lambda: TeleopSession(given.get("__ns", "").strip("/"), names))
     stage = STAGES.find(name)
     return run(lambda: make_node(stage))
 
@@ -89,9 +92,13 @@ def help_text(name: str) -> str:
     """
     if name == ANY:
         return f"usage: {ANY} NAME [--ros-args ...], with NAME one of {', '.join(STAGES)}"
-    lines = [f"usage: {name} [--ros-args ...]", ""]
+    nodes = "[NODE ...] " if name == SESSION else ""
+    lines = [f"usage: {name} {nodes}[--ros-args ...]", ""]
     if name == SESSION:
         lines.append("  a whole session in one process; its parameters are those of its stages")
+        lines.append(
+            "  with names of nodes, these alone, without the recorder: one side of several"
+        )
     else:
         stage = STAGES.find(name)
         for verb, topics in (("reads", stage.reads), ("writes", stage.writes)):

@@ -9,12 +9,16 @@ the topic instead: a real device, or a node elsewhere, takes its place.
 import sys
 import threading
 import time
+from collections.abc import Sequence
+from typing import Any
 
 from rclpy.parameter import Parameter
 
+from teleop_core.base.errors import UnknownNameError
 from teleop_core.graph.graph import RECORDER_NAME, Graph, Member
 from teleop_core.graph.stage import STAGES
 from teleop_core.nodes.base import CoreNode
+from teleop_core.nodes.feed import WRITES, Feed, pipes_of_environment
 from teleop_core.nodes.files import graph_of
 from teleop_core.nodes.loop import Loop
 from teleop_core.nodes.making import make_node
@@ -32,14 +36,27 @@ class TeleopSession:
 
     Args:
         namespace: Where all of it is, without the slash before it; arms are below.
+        names: Nodes of this process, with the namespaces of their arms; empty: all, and the
+            recorder. What others do, these hear of by topics.
+
+    Raises:
+        UnknownNameError: The graph has no such node.
     """
 
-    def __init__(self, namespace: str = "") -> None:
+    def __init__(self, namespace: str = "", names: Sequence[str] = ()) -> None:
         graph = graph_of(sys.argv)
-        self._recorder = RecorderNode(STAGES.find(RECORDER_NAME), graph=graph, namespace=namespace)
-        self._stages = tuple(_node(graph, member, namespace) for member in graph.members)
-        members = zip(graph.members, self._stages, strict=True)
-        self._recorder.stages = {member.name: node.parameters for member, node in members}
+        known = [member.name for member in graph.members]
+        for name in names:
+            if name not in known:
+                raise UnknownNameError("node of the session", name, known)
+        members = [member for member in graph.members if member.name in names or not names]
+        self._recorder = () if names else (_recorder(graph, namespace),)
+        self._stages = tuple(_node(graph, member, namespace) for member in members)
+        pairs = zip(members, self._stages, strict=True)
+        stages = {member.name: node.parameters for member, node in pairs}
+        for recorder in self._recorder:
+            recorder.stages = stages
+        self._feeds = [Feed(pipe) for pipe in pipes_of_environment(WRITES)]
         self._gate = threading.Lock()
         for node in self._stages:
             node.has_own_loop, node.gate = False, self._gate
@@ -54,18 +71,20 @@ class TeleopSession:
     @property
     def nodes(self) -> tuple[CoreNode, ...]:
         """The nodes, recorder first and masters last: nothing that is sent is missed."""
-        return (self._recorder, *reversed(self._stages))
+        return (*self._recorder, *reversed(self._stages))
 
     def watched(self) -> list[tuple[Loop, int]]:
         """The loop of all stages, and that of the recorder."""
         own = [(self._loop, self._loop.turns + self._ticks)] if self._loop.is_ready else []
-        return [*own, *self._recorder.watched()]
+        return [*own, *(one for recorder in self._recorder for one in recorder.watched())]
 
     def halt(self) -> None:
         """Stop the loop; where it hangs, its nodes end without it."""
         if not self._loop.stop():
             for node in self._stages:
                 node.gate = threading.Lock()
+        for feed in self._feeds:
+            feed.close()
 
     def _turn(self) -> None:
         """All ticks that are due, each through all stages."""
@@ -106,6 +125,8 @@ class TeleopSession:
                     self._pending.clear()
             for output, stamp_ns, sent_ns in waiting:
                 output.publish(stamp_ns, sent_ns)
+            for feed in self._feeds:
+                feed.flush()
             for node in self._stages:
                 if node.is_at_work:
                     node.tell()
@@ -118,14 +139,21 @@ class TeleopSession:
                 node.schedule = self._schedule
         outputs = {topic.name: out for node in active for topic, out in node.ports.outputs.items()}
         inputs = [entry for node in active for entry in node.ports.all_inputs()]
+        channels: dict[str, Any] = {}
+        for recorder in (*self._recorder, *self._feeds):
+            channels |= recorder.channels
         for name, out in outputs.items():
             out.inputs = [entry for entry in inputs if entry.topic.name == name]
-            channel = self._recorder.channels.get(name)
+            channel = channels.get(name)
             out.tap, out.pending = channel.give if channel else None, self._pending
         for entry in inputs:
             entry.join(entry.topic.name in outputs)
-        for name, channel in self._recorder.channels.items():
+        for name, channel in channels.items():
             channel.join(name in outputs)
+
+
+def _recorder(graph: Graph, namespace: str) -> RecorderNode:
+    return RecorderNode(STAGES.find(RECORDER_NAME), graph=graph, namespace=namespace)
 
 
 def _node(graph: Graph, member: Member, namespace: str) -> CoreNode:

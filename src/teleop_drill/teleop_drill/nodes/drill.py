@@ -12,6 +12,7 @@ import numpy as np
 from teleop_core.base.errors import SessionError
 from teleop_core.base.own_parts import VARIABLE, load_own_parts
 from teleop_core.nodes.children import environment, free_domain
+from teleop_core.nodes.real_time import is_priority_granted
 from teleop_core.session import api
 from teleop_core.session.configuration import Configuration
 from teleop_drill.drill import hand, inside
@@ -24,6 +25,7 @@ from teleop_drill.nodes.drill_evidence import help_on, note_state, recover, seen
 from teleop_drill.nodes.drill_rig import LiveRig
 from teleop_drill.nodes.drill_session import ARM, SIMULATOR, DrillSession
 
+_PRIORITY = 30
 _BEFORE = 0.2  # motion that is seen before a fault [s]
 _FOLLOWS = 90.0  # until it follows after the start [s]
 _CIRCLE = (
@@ -51,6 +53,9 @@ def drill(
 ) -> list[Outcome]:
     """Do exercises in sessions of their own, on a ROS domain of their own.
 
+    Loops and the drill's own tap take SCHED_FIFO where the system grants it and ``texts`` name no
+    priority: seven processes on two cores are late by themselves.
+
     Args:
         exercises: What is done, as of :func:`teleop_drill.drill.chosen`.
         folder: Where recordings go.
@@ -66,6 +71,8 @@ def drill(
     Raises:
         TeleopError: A parameter is wrong, or a session cannot be started.
     """
+    if is_priority_granted(_PRIORITY):
+        texts = (f"real_time.priority={_PRIORITY}", *texts)
     sys.setswitchinterval(2e-4)  # the drill's own hand must not wait 5 ms for its turn
     foreign = {SIMULATOR: drives, ARM: arm}
     outcomes: list[Outcome] = []

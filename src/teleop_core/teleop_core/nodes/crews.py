@@ -1,0 +1,61 @@
+"""Crews: which processes a live session has, and which nodes each of them holds."""
+
+from collections.abc import Collection
+from enum import StrEnum
+
+from teleop_core.base.errors import UnknownNameError
+from teleop_core.graph.graph import RECORDER_NAME, Graph
+from teleop_core.nodes.start import SESSION
+
+_SIDES = ("hand_side", "slave_side")
+Crew = dict[str, tuple[str, ...]]
+"""Processes that are started together, each with its nodes."""
+
+
+class Processes(StrEnum):
+    """How the nodes of a session are shared out; the recorder always has a process of its own."""
+
+    SIDES = "sides"
+    """The hand's side, to inverse kinematics; the slave's side, with the simulated arm."""
+    NODES = "nodes"
+    """A process for each node: any of them can be replaced or killed alone."""
+    ONE = "one"
+    """All stages in one process: the fastest session."""
+
+
+def crews(
+    graph: Graph, processes: Processes = Processes.SIDES, without: Collection[str] = ()
+) -> tuple[Crew, ...]:
+    """Processes of a graph: the recorder before the others.
+
+    Args:
+        graph: What runs.
+        processes: How the nodes are shared out.
+        without: Nodes that are not started.
+
+    Raises:
+        UnknownNameError: A node that is to be left out is not there.
+    """
+    names = tuple(member.name for member in graph.members)
+    for name in without:
+        if name not in names:
+            raise UnknownNameError("node of the session", name, names)
+    own = {name: _process_of(graph, name, processes) for name in names if name not in without}
+    shared = {
+        process: tuple(name for name in own if own[name] == process)
+        for process in dict.fromkeys(own.values())
+    }
+    return ({RECORDER_NAME: (RECORDER_NAME,)}, shared)
+
+
+def _process_of(graph: Graph, name: str, processes: Processes) -> str:
+    """Name of the process in which a node is."""
+    if processes is Processes.NODES:
+        return name
+    if processes is Processes.ONE:
+        return SESSION
+    stages = [
+        member.stage.name for member in graph.members if member.arm == name.rpartition("/")[0]
+    ]
+    place = stages.index(name.rpartition("/")[2])
+    return _SIDES[place >= stages.index("slave")]
