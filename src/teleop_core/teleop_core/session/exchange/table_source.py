@@ -11,11 +11,12 @@ from teleop_core.base.errors import ParameterError, RecordingError
 from teleop_core.kernels.geometry import Array
 from teleop_core.kernels.portable import length
 from teleop_core.session.exchange import names
+from teleop_core.session.exchange.episodes import Episodes
 from teleop_core.session.exchange.options import BUTTONS, ImportOptions, option
 from teleop_core.session.exchange.orientation import TOLERANCE, Attitudes
 from teleop_core.session.exchange.source import Block, Presses
 from teleop_core.session.exchange.tables import Numbers, Table, column_of
-from teleop_core.session.exchange.times import SECOND_NS
+from teleop_core.session.exchange.times import SECOND_NS, nanoseconds
 
 
 @dataclass(frozen=True)
@@ -44,13 +45,15 @@ class TableSource:
     def __init__(self, table: Table, options: ImportOptions) -> None:
         self.path, self._table, self._options = table.path, table, options
         self.told: list[str] = []
-        if options.topic or options.buttons_topic or options.frame:
-            raise ParameterError("--topic", options.topic, "left out: this file has columns")
+        for name in ("topic", "buttons_topic", "frame", "parent"):
+            if given := getattr(options, name):
+                raise ParameterError(option(name), given, "left out: this file has columns")
         position = self._position()
         time = self._time(position)
         self.attitudes, orientation = self._orientation({*position, *time})
         taken = {*position, *time, *orientation}
         self._columns = Columns(time, position, orientation, self._buttons(taken))
+        self._episodes = Episodes(table, options.episode)
         self.has_time = bool(time)
         self.time_unit = self._time_unit(time)
         self.unit, self.is_unit_said = self._unit(position)
@@ -259,7 +262,7 @@ class TableSource:
         c = self._columns
         order = [*c.time, *c.position, *c.orientation, *c.buttons.values()]
         first, second = len(c.time), len(c.time) + 3
-        for columns in self._table.blocks(order):
+        for columns in self._episodes.blocks(order):
             turned = columns[second : second + len(c.orientation)]
             count = len(columns[first])
             rows = np.column_stack(turned) if turned else np.empty((count, 0))
@@ -269,6 +272,7 @@ class TableSource:
                 self.attitudes.quaternions(rows.astype(np.float64, copy=False)),
                 self._pressed(columns[second + len(turned) :], count),
             )
+        self.told += self._episodes.told()
 
     def _pressed(self, columns: Sequence[Numbers], count: int) -> NDArray[np.uint8] | None:
         if not columns:
@@ -304,4 +308,6 @@ def _time(columns: Sequence[Numbers], count: int) -> Numbers:
         return np.zeros(count)
     if len(columns) == 1:
         return columns[0]
+    if all(np.isfinite(column).all() for column in columns):
+        return nanoseconds(columns[0], "s") + nanoseconds(columns[1], "ns")
     return np.asarray(columns[0] * SECOND_NS + columns[1])
