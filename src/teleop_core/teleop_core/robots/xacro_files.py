@@ -35,7 +35,7 @@ def xml_of(path: Path, arguments: Mapping[str, str]) -> bytes:
     """
     with damage_told(path):
         data = path.read_bytes()
-    if path.suffix != ".xacro":
+    if path.suffix.lower() != ".xacro":
         if arguments and not path.name.endswith(EXPANDED):
             needed = f"left out: {path} is no .xacro"
             raise ParameterError("arguments of xacro", list(arguments), needed)
