@@ -1,5 +1,6 @@
 """Importing bags of others: any pose, any storage, ROS 1 and 2, read beside the rosbags library."""
 
+import sqlite3
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
@@ -474,6 +475,14 @@ def test_what_is_no_recording_is_told_in_one_line(name: str, tmp_path: Path) -> 
         tc.import_recording(path, tmp_path / "out")
     assert "\n" not in str(error.value)
     assert not (tmp_path / "out").exists()
+
+
+def test_an_entry_that_a_recording_lacks_is_named(tmp_path: Path) -> None:
+    (file,) = write2(tmp_path / "bag", poses(), StoragePlugin.SQLITE3).glob("*.db3")
+    with sqlite3.connect(file) as storage:
+        storage.execute("UPDATE topics SET offered_qos_profiles = '- history: 1'")
+    with pytest.raises(tc.RecordingError, match="it lacks 'depth'"):
+        tc.import_recording(file, tmp_path / "out")
 
 
 def test_a_bag_that_was_cut_off_is_told(tmp_path: Path) -> None:
