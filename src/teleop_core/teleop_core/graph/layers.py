@@ -281,7 +281,7 @@ def _hits(key: str) -> list[tuple[str, Spec]]:
         raise UnknownNameError("key", key, ends)  # several parameters end so
     if not ends:
         near = difflib.get_close_matches(
-            key[:LONGEST_VALUE], [*known, *(s.name for _, s in declared.values())]
+            key[:LONGEST_VALUE], dict.fromkeys([*known, *(s.name for _, s in declared.values())])
         )
         raise UnknownNameError("key", key, near or declared)
     return list({stage: (stage, spec) for stage, spec in ends.values()}.values())

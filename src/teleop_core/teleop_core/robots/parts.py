@@ -174,5 +174,6 @@ ROBOTS: Registry[RobotPart] = Registry(
     {name: f"teleop_core.robots.{name}:make" for name in _BUILT_IN},
     _checked,
     _try,
+    others=("FILE.urdf", "FILE.xacro", "FILE.yaml"),
 )
 """All robots by name; see :data:`RobotPart` for what can be added."""

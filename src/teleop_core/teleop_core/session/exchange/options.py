@@ -22,7 +22,7 @@ BUTTONS = ("clutch", "fixture", "mode")
 AXES = ("+x", "-x", "+y", "-y", "+z", "-z")
 ORIENTATIONS = ("quaternion", "matrix", "euler", "rotation_vector", "forward")
 """Options that say where the orientation is."""
-_CHOICES = {
+CHOICES = {
     "time_unit": ("auto", *TIMES_NS),
     "stamps": ("header", "log"),
     "unit": ("auto", *LENGTHS),
@@ -133,7 +133,7 @@ class ImportOptions:
             object.__setattr__(self, name, expanded(getattr(self, name)))
         for name in BUTTONS:
             object.__setattr__(self, name, str(getattr(self, name)))
-        for name, choices in _CHOICES.items():
+        for name, choices in CHOICES.items():
             if getattr(self, name) not in choices:
                 raise UnknownNameError(option(name), getattr(self, name), choices)
         self._check_columns()
