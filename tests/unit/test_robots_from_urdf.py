@@ -404,12 +404,11 @@ def test_a_mistake_is_told_by_its_element(name: str, tmp_path: Path) -> None:
     assert "\n" not in str(told.value)
 
 
+WORDS = ("nan", "-inf", "x", "0.2m", "1e300", "-1e160", "2e9", "0 0", "nan 0.1", "0.2m 0.1")
 NUMBERS = ("xyz", "lower", "upper", "effort", "velocity", "value", "ixx", "iyy", "izz")
 
 
-@pytest.mark.parametrize(
-    "word", ["nan", "-inf", "x", "0.2m", "1e300", "-1e160", "2e9", "0 0", "nan 0.1", "0.2m 0.1"]
-)
+@pytest.mark.parametrize("word", WORDS)
 def test_no_number_of_a_file_is_read_as_another(word: str, tmp_path: Path) -> None:
     path, refused = tmp_path / "arm.urdf", set()
     for found in re.finditer(rf'({"|".join(NUMBERS)})="([^"]*)"', TEXT):

@@ -56,7 +56,7 @@ class Episodes:
         if self._wanted is None and len(listed) > 1:
             few = ", ".join(listed) if len(listed) < _LISTED else f"{listed[0]} to {listed[-1]}"
             reason = f"holds {len(listed)} episodes (column {self._table.names[column]!r}: {few})"
-            hint = "take one by `teleop import --episode N`"
+            hint = "take one by --episode N"
             raise RecordingError(self._table.path, f"{reason}; {hint}")
 
     def told(self) -> list[str]:

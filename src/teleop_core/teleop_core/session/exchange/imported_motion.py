@@ -132,12 +132,12 @@ class Motion:
         timed = max(1, c.rows - c.missing - c.damaged)
         if c.backwards > most * timed:
             share = 100.0 * c.backwards / timed
-            hint = "is --time the right column? Else `teleop import --backwards sort` or drop"
+            hint = "is --time the right column? Else give --backwards sort or drop"
             raise RecordingError(self._path, f"the time goes back in {c.backwards} rows "
                                  f"({share:.3g} %): {hint}")  # fmt: skip
         if c.doubled > MOST_DOUBLED * timed:
             share = 100.0 * c.doubled / timed
-            hint = "it is too coarse; `teleop import --rate HZ`, or --stamps log for a bag"
+            hint = "it is too coarse; give --rate HZ, or --stamps log for a bag"
             raise RecordingError(self._path, f"the time stands still in {share:.3g} % of the rows: "
                                  f"{hint}")  # fmt: skip
         if c.samples < 2:
