@@ -156,9 +156,9 @@ class Loose:
 @pytest.mark.parametrize(
     ("name", "value", "needed"),
     [
-        ("length", 1e6, "between -1000 and 1000 m"),
-        ("length", -1e300, "between -1000 and 1000 m"),
-        ("angle", 2e4, "between -10000 and 10000 rad or m"),
+        ("length", 1e9, "between -1e+07 and 1e+07 m"),
+        ("length", -1e300, "between -1e+07 and 1e+07 m"),
+        ("angle", 2e9, "between -1e+07 and 1e+07 rad or m"),
         ("silence", 1e-9, "0, or between 0.01 and 9 s"),
     ],
 )

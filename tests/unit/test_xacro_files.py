@@ -116,7 +116,7 @@ def test_macros_in_a_file_that_is_called_urdf_are_told(tmp_path: Path) -> None:
 
 def test_what_no_file_declares_and_what_is_no_xacro_takes_no_argument(tmp_path: Path) -> None:
     path = arm(tmp_path)
-    with pytest.raises(UnknownNameError, match=r"prefx.*height, prefix"):
+    with pytest.raises(UnknownNameError, match=r"prefx.*prefix, height"):
         load_robot(str(path), tip="tool0", **{"xacro.prefx": "left_"})
     with pytest.raises(ParameterError, match=r"is no \.xacro"):
         load_robot(str(EXAMPLE), tip="tool0", **{"xacro.prefix": "left_"})

@@ -21,8 +21,8 @@ class Range(NamedTuple):
 
 RANGES = {
     "": Range(1e9),
-    "m": Range(1e3, 20.0, "mm"),
-    "rad": Range(1e4, 8.0 * math.pi, "degrees"),
+    "m": Range(1e7, 20.0, "mm"),
+    "rad": Range(1e7, 8.0 * math.pi, "degrees"),
     "m/s": Range(1e3, 20.0, "mm/s"),
     "rad/s": Range(1e4, 50.0, "degrees/s"),
     "kg": Range(1e6),
@@ -35,7 +35,8 @@ RANGES = {
     "N·m·s/rad": Range(1e9),
     "s": Range(1e6),
 }
-"""By unit. Four rounds are more than arms turn to either side, 50 rad/s more than they do."""
+"""By unit. Four rounds are more than arms turn to either side, 50 rad/s more than they do; files
+write limits of 999999 rad or m where they mean none."""
 LONGEST_DELAY = 10.0
 """Of a packet on its way [s]: to the Moon and back takes 2.6 s, ETS-VII took 7 s."""
 LATEST_S = 4e9

@@ -22,6 +22,7 @@ KINDS = {"revolute": "turn", "continuous": "turn", "prismatic": "slide"}
 """What each type of joint that moves does."""
 UNITS = {"turn": "rad", "slide": "m"}
 """Of the coordinate of such a joint."""
+_READ = ("link", "joint", "inertial")  # elements in which a macro would be missed
 _XACRO = "{http://www.ros.org/wiki/xacro}"
 Links = Mapping[str, Xml.Element]
 _ROUNDS = 2.0 * math.pi
@@ -64,7 +65,11 @@ def root_of(path: Path, data: bytes) -> Xml.Element:
         root = tree_of(data)
     if root.tag != "robot":
         raise ParameterError(str(path), f"<{root.tag}>", "a <robot>")
-    if macros := [element.tag for element in root.iter() if element.tag.startswith(_XACRO)]:
+    elements = (
+        *root,
+        *(inner for kind in _READ for element in root.iter(kind) for inner in element),
+    )
+    if macros := [element.tag for element in elements if element.tag.startswith(_XACRO)]:
         found = f"<xacro:{macros[0].removeprefix(_XACRO)}>"
         raise ParameterError(str(path), found, "without macros; call it .xacro to have it expanded")
     return root
