@@ -51,7 +51,7 @@ def built(name: str, part: RobotPart, geometry: Mapping[str, float | str]) -> Ro
     """
     for symbol, value in geometry.items():
         if isinstance(value, float):
-            check(f"geometry {symbol}", value, "rad or m")
+            check(symbol, value, "rad or m")
     if isinstance(part, Robot | RobotSource):
         if geometry:
             raise ParameterError("geometry", dict(geometry), f"empty: {name!r} has no symbols")
