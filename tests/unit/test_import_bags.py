@@ -1,5 +1,6 @@
 """Importing bags of others: any pose, any storage, ROS 1 and 2, read beside the rosbags library."""
 
+import sqlite3
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
@@ -7,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from mcap.writer import Writer as McapWriter
 from numpy.typing import ArrayLike, NDArray
 from rosbags.highlevel import AnyReader
 from rosbags.rosbag1 import Writer as Writer1
@@ -226,13 +228,12 @@ def test_rows_are_those_of_the_rosbags_library(tmp_path: Path) -> None:
 
 
 def test_messages_that_are_not_alike_are_read_one_by_one(tmp_path: Path) -> None:
-    messages = poses("Odometry")
-    for i in range(0, COUNT, 3):  # of the same length, and of another one
-        topic, log_ns, message = messages[i]
-        message.header.frame_id, message.child_frame_id = ("bas", "etool") if i % 2 else ("b", "t")
-        messages[i] = (topic, log_ns, message)
+    messages = poses("TFMessage", "/tf")
+    cameras = poses("TFMessage", "/tf", child="camera")
+    for i in range(0, COUNT, 3):
+        messages[i][2].transforms.append(cameras[i][2].transforms[0])
     path = write2(tmp_path / "bag", messages, StoragePlugin.SQLITE3)
-    assert_same(imported(path, tmp_path)[1])
+    assert_same(imported(path, tmp_path, frame="tool")[1])
 
 
 def test_messages_that_are_alike_are_read_as_one_array(
@@ -241,6 +242,63 @@ def test_messages_that_are_alike_are_read_as_one_array(
     monkeypatch.setattr(bag_messages.PoseReader, "_one", None)  # reading one by one would fail
     path = write2(tmp_path / "bag", poses("TransformStamped"), StoragePlugin.SQLITE3)
     assert_same(imported(path, tmp_path)[1])
+
+
+# In which order.
+
+
+@pytest.mark.parametrize("storage", list(StoragePlugin))
+def test_messages_count_in_the_order_of_their_recording(
+    storage: StoragePlugin, tmp_path: Path
+) -> None:
+    rng = np.random.default_rng(3)
+    messages = poses()
+    shuffled = [messages[i] for i in rng.permutation(COUNT)]
+    assert_same(imported(write2(tmp_path / "bag", shuffled, storage), tmp_path)[1])
+
+
+@pytest.mark.parametrize("storage", list(StoragePlugin))
+def test_splits_may_be_listed_in_any_order(storage: StoragePlugin, tmp_path: Path) -> None:
+    messages = poses()
+    first = write2(tmp_path / "bag", messages[:200], storage)
+    second = write2(tmp_path / "second", messages[200:], storage)
+    (one,), (two,) = ([p for p in d.iterdir() if p.suffix != ".yaml"] for d in (first, second))
+    two.rename(first / f"later{one.suffix}")
+    index = first / "metadata.yaml"
+    text = index.read_text().replace(f"- {one.name}\n", f"- later{one.suffix}\n  - {one.name}\n", 1)
+    index.write_text(text)
+    assert_same(imported(first, tmp_path)[1])
+
+
+@pytest.mark.parametrize("end", ["-wal", "-journal"])
+def test_messages_that_lie_beside_a_db3_are_told(end: str, tmp_path: Path) -> None:
+    (file,) = write2(tmp_path / "bag", poses(), StoragePlugin.SQLITE3).glob("*.db3")
+    log = file.with_name(file.name + end)
+    log.write_bytes(b"")
+    assert_same(imported(file, tmp_path)[1])
+    log.write_bytes(b"changes of a recorder that was killed")
+    for path in (file, file.parent):
+        with pytest.raises(tc.RecordingError, match=log.name):
+            tc.import_recording(path, tmp_path / "other")
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_messages_of_ros_1_in_mcap_are_read(kind: str, tmp_path: Path) -> None:
+    messages, types = poses(kind, is_ros2=False), types_of(False)
+    path = tmp_path / "ros1.mcap"
+    with path.open("wb") as file:
+        writer = McapWriter(file)
+        writer.start(profile="ros1", library="")
+        name = messages[0][2].__msgtype__
+        text, _ = types.generate_msgdef(name, ros_version=1)
+        schema = writer.register_schema(name.replace("/msg/", "/"), "ros1msg", text.encode())
+        channel = writer.register_channel("/hand/pose", "ros1", schema)
+        for _, log_ns, message in messages:
+            data = types.serialize_ros1(message, name)
+            writer.add_message(channel, int(log_ns), bytes(data), int(log_ns))
+        writer.finish()
+    _, stream = imported(path, tmp_path)
+    assert_same(stream, LOGS if kind in {"Pose", "Transform"} else STAMPS)
 
 
 # Which topic.
@@ -272,6 +330,45 @@ def test_of_several_transforms_one_frame_is_taken(tmp_path: Path) -> None:
     with pytest.raises(tc.UnknownNameError, match="camera, tool"):
         tc.import_recording(path, tmp_path / "out")
     assert_same(imported(path, tmp_path, frame="tool")[1])
+
+
+@pytest.mark.parametrize("kind", ["TFMessage", "PoseStamped", "Odometry"])
+@pytest.mark.parametrize("second", ["every other", "from the middle on"])
+def test_poses_in_two_frames_are_never_mixed(kind: str, second: str, tmp_path: Path) -> None:
+    messages = poses(kind)
+    others = np.arange(COUNT) % 2 if second == "every other" else np.arange(COUNT) >= COUNT // 2
+    for i in np.flatnonzero(others):
+        message = messages[i][2]
+        (message.transforms[0] if kind == "TFMessage" else message).header.frame_id = "camera"
+    path = write2(tmp_path / "bag", messages)
+    with pytest.raises(tc.UnknownNameError, match=r"--parent.*base, camera"):
+        tc.import_recording(path, tmp_path / "out")
+    with pytest.raises(tc.RecordingError, match=r"no pose of.*table"):
+        tc.import_recording(path, tmp_path / "out", parent="table")
+    report, stream = imported(path, tmp_path, parent="camera")
+    kept = np.flatnonzero(others)
+    assert_same(stream, STAMPS[kept], POSES[kept])
+    assert kind == "PoseStamped" or "poses of tool in camera" in report.told
+
+
+def test_poses_of_two_frames_on_one_topic_are_never_mixed(tmp_path: Path) -> None:
+    messages = poses("TransformStamped")
+    for _, _, message in messages[200:]:
+        message.child_frame_id = "probe"
+    path = write2(tmp_path / "bag", messages)
+    with pytest.raises(tc.UnknownNameError, match=r"--frame.*probe, tool"):
+        tc.import_recording(path, tmp_path / "out")
+    assert_same(imported(path, tmp_path, frame="probe")[1], STAMPS[200:], POSES[200:])
+
+
+def test_a_frame_that_is_carried_by_another_is_told(tmp_path: Path) -> None:
+    carried = poses("TFMessage", "/tf", child="base")
+    for _, _, message in carried:
+        message.transforms[0].header.frame_id = "room"
+    path = write2(tmp_path / "bag", in_order(poses("TFMessage", "/tf"), carried))
+    report, _ = imported(path, tmp_path, frame="tool")
+    assert "poses of tool in base" in report.told
+    assert any("base is in room itself" in text for text in report.told)
 
 
 def test_options_of_columns_do_not_fit_a_bag(tmp_path: Path) -> None:
@@ -378,6 +475,14 @@ def test_what_is_no_recording_is_told_in_one_line(name: str, tmp_path: Path) -> 
         tc.import_recording(path, tmp_path / "out")
     assert "\n" not in str(error.value)
     assert not (tmp_path / "out").exists()
+
+
+def test_an_entry_that_a_recording_lacks_is_named(tmp_path: Path) -> None:
+    (file,) = write2(tmp_path / "bag", poses(), StoragePlugin.SQLITE3).glob("*.db3")
+    with sqlite3.connect(file) as storage:
+        storage.execute("UPDATE topics SET offered_qos_profiles = '- history: 1'")
+    with pytest.raises(tc.RecordingError, match="it lacks 'depth'"):
+        tc.import_recording(file, tmp_path / "out")
 
 
 def test_a_bag_that_was_cut_off_is_told(tmp_path: Path) -> None:

@@ -1,6 +1,7 @@
 """Files and options that cannot be imported: one clear line each, and nothing is left behind."""
 
 import math
+import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -160,7 +161,7 @@ def test_an_existing_directory_is_never_touched(tmp_path: Path) -> None:
         ({"axes": ("+x", "+y", "-z")}, "mirror"),
         ({"axes": ("+x", "+x", "+z")}, "mirror"),
         ({"axes": ("x", "up", "z")}, "--axes"),
-        ({"unit": "km"}, "one of: auto, m, cm, mm, in"),
+        ({"unit": "km"}, "one of: m, auto, cm, mm, in"),
         ({"time_unit": "h"}, "one of: auto, s, ms, us, ns"),
         ({"center": "top"}, "keep"),
         ({"scale": 0.0}, "--scale"),
@@ -182,6 +183,35 @@ def test_options_that_mean_nothing_are_refused(
     options: Mapping[str, str | float | tuple[str, ...]], text: str, tmp_path: Path
 ) -> None:
     assert text in refusal(written(tmp_path, GOOD), tmp_path, **options)
+
+
+@pytest.mark.parametrize(
+    ("columns", "options", "text"),
+    [
+        (["t", "x (mm)", "y (mm)", "z (mm)"], {"unit": "m"}, "--unit is 'm', must be mm"),
+        (["t_ms", "x", "y", "z"], {"time_unit": "s"}, "--time-unit is 's', must be ms"),
+        (["t", "x", "y", "z", "roll [deg]", "pitch [deg]", "yaw [deg]"], {"angles": "rad"},
+         "--angles is 'rad', must be deg"),
+    ],
+)  # fmt: skip
+def test_a_unit_that_the_names_contradict_is_refused(
+    columns: list[str], options: Mapping[str, str], text: str, tmp_path: Path
+) -> None:
+    table = GOOD.assign(**dict.fromkeys(columns[4:], 0.0))
+    table.columns = pd.Index(columns)
+    assert text in refusal(written(tmp_path, table), tmp_path, **options)
+
+
+def test_columns_that_are_left_unused_are_told(tmp_path: Path) -> None:
+    table = GOOD.assign(PedalDown=0, grip=0.5)
+    report = tc.import_recording(written(tmp_path, table), tmp_path / "out")
+    assert "left unused: 'PedalDown', 'grip'" in report.told
+
+
+def test_who_scores_a_table_is_told_to_import_it(tmp_path: Path) -> None:
+    path = written(tmp_path, GOOD)
+    with pytest.raises(tc.RecordingError, match=rf"`teleop import {re.escape(str(path))} --out"):
+        tc.open_recording(path)
 
 
 def test_options_say_what_they_are_on_the_command_line() -> None:

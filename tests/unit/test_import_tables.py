@@ -433,6 +433,96 @@ def test_shuffled_rows_are_sorted_on_request(tmp_path: Path) -> None:
     assert_same_motion(imported(tmp_path / "a.csv", tmp_path, backwards="sort")[1])
 
 
+@pytest.mark.parametrize("ahead", [3.0, 1e6])
+def test_a_stamp_from_the_future_costs_its_own_row_alone(ahead: float, tmp_path: Path) -> None:
+    rows = TABLE.copy()
+    rows[123, 0] += ahead
+    frame(rows=rows).to_csv(tmp_path / "a.csv", index=False)
+    report, stream = imported(tmp_path / "a.csv", tmp_path, time_unit="s")
+    kept = np.delete(np.arange(COUNT), 123)
+    assert (report.counts.backwards, report.counts.samples) == (1, COUNT - 1)
+    assert_same_motion(stream, PLACES[kept], TURNS[kept], TIMES[kept])
+
+
+@pytest.mark.parametrize("policy", ["auto", "refuse", "drop", "sort"])
+def test_a_time_that_begins_anew_is_never_one_motion(policy: str, tmp_path: Path) -> None:
+    frame(rows=np.vstack((TABLE[:100], TABLE, TABLE[:250]))).to_csv(tmp_path / "a.csv")
+    with pytest.raises(tc.RecordingError, match=r"3 recordings.* row 101, 501"):
+        imported(tmp_path / "a.csv", tmp_path, backwards=policy)
+
+
+@pytest.mark.parametrize("name", ["episode_index", "Episode", "trial_id"])
+@pytest.mark.parametrize("ending", ["csv", "parquet"])
+def test_of_a_table_of_episodes_one_is_taken(name: str, ending: str, tmp_path: Path) -> None:
+    table = frame(rows=np.vstack((TABLE[:100], TABLE, TABLE[:250])))
+    table[name] = np.repeat([0, 1, 5], [100, COUNT, 250])
+    path = tmp_path / f"a.{ending}"
+    table.to_csv(path) if ending == "csv" else table.to_parquet(path)
+    for policy in ("auto", "drop", "sort"):
+        with pytest.raises(tc.RecordingError, match=r"3 episodes.*0, 1, 5.*--episode"):
+            imported(path, tmp_path, backwards=policy)
+    with pytest.raises(tc.UnknownNameError, match=r"--episode is 2.*0, 1, 5"):
+        imported(path, tmp_path, episode=2)
+    report, stream = imported(path, tmp_path, episode=1)
+    assert_same_motion(stream)
+    assert "episode 1 of 3" in report.told
+    assert report.counts.rows == COUNT
+
+
+def test_an_episode_cannot_be_taken_of_a_table_of_one(tmp_path: Path) -> None:
+    frame().to_csv(tmp_path / "a.csv")
+    with pytest.raises(tc.ParameterError, match="--episode"):
+        imported(tmp_path / "a.csv", tmp_path, episode=1)
+
+
+@pytest.mark.parametrize("missing", ["nan", "NaN", "inf", "null"])
+@pytest.mark.parametrize("count", [1, 5])
+def test_a_table_may_begin_with_missing_rows(missing: str, count: int, tmp_path: Path) -> None:
+    rows = TABLE.copy()
+    rows[:count, 1:] = np.nan
+    frame(rows=rows).to_csv(tmp_path / "a.csv", index=False, na_rep=missing)
+    report, stream = imported(tmp_path / "a.csv", tmp_path)
+    assert (report.counts.rows, report.counts.missing) == (COUNT, count)
+    assert_same_motion(stream, PLACES[count:], TURNS[count:], TIMES[count:])
+
+
+@pytest.mark.parametrize("name", ["hand.csv", "hand.txt"])
+def test_a_hand_that_rests_at_whole_numbers_is_read_on(name: str, tmp_path: Path) -> None:
+    count = 1300
+    moved = np.maximum(0, np.arange(count) - 1000)[:, None] * [1e-4, -1e-4, 5e-5]
+    cells = np.column_stack((np.arange(count) * 0.01, moved))
+    sep = "," if name.endswith("csv") else " "
+    lines = ["t,x,y,z".replace(",", sep), *(sep.join(f"{c:.10g}" for c in r) for r in cells)]
+    (tmp_path / name).write_text("\n".join(lines))
+    _, stream = imported(tmp_path / name, tmp_path)
+    assert np.allclose(stream[["x", "y", "z"]], moved, rtol=0, atol=1e-15)
+
+
+@pytest.mark.parametrize("ending", ["Z", "+00:00", "+02:00", "-0330", ""])
+def test_dates_keep_to_their_zone(ending: str, tmp_path: Path) -> None:
+    zone = pd.Timestamp(f"2025-04-17T15:00:08{ending}")
+    at = pd.date_range("2025-04-17T15:00:08", periods=COUNT, freq="10ms")
+    table = frame()
+    table["t"] = [f"{one.isoformat(timespec='milliseconds')}{ending}" for one in at]
+    table.to_csv(tmp_path / "a.csv", index=False)
+    _, stream = imported(tmp_path / "a.csv", tmp_path)
+    assert stream.stamp_ns[0] == zone.value
+    assert_same_motion(stream)
+
+
+def test_our_own_export_comes_back(tmp_path: Path) -> None:
+    recording = tc.run("coarse_box", duration=3.0)
+    tc.export_recording(recording, tmp_path / "bag.csv")
+    topic = "master/measured_cp"
+    _, stream = imported(
+        tmp_path / "bag.csv", tmp_path, position=[f"{topic}.{axis}" for axis in "xyz"],
+        quaternion=[f"{topic}.q{axis}" for axis in "wxyz"],
+    )  # fmt: skip
+    own = recording[topic]
+    assert len(stream) == len(own)
+    assert np.array_equal(stream[["x", "y", "z"]], own[["x", "y", "z"]])
+
+
 def test_rows_of_wrong_length_are_left_out_and_counted(tmp_path: Path) -> None:
     lines = frame().to_csv(index=False).splitlines()
     lines[10], lines[20] = "1,2,3", lines[20] + ",9"

@@ -11,6 +11,7 @@ import coal
 import numpy as np
 import pytest
 import trimesh
+from numpy.typing import NDArray
 from trimesh import Trimesh
 
 import teleop_core as tc
@@ -275,6 +276,39 @@ def test_what_is_no_mesh_is_refused_in_one_line(text: str, ending: str, tmp_path
     file.write_text(text)
     with pytest.raises(ParameterError, match=r"world\.mesh\.file is .*must be a mesh"):
         pressed(file)
+
+
+CORNERS = np.array([(0, 0, 0), (1, 1, 0), (1, 0, 1), (0, 1, 1)])
+FACES = np.array([(0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3)])
+
+
+def off(size: float, faces: NDArray[np.int64]) -> str:
+    rows = [*(size * CORNERS).tolist(), *([3, *face] for face in faces.tolist())]
+    return "\n".join((f"OFF\n4 {len(faces)} 0", *(" ".join(map(str, row)) for row in rows), ""))
+
+
+def obj(size: float, faces: NDArray[np.int64]) -> str:
+    rows = [("v", row) for row in (size * CORNERS).tolist()]
+    rows += [("f", row) for row in (faces + 1).tolist()]
+    return "\n".join(f"{kind} {' '.join(map(str, row))}" for kind, row in rows)
+
+
+@pytest.mark.parametrize(
+    ("size", "count", "said"),
+    [(30.0, 0, "triangles|can be read"), (1e120, 4, "longest side"), (1e308, 4, "longest side"),
+     (-1e308, 4, "longest side"), (1e-300, 4, "mesh")],
+)  # fmt: skip
+@pytest.mark.parametrize("write", [off, obj])
+@pytest.mark.parametrize("use", ["world", "fixture"])
+def test_a_mesh_without_triangles_or_of_no_size_is_refused_in_one_line(
+    size: float, count: int, said: str, write: Callable[..., str], use: str, tmp_path: Path
+) -> None:
+    file = tmp_path / f"bad.{write.__name__}"
+    file.write_text(write(size, FACES[:count]))
+    kind = "mesh" if use == "world" else "keep_out_mesh"
+    texts = [f"{use}.kind={kind}", f"{use}.{kind}.file={file}"]
+    with pytest.raises(ParameterError, match=said):
+        VirtualTime(configure("coarse_box", settings=texts))
 
 
 def test_a_mesh_that_does_not_fit_is_refused_with_what_would(folder: Path) -> None:

@@ -146,6 +146,36 @@ def test_unknown_name_is_refused_with_all_names(name: str) -> None:
     assert "spring.stiffness" in error.alternatives
 
 
+@dataclass(frozen=True)
+class Loose:
+    length: float = parameter(0.0, unit="m", doc="")
+    angle: float = parameter(0.0, unit="rad or m", lower=0.0, doc="")
+    silence: float = parameter(0.0, unit="s", lower=0.01, upper=9.0, off=0.0, doc="")
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "needed"),
+    [
+        ("length", 1e9, "between -1e+07 and 1e+07 m"),
+        ("length", -1e300, "between -1e+07 and 1e+07 m"),
+        ("angle", 2e9, "between -1e+07 and 1e+07 rad or m"),
+        ("silence", 1e-9, "0, or between 0.01 and 9 s"),
+    ],
+)
+def test_without_bounds_of_its_own_a_number_has_those_of_its_unit(
+    name: str, value: float, needed: str
+) -> None:
+    with pytest.raises(ParameterError) as told:
+        build(Loose, {name: value})
+    assert told.value.requirement == needed
+
+
+def test_what_turns_a_parameter_off_is_allowed_whatever_its_bounds() -> None:
+    assert build(Loose, {"silence": 0.0}).silence == 0.0
+    (spec,) = (one for one in specs(Loose) if one.name == "silence")
+    assert spec.lowest == 0.0
+
+
 def test_broken_relation_between_values_is_refused() -> None:
     assert refusal({"slow": 0.6}).requirement == "<= fast 0.5"
 

@@ -365,7 +365,7 @@ MISTAKES: dict[str, tuple[tuple[str, dict[str, Any]], str]] = {
     "no parent": (changed('<parent link="upper_arm"/>', ""), "parent of joint elbow"),
     "planar": (changed(ELBOW, '"elbow" type="planar"'), "type of joint elbow"),
     "no type": (changed(ELBOW, '"elbow"'), "type of joint elbow"),
-    "an endless axis": (changed("0 1 0", "0 inf 0"), "xyz of joint shoulder"),
+    "an endless axis": (changed("0 1 0", "0 inf 0"), "xyz of axis of joint shoulder"),
     "a tiny axis": (changed("0 1 0", "0 1e-12 0"), "axis of joint shoulder"),
     "negative velocity": (changed('velocity="3.1"', 'velocity="-3.1"'), "velocity of joint elbow"),
     "an inertia that is no number": (changed('izz="0.008"', 'izz="nan"'), "izz of link forearm"),
@@ -374,7 +374,14 @@ MISTAKES: dict[str, tuple[tuple[str, dict[str, Any]], str]] = {
     "floating": (changed(ELBOW, '"elbow" type="floating"'), "joint elbow"),
     "no length of axis": (changed("0 1 0", "0 0 0"), "axis of joint shoulder"),
     "limits without room": (changed(LOW, 'lower="2.6"'), "joint elbow"),
-    "no limits": (changed(f'<limit {LOW} upper="2.6"', "<limit"), "joint elbow"),
+    "no limits": (
+        changed(f'<limit {LOW} upper="2.6"', "<limit"),
+        "<limit> of joint elbow is 'missing'",
+    ),
+    "no limit": (
+        changed(f'<limit {LOW} upper="2.6" effort="80" velocity="3.1"/>', ""),
+        "<limit> of joint elbow is 'missing'",
+    ),
     "a word for a number": (changed(LOW, 'lower="low"'), "lower of joint elbow"),
     "not a number": (changed('upper="2.6"', 'upper="nan"'), "upper of joint elbow"),
     "two numbers of three": (changed('xyz="0 0 0.42"', 'xyz="0 0.42"'), "joint elbow"),
@@ -395,6 +402,98 @@ def test_a_mistake_is_told_by_its_element(name: str, tmp_path: Path) -> None:
     with pytest.raises((ParameterError, UnknownNameError), match=re.escape(word)) as told:
         load_robot(str(path), **options)
     assert "\n" not in str(told.value)
+
+
+WORDS = ("nan", "-inf", "x", "0.2m", "1e300", "-1e160", "2e9", "0 0", "nan 0.1", "0.2m 0.1")
+NUMBERS = ("xyz", "lower", "upper", "effort", "velocity", "value", "ixx", "iyy", "izz")
+
+
+@pytest.mark.parametrize("word", WORDS)
+def test_no_number_of_a_file_is_read_as_another(word: str, tmp_path: Path) -> None:
+    path, refused = tmp_path / "arm.urdf", set()
+    for found in re.finditer(rf'({"|".join(NUMBERS)})="([^"]*)"', TEXT):
+        words = found[2].split()
+        words[len(words) // 2] = word
+        text = f'{TEXT[: found.start()]}{found[1]}="{" ".join(words)}"{TEXT[found.end() :]}'
+        path.write_text(text)
+        with pytest.raises(ParameterError, match=rf"^{found[1]} of "):
+            load_robot(str(path), **TOOL)
+        refused.add(found[1])
+    assert refused == set(NUMBERS)
+
+
+def told(text: str, tmp_path: Path) -> tuple[Robot, str]:
+    path = tmp_path / "arm.urdf"
+    path.write_text(text)
+    robot = load_robot(str(path), **TOOL)
+    return robot, "\n".join(robot.notes)
+
+
+def test_an_arm_of_sound_numbers_has_no_notes(tmp_path: Path) -> None:
+    assert told(TEXT, tmp_path)[1] == ""
+
+
+def test_soft_limits_of_a_controller_are_kept_and_told(tmp_path: Path) -> None:
+    soft = '<safety_controller soft_lower_limit="-1.0" soft_upper_limit="9" k_velocity="1"/>'
+    robot, notes = told(changed(f"<limit {LOW}", f"{soft}<limit {LOW}")[0], tmp_path)
+    elbow = robot.joint_names.index("elbow")
+    assert (robot.lower[elbow], robot.upper[elbow]) == (-1.0, 2.6)
+    assert notes == "elbow: narrowed to the soft limits of its safety_controller"
+    none = '<safety_controller k_velocity="1"/>'
+    robot, notes = told(changed(f"<limit {LOW}", f"{none}<limit {LOW}")[0], tmp_path)
+    assert (robot.upper[elbow], notes) == (2.6, "")
+
+
+def test_limits_of_a_continuous_joint_are_told(tmp_path: Path) -> None:
+    text = changed(ELBOW, '"elbow" type="continuous"')[0]
+    assert told(text, tmp_path)[1] == "elbow: lower and upper left out: it is continuous"
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        (LOW, 'lower="-170"', "limits of elbow 170 rad: are they degrees?"),
+        ('velocity="3.1"', 'velocity="120"', "speeds of elbow 120 rad/s: are they degrees/s?"),
+        ('xyz="0 0 0.42"', 'xyz="0 0 420"', "origins of elbow 420 m: are they mm?"),
+        ('izz="0.008"', 'izz="-0.008"', "link forearm has a negative inertia, which no body has"),
+    ],
+)
+def test_numbers_that_look_like_another_unit_are_told(
+    old: str, new: str, said: str, tmp_path: Path
+) -> None:
+    assert told(changed(old, new)[0], tmp_path)[1] == said
+
+
+def test_a_session_tells_the_notes_of_its_arm(tmp_path: Path) -> None:
+    path = tmp_path / "ARM.URDF"
+    path.write_text(changed(LOW, 'lower="-170"')[0])
+    notes = notes_of(configuration("coarse_box", robot=str(path), geometry=["tip=tool0"]))
+    assert f"{path}: limits of elbow 170 rad: are they degrees?" in notes
+
+
+def test_frames_that_weigh_next_to_nothing_have_no_inertia(tmp_path: Path) -> None:
+    body = '<inertial><mass value="1e-8"/><inertia ixx="1e-8" iyy="0" izz="0"/></inertial>'
+    text = changed('<link name="tool0"/>', f'<link name="tool0">{body}</link>')[0]
+    for dynamics in ("links", "independent"):
+        path = tmp_path / "arm.urdf"
+        path.write_text(text)
+        found, plain = (load_robot(str(f), dynamics=dynamics, **TOOL) for f in (path, EXAMPLE))
+        np.testing.assert_array_equal(
+            present(found.dynamics).parameters, present(plain.dynamics).parameters
+        )
+
+
+def test_a_heavy_arm_of_weak_drives_is_not_held_by_a_friction_that_was_assumed(
+    tmp_path: Path,
+) -> None:
+    heavy = re.sub(r'(value|i[xyz]{2})="([^"]*)"', lambda m: f'{m[1]}="{10 * float(m[2])}"', TEXT)
+    path = tmp_path / "arm.urdf"
+    path.write_text(re.sub(r'effort="[^"]*"', 'effort="30"', heavy))
+    drives = present(load_robot(str(path), **TOOL).drives)
+    assert (drives.coulomb <= 0.1 * drives.effort_limit * (1 + 1e-12)).all()
+    most = 0.5 * drives.effort_limit / drives.speed_limit
+    assert (drives.viscous <= most * (1 + 1e-12)).all()
+    run("coarse_box", duration=0.05, robot=str(path), geometry=["tip=tool0"])
 
 
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-16"])

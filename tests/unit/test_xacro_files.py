@@ -91,6 +91,9 @@ def test_packages_are_found_where_meshes_are_and_xacro_is_left_as_it_was(
         ('<origin xyz="$(arg depth) 0 0"/>', "depth"),
         ('<origin xyz="${__import__(1)} 0 0"/>', "__import__"),
         ('<origin xyz="$(find ..)"/>', "package is '..'"),
+        ('<origin xyz="$(find nowhere) 0 0"/>', "package is 'nowhere'"),
+        ('<xacro:include filename="$(find nowhere)/a.xacro"/>', "package is 'nowhere'"),
+        ("<x a=\"${xacro.load_yaml('$(find nowhere)/a.yaml')}\"/>", "package is 'nowhere'"),
     ],
 )
 def test_a_mistake_in_a_xacro_is_told_in_one_line_that_names_the_file(
@@ -102,11 +105,18 @@ def test_a_mistake_in_a_xacro_is_told_in_one_line_that_names_the_file(
     assert word in str(told.value)
     assert path.name in str(told.value)
     assert "\n" not in str(told.value)
+    assert "<class" not in str(told.value)
+
+
+def test_macros_in_a_file_that_is_called_urdf_are_told(tmp_path: Path) -> None:
+    path = arm(tmp_path).rename(tmp_path / "arm.urdf")
+    with pytest.raises(ParameterError, match=r"<xacro:.*> must be|call it \.xacro"):
+        load_robot(str(path), tip="tool0")
 
 
 def test_what_no_file_declares_and_what_is_no_xacro_takes_no_argument(tmp_path: Path) -> None:
     path = arm(tmp_path)
-    with pytest.raises(UnknownNameError, match=r"prefx.*height, prefix"):
+    with pytest.raises(UnknownNameError, match=r"prefx.*prefix, height"):
         load_robot(str(path), tip="tool0", **{"xacro.prefx": "left_"})
     with pytest.raises(ParameterError, match=r"is no \.xacro"):
         load_robot(str(EXAMPLE), tip="tool0", **{"xacro.prefix": "left_"})

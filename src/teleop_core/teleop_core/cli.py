@@ -385,6 +385,8 @@ def _robot(arguments: argparse.Namespace) -> int:
         print(f"{arguments.urdf}: {robot.name}")
         return 0
     print(text(robot))
+    for note in robot.notes:
+        print(f"note: {note}")
     return 0
 
 

@@ -62,7 +62,7 @@ class KeptFiles:
         if found is None:
             return
         path, text, geometry = found[0], None, geometry_of(settings)
-        if path.suffix == ".xacro":
+        if path.suffix.lower() == ".xacro":
             arguments = found[1] | arguments_of(geometry)
             text = printable(xml_of(path, arguments).decode())
         else:
@@ -164,7 +164,7 @@ def _robot_now(
     same = {mesh for mesh, digest in digests.items() if _digest_now(files.get(mesh)) == digest}
     if _text(path) == text and len(same) == len(digests):
         return name
-    is_made = path.name.endswith((".xacro", DESCRIPTION))
+    is_made = path.name.lower().endswith((".xacro", DESCRIPTION))
     copy = _place(f"{text}{digests}") / (path.name + EXPANDED * is_made)
     room = _MOST
     for mesh, digest in digests.items():

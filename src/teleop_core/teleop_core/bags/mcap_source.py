@@ -93,8 +93,9 @@ class McapSource:
         if not begin:
             raise RecordingError(self.path, "is an empty file: nothing was recorded")
         if begin != MAGIC:
-            kind = "an SQLite file" if begin == b"SQLite f" else "no MCAP file"
-            raise RecordingError(self.path, f"is {kind}; recordings must have the storage mcap")
+            kind = "an SQLite file, no MCAP" if begin == b"SQLite f" else "no MCAP file"
+            hint = f"`teleop import {self.path} --out DIR` makes a recording of tables and bags"
+            raise RecordingError(self.path, f"is {kind}, as recordings must be; {hint}")
         size = file.seek(0, 2)
         file.seek(max(0, size - len(MAGIC)))
         has_end = size > 2 * len(MAGIC) + _FOOTER_SIZE and file.read() == MAGIC

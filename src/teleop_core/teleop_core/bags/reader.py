@@ -85,6 +85,11 @@ def _name(topic: Topic | str) -> str:
     return topic.name if isinstance(topic, Topic) else printable(topic.removeprefix("/"))
 
 
+def _begin_ns(source: McapSource) -> int:
+    """First log time of a file [ns]; an index may list files in another order than that of time."""
+    return min((place.start_ns for place in source.contents.places), default=0)
+
+
 class Bag:
     """A recording, opened for reading.
 
@@ -96,6 +101,7 @@ class Bag:
     Attributes:
         topics: Topics in it, with type and count.
         metadata: Names and texts stored by our writer; empty if others recorded it.
+        is_ros1: Whether the messages are those of ROS 1, which only an import reads.
         start_ns: First log time, [ns].
         end_ns: Last log time, [ns].
 
@@ -107,11 +113,12 @@ class Bag:
         self.path = Path(path)
         # Of each file the channels of each topic; several publishers may have made several.
         self._numbers: dict[McapSource, dict[str, list[int]]] = {
-            McapSource(file): {} for file in mcap_files(self.path)
+            source: {} for source in sorted(map(McapSource, mcap_files(self.path)), key=_begin_ns)
         }
         counts: Counter[str] = Counter()
         types: dict[str, str] = {}
         self.metadata: dict[str, str] = {}
+        self.is_ros1 = False
         for source, numbers in self._numbers.items():
             found = source.contents
             for number, channel in found.channels.items():
@@ -120,6 +127,7 @@ class Bag:
                 counts[name] += found.counts[number]
                 schema = found.schemas.get(channel.schema_id)
                 types[name] = printable(schema.name) if schema else ""
+                self.is_ros1 |= channel.message_encoding == "ros1"
             for record in found.metadata:
                 if record.name == METADATA_NAME:
                     self.metadata |= {n: printable(text) for n, text in record.metadata.items()}
@@ -259,6 +267,16 @@ class Bag:
                 raise RecordingError(self.path, f"has nothing to read: {note}")
             warnings.warn(f"{self.path.name}: left out of {note}", stacklevel=2)
         return out
+
+    def stored(self, topic: str) -> Iterator[tuple[int, bytes]]:
+        """Log time [ns] and bytes of a topic's messages in the order in which they are stored."""
+        for source, records in self._records([topic]):
+            own = np.flatnonzero(np.isin(records.channel, self._numbers[source].get(topic, [])))
+            begins, sizes, logs = (
+                c[own].tolist() for c in (records.begin, records.size, records.log_ns)
+            )
+            for begin, size, log_ns in zip(begins, sizes, logs, strict=True):
+                yield log_ns, records.data[begin : begin + size].tobytes()
 
     def raw(
         self, topics: Iterable[Topic | str] | None = None

@@ -38,6 +38,8 @@ def damage_told(path: Path | str, said: str = "cannot be read: {}") -> Iterator[
         raise RecordingError(path, f"cannot be read: {reason}") from error
     except MemoryError as error:
         raise RecordingError(path, said.format("it asks for more memory than there is")) from error
+    except KeyError as error:  # says the name alone
+        raise RecordingError(path, said.format(f"it lacks {error}")) from error
     except Exception as error:  # there is no list of what foreign readers raise
         words = " ".join(str(error).split())[:200] or type(error).__name__
         raise RecordingError(path, said.format(words)) from error

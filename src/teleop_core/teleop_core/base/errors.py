@@ -13,6 +13,7 @@ from teleop_core.base.texts import LONGEST_LINE, one_line, printable, shown
 
 _SHOWN = 40
 """Alternatives that a message lists whole."""
+_NEAR = 8
 
 
 class TeleopError(Exception):
@@ -44,14 +45,19 @@ class ParameterError(TeleopError, ValueError):
 
 
 class UnknownNameError(ParameterError):
-    """A name is not in its list: carries the ``alternatives``; of many the text has the nearest."""
+    """A name is not in its list: carries the ``alternatives``, each once.
+
+    The text has those first that are nearest to the name, and of many these alone.
+    """
 
     def __init__(self, kind: str, value: object, alternatives: Iterable[str]) -> None:
-        self.alternatives = tuple(alternatives)
-        named = self.alternatives
+        self.alternatives = named = tuple(dict.fromkeys(alternatives))
+        name = shown(value).strip("'")
+        near = get_close_matches(name, named, n=_NEAR)
+        named = tuple(dict.fromkeys((*near, *named)))
         if len(named) > _SHOWN or sum(map(len, named)) > LONGEST_LINE // 2:
-            near = get_close_matches(shown(value).strip("'"), named, n=8, cutoff=0.3)
-            named = (*(near or named[:8]), f"… ({len(self.alternatives)} in all)")
+            near = get_close_matches(name, named, n=_NEAR, cutoff=0.3)
+            named = (*(near or named[:_NEAR]), f"… ({len(self.alternatives)} in all)")
         super().__init__(kind, value, "one of: " + ", ".join(named))
 
 

@@ -9,6 +9,7 @@ from types import UnionType
 from typing import TYPE_CHECKING, Any, TypeVar, get_args, get_origin, get_type_hints
 
 from teleop_core.base.errors import ParameterError, PartError, UnknownNameError
+from teleop_core.base.ranges import check
 
 if TYPE_CHECKING:
     from teleop_core.base.registry import Registry
@@ -32,6 +33,7 @@ def parameter(
     upper: float | None = None,
     choices: tuple[str, ...] = (),
     length: int | None = None,
+    off: float | None = None,
     fixed: bool = False,
     source: str = "",
 ) -> Any:
@@ -41,10 +43,12 @@ def parameter(
         default: Value when nothing else is said; its type is the parameter's type.
         unit: SI unit, empty for pure numbers and names.
         doc: One line for the README's table and the ROS descriptor.
-        lower: Smallest allowed number, itself allowed; each element of a tuple.
+        lower: Smallest allowed number, itself allowed; each element of a tuple. None, as of
+            ``upper``: that of its unit (:mod:`~teleop_core.base.ranges`).
         upper: Largest allowed number, itself allowed; each element of a tuple.
         choices: Allowed names; empty for any.
         length: Number of elements of a tuple; None for any.
+        off: Number that is allowed whatever the bounds, and turns off what it sets; None for none.
         fixed: Whether it can only be set before the stage is built.
         source: Where the default comes from: a mark of :data:`MARKS`, a colon, and by whom, from
             what, to what or why; empty for a matter of taste.
@@ -59,7 +63,7 @@ def parameter(
         raise ParameterError("source", source, f"one of {', '.join(MARKS)}, a colon and a text")
     meta = {
         "unit": unit, "doc": doc, "lower": lower, "upper": upper,
-        "choices": choices, "length": length, "fixed": fixed, "source": source,
+        "choices": choices, "length": length, "off": off, "fixed": fixed, "source": source,
     }  # fmt: skip
     return field(default=default, metadata=meta)
 
@@ -132,6 +136,14 @@ class Spec:
     length: int | None
     fixed: bool
     source: str = ""
+    off: float | None = None
+
+    @property
+    def lowest(self) -> float | None:
+        """Smallest allowed number, that which turns it off included; None without a bound."""
+        if self.lower is None or self.off is None:
+            return self.lower
+        return min(self.lower, self.off)
 
     def check(self, value: object) -> None:
         """Refuse a value of another type, length, bound or choice.
@@ -161,19 +173,24 @@ class Spec:
             raise ParameterError(self.name, value, "a number of at most 18 digits")
         if isinstance(value, int | float) and not self._is_inside(value):
             raise ParameterError(self.name, value, self.bounds())
+        if isinstance(value, float):
+            check(self.name, value, self.unit)
 
     def _is_inside(self, value: float) -> bool:
-        return (self.lower is None or value >= self.lower) and (
-            self.upper is None or value <= self.upper
+        is_off = self.off is not None and value == self.off
+        return is_off or (
+            (self.lower is None or value >= self.lower)
+            and (self.upper is None or value <= self.upper)
         )
 
     def bounds(self) -> str:
         """Allowed range in words, with the unit."""
         unit = f" {self.unit}" if self.unit else ""
+        off = "" if self.off is None else f"{self.off:g}, or "
         if self.lower is not None and self.upper is not None:
-            return f"between {self.lower:g} and {self.upper:g}{unit}"
+            return f"{off}between {self.lower:g} and {self.upper:g}{unit}"
         if self.lower is not None:
-            return f"at least {self.lower:g}{unit}"
+            return f"{off}at least {self.lower:g}{unit}"
         return f"at most {self.upper:g}{unit}" if self.upper is not None else f"any value{unit}"
 
 

@@ -36,6 +36,7 @@ class Registry(Generic[Part]):
             returns it.
         trial: Tries a part that is not of the package, and raises as ``check`` does.
         package: Whose registry it is.
+        others: What serves in place of a name, for messages: "FILE.urdf".
     """
 
     def __init__(
@@ -47,9 +48,11 @@ class Registry(Generic[Part]):
         trial: Callable[[Part], None] | None = None,
         *,
         package: str = "teleop_core",
+        others: tuple[str, ...] = (),
     ) -> None:
         self.kind, self.kinds, self.group = kind, kinds, f"{package}.{kinds}"
         self._builtin, self._check, self._trial = dict(builtin), check, trial
+        self._others = others
         self._parts: dict[str, Part] = {}
         self._own: set[str] = set()
         self._installed: dict[str, EntryPoint] | None = None
@@ -136,7 +139,7 @@ class Registry(Generic[Part]):
             module, _, attribute = place.partition(":")
             return getattr(import_module(module), attribute)
         if (entry := self._entries().get(name)) is None:
-            raise UnknownNameError(self.kind, name, self.names())
+            raise UnknownNameError(self.kind, name, (*self.names(), *self._others))
         try:
             return entry.load()
         except Exception as error:  # whatever a foreign module raises, one line names it

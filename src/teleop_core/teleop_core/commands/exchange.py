@@ -68,7 +68,8 @@ def _options(parser: argparse.ArgumentParser) -> None:
     _damage(parser.add_argument_group("what is damaged"))
     bags = parser.add_argument_group("recordings of ROS")
     bags.add_argument("--topic", metavar="TOPIC", help="topic of the poses, if there are several")
-    bags.add_argument("--frame", metavar="NAME", help="child frame, for a topic of transforms")
+    bags.add_argument("--frame", metavar="NAME", help="child frame, if a topic has several")
+    bags.add_argument("--parent", metavar="NAME", help="frame of the poses, if there are several")
     bags.add_argument(
         "--stamps", choices=("header", "log"), help="times of the messages (default: header)"
     )
@@ -151,6 +152,9 @@ def _changes(group: Any) -> None:
 
 def _damage(group: Any) -> None:
     group.add_argument("--skip", type=int, metavar="N", help="lines to leave out at the beginning")
+    group.add_argument(
+        "--episode", type=int, metavar="N", help="which recording of a table that holds several"
+    )
     group.add_argument(
         "--missing", choices=("drop", "interpolate"), help="rows with NaN (default: drop)"
     )

@@ -226,7 +226,7 @@ def parameters_of(
                 doc = f"{spec.doc} [{spec.unit}]" if spec.unit else spec.doc
                 value = cast("Setting", values[spec.name])
                 found[node, spec.name] = ParameterInfo(
-                    node, spec.name, value, doc, spec.lower, spec.upper,
+                    node, spec.name, value, doc, spec.lowest, spec.upper,
                     spec.choices, is_fixed=True,
                 )  # fmt: skip
     return found

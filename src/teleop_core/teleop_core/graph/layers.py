@@ -26,7 +26,7 @@ class RealTimeParameters:
         (), lower=0, fixed=True, doc="processors that the loop may use; empty: all"
     )
     patience: float = parameter(
-        0.8, unit="s", lower=0.0, upper=60.0, fixed=True, source="assumed",
+        0.8, unit="s", lower=0.01, upper=60.0, off=0.0, fixed=True, source="assumed",
         doc="a loop of which nothing came for longer hangs, and ends its process; time for which "
         "it waited for a processor does not count; 0: never",
     )  # fmt: skip
@@ -281,7 +281,7 @@ def _hits(key: str) -> list[tuple[str, Spec]]:
         raise UnknownNameError("key", key, ends)  # several parameters end so
     if not ends:
         near = difflib.get_close_matches(
-            key[:LONGEST_VALUE], [*known, *(s.name for _, s in declared.values())]
+            key[:LONGEST_VALUE], dict.fromkeys([*known, *(s.name for _, s in declared.values())])
         )
         raise UnknownNameError("key", key, near or declared)
     return list({stage: (stage, spec) for stage, spec in ends.values()}.values())

@@ -46,7 +46,7 @@ def descriptor(spec: Spec) -> ParameterDescriptor:
 
 def _bound(out: ParameterDescriptor, spec: Spec) -> None:
     largest = sys.float_info.max if spec.element is float else _LARGEST_INTEGER
-    lower = -largest if spec.lower is None else spec.lower
+    lower = -largest if spec.lowest is None else spec.lowest
     upper = largest if spec.upper is None else spec.upper
     if spec.element is float:
         limits = FloatingPointRange(from_value=float(lower), to_value=float(upper))

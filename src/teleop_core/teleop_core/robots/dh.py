@@ -45,6 +45,7 @@ from typing import Any
 from teleop_core.base import plain_yaml
 from teleop_core.base.damage import damage_told
 from teleop_core.base.errors import ParameterError, UnknownNameError
+from teleop_core.base.ranges import check
 from teleop_core.robots.dh_chain import (
     CONVENTIONS,
     DhJoint,
@@ -129,13 +130,13 @@ def _row(number: int, row: Any, convention: str, unit: float) -> DhRow:
         scale = unit if kind == "turn" else 1.0
         text = row.get(symbol, 0.0)
         if not isinstance(text, str):
-            constants[symbol] = scale * _number(f"{where} {symbol}", text)
+            constants[symbol] = scale * _number(f"{where} {symbol}", text, kind)
             continue
         match = _EXPRESSION.fullmatch(text.strip())
         if match is None or axis != "z" or joint is not None:
             wanted = "a number, or for one z symbol of the row an expression like q, -q or q - 90"
             raise ParameterError(f"{where} {symbol}", text, wanted)
-        offset = _number(f"{where} {symbol}", float(match[3] or 0.0))
+        offset = _number(f"{where} {symbol}", float(match[3] or 0.0), kind)
         constants[symbol] = scale * (-offset if match[2] == "-" else offset)
         joint = _joint(number, row, symbol, -1.0 if match[1] == "-" else 1.0, scale, kind)
     if joint is None and any(key in row for key in _JOINT_KEYS[1:]):
@@ -150,13 +151,13 @@ def _joint(
     circle = math.pi / scale if kind == "turn" else None
     bounds = []
     for key, default in (("lower", circle and -circle), ("upper", circle)):
-        bounds.append(scale * _number(f"{where} {key}", row.get(key, default)))
+        bounds.append(scale * _number(f"{where} {key}", row.get(key, default), kind))
     lower, upper = bounds
     if lower >= upper:
         raise ParameterError(f"{where} lower", lower, f"below upper ({upper!r})")
     middle = 0.0 if lower <= 0.0 <= upper else 0.5 * (lower + upper)
-    home = scale * _number(f"{where} home", row["home"]) if "home" in row else middle
-    start = scale * _number(f"{where} start", row["start"]) if "start" in row else None
+    home = scale * _number(f"{where} home", row["home"], kind) if "home" in row else middle
+    start = scale * _number(f"{where} start", row["start"], kind) if "start" in row else None
     for name, value in (("home", home), ("start", home if start is None else start)):
         if not lower <= value <= upper:
             raise ParameterError(f"{where} {name}", value, f"between {lower!r} and {upper!r}")
@@ -166,10 +167,11 @@ def _joint(
     )
 
 
-def _number(name: str, value: Any) -> float:
+def _number(name: str, value: Any, kind: str) -> float:
+    """Length [m] or angle, whose range in radians holds for degrees as well."""
     if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
         raise ParameterError(name, value, "a finite number")
-    return float(value)
+    return check(name, float(value), "rad" if kind == "turn" else "m")
 
 
 def _choice(name: str, value: Any, choices: Any) -> str:

@@ -15,6 +15,7 @@ import numpy as np
 from teleop_core.base import plain_yaml
 from teleop_core.base.damage import damage_told
 from teleop_core.base.errors import ParameterError, UnknownNameError
+from teleop_core.base.ranges import check
 from teleop_core.robots.drives import ENTRIES, MAY_BE_ZERO, Drives
 
 # All assumed, [rad, N·m, s] of turning joints, [m, N, s] of sliding ones.
@@ -27,6 +28,14 @@ _PER_INERTIA = {
     "turn": {"viscous": 2.0, "coulomb": 1.0, "effort_limit": 100.0},
     "slide": {"viscous": 10.0, "coulomb": 0.4, "effort_limit": 40.0},
 }
+_UNITS = {
+    "turn": {"inertia": "kg·m²", "viscous": "N·m·s/rad", "coulomb": "N·m", "friction_speed":
+             "rad/s", "effort_limit": "N·m", "speed_limit": "rad/s", "encoder_step": "rad"},
+    "slide": {"inertia": "kg", "viscous": "N·s/m", "coulomb": "N", "friction_speed": "m/s",
+              "effort_limit": "N", "speed_limit": "m/s", "encoder_step": "m"},
+}  # fmt: skip
+# Of the effort: dry friction, and viscous friction at the largest speed.
+_MOST_ASSUMED = {"coulomb": 0.1, "viscous": 0.5}
 _OF_POSITION = ("friction_speed", "speed_limit", "encoder_step")  # in the table's unit of angles
 _FASTEST = {"bandwidth": 500.0}  # [rad/s], what the 1 kHz control can do
 # Friction may stop a joint no faster than this [1/s]: two integration steps a millisecond.
@@ -42,7 +51,15 @@ def assumed_drive(kind: str, stated: Mapping[str, float]) -> dict[str, float]:
     """
     inertia = stated.get("inertia", _INERTIA[kind])
     scaled = {name: share * inertia for name, share in _PER_INERTIA[kind].items()}
-    return {"inertia": inertia, **scaled, **_SPEEDS[kind], **stated}
+    joint = {"inertia": inertia, **scaled, **_SPEEDS[kind], **stated}
+    most = {
+        "coulomb": joint["effort_limit"],
+        "viscous": joint["effort_limit"] / joint["speed_limit"],
+    }
+    for name, share in _MOST_ASSUMED.items():
+        if name not in stated:
+            joint[name] = min(joint[name], share * most[name])
+    return joint
 
 
 def drives_of(kinds: Sequence[str], stated: Sequence[Mapping[str, float]]) -> Drives:
@@ -113,12 +130,12 @@ def _entries(
         if name not in names:
             raise UnknownNameError("drives joint", name, names)
     return tuple(
-        _joint(f"drives {name}", section.get(name, {}), unit if kind == "turn" else 1.0)
+        _joint(f"drives {name}", section.get(name, {}), kind, unit if kind == "turn" else 1.0)
         for name, kind in zip(names, kinds, strict=True)
     )
 
 
-def _joint(where: str, content: Any, unit: float) -> dict[str, float]:
+def _joint(where: str, content: Any, kind: str, unit: float) -> dict[str, float]:
     if not isinstance(content, Mapping):
         raise ParameterError(where, content, "a mapping of entries such as {speed_limit: 2.0}")
     stated: dict[str, float] = {}
@@ -126,7 +143,8 @@ def _joint(where: str, content: Any, unit: float) -> dict[str, float]:
         if name not in ENTRIES:
             raise UnknownNameError(f"{where} entry", name, ENTRIES)
         number = _number(f"{where} {name}", name, value)
-        stated[name] = number * (unit if name in _OF_POSITION else 1.0)
+        scaled = number * (unit if name in _OF_POSITION else 1.0)
+        stated[name] = check(f"{where} {name}", scaled, _UNITS[kind].get(name, ""))
     return stated
 
 

@@ -40,8 +40,10 @@ from teleop_core.robots.followers import (
 )
 from teleop_core.robots.kinematics import DIRECTIONS
 from teleop_core.robots.robot import Robot
+from teleop_core.robots.urdf_notes import notes_on
 from teleop_core.robots.urdf_tree import (
     KINDS,
+    UNITS,
     Links,
     UrdfJoint,
     chain_to,
@@ -62,6 +64,7 @@ from teleop_core.robots.xacro_files import xml_of
 MODELS = ("independent", "links")
 """How the arm of a file may move: see :func:`load_urdf`."""
 _ROUNDING = 1e-6  # of an inertia, over its trace: files are written with few digits
+_NO_MASS = 1e-6  # [kg, kg·m²]; simulators want some of every link
 _NO_INERTIA = 1e-9  # [kg·m² or kg]; below it is rounding of bodies on the axis, and unknown
 _POWERS = {"viscous": 2, "coulomb": 1}  # of a factor, by which friction of a follower counts
 
@@ -145,7 +148,8 @@ def load_urdf(
     coordinates = dict(zip((j.name for j in moving), followers.of(home).tolist(), strict=True))
     visuals = tuple(visuals_of(coordinates, links, by_child, Path(path)))
     # Without its start, for which a second's search would begin here: who needs it asks for it.
-    robot = replace(robot, visuals=visuals, start=None)
+    notes = tuple(notes_on(chain, links))
+    robot = replace(robot, visuals=visuals, notes=notes, start=None)
     if dynamics == "independent":
         return robot
     motors = np.maximum(table.inertia - np.diag(inertia), 0.0)
@@ -192,7 +196,8 @@ def _leader(joint: UrdfJoint, named: Mapping[str, UrdfJoint]) -> tuple[UrdfJoint
         own = float(numbers_of(where, mimic, "multiplier", (1.0,))[0])
         if own == 0.0:
             raise ParameterError(f"multiplier of {where}", own, "not 0: what never moves is fixed")
-        offset += factor * float(numbers_of(where, mimic, "offset", (0.0,))[0])
+        unit = UNITS[KINDS[joint.kind]]
+        offset += factor * float(numbers_of(where, mimic, "offset", (0.0,), unit)[0])
         factor, name = factor * own, mimic.get("joint", "")
         movable = [other for other in named if named[other].axis is not None]
         if name not in movable:
@@ -292,12 +297,15 @@ def _drives(trains: list[list[_Geared]], inertias: list[float], file: str) -> Dr
 
 
 def _drive_entries(joint: UrdfJoint) -> dict[str, float]:
-    where, found = f"joint {joint.name}", {}
-    for tag, key, entry in (
-        ("limit", "effort", "effort_limit"), ("limit", "velocity", "speed_limit"),
-        ("dynamics", "damping", "viscous"), ("dynamics", "friction", "coulomb"),
-    ):  # fmt: skip
-        value = float(numbers_of(where, joint.element.find(tag), key, (0.0,))[0])
+    where, found, is_turn = f"joint {joint.name}", {}, KINDS[joint.kind] == "turn"
+    for tag, key, entry, units in (
+        ("limit", "effort", "effort_limit", ("N·m", "N")),
+        ("limit", "velocity", "speed_limit", ("rad/s", "m/s")),
+        ("dynamics", "damping", "viscous", ("N·m·s/rad", "N·s/m")),
+        ("dynamics", "friction", "coulomb", ("N·m", "N")),
+    ):
+        element, unit = joint.element.find(tag), units[0 if is_turn else 1]
+        value = float(numbers_of(where, element, key, (0.0,), unit)[0])
         if value < 0.0:
             raise ParameterError(f"{key} of {where}", value, ">= 0")
         if value > 0.0:  # a limit of 0 is what files say that do not know it
@@ -339,13 +347,15 @@ def _mass(name: str, link: Xml.Element, may_be_any: bool) -> tuple[float, Array,
     element, where = link.find("inertial"), f"link {name}"
     if element is None:
         return 0.0, np.zeros((3, 3)), np.eye(4)
-    mass = float(numbers_of(where, element.find("mass"), "value", (0.0,))[0])
+    mass = float(numbers_of(where, element.find("mass"), "value", (0.0,), "kg")[0])
     tensor = element.find("inertia")
     xx, xy, xz, yy, yz, zz = (
-        float(numbers_of(where, tensor, key, (0.0,))[0])
+        float(numbers_of(where, tensor, key, (0.0,), "kg·m²")[0])
         for key in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
     )
     inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    if 0.0 <= mass < _NO_MASS and abs(inertia).max() < _NO_MASS:  # a frame that has to weigh
+        return 0.0, np.zeros((3, 3)), np.eye(4)
     if mass < 0.0 or not (may_be_any or _is_possible(inertia)):
         needed = "that of a body; dynamics=independent takes any"
         raise ParameterError(f"inertial of {where}", (mass, inertia.tolist()), needed)

@@ -9,6 +9,7 @@ from typing import Protocol, TypeAlias, TypeVar, runtime_checkable
 import numpy as np
 
 from teleop_core.base.errors import ParameterError, PartError, TeleopError, UnknownNameError
+from teleop_core.base.ranges import check
 from teleop_core.base.registry import Registry
 from teleop_core.robots.robot import Robot
 
@@ -17,7 +18,7 @@ _BUILT_IN = (
     "three_finger_hand", "puma560", "scara", "planar_3r", "five_axis",
 )  # fmt: skip
 _TABLE_ENDINGS = (".yaml", ".yml")
-_FILE_ENDINGS = (".urdf", ".xacro", *_TABLE_ENDINGS)
+_URDF_ENDINGS = (".urdf", ".xacro")
 DESCRIPTION = "_description"
 """How names of the package ``robot_descriptions`` end."""
 ARGUMENT = "xacro."
@@ -48,6 +49,9 @@ def built(name: str, part: RobotPart, geometry: Mapping[str, float | str]) -> Ro
         ParameterError: A ready robot is given a geometry, or a length is not possible.
         PartError: The part makes something else than a robot.
     """
+    for symbol, value in geometry.items():
+        if isinstance(value, float):
+            check(symbol, value, "rad or m")
     if isinstance(part, Robot | RobotSource):
         if geometry:
             raise ParameterError("geometry", dict(geometry), f"empty: {name!r} has no symbols")
@@ -66,7 +70,7 @@ def from_file(path: str, geometry: Mapping[str, float | str]) -> Robot | None:
     if found is None:
         return None
     file, arguments = found
-    if file.suffix in _TABLE_ENDINGS:
+    if file.suffix.lower() in _TABLE_ENDINGS:
         from teleop_core.robots.dh import load_table
 
         return built(path, load_table(file), geometry)
@@ -86,7 +90,13 @@ def file_of(name: str) -> tuple[Path, dict[str, str]] | None:
         from teleop_core.robots.descriptions import description_file
 
         return description_file(name)
-    return (Path(name).expanduser(), {}) if name.endswith(_FILE_ENDINGS) else None
+    is_file = name.lower().endswith((*_URDF_ENDINGS, *_TABLE_ENDINGS))
+    return (Path(name).expanduser(), {}) if is_file else None
+
+
+def is_urdf(name: str) -> bool:
+    """Whether a robot's name is a URDF, a xacro or a description."""
+    return name.lower().endswith(_URDF_ENDINGS) or name.endswith(DESCRIPTION)
 
 
 def arguments_of(geometry: Mapping[str, float | str]) -> dict[str, str]:
@@ -164,5 +174,6 @@ ROBOTS: Registry[RobotPart] = Registry(
     {name: f"teleop_core.robots.{name}:make" for name in _BUILT_IN},
     _checked,
     _try,
+    others=("FILE.urdf", "FILE.xacro", "FILE.yaml"),
 )
 """All robots by name; see :data:`RobotPart` for what can be added."""

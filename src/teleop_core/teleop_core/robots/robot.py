@@ -80,6 +80,7 @@ class Robot:
         task_mask: Directions that the robot controls: x, y, z, then rotations about x, y, z.
         solution: How inverse kinematics are solved, in words; empty for robots that do not say.
         visuals: What its links look like, if a file says so; nothing is read before it is drawn.
+        notes: What was read of its file otherwise than it may be meant, in words.
 
     Raises:
         ShapeError: Limits, home, start or drives are not vectors (n,).
@@ -99,6 +100,7 @@ class Robot:
     task_mask: tuple[bool, ...] = (True,) * 6
     solution: str = ""
     visuals: tuple[Visual, ...] = ()
+    notes: tuple[str, ...] = ()
     start: _Start = _Start()
     # Writable copies for the kernels, which are compiled for such arrays alone.
     _row: Array = field(init=False)

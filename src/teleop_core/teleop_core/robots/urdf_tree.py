@@ -5,7 +5,7 @@ Source:
 """
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from xml.etree import ElementTree as Xml
@@ -14,11 +14,16 @@ import numpy as np
 
 from teleop_core.base.damage import damage_told
 from teleop_core.base.errors import ParameterError, UnknownNameError
+from teleop_core.base.ranges import check
 from teleop_core.kernels.geometry import Array, rotation, transform
 from teleop_core.kernels.portable import length, product
 
 KINDS = {"revolute": "turn", "continuous": "turn", "prismatic": "slide"}
 """What each type of joint that moves does."""
+UNITS = {"turn": "rad", "slide": "m"}
+"""Of the coordinate of such a joint."""
+_READ = ("link", "joint", "inertial")  # elements in which a macro would be missed
+_XACRO = "{http://www.ros.org/wiki/xacro}"
 Links = Mapping[str, Xml.Element]
 _ROUNDS = 2.0 * math.pi
 """Limit [rad] of a continuous joint to either side, assumed."""
@@ -60,6 +65,13 @@ def root_of(path: Path, data: bytes) -> Xml.Element:
         root = tree_of(data)
     if root.tag != "robot":
         raise ParameterError(str(path), f"<{root.tag}>", "a <robot>")
+    elements = (
+        *root,
+        *(inner for kind in _READ for element in root.iter(kind) for inner in element),
+    )
+    if macros := [element.tag for element in elements if element.tag.startswith(_XACRO)]:
+        found = f"<xacro:{macros[0].removeprefix(_XACRO)}>"
+        raise ParameterError(str(path), found, "without macros; call it .xacro to have it expanded")
     return root
 
 
@@ -107,7 +119,7 @@ def joint_of(name: str, element: Xml.Element, links: Links) -> UrdfJoint:
             raise UnknownNameError(f"{end} of joint {name}", link, links)
         ends.append(link)
     if kind != "fixed":
-        given = numbers_of(f"joint {name}", element.find("axis"), "xyz", (1.0, 0.0, 0.0))
+        given = numbers_of(f"axis of joint {name}", element.find("axis"), "xyz", (1.0, 0.0, 0.0))
         norm = float(length(given))
         if norm < 1e-9:
             raise ParameterError(f"axis of joint {name}", given.tolist(), "longer than 0")
@@ -171,16 +183,38 @@ def chain_to(tip: str, by_child: Mapping[str, UrdfJoint]) -> list[UrdfJoint]:
 
 
 def limits_of(joint: UrdfJoint) -> tuple[float, float]:
-    """Lower and upper limit of a joint [rad, m]."""
-    where, limit = f"joint {joint.name}", joint.element.find("limit")
+    """Lower and upper limit of a joint [rad, m], narrowed to the soft ones of its controller.
+
+    Raises:
+        ParameterError: It has none and is not continuous, or they cross or are not physical.
+    """
     if joint.kind == "continuous":
         lower, upper = -_ROUNDS, _ROUNDS
     else:
-        lower = float(numbers_of(where, limit, "lower", (0.0,))[0])
-        upper = float(numbers_of(where, limit, "upper", (0.0,))[0])
+        lower, upper = ends_of(joint, "limit", "lower", "upper")
+        if joint.element.find("limit") is None or lower == upper == 0.0:
+            name = f"<limit> of joint {joint.name}"
+            needed = "given: a lower < upper; a joint without limits is continuous"
+            raise ParameterError(name, "missing", needed)
+    if soft := soft_limits_of(joint):
+        lower, upper = max(lower, soft[0]), min(upper, soft[1])
     if not lower < upper:
-        raise ParameterError(f"limits of {where}", (lower, upper), "lower < upper")
+        raise ParameterError(f"limits of joint {joint.name}", (lower, upper), "lower < upper")
     return lower, upper
+
+
+def soft_limits_of(joint: UrdfJoint) -> tuple[float, float] | None:
+    """Limits that the joint's controller keeps [rad, m]; None where the file gives none."""
+    lower, upper = ends_of(joint, "safety_controller", "soft_lower_limit", "soft_upper_limit")
+    return (lower, upper) if lower < upper else None
+
+
+def ends_of(joint: UrdfJoint, tag: str, lower: str, upper: str) -> tuple[float, float]:
+    """Two coordinates [rad, m] of an element of a joint; 0 where they are missing."""
+    where, unit = f"joint {joint.name}", UNITS[KINDS[joint.kind]]
+    element = joint.element.find(tag)
+    first, second = (float(numbers_of(where, element, k, (0.0,), unit)[0]) for k in (lower, upper))
+    return first, second
 
 
 def turn_of_z(axis: Array) -> tuple[float, Array]:
@@ -205,30 +239,40 @@ def _turned_z(axis: Array) -> Array:
 def origin_of(where: str, element: Xml.Element) -> Array:
     """Transform (4, 4) of the origin of an element; ``where`` names it if it is no origin."""
     found = element.find("origin")
-    roll, pitch, yaw = numbers_of(where, found, "rpy", (0.0, 0.0, 0.0)).tolist()
+    roll, pitch, yaw = numbers_of(where, found, "rpy", (0.0, 0.0, 0.0), "rad").tolist()
     turn = product(product(rotation("z", yaw), rotation("y", pitch)), rotation("x", roll))
-    return transform(turn, numbers_of(where, found, "xyz", (0.0, 0.0, 0.0)))
+    return transform(turn, numbers_of(where, found, "xyz", (0.0, 0.0, 0.0), "m"))
 
 
 def numbers_of(
-    where: str, element: Xml.Element | None, key: str, default: tuple[float, ...]
+    where: str, element: Xml.Element | None, key: str, default: tuple[float, ...], unit: str = ""
 ) -> Array:
-    """Numbers of an attribute, or the default where element or attribute is missing."""
+    """Numbers of an attribute, or the default where element or attribute is missing.
+
+    Args:
+        where: What has the attribute, for the error.
+        element: The element.
+        key: Name of the attribute.
+        default: As many numbers as there must be.
+        unit: Theirs, of :data:`~teleop_core.base.ranges.RANGES`, which bounds them.
+
+    Raises:
+        ParameterError: There are more or fewer words, one is no number, or one is not physical.
+    """
     text = None if element is None else element.get(key)
     if text is None:
         return np.array(default)
-    found = list(_finite(text))
-    if len(found) != len(default):
+    found = np.array([_number(word) for word in text.split()])
+    if len(found) != len(default) or not np.isfinite(found).all():
         wanted = f"{len(default)} finite numbers" if len(default) > 1 else "a finite number"
         raise ParameterError(f"{key} of {where}", text, wanted)
-    return np.array(found)
+    for value in found.tolist():
+        check(f"{key} of {where}", value, unit)
+    return found
 
 
-def _finite(text: str) -> Iterator[float]:
-    for word in text.split():
-        try:
-            value = float(word)
-        except ValueError:
-            continue
-        if math.isfinite(value):
-            yield value
+def _number(word: str) -> float:
+    try:
+        return float(word)
+    except ValueError:
+        return math.nan

@@ -172,9 +172,9 @@ def visuals_of(
             for kind, keys in _SHAPES.items():
                 found = shape.find(f"geometry/{kind}")
                 if found is not None:
-                    size = [
-                        float(x) for key, one in keys for x in numbers_of(where, found, key, one)
-                    ]
+                    unit = "" if kind == "mesh" else "m"
+                    sizes = (numbers_of(where, found, key, one, unit) for key, one in keys)
+                    size = [float(x) for each in sizes for x in each]
                     file = found.get("filename", "")
                     yield Visual(link, moved, place, kind, tuple(size), file, urdf)
 

@@ -35,7 +35,7 @@ def xml_of(path: Path, arguments: Mapping[str, str]) -> bytes:
     """
     with damage_told(path):
         data = path.read_bytes()
-    if path.suffix != ".xacro":
+    if path.suffix.lower() != ".xacro":
         if arguments and not path.name.endswith(EXPANDED):
             needed = f"left out: {path} is no .xacro"
             raise ParameterError("arguments of xacro", list(arguments), needed)
@@ -54,14 +54,21 @@ def _expanded(path: Path, arguments: dict[str, str]) -> bytes:
         with _our_files(path):
             document = xacro.process_file(str(path), mappings=dict(arguments), verbosity=0)
         expanded: str = document.documentElement.toxml()
-    except TeleopError:
-        raise
     except Exception as error:  # whatever the expressions of a file raise, one line names the file
+        if ours := _wrapped(error):
+            raise ours from None
         reason = " ".join(f"{type(error).__name__}: {error}".split())[:_MOST_CHARACTERS]
         file = (xacro.filestack or [path])[-1]
         raise ParameterError("xacro", str(file), f"one that can be expanded ({reason})") from error
     _refuse_unknown(arguments, [path, *map(Path, xacro.all_includes[before:])])
     return expanded.encode()
+
+
+def _wrapped(error: BaseException | None) -> TeleopError | None:
+    """Error of ours, as of ``$(find NAME)``, in what the package makes of it; None without."""
+    while error is not None and not isinstance(error, TeleopError):
+        error = getattr(error, "exc", None) or error.__cause__ or error.__context__
+    return error
 
 
 def _refuse_unknown(arguments: Mapping[str, str], files: list[Path]) -> None:

@@ -11,7 +11,7 @@ from teleop_core.graph.graph import BUILT_IN
 from teleop_core.graph.signals import DT
 from teleop_core.graph.topics import MASTER_MEASURED_CP, MASTER_SERVO_CF
 from teleop_core.robots import load_robot_set
-from teleop_core.robots.parts import DESCRIPTION
+from teleop_core.robots.parts import is_urdf
 from teleop_core.robots.robot import Robot
 from teleop_core.session.configuration import Configuration
 from teleop_core.slave.slave import SLAVE, SlaveParameters
@@ -40,11 +40,11 @@ def notes_of(configuration: Configuration, transport: float = 0.0) -> list[str]:
             )
             found += [f"arm {arm!r}: {note}" if arm else note for note in told if note]
         slave = configuration.group(SLAVE.name, arm)
-        if isinstance(slave, SlaveParameters) and slave.robot.endswith(
-            (".urdf", ".xacro", DESCRIPTION)
-        ):
-            note = assumed_note(load_robot_set(slave.robot, slave.geometry), slave.robot)
-            found += [note] * (bool(note) and note not in found)
+        if isinstance(slave, SlaveParameters) and is_urdf(slave.robot):
+            robot = load_robot_set(slave.robot, slave.geometry)
+            own = [f"{slave.robot}: {note}" for note in robot.notes]
+            own += filter(None, [assumed_note(robot, slave.robot)])
+            found += [note for note in own if note not in found]
     return found
 
 

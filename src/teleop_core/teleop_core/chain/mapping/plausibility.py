@@ -42,7 +42,7 @@ class PlausibilityParameters(HandLimits):
     """What a hand on the master can do, and how long its buttons may be silent."""
 
     button_silence: float = parameter(
-        0.5, unit="s", lower=0.0, upper=60.0,
+        0.5, unit="s", lower=0.01, upper=60.0, off=0.0,
         doc="a stream of buttons that fell silent for longer counts as a pressed clutch; 0: never",
     )  # fmt: skip
 

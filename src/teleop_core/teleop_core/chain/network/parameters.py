@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from teleop_core.base.parameters import Choice, build, choice, parameter
+from teleop_core.base.ranges import LONGEST_DELAY
 from teleop_core.chain.network import NETWORKS
 from teleop_core.chain.network.deadband import DeadbandParameters
 from teleop_core.chain.network.link import QUEUE
@@ -64,7 +65,7 @@ class WayParameters:
 
     kind: Choice = choice(NETWORKS, "constant", doc="how packets travel")
     least_delay: float = parameter(
-        0.0, unit="s", lower=0.0, upper=10.0, doc="least time of a packet on the way"
+        0.0, unit="s", lower=0.0, upper=LONGEST_DELAY, doc="least time of a packet on the way"
     )
     loss: float = parameter(
         0.0, lower=0.0, upper=1.0, doc="share of packets that are lost, each by itself"

@@ -9,11 +9,13 @@ import numpy as np
 
 from teleop_core.base.errors import ParameterError
 from teleop_core.base.parameters import parameter
+from teleop_core.base.ranges import LATEST_S, LONGEST_DELAY
 from teleop_core.chain.network import LOST, Network
 from teleop_core.kernels import kernel
 from teleop_core.kernels.geometry import Array
 
 _NAME = "trace.file"
+_SLOW = 20.0  # [s] from row to row: a session would hardly see the network change
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,7 +34,7 @@ def read_trace(path: str) -> Array:
 
     Raises:
         ParameterError: The file cannot be read, or its times are negative or not in order, or a
-            delay is negative; the text names the line.
+            delay is negative, or either looks like milliseconds; the text names the line.
     """
     try:
         with Path(path).expanduser().open(newline="", encoding="utf-8") as file:
@@ -49,6 +51,9 @@ def read_trace(path: str) -> Array:
         raise ParameterError(_NAME, path, "a file with two rows of time and delay at least")
     times = np.array(rows, dtype=np.float64)
     times[::2] -= times[0]
+    if (step := float(np.median(np.diff(times[::2])))) > _SLOW:
+        needed = f"a row every {_SLOW:g} s at least, not every {step:g} s: are the times ms?"
+        raise ParameterError(_NAME, path, needed)
     return times
 
 
@@ -62,11 +67,15 @@ def _row(path: str, number: int, line: list[str], before: float) -> tuple[float,
         delay = 0.0
     if not (math.isfinite(time) and math.isfinite(delay)):
         raise ParameterError(_NAME, path, f"numbers, time and delay, in line {number}")
+    if time > LATEST_S:
+        needed = f"times of at most {LATEST_S:g} s; line {number} says {time:.15g} s: are they ms?"
+        raise ParameterError(_NAME, path, needed)
     if time < 0.0 or time <= before:
         needed = f"times that are not negative and grow; line {number} says {time:g} s"
         raise ParameterError(_NAME, path, f"{needed} after {before:g} s" if before >= 0 else needed)
-    if delay < 0.0 and delay != LOST:
-        raise ParameterError(_NAME, path, f"delays from 0 on; line {number} says {delay:g} s")
+    if not 0.0 <= delay <= LONGEST_DELAY and delay != LOST:
+        needed = f"delays from 0 to {LONGEST_DELAY:g} s; line {number} says {delay:g} s"
+        raise ParameterError(_NAME, path, needed + ": are they ms?" * (delay > 0.0))
     return time, delay
 
 

@@ -7,11 +7,12 @@ as one array: the library's own writer tells where the numbers stand in the byte
 import struct
 from collections.abc import Iterable, Iterator
 from itertools import islice
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
 
+from teleop_core.base.errors import UnknownNameError
 from teleop_core.kernels.geometry import Array
 from teleop_core.session.exchange.times import SECOND_NS, Stamps
 
@@ -31,6 +32,8 @@ BATCH = 8192
 _MARK_S, _MARK_NS = 0x5A17C3B1, 0x31234567 % SECOND_NS
 Raw = tuple[int, bytes]
 """Time of recording [ns] and bytes of a message."""
+Frames = tuple[str, str]
+"""Parent and child frame of a pose; empty where a message names none."""
 
 
 class Rows(NamedTuple):
@@ -48,11 +51,19 @@ class PoseReader:
         typestore: Types of the bag, from rosbags.
         ros_type: Type of the messages.
         is_ros2: Whether the bytes are CDR, not those of ROS 1.
-        frame: Child frame whose transforms are taken; for messages of transforms only.
+        frame: Child frame that is taken; empty for any.
+        parent: Frame in which it is taken; empty for any.
+
+    Attributes:
+        taken: Parent and child frame of the poses taken; None before the first.
     """
 
-    def __init__(self, typestore: Any, ros_type: str, *, is_ros2: bool, frame: str = "") -> None:
-        self._types, self._type, self._is_ros2, self._frame = typestore, ros_type, is_ros2, frame
+    def __init__(
+        self, typestore: Any, ros_type: str, *, is_ros2: bool, frame: str = "", parent: str = ""
+    ) -> None:
+        self._types, self._type, self._is_ros2 = typestore, ros_type, is_ros2
+        self._frame, self._parent = frame, parent
+        self.taken: Frames | None = None
         self._place: _Place | None = None
         self._is_new = True
 
@@ -62,7 +73,11 @@ class PoseReader:
         return read(data, self._type)
 
     def blocks(self, messages: Iterable[Raw]) -> Iterator[Rows]:
-        """Poses, some messages at a time."""
+        """Poses, some messages at a time.
+
+        Raises:
+            UnknownNameError: Poses of several frames, or in several, would be mixed.
+        """
         stream = iter(messages)
         while batch := list(islice(stream, BATCH)):
             yield self._read(batch)
@@ -93,24 +108,42 @@ class PoseReader:
         return True
 
     def _part(self, message: Any) -> tuple[Any, Any, Any] | None:
-        """Header or None, place and turn in a message; None if it lacks the frame."""
+        """Header or None, place and turn in a message; None if it lacks the frame.
+
+        Raises:
+            UnknownNameError: The pose is of another frame, or in another, than those before.
+        """
+        chosen = None
+        for part in self._parts(message):
+            parent, child = named = names_of(part)
+            if self._frame not in {"", child} or self._parent not in {"", parent}:
+                continue
+            if self.taken not in {None, named}:
+                self._refuse(named)
+            self.taken, chosen = named, part
+        if chosen is None:
+            return None
+        if hasattr(chosen.pose, "translation"):
+            return chosen.header, chosen.pose.translation, chosen.pose.rotation
+        return chosen.header, chosen.pose.position, chosen.pose.orientation
+
+    def _parts(self, message: Any) -> list["_Part"]:
+        """Poses in a message."""
         if self._type in TRANSFORMS:
-            chosen = [t for t in message.transforms if plain(t.child_frame_id) == self._frame]
-            if not chosen:
-                return None
-            return (
-                chosen[-1].header,
-                chosen[-1].transform.translation,
-                chosen[-1].transform.rotation,
-            )
+            return [_Part(t.header, t.child_frame_id, t.transform) for t in message.transforms]
         where, has_header = POSES[self._type]
         pose = message
         for name in filter(None, where.split(".")):
             pose = getattr(pose, name)
         header = message.header if has_header else None
-        if hasattr(pose, "translation"):
-            return header, pose.translation, pose.rotation
-        return header, pose.position, pose.orientation
+        return [_Part(header, getattr(message, "child_frame_id", ""), pose)]
+
+    def _refuse(self, named: Frames) -> NoReturn:
+        """Refuse a pose of other frames than those before."""
+        assert self.taken is not None
+        index = 0 if self.taken[0] != named[0] else 1
+        option = ("--parent (poses stand in several)", "--frame (poses are of several)")[index]
+        raise UnknownNameError(option, "", sorted({self.taken[index], named[index]}))
 
     def _learned(self, data: bytes) -> "_Place | None":
         """Where the numbers stand in messages like this one; None if that cannot be told."""
@@ -180,9 +213,22 @@ def plain(name: str) -> str:
     return name.removeprefix("/")
 
 
-def frames(message: Any) -> list[str]:
-    """Child frames in a message of transforms."""
-    return [plain(transform.child_frame_id) for transform in message.transforms]
+class _Part(NamedTuple):
+    """A pose in a message, with its header or None, and its child frame or an empty text."""
+
+    header: Any
+    child: str
+    pose: Any
+
+
+def names_of(part: _Part) -> Frames:
+    """Parent and child frame of a pose."""
+    return "" if part.header is None else plain(part.header.frame_id), plain(part.child)
+
+
+def frames(message: Any) -> list[Frames]:
+    """Parent and child frames in a message of transforms."""
+    return [(plain(t.header.frame_id), plain(t.child_frame_id)) for t in message.transforms]
 
 
 class JoyReader:

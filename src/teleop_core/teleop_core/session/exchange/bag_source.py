@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +11,7 @@ import numpy as np
 from teleop_core.bags.reader import Bag
 from teleop_core.base.damage import damage_told
 from teleop_core.base.errors import ParameterError, RecordingError, UnknownNameError
-from teleop_core.graph.topics import MASTER_BUTTONS, MASTER_MEASURED_CP, Kind
+from teleop_core.graph.topics import MASTER_BUTTONS, MASTER_MEASURED_CP
 from teleop_core.kernels.geometry import Array
 from teleop_core.session.exchange.bag_messages import (
     JOY,
@@ -107,20 +108,21 @@ class BagSource:
         raise UnknownNameError("--topic", "", sorted(found))
 
     def _child_frame(self, bag: RosBag) -> str:
-        if self._types[self._topic] not in TRANSFORMS:
-            return ""
-        poses = self._pose_reader(bag)
-        known: dict[str, None] = {}
-        for number, (_, data) in enumerate(bag.raw(self._topic)):
-            known |= dict.fromkeys(frames(poses.message(data)))
-            if number >= _LOOKED_AT:
-                break
+        """Child frame that is taken; for topics of transforms it must be said or the only one."""
         wanted = plain(self._options.frame)
+        if self._types[self._topic] not in TRANSFORMS:
+            return wanted
+        poses = self._pose_reader(bag)
+        known: dict[str, str] = {}
+        for _, data in islice(bag.raw(self._topic), _LOOKED_AT):
+            known |= {child: parent for parent, child in frames(poses.message(data))}
         if not wanted and len(known) == 1:
-            wanted = next(iter(known))
-            self.told.append(f"transforms of the frame {wanted}")
+            (wanted,) = known
         if wanted not in known:
             raise UnknownNameError("--frame", wanted, sorted(known))
+        if (parent := known[wanted]) in known:
+            text = f"{parent} is in {known[parent]} itself, and may move there"
+            self.told.append(f"{text}: that motion is not in the poses of {wanted}")
         return wanted
 
     def _joy_topic(self) -> str:
@@ -161,26 +163,29 @@ class BagSource:
     # -- messages --------------------------------------------------------------------------------
 
     def _pose_reader(self, bag: RosBag) -> PoseReader:
-        frame = getattr(self, "_frame", "")
+        frame, parent = getattr(self, "_frame", ""), plain(self._options.parent)
         kind = self._types[self._topic]
-        return PoseReader(bag.typestore, kind, is_ros2=bag.is_ros2, frame=frame)
+        return PoseReader(bag.typestore, kind, is_ros2=bag.is_ros2, frame=frame, parent=parent)
 
     def blocks(self) -> Iterator[Block]:
         """As of any source.
 
         Raises:
             RecordingError: The file is damaged.
+            UnknownNameError: The frames of the poses are several, and none or another is chosen.
         """
-        if self._bag is not None and self._types[self._topic] == Kind.POSE.ros_type:
-            for found in self._bag.blocks([self._topic]):
-                if self._topic in found:
-                    series = found[self._topic]
-                    yield self._block(series.stamp_ns, series.log_ns, series.values)
-            return
         with self._opened() as bag:
             poses = self._pose_reader(bag)
             for rows in poses.blocks(bag.raw(self._topic)):
                 yield self._block(*rows)
+        parent, child = poses.taken or ("", "")
+        if poses.taken is None:
+            chosen = (
+                f"--frame {self._frame or '(any)'} in --parent {self._options.parent or '(any)'}"
+            )
+            raise RecordingError(self.path, f"{self._topic} holds no pose of {chosen}")
+        if child:
+            self.told.append(f"poses of {child} in {parent or 'a frame without a name'}")
 
     def _block(self, stamps: Any, logs: Any, poses: Array) -> Block:
         quaternions = self.attitudes.quaternions(poses[:, 3:])
@@ -192,7 +197,9 @@ class BagSource:
             return None
         with self._opened() as bag:
             joy = JoyReader(bag.typestore, is_ros2=bag.is_ros2, numbers=self._numbers)
-            return Presses(*joy.read(bag.raw(self._joy)))
+            stamps, logs, pressed = joy.read(bag.raw(self._joy))
+        order = np.argsort(logs, kind="stable")
+        return Presses(stamps[order], logs[order], pressed[order])
 
     def check(self, finite: Array) -> None:
         """As of any source."""

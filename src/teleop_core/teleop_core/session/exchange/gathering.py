@@ -44,6 +44,7 @@ class Gathered:
         told: What was taken and guessed, in words.
         bad_rows: How many rows were left out as damaged before they came here.
         strange: How many orientations cannot be rotations.
+        order: Rows in the order in which they were recorded (N,); None if it is that of the file.
     """
 
     spool: Spool
@@ -54,6 +55,7 @@ class Gathered:
     told: list[str]
     bad_rows: int
     strange: int
+    order: NDArray[np.int32] | None = None
 
 
 @dataclass(eq=False)
@@ -96,13 +98,25 @@ def gather(source: Source, options: ImportOptions, spool: Spool) -> Gathered:
     told = list(source.told)
     if source.attitudes.longest > TOLD_LENGTH:
         told.append(f"quaternions up to {source.attitudes.longest:.2g} off unit length made unit")
+    order = _recorded_order(parts.logs)
     stamps, usable, is_log = _stamps(source, options, parts, told)
     presses = source.presses()
     if presses is not None and (is_log or is_constant(presses.stamp_ns)):
         presses = Presses(presses.log_ns, presses.log_ns, presses.pressed)
     buttons = np.concatenate(parts.buttons) if parts.buttons else None
     strange = source.attitudes.strange
-    return Gathered(spool, stamps, usable, buttons, presses, told, source.bad_rows, strange)
+    return Gathered(spool, stamps, usable, buttons, presses, told, source.bad_rows, strange, order)
+
+
+def _recorded_order(logs: list[Stamps]) -> NDArray[np.int32] | None:
+    """Rows in the order of their times of recording (N,); None if they stand so.
+
+    Files of several writers, and splits that are listed in another order, hold them in any.
+    """
+    whole = np.concatenate(logs) if logs else np.zeros(0, np.int64)
+    if (whole[1:] >= whole[:-1]).all():
+        return None
+    return np.argsort(whole, kind="stable").astype(np.int32)
 
 
 def _check(source: Source, parts: _Parts, count: int) -> None:

@@ -21,7 +21,7 @@ from teleop_core.session.exchange.options import ImportOptions
 from teleop_core.session.exchange.orientation import continuous
 from teleop_core.session.exchange.source import Source
 from teleop_core.session.exchange.spool import Spool
-from teleop_core.session.exchange.times import SECOND_NS, Stamps, gaps, ordered
+from teleop_core.session.exchange.times import SECOND_NS, Stamps, gaps, ordered, restarts
 
 if TYPE_CHECKING:
     from teleop_core.session.exchange.tables import Table
@@ -86,9 +86,12 @@ class Motion:
             filled = bridge(gathered, round(options.missing_time * SECOND_NS))
         # Every copy of the times of an hour at 1 kHz takes 29 MB.
         usable = np.flatnonzero(gathered.is_usable).astype(np.int32)
-        is_whole = len(usable) == len(gathered.is_usable)
+        is_whole = len(usable) == len(gathered.is_usable) and gathered.order is None
+        if gathered.order is not None:
+            usable = gathered.order[gathered.is_usable[gathered.order]]
         stamps = gathered.stamp_ns if is_whole else gathered.stamp_ns[usable]
         gathered.stamp_ns = stamps[:0]
+        self._refuse_several(stamps)
         order = ordered(stamps, is_sorted=options.backwards == "sort")
         is_kept = not order.doubled and not order.backwards
         self._rows = usable if is_kept else usable[order.rows]
@@ -104,6 +107,19 @@ class Motion:
         self._shift_ns = 0
         self._origin = np.zeros(3)
         self._origin = self._center()
+
+    def _refuse_several(self, stamps: Stamps) -> None:
+        """Refuse several recordings in one table: no policy makes one hand of them.
+
+        Raises:
+            RecordingError: Says where they begin.
+        """
+        if len(rows := restarts(stamps)):
+            listed = ", ".join(str(row + 1) for row in rows[:5]) + (", …" if len(rows) > 5 else "")
+            reason = f"holds {len(rows) + 1} recordings: the time begins anew in row {listed}"
+            raise RecordingError(
+                self._path, f"{reason}; give a file for each, or --stamps log for a bag"
+            )
 
     def _check(self) -> None:
         """Refuse what is no motion.
@@ -189,7 +205,7 @@ class Motion:
         g = self._gathered
         if g.presses is not None:
             stamps, pressed = g.presses.stamp_ns + self._shift_ns, g.presses.pressed
-            order = ordered(stamps)
+            order = ordered(stamps, is_sorted=True)
             stamps, pressed = stamps[order.rows], pressed[order.rows]
         elif g.buttons is not None:
             stamps, pressed = self.stamp_ns, g.buttons[self._rows]

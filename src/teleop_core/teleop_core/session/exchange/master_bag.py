@@ -5,6 +5,8 @@ topic or message of the pose, stamps that say nothing, buttons of another Joy, d
 """
 
 import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,7 +16,7 @@ from teleop_core.bags.memory import MemoryBag
 from teleop_core.bags.messages import QUATERNION_TOLERANCE
 from teleop_core.bags.reader import Bag
 from teleop_core.bags.series import Series
-from teleop_core.base.errors import RecordingError
+from teleop_core.base.errors import RecordingError, TeleopError
 from teleop_core.graph.topics import MASTER_BUTTONS, MASTER_MEASURED_CP, Kind, Topic
 from teleop_core.kernels.portable import length
 from teleop_core.session.exchange.imported_motion import Motion
@@ -121,7 +123,7 @@ def _of_arm(bag: Bag, prefix: str, options: ImportOptions) -> ImportOptions:
 
 def _read(path: Path, arm: str, options: ImportOptions) -> dict[Topic, Series]:
     """Streams of one arm."""
-    with Spool(7) as spool:
+    with Spool(7) as spool, _options_told(path):
         motion = Motion(path, options, spool)
         blocks = [poses for _, poses in motion.blocks()]
         presses = motion.presses()
@@ -135,3 +137,14 @@ def _read(path: Path, arm: str, options: ImportOptions) -> dict[Topic, Series]:
     if notes := [*motion.told, *motion.losses()]:
         warnings.warn(f"{path.name}: {'; '.join(notes)}", stacklevel=4)
     return found
+
+
+@contextmanager
+def _options_told(path: Path) -> Iterator[None]:
+    """Say whose options those are that an error advises: who plays a recording takes none."""
+    try:
+        yield
+    except TeleopError as error:
+        if "--" in str(error):
+            error.args = (f"{error} (an option of `teleop import {path} --out DIR`)",)
+        raise

@@ -23,6 +23,7 @@ _NOT_PLACES = re.compile(
 )
 _PLACES = re.compile(r"(^|_)(pos\w*|trans\w*|place|p|loc\w*|xyz|point|tip|hand|t)(_|$)")
 _TURNS = re.compile(r"(^|_)(q|quat\w*|orient\w*|rot\w*|attitude|r|o)(_|$)")
+_EPISODES = re.compile(r"(episode|trial|demo)(_(index|id|number|nr))?")
 _VECTORS = re.compile(r"(^|_)(rotvec|rot_vec\w*|rotation_vec\w*|rvec|axis_angle|r)(_|$)")
 
 
@@ -137,6 +138,12 @@ def find_button(names: Sequence[str], button: str) -> int | None:
     """Column of a button by its name."""
     whole = [plain(name) for name in names]
     return next((i for i, name in enumerate(whole) if name.rpartition("_")[2] == button), None)
+
+
+def find_episode(names: Sequence[str]) -> int | None:
+    """Column that says which of several recordings a row is of, as in data sets of LeRobot."""
+    whole = [plain(name) for name in names]
+    return next((i for i, name in enumerate(whole) if _EPISODES.fullmatch(name)), None)
 
 
 def unit_of(names: Sequence[str], columns: Sequence[int]) -> str:

@@ -22,7 +22,7 @@ BUTTONS = ("clutch", "fixture", "mode")
 AXES = ("+x", "-x", "+y", "-y", "+z", "-z")
 ORIENTATIONS = ("quaternion", "matrix", "euler", "rotation_vector", "forward")
 """Options that say where the orientation is."""
-_CHOICES = {
+CHOICES = {
     "time_unit": ("auto", *TIMES_NS),
     "stamps": ("header", "log"),
     "unit": ("auto", *LENGTHS),
@@ -72,8 +72,10 @@ class ImportOptions:
         mode: As ``clutch``.
         threshold: Above it a button is pressed.
         skip: Lines to leave out at the beginning of a text.
+        episode: Which recording of a table that holds several; None if it is one.
         topic: Topic of the poses in a bag, or its end; empty if there is only one.
-        frame: Child frame, for a topic of transforms.
+        frame: Child frame, for a topic that has several.
+        parent: Frame in which the poses stand, for a topic that has several.
         buttons_topic: Topic of the Joy messages, or its end; empty if there is at most one. Of
             several with ``|`` between them the first one there is taken; an empty last one stands
             for no buttons.
@@ -111,8 +113,10 @@ class ImportOptions:
     mode: str = ""
     threshold: float = 0.5
     skip: int = 0
+    episode: int | None = None
     topic: str = ""
     frame: str = ""
+    parent: str = ""
     buttons_topic: str = ""
     buttons: str = ""
     axes: Columns = ("+x", "+y", "+z")
@@ -129,7 +133,7 @@ class ImportOptions:
             object.__setattr__(self, name, expanded(getattr(self, name)))
         for name in BUTTONS:
             object.__setattr__(self, name, str(getattr(self, name)))
-        for name, choices in _CHOICES.items():
+        for name, choices in CHOICES.items():
             if getattr(self, name) not in choices:
                 raise UnknownNameError(option(name), getattr(self, name), choices)
         self._check_columns()

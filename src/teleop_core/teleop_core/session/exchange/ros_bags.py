@@ -5,18 +5,23 @@ reader of ROS 1 is handed a file that keeps it to that too.
 """
 
 import io
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Protocol
 
 from rosbags.highlevel import AnyReader
-from rosbags.typesys import Stores, get_typestore
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from teleop_core.bags import ros_types
 from teleop_core.bags.finding import METADATA, compression_mode
 from teleop_core.bags.reader import Bag
+from teleop_core.base.errors import RecordingError
 from teleop_core.session.exchange.bag_messages import Raw, plain
+
+_SHORT = re.compile(r"^(\w+)/(\w+)$")
+_TRANSFORMS = "geometry_msgs/TransformStamped[] transforms"  # of tf2_msgs, which that store lacks
 
 
 class RosBag(Protocol):
@@ -33,23 +38,24 @@ class RosBag(Protocol):
     is_ros2: bool
 
     def raw(self, topic: str) -> Iterator[Raw]:
-        """Messages of a topic: time of recording [ns], bytes."""
+        """Messages of a topic in the order of the file: time of recording [ns], bytes."""
 
 
 class OurBag:
-    """A recording in MCAP."""
-
-    is_ros2 = True
+    """A recording in MCAP, of ROS 2 or of ROS 1."""
 
     def __init__(self, bag: Bag) -> None:
-        self._bag = bag
-        self.types = {name: info.type for name, info in bag.topics.items() if info.count}
-        self.typestore = ros_types.typestore()
+        self._bag, self.is_ros2 = bag, not bag.is_ros1
+        found = {name: info.type for name, info in bag.topics.items() if info.count}
+        self.types, self.typestore = found, ros_types.typestore()
+        if bag.is_ros1:  # whose types are written geometry_msgs/PoseStamped
+            self.types = {name: _SHORT.sub(r"\1/msg/\2", kind) for name, kind in found.items()}
+            self.typestore = get_typestore(Stores.ROS1_NOETIC)
+            self.typestore.register(get_types_from_msg(_TRANSFORMS, "tf2_msgs/msg/TFMessage"))
 
     def raw(self, topic: str) -> Iterator[Raw]:
         """As of any recording."""
-        for _, _, log_ns, data in self._bag.raw([topic]):
-            yield log_ns, data
+        yield from self._bag.stored(topic)
 
 
 class ForeignBag:
@@ -82,10 +88,25 @@ def is_plain_mcap(path: Path) -> bool:
 
 @contextmanager
 def opened_by_rosbags(path: Path) -> Iterator[ForeignBag]:
-    """A ROS 1 ``.bag``, a ``.db3``, or a recording whose files or messages are compressed."""
+    """A ROS 1 ``.bag``, a ``.db3``, or a recording whose files or messages are compressed.
+
+    Raises:
+        RecordingError: Messages of a ``.db3`` are still in a file beside it, which is not read.
+    """
+    for file in [path] if path.suffix == ".db3" else sorted(path.glob("*.db3")):
+        _refuse_unmerged(file)
     types = get_typestore(Stores.ROS2_JAZZY)
     with AnyReader([_BoundedPath(path)], default_typestore=types) as reader:
         yield ForeignBag(reader)
+
+
+def _refuse_unmerged(file: Path) -> None:
+    """Refuse an SQLite file whose last changes are in its log: its recorder was killed."""
+    for end in ("-wal", "-journal"):
+        log = file.with_name(file.name + end)
+        if log.exists() and log.stat().st_size:
+            mend = f"merge them by `sqlite3 {file} 'PRAGMA integrity_check'`"
+            raise RecordingError(file, f"lacks messages that are still in {log.name}: {mend}")
 
 
 class _BoundedFile(io.BufferedReader):

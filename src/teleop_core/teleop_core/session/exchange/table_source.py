@@ -11,11 +11,14 @@ from teleop_core.base.errors import ParameterError, RecordingError
 from teleop_core.kernels.geometry import Array
 from teleop_core.kernels.portable import length
 from teleop_core.session.exchange import names
-from teleop_core.session.exchange.options import BUTTONS, ImportOptions, option
+from teleop_core.session.exchange.episodes import Episodes
+from teleop_core.session.exchange.options import BUTTONS, CHOICES, ImportOptions, option
 from teleop_core.session.exchange.orientation import TOLERANCE, Attitudes
 from teleop_core.session.exchange.source import Block, Presses
 from teleop_core.session.exchange.tables import Numbers, Table, column_of
-from teleop_core.session.exchange.times import SECOND_NS
+from teleop_core.session.exchange.times import SECOND_NS, nanoseconds
+
+_TOLD = 8  # columns that are told by name
 
 
 @dataclass(frozen=True)
@@ -44,16 +47,19 @@ class TableSource:
     def __init__(self, table: Table, options: ImportOptions) -> None:
         self.path, self._table, self._options = table.path, table, options
         self.told: list[str] = []
-        if options.topic or options.buttons_topic or options.frame:
-            raise ParameterError("--topic", options.topic, "left out: this file has columns")
+        for name in ("topic", "buttons_topic", "frame", "parent"):
+            if given := getattr(options, name):
+                raise ParameterError(option(name), given, "left out: this file has columns")
         position = self._position()
         time = self._time(position)
         self.attitudes, orientation = self._orientation({*position, *time})
         taken = {*position, *time, *orientation}
         self._columns = Columns(time, position, orientation, self._buttons(taken))
+        self._episodes = Episodes(table, options.episode)
         self.has_time = bool(time)
         self.time_unit = self._time_unit(time)
         self.unit, self.is_unit_said = self._unit(position)
+        self._tell_unused({*taken, *self._columns.buttons.values()})
 
     # -- which columns ---------------------------------------------------------------------------
 
@@ -186,9 +192,9 @@ class TableSource:
     def _in_degrees(self, kind: str, columns: Sequence[int]) -> bool:
         if kind not in {"euler", "rotation_vector"}:
             return False
+        named = self._agreed("angles", columns)
         if self._options.angles != "auto":
-            return self._options.angles == "deg"
-        named = names.unit_of(self._table.names, columns)
+            return named == "deg"
         sizes = [np.abs(self._table.sample(c).astype(np.float64)) for c in columns]
         largest = max((float(np.nanmax(s)) for s in sizes if np.isfinite(s).any()), default=0.0)
         is_degrees = named == "deg" or (named != "rad" and largest > 2.0 * math.pi + 0.1)
@@ -220,6 +226,13 @@ class TableSource:
     def _is_button(self, column: int) -> bool:
         return bool(np.isin(self._table.sample(column).astype(np.float64), (0.0, 1.0)).all())
 
+    def _tell_unused(self, taken: set[int]) -> None:
+        known = self._table.names
+        unused = [name for column, name in enumerate(known) if column not in taken]
+        if unused:
+            more = f" and {len(unused) - _TOLD} more" if len(unused) > _TOLD else ""
+            self.told.append(f"left unused: {', '.join(map(repr, unused[:_TOLD]))}{more}")
+
     # -- units -----------------------------------------------------------------------------------
 
     def _time_unit(self, time: tuple[int, ...]) -> str:
@@ -227,17 +240,29 @@ class TableSource:
             return "ns"
         if len(time) == 2:
             return "ns"
-        named = names.unit_of(self._table.names, time)
-        return named if self._options.time_unit == "auto" and named else self._options.time_unit
+        return self._agreed("time_unit", time) or "auto"
 
     def _unit(self, position: tuple[int, ...]) -> tuple[str, bool]:
         """Unit of the position, and whether anybody says it."""
-        if self._options.unit != "auto":
-            return self._options.unit, True
-        named = names.unit_of(self._table.names, position)
-        if named in {"mm", "cm", "in"}:
-            self.told.append(f"positions in {named}, as the names say")
-        return (named, True) if named in {"m", "mm", "cm", "in"} else ("m", False)
+        unit = self._agreed("unit", position)
+        if self._options.unit == "auto" and unit not in {"", "m"}:
+            self.told.append(f"positions in {unit}, as the names say")
+        return unit or "m", bool(unit)
+
+    def _agreed(self, name: str, columns: Sequence[int]) -> str:
+        """Unit that an option or the names of columns say; empty if neither does.
+
+        Raises:
+            ParameterError: They differ.
+        """
+        wanted, choices = getattr(self._options, name), CHOICES[name]
+        named = names.unit_of(self._table.names, columns)
+        if named not in choices or wanted == named:
+            return "" if wanted == "auto" else str(wanted)
+        if wanted == "auto":
+            return named
+        listed = ", ".join(repr(self._table.names[column]) for column in columns)
+        raise ParameterError(option(name), wanted, f"{named}, as {listed} say; else change these")
 
     # -- rows ------------------------------------------------------------------------------------
 
@@ -259,7 +284,7 @@ class TableSource:
         c = self._columns
         order = [*c.time, *c.position, *c.orientation, *c.buttons.values()]
         first, second = len(c.time), len(c.time) + 3
-        for columns in self._table.blocks(order):
+        for columns in self._episodes.blocks(order):
             turned = columns[second : second + len(c.orientation)]
             count = len(columns[first])
             rows = np.column_stack(turned) if turned else np.empty((count, 0))
@@ -269,6 +294,7 @@ class TableSource:
                 self.attitudes.quaternions(rows.astype(np.float64, copy=False)),
                 self._pressed(columns[second + len(turned) :], count),
             )
+        self.told += self._episodes.told()
 
     def _pressed(self, columns: Sequence[Numbers], count: int) -> NDArray[np.uint8] | None:
         if not columns:
@@ -304,4 +330,6 @@ def _time(columns: Sequence[Numbers], count: int) -> Numbers:
         return np.zeros(count)
     if len(columns) == 1:
         return columns[0]
+    if all(np.isfinite(column).all() for column in columns):
+        return nanoseconds(columns[0], "s") + nanoseconds(columns[1], "ns")
     return np.asarray(columns[0] * SECOND_NS + columns[1])

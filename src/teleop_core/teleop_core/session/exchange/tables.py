@@ -81,7 +81,7 @@ def numbers(column: "pa.ChunkedArray | pa.Array") -> Numbers:
     """Column of Arrow as numbers; what is missing is NaN."""
     kind = column.type
     if pa.types.is_timestamp(kind):
-        column = column.cast(pa.timestamp("ns")).cast(pa.int64())
+        column = column.cast(pa.timestamp("ns", tz=kind.tz)).cast(pa.int64())
     elif pa.types.is_boolean(kind):
         column = column.cast(pa.int8())
     elif pa.types.is_decimal(kind) or pa.types.is_string(kind) or pa.types.is_large_string(kind):

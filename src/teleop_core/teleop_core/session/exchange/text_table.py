@@ -22,7 +22,9 @@ _COMMENTS = ("#", "%", "//")
 _MISSING = ("", "nan", "NaN", "NAN", "-nan", "NA", "N/A", "n/a", "null", "NULL", "None", "-", "--",
             "inf", "-inf", "Inf", "-Inf")  # fmt: skip
 _NUMBER = re.compile(r"[+-]?(\d+[.,]?\d*|[.,]\d+)([eE][+-]?\d+)?")
-_CLOCK = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d")
+_NAN = re.compile(r"[+-]?(nan|inf|infinity|null|none|n/?a)", re.I)
+_CLOCK = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d[\d:.]*\s?(Z|[+-]\d\d:?\d\d)?")
+_EXACT = 1 << 53  # whole numbers up to here are exact as floating-point numbers, too
 _BLANK = r"\s+"
 
 
@@ -92,15 +94,20 @@ class TextTable:
         if self._is_truth(column):
             return np.array([cell.strip().lower() == "true" for cell in cells], np.int64)
         if self.is_clock(column):
-            return np.array(pd.to_datetime(cells).as_unit("ns").astype("int64"), np.int64)
+            clock = pd.to_datetime(cells, format="ISO8601", utc=True).as_unit("ns")
+            return np.array(clock.astype("int64"), np.int64)
         if cells and all(re.fullmatch(r"[+-]?\d{1,18}", cell.strip()) for cell in cells):
             return np.array([int(cell) for cell in cells], np.int64)
         return np.array([number(cell, self._form.decimal) for cell in cells], np.float64)
 
     def is_clock(self, column: int) -> bool:
         """As of any table."""
+        return self._clock(column) is not None
+
+    def _clock(self, column: int) -> re.Match[str] | None:
+        """How the first cell of a column is a date, with its zone; None if it is none."""
         rows = self._form.rows
-        return bool(rows) and column < len(rows[0]) and bool(_CLOCK.match(rows[0][column].strip()))
+        return _CLOCK.match(rows[0][column].strip()) if rows and column < len(rows[0]) else None
 
     def _is_truth(self, column: int) -> bool:
         """Whether a column holds ``True`` and ``False``, as pandas and Unity write them."""
@@ -136,11 +143,14 @@ class TextTable:
                 yield [numbers(batch.column(names[column])) for column in columns]
 
     def _type(self, column: int) -> pa.DataType:
-        if self.is_clock(column):
-            return pa.timestamp("ns")
+        if clock := self._clock(column):
+            return pa.timestamp("ns", tz="UTC" if clock[1] else None)
         if self._is_truth(column):
             return pa.bool_()
-        return pa.int64() if self.sample(column).dtype.kind == "i" else pa.float64()
+        # Whole numbers at the beginning say nothing of the rest, unless they need all digits.
+        sample = self.sample(column)
+        is_long = sample.dtype.kind == "i" and np.abs(sample).max() > _EXACT
+        return pa.int64() if is_long else pa.float64()
 
     def _bad_row(self, row: pc.InvalidRow) -> str:
         self.bad_rows += 1
@@ -272,9 +282,10 @@ def _separator(lines: list[str]) -> str:
 
 
 def _has_numbers(row: list[str]) -> bool:
-    """Whether a row has numbers, and at most some texts beside them."""
-    found = sum(bool(_NUMBER.fullmatch(cell.strip())) for cell in row)
-    return found >= 1 and 2 * found >= sum(bool(cell.strip()) for cell in row)
+    """Whether a row has numbers, also missing ones, and at most some texts beside them."""
+    texts = [text for cell in row if (text := cell.strip())]
+    found = sum(bool(_NUMBER.fullmatch(text) or _NAN.fullmatch(text)) for text in texts)
+    return found >= 1 and 2 * found >= len(texts)
 
 
 def _has_decimal_commas(rows: list[list[str]]) -> bool:

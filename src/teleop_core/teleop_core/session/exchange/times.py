@@ -1,10 +1,12 @@
 """Times of an import: their unit, and which rows stay where they are doubled or go back."""
 
+from bisect import bisect_right
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import median_filter
 
 from teleop_core.kernels.geometry import Array
 from teleop_core.session.exchange.options import TIMES_NS
@@ -16,6 +18,7 @@ RATES_HZ = (5.0, 3000.0)
 _EPOCH_S = 3e8  # 1979: later times are seconds since 1970
 _FOREVER_S = 4e9
 _LONGEST_S = 60.0  # between two samples
+_STRETCH = 10  # rows; shorter ones are no recording of their own
 
 
 class Unit(NamedTuple):
@@ -92,7 +95,7 @@ class Order:
 
 
 def ordered(stamps: Stamps, *, is_sorted: bool = False) -> Order:
-    """Rows with rising times: of equal ones the first; those that go back left out, or sorted in.
+    """Rows with rising times: of equal ones the first; of the others the fewest are left out.
 
     Args:
         stamps: Times (N,) [ns] in the order of the file.
@@ -100,14 +103,51 @@ def ordered(stamps: Stamps, *, is_sorted: bool = False) -> Order:
     """
     if (stamps[1:] > stamps[:-1]).all():
         return Order(np.arange(len(stamps), dtype=np.int32), 0, 0)
-    newest = np.maximum.accumulate(stamps)
-    back = np.zeros(len(stamps), np.bool_)
-    back[1:] = stamps[1:] < newest[:-1]
-    rows = np.argsort(stamps, kind="stable") if is_sorted else np.flatnonzero(~back)
-    rising = stamps[rows]
+    rising = _longest_rising(stamps)
+    rows = np.argsort(stamps, kind="stable") if is_sorted else rising
+    kept = stamps[rows]
     first = np.ones(len(rows), np.bool_)
-    first[1:] = rising[1:] > rising[:-1]
-    return Order(rows[first].astype(np.int32), int((~first).sum()), int(back.sum()))
+    first[1:] = kept[1:] > kept[:-1]
+    return Order(rows[first].astype(np.int32), int((~first).sum()), len(stamps) - len(rising))
+
+
+def _longest_rising(stamps: Stamps) -> NDArray[np.int64]:
+    """Most rows of which none has a time before that of an earlier one (Fredman 1975).
+
+    So one stamp from the future costs its own row, not all rows until that time has come.
+    """
+    before = np.empty(len(stamps), np.int64)
+    ends: list[int] = []  # least last time of so many rows, and which row that is
+    last: list[int] = []
+    for row, stamp in enumerate(stamps.tolist()):
+        count = bisect_right(ends, stamp)
+        before[row] = last[count - 1] if count else -1
+        ends[count : count + 1], last[count : count + 1] = [stamp], [row]
+    rows, row = np.empty(len(last), np.int64), last[-1] if last else -1
+    for place in range(len(last) - 1, -1, -1):
+        rows[place], row = row, int(before[row])
+    return rows
+
+
+def restarts(stamps: Stamps) -> NDArray[np.int64]:
+    """Rows at which another recording begins: the time falls back to run once more.
+
+    It falls back by more than half of the stretch before, and runs on into it: rows that are only
+    stored late do not. Single rows of another time do not count.
+
+    Args:
+        stamps: Times (N,) [ns] in the order of the file.
+    """
+    if (stamps[1:] >= stamps[:-1]).all():
+        return np.zeros(0, np.int64)
+    stamps = median_filter(stamps, 3, mode="nearest")
+    begins = np.flatnonzero(np.diff(stamps, prepend=stamps[:1] + 1) < 0)
+    ends = np.append(begins[1:], len(stamps))
+    first, middle, last = stamps[begins], stamps[(begins + ends) // 2], stamps[ends - 1]
+    sizes = ends - begins
+    is_long = (sizes[1:] >= _STRETCH) & (sizes[:-1] >= _STRETCH)
+    is_anew = (first[1:] < middle[:-1]) & (last[1:] > first[:-1])
+    return begins[1:][is_long & is_anew]
 
 
 def gaps(stamps: Stamps, periods: float) -> tuple[tuple[float, float], ...]:

@@ -24,12 +24,12 @@ class OperationParameters:
         doc="after a stop, or disabled: the drives hold the arm, or are off and brakes hold it",
     )  # fmt: skip
     heartbeat: float = parameter(
-        0.0, unit="s", lower=0.0, upper=10.0,
+        0.0, unit="s", lower=0.01, upper=10.0, off=0.0,
         doc="a stop button that says 'released' less often than this counts as pressed; 0: none is "
         "there",
     )  # fmt: skip
     longest_outage: float = parameter(
-        2.0, unit="s", lower=0.0, upper=60.0,
+        2.0, unit="s", lower=0.01, upper=60.0, off=0.0,
         doc="after a longer silence of commands it is paused and resumes on purpose only; 0: never",
         source="assumed: longer than a node takes to hiccup, shorter than a person to look away",
     )  # fmt: skip

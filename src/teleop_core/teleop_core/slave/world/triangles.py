@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from teleop_core.base.errors import ParameterError, TeleopError
+from teleop_core.base.ranges import check
 from teleop_core.kernels import inner, kernel
 from teleop_core.kernels.geometry import Array
 from teleop_core.kernels.portable import arctangent, dot, length, product
@@ -51,15 +52,18 @@ def read_triangles(path: Path, data: bytes, placed: Array, group: str = "world.m
     except ImportError as error:
         raise TeleopError("a mesh needs trimesh: pip install 'teleop_core[mesh]'") from error
     try:
-        mesh = trimesh.load_mesh(io.BytesIO(data), file_type=path.suffix.lower().lstrip("."))
-        mesh.merge_vertices(merge_tex=True, merge_norm=True)
+        with np.errstate(all="ignore"):  # of numbers that are refused below
+            mesh = trimesh.load_mesh(io.BytesIO(data), file_type=path.suffix.lower().lstrip("."))
+            mesh.merge_vertices(merge_tex=True, merge_norm=True)
         points, faces = np.array(mesh.vertices, np.float64), np.array(mesh.faces, np.int64)
+        faces = faces.reshape(-1, 3)  # without triangles it has no second axis
     except Exception as error:  # of a foreign reader, of a file that anybody wrote
         text = f"a mesh that can be read, such as STL or OBJ ({type(error).__name__}: {error})"
         raise ParameterError(name, str(path), text) from error
     faces = faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)]
     if not (len(faces) and np.isfinite(points).all()):
         raise ParameterError(name, str(path), "a mesh of triangles with finite corners")
+    check(f"{name}: longest side in the file's unit", float(np.ptp(points, axis=0).max()), "")
     _check_closed(name, path, points, faces)
     points = product(points - 0.5 * (points.min(axis=0) + points.max(axis=0)), placed.T)
     a, b, c = points[faces].transpose(1, 0, 2)
