@@ -118,7 +118,10 @@ def _below(name: str, values: Mapping[str, object]) -> dict[str, object]:
 
 @dataclass(frozen=True)
 class Spec:
-    """Declaration of one parameter: ``name`` is dotted for nested groups."""
+    """Declaration of one parameter: ``name`` is dotted for nested groups.
+
+    ``is_part`` says whether it names a part of a registry.
+    """
 
     name: str
     kind: type
@@ -132,6 +135,7 @@ class Spec:
     length: int | None
     fixed: bool
     source: str = ""
+    is_part: bool = False
 
     def check(self, value: object) -> None:
         """Refuse a value of another type, length, bound or choice.
@@ -212,8 +216,9 @@ def _choice_specs(entry: Any, prefix: str) -> Iterator[Spec]:
     names, kind = meta["registry"].names(), prefix + entry.name
     text: dict[str, Any] = {"unit": "", "doc": meta["doc"], "lower": None, "upper": None}
     yield Spec(
-        kind, str, str, meta["default"], **text, choices=names, length=None, fixed=meta["fixed"]
-    )
+        kind, str, str, meta["default"], **text, choices=names, length=None, fixed=meta["fixed"],
+        is_part=True,
+    )  # fmt: skip
     for name in names:
         yield from specs(meta["registry"].find(name).parameters, f"{prefix}{name}.")
 
