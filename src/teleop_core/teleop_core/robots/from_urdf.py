@@ -145,7 +145,7 @@ def load_urdf(
     coordinates = dict(zip((j.name for j in moving), followers.of(home).tolist(), strict=True))
     visuals = tuple(visuals_of(coordinates, links, by_child, Path(path)))
     # Without its start, for which a second's search would begin here: who needs it asks for it.
-    robot = replace(robot, visuals=visuals, start=None)
+    robot = replace(robot, visuals=visuals, home_is_assumed=True, start=None)
     if dynamics == "independent":
         return robot
     motors = np.maximum(table.inertia - np.diag(inertia), 0.0)
