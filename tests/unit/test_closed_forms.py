@@ -421,3 +421,20 @@ def test_far_from_singular_postures_the_least_move_alone_is_made(
         np.linspace(0.0, 6.0, 3000)[:, None] + np.arange(7))  # fmt: skip
     plain = moved_least(arm, arm.fk(joints), joints[0])
     np.testing.assert_array_equal(check_path(arm, joints).q[:3000], plain)
+
+
+@pytest.mark.parametrize("beside", [0.0, 0.02, 0.1])
+def test_seven_axes_stay_in_the_branch_of_the_seed_and_give_up_the_margin_first(
+    beside: float, load: Callable[..., Robot]
+) -> None:
+    rng = np.random.default_rng(8)
+    arms = [load(IIWA14, IIWA14_LIMITS), *(load(swivel_axes(rng), narrow(rng, 7)) for _ in "abc")]
+    for arm in arms:
+        q = rng.uniform(arm.lower, arm.upper, (2000, 7))
+        seeds = np.clip(q + rng.uniform(-beside, beside, q.shape), arm.lower, arm.upper)
+        moves = np.abs(arm.ik_batch(arm.fk(q), seeds).q - seeds).max(axis=1)
+        known = np.abs(q - seeds).max(axis=1)
+        longer = moves - known
+        # The least move is looked for in eight rounds, by its sum of squares.
+        assert (longer > 0.3 + 1e-9).mean() <= (0.005 if beside else 0.0)
+        assert longer.max() < 1.0
