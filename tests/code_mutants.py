@@ -44,7 +44,7 @@ CODE_MUTANTS = (
             "chain/mapping/plausibility.py", "max(s.in_row - _STREAM, 0)", "0", "plausible_hand"),
     # kernels and robots
     _mutant("margin_first", "a margin from a limit is worth any way", "robots/swivel.py",
-            "> most + _BESIDE:", "> most + 10.0:", "closed_forms"),
+            "> most + BESIDE_SEED:", "> most + 10.0:", "closed_forms"),
     _mutant("far_turn", "a turn beyond half a turn goes the long way", "kernels/geometry.py",
             "sign = -1.0 if turn[0] < 0.0 else 1.0", "sign = 1.0", "geometry"),
     _mutant("force_here", "a force's torque about the base is that about the tip",
