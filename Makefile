@@ -88,8 +88,10 @@ test-slow: $(VENV)/.tested crtk_msgs
 	$(ALONE) -m "ros and (slow or alone) and not soak" || code=1; \
 	exit $$code
 
-# Long tests whose law a shorter one tests in CI with another case; a quarter of an hour.
+# Long tests whose law a shorter one tests in CI with another case, and whole sessions of all commands
+# that README, site and --help name, after a list of those that are not run; half an hour.
 soak: $(VENV)/.tested crtk_msgs
+	$(BIN)/python tests/named.py
 	$(BIN)/pytest -n 1 -m soak tests
 
 # Broken files, texts and messages, other ones each time; an hour. The tests have a short form of it.

@@ -2,7 +2,8 @@
 
 Run with ``python benchmarks/urdf_arms.py``. Seeds lie 0.05 rad (standard deviation) off the joints
 that made the pose. Solved means within 1e-6 m and 1e-6 rad, legal means inside the joint limits
-too; the ratio is ours over the peer's median. Pink and mink step with damped least squares, steps
+too; the ratio is ours over the peer's median. A move is the largest of any joint from the seed: a
+large one is another branch. Pink and mink step with damped least squares, steps
 of full length, until the tolerance or 100 rounds; EAIK has two choices: the nearest branch, and the
 nearest of all whole turns inside the limits. Peers that are not installed are named and skipped.
 """
@@ -198,8 +199,11 @@ def compare(path: Path, robot: Any, kind: str, count: int) -> None:
         median = float(np.median(times))
         ours = ours or median
         solved, legal = judged(robot, poses, np.array(answers))
+        moves = np.abs(np.array(answers) - seeds).max(axis=1)
+        far = f"moves by {np.nanmax(moves):.2f} rad at most, {(moves > 0.5).sum()} by more than 0.5"
         print(f"  {name:23} solved {solved:5.1f} %  legal {legal:5.1f} %  median {median:9.1f} µs  "
               f"p99 {np.percentile(times, 99):9.1f} µs  ratio {ours / median:6.3f}")  # fmt: skip
+        print(f"  {'':23} {far}")
     rates = []
     for _ in range(5):
         begin = time.perf_counter()

@@ -1,6 +1,7 @@
 """Closed forms of arms from files: all solutions, limits, whole turns, paths and classes."""
 
 import math
+import re
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -22,6 +23,7 @@ from random_arms import (
     urdf,
     wrist_axes,
 )
+from real_arms import urdf_of
 from teleop_core.kernels import kernel
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots import IkStatus, dh_kernels, load_robot, swivel
@@ -231,11 +233,39 @@ def test_rounded_files_are_recognised_and_solved_to_the_last_digit(
     assert answer.residual.max() < 1e-9
 
 
-@pytest.mark.parametrize("tilt", [1e-3, 0.1])
-def test_arms_that_do_not_decompose_are_searched(tilt: float, load: Callable[..., Robot]) -> None:
+@pytest.mark.parametrize("arm", ["m1013", "m0609", "ur5e", "irb120", "iiwa14"])
+def test_files_that_say_1_571_are_solved_in_closed_form_beside_the_seed(
+    arm: str, tmp_path: Path
+) -> None:
+    def rounded(found: "re.Match[str]") -> str:
+        angles = (float(text) for text in found[1].split())
+        off = rng.uniform(-2.5e-4, 2.5e-4, 3)
+        return f'rpy="{" ".join(repr(float(a + b)) for a, b in zip(angles, off, strict=True))}"'
+
+    rng, path = np.random.default_rng(5), tmp_path / "arm.urdf"
+    text = urdf_of(arm)
+    path.write_text(text if arm.startswith("m") else re.sub(r'rpy="([^"]*)"', rounded, text))
+    robot = load_robot(str(path))
+    assert "closed form" in robot.solution
+    assert "within 1e-3 of the class" in robot.solution
+    q = rng.uniform(robot.lower, robot.upper, (2000, robot.n))
+    seeds = np.clip(q + rng.normal(0.0, 0.05, q.shape), robot.lower, robot.upper)
+    for answer in (robot.ik_batch(robot.fk(q)), robot.ik_batch(robot.fk(q), seeds)):
+        assert np.isin(answer.status, REACHED).all()
+        assert answer.residual.max() < 1e-9
+    assert (np.abs(answer.q - seeds).max(axis=1) > 0.5).mean() < 0.003  # by stretched elbows
+
+
+@pytest.mark.parametrize(("tilt", "told"), [(2e-3, "0.162°"), (0.1, "8.05°")])
+def test_arms_that_do_not_decompose_are_searched_and_say_what_their_axes_miss(
+    tilt: float, told: str, load: Callable[..., Robot]
+) -> None:
     axes = list(UR5E)
     axes[3] = (axes[3][0] + np.array([tilt, 0.0, tilt]), axes[3][1])
-    assert "search" in load(axes).solution
+    solution = load(axes).solution
+    assert solution.startswith("search")
+    assert f"axes 2, 3, 4 are {told} from parallel" in solution
+    assert "axes 4, 5, 6 miss a point by 1" in solution
 
 
 def test_the_arm_as_built_has_the_constants_of_its_chain_alone(load: Callable[..., Robot]) -> None:
@@ -421,3 +451,20 @@ def test_far_from_singular_postures_the_least_move_alone_is_made(
         np.linspace(0.0, 6.0, 3000)[:, None] + np.arange(7))  # fmt: skip
     plain = moved_least(arm, arm.fk(joints), joints[0])
     np.testing.assert_array_equal(check_path(arm, joints).q[:3000], plain)
+
+
+@pytest.mark.parametrize("beside", [0.0, 0.02, 0.1])
+def test_seven_axes_stay_in_the_branch_of_the_seed_and_give_up_the_margin_first(
+    beside: float, load: Callable[..., Robot]
+) -> None:
+    rng = np.random.default_rng(8)
+    arms = [load(IIWA14, IIWA14_LIMITS), *(load(swivel_axes(rng), narrow(rng, 7)) for _ in "abc")]
+    for arm in arms:
+        q = rng.uniform(arm.lower, arm.upper, (2000, 7))
+        seeds = np.clip(q + rng.uniform(-beside, beside, q.shape), arm.lower, arm.upper)
+        moves = np.abs(arm.ik_batch(arm.fk(q), seeds).q - seeds).max(axis=1)
+        known = np.abs(q - seeds).max(axis=1)
+        longer = moves - known
+        # The least move is looked for in eight rounds, by its sum of squares.
+        assert (longer > 0.3 + 1e-9).mean() <= (0.005 if beside else 0.0)
+        assert longer.max() < 1.0

@@ -215,6 +215,7 @@ def test_legal_poses_are_found_and_all_branches_are_solutions(tmp_path: Path) ->
         np.testing.assert_allclose(robot.fk(branch)[:3, 3], robot.fk(q[0])[:3, 3], atol=1e-9)
 
 
+@pytest.mark.filterwarnings("ignore:.*directions at once:UserWarning")
 def test_a_path_is_followed_by_an_arm_with_followers_in_a_session(tmp_path: Path) -> None:
     path, options = str(tmp_path / "arm.urdf"), ["tip=tip", "task=x y z"]
     Path(path).write_text(re.sub("<dynamics[^>]*/>", "", ARM))  # friction alone would be 1 mm

@@ -32,6 +32,9 @@ ROUNDED = {
     "yam": "three parallel axes",
     "big_yam": "three parallel axes",
     "rm75": "spherical shoulder and wrist",
+    "m1013": "spherical wrist, closed form, 8 solutions, within 1e-3",
+    "m0609": "spherical wrist, closed form, 8 solutions, within 1e-3",
+    "piper": "spherical wrist, closed form, 8 solutions, within 1e-3",
 }
 
 

@@ -9,12 +9,15 @@ import numpy as np
 import pytest
 
 import teleop_core as tc
+from present import present
 from teleop_core.base.errors import ParameterError, ShapeError
+from teleop_core.graph.layers import list_scenarios
 from teleop_core.kernels import IS_COMPILED
 from teleop_core.robots import IkStatus
 from teleop_core.robots.dh import robot_from_table
-from teleop_core.robots.room import room, samples, start_posture
+from teleop_core.robots.room import lever, room, samples, start_posture
 
+ANY_ARM = str(Path(__file__).resolve().parents[2] / "examples/any_arm.urdf")
 TABLES = Path(__file__).resolve().parents[2] / "config/robots"
 walks_far = pytest.mark.skipif(not IS_COMPILED, reason="looks at 100 000 poses")
 FROZEN = ("rcrt1", "puma560", "mma", "scara_stewart")
@@ -140,3 +143,26 @@ def test_a_start_is_nobody_elses_to_change() -> None:
     for start in (robot.start, tc.load_robot("rcrt1").start, robot_from_table(ARM).start):
         with pytest.raises(ValueError, match="read-only"):
             start[0] = 1.0
+
+
+@pytest.mark.parametrize("scenario", list_scenarios())
+def test_an_arm_from_a_urdf_starts_with_room_in_every_scenario(scenario: str) -> None:
+    made = tc.configuration(scenario, robot=ANY_ARM, geometry=["tip=tool0"])
+    robot = tc.load_robot(ANY_ARM, tip="tool0")
+    start = made.group("slave").start_of(robot)
+    assert min(room(robot, start)[1], room(robot, start)[0] / lever(robot)) > math.radians(12.0)
+    assert not np.allclose(start, robot.home, rtol=0, atol=0.1)
+
+
+def test_a_posture_that_is_asked_for_is_the_start_of_an_arm_from_a_urdf_too() -> None:
+    made = tc.configuration(
+        "coarse_box", robot=ANY_ARM, geometry=["tip=tool0"], slave__start=[0.1] * 6
+    )
+    assert (made.group("slave").start_of(tc.load_robot(ANY_ARM, tip="tool0")) == 0.1).all()
+
+
+@pytest.mark.slow
+def test_an_arm_from_a_urdf_follows_the_coarse_box_without_settings() -> None:
+    score = tc.run("coarse_box", robot=ANY_ARM, geometry=["tip=tool0"]).score()
+    assert score.verdict.is_good, score.verdict
+    assert present(score.reach.followed_share) > 0.999

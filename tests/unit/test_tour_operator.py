@@ -9,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.interpolate import CubicHermiteSpline
 
+import teleop_core as tc
 from present import present
 from teleop_core.base.errors import ParameterError
 from teleop_core.base.parameters import build
@@ -110,3 +111,14 @@ def test_scenario_has_24_different_points_and_takes_the_published_time() -> None
     p = made.group("operator").kind.parameters
     assert len({tuple(stop) for stop in p.stops.tolist()}) == 24
     assert p.visit_time + p.trace_time == pytest.approx(45.0)
+
+
+def test_scenario_lasts_as_long_as_it_says_and_longer_where_its_tour_does() -> None:
+    def seconds(**settings: float) -> float:
+        named: dict[str, Any] = {f"operator.tour.{name}": v for name, v in settings.items()}
+        made = tc.configuration("points24", settings=named)
+        return float(made.groups["teleop"].duration)
+
+    assert seconds() == 50.0  # a second more than approach and tour
+    assert seconds(leg_time=0.5) == 50.0
+    assert seconds(leg_time=1.5) == pytest.approx(4.0 + 24 * (1.5 + 0.6) + 13.8)

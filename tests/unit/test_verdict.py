@@ -2,6 +2,8 @@
 
 import io
 import json
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -10,8 +12,17 @@ import pytest
 from rich.console import Console
 
 import teleop_core as tc
+from teleop_core.base.parameters import NoParameters
+from teleop_core.base.registry import Registry
+from teleop_core.chain.fixtures import FIXTURES, register_fixture
+from teleop_core.chain.fixtures.sphere import SPHERE
 from teleop_core.evaluation.command import evaluate_bags
 from teleop_core.evaluation.verdict import verdict_of
+from teleop_core.graph.stage import STAGES, Stage, register_stage
+from teleop_core.graph.topics import SLAVE_MEASURED_CP, Kind, Topic, passed_on
+from teleop_core.robots import ROBOTS, load_robot, register_robot
+from teleop_core.slave.controllers import CONTROLLERS, register_controller
+from teleop_core.slave.controllers.source_pid import SOURCE_PID
 
 FINE = {
     "reach.followed_share": 0.999, "asked_error_mm.max": 6.0, "command_error_mm.max": 5.5,
@@ -99,3 +110,61 @@ def test_scores_are_a_row_of_a_data_frame_each(drifting: tc.Recording) -> None:
     assert len(frame) == 2
     assert frame["reach.followed_share"].tolist() == [score.reach.followed_share] * 2
     assert frame["verdict.text"][0] == score.verdict.text
+
+
+# Parts of a user's own, without the file that registers them.
+
+
+def slab() -> dict[str, Any]:
+    register_fixture(replace(SPHERE, name="slab"))
+    return {"fixture": "slab"}
+
+
+def law() -> dict[str, Any]:
+    register_controller(replace(SOURCE_PID, name="law"))
+    return {"controller": "law"}
+
+
+def mirror() -> dict[str, Any]:
+    topic = Topic("test/mirror", Kind.POSE, passed_on("slave/measured_cp"))
+
+    def step(parameters: Any, state: Any, signals: Any, dt: Any) -> None:
+        signals["test_mirror"] = signals["slave_measured_cp"]
+
+    register_stage(Stage("mirror", NoParameters, (SLAVE_MEASURED_CP,), (topic,), step=step))
+    return {"stages": ["mirror"]}
+
+
+def arm() -> dict[str, Any]:
+    register_robot(load_robot("puma560"), "own_arm")
+    return {"robot": "own_arm"}
+
+
+@pytest.mark.parametrize(
+    ("register", "registry", "name", "told"),
+    [
+        (slab, FIXTURES, "slab", "fixture 'slab'"),
+        (law, CONTROLLERS, "law", "controller 'law'"),
+        (mirror, STAGES, "mirror", "stage 'mirror'"),
+        (arm, ROBOTS, "own_arm", "robot 'own_arm'"),
+    ],
+)
+@pytest.mark.usefixtures("own_parts")
+@pytest.mark.filterwarnings("ignore:stage 'mirror' writes")
+def test_no_verdict_is_green_while_a_part_of_the_recording_is_not_known(
+    register: Callable[[], dict[str, Any]], registry: Registry[Any], name: str, told: str
+) -> None:
+    recording = tc.run(scenario="coarse_box", duration=0.3, **register())
+    known = recording.score()
+    assert known.session.missing is None
+    registry.remove(name)
+    found = recording.score().verdict
+    assert not found.is_good
+    assert found.text.startswith(f"not known here: {told}; give the file that has it: ")
+    assert "--parts" in found.text
+
+
+def test_a_fixture_that_is_not_scored_comes_before_whatever_else_is_wrong() -> None:
+    found = verdict_of(FINE | {"position_error_mm.rms": 9.0, "fixture.unscored": "slab: why"})
+    assert found.worst == "fixture.unscored"
+    assert found.text.startswith("not scored: slab: why; give ")

@@ -122,7 +122,10 @@ def _below(name: str, values: Mapping[str, object]) -> dict[str, object]:
 
 @dataclass(frozen=True)
 class Spec:
-    """Declaration of one parameter: ``name`` is dotted for nested groups."""
+    """Declaration of one parameter: ``name`` is dotted for nested groups.
+
+    ``is_part`` says whether it names a part of a registry.
+    """
 
     name: str
     kind: type
@@ -137,6 +140,7 @@ class Spec:
     fixed: bool
     source: str = ""
     off: float | None = None
+    is_part: bool = False
 
     @property
     def lowest(self) -> float | None:
@@ -229,8 +233,9 @@ def _choice_specs(entry: Any, prefix: str) -> Iterator[Spec]:
     names, kind = meta["registry"].names(), prefix + entry.name
     text: dict[str, Any] = {"unit": "", "doc": meta["doc"], "lower": None, "upper": None}
     yield Spec(
-        kind, str, str, meta["default"], **text, choices=names, length=None, fixed=meta["fixed"]
-    )
+        kind, str, str, meta["default"], **text, choices=names, length=None, fixed=meta["fixed"],
+        is_part=True,
+    )  # fmt: skip
     for name in names:
         yield from specs(meta["registry"].find(name).parameters, f"{prefix}{name}.")
 

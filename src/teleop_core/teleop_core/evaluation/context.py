@@ -7,6 +7,7 @@ from typing import Protocol, TypeVar, cast
 from teleop_core.bags.kept_files import recorded_files, recorded_geometry
 from teleop_core.bags.reader import Bag
 from teleop_core.base.errors import EvaluationError, TeleopError
+from teleop_core.base.texts import shown
 from teleop_core.evaluation.origin import Origin
 from teleop_core.evaluation.state_history import StateHistory
 from teleop_core.evaluation.windows import Span, Window
@@ -55,6 +56,11 @@ class Context:
                 geometry = recorded_geometry(self.origin.geometry, files)
                 return load_robot_set(files.get(self.robot, self.robot), geometry)
         return None
+
+    def missing(self) -> tuple[str, ...]:
+        """Parts that the recording names and that are not known here, each as a text."""
+        is_lost = self.robot is not None and self.load_robot() is None
+        return (*self.origin.missing, *[f"robot {shown(self.robot)}"] * is_lost)
 
     def expected(self, topic: Topic) -> int:
         """Messages of a topic in the recording."""

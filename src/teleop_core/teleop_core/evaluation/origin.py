@@ -1,6 +1,6 @@
 """Origin: what a recording says of the session it was made in: its graph, and how axes map."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -8,7 +8,8 @@ from typing import Any
 from teleop_core.bags.reader import Bag
 from teleop_core.base import plain_yaml
 from teleop_core.base.errors import TeleopError
-from teleop_core.base.parameters import build
+from teleop_core.base.parameters import build, specs
+from teleop_core.base.texts import shown
 from teleop_core.chain.mapping.motion_scaling import MOTION_SCALING
 from teleop_core.chain.mapping.parameters import MotionScalingParameters, axis_map, tool_maps
 from teleop_core.chain.master.operator import OPERATOR
@@ -41,6 +42,7 @@ class Origin:
         lag: By how many setpoints a measured pose comes after that which it was sampled with: by
             one since it is the arm's server that tells it.
         world: What is stored of the object that the slave touches, by names without ``world.``.
+        missing: Parts that the recording names and that are not known here, each as a text.
         tool: Quaternions (4,) of the maps from the master's base to the slave's axes, and from the
             stylus to the tool; None where the tool does not turn as much as the stylus.
     """
@@ -55,6 +57,7 @@ class Origin:
     geometry: tuple[str, ...] = ()
     lag: int = 0
     world: Mapping[str, object] = field(default_factory=dict)
+    missing: tuple[str, ...] = ()
 
     @cached_property
     def chain(self) -> tuple[tuple[str, Topic], ...]:
@@ -87,7 +90,7 @@ def read_origin(bag: Bag, arm: str = "") -> Origin:
     return Origin(
         _graph(layer), _axes(layer, arm), _operator(layer, arm), _interpolation(layer, arm),
         _tool(layer, arm), *_slave(layer, arm), _geometry(layer, arm),
-        int(has_server), _world(layer, arm),
+        int(has_server), _world(layer, arm), tuple(dict.fromkeys(_missing(layer, arm))),
     )  # fmt: skip
 
 
@@ -112,6 +115,22 @@ def _layer(bag: Bag, content: Mapping[Any, Any]) -> Layer:
         return parse_layer(kept, f"{bag.path}: configuration")
     except TeleopError:
         return {}
+
+
+def _missing(layer: Layer, arm: str) -> Iterator[str]:
+    """Stages of the session, and parts that its stages chose by name, that are not known here."""
+    stages = layer.get(SESSION, {}).get("stages", ())
+    for name in stages if isinstance(stages, list | tuple) else ():
+        if name not in STAGES.names():
+            yield f"stage {shown(name)}"
+    for name in dict.fromkeys(map(_stage, layer)):
+        if name not in STAGES.names():
+            continue
+        said = _said(layer, name, arm)
+        for spec in specs(STAGES.find(name).parameters):
+            chosen = said.get(spec.name, spec.default)
+            if spec.is_part and chosen not in spec.choices:
+                yield f"{spec.name.removesuffix('.kind')} {shown(chosen)}"
 
 
 def _graph(layer: Layer) -> Graph:

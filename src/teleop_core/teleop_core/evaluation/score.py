@@ -32,6 +32,7 @@ SESSION_KEYS = (
     Key("session.plant", "1", "what the simulated slave was; null if no simulator is told of"),
     Key("session.controller", "1", "its control law; null if unknown"),
     Key("session.from_s|to_s", "s", "what was scored, since the first message"),
+    Key("session.missing", "1", "parts it names that are not known here; null if all are known"),
     Key("verdict.text", "1", "one line that names the worst first"),
     Key("verdict.worst", "1", "key of the worst; null if nothing is beyond what is fine"),
 )
@@ -59,7 +60,8 @@ class Session:
     """Which recording was scored; texts as in its metadata, None if it has none.
 
     ``arm`` is empty for the default arm of a recording that names no arms. ``from_s`` and ``to_s``
-    bound what was scored, since the first message; None stands for the last one.
+    bound what was scored, since the first message; None stands for the last one. ``missing`` lists
+    the parts that the recording names and that are not known here.
     """
 
     name: str
@@ -73,6 +75,7 @@ class Session:
     to_s: float | None = None
     plant: str | None = None
     controller: str | None = None
+    missing: str | None = None
 
     @property
     def facts(self) -> tuple[str, ...]:
@@ -197,14 +200,17 @@ class Score:
     @property
     def verdict(self) -> Verdict:
         """One line that names the worst first."""
-        found = {result.name: result.json for result in self.results if result.json is not None}
-        return verdict_of(_by_key(found))
+        return verdict_of(_by_key(self._found()))
 
     def to_json(self) -> dict[str, Plain]:
         """The score as plain dictionaries with the keys of :func:`keys`."""
+        session, *found = self._found().items()
+        return dict([session, (VERDICT, plain(self.verdict)), *found])
+
+    def _found(self) -> dict[str, Plain]:
+        """What is known without the verdict: the session, then each metric that has keys."""
         found = {result.name: result.json for result in self.results if result.json is not None}
-        about: dict[str, Plain] = {SESSION: plain(self.session), VERDICT: plain(self.verdict)}
-        return {**about, **found}
+        return {SESSION: plain(self.session), **found}
 
     def to_dict(self) -> dict[str, Leaf]:
         """Every value by its key, in one dictionary: a row of a data frame."""

@@ -244,5 +244,6 @@ def _session(context: Context) -> Session:
         plant=context.origin.plant,
         controller=context.origin.controller,
         from_s=0.0 if span is None else (span.first_ns - bag.start_ns) * 1e-9,
+        missing="; ".join(context.missing()) or None,
         to_s=((bag.end_ns if span is None else span.last_ns) - bag.start_ns) * 1e-9,
     )

@@ -75,6 +75,15 @@ def percent(share: float) -> str:
     return f"{math.floor(1000.0 * share + 1e-9) / 10.0:g}"
 
 
+def _missing(values: Values) -> Iterator[Concern]:
+    """Parts that are not known here: what depends on them is in no score, so it comes first."""
+    for key, what in (("session.missing", "not known here"), ("fixture.unscored", "not scored")):
+        if told := values.get(key):
+            text = f"{what}: {told}; give the file that has it: teleop evaluate --parts FILE.py"
+            yield Concern(math.inf, key, text)
+            return
+
+
 def _drift(values: Values) -> Iterator[Concern]:
     """Off where the hand led: more than the lag of filters, which is in the command error too."""
     key = "asked_error_mm.max"
@@ -131,7 +140,7 @@ def _ticks(values: Values) -> Iterator[Concern]:
 
 
 _CONCERNS: tuple[Callable[[Values], Iterator[Concern]], ...] = (
-    _drift, _following, _messages, _ticks,
+    _missing, _drift, _following, _messages, _ticks,
     _beyond("position_error_mm.rms", _ERROR_MM, "{:.3g} mm RMS from its reference"),
     _beyond("fixture.penetration_max_mm", BOX_OVERSHOOT_MM, "{:.3g} mm out of the fixture"),
     _beyond("contact.feeding", 0.5, "{:.0f} contacts whose wall gave back more than it took"),

@@ -4,8 +4,9 @@ A closed form sees the arm as G = Rz(q1) F1 Rz(q2) F2 ... Rz(qn), with constant 
 the joints and every joint about its own z axis; for arms that decompose from the tip it is the arm
 from tip to base. Its constants stand behind the chain's in the geometry row
 (:mod:`teleop_core.robots.dh_kernels`): 1 or -1 for the order, n signs, n groups, the constant
-transforms before and after G, those between the joints, of twelve numbers each, and last what a
-class of arms has beside (:mod:`teleop_core.robots.decomposition`).
+transforms before and after G, those between the joints, of twelve numbers each, what a class of
+arms has beside, and last 1 for an arm that is of its class only nearly
+(:mod:`teleop_core.robots.decomposition`).
 
 Branches are candidates: joint vectors in the arm's own order, with 1.0 behind those that reach the
 pose. The best one is brought into limits and steps; where it then misses the pose, damped least
@@ -29,7 +30,10 @@ from teleop_core.robots.dh_kernels import descend, descend_long, fk, is_hardly_m
 from teleop_core.robots.kinematics import IkStatus, pose_residual
 
 _ROUNDS, _PATH_ROUNDS = 60, 12  # of the search that makes the best of a branch out of limits
+_FEW_ROUNDS = 8  # of the search beside the seed
 _GROUPS = 3
+BESIDE_SEED = 0.3
+"""Largest move [rad] below which the posture beside the seed is the answer."""
 _INEXACT = 1e4  # added to the cost of a branch that does not reach: after all others
 _FOLLOWED, _LIMITED = int(IkStatus.FOLLOWED), int(IkStatus.LIMITED)
 _NEAR_SINGULAR, _UNREACHABLE = int(IkStatus.NEAR_SINGULAR), int(IkStatus.UNREACHABLE)
@@ -199,6 +203,30 @@ def box_around(seed: Array, limits: Array, box: Array) -> None:
         near = min(max(seed[i], limits[0, i]), limits[1, i])
         box[0, i] = max(limits[0, i], near - limits[2, i])
         box[1, i] = min(limits[1, i], near + limits[2, i])
+
+
+@kernel
+def is_beside(T: Array, seed: Array, limits: Array, geometry: Array, q: Array) -> bool:
+    """Whether an arm that is nearly of its class reaches the pose beside the seed; then by ``q``.
+
+    Beside a stretched elbow, or a limit, the branch of the seed may be none of the class.
+    """
+    n, box = q.shape[0], np.empty((2, q.shape[0]))
+    if geometry[geometry.shape[0] - 1] == 0.0 or math.isfinite(limits[2, 0]):
+        return False
+    box_around(seed, limits, box)
+    for i in range(n):
+        q[i] = min(max(seed[i], box[0, i]), box[1, i])
+    return descend(T, box, geometry, _FEW_ROUNDS, q) <= ZERO and move_of(q, seed) < BESIDE_SEED
+
+
+@inner
+def move_of(q: Array, seed: Array) -> float:
+    """Largest move of a joint from the seed [rad]."""
+    most = 0.0
+    for i in range(seed.shape[0]):
+        most = max(most, abs(q[i] - seed[i]))
+    return most
 
 
 @kernel

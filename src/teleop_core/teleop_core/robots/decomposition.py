@@ -6,13 +6,16 @@ Classes, in the order in which they are looked for, from the base and, turned ro
 - *three parallel axes*: six turning joints, axes 2, 3 and 4 are parallel;
 - *spherical shoulder and wrist*: seven turning joints, axes 1, 2, 3 meet, and 5, 6, 7 do.
 
-Axes meet or are parallel within :data:`TOLERANCE`; what a file's rounding leaves, a step on the
-chain as it is takes away. Arms that control fewer directions of the tip, that slide, or that are of
-another class are solved by search (:mod:`teleop_core.robots.dh_kernels`).
+Axes meet or are parallel within :data:`NEARLY`, as in files that say 1.571 for a quarter turn; what
+that leaves, Newton steps on the chain as it is take away. Arms that control fewer directions of the
+tip, that slide, or that are of another class, which say by how much their axes miss one, are solved
+by search (:mod:`teleop_core.robots.dh_kernels`).
 """
 
+import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -21,10 +24,12 @@ from teleop_core.kernels.portable import arctangent, dot, inverse_motion, length
 from teleop_core.robots import dh_kernels, parallel_axes, spherical_wrist, swivel
 from teleop_core.robots.kinematics import Kernels
 
-TOLERANCE = 1e-5
+NEARLY = 1e-3
 """Angle [rad] up to which axes are parallel, and share of the reach within which they meet."""
+_EXACT = 1e-5  # the same, up to which a Newton step is all that an arm needs beside the class
 _LEAST = 1e-3  # share of the reach, or sine, under which an arm of a class counts as degenerate
 _PARALLEL, _MEETING, _SKEW = 0.0, 1.0, 2.0
+_NEAR = ", within 1e-3 of the class and finished by Newton steps"
 _Z = np.array([0.0, 0.0, 1.0])
 _FLIP = np.diag([1.0, -1.0, -1.0, 1.0])
 
@@ -54,12 +59,59 @@ class _Chain:
     """Turning joints about z with constant transforms around them, from base to tip or back.
 
     ``signs`` say which way the arm's own joints turn; ``order`` is -1 for a chain from the tip.
+    ``off`` is the largest angle or share of the reach that was taken for none, ``misses`` says what
+    it lacks to be of a class.
     """
 
     order: float
     signs: list[float]
     fixed: list[Array]
     reach: float
+    off: float = 0.0
+    misses: dict[str, str] = field(default_factory=dict)
+
+    def is_parallel(self, joints: Sequence[int]) -> bool:
+        """Whether the axes of some joints are parallel."""
+        axes = [self.frames()[joint][:3, 2] for joint in joints]
+        off = max(float(length(np.cross(axes[0], axis))) for axis in axes[1:])
+        return self._counts(off, joints, f"are {_degrees(off):.3g}° from parallel")
+
+    def do_meet(self, joints: Sequence[int]) -> bool:
+        """Whether three neighbouring axes meet in a point; brings their frames' origins there."""
+        axes = [self.frames()[joint][:3, 2] for joint in joints]
+        if any(length(np.cross(a, b)) <= NEARLY for a, b in pairwise(axes)):
+            return False
+        first, middle, last = joints
+        self.slide_next_to(middle, first)
+        centre = self.frames()[middle][:3, 3]
+        for joint in (first, last):
+            frame = self.frames()[joint]
+            self.slide(joint, float(dot(frame[:3, 2], centre - frame[:3, 3])))
+        off = max(float(length(self.frames()[joint][:3, 3] - centre)) for joint in joints)
+        text = f"miss a point by {1e3 * off:.3g} mm"
+        return self._counts(off / self.reach, joints, text)
+
+    def null_rule(self, rows: Array) -> tuple[float, float, float] | None:
+        """Null vector (2,) of two rows (2, 2) that are one, and the larger row; None if two."""
+        sizes = length(rows)
+        large = int(sizes[1] > sizes[0])
+        a, b = rows[large], rows[1 - large]
+        off = float(abs(a[0] * b[1] - a[1] * b[0]) / sizes[large] ** 2)
+        if off > NEARLY:
+            return None
+        self.off = max(self.off, off)
+        share = -float(dot(a, b) / dot(a, a))
+        return (share, 1.0, large) if large == 0 else (1.0, share, large)
+
+    def _counts(self, off: float, joints: Sequence[int], text: str) -> bool:
+        """Whether so much counts as none; the text says what else is in the way of a class."""
+        if off <= NEARLY:
+            self.off = max(self.off, off)
+            return True
+        n = len(self.signs)
+        names = sorted(joint + 1 if self.order > 0.0 else n - joint for joint in joints)
+        self.misses[", ".join(map(str, names))] = text
+        return False
 
     def frames(self) -> list[Array]:
         """Frame of each joint at zero in the chain's base."""
@@ -91,7 +143,7 @@ class _Chain:
         w, v = frames[joint][:3, 2], frames[other][:3, 2]
         gap = frames[other][:3, 3] - frames[joint][:3, 3]
         share = float(dot(w, v))
-        if 1.0 - share * share > TOLERANCE**2:
+        if 1.0 - share * share > NEARLY**2:
             self.slide(joint, float(dot(gap, w) - share * dot(gap, v)) / (1.0 - share * share))
 
     def constants(self, groups: Sequence[float], beside: Sequence[float]) -> tuple[float, ...]:
@@ -100,18 +152,23 @@ class _Chain:
         matrices = [*inverse, *self.fixed[1:-1]]
         rows = np.concatenate([matrix[:3].ravel() for matrix in matrices]).tolist()
         in_order = groups if self.order > 0.0 else groups[::-1]
-        return (self.order, *self.signs, *in_order, *rows, *beside)
+        is_nearly = float(self.off > _EXACT)
+        return (self.order, *self.signs, *in_order, *rows, *beside, is_nearly)
 
 
-def _from_base(kinds: Sequence[float], fixed: Sequence[Array], reach: float) -> _Chain:
-    signs, matrices = list(kinds), [matrix.copy() for matrix in fixed]
-    return _Chain(order=1.0, signs=signs, fixed=matrices, reach=reach)
+def _degrees(sine: float) -> float:
+    """Angle in degrees."""
+    return math.degrees(math.asin(min(sine, 1.0)))
 
 
-def _from_tip(kinds: Sequence[float], fixed: Sequence[Array], reach: float) -> _Chain:
-    signs = [-kind for kind in kinds[::-1]]
+def _chains(kinds: Sequence[float], fixed: Sequence[Array], reach: float) -> tuple[_Chain, _Chain]:
+    """The chain from base to tip, and from tip to base."""
     back = [inverse_motion(matrix) for matrix in fixed[::-1]]
-    return _Chain(order=-1.0, signs=signs, fixed=back, reach=reach)
+    turned = [-kind for kind in kinds[::-1]]
+    return (
+        _Chain(order=1.0, signs=list(kinds), fixed=[m.copy() for m in fixed], reach=reach),
+        _Chain(order=-1.0, signs=turned, fixed=back, reach=reach),
+    )
 
 
 def solution_of(
@@ -126,52 +183,27 @@ def solution_of(
         task: Directions that the arm is to control.
 
     Returns:
-        The first class that fits, else :data:`SEARCH`.
+        The first class that fits, else :data:`SEARCH`, with what the axes lack for a class.
     """
     if len(task) < 6 or reach <= 0.0 or any(abs(kind) > 1.5 for kind in kinds):
         return SEARCH
+    misses: dict[str, str] = {}
     for recognise in _CLASSES.get(len(kinds), ()):
-        for chain in (_from_base(kinds, fixed, reach), _from_tip(kinds, fixed, reach)):
+        for chain in _chains(kinds, fixed, reach):
             found = recognise(chain)
             if found is not None:
-                return found
-    return SEARCH
-
-
-def _is_parallel(a: Array, b: Array) -> bool:
-    return float(length(np.cross(a, b))) <= TOLERANCE
-
-
-def _do_meet(chain: _Chain, joints: Sequence[int]) -> bool:
-    """Whether three neighbouring axes meet in a point; brings their frames' origins there."""
-    frames = chain.frames()
-    axes = [frames[joint][:3, 2] for joint in joints]
-    if _is_parallel(axes[0], axes[1]) or _is_parallel(axes[1], axes[2]):
-        return False
-    first, middle, last = joints
-    chain.slide_next_to(middle, first)
-    centre = chain.frames()[middle][:3, 3]
-    for joint in (first, last):
-        frame = chain.frames()[joint]
-        chain.slide(joint, float(dot(frame[:3, 2], centre - frame[:3, 3])))
-    points = [chain.frames()[joint][:3, 3] for joint in joints]
-    return all(float(length(p - centre)) <= TOLERANCE * chain.reach for p in points)
-
-
-def _null_rule(rows: Array) -> tuple[float, float, float] | None:
-    """Null vector (2,) of two rows (2, 2) that are one, and the larger row; None if two."""
-    sizes = length(rows)
-    large = int(sizes[1] > sizes[0])
-    a, b = rows[large], rows[1 - large]
-    if abs(a[0] * b[1] - a[1] * b[0]) > TOLERANCE * sizes[large] ** 2:
-        return None
-    share = -float(dot(a, b) / dot(a, a))
-    return (share, 1.0, large) if large == 0 else (1.0, share, large)
+                text = found.text + _NEAR * (chain.off > _EXACT)
+                return replace(found, text=text)
+            misses |= chain.misses
+    if not misses:
+        return SEARCH
+    why = "; ".join(f"axes {joints} {text}" for joints, text in misses.items())
+    return replace(SEARCH, text=f"{SEARCH.text}; {why}")
 
 
 def _spherical_wrist(chain: _Chain) -> Solution | None:
     """Six joints whose last three axes meet."""
-    if not _do_meet(chain, (3, 4, 5)):
+    if not chain.do_meet((3, 4, 5)):
         return None
     chain.slide_next_to(1, 0)
     F1, F2, t3 = chain.fixed[1], chain.fixed[2], chain.fixed[3][:3, 3]
@@ -182,10 +214,10 @@ def _spherical_wrist(chain: _Chain) -> Solution | None:
     three = np.array([F2[2, :2], over * k[:2]])
     if length(t3[:2]) * over < _LEAST or min(abs(one).max(), abs(three).max()) < _LEAST:
         return None
-    rule = _null_rule(three)
+    rule = chain.null_rule(three)
     kind, other = _PARALLEL, one
     if rule is None:
-        rule = _null_rule(one)
+        rule = chain.null_rule(one)
         kind, other = _MEETING, three
     if rule is None:
         rule, kind = (0.0, 0.0, 0.0), _SKEW
@@ -207,10 +239,9 @@ def _spherical_wrist(chain: _Chain) -> Solution | None:
 
 def _parallel_axes(chain: _Chain) -> Solution | None:
     """Six joints whose axes 2, 3 and 4 are parallel."""
-    frames = chain.frames()
-    axes = [frame[:3, 2] for frame in frames]
-    if not (_is_parallel(axes[1], axes[2]) and _is_parallel(axes[1], axes[3])):
+    if not chain.is_parallel((1, 2, 3)):
         return None
+    axes = [frame[:3, 2] for frame in chain.frames()]
     for joint in (2, 3):
         if dot(axes[1], axes[joint]) < 0.0:
             chain.flip(joint)
@@ -226,7 +257,7 @@ def _parallel_axes(chain: _Chain) -> Solution | None:
     arms = min(float(length(chain.fixed[joint][:2, 3])) * over for joint in (2, 3))
     if min(arms, float(length(r[:2])), float(length(m[:2])), abs(rows).max()) < _LEAST:
         return None
-    rule = _null_rule(rows)
+    rule = chain.null_rule(rows)
     kind = _PARALLEL if rule else _SKEW
     x, y = r[:2].tolist()
     B = [-v for q in rows for v in (x * q[0] + y * q[1], y * q[0] - x * q[1])]
@@ -243,11 +274,11 @@ def _parallel_axes(chain: _Chain) -> Solution | None:
 
 def _shoulder_and_wrist(chain: _Chain) -> Solution | None:
     """Seven joints of which the first three axes meet, and the last three."""
-    if not (_do_meet(chain, (0, 1, 2)) and _do_meet(chain, (4, 5, 6))):
+    if not (chain.do_meet((0, 1, 2)) and chain.do_meet((4, 5, 6))):
         return None
     F3, t4, over = chain.fixed[3], chain.fixed[4][:3, 3], 1.0 / chain.reach
     k = product(F3[:3, :3].T, F3[:3, 3])
-    if min(float(length(k[:2])), float(length(t4[:2]))) * over < TOLERANCE:
+    if min(float(length(k[:2])), float(length(t4[:2]))) * over < NEARLY:
         return None  # joint 4 does not change the distance from shoulder to wrist
     return Solution(
         text="spherical shoulder and wrist, closed form over the swivel, 8 branches",

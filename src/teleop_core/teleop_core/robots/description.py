@@ -9,7 +9,8 @@ import numpy as np
 
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots.kinematics import DIRECTIONS
-from teleop_core.robots.room import room
+from teleop_core.robots.rank import directions_of
+from teleop_core.robots.room import lever, room
 
 if TYPE_CHECKING:
     from teleop_core.robots.robot import Robot
@@ -26,6 +27,8 @@ def short(robot: "Robot") -> str:
 def text(robot: "Robot") -> str:
     """Page: controlled directions, joints, drives, geometry, room, pose of the tip at home."""
     lines = [f"{robot.name}: {robot.n} joints [rad, m], controls {controlled(robot)} of the tip"]
+    if (rank := directions_of(robot, lever(robot)).rank) < len(DIRECTIONS):
+        lines.append(f"the tip moves in {rank} of 6 directions at once; task=... chooses which")
     for row, start in zip(rows(robot), robot.start.tolist(), strict=True):
         lines.append("  {:14} {:9.4f} … {:8.4f}   home {:8.4f}   start {:8.4f}".format(*row, start))
     lines += [f"room at {name}: {room_text(robot, q)}" for name, q in postures(robot).items()]

@@ -17,6 +17,7 @@ Source:
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import combinations
 from pathlib import Path
 from xml.etree import ElementTree as Xml
@@ -39,6 +40,7 @@ from teleop_core.robots.followers import (
     follower_inertia,
 )
 from teleop_core.robots.kinematics import DIRECTIONS
+from teleop_core.robots.rank import directions_of
 from teleop_core.robots.robot import Robot
 from teleop_core.robots.urdf_notes import notes_on
 from teleop_core.robots.urdf_tree import (
@@ -85,7 +87,8 @@ def load_urdf(
         arguments: Texts for the ``<xacro:arg>`` of a xacro, by their names.
         tip: Link whose frame is the tip; empty for the only link without a child.
         task: Directions that the arm is to control, of :data:`DIRECTIONS`, with blanks or commas
-            between them; empty for all. An arm of fewer than six joints controls fewer.
+            between them; empty for all, or of an arm that cannot move in all of them at once for
+            those of :func:`~teleop_core.robots.rank.directions_of`.
         dynamics: Of :data:`MODELS`. independent: axes that do not act on each other, gravity
             balanced. links: the bodies of the file, which weigh and act on each other; the
             controller feeds their gravity forward.
@@ -133,23 +136,24 @@ def load_urdf(
     chain_numbers = chain_row(kinds, fixed, bodies, np.zeros(len(moving)))
     follower_inertia(home, dynamics_row(followers, chain_numbers, np.zeros(n)), inertia)
     table = _drives(trains, np.diag(inertia).tolist(), str(drives))
-    solution = solution_of(kinds, fixed, reach, _task(task)) if followers.is_plain else SEARCH
-    robot = chain_robot(
+    make = partial(
+        chain_robot,
         name=root.get("name") or Path(path).stem,
         joints=limits,
         kinds=kinds,
         fixed=fixed,
         reach=reach,
-        task=_task(task),
         drives=table,
-        solution=solution,
         followers=None if followers.is_plain else followers,
     )
+    controlled = _task(task) or directions_of(make(task=DIRECTIONS), reach / math.pi or 1.0).best
+    solution = solution_of(kinds, fixed, reach, controlled) if followers.is_plain else SEARCH
+    robot = make(task=controlled, solution=solution)
     coordinates = dict(zip((j.name for j in moving), followers.of(home).tolist(), strict=True))
     visuals = tuple(visuals_of(coordinates, links, by_child, Path(path)))
     # Without its start, for which a second's search would begin here: who needs it asks for it.
     notes = tuple(notes_on(chain, links))
-    robot = replace(robot, visuals=visuals, notes=notes, start=None)
+    robot = replace(robot, visuals=visuals, notes=notes, home_is_assumed=True, start=None)
     if dynamics == "independent":
         return robot
     motors = np.maximum(table.inertia - np.diag(inertia), 0.0)
@@ -235,7 +239,7 @@ def _task(task: str) -> tuple[str, ...]:
     for name in names:
         if name not in DIRECTIONS:
             raise UnknownNameError("task", name, DIRECTIONS)
-    return names or DIRECTIONS
+    return names
 
 
 def _narrowed(train: list[_Geared]) -> DhJoint:

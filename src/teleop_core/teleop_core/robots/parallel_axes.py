@@ -22,6 +22,7 @@ from teleop_core.robots.closed_form import (
     angle_of,
     choose,
     constants_at,
+    is_beside,
     kept,
     set_angle,
     settled,
@@ -146,6 +147,8 @@ def ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual
     if not is_askable(T, seed):
         return -1
     found = np.empty((12, 7))
+    if is_beside(T, seed, limits, geometry, q):
+        return int(settled(T, seed, limits, geometry, 2, found, 0, q, residual))
     count, least = _branches(T, geometry, seed, found)
     K = geometry[constants_at(6) :]
     reach, _ = choose(found, count, seed, limits, K, least < BESIDE, q)

@@ -69,6 +69,8 @@ class Robot:
         lower: Smallest joint positions (n,) [rad, m].
         upper: Largest joint positions (n,) [rad, m].
         home: Joint vector (n,) of the published or natural zero, inside the limits.
+        home_is_assumed: Whether nobody says that home is a posture to work from: the zero of a
+            URDF, at which many arms are stretched out. No session starts there.
         start: Joint vector (n,) at which a session starts, inside the limits; None for one with
             room in all directions (:func:`teleop_core.robots.room.start_posture`), looked for
             when it is first asked for.
@@ -101,6 +103,7 @@ class Robot:
     solution: str = ""
     visuals: tuple[Visual, ...] = ()
     notes: tuple[str, ...] = ()
+    home_is_assumed: bool = False
     start: _Start = _Start()
     # Writable copies for the kernels, which are compiled for such arrays alone.
     _row: Array = field(init=False)

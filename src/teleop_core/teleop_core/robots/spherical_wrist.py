@@ -25,6 +25,7 @@ from teleop_core.robots.closed_form import (
     branch_cost,
     choose,
     constants_at,
+    is_beside,
     kept,
     set_angle,
     settled,
@@ -195,8 +196,10 @@ def ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual
     if not is_askable(T, seed):
         return -1
     found = np.empty((13, 7))
-    count, least = _branches(T, geometry, seed, limits, False, found)
+    if is_beside(T, seed, limits, geometry, q):
+        return int(settled(T, seed, limits, geometry, 2, found, 0, q, residual))
     K = geometry[constants_at(6) :]
+    count, least = _branches(T, geometry, seed, limits, False, found)
     reach, _ = choose(found, count, seed, limits, K, least < BESIDE, q)
     return int(settled(T, seed, limits, geometry, reach, found, count, q, residual))
 

@@ -24,12 +24,14 @@ from teleop_core.kernels import inner, kernel
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots.branches import BESIDE, cost_of, is_allowed, turn
 from teleop_core.robots.closed_form import (
+    BESIDE_SEED,
     angle_of,
     box_around,
     branch_cost,
     choose,
     constants_at,
     kept,
+    move_of,
     set_angle,
     settled,
     wanted_motion,
@@ -51,7 +53,6 @@ from teleop_core.robots.swivel_families import (
 
 _SPEED = 0.3  # share of a joint's largest step by which psi goes back to its margin in a path
 _ROUNDS = 8  # of the search for the least move
-_BESIDE = 0.3  # [rad] from the seed up to which that is the answer
 _FLAT = 0.3  # volume of three unit axes under which manipulability counts
 _ASIDE = 1e-3  # psi [rad] to either side where it is compared
 _GAIN = 200.0  # of the relative difference, up to full speed
@@ -168,15 +169,6 @@ def _least_move(T: Array, seed: Array, limits: Array, geometry: Array, q: Array)
 
 
 @inner
-def _is_beside(q: Array, seed: Array) -> bool:
-    """Whether no joint has moved so far that another branch may be nearer."""
-    most = 0.0
-    for i in range(7):
-        most = max(most, abs(q[i] - seed[i]))
-    return most < _BESIDE
-
-
-@inner
 def _room(q: Array, limits: Array) -> float:
     """Least distance [rad] of a joint from its limits."""
     room = math.inf
@@ -246,18 +238,23 @@ def ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual
     if not is_askable(T, seed):
         return -1
     found, work, K = np.empty((13, 8)), np.empty((60, 4)), geometry[constants_at(7) :]
-    is_free, posture = not math.isfinite(limits[2, 0]), seed
+    is_free, posture, near, most = not math.isfinite(limits[2, 0]), seed, seed, math.inf
     if _least_move(T, seed, limits, geometry, q):
-        if _room(q, limits) > MARGIN and _is_beside(q, seed):
+        near, most = q.copy(), move_of(q, seed)
+        if _room(q, limits) > MARGIN and most < BESIDE_SEED:
             urge = 0.0 if is_free else _urge(q, seed, limits, K)
             if urge > 0.0:
                 _step_to_width(T, seed, limits, geometry, urge, found, q)
             return int(settled(T, seed, limits, geometry, 2, found, 0, q, residual))
-        posture = seed if is_free else q.copy()
+        posture = seed if is_free else near
     count, least = _branches(T, geometry, posture, limits, is_free, found, work)
     reach, best = choose(found, count, posture, limits, K, least < BESIDE, q)
     if not is_free and reach == 2:
         _step_to_margin(seed, limits, K, work, found, best, q)
+    if is_free and move_of(q, seed) > most + BESIDE_SEED:  # a margin is not worth the way
+        reach = 2
+        for i in range(7):
+            q[i] = near[i]
     return int(settled(T, seed, limits, geometry, reach, found, count, q, residual))
 
 

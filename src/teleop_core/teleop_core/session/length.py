@@ -5,6 +5,7 @@ from dataclasses import fields, replace
 
 import numpy as np
 
+from teleop_core.chain.master.operator import OPERATOR
 from teleop_core.chain.operators import OPERATORS, Setting
 from teleop_core.chain.operators.parameters import OperatorParameters
 from teleop_core.chain.operators.shapes import PHASES
@@ -15,6 +16,9 @@ from teleop_core.session.configuration import Configuration
 def as_long_as_followed(made: Configuration, given: Iterable[Layer]) -> Configuration:
     """The same session, as long as the recordings that its operators follow.
 
+    A scenario that names such an operator itself lasts at least as long as it says: it leaves the
+    slave time to come to where the hand ends.
+
     Args:
         made: The session.
         given: What was said of it beside defaults and scenario; a duration there holds.
@@ -22,15 +26,24 @@ def as_long_as_followed(made: Configuration, given: Iterable[Layer]) -> Configur
     Raises:
         TeleopError: A recording cannot be read.
     """
-    if any("duration" in layer.get(SESSION, {}) for layer in given):
+    said = list(given)
+    if any("duration" in layer.get(SESSION, {}) for layer in said):
         return made
     lengths = [length for name in made.groups if (length := _length(made, name)) is not None]
     if not lengths:
         return made
+    if made.scenario and not any(map(_chooses_operator, said)):
+        lengths.append(made.groups[SESSION].duration)
     bounds = next(f for f in fields(SessionParameters) if f.name == "duration").metadata
     duration = float(np.clip(max(lengths), bounds["lower"], bounds["upper"]))
     session = replace(made.groups[SESSION], duration=duration)
     return replace(made, groups=made.groups | {SESSION: session})
+
+
+def _chooses_operator(layer: Layer) -> bool:
+    """Whether a layer says who moves a hand."""
+    operators = (said for name, said in layer.items() if name.rpartition("/")[2] == OPERATOR.name)
+    return any("kind" in said for said in operators)
 
 
 def _length(made: Configuration, name: str) -> float | None:

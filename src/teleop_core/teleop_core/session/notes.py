@@ -11,8 +11,11 @@ from teleop_core.graph.graph import BUILT_IN
 from teleop_core.graph.signals import DT
 from teleop_core.graph.topics import MASTER_MEASURED_CP, MASTER_SERVO_CF
 from teleop_core.robots import load_robot_set
+from teleop_core.robots.kinematics import DIRECTIONS
 from teleop_core.robots.parts import is_urdf
+from teleop_core.robots.rank import directions_of
 from teleop_core.robots.robot import Robot
+from teleop_core.robots.room import lever
 from teleop_core.session.configuration import Configuration
 from teleop_core.slave.slave import SLAVE, SlaveParameters
 
@@ -42,8 +45,9 @@ def notes_of(configuration: Configuration, transport: float = 0.0) -> list[str]:
         slave = configuration.group(SLAVE.name, arm)
         if isinstance(slave, SlaveParameters) and is_urdf(slave.robot):
             robot = load_robot_set(slave.robot, slave.geometry)
-            own = [f"{slave.robot}: {note}" for note in robot.notes]
-            own += filter(None, [assumed_note(robot, slave.robot)])
+            has_task = any(entry.startswith("task=") for entry in slave.geometry)
+            told = (rank_note(robot, slave.robot, has_task), assumed_note(robot, slave.robot))
+            own = [*(f"{slave.robot}: {note}" for note in robot.notes), *filter(None, told)]
             found += [note for note in own if note not in found]
     return found
 
@@ -58,6 +62,29 @@ def _delay(configuration: Configuration, arm: str) -> float:
         if link.port.name in around
         and link.reader.arm == arm
         and link.reader.stage.name == ends[link.port.name]
+    )
+
+
+def rank_note(robot: Robot, file: str, has_task: bool) -> str:
+    """Which directions an arm does not hold that cannot move in all of them at once; else empty.
+
+    Args:
+        robot: As it was loaded from the file.
+        file: Its path, for the text.
+        has_task: Whether the directions that it controls were asked for; then only too many count.
+    """
+    rank, best = directions_of(robot, lever(robot))
+    pairs = list(zip(DIRECTIONS, robot.task_mask, strict=True))
+    held, free = ([name for name, is_held in pairs if is_held == kind] for kind in (True, False))
+    if rank == len(DIRECTIONS) or (has_task and len(held) <= rank):
+        return ""
+    does = f"it controls {' '.join(held)}, and not {' '.join(free)}"
+    if len(held) > rank:
+        does = f'it is asked for {" ".join(held)}; "task={" ".join(best)}" it can follow'
+    return (
+        f"{file}: its tip moves in {rank} of 6 directions at once, so it cannot reach every pose: "
+        f'{does}. geometry=[..., "task=x y z"] chooses what it controls, and teleop reach says '
+        "how far a hand can go with that"
     )
 
 

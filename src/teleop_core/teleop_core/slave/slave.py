@@ -92,8 +92,9 @@ class SlaveParameters(RobotParameters):
         doc="joints to which the slave moves from home before it follows; empty: the robot's start",
     )  # fmt: skip
     starts_at_home: bool = parameter(
-        False, fixed=True, doc="whether it starts where it is, at home, if no start is given"
-    )
+        False, fixed=True,
+        doc="whether it starts where it is, at home, if no start is given; a URDF states no home",
+    )  # fmt: skip
     start_speed: float = parameter(
         0.5, lower=0.01, upper=1.0, fixed=True, doc="share of the speed limits used on that move"
     )
@@ -108,7 +109,8 @@ class SlaveParameters(RobotParameters):
         """Joints (n,) from which a robot follows [rad or m]."""
         if self.start:
             return np.array(self.start, dtype=np.float64)
-        return robot.home.copy() if self.starts_at_home else robot.start.copy()
+        is_home = self.starts_at_home and not robot.home_is_assumed
+        return robot.home.copy() if is_home else robot.start.copy()
 
 
 class Slave(RunningStage):

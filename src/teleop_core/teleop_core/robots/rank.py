@@ -1,0 +1,68 @@
+"""Rank: in how many directions a tip can move at once, and which of them to control.
+
+An arm of five joints cannot hold every pose: asked for all six directions it follows none of them
+well. Of the sets of directions that it can move in at once, the one is taken that holds most of the
+position, and of these the one in which the worst direction needs the least motion of the joints, in
+the median of postures spread evenly over the limits.
+"""
+
+from itertools import combinations
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from teleop_core.kernels.geometry import Array
+from teleop_core.robots.kinematics import DIRECTIONS
+from teleop_core.robots.room import samples
+
+if TYPE_CHECKING:
+    from teleop_core.robots.robot import Robot
+
+_POSTURES, _FEW = 128, 4
+_NONE = 1e-6  # singular value, over the lever, of a direction in which the tip cannot move
+_POOR = 1e-3  # median of the least one below which a set of directions is of no use
+
+
+class Directions(NamedTuple):
+    """In how many directions a tip can move at once, and the names of those to control."""
+
+    rank: int
+    best: tuple[str, ...]
+
+
+def directions_of(robot: "Robot", lever: float) -> Directions:
+    """Directions that a robot can control, of all six: it may control fewer.
+
+    Args:
+        robot: The arm.
+        lever: Distance [m] that counts as much as a radian.
+
+    Source:
+        The least singular value as a measure of dexterity: Klein and Blaho 1987, IJRR 6(2).
+    """
+    postures = samples(robot)[:_POSTURES]
+    if _rank(_jacobians(robot, postures[:_FEW], lever)) == len(DIRECTIONS):
+        return Directions(len(DIRECTIONS), DIRECTIONS)
+    jacobians = _jacobians(robot, postures, lever)
+    rank = _rank(jacobians)
+    kept: dict[tuple[int, ...], float] = {}
+    for some in combinations(range(len(DIRECTIONS)), rank):
+        least = np.linalg.svd(jacobians[:, list(some)], compute_uv=False)[:, -1]
+        kept[some] = round(float(np.median(least)), 6)
+    useful = [some for some in kept if kept[some] > _POOR] or list(kept)
+    best = max(useful, key=lambda some: (sum(i < 3 for i in some), kept[some]))
+    return Directions(rank, tuple(DIRECTIONS[i] for i in best))
+
+
+def _rank(jacobians: Array) -> int:
+    """Largest rank of several Jacobians (k, 6, n)."""
+    return int((np.linalg.svd(jacobians, compute_uv=False) > _NONE).sum(axis=1).max())
+
+
+def _jacobians(robot: "Robot", postures: Array, lever: float) -> Array:
+    """Jacobians (k, 6, n) at postures (k, n), with linear rows over the lever."""
+    found, row = np.empty((len(postures), 6, robot.n)), robot.geometry_row
+    for q, jacobian in zip(postures, found, strict=True):
+        robot.kernels.jacobian(q.copy(), row, jacobian)
+    found[:, :3] /= lever
+    return found

@@ -1,0 +1,98 @@
+"""Whatever README, site and ``--help`` name runs to its end.
+
+Sessions of commands are short here, and whole in ``make soak``. What is not run is listed, with the
+reason, by ``python tests/named.py``. The tutorials run where the site is built.
+"""
+
+import re
+import subprocess
+import sys
+import warnings
+from pathlib import Path
+
+import pytest
+
+import teleop_core as tc
+from example_runs import NAMES
+from named import ROOT, Named, commands, places, provide
+from present import present
+from teleop_core.cli import main
+from teleop_core.graph.layers import list_scenarios
+from teleop_core.session.configuration import configure
+from teleop_core.session.runner import session_ticks
+from teleop_core.session.virtual import VirtualTime
+from teleop_lab import experiments
+
+BRIEF = ("--duration", "2")
+FORMS = ["brief", pytest.param("whole", marks=pytest.mark.soak)]
+AGREEING = {
+    "resolution": 17, "tendons": 3, "poses": 73, "workspace": 13, "filter": 10, "precision": 5,
+    "repeatability": 6, "responses": 5, "accuracy": 30, "master_slave": 7, "controllers": 2,
+    "gravity": 6, "robustness": 0, "shares": 0, "points24": 1, "stability": 12, "zwidth": 32,
+    "transparency": 112, "drift": 44, "puncture": 27, "mma_frames": 39, "mma_balance": 24,
+    "hybrid": 18, "parallel_robots": 17, "dh_robots": 33,
+}  # fmt: skip
+"""Published figures that each experiment agrees with."""
+TRACKED_MM = {"coarse_box": 0.289, "fine_box": 0.260, "human": 0.141}
+"""Root mean square of each scenario's position error, where it is above a tenth."""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", experiments.EXPERIMENTS.names())
+def test_every_experiment_runs_to_its_end_and_agrees_as_it_did(name: str) -> None:
+    assert experiments.run(name).agreeing == AGREEING[name]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("scenario", list_scenarios())
+@pytest.mark.filterwarnings("default")
+def test_every_scenario_runs_to_its_end_and_is_followed(scenario: str) -> None:
+    made = configure(scenario)
+    recording = tc.run(scenario)
+    assert len(recording["slave/measured_js"]) == session_ticks(made, VirtualTime(made))
+    score = recording.score()
+    assert present(score.reach.followed_share) > 0.99
+    expected = pytest.approx(
+        TRACKED_MM.get(scenario, 0.05), rel=0.1 if scenario in TRACKED_MM else 1
+    )
+    assert score.position_error_mm.rms == expected
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("place", places())
+@pytest.mark.filterwarnings("default")
+def test_commands_of_a_page_run_one_after_the_other(
+    place: str, form: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("config", "examples"):
+        (tmp_path / name).symlink_to(ROOT / name)
+    (tmp_path / "bags").mkdir()
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(warnings, "showwarning", warnings.showwarning)  # which a command replaces
+    for named in commands():
+        if named.place == place and not named.reason and (form == "whole" or not named.is_long):
+            provide(named, tmp_path)
+            assert run(named, form) == 0, named.line
+
+
+def run(named: Named, form: str) -> int:
+    """Exit code of a command, run here, or in a process of its own if it loads parts."""
+    words = [*named.words, *(BRIEF if form == "brief" and named.words[0] == "sim" else ())]
+    if "--parts" not in words:
+        return main(words)
+    return subprocess.run([sys.executable, "-m", "teleop_core.cli", *words], check=False).returncode
+
+
+def test_every_example_is_run_by_a_test() -> None:
+    texts = [path.read_text(encoding="utf-8") for path in ROOT.glob("tests/*/test_examples.py")]
+    run_by_name = set(re.findall(r"run\(\s*\"(\w+)\"", "\n".join(texts)))
+    named = set(re.findall(r"examples/(\w+)\.py", "\n".join(texts + [str(c) for c in commands()])))
+    apart = {"foreign_slave"}  # the drives of crtk_client, which its test starts
+    assert set(NAMES) <= run_by_name | named | apart
+
+
+def test_every_command_that_is_not_run_has_a_reason_and_most_are_run() -> None:
+    found = list(commands())
+    assert sum(not named.reason for named in found) > 0.55 * len(found)
+    assert set(AGREEING) == set(experiments.EXPERIMENTS.names())
