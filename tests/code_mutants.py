@@ -112,8 +112,12 @@ CODE_MUTANTS = (
             "chain/mapping/plausibility.py", "s.is_doubted = 0 if is_sound else 1",
             "s.is_doubted = 0", "plausible_hand"),
     _mutant("sticking", "the device's friction never holds it", _HAND,
-            "if square > rubbed * rubbed else 0.0", "if square > rubbed * rubbed else 1.0",
-            "haptic_master"),
+            "sticks = square <= p.friction * p.friction", "sticks = False", "haptic_master"),
+    _mutant("felt_early", "the device is farther within a tick than its held force brings it",
+            _HAND, "given[i, _PUSH] -= share * needed[i]\n",
+            "given[i, _PUSH] -= share * needed[i]\n"
+            "        s.position[i] += 0.25 * (time + 1e-3) * (1.0 - share) * given[i, _PUSH] * "
+            "p.flow[0, i, _SPEED, _PUSH]\n", "stability"),
     _mutant("stops_bend", "a hand that leans on the device's stop bends its wrist", _HAND,
             "s.hand[i], s.hand_speed[i] = s.position[i], 0.0", "pass", "haptic_master"),
     _mutant("wobble", "the gimbal's noise exceeds its bound", "chain/master/device.py",
