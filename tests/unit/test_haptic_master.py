@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy.linalg import expm
 from scipy.signal import periodogram
 from scipy.spatial.transform import Rotation
 
@@ -16,7 +17,7 @@ from teleop_core.base.errors import ParameterError
 from teleop_core.base.parameters import build
 from teleop_core.chain.master.device import DeviceParameters
 from teleop_core.chain.master.hand_mechanics import HandParameters
-from teleop_core.chain.master.haptic_master import HapticMasterParameters
+from teleop_core.chain.master.haptic_master import HapticMaster, HapticMasterParameters
 from teleop_core.chain.operators import OPERATORS, Setting, register_operator
 from teleop_core.chain.operators.parameters import ButtonParameters, OperatorParameters
 from teleop_core.chain.operators.rest import REST_POSITION, REST_TILT
@@ -204,6 +205,46 @@ def test_without_friction_the_hand_gives_way_by_force_over_stiffness_and_returns
     assert np.allclose(moved, (2.0 / 300.0 + 2.0 / 1260.0, 0.0, 0.0), rtol=0, atol=1e-9)
     moved = places(run(master, 3000))[-1] - REST_POSITION
     assert np.abs(moved).max() < 1e-9
+
+
+@pytest.mark.parametrize("stiffness", [(1260.0, 2310.0, 1020.0), (1e7, 1e6, 1e5)])
+def test_two_masses_move_exactly_under_a_force_that_is_held_for_a_tick(
+    stiffness: tuple[float, float, float],
+) -> None:
+    """Against the exponential of their own equations, tick by tick, axis by axis."""
+    hand = HandParameters()
+    frictionless: dict[str, Any] = {**QUIET, **COLD, "friction": 0.0, "stiffness": stiffness}
+    device = DeviceParameters(**frictionless)
+    master = HapticMaster(HapticMasterParameters(device=device, hand=hand))
+    forces = np.random.default_rng(6).normal(0.0, 0.5, (300, 3))
+    expected = np.zeros((3, 4))  # places of device and hand, their speeds
+    steps = []
+    for k in stiffness:
+        bend, damping = k * np.array([1, -1]), device.structure_damping * np.array([1, -1])
+        rates = np.zeros((5, 5))
+        rates[0, 2] = rates[1, 3] = 1.0
+        rates[2, :4] = -np.r_[bend, damping] / device.apparent_mass
+        rates[2, 4] = 1.0 / device.apparent_mass
+        rates[3, :4] = np.r_[bend, damping] / hand.mass
+        rates[3, 1] -= hand.stiffness / hand.mass
+        rates[3, 3] -= hand.damping / hand.mass
+        steps.append(expm(rates * 1e-3))
+    master.prepare(len(forces))
+    tick = master.load()
+    for i, force in enumerate(forces):
+        master.signals["hand_servo_cp_ns"] = i + 1
+        master.signals["master_servo_cf"][:3] = force
+        tick()
+        expected = np.array(
+            [
+                (step @ [*state, push])[:4]
+                for step, state, push in zip(steps, expected, force, strict=True)
+            ]
+        )
+        for name, column in (("position", 0), ("hand", 1)):
+            moved = master.state[name] - REST_POSITION
+            assert np.abs(moved - expected[:, column]).max() < 1e-11, (i, name)
+    assert np.abs(expected[:, 0]).max() > 1e-4
 
 
 def test_wanted_path_is_followed() -> None:

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.linalg import expm
 
 import teleop_core
 from teleop_core.kernels.portable import (
@@ -15,6 +16,7 @@ from teleop_core.kernels.portable import (
     exponential,
     inverse_motion,
     length,
+    matrix_exponential,
     product,
 )
 
@@ -139,3 +141,13 @@ def test_an_inverse_motion_leads_back() -> None:
 
     there = transform(rotation("x", 0.7), np.array([0.1, -0.2, 0.3]))
     np.testing.assert_allclose(product(inverse_motion(there), there), np.eye(4), atol=1e-15)
+
+
+@pytest.mark.parametrize("size", [0.0, 1e-3, 1.0, 30.0])
+def test_the_exponential_of_a_matrix_is_scipys(size: float) -> None:
+    rng = np.random.default_rng(4)
+    for n in (1, 3, 8):
+        matrix = size * rng.normal(size=(n, n))
+        expected = expm(matrix)
+        error = np.abs(matrix_exponential(matrix) - expected).max()
+        assert error < 1e-12 * np.abs(expected).max()

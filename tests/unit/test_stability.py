@@ -2,10 +2,14 @@
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
+from teleop_core.graph.signals import DT
 from teleop_lab.experiments.bench import Bench
 from teleop_lab.experiments.one_axis import Grip, exact_boundary, found_boundary, growth
+from teleop_lab.experiments.sampled_wall import Wall, wall_growth
 from teleop_lab.experiments.stability import DELAYS, GRIPS, STIFFEST, chain_boundary, fastest
+from teleop_lab.experiments.zwidth import BARE
 
 MEDIUM = GRIPS["medium"]
 PUBLISHED = {0.0: 24_200.0, 0.02: 708.0, 0.05: 394.0, 0.1: 318.0, 0.2: 301.0}
@@ -49,11 +53,24 @@ def test_the_exact_boundary_is_where_the_roots_of_the_sampled_hand_leave_the_cir
     assert largest_root(grip, delay, 0.98 * exact) < 0.0 < largest_root(grip, delay, 1.02 * exact)
 
 
+@pytest.mark.parametrize("grip", [MEDIUM, BARE], ids=["in a hand", "bare"])
+@pytest.mark.parametrize("late", [0, 1, 10, 20, 50, 100, 200])
+def test_our_device_stands_a_wall_that_is_late_as_stiff_as_its_exact_axis_within_two_percent(
+    grip: Grip, late: int
+) -> None:
+    near = exact_boundary(grip, 1e-3 * late)
+    exact = brentq(lambda k: largest_root(grip, 1e-3 * late, k), 0.9 * near, 1.1 * near, rtol=1e-3)
+    below, above = (wall_growth(grip, Wall(share * exact, 0.0, late)) for share in (0.98, 1.02))
+    assert below < 0.0 < above
+
+
 @pytest.mark.parametrize("grip", GRIPS.values(), ids=GRIPS)
-@pytest.mark.parametrize("delay", DELAYS[1:])
-def test_our_hand_and_mapping_swing_up_where_the_exact_axis_does(grip: Grip, delay: float) -> None:
-    exact = exact_boundary(grip, delay)
-    assert growth(grip, delay, 0.9 * exact) < 0.0 < growth(grip, delay, 1.1 * exact)
+@pytest.mark.parametrize("delay", DELAYS)
+def test_our_hand_and_mapping_swing_up_where_an_axis_that_is_a_tick_later_does(
+    grip: Grip, delay: float
+) -> None:
+    exact = exact_boundary(grip, delay + DT)
+    assert growth(grip, delay, 0.98 * exact) < 0.0 < growth(grip, delay, 1.02 * exact)
 
 
 def test_the_boundary_that_is_found_lies_where_nothing_grows() -> None:

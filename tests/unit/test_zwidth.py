@@ -14,7 +14,6 @@ from teleop_lab.experiments.sampled_wall import (
     is_restless,
     passive_boundary,
     press_energy,
-    wall_boundary,
     wall_growth,
 )
 from teleop_lab.experiments.stability import GRIPS
@@ -24,14 +23,12 @@ from teleop_lab.experiments.zwidth import (
     DEVICES,
     LATE,
     WALL_DAMPINGS,
-    linear_law,
     passive_law,
     press_law,
     quiet_law,
 )
 
 PUSHES = [1.0 + share / 8.0 for share in range(1, 8)]
-FINE_TICKS, SESSION_TICKS = "device in ticks of 0.1 ms", "device in a session's ticks"
 
 
 @pytest.fixture(scope="module")
@@ -47,7 +44,7 @@ def rows(outcome: Outcome, *parts: str) -> list[Row]:
 
 
 def test_our_device_stands_a_late_wall_as_the_linear_law_says(outcome: Outcome) -> None:
-    found = rows(outcome, "linear law", "B = 0", FINE_TICKS)
+    found = rows(outcome, "linear law", "B = 0")
     assert len(found) == len(LATE)
     assert all(row.agrees for row in found)
 
@@ -56,22 +53,15 @@ def test_our_device_stands_a_late_wall_as_the_linear_law_says(outcome: Outcome) 
 def test_our_device_stands_the_wall_of_the_exact_axis_with_a_damper_too(
     outcome: Outcome, damping: float
 ) -> None:
-    found = rows(outcome, "exact sampled axis", f"B = {damping:g}", "0.1 ms")
+    found = rows(outcome, "exact sampled axis", f"B = {damping:g}")
     assert len(found) == len(LATE)
-    assert all(abs(present(row.difference)) < 0.06 * present(row.published) for row in found)
+    assert all(abs(present(row.difference)) < 0.02 * present(row.published) for row in found)
 
 
-def test_what_misses_is_the_device_in_whole_ticks_and_the_law_with_a_damper(
-    outcome: Outcome,
-) -> None:
+def test_what_misses_is_the_linear_law_with_a_damper(outcome: Outcome) -> None:
     missed = {(row.group, row.quantity) for row in outcome.rows if row.agrees is False}
-    whole = f"stable, linear law of Gil 2009, B = 0 N·s/m, {SESSION_TICKS}"
-    damped = f"stable, linear law of Gil 2009, B = 5 N·s/m, {FINE_TICKS}"
-    assert missed == {
-        *((whole, f"force {late} ms later") for late in (0, 1, 2, 3)),
-        *((damped, f"force {late} ms later") for late in (2, 3, 5, 10)),
-        ("diverges, b = B = 5 N·s/m, 0.25 kg, exact sampled axis", SESSION_TICKS),
-    }
+    damped = "stable, linear law of Gil 2009, B = 5 N·s/m"
+    assert missed == {(damped, f"force {late} ms later") for late in (1, 2, 3, 5, 10)}
 
 
 def test_more_delay_never_allows_a_stiffer_wall(outcome: Outcome) -> None:
@@ -82,16 +72,10 @@ def test_more_delay_never_allows_a_stiffer_wall(outcome: Outcome) -> None:
             assert present(late.predicted) < present(soon.predicted)
 
 
-@pytest.mark.parametrize("late", [0, 1, 2])
-def test_in_ticks_of_a_session_a_wall_is_felt_a_quarter_of_a_tick_early(late: int) -> None:
-    found = wall_boundary(BARE, 0.0, late, 1)
-    assert found == pytest.approx(linear_law(2.0, 0.0, 1e-3 * late - 0.25e-3), rel=0.03)
-
-
 @pytest.mark.parametrize("damping", WALL_DAMPINGS)
 def test_a_wall_swings_up_above_the_exact_boundary_and_down_below_it(damping: float) -> None:
     exact = sampled_boundary(BARE, 1, damping)
-    below, above = (wall_growth(BARE, Wall(share * exact, damping, 1)) for share in (0.9, 1.1))
+    below, above = (wall_growth(BARE, Wall(share * exact, damping, 1)) for share in (0.98, 1.02))
     assert below < 0.0 < above
 
 
@@ -134,8 +118,8 @@ def test_a_wall_gives_energy_long_before_it_diverges() -> None:
     loose = GRIPS["loose"]
     assert passive_law(loose.damping, loose.damping) == 0.0
     assert press_energy(loose.damping, Wall(100.0, loose.damping), 1, 0.05) > 0.0
-    assert wall_growth(loose, Wall(0.95 * 19_672.0, loose.damping)) < 0.0
-    assert wall_growth(loose, Wall(1.10 * 19_672.0, loose.damping)) > 0.0
+    assert wall_growth(loose, Wall(0.98 * 19_672.0, loose.damping)) < 0.0
+    assert wall_growth(loose, Wall(1.02 * 19_672.0, loose.damping)) > 0.0
 
 
 # Steps of the reading and dry friction.
@@ -154,7 +138,7 @@ def test_friction_holds_a_device_between_steps_up_to_its_law(
 def test_a_restless_wall_pushes_by_one_step_of_its_force() -> None:
     friction, resolution = DEVICES[0]
     wall = Wall(1.1 * quiet_law(friction, resolution))
-    loop = Loop(Grip(0.045, 1.0, 0.1), wall, 1, friction=friction, position_resolution=resolution)
+    loop = Loop(Grip(0.045, 1.0, 0.1), wall, friction=friction, position_resolution=resolution)
     loop.aim(loop.origin + 1.5 * wall.stiffness * resolution)
     forces = [loop.step() for _ in range(600)][-100:]
     assert max(forces) - min(forces) == pytest.approx(wall.stiffness * resolution, rel=1e-9)

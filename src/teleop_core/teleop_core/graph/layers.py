@@ -69,6 +69,8 @@ RENAMED = {
     "haptic_master.hand.tremor_frequency": "operator.tremor_frequency",
     "motion_scaling.fixture.size": "motion_scaling.fixture.box.size",
     "slave_sim.pid.": "slave_sim.controller.pid.",
+    "network.there.outages.period": "network.there.outages.pause",
+    "network.back.outages.period": "network.back.outages.pause",
     **{
         f"slave_sim.{name}": f"slave.{name}"
         for name in (

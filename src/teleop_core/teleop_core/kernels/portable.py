@@ -64,6 +64,23 @@ def arctangent(y: ArrayLike, x: ArrayLike) -> Array:
     return out
 
 
+def matrix_exponential(matrix: Array) -> Array:
+    """Exponential of a square matrix (n, n), by Taylor's series of its half, quarter, ... squared.
+
+    Source:
+        Moler and Van Loan 2003, method 3, scaling and squaring.
+    """
+    halvings = max(math.frexp(float(np.abs(matrix).sum(axis=1).max()))[1] + 1, 0)
+    scaled, term = matrix / 2.0**halvings, np.eye(len(matrix))
+    out = term.copy()
+    for k in range(1, 19):  # 0.5^19 / 19! is far below the rounding of 1
+        term = product(term, scaled) / k
+        out = out + term
+    for _ in range(halvings):
+        out = product(out, out)
+    return out
+
+
 @kernel
 def _arctangents(y: Array, x: Array, out: Array) -> None:
     for i in range(len(out)):

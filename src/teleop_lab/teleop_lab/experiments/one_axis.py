@@ -19,6 +19,7 @@ from teleop_core.kernels.geometry import Array
 _AXIS = 1  # of the master's base, along which the hand is pushed
 _KICK = 1e-5  # speed that the hand is given [m/s]: far from every limit
 _SETTLE, _LOOK = 1.0, 3.0  # before the growth is looked at, and for how long [s]
+_SETTLED, _LOOKS = 10, 20  # the same besides, in delays of the force
 _BLOCK = 500  # ticks
 _GRID = 4000
 _LEAST_HAND = 0.01  # least mass of a hand that the parameters allow [kg]
@@ -163,12 +164,13 @@ def growth(grip: Grip, delay: float, stiffness: float) -> float:
 
     Args:
         grip: The hand.
-        delay: Of the force, in whole ticks [s].
+        delay: Of the force, in whole ticks beside the one of the graph [s].
         stiffness: Of the spring [N/m], at the place where the slave's tip is commanded.
     """
     chain = Mapped(grip)
     late = deque([np.zeros(3)] * (round(delay / DT) + 1))
-    place = np.empty(round((_SETTLE + _LOOK) / DT))
+    settle = round((_SETTLE + _SETTLED * delay) / DT)
+    place = np.empty(settle + round((_LOOK + _LOOKS * delay) / DT))
     origin = np.zeros(3)
     for i in range(len(place)):
         if i == _BLOCK:
@@ -178,7 +180,7 @@ def growth(grip: Grip, delay: float, stiffness: float) -> float:
         if i < _BLOCK:
             origin = command
         late.append(-stiffness * (command - origin))
-    return growth_rate(np.diff(place)[round(_SETTLE / DT) :])
+    return growth_rate(np.diff(place)[settle:])
 
 
 def growth_rate(speed: Array, period: float = DT) -> float:
@@ -194,7 +196,7 @@ def growth_rate(speed: Array, period: float = DT) -> float:
 
 def found_boundary(grip: Grip, delay: float) -> float:
     """Stiffness [N/m] at which our hand, device and mapping neither swing up nor down."""
-    start = 0.3 * exact_boundary(grip, delay)
+    start = 0.3 * exact_boundary(grip, delay + DT)
     return boundary_from_below(lambda stiffness: growth(grip, delay, stiffness), start)
 
 
@@ -213,7 +215,7 @@ def boundary_from_below(rate_at: Callable[[float], float], start: float) -> floa
         rate = rate_at(high)
     if math.isinf(before):
         before = rate_at(low)
-    for _ in range(3):
+    for _ in range(4):
         middle = low + (high - low) * min(max(before / (before - rate), 0.1), 0.9)
         found = rate_at(middle)
         if found < 0.0:
@@ -229,8 +231,8 @@ _MAPPING = {
 }  # fmt: skip
 _IDEAL_DEVICE = {
     "device.friction": 0.0, "device.position_resolution": 0.0, "device.gimbal_noise": 0.0,
-    "device.stiffness": (1e7,) * 3, "device.peak_force": 50.0, "device.continuous_force": 50.0,
-    "force_range": 1000.0,
+    "device.stiffness": (1e7,) * 3, "device.structure_damping": 1e3, "device.peak_force": 50.0,
+    "device.continuous_force": 50.0, "force_range": 1000.0,
 }  # fmt: skip
 
 

@@ -19,11 +19,10 @@ from teleop_lab.experiments.one_axis import (
 )
 
 AXIS = 1  # of the master's base, along which the hand is pushed
-FINE = 10
-"""Ticks of the device in a period of the wall: nearly the continuous device of the laws."""
 _BLOCK = 500  # ticks for which noise is drawn at once
 _KICK = 1e-4  # speed that the hand is given [m/s]
 _SECONDS, _SETTLE = 0.6, 0.1  # how long a hand swings, and before the growth is looked at [s]
+_DELAYS, _SETTLED = 40, 10  # the same besides, in delays of the force
 _DEAD = 1e-12  # mean square root of speeds [m/s] below which rounding speaks
 _SHARES = (0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875)
 """Parts of a step of the wall's force by which a push exceeds one step."""
@@ -54,13 +53,12 @@ class Loop:
     Args:
         grip: The hand.
         wall: The wall, through the place where the device begins.
-        ticks: Ticks of the device in a period; 1: as in a session.
         own: Parameters of the device.
     """
 
-    def __init__(self, grip: Grip, wall: Wall, ticks: int = FINE, **own: float) -> None:
-        self.master = HapticMaster(ideal_device(grip, **own), DT / ticks)
-        self._wall, self._ticks, self._tick = wall, ticks, self.master.load()
+    def __init__(self, grip: Grip, wall: Wall, **own: float) -> None:
+        self.master = HapticMaster(ideal_device(grip, **own))
+        self._wall, self._tick = wall, self.master.load()
         self._most = float(self.master.parameters["peak_force"])
         self._depth, self._push, self._left = np.zeros(3), np.zeros(3), 0
         self._late = deque([0.0] * wall.late)
@@ -106,42 +104,40 @@ class Loop:
         self._late.append(float(self._push[AXIS]) - damper)
         force = self._late.popleft()
         felt["master_servo_cf"][AXIS] = force
-        for _ in range(self._ticks):
-            if self._left == 0:
-                self.master.prepare(_BLOCK)
-                self._left = _BLOCK
-            self._left -= 1
-            felt["hand_servo_cp_ns"] += 1
-            self._tick()
+        if self._left == 0:
+            self.master.prepare(_BLOCK)
+            self._left = _BLOCK
+        self._left -= 1
+        felt["hand_servo_cp_ns"] += 1
+        self._tick()
         return force
 
 
-def wall_growth(grip: Grip, wall: Wall, ticks: int = FINE) -> float:
+def wall_growth(grip: Grip, wall: Wall) -> float:
     """Rate [1/s] at which our hand and device swing up before a wall; negative: down."""
-    loop = Loop(grip, wall, ticks)
+    loop = Loop(grip, wall)
     loop.move(_KICK)
-    place = np.empty(round(_SECONDS / DT))
+    place = np.empty(round(_SECONDS / DT) + _DELAYS * wall.late)
     for i in range(len(place)):
         loop.step()
         place[i] = loop.place
-    speed: Array = np.diff(place)[round(_SETTLE / DT) :] / DT
+    speed: Array = np.diff(place)[round(_SETTLE / DT) + _SETTLED * wall.late :] / DT
     rest = speed[len(speed) // 2 :]
     # What is dead does not grow; its rounding may.
     return -1.0 / DT if np.sqrt(np.mean(rest * rest)) < _DEAD else growth_rate(speed)
 
 
-def wall_boundary(grip: Grip, damping: float, late: int, ticks: int = FINE) -> float:
+def wall_boundary(grip: Grip, damping: float, late: int) -> float:
     """Stiffness [N/m] of a wall at which our hand and device neither swing up nor down.
 
     Args:
         grip: The hand.
         damping: Of the wall [N·s/m].
         late: Periods by which its force comes late.
-        ticks: Ticks of the device in a period.
     """
     start = 0.3 * sampled_boundary(grip, late, damping)
     return boundary_from_below(
-        lambda stiffness: wall_growth(grip, Wall(stiffness, damping, late), ticks), start
+        lambda stiffness: wall_growth(grip, Wall(stiffness, damping, late)), start
     )
 
 
@@ -158,7 +154,7 @@ def press_energy(damping: float, wall: Wall, length: int, speed: float) -> float
         length: Periods in, and as many out.
         speed: Of the hand [m/s].
     """
-    loop = Loop(Grip(5.0, 1.0, 0.1), wall, 1)
+    loop = Loop(Grip(5.0, 1.0, 0.1), wall)
     loop.origin -= 0.25 * speed * DT  # no sample is on the plane: force 0 would end the contact
     before, lost = 0.0, 0.0
     for i in range(4 * length):
@@ -194,7 +190,7 @@ def is_restless(wall: Wall, friction: float, resolution: float, push: float) -> 
         push: Of the hand [steps of the wall's force].
     """
     grip = Grip(0.045, 1.0, 0.1)
-    loop = Loop(grip, wall, 1, friction=friction, position_resolution=resolution)
+    loop = Loop(grip, wall, friction=friction, position_resolution=resolution)
     force = push * wall.stiffness * resolution
     loop.aim(loop.origin + force / grip.stiffness)
     forces = [loop.step() for _ in range(600)]

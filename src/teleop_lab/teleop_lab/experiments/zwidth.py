@@ -15,7 +15,6 @@ from teleop_lab.experiments.experiment import Experiment
 from teleop_lab.experiments.one_axis import Grip, sampled_boundary
 from teleop_lab.experiments.outcome import Findings, Row, absolute, percent
 from teleop_lab.experiments.sampled_wall import (
-    FINE,
     passive_boundary,
     restless_boundary,
     wall_boundary,
@@ -42,16 +41,12 @@ DEVICES = (
     (_OWN.friction, 0.5 * _OWN.position_resolution),
 )
 """Dry frictions [N] and steps of the reading [m]: those of our device, and halves of them."""
-_WITHIN = percent(10.0)
+_WITHIN, _EXACT = percent(10.0), percent(2.0)
 _NONE = absolute(10.0)  # N/m; where a law allows no stiffness there is no share of it
-_TICKS = ((FINE, f"device in ticks of {1e3 * DT / FINE:g} ms"), (1, "device in a session's ticks"))
-_CASES = (
-    *((b, late, FINE) for b in WALL_DAMPINGS for late in LATE),
-    *((0.0, late, 1) for late in LATE),
-)
+_CASES = tuple((b, late) for b in WALL_DAMPINGS for late in LATE)
 _COLORS = (FIRST, SECOND)
-Boundaries = Mapping[tuple[float, int, int], float]
-"""Stiffness [N/m] by damping of the wall, periods of delay, and ticks in a period."""
+Boundaries = Mapping[tuple[float, int], float]
+"""Stiffness [N/m] by damping of the wall and periods of delay."""
 Bounds = Mapping[tuple[float, float, int], float]
 """Stiffness [N/m] by damping of device and wall, and length of the press."""
 
@@ -104,21 +99,20 @@ def quiet_law(friction: float, resolution: float) -> float:
 
 
 def _stability(found: Boundaries) -> list[Row]:
-    """Rows of the linear law for every damping and ticks, then of the exact axis."""
+    """Rows of the linear law for every damping, then of the exact axis."""
     laws, exact = [], []
-    for (wall_damping, late, ticks), predicted in found.items():
+    for (wall_damping, late), predicted in found.items():
         axis_ = sampled_boundary(BARE, late, wall_damping)
         law = linear_law(BARE.damping, wall_damping, 1e-3 * late)
-        where = f"B = {wall_damping:g} N·s/m, {dict(_TICKS)[ticks]}"
+        where = f"B = {wall_damping:g} N·s/m"
         row = Row(
             quantity=f"force {late} ms later", unit="N/m", published=round(law, 1),
             predicted=predicted, within=_WITHIN, group=f"stable, linear law of Gil 2009, {where}",
             note=f"exact {axis_:.0f}",
         )  # fmt: skip
         laws.append(row)
-        if ticks == FINE:
-            group = f"stable, exact sampled axis, {where}"
-            exact.append(replace(row, published=round(axis_, 1), group=group, note=""))
+        group = f"stable, exact sampled axis, {where}"
+        exact.append(replace(row, published=round(axis_, 1), within=_EXACT, group=group, note=""))
     return [*laws, *exact]
 
 
@@ -138,14 +132,13 @@ def _energy(found: Bounds) -> list[Row]:
     return sorted(rows, key=lambda row: row.group, reverse=True)
 
 
-def _divergence(ticks: int, name: str) -> Row:
+def _divergence() -> Row:
     grip = GRIPS["loose"]  # b of 5 N·s/m and 0.25 kg
     return Row(
-        quantity=name, unit="N/m",
+        quantity="b = B = 5 N·s/m, 0.25 kg", unit="N/m",
         published=round(sampled_boundary(grip, 0, grip.damping), 1),
-        predicted=wall_boundary(grip, grip.damping, 0, ticks), within=_WITHIN,
-        group="diverges, b = B = 5 N·s/m, 0.25 kg, exact sampled axis",
-        note="passive: 0",
+        predicted=wall_boundary(grip, grip.damping, 0), within=_EXACT,
+        group="diverges, exact sampled axis", note="passive: 0",
     )  # fmt: skip
 
 
@@ -159,26 +152,24 @@ def _quiet(friction: float, resolution: float) -> Row:
 
 
 def _measure(bench: Bench) -> Findings:
-    total, steps = len(_CASES) + len(_TICKS) + len(DAMPINGS) + len(DEVICES), count(1)
-    stable: dict[tuple[float, int, int], float] = {}
-    for wall_damping, late, ticks in _CASES:
-        stable[wall_damping, late, ticks] = wall_boundary(BARE, wall_damping, late, ticks)
+    total, steps = len(_CASES) + 1 + len(DAMPINGS) + len(DEVICES), count(1)
+    stable: dict[tuple[float, int], float] = {}
+    for case in _CASES:
+        stable[case] = wall_boundary(BARE, *case)
         bench.progress(next(steps), total)
-    diverging = []
-    for ticks, name in _TICKS:
-        diverging.append(_divergence(ticks, name))
-        bench.progress(next(steps), total)
+    diverging = _divergence()
+    bench.progress(next(steps), total)
     passive: dict[tuple[float, float, int], float] = {}
-    for case in DAMPINGS:
+    for dampings in DAMPINGS:
         for length in PRESSES:
-            bounds = [passive_boundary(*case, length, speed) for speed in SPEEDS]
-            passive[(*case, length)] = min(bounds)
+            bounds = [passive_boundary(*dampings, length, speed) for speed in SPEEDS]
+            passive[(*dampings, length)] = min(bounds)
         bench.progress(next(steps), total)
     quiet = []
     for device in DEVICES:
         quiet.append(_quiet(*device))
         bench.progress(next(steps), total)
-    rows = (*_stability(stable), *_energy(passive), *diverging, *quiet)
+    rows = (*_stability(stable), *_energy(passive), diverging, *quiet)
     return Findings(rows, (_delay_figure(stable), _press_figure(passive, diverging)), _NOTES)
 
 
@@ -189,17 +180,14 @@ _NOTES = (
     "Predicted: our haptic master, rigid, with the spring of the chain's soft wall "
     "(walls.wall_force) and a damper B on the difference of two samples. No wall of the chain has "
     "that damper; the damped wall smooths its speed. The force comes in the very next period.",
-    "In a session's ticks of 1 ms our device makes two implicit steps a tick, whose places lead "
-    "the exact ones by a quarter of a tick: half of the delay of a held force is missing. So "
-    "without more delay our device stands twice as stiff a wall. In ticks of 0.1 ms 5 % are left.",
     "The linear law is one of small stiffness: with B = 5 N·s/m on 45 g it is too high beside the "
-    "exact axis from 2 ms on. Those rows miss the law, not the axis.",
+    "exact axis from 1 ms on. Those rows miss the law, not the axis.",
     "Energy: work of master/contact over a press within the wall at one speed, by a hand that "
     "nothing stops, less what b takes of the same way, for our device has no viscous friction. The "
     f"worst of presses of {', '.join(map(str, PRESSES))} ms in and as many out; the speed does not "
     "matter. Where the law is 0 the row is judged within 10 N/m.",
     "Rests: a hand of 1 N/m and 0.1 N·s/m leans between two steps of the wall's force, without a "
-    "blow; judged in a session's ticks. At 80 % of the law a hand that comes with 0.15 m/s comes "
+    "blow. At 80 % of the law a hand that comes with 0.15 m/s comes "
     "to rest too; with 0.2 m/s it swings on, since the held force then gives more than friction "
     "takes (measured once, not by this command).",
 )
@@ -217,25 +205,22 @@ def _delay_figure(found: Boundaries) -> Figure:
              "line": {"color": color, "width": 1.2, "dash": "dot"}},
             line(np.array(LATE, dtype=float), exact, f"{name}, exact", color, 1.5, "N/m"),
         ]  # fmt: skip
-        for k, (ticks, ours) in enumerate(_TICKS):
-            if (wall_damping, 0, ticks) in found:
-                ys = np.array([found[wall_damping, late, ticks] for late in LATE])
-                marks = points(
-                    np.array(LATE, dtype=float), ys, f"{name}, {ours}", color, "N/m", k + 1
-                )
-                traces.append(marks)
+        ys = np.array([found[wall_damping, late] for late in LATE])
+        traces.append(
+            points(np.array(LATE, dtype=float), ys, f"{name}, our device", color, "N/m", 1)
+        )
     layout = {"xaxis": axis("the force comes later by", "ms"),
               "yaxis": axis("stiffness", "N/m", type="log")}  # fmt: skip
-    sentence = "Below its line a wall is stable. Our device's marks should lie on the exact line."
+    sentence = "Below its line a wall is stable. Our device's marks lie on the exact line."
     return Figure("How stiff a sampled wall may be", sentence, traces, layout, 460)
 
 
-def _press_figure(found: Bounds, diverging: list[Row]) -> Figure:
+def _press_figure(found: Bounds, diverging: Row) -> Figure:
     damping, wall_damping = DAMPINGS[-1]
     lengths = range(1, max(PRESSES) + 1)
     law = np.array([press_law(damping, wall_damping, n) for n in lengths])
     ours = np.array([found[damping, wall_damping, n] for n in PRESSES])
-    shape, note = level(diverging[0].published or 0.0, "diverges")
+    shape, note = level(diverging.published or 0.0, "diverges")
     traces = [
         line(np.array(lengths, dtype=float), law, "gives energy, exact", FIRST, 1.5, "N/m"),
         points(np.array(PRESSES, dtype=float), ours, "gives energy, our device", FIXTURE, "N/m"),

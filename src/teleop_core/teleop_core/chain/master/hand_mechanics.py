@@ -2,14 +2,22 @@
 
 import math
 from dataclasses import dataclass
+from typing import Annotated
+
+import numpy as np
 
 from teleop_core.base.parameters import parameter
+from teleop_core.chain.master.device import DeviceParameters
 from teleop_core.kernels import inner
 from teleop_core.kernels.fields import Fields, Vector3
 from teleop_core.kernels.geometry import Array
+from teleop_core.kernels.portable import matrix_exponential
 from teleop_core.kernels.room import room
 
-_STEPS = 2
+_FASTEST = 1.5
+"""Largest part of an oscillation of hand against device in a step between two frictions [rad]."""
+_PLACE, _SPEED, _HAND, _HAND_SPEED = range(4)  # what a step gives
+_PUSH = 5  # the last of what a step takes
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,16 +44,9 @@ class HandParameters:
 class HandNumbers(Fields):
     """Fields of a parameter record with the mechanics of hand and device."""
 
-    mass: float  # of the hand [kg]
-    stiffness: float  # of its grip [N/m]
-    damping: float  # of its grip [N·s/m]
     friction: float  # dry, of the device [N]
-    device_mass: float  # [kg]
-    device_damping: float  # [N·s/m]
-    device_stiffness: Vector3  # [N/m]
-    joined_share: Vector3
-    lightness: Vector3  # [1/kg]
-    hand_lightness: Vector3  # [1/kg]
+    steps: int  # of equal length, in a tick
+    flow: Annotated[Array, 2, 3, 4, 6]  # of join()
     center: Vector3  # of the workspace [m]
     half: Vector3  # of its sides [m]
 
@@ -66,19 +67,20 @@ def move_hand(p: HandNumbers, s: HandState, wanted: Array, force: Array, dt: flo
 
     Two masses on each axis: the hand, which a spring and a damper pull along its path, and the
     device with its motors, encoders and dry friction; between them the device's structure, a spring
-    and a damper. Two equal Euler steps, implicit but for the hand's spring: stable for every hand
-    and device that the parameters allow. Friction is a force of any direction up to its bound. It
-    takes all speed that it can, so the device sticks, without creep, until what pulls is larger.
+    and a damper. The motors' force is held and the path is straight within the tick, so each step
+    is exact. Friction is a force of any direction up to its bound, held for a step. It takes all
+    speed that it can, so the device sticks, without creep, until what pulls is larger.
 
     Source:
-        Kikuuwe, Takesue, Sano, Mochiyama and Fujimoto 2006 for Coulomb friction, a set of forces,
-        by the implicit Euler step; Moreau 1988 for the scheme.
+        Exact step of a linear system under held input, as in any book on sampled control (Astrom
+        and Wittenmark 1997, section 2.3). Friction as a set of forces: Kikuuwe, Takesue, Sano,
+        Mochiyama and Fujimoto 2006; Moreau 1988.
     """
-    h, aim_speed = dt / _STEPS, room(3)
+    h, aim_speed = dt / p.steps, room(3)
     for i in range(3):
         aim_speed[i] = (wanted[i] - s.wanted[i]) / dt
-    for step in range(_STEPS):
-        _push_on(p, s, aim_speed, force, h, h * (step + 1))
+    for step in range(p.steps):
+        _push_on(p, s, aim_speed, force, h * step)
     for i in range(3):
         s.wanted[i] = wanted[i]
         low, high = p.center[i] - p.half[i], p.center[i] + p.half[i]
@@ -90,39 +92,70 @@ def move_hand(p: HandNumbers, s: HandState, wanted: Array, force: Array, dt: flo
 
 
 @inner
-def _push_on(
-    p: HandNumbers, s: HandState, aim_speed: Array, force: Array, h: float, time: float
-) -> None:
-    """Make one step of ``h`` [s] that ends ``time`` [s] after the tick's begin."""
-    free, pulled = room(3), room(3)
-    square = 0.0
+def _push_on(p: HandNumbers, s: HandState, aim_speed: Array, force: Array, time: float) -> None:
+    """Make one step that begins ``time`` [s] after the tick."""
+    given, needed = room(3, 6), room(3)
+    square, rests = 0.0, True
     for i in range(3):
-        pull = p.stiffness * (s.wanted[i] + time * aim_speed[i] - s.hand[i])
-        # Momenta of hand and device without friction and without what joins them.
-        bent = h * p.device_stiffness[i] * (s.hand[i] - s.position[i])
-        pulled[i] = p.mass * s.hand_speed[i] + h * (pull + p.damping * aim_speed[i]) - bent
-        free[i] = p.device_mass * s.speed[i] + h * force[i] + bent + p.joined_share[i] * pulled[i]
-        square += free[i] * free[i]
-    rubbed = h * p.friction  # most momentum that friction takes
-    left = 1.0 - rubbed / math.sqrt(square) if square > rubbed * rubbed else 0.0
+        given[i, 0], given[i, 1] = s.speed[i], s.hand_speed[i]
+        given[i, 2] = s.hand[i] - s.position[i]
+        given[i, 3] = s.wanted[i] + time * aim_speed[i] - s.hand[i]
+        given[i, 4], given[i, _PUSH] = aim_speed[i], force[i]
+        # Force against which the device would stand still at the end of the step.
+        needed[i] = _flows(p.flow[0, i, _SPEED], given[i]) / p.flow[0, i, _SPEED, _PUSH]
+        square += needed[i] * needed[i]
+        rests = rests and s.speed[i] == 0.0
+    sticks = square <= p.friction * p.friction
+    share = 1.0 if sticks else p.friction / math.sqrt(square)
+    held = 1 if sticks and rests else 0
     for i in range(3):
-        s.speed[i] = left * free[i] * p.lightness[i]
-        s.hand_speed[i] = pulled[i] * p.hand_lightness[i] + p.joined_share[i] * s.speed[i]
-        s.position[i] += h * s.speed[i]
-        s.hand[i] += h * s.hand_speed[i]
+        s.speed[i] = (1.0 - share) * needed[i] * p.flow[0, i, _SPEED, _PUSH]
+        given[i, _PUSH] -= share * needed[i]
+        s.position[i] += _flows(p.flow[held, i, _PLACE], given[i])
+        s.hand[i] += _flows(p.flow[held, i, _HAND], given[i])
+        s.hand_speed[i] = _flows(p.flow[held, i, _HAND_SPEED], given[i])
 
 
-def join(p: HandNumbers, dt: float) -> None:
-    """Write what the implicit step needs of the matrix that joins hand and device.
+@inner
+def _flows(row: Array, given: Array) -> float:
+    total = 0.0
+    for k in range(6):
+        total += row[k] * given[k]
+    return total
+
+
+def join(p: HandNumbers, hand: HandParameters, device: DeviceParameters, dt: float) -> None:
+    """Write the exact step of hand and device, and how many of them make a tick.
+
+    ``flow[0]`` (3, 4, 6) gives on each axis the way of the device, its speed, the way of the hand
+    and its speed after a step, from: the speeds of device and hand, the hand from the device, the
+    aim from the hand, the speed of the aim, and the force on the device. ``flow[1]`` is the same
+    while friction holds the device.
 
     Args:
-        p: Parameter record with masses, dampings and stiffnesses; ``joined_share``, what the hand's
-            momentum gives the device's, and ``lightness`` and ``hand_lightness`` [1/kg] of device
-            and hand are written, (3,) each.
+        p: Parameter record; ``flow`` and ``steps`` are written.
+        hand: The hand.
+        device: The device.
         dt: Tick [s].
     """
-    h = dt / _STEPS
-    joined = h * (p["device_damping"] + h * p["device_stiffness"])
-    own = p["mass"] + h * p["damping"] + joined
-    p["joined_share"], p["hand_lightness"] = joined / own, 1.0 / own
-    p["lightness"] = 1.0 / (p["device_mass"] + joined - joined * joined / own)
+    lightness = 1.0 / hand.mass + 1.0 / device.apparent_mass
+    fastest = math.sqrt(max(device.stiffness) * lightness)
+    p["steps"] = max(1, math.ceil(fastest * dt / _FASTEST))
+    for i, stiffness in enumerate(device.stiffness):
+        bend = np.array([0.0, -1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0]) * device.structure_damping
+        bend[4] = stiffness
+        pull = np.array([0.0, 0.0, 0.0, -1.0, 0.0, 0.0, 1.0, 0.0]) * hand.damping
+        pull[5] = hand.stiffness
+        # Rates of the way of the device, its speed, the way of the hand, its speed, and of what a
+        # step takes besides: hand from device, aim from hand, speed of the aim, force.
+        rates = np.zeros((8, 8))
+        rates[0, 1] = rates[2, 3] = rates[4, 3] = rates[5, 6] = 1.0
+        rates[4, 1] = rates[5, 3] = -1.0
+        rates[3] = (pull - bend) / hand.mass
+        p["flow"][1, i] = _step(rates, dt / p["steps"])
+        rates[1], rates[1, 7] = bend / device.apparent_mass, 1.0 / device.apparent_mass
+        p["flow"][0, i] = _step(rates, dt / p["steps"])
+
+
+def _step(rates: Array, h: float) -> Array:
+    return matrix_exponential(rates * h)[:4, [1, 3, 4, 5, 6, 7]]

@@ -237,11 +237,7 @@ class HapticMaster(RunningStage):
         p["friction"], p["peak_force"] = device.friction, device.peak_force
         p["continuous"] = device.continuous_force
         p["warming"] = -math.expm1(-self.dt / device.thermal_time)
-        p["device_stiffness"] = device.stiffness
-        p["device_damping"] = device.structure_damping
-        p["mass"], p["device_mass"] = hand.mass, device.apparent_mass
-        p["stiffness"], p["damping"] = hand.stiffness, hand.damping
-        join(p, self.dt)
+        join(p, hand, device, self.dt)
         p["force_range"] = parameters.force_range
         p["silence_ns"] = round(parameters.hand_timeout * 1e9)
         p["center"] = np.subtract(REST_POSITION, device.start)

@@ -16,11 +16,12 @@ class GilbertElliottParameters:
 
     to_bad: float = parameter(
         0.05, lower=0.0, upper=1.0, source=_LEVEL,
-        doc="chance that a bad time begins, after every burst and the packet that follows it",
+        doc="chance at every packet that a bad time begins",
     )  # fmt: skip
     stay_bad: float = parameter(
-        0.9, lower=0.0, upper=1.0, doc="chance that a bad time goes on", source=_LEVEL
-    )
+        0.9, lower=0.0, upper=1.0, doc="chance at every packet that a bad time goes on",
+        source=_LEVEL,
+    )  # fmt: skip
     good: tuple[float, ...] = parameter(
         (4.428, 1.638), lower=1e-3, upper=100.0, length=2, source=_LEVEL,
         doc="shape and scale of the length of bursts in good times, a Pareto II distribution "
@@ -40,11 +41,13 @@ class GilbertElliottParameters:
 def gilbert_elliott_draw(numbers: Array, memory: Array, chances: Array, now: float) -> float:
     """Nothing beside the least time, or lost.
 
+    Times change at every packet, within bursts too. The packet after a burst passes.
+
     ``memory`` holds how many packets of the burst are still to be lost, and whether times are bad.
     """
+    border = numbers[1] if memory[1] > 0.0 else numbers[0]
+    memory[1] = 1.0 if chances[0] < border else 0.0
     if memory[0] < 1.0:
-        border = numbers[1] if memory[1] > 0.0 else numbers[0]
-        memory[1] = 1.0 if chances[0] < border else 0.0
         at = 4 if memory[1] > 0.0 else 2
         length = numbers[at + 1] * ((1.0 - chances[1]) ** (-1.0 / numbers[at]) - 1.0)
         memory[0] = float(int(min(length, 1e9))) + 1.0  # and one that passes

@@ -12,29 +12,40 @@ _LEVEL = "published: UVA-DSA telesurgery QoS analysis 2026, the first level of o
 
 @dataclass(frozen=True, kw_only=True)
 class OutagesParameters:
-    """How often nothing passes, and for how long at most."""
+    """How long everything passes between outages, and how long nothing does at most.
 
-    period: float = parameter(
-        8.5, unit="s", lower=1e-3, upper=3600.0, doc="from one outage to the next", source=_LEVEL
-    )
-    longest: float = parameter(
-        3.0, unit="s", lower=0.0, upper=3600.0, source=_LEVEL,
-        doc="longest outage; each lasts for any time up to it",
+    The share ``longest / (longest + 2 pause)`` is lost in the long run.
+    """
+
+    pause: float = parameter(
+        8.5, unit="s", lower=1e-3, upper=1e6, source=_LEVEL,
+        doc="from the end of an outage to the beginning of the next; in packets with in_packets",
     )  # fmt: skip
+    longest: float = parameter(
+        3.0, unit="s", lower=0.0, upper=1e6, source=_LEVEL,
+        doc="longest outage; each lasts for any time up to it; in packets with in_packets",
+    )  # fmt: skip
+    in_packets: bool = parameter(
+        False, doc="count pause and longest in packets that are sent, in place of seconds"
+    )
 
 
 @kernel
 def outages_draw(numbers: Array, memory: Array, chances: Array, now: float) -> float:
     """Nothing beside the least time, or lost.
 
-    ``memory`` holds when the next outage begins [s], and when the present one ends.
+    The first packet begins an outage. The packet that begins one is lost; the first one at or after
+    its end passes, and begins the pause (NetFI's communication loss).
+
+    ``memory`` holds when the outage or pause ends [s or packets], whether it is an outage, and the
+    number of packets before this one.
     """
-    if memory[0] == 0.0:
-        memory[0] = now + numbers[0]
-    if now >= memory[0]:
-        memory[0] += numbers[0]
-        memory[1] = now + chances[0] * numbers[1]
-    return LOST if now < memory[1] else 0.0
+    at = memory[2] if numbers[2] > 0.0 else now
+    memory[2] += 1.0
+    if memory[2] == 1.0 or at >= memory[0]:
+        memory[1] = 1.0 - memory[1]
+        memory[0] = at + (chances[0] * numbers[1] if memory[1] > 0.0 else numbers[0])
+    return LOST if memory[1] > 0.0 else 0.0
 
 
 OUTAGES = Network("outages", OutagesParameters, outages_draw)

@@ -29,8 +29,11 @@ def _delays(least: float, mean: float, slow_mean: float, slow_share: float) -> d
     return {"there": late, "back": {}}
 
 
-def _outages(period: float, longest: float) -> dict[str, Any]:
-    gone = {"kind": "outages", "outages.period": period, "outages.longest": longest}
+def _outages(pause: float, longest: float, packet_rate: float = 0.0) -> dict[str, Any]:
+    """Times in seconds, or in packets of which so many are sent in a second."""
+    gone = {"kind": "outages", "outages.pause": pause, "outages.longest": longest}
+    if packet_rate > 0.0:
+        gone |= {"outages.in_packets": True, "packet_rate": packet_rate}
     return {"there": gone, "back": {}}
 
 
@@ -51,12 +54,16 @@ PRESETS: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
     "outages_3_of_8": _outages(8.5, 3.0),
     "outages_1_of_1": _outages(1.0, 1.0),
     "outages_2_of_1": _outages(1.0, 2.0),
+    "outages_3_of_8_packets": _outages(8500.0, 3000.0, 517.0),
+    "outages_1_of_1_packets": _outages(1000.0, 1000.0, 517.0),
+    "outages_2_of_1_packets": _outages(1000.0, 2000.0, 517.0),
     "iss": _far(0.4, 0.05),
     "ets7": _far(3.4, 0.1),
 }
 """Networks by name. Loss, delay and outages are the nine levels of the UVA-DSA telesurgery QoS
-analysis 2026, on the way to the slave alone; ``iss`` takes 0.8 to 1 s there and back, ``ets7`` 7 s
-(ETS-VII 1999); how the delay of these two varies is assumed."""
+analysis 2026, on the way to the slave alone. Its table gives outages in milliseconds, the program
+it ships counts packets (``_packets``), of which its recording has 517 a second. ``iss`` takes 0.8
+to 1 s there and back, ``ets7`` 7 s (ETS-VII 1999); how the delay of these two varies is assumed."""
 
 
 @dataclass(frozen=True, kw_only=True)
