@@ -330,7 +330,7 @@ def test_dropped_samples_are_gaps_of_their_topic_alone(recipe: Recipe, path: Pat
     )
     assert score.topics["slave/servo_cp"].gaps == 0
     assert score.topics["teleop/state"].gaps is None
-    assert (score.ticks.executed, score.ticks.late, score.ticks.missed) == (2994, None, 6)
+    assert (score.ticks.executed, score.ticks.late, score.ticks.dropped) == (2994, None, 6)
 
 
 def test_topic_recorded_at_a_tenth_of_the_rate_has_no_gaps(recipe: Recipe, path: Path) -> None:
@@ -342,11 +342,13 @@ def test_topic_recorded_at_a_tenth_of_the_rate_has_no_gaps(recipe: Recipe, path:
 def test_ticks_are_those_that_the_slave_reported_last(recipe: Recipe, path: Path) -> None:
     for second in (1, 2):
         at = START_NS + second * 1000 * TICK_NS
-        values = {"ticks": str(1000 * second), "late": str(3 * second), "missed": str(second),
+        values = {"ticks": str(1000 * second), "late": str(3 * second),
+                  "missed": str(9 * second), "caught_up": str(8 * second),
                   "rate_hz": "999.9", "refused.slave/servo_jp.jump": "0"}  # fmt: skip
         recipe.singles.append((DIAGNOSTICS, at, report(at, "slave_sim", 0, "ACTIVE", values)))
     score = evaluate(recipe.write(path))
-    assert (score.ticks.executed, score.ticks.late, score.ticks.missed) == (2000, 6, 2)
+    assert (score.ticks.executed, score.ticks.late) == (2000, 6)
+    assert (score.ticks.made_up, score.ticks.dropped) == (16, 2)
     assert "rate_hz" not in score.nodes["slave_sim"]
     assert score.nodes["slave_sim"]["refused.slave/servo_jp.jump"] == 0
 

@@ -27,7 +27,8 @@ from teleop_core.slave.controllers.source_pid import SOURCE_PID
 FINE = {
     "reach.followed_share": 0.999, "asked_error_mm.max": 6.0, "command_error_mm.max": 5.5,
     "position_error_mm.rms": 0.3, "latency_ms.total.p99": 3.0, "ticks.executed": 10000,
-    "ticks.missed": 0, "topics.slave/servo_cp.count": 9000, "topics.slave/servo_cp.gaps": 0,
+    "ticks.made_up": 0, "ticks.dropped": 0, "topics.slave/servo_cp.count": 9000,
+    "topics.slave/servo_cp.gaps": 0,
     "fixture.penetration_max_mm": None, "fixture.kind": "box",
 }  # fmt: skip
 
@@ -49,7 +50,10 @@ def test_a_drift_is_named_before_the_share_that_was_followed() -> None:
         ({}, None, "nothing stands out: followed 99.9 % of the time, 0.3 mm RMS"),
         ({"asked_error_mm.max": 12.0, "command_error_mm.max": 11.0}, None, "nothing"),  # filters
         ({"latency_ms.total.p99": 80.0}, "latency_ms.total.p99", "80 ms from hand to setpoint"),
-        ({"ticks.missed": 300}, "ticks.missed", "300 control ticks left out"),
+        ({"ticks.made_up": 300}, "ticks.made_up", "300 control ticks made up late"),
+        ({"ticks.dropped": 300}, "ticks.dropped", "300 control ticks never executed (3 %)"),
+        ({"topics.slave/servo_cp.gaps": 1000, "topics.slave/servo_cp.lost": 400}, "topics",
+         "1000 messages missing (10 %), 400 of them lost on the way"),
         ({"topics.slave/servo_cp.gaps": 1000}, "topics", "1000 messages missing (10 %)"),
         ({"fixture.penetration_max_mm": 2.5}, "fixture.penetration_max_mm", "2.5 mm out of"),
         ({"position_error_mm.rms": 4.0}, "position_error_mm.rms", "4 mm RMS"),

@@ -115,30 +115,37 @@ def _beyond(key: str, fine: float, text: str) -> Callable[[Values], Iterator[Con
 
 
 def _messages(values: Values) -> Iterator[Concern]:
-    """Lost messages, of all topics."""
-    missing = sum(
-        int(value) for key, value in values.items()
-        if key.startswith("topics.") and key.endswith(".gaps") and isinstance(value, int | float)
-    )  # fmt: skip
-    count = sum(
-        int(value) for key, value in values.items()
-        if key.startswith("topics.") and key.endswith(".count") and isinstance(value, int | float)
-    )  # fmt: skip
+    """Messages that are missing, of all topics: lost, or never sent by a stage that was late."""
+    missing, count, lost = (_of_topics(values, name) for name in ("gaps", "count", "lost"))
     if missing:
         share = missing / max(1, count + missing)
-        yield Concern(
-            share / _SHARE, "topics", f"{missing} messages missing ({100.0 * share:.2g} %)"
-        )
+        text = f"{missing} messages missing ({100.0 * share:.2g} %)"
+        text += f", {min(lost, missing)} of them lost on the way" if lost else ""
+        yield Concern(share / _SHARE, "topics", text)
+
+
+def _of_topics(values: Values, name: str) -> int:
+    """Sum of a number of all topics."""
+    return sum(
+        int(value)
+        for key, value in values.items()
+        if key.startswith("topics.") and key.endswith(f".{name}") and isinstance(value, int | float)
+    )
 
 
 def _ticks(values: Values) -> Iterator[Concern]:
-    done, missed = _number(values, "ticks.executed"), _number(values, "ticks.missed")
-    if done and missed:
-        yield Concern(
-            missed / done / _SHARE, "ticks.missed", f"{missed:.0f} control ticks left out"
-        )
+    """Control ticks that were not in time: the machine was busy."""
+    done = _number(values, "ticks.executed")
+    for key, (fine, text) in _UNTIMELY.items():
+        if done and (count := _number(values, key)):
+            share = count / done
+            yield Concern(share / fine, key, f"{text.format(count)} ({100.0 * share:.2g} %)")
 
 
+_UNTIMELY = {
+    "ticks.made_up": (5e-3, "{:.0f} control ticks made up late, as on a busy machine"),
+    "ticks.dropped": (_SHARE, "{:.0f} control ticks never executed"),
+}
 _CONCERNS: tuple[Callable[[Values], Iterator[Concern]], ...] = (
     _missing, _drift, _following, _messages, _ticks,
     _beyond("position_error_mm.rms", _ERROR_MM, "{:.3g} mm RMS from its reference"),

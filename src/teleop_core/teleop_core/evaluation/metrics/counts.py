@@ -11,6 +11,7 @@ from teleop_core.evaluation.rows import MISSING, Row
 from teleop_core.evaluation.stamps import StampTallies
 from teleop_core.evaluation.tracking import TRACKED, tracked
 from teleop_core.evaluation.windows import Window
+from teleop_core.graph.graph import RECORDER_NAME
 from teleop_core.graph.topics import DIAGNOSTICS, SLAVE_MEASURED_CP
 
 Counts = dict[str, dict[str, int]]
@@ -60,12 +61,14 @@ class Ticks:
     Attributes:
         executed: Ticks executed.
         late: Ticks begun late; None if nobody counted them (virtual time, foreign slaves).
-        missed: Ticks that were due and never executed.
+        made_up: Ticks executed after the next one was due; None if nobody counted them.
+        dropped: Ticks that were due and never executed.
     """
 
     executed: int
     late: int | None
-    missed: int
+    made_up: int | None
+    dropped: int
 
 
 class TicksMetric(Metric):
@@ -73,8 +76,9 @@ class TicksMetric(Metric):
 
     name = "ticks"
     keys = (
-        Key("ticks.executed|late|missed", "1",
-            "control ticks of the slave; late is null if uncounted"),
+        Key("ticks.executed|late|made_up|dropped", "1",
+            "control ticks of the slave: begun late, executed after the next one was due, never "
+            "executed; late and made_up are null if uncounted"),
     )  # fmt: skip
     topics = (SLAVE_MEASURED_CP,)
 
@@ -91,22 +95,34 @@ class TicksMetric(Metric):
         nodes = self._nodes.values()
         own = nodes.get(self._slave) or nodes.get(_FORMER) or {}
         gaps = self._stamps.of[SLAVE_MEASURED_CP.name].gaps()
-        return Ticks(own.get("ticks", self._samples), own.get("late"), own.get("missed", gaps))
+        missed, made_up = own.get("missed"), own.get("caught_up")
+        dropped = gaps if missed is None else missed - (made_up or 0)
+        return Ticks(own.get("ticks", self._samples), own.get("late"), made_up, dropped)
 
     def rows(self) -> list[Row]:
-        """All three in one row."""
+        """A row for each way in which a tick is not in time."""
         ticks = self.values()
-        late = MISSING if ticks.late is None else str(ticks.late)
-        text = f"{ticks.executed}/{late}/{ticks.missed}"
-        return [Row(GROUP, "ticks done/late/missed", "", text)]
+        late, made_up = (MISSING if n is None else str(n) for n in (ticks.late, ticks.made_up))
+        return [
+            Row(GROUP, "ticks executed", "", str(ticks.executed)),
+            Row(GROUP, "late/made up/dropped", "", f"{late}/{made_up}/{ticks.dropped}"),
+        ]
 
 
 @dataclass(frozen=True)
 class TopicScore:
-    """Messages of a topic, and how many are missing by their stamps (None if not a stream)."""
+    """Messages of a topic.
+
+    Attributes:
+        count: Those that are there.
+        gaps: Those that are missing by their stamps; None if it is not a stream.
+        lost: Those of them that were sent and lost on the way to the recorder; None if nobody
+            counted them. The others were never sent: a stage takes only the newest.
+    """
 
     count: int
     gaps: int | None
+    lost: int | None
 
 
 class TopicsMetric(Metric):
@@ -118,10 +134,14 @@ class TopicsMetric(Metric):
         Key("topics.<name>.gaps", "1",
             "messages missing by their stamps, lost or passed over by a stage that takes only the "
             "newest; null if not a stream, or one that is sent where it changes"),
+        Key("topics.<name>.lost", "1",
+            "messages that were sent and did not reach the recorder, by its own count; null if "
+            "uncounted"),
     )  # fmt: skip
 
     def __init__(self, context: Context) -> None:
         self._infos, self._stamps = context.bag.topics, context.shared(StampTallies)
+        self._nodes = context.shared(NodesMetric)
 
     def add(self, window: Window) -> None:
         """Nothing: stamps are counted by others too."""
@@ -129,9 +149,14 @@ class TopicsMetric(Metric):
     def values(self) -> dict[str, TopicScore]:
         """Score of each topic, in the order of their names."""
         return {
-            name: TopicScore(info.count, self._gaps(name))
+            name: TopicScore(info.count, self._gaps(name), self._lost(name))
             for name, info in sorted(self._infos.items())
         }
+
+    def _lost(self, name: str) -> int | None:
+        reports = self._nodes.values().items()
+        told = (counts for node, counts in reports if node.rpartition("/")[2] == RECORDER_NAME)
+        return next((counts[key] for counts in told if (key := f"lost.{name}") in counts), None)
 
     def _gaps(self, name: str) -> int | None:
         tally = self._stamps.of.get(name)
@@ -143,6 +168,7 @@ class TopicsMetric(Metric):
         return [
             Row(GROUP, "messages", "", str(sum(topic.count for topic in topics))),
             Row(GROUP, "messages missing", "", str(sum(topic.gaps or 0 for topic in topics))),
+            Row(GROUP, "lost on the way", "", str(sum(topic.lost or 0 for topic in topics))),
         ]
 
 
