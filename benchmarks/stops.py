@@ -107,7 +107,7 @@ def one_stop(tap: Tap) -> float:
     return float(stamps[first] - pressed_ns) * 1e-9
 
 
-def session(folder: Path, domain: str, priority: int, is_composed: bool) -> subprocess.Popen[bytes]:
+def session(folder: Path, domain: str, priority: int, processes: str) -> subprocess.Popen[bytes]:
     """Start a session in which the hand never rests."""
     command = [sys.executable, "-m", "teleop_core.cli", "live", "--out", str(folder / "bag")]
     command += ["--scenario", "free_motion", "--duration", "3600"]
@@ -118,17 +118,17 @@ def session(folder: Path, domain: str, priority: int, is_composed: bool) -> subp
     ):
         command += ["--set", setting]
     return subprocess.Popen(
-        command + ["--composed"] * is_composed, stdin=subprocess.DEVNULL,
+        [*command, "--processes", processes], stdin=subprocess.DEVNULL,
         stdout=subprocess.DEVNULL, env=environment() | {"ROS_DOMAIN_ID": domain},
     )  # fmt: skip
 
 
-def measure(count: int, priority: int, is_composed: bool) -> list[float]:
+def measure(count: int, priority: int, processes: str) -> list[float]:
     """Times of some stops of one session [s]."""
     environment()
     domain = free_domain()
     with tempfile.TemporaryDirectory() as folder:
-        running = session(Path(folder), domain, priority, is_composed)
+        running = session(Path(folder), domain, priority, processes)
         tap, found = Tap(int(domain)), []
         try:
             with RemoteControl(int(domain), patience=_PATIENCE) as operator:
@@ -147,14 +147,21 @@ def measure(count: int, priority: int, is_composed: bool) -> list[float]:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--count", type=int, default=100, help="stops of each kind")
-    parser.add_argument("--priority", type=int, default=30, help="SCHED_FIFO of the session; 0: no")
+    parser.add_argument(
+        "--priority",
+        type=int,
+        default=-1,
+        help="SCHED_FIFO of the session; 0: none; -1: its default",
+    )
     parser.add_argument("--load", type=int, default=0, help="busy processes beside the session")
-    parser.add_argument("--kinds", nargs="+", default=["composed", "five"])
+    parser.add_argument(
+        "--kinds", nargs="+", default=["sides", "one"], choices=("sides", "one", "nodes")
+    )
     given = parser.parse_args()
     busy = [subprocess.Popen([sys.executable, "-c", "while 1: pass"]) for _ in range(given.load)]
     try:
         for kind in given.kinds:
-            times = 1e3 * np.sort(measure(given.count, given.priority, kind == "composed"))
+            times = 1e3 * np.sort(measure(given.count, given.priority, kind))
             within = np.count_nonzero(times <= 2.0)
             print(f"{kind}, priority {given.priority}, load {os.getloadavg()[0]:.1f}: median "
                   f"{np.median(times):.2f} ms, within 2 ms {within} of {len(times)}, largest "

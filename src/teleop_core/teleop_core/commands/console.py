@@ -32,8 +32,6 @@ printed with the address. One browser drives at a time; anybody may press the em
 """
 _OWN = ("operator=remote", "teleop.duration=86400.0")
 """What a session behind a page is beside its scenario: a person is the hand, until Ctrl-C."""
-_PRIORITY = 20
-"""A browser on the same processors must not make the session late, where the system grants that."""
 
 
 def add(commands: Any) -> None:
@@ -118,11 +116,9 @@ def _drive(arguments: argparse.Namespace, server: "ConsoleServer") -> None:
 
     ros_module("console_session")
     from teleop_core.nodes.console_session import ConsoleSession
-    from teleop_core.nodes.real_time import is_priority_granted
 
     first = arguments.out or Path("bags") / time.strftime("console_%Y%m%d_%H%M%S")
-    own = [f"real_time.priority={_PRIORITY}"] if is_priority_granted(_PRIORITY) else []
-    texts, number, wanted = [*_OWN, *own, *arguments.settings], 0, list[str]()
+    texts, number, wanted = [*_OWN, *arguments.settings], 0, list[str]()
 
     def renew(more: tuple[str, ...]) -> str:
         try:

@@ -19,8 +19,9 @@ class RealTimeParameters:
     """What a live node asks of the system; a refusal is reported and the node works on."""
 
     priority: int = parameter(
-        0, lower=0, upper=98, fixed=True,
-        doc="SCHED_FIFO priority of the loop, and 1 for the threads beside it; 0: fair shares",
+        -1, lower=-1, upper=98, fixed=True,
+        doc="SCHED_FIFO priority of the loop, and 1 for the threads beside it; 0: fair shares; -1: "
+        "20 in sessions by side or in one process where the system grants it, else fair shares",
     )  # fmt: skip
     cpus: tuple[int, ...] = parameter(
         (), lower=0, fixed=True, doc="processors that the loop may use; empty: all"

@@ -117,7 +117,7 @@ def _priority(configuration: Configuration, processes: Processes) -> int | None:
 
     Processes for each node need more than two processors together, so that theirs stays 0.
     """
-    if configuration.groups[SESSION].real_time.priority or processes is Processes.NODES:
+    if configuration.groups[SESSION].real_time.priority >= 0 or processes is Processes.NODES:
         return None
     return _PRIORITY if is_priority_granted(_PRIORITY) else 0
 

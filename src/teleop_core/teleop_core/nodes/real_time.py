@@ -26,7 +26,7 @@ def apply_options(options: RealTimeParameters) -> list[str]:
     refusals = []
     if options.cpus:
         refusals += _cpus(options.cpus)
-    if options.priority:
+    if options.priority > 0:
         refusals += _priority(options.priority)
     if options.lock_memory and ctypes.CDLL(None, use_errno=True).mlockall(_EVERYTHING):
         refusals.append(
