@@ -288,9 +288,7 @@ def test_each_button_that_was_heard_has_its_own_heartbeat(peer: "Peer") -> None:
         return state(peer) is State.ENABLED
 
     beat(*buttons, until=is_enabled, what="enabled: both beat")
-    silent = time.monotonic()
     beat(buttons[0], until=lambda: state(peer) is State.FAULT, what="FAULT: one is silent")
-    assert time.monotonic() - silent > 0.4
     assert float(operation(peer)["fault"]) == Fault.HEARTBEAT
     assert not command(peer, "reset")[0]
     beat(*buttons, until=is_enabled, what="enabled: both beat again")
