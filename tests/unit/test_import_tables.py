@@ -499,12 +499,13 @@ def test_a_hand_that_rests_at_whole_numbers_is_read_on(name: str, tmp_path: Path
 
 
 @pytest.mark.parametrize("ending", ["Z", "+00:00", "+02:00", "-0330", ""])
-def test_dates_keep_to_their_zone(ending: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize("sep", [",", " "])
+def test_dates_keep_to_their_zone(ending: str, sep: str, tmp_path: Path) -> None:
     zone = pd.Timestamp(f"2025-04-17T15:00:08{ending}")
     at = pd.date_range("2025-04-17T15:00:08", periods=COUNT, freq="10ms")
     table = frame()
     table["t"] = [f"{one.isoformat(timespec='milliseconds')}{ending}" for one in at]
-    table.to_csv(tmp_path / "a.csv", index=False)
+    table.to_csv(tmp_path / "a.csv", index=False, sep=sep)
     _, stream = imported(tmp_path / "a.csv", tmp_path)
     assert stream.stamp_ns[0] == zone.value
     assert_same_motion(stream)
