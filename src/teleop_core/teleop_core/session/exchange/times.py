@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
+from teleop_core.base.ranges import LATEST_S
 from teleop_core.kernels.geometry import Array
 from teleop_core.session.exchange.options import TIMES_NS
 
@@ -16,7 +17,6 @@ SECOND_NS = 1_000_000_000
 RATES_HZ = (5.0, 3000.0)
 """Rates that a recording of a hand may have; the unit of its times follows from them."""
 _EPOCH_S = 3e8  # 1979: later times are seconds since 1970
-_FOREVER_S = 4e9
 _LONGEST_S = 60.0  # between two samples
 _STRETCH = 10  # rows; shorter ones are no recording of their own
 
@@ -42,7 +42,7 @@ def guessed_unit(raw: NDArray[np.float64] | Stamps) -> Unit:
         return Unit("s", "")
     for name, nanoseconds in TIMES_NS.items():
         seconds, period = (value * nanoseconds / SECOND_NS for value in (middle, step))
-        if _EPOCH_S < seconds < _FOREVER_S and period < _LONGEST_S:
+        if _EPOCH_S < seconds < LATEST_S and period < _LONGEST_S:
             return Unit(name, "they are times of the clock")
     best, distance = "s", float("inf")
     for name, nanoseconds in TIMES_NS.items():
@@ -56,13 +56,17 @@ def guessed_unit(raw: NDArray[np.float64] | Stamps) -> Unit:
 
 
 def joined_ns(parts: list[NDArray[np.float64] | Stamps], unit: str, without: int) -> Stamps:
-    """Times of all blocks [ns], with a number for those that are none; empties the list."""
+    """Times of all blocks [ns], with a number for those that are none; empties the list.
+
+    Times later than 2096 are none: their nanoseconds would not fit into 64 bits for long.
+    """
+    latest = LATEST_S * SECOND_NS / TIMES_NS[unit]
     out = np.empty(sum(map(len, parts)), np.int64)
     end = len(out)
     while parts:
         raw = parts.pop()
         begin = end - len(raw)
-        known = np.isfinite(raw)
+        known = np.abs(raw) <= latest  # NaN is not
         out[begin:end] = nanoseconds(np.where(known, raw, 0), unit)
         out[begin:end][~known] = without
         end = begin
