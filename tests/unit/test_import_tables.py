@@ -15,6 +15,7 @@ from scipy.spatial.transform import Rotation
 import teleop_core as tc
 from teleop_core.kernels.geometry import Array
 from teleop_core.session.exchange import names, orientation
+from teleop_core.session.exchange.times import ordered
 
 COUNT, RATE = 400, 100.0
 TIMES = np.arange(COUNT) / RATE
@@ -443,6 +444,22 @@ def test_a_stamp_from_the_future_costs_its_own_row_alone(ahead: float, tmp_path:
     left_out = (report.counts.backwards, report.counts.missing)
     assert left_out == ((1, 0) if ahead < 1e9 else (0, 1))
     assert_same_motion(stream, PLACES[kept], TURNS[kept], TIMES[kept])
+
+
+def test_no_fewer_rows_could_be_left_out_for_the_others_to_rise() -> None:
+    rng = np.random.default_rng(2)
+    for _ in range(300):
+        stamps = np.sort(rng.integers(0, 60, rng.integers(1, 40)))
+        wrong = rng.integers(0, len(stamps), 4)
+        stamps[wrong] = rng.integers(0, 60, 4)
+        longest = np.ones(len(stamps), np.int64)
+        for i in range(len(stamps)):
+            before = longest[:i][stamps[:i] <= stamps[i]]
+            longest[i] = 1 + before.max(initial=0)
+        order = ordered(stamps)
+        assert (np.diff(stamps[order.rows]) > 0).all()
+        assert order.backwards == len(stamps) - longest.max()
+        assert len(order.rows) + order.doubled == longest.max()
 
 
 @pytest.mark.parametrize("policy", ["auto", "refuse", "drop", "sort"])

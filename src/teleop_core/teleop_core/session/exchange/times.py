@@ -120,17 +120,21 @@ def _longest_rising(stamps: Stamps) -> NDArray[np.int64]:
 
     So one stamp from the future costs its own row, not all rows until that time has come.
     """
-    before = np.empty(len(stamps), np.int64)
+    newest, oldest = np.maximum.accumulate(stamps), np.minimum.accumulate(stamps[::-1])[::-1]
+    is_kept = (stamps == newest) & (stamps == oldest)  # no other row contradicts these
+    others = np.flatnonzero(~is_kept)
+    before = np.empty(len(others), np.int64)
     ends: list[int] = []  # least last time of so many rows, and which row that is
     last: list[int] = []
-    for row, stamp in enumerate(stamps.tolist()):
+    for row, stamp in enumerate(stamps[others].tolist()):
         count = bisect_right(ends, stamp)
         before[row] = last[count - 1] if count else -1
         ends[count : count + 1], last[count : count + 1] = [stamp], [row]
-    rows, row = np.empty(len(last), np.int64), last[-1] if last else -1
-    for place in range(len(last) - 1, -1, -1):
-        rows[place], row = row, int(before[row])
-    return rows
+    row = last[-1] if last else -1
+    while row >= 0:
+        is_kept[others[row]] = True
+        row = int(before[row])
+    return np.flatnonzero(is_kept)
 
 
 def restarts(stamps: Stamps) -> NDArray[np.int64]:
