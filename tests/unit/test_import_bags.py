@@ -265,9 +265,18 @@ def test_splits_may_be_listed_in_any_order(storage: StoragePlugin, tmp_path: Pat
     (one,), (two,) = ([p for p in d.iterdir() if p.suffix != ".yaml"] for d in (first, second))
     two.rename(first / f"later{one.suffix}")
     index = first / "metadata.yaml"
-    text = index.read_text().replace(f"- {one.name}\n", f"- later{one.suffix}\n  - {one.name}\n", 1)
-    index.write_text(text)
+    listed = index.read_text().replace("message_count: 200", f"message_count: {COUNT}")
+    name = f"- {one.name}\n"
+    index.write_text(listed.replace(name, f"- later{one.suffix}\n  {name}", 1))
     assert_same(imported(first, tmp_path)[1])
+
+
+def test_messages_that_the_metadata_promise_and_no_file_holds_are_told(tmp_path: Path) -> None:
+    path = write2(tmp_path / "bag", poses(), StoragePlugin.SQLITE3)
+    index = path / "metadata.yaml"
+    index.write_text(index.read_text().replace(f"count: {COUNT}", f"count: {2 * COUNT}"))
+    with pytest.warns(UserWarning, match=f"{COUNT} messages of {2 * COUNT} that are listed"):
+        assert_same(imported(path, tmp_path)[1])
 
 
 @pytest.mark.parametrize("end", ["-wal", "-journal"])

@@ -202,6 +202,14 @@ def test_a_unit_that_the_names_contradict_is_refused(
     assert text in refusal(written(tmp_path, table), tmp_path, **options)
 
 
+@pytest.mark.parametrize("column", ["t", "x"])
+def test_numbers_that_nothing_physical_has_are_refused(column: str, tmp_path: Path) -> None:
+    table = GOOD.copy()
+    table[column] += 1.7e12
+    text = refusal(written(tmp_path, table), tmp_path, unit="m", time_unit="s")
+    assert ("--time-unit" if column == "t" else "between -1e+07 and 1e+07 m") in text
+
+
 def test_columns_that_are_left_unused_are_told(tmp_path: Path) -> None:
     table = GOOD.assign(PedalDown=0, grip=0.5)
     report = tc.import_recording(written(tmp_path, table), tmp_path / "out")

@@ -7,10 +7,12 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+from mcap.writer import Writer
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 import teleop_core as tc
+from teleop_core.bags.layouts import layout
 from teleop_core.bags.memory import MemoryBag
 from teleop_core.bags.reader import Bag
 from teleop_core.bags.series import Series
@@ -144,3 +146,18 @@ def test_replay_takes_a_bag_without_buttons_of_another_name_and_rate(tmp_path: P
     assert len(again["slave/measured_cp"]) >= 2000
     moved = np.ptp(again["slave/measured_cp"][["x", "y", "z"]], axis=0).max()
     assert moved > 5e-3
+
+
+def test_a_recording_whose_frame_changes_is_told(tmp_path: Path) -> None:
+    place, path = MASTER_MEASURED_CP, tmp_path / "bag.mcap"
+    with path.open("wb") as file:
+        writer = Writer(file)
+        writer.start()
+        schema = writer.register_schema(place.kind.ros_type, "ros2msg", b"")
+        channel = writer.register_channel(place.name, "cdr", schema)
+        for i, stamp in enumerate(STAMPS.tolist()):
+            message = layout(place, (), "camera" if i >= 50 else "base").encode_one(stamp, POSES[i])
+            writer.add_message(channel, stamp, message, stamp)
+        writer.finish()
+    with pytest.warns(UserWarning, match=r"150 messages stand in the frame 'camera'.*'base'"):
+        assert len(Bag(path).read(place)) == COUNT

@@ -210,6 +210,14 @@ def discover(kind: Kind, data: bytes) -> Layout | None:
     return found if found.decode_one(data) is not None else None
 
 
+def frame_of(data: bytes) -> str:
+    """Frame in the header of a message; empty if there is none."""
+    try:
+        return _read_string(data, 12)[0]
+    except (struct.error, UnicodeDecodeError):
+        return ""
+
+
 def _read_length(data: bytes, at: int) -> tuple[int, int]:
     at += -at % 4
     return struct.unpack_from("<I", data, at)[0], at + 4

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from teleop_core.bags import ros_types
-from teleop_core.bags.layouts import Bytes, Layout, Stamps, Values, discover
+from teleop_core.bags.layouts import Bytes, Layout, Stamps, Values, discover, frame_of
 from teleop_core.bags.messages import Refusal, read_any
 from teleop_core.bags.walk import gather
 from teleop_core.graph.topics import BY_NAME, Kind
@@ -85,7 +85,7 @@ class Column:
         self.names: tuple[str, ...] = ()
         self.frame_id = ""
         self._is_new = True
-        self.total, self.left_out = 0, Counter[Refusal]()
+        self.total, self.left_out, self._frames = 0, Counter[Refusal](), Counter[str]()
 
     def read(self, data: Bytes, begins: Stamps, sizes: Stamps, log_ns: Stamps) -> Series:
         """Series of messages ``data[begins[i] : begins[i] + sizes[i]]``.
@@ -107,7 +107,12 @@ class Column:
         return [
             f"{self.name}: {count} of {self.total} messages are left out: each {reason.value}"
             for reason, count in self.left_out.items()
-        ]
+        ] + [
+            f"{self.name}: {count} messages stand in the frame {frame!r}, the first in "
+            f"{self.frame_id!r}"
+            for frame, count in self._frames.items()
+            if frame != self.frame_id and not self.kind.has_names
+        ]  # fmt: skip
 
     def _begin(self, data: Bytes, begins: Stamps, sizes: Stamps) -> None:
         """Learn from the first message that can be read, of those of the commonest size first."""
@@ -161,6 +166,7 @@ class Column:
                 self.left_out[result] += 1
                 continue
             kept.append(i)
+            self._frames[frame_of(bytes(data[begin : begin + size]))] += 1
             stamps.append(result[0])
             values.append(result[1])
         width = self.kind.width(len(self.names))

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from teleop_core.base.errors import RecordingError
+from teleop_core.base.ranges import check
 from teleop_core.kernels.portable import dot, length
 from teleop_core.session.exchange.options import LENGTHS, ImportOptions
 from teleop_core.session.exchange.source import Presses, Source
@@ -131,6 +132,7 @@ def _check(source: Source, parts: _Parts, count: int) -> None:
         raise RecordingError(source.path, f"{_strange(attitudes.kind)} in {share:.3g} % of the rows"
                              f"{_hint(attitudes.kind, attitudes.mirrored)}")  # fmt: skip
     source.check(parts.finite)
+    check("farthest place from the origin", parts.farthest, "m")
     if parts.farthest > FARTHEST and not source.is_unit_said:
         reason = (
             f"places are up to {parts.farthest:,.4g} m from the origin, if they are in metres; say "
@@ -178,6 +180,9 @@ def _stamps(
         told.append(f"times in {unit}" + (f" ({reason})" if reason else ""))
     del known
     stamps = joined_ns(parts.times, unit, _NO_TIME)
+    if (stamps == _NO_TIME).all():
+        reason = f"its times are {first:g} {unit} and so on, after 2096; give another --time-unit"
+        raise RecordingError(source.path, reason)
     usable &= (stamps != _NO_TIME) & ((stamps != 0) | (not is_bag))
     return stamps, usable, False
 

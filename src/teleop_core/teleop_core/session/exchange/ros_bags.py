@@ -6,6 +6,7 @@ reader of ROS 1 is handed a file that keeps it to that too.
 
 import io
 import re
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -69,9 +70,13 @@ class ForeignBag:
     def raw(self, topic: str) -> Iterator[Raw]:
         """As of any recording."""
         chosen = [c for c in self._reader.connections if plain(c.topic) == topic]
+        count, listed = 0, sum(connection.msgcount for connection in chosen)
         # There is one file: its own reader need not be merged with others.
         for _, log_ns, data in self._reader.readers[0].messages(connections=chosen):
+            count += 1
             yield log_ns, data
+        if count != listed:
+            warnings.warn(f"{topic}: {count} messages of {listed} that are listed", stacklevel=2)
 
 
 def is_plain_mcap(path: Path) -> bool:

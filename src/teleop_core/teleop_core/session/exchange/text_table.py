@@ -5,7 +5,7 @@ import re
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -94,8 +94,7 @@ class TextTable:
         if self._is_truth(column):
             return np.array([cell.strip().lower() == "true" for cell in cells], np.int64)
         if self.is_clock(column):
-            clock = pd.to_datetime(cells, format="ISO8601", utc=True).as_unit("ns")
-            return np.array(clock.astype("int64"), np.int64)
+            return _clock_ns(pd.Series(cells))
         if cells and all(re.fullmatch(r"[+-]?\d{1,18}", cell.strip()) for cell in cells):
             return np.array([int(cell) for cell in cells], np.int64)
         return np.array([number(cell, self._form.decimal) for cell in cells], np.float64)
@@ -162,6 +161,7 @@ class TextTable:
         wanted = sorted(dict.fromkeys(columns))
         kinds = {pa.float64(): "float64", pa.bool_(): "boolean"}
         types = {names[c]: kinds.get(self._type(c), "Int64") for c in wanted}
+        types |= {names[c]: "str" for c in wanted if self.is_clock(c)}
         reader = pd.read_csv(
             self.path, sep=_BLANK, header=None, names=names, usecols=[names[c] for c in wanted],
             skiprows=form.head, chunksize=ROWS, engine="c",
@@ -190,7 +190,16 @@ class TextTable:
         return f"column {self.names[int(number)]!r}" if number else "a column"
 
 
-def _numbers(column: "pd.Series[float]") -> Numbers:
+def _clock_ns(column: "pd.Series[str]") -> Numbers:
+    """Dates as times since 1970 [ns]; without a zone they are UTC."""
+    clock = pd.to_datetime(column, format="ISO8601", utc=True).dt.as_unit("ns")
+    stamps = np.asarray(clock.astype("int64"), np.int64)
+    return np.where(clock.isna(), np.nan, stamps) if clock.hasnans else stamps
+
+
+def _numbers(column: "pd.Series[Any]") -> Numbers:
+    if pd.api.types.is_string_dtype(column):
+        return _clock_ns(column)
     if column.dtype == "Int64" and not column.hasnans:
         return np.asarray(column.to_numpy(np.int64))
     return np.asarray(column.to_numpy(np.float64, na_value=np.nan))

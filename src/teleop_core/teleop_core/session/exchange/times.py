@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
+from teleop_core.base.ranges import LATEST_S
 from teleop_core.kernels.geometry import Array
 from teleop_core.session.exchange.options import TIMES_NS
 
@@ -16,7 +17,6 @@ SECOND_NS = 1_000_000_000
 RATES_HZ = (5.0, 3000.0)
 """Rates that a recording of a hand may have; the unit of its times follows from them."""
 _EPOCH_S = 3e8  # 1979: later times are seconds since 1970
-_FOREVER_S = 4e9
 _LONGEST_S = 60.0  # between two samples
 _STRETCH = 10  # rows; shorter ones are no recording of their own
 
@@ -42,7 +42,7 @@ def guessed_unit(raw: NDArray[np.float64] | Stamps) -> Unit:
         return Unit("s", "")
     for name, nanoseconds in TIMES_NS.items():
         seconds, period = (value * nanoseconds / SECOND_NS for value in (middle, step))
-        if _EPOCH_S < seconds < _FOREVER_S and period < _LONGEST_S:
+        if _EPOCH_S < seconds < LATEST_S and period < _LONGEST_S:
             return Unit(name, "they are times of the clock")
     best, distance = "s", float("inf")
     for name, nanoseconds in TIMES_NS.items():
@@ -56,13 +56,17 @@ def guessed_unit(raw: NDArray[np.float64] | Stamps) -> Unit:
 
 
 def joined_ns(parts: list[NDArray[np.float64] | Stamps], unit: str, without: int) -> Stamps:
-    """Times of all blocks [ns], with a number for those that are none; empties the list."""
+    """Times of all blocks [ns], with a number for those that are none; empties the list.
+
+    Times later than 2096 are none: their nanoseconds would not fit into 64 bits for long.
+    """
+    latest = LATEST_S * SECOND_NS / TIMES_NS[unit]
     out = np.empty(sum(map(len, parts)), np.int64)
     end = len(out)
     while parts:
         raw = parts.pop()
         begin = end - len(raw)
-        known = np.isfinite(raw)
+        known = np.abs(raw) <= latest  # NaN is not
         out[begin:end] = nanoseconds(np.where(known, raw, 0), unit)
         out[begin:end][~known] = without
         end = begin
@@ -116,17 +120,21 @@ def _longest_rising(stamps: Stamps) -> NDArray[np.int64]:
 
     So one stamp from the future costs its own row, not all rows until that time has come.
     """
-    before = np.empty(len(stamps), np.int64)
+    newest, oldest = np.maximum.accumulate(stamps), np.minimum.accumulate(stamps[::-1])[::-1]
+    is_kept = (stamps == newest) & (stamps == oldest)  # no other row contradicts these
+    others = np.flatnonzero(~is_kept)
+    before = np.empty(len(others), np.int64)
     ends: list[int] = []  # least last time of so many rows, and which row that is
     last: list[int] = []
-    for row, stamp in enumerate(stamps.tolist()):
+    for row, stamp in enumerate(stamps[others].tolist()):
         count = bisect_right(ends, stamp)
         before[row] = last[count - 1] if count else -1
         ends[count : count + 1], last[count : count + 1] = [stamp], [row]
-    rows, row = np.empty(len(last), np.int64), last[-1] if last else -1
-    for place in range(len(last) - 1, -1, -1):
-        rows[place], row = row, int(before[row])
-    return rows
+    row = last[-1] if last else -1
+    while row >= 0:
+        is_kept[others[row]] = True
+        row = int(before[row])
+    return np.flatnonzero(is_kept)
 
 
 def restarts(stamps: Stamps) -> NDArray[np.int64]:
