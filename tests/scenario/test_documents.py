@@ -16,6 +16,7 @@ import teleop_core
 import teleop_drill
 import teleop_lab
 from teleop_core.cli import _parser
+from teleop_core.evaluation.score import keys
 from teleop_core.graph.layers import parse_setting
 from teleop_core.session.api import configuration
 from teleop_core.session.virtual import VirtualTime
@@ -29,6 +30,7 @@ TUTORIALS = sorted((ROOT / "docs" / "tutorials").glob("*.md"))
 PAGES = [*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md"), *ROOT.glob("bags/*.md")]
 NAMES = [path.relative_to(ROOT).as_posix() for path in sorted(PAGES)]
 HISTORY = {"CHANGELOG.md", "docs/style.md"}  # what was written before, and the words themselves
+COUNTS = {"three": 3, "four": 4, "five": 5, "six": 6}
 PACKAGE_HEADING = "## As an installed package"
 
 
@@ -189,6 +191,27 @@ def test_parts_of_the_package_in_the_documents_are_there_once_it_is_installed(
     sim = ["sim", "--duration", "1", "--out", "bag", "--set", "fixture=fence", "fence.room=0.02",
            "operator=still"]  # fmt: skip
     run(["-m", "teleop_core.cli", *sim], tmp_path, PYTHONPATH=str(tmp_path))
+
+
+def test_every_key_of_a_score_that_a_page_names_is_one() -> None:
+    every = "\n".join(text_of(name) for name in NAMES if name not in HISTORY)
+    named = set(re.findall(r"\.value\(\s*\"([\w.]+)\"", every))
+    assert len(named) > 3
+    for key in named - {"farthest.max"}:  # of a metric that the page itself makes
+        assert any(known.covers(key.split(".")) for known in keys()), key
+
+
+def test_pages_agree_on_how_many_distributions_and_extras_there_are() -> None:
+    folders = [path.parent.name for path in ROOT.glob("src/*/pyproject.toml")]
+    folders += [path.parent.name for path in ROOT.glob("src/*/setup.py")]
+    count = len({name for name in folders if name != "crtk_msgs"})
+    for name in ("README.md", "docs/install.md", "docs/use.md"):
+        (said,) = set(re.findall(r"(\w+)\s+\[distributions\]", text_of(name)))
+        assert COUNTS[said] == count, name
+    setup = text_of("src/teleop_core/setup.py").split("extras_require")[1].split("\n    },")[0]
+    extras = set(re.findall(r"^        \"(\w+)\": \[", setup, re.MULTILINE))
+    (said,) = re.findall(r"(\w+) extras add more", text_of("docs/install.md"))
+    assert COUNTS[said.lower()] == len(extras - {"test", "bench", "docs"})
 
 
 def test_version_is_the_same_wherever_it_stands() -> None:

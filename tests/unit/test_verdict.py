@@ -2,6 +2,7 @@
 
 import io
 import json
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -17,6 +18,9 @@ from teleop_core.base.registry import Registry
 from teleop_core.chain.fixtures import FIXTURES, register_fixture
 from teleop_core.chain.fixtures.sphere import SPHERE
 from teleop_core.evaluation.command import evaluate_bags
+from teleop_core.evaluation.figure import Figure
+from teleop_core.evaluation.overview import overview
+from teleop_core.evaluation.rows import fixed, number
 from teleop_core.evaluation.verdict import verdict_of
 from teleop_core.graph.stage import STAGES, Stage, register_stage
 from teleop_core.graph.topics import SLAVE_MEASURED_CP, Kind, Topic, passed_on
@@ -38,7 +42,7 @@ def test_a_drift_is_named_before_the_share_that_was_followed() -> None:
                       "reach.joint_share": 0.06}  # fmt: skip
     found = verdict_of(drifted)
     assert found.text == (
-        "up to 67 mm from where the hand led; followed 94 % of the time (6.0 % at a joint's end)"
+        "largest lag behind the hand 67 mm; followed 94 % of the time (6.0 % at a joint's end)"
     )
     assert found.worst == "asked_error_mm.max"
     assert not found.is_good
@@ -47,16 +51,16 @@ def test_a_drift_is_named_before_the_share_that_was_followed() -> None:
 @pytest.mark.parametrize(
     ("changes", "worst", "text"),
     [
-        ({}, None, "nothing stands out: followed 99.9 % of the time, 0.3 mm RMS"),
+        ({}, None, "nothing stands out: followed 99.9 % of the time, tracking error 0.3 mm RMS"),
         ({"asked_error_mm.max": 12.0, "command_error_mm.max": 11.0}, None, "nothing"),  # filters
-        ({"latency_ms.total.p99": 80.0}, "latency_ms.total.p99", "80 ms from hand to setpoint"),
+        ({"latency_ms.total.p99": 80.0}, "latency_ms.total.p99", "delay p99 80 ms"),
         ({"ticks.made_up": 300}, "ticks.made_up", "300 control ticks made up late"),
         ({"ticks.dropped": 300}, "ticks.dropped", "300 control ticks never executed (3 %)"),
         ({"topics.slave/servo_cp.gaps": 1000, "topics.slave/servo_cp.lost": 400}, "topics",
          "1000 messages missing (10 %), 400 of them lost on the way"),
         ({"topics.slave/servo_cp.gaps": 1000}, "topics", "1000 messages missing (10 %)"),
-        ({"fixture.penetration_max_mm": 2.5}, "fixture.penetration_max_mm", "2.5 mm out of"),
-        ({"position_error_mm.rms": 4.0}, "position_error_mm.rms", "4 mm RMS"),
+        ({"fixture.penetration_max_mm": 2.5}, "fixture.penetration_max_mm", "fixture penetration"),
+        ({"position_error_mm.rms": 4.0}, "position_error_mm.rms", "tracking error 4 mm RMS"),
     ],
 )  # fmt: skip
 def test_whatever_is_worst_comes_first(
@@ -172,3 +176,38 @@ def test_a_fixture_that_is_not_scored_comes_before_whatever_else_is_wrong() -> N
     found = verdict_of(FINE | {"position_error_mm.rms": 9.0, "fixture.unscored": "slab: why"})
     assert found.worst == "fixture.unscored"
     assert found.text.startswith("not scored: slab: why; give ")
+
+
+# Numbers and small pictures.
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (190292.0951, "190292"), (1000.0, "1000"), (275.889, "275.9"), (24.0671, "24.07"),
+        (9.99951, "10.00"), (0.338, "0.338"), (0.0064, "0.0064"), (-0.0, "0.000"),
+        (2.4e-14, "0.000"), (-24.0671, "-24.07"), (None, "–"),
+    ],
+)  # fmt: skip
+def test_numbers_have_four_digits_and_no_minus_before_nothing(
+    value: float | None, text: str
+) -> None:
+    assert number(value) == text
+    assert fixed(-0.04, 1) == "0.0"
+
+
+@pytest.mark.parametrize(
+    ("way", "told"),
+    [((30.0, 0.0, 0.0), "from above, 30 × 0 mm"), ((0.0, 0.0, 30.0), "from the side, 0 × 30 mm"),
+     ((30.0, 20.0, 60.0), "from above, 30 × 20 mm")],
+)  # fmt: skip
+def test_the_small_picture_of_a_line_shows_its_length(
+    way: tuple[float, float, float], told: str, drifting: tc.Recording
+) -> None:
+    x, y, z = np.linspace((0.0, 0.0, 0.0), way, 50).T
+    curve = {"type": "scatter3d", "mode": "lines", "x": x, "y": y, "z": z}
+    page = overview([drifting.score()], [[Figure("Path in space", "", [curve], {}, 300)]], [[]])
+    assert told in page
+    (points,) = re.findall(r'points="([^"]+)"', page)
+    places = np.array([pair.split(",") for pair in points.split()], float)
+    assert np.ptp(places, axis=0).max() == pytest.approx(180.0, abs=0.2)

@@ -16,17 +16,19 @@ from teleop_core.evaluation.verdict import SHARE, Verdict, percent
 SHOWN = 5
 """Figures of a session."""
 _FIGURES = (
-    (SHARE, "%", "of the time followed"),
-    ("asked_error_mm.max", "mm", "at most from where the hand led"),
-    ("position_error_mm.rms", "mm", "RMS from the reference"),
-    ("orientation_error_deg.angle.rms", "°", "RMS turned off it"),
-    ("fixture.penetration_max_mm", "mm", "at most out of the fixture"),
-    ("latency_ms.total.p99", "ms", "from hand to setpoint, 99 of 100"),
-    ("force_n.max", "N", "at most on the hand"),
+    (SHARE, "%", "time followed"),
+    ("asked_error_mm.max", "mm", "largest lag behind the hand"),
+    ("position_error_mm.rms", "mm", "tracking error RMS"),
+    ("orientation_error_deg.angle.rms", "°", "orientation error RMS"),
+    ("fixture.penetration_max_mm", "mm", "largest fixture penetration"),
+    ("latency_ms.total.p99", "ms", "delay p99, hand to setpoint"),
+    ("force_n.max", "N", "peak force on the hand"),
     ("motion.hand.speed_median_mm_s", "mm/s", "median speed of the hand"),
 )
 _OFTEN_NOTHING = {"latency_ms.total.p99", "force_n.max", "fixture.penetration_max_mm"}
 _SIZE, _MARGIN, _POINTS = 200, 10, 400
+_UPRIGHT = 5.0
+"""Height over width from which on a path is seen from the side: from above it is a dot."""
 
 
 def overview(
@@ -73,39 +75,45 @@ def _pictures(plots: Sequence[Figure], bands: Sequence[Band]) -> str:
 
 
 def _path(plot: Figure) -> str:
-    """The curves of a plot in space, seen from above; empty for other plots."""
+    """The curves of a plot in space, seen from above, or from the side where that shows more."""
     curves = [trace for trace in plot.traces if trace.get("type") == "scatter3d" and _drawn(trace)]
     if not curves or "meta" in plot.layout:
         return ""
-    points = [_thin(trace["x"], trace["y"]) for trace in curves]
+    points = [_thin(*(trace[axis] for axis in "xyz")) for trace in curves]
     whole = np.concatenate(points)
-    low, high = whole.min(axis=0), whole.max(axis=0)
-    scale = (_SIZE - 2 * _MARGIN) / max(float((high - low).max()), 1e-6)
-    lines = "".join(_line(trace, (xy - 0.5 * (low + high)) * scale, trace is curves[-1])
-                    for trace, xy in zip(curves, points, strict=True))  # fmt: skip
-    told = f"from above, {high[0] - low[0]:.3g} × {high[1] - low[1]:.3g} mm"
+    low, extent = whole.min(axis=0), np.ptp(whole, axis=0)
+    seen, told = (0, 1), "from above"
+    if extent[2] > _UPRIGHT * max(extent[0], extent[1]):
+        seen, told = (int(extent[1] > extent[0]), 2), "from the side"
+    axes = list(seen)
+    middle, size = (low + 0.5 * extent)[axes], extent[axes]
+    scale = (_SIZE - 2 * _MARGIN) / max(float(size.max()), 1e-6)
+    lines = "".join(_line(trace, (place[:, axes] - middle) * scale, trace is curves[-1])
+                    for trace, place in zip(curves, points, strict=True))  # fmt: skip
+    told += f", {size[0]:.3g} × {size[1]:.3g} mm"
     return (
-        f'<figure><svg viewBox="0 0 {_SIZE} {_SIZE}" role="img" aria-label="path from above">'
+        f'<figure><svg viewBox="0 0 {_SIZE} {_SIZE}" role="img" aria-label="path">'
         f"{lines}</svg><small>{told}</small></figure>"
     )
 
 
 def _drawn(trace: dict[str, Any]) -> bool:
-    arrays = [trace.get(axis) for axis in "xy"]
+    arrays = [trace.get(axis) for axis in "xyz"]
     return all(isinstance(a, np.ndarray) and len(a) > 1 for a in arrays) and "lines" in str(
         trace.get("mode", "")
     )
 
 
-def _thin(x: Numbers, y: Numbers) -> Numbers:
-    points = np.column_stack((x, y)).astype(np.float64)
+def _thin(*places: Numbers) -> Numbers:
+    points = np.column_stack(places).astype(np.float64)
     points = points[np.isfinite(points).all(axis=1)]
     thin: Numbers = points[:: max(1, len(points) // _POINTS)]
-    return thin if len(thin) else np.zeros((1, 2))
+    return thin if len(thin) else np.zeros((1, 3))
 
 
 def _line(trace: dict[str, Any], points: Numbers, is_last: bool) -> str:
     color = trace.get("line", {}).get("color")
     color = color if isinstance(color, str) else "#c2370a" if is_last else "#9ed0fb"
     places = " ".join(f"{0.5 * _SIZE + x:.1f},{0.5 * _SIZE - y:.1f}" for x, y in points.tolist())
-    return f'<polyline points="{places}" fill="none" stroke="{escape(color)}" stroke-width="1.5"/>'
+    look = f'fill="none" stroke="{escape(color)}" stroke-width="1.5" stroke-linecap="round"'
+    return f'<polyline points="{places}" {look}/>'

@@ -8,6 +8,7 @@ import numpy as np
 
 from teleop_core.evaluation.bands import Band, merged
 from teleop_core.evaluation.figure import Figure, Numbers, is_against_time
+from teleop_core.evaluation.rows import fixed
 
 _WIDTH, _HEIGHT, _STRETCHES, _BANDS = 1000, 300, 200, 200
 
@@ -23,7 +24,7 @@ def preview(figure: Figure, bands: Sequence[Band]) -> str:
     rows = list(dict.fromkeys(str(trace.get("yaxis", "y")) for trace in curves))
     begin, end = _ends([trace["x"] for trace in curves])
     height = _HEIGHT / len(rows)
-    parts, told = [_bands(bands, begin, end)], [f"{begin:.1f} … {end:.1f} s"]
+    parts, told = [_bands(bands, begin, end)], [f"{fixed(begin, 1)} … {fixed(end, 1)} s"]
     for number, row in enumerate(rows):
         members = [trace for trace in curves if trace.get("yaxis", "y") == row]
         low, high = _ends([trace["y"] for trace in members])

@@ -10,6 +10,7 @@ if TYPE_CHECKING:
     from teleop_core.evaluation.score import Score
 
 MISSING = "–"
+_LEAST = 1e-9  # a number below it is rounding
 
 
 @dataclass(frozen=True)
@@ -69,10 +70,21 @@ def error_rows(group: str, label: str, unit: str, spread: Spread) -> list[Row]:
 
 
 def number(value: float | None, missing: str = MISSING) -> str:
-    """Text with three decimals, two significant digits for small values; ``missing`` for None."""
+    """Text with four significant digits, at most three of them decimals; ``missing`` for None.
+
+    Values below 0.1 have two significant digits, and what rounds to nothing is 0.
+    """
     if value is None:
         return missing
-    return f"{value:.3f}" if value == 0.0 or abs(value) >= 0.0995 else f"{value:#.2g}"
+    size = abs(value)
+    if _LEAST < size < 0.0995:
+        return f"{value:#.2g}"
+    return fixed(value, 3 if size < 9.9995 else 2 if size < 99.995 else 1 if size < 999.95 else 0)
+
+
+def fixed(value: float, decimals: int) -> str:
+    """Text with so many decimals, and without a minus sign where they are all zero."""
+    return f"{round(value, decimals) + 0.0:.{decimals}f}"
 
 
 _NOTHING = {MISSING, "0/0/0", "0, 0", "0/0"}

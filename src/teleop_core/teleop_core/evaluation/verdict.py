@@ -61,7 +61,7 @@ def verdict_of(values: Values) -> Verdict:
     if (share := _number(values, SHARE)) is not None:
         parts.append(f"followed {percent(share)} % of the time")
     if (error := _number(values, "position_error_mm.rms")) is not None:
-        parts.append(f"{error:.3g} mm RMS from its reference")
+        parts.append(f"tracking error {error:.3g} mm RMS")
     return Verdict(f"{parts[0]}: {', '.join(parts[1:])}" if parts[1:] else parts[0], None)
 
 
@@ -89,7 +89,7 @@ def _drift(values: Values) -> Iterator[Concern]:
     key = "asked_error_mm.max"
     off, lag = _number(values, key), _number(values, "command_error_mm.max") or 0.0
     if off is not None:
-        yield Concern((off - lag) / _DRIFT_MM, key, f"up to {off:.3g} mm from where the hand led")
+        yield Concern((off - lag) / _DRIFT_MM, key, f"largest lag behind the hand {off:.3g} mm")
 
 
 def _following(values: Values) -> Iterator[Concern]:
@@ -148,8 +148,8 @@ _UNTIMELY = {
 }
 _CONCERNS: tuple[Callable[[Values], Iterator[Concern]], ...] = (
     _missing, _drift, _following, _messages, _ticks,
-    _beyond("position_error_mm.rms", _ERROR_MM, "{:.3g} mm RMS from its reference"),
-    _beyond("fixture.penetration_max_mm", BOX_OVERSHOOT_MM, "{:.3g} mm out of the fixture"),
-    _beyond("contact.feeding", 0.5, "{:.0f} contacts whose wall gave back more than it took"),
-    _beyond("latency_ms.total.p99", _LATENCY_MS, "{:.3g} ms from hand to setpoint in 1 of 100"),
+    _beyond("position_error_mm.rms", _ERROR_MM, "tracking error {:.3g} mm RMS"),
+    _beyond("fixture.penetration_max_mm", BOX_OVERSHOOT_MM, "fixture penetration {:.3g} mm"),
+    _beyond("contact.feeding", 0.5, "non-passive contacts: {:.0f}"),
+    _beyond("latency_ms.total.p99", _LATENCY_MS, "delay p99 {:.3g} ms, hand to setpoint"),
 )  # fmt: skip

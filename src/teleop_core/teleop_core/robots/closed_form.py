@@ -26,7 +26,7 @@ from teleop_core.robots.branches import (
     wrapped,
 )
 from teleop_core.robots.damped import ZERO, assign
-from teleop_core.robots.dh_kernels import descend, descend_long, fk, is_hardly_moving
+from teleop_core.robots.dh_kernels import descend, descend_long, fk, pose_of_chain
 from teleop_core.robots.kinematics import IkStatus, pose_residual
 
 _ROUNDS, _PATH_ROUNDS = 60, 12  # of the search that makes the best of a branch out of limits
@@ -288,16 +288,15 @@ def settled(
     The last four rows of ``found`` are memory.
     """
     reached = found[found.shape[0] - 4 :]
-    is_there = is_allowed(q, seed, limits)
-    if is_there:
-        fk(q, geometry, reached)
-        is_there = pose_residual(reached, T, residual)
-    if not is_there:
-        _best_of_rest(T, seed, limits, geometry, reach == 2, found, count, q)
-        fk(q, geometry, reached)
-        if not pose_residual(reached, T, residual):
-            return _LIMITED if reach > 0 else _UNREACHABLE
-    return _NEAR_SINGULAR if is_hardly_moving(q, geometry) else _FOLLOWED
+    if is_allowed(q, seed, limits):
+        is_flat = pose_of_chain(q, geometry, reached)
+        if pose_residual(reached, T, residual):
+            return _NEAR_SINGULAR if is_flat else _FOLLOWED
+    _best_of_rest(T, seed, limits, geometry, reach == 2, found, count, q)
+    is_flat = pose_of_chain(q, geometry, reached)
+    if not pose_residual(reached, T, residual):
+        return _LIMITED if reach > 0 else _UNREACHABLE
+    return _NEAR_SINGULAR if is_flat else _FOLLOWED
 
 
 @kernel

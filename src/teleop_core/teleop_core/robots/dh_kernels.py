@@ -99,19 +99,19 @@ def jacobian(q: Array, geometry: Array, J: Array) -> None:
     if m > 0:
         motions, whole = np.empty(m), np.empty((6, m))
         spread(q, geometry[at + 1 :], motions)
-        _chain_jacobian(motions, geometry[at + 1 + 3 * m :], whole)
+        _chain_jacobian(motions, geometry[at + 1 + 3 * m :], np.empty((4, 4)), whole)
         for r in range(6):
             for j in range(q.shape[0]):
                 J[r, j] = 0.0
             for i in range(m):
                 J[r, int(geometry[at + 1 + i])] += geometry[at + 1 + m + i] * whole[r, i]
     else:
-        _chain_jacobian(q, geometry, J)
+        _chain_jacobian(q, geometry, np.empty((4, 4)), J)
 
 
 @inner
-def _chain_jacobian(q: Array, geometry: Array, J: Array) -> None:
-    n, T = q.shape[0], np.empty((4, 4))
+def _chain_jacobian(q: Array, geometry: Array, T: Array, J: Array) -> None:
+    n = q.shape[0]
     for i in range(4):
         for j in range(4):
             T[i, j] = 1.0 if i == j else 0.0
@@ -147,8 +147,13 @@ def _masked_error(reached: Array, T: Array, geometry: Array, n: int, error: Arra
 @inner
 def _weighted_jacobian(q: Array, geometry: Array, J: Array) -> None:
     """Write the Jacobian (6, n) with linear rows over the reach and uncontrolled rows zero."""
-    n = q.shape[0]
     jacobian(q, geometry, J)
+    _weigh(q.shape[0], geometry, J)
+
+
+@inner
+def _weigh(n: int, geometry: Array, J: Array) -> None:
+    """Weigh a Jacobian (6, n): linear rows over the reach, uncontrolled rows zero."""
     for r in range(6):
         weight = geometry[n + 1 + r] / (geometry[n] if r < 3 else 1.0)
         for j in range(n):
@@ -247,11 +252,30 @@ def _search(T: Array, seed: Array, box: Array, geometry: Array, q: Array) -> Non
 @inner
 def is_hardly_moving(q: Array, geometry: Array) -> bool:
     """Whether small moves of the tip need large joint moves at ``q`` (n,)."""
-    J, A = np.empty((6, q.shape[0])), np.empty((6, 6))
+    J = np.empty((6, q.shape[0]))
     _weighted_jacobian(q, geometry, J)
-    gram(J, np.ones(q.shape[0]), 0.0, A)
+    return _is_flat(q.shape[0], geometry, J)
+
+
+@inner
+def pose_of_chain(q: Array, geometry: Array, T: Array) -> bool:
+    """Write the pose (4, 4) of a chain without followers, and say :func:`is_hardly_moving`.
+
+    It takes one walk along the chain in place of two.
+    """
+    J = np.empty((6, q.shape[0]))
+    _chain_jacobian(q, geometry, T, J)
+    _weigh(q.shape[0], geometry, J)
+    return _is_flat(q.shape[0], geometry, J)
+
+
+@inner
+def _is_flat(n: int, geometry: Array, J: Array) -> bool:
+    """Whether some controlled direction of a weighted Jacobian (6, n) needs large joint moves."""
+    A = np.empty((6, 6))
+    gram(J, np.ones(n), 0.0, A)
     for r in range(6):
-        A[r, r] += 1.0 - geometry[q.shape[0] + 1 + r]
+        A[r, r] += 1.0 - geometry[n + 1 + r]
     factorise(A)
     pivot = A[0, 0]
     for r in range(1, 6):

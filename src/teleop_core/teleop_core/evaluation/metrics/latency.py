@@ -9,7 +9,7 @@ from teleop_core.evaluation.context import Context
 from teleop_core.evaluation.figure import DARK, FIRST, SECOND, THIRD, Figure, line
 from teleop_core.evaluation.metric import Key, Metric
 from teleop_core.evaluation.pairing import NONE, same_stamp
-from teleop_core.evaluation.rows import MISSING, Row, number
+from teleop_core.evaluation.rows import MISSING, Row, fixed, number
 from teleop_core.evaluation.windows import Window
 from teleop_core.graph.topics import Topic
 
@@ -112,7 +112,7 @@ def _short(value: float | None) -> str:
     """Text of a few milliseconds."""
     if not value:
         return "0"
-    return f"{value:.2f}" if abs(value) < 10.0 else f"{value:.1f}"
+    return fixed(value, 2 if abs(value) < 10.0 else 1)
 
 
 def _bin_width(delays: list[Distribution]) -> int:
