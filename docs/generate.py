@@ -2,11 +2,13 @@
 
 python docs/generate.py            write the pages
 python docs/generate.py --check    say which of them differ, and fail if one does
+python docs/generate.py --quick    leave out the tables that take sessions of 20 s: half a minute
 """
 
 import argparse
 import sys
 from collections.abc import Iterator
+from itertools import chain
 from pathlib import Path
 
 from teleop_core.base.parameters import specs
@@ -34,6 +36,7 @@ from teleop_core.session.configuration import parameter_rows
 from teleop_core.slave.plants.hardware import HardwareParameters
 
 sys.path.insert(0, str(Path(__file__).parent))
+import passivity_tables
 from reference_pages import api_page, commands_page, examples_page
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -236,8 +239,21 @@ def between(text: str, markers: tuple[str, str], written: str) -> str:
     return f"{before}{begin}\n{written}\n{end}{after}"
 
 
+def session_pages() -> Iterator[tuple[Path, str]]:
+    """Pages with tables that come from sessions."""
+    tables = passivity_tables.tables()
+    for name in ("passivity.md", "network.md"):
+        path = ROOT / "docs" / name
+        text = path.read_text(encoding="utf-8")
+        for key, written in tables.items():
+            markers = f"<!-- {key}: written by docs/generate.py -->", f"<!-- end of {key} -->"
+            if markers[0] in text:
+                text = between(text, markers, f"\n{written}\n")
+        yield path, text
+
+
 def pages() -> Iterator[tuple[Path, str]]:
-    """Every generated file with what it must hold."""
+    """Every generated file with what it must hold, but for :func:`session_pages`."""
     graph, docs = build_graph(), ROOT / "docs"
     yield ROW, row_module()
     yield docs / "parameters.md", parameters_page()
@@ -257,9 +273,10 @@ def main() -> int:
     """Write the pages, or check them; returns the exit code."""
     parser = argparse.ArgumentParser(description="Write the generated pages of the documents.")
     parser.add_argument("--check", action="store_true", help="write nothing, fail if one differs")
-    is_check = parser.parse_args().check
-    stale = []
-    for path, text in pages():
+    parser.add_argument("--quick", action="store_true", help="leave out tables that take sessions")
+    options = parser.parse_args()
+    is_check, stale = options.check, []
+    for path, text in chain(pages(), () if options.quick else session_pages()):
         before = path.read_text(encoding="utf-8") if path.exists() else ""
         if before != text:
             stale.append(path.relative_to(ROOT).as_posix())

@@ -32,6 +32,7 @@ _CONTACT, _PUNCTURE = "slave/world/contact.py", "slave/world/puncture.py"
 _SCALING, _LINK = "chain/mapping/motion_scaling.py", "chain/network/link.py"
 _SIDE = "chain/mapping/side.py"
 _TDPA, _CENTRE = "chain/passivity/tdpa.py", "chain/fixtures/remote_centre.py"
+_HELD = "chain/passivity/held_back.py"
 _CENTRE_SCORE, _TOUCH = "evaluation/metrics/remote_centre.py", "evaluation/metrics/touch.py"
 _JAW, _JAW_SCORE = "slave/jaw/jaw.py", "evaluation/metrics/jaw.py"
 _GRIP, _TRANSFER = "slave/jaw/grip.py", "evaluation/metrics/transfer.py"
@@ -179,12 +180,21 @@ CODE_MUTANTS = (
             "memory[1] = memory[1] if memory[0] >= 1.0 else float(chances[0] < border)",
             "network"),
     _mutant("never_stopped", "a tank lets the command go on against any force",
-            "chain/passivity/tank.py", "max(numbers[5] - size, 0.0)", "numbers[5]", "passivity"),
+            "chain/passivity/tank.py", "command, numbers[5], period)", "command, 1e9, period)",
+            "passivity"),
     _mutant("told_twice", "what was told to the other side is also spent here", _TDPA,
             "        port[MARGIN] -= told\n", "        port[MARGIN] -= 0.0\n", "passivity"),
-    _mutant("overdrawn", "the arm may give twice of what was paid",
-            "chain/passivity/held_back.py", "if inwards > left and size > least:",
-            "if inwards > 2.0 * left and size > least:", "passivity"),
+    _mutant("forgiven", "what the arm owes is forgiven", _TDPA,
+            "    tell(port, 0.0)\n", "    port[MARGIN] = max(port[MARGIN], 0.0)\n"
+            "    tell(port, 0.0)\n", "passivity"),
+    _mutant("overdrawn", "the arm may go twice as far as was paid for", _HELD,
+            "    length = norm(lead)\n", "    length = 0.5 * norm(lead)\n", "passivity"),
+    _mutant("turned_free", "turns against a torque cost nothing", _HELD,
+            "    if excess > 0.0:", "    if excess > 1e9:", "passivity"),
+    _mutant("turns_uncounted", "what torques took and gave is not counted as paid",
+            "chain/passivity/slave_side.py", "        came += turned\n", "", "passivity"),
+    _mutant("drag_missing", "the hand never pays for a slave that has nothing", _TDPA,
+            "drag = numbers[2] * min", "drag = 0.0 * min", "passivity"),
     _mutant("wave_cheap", "a wave costs half of its energy", "chain/passivity/wave.py",
             "return 0.5 * square * share", "return 0.25 * square * share", "wave"),
     _mutant("wave_echo", "the hand's wave does not take in the one that came",

@@ -90,6 +90,16 @@ def test_every_stream_is_that_of_before_to_the_bit(scenario: str, seed: int) -> 
 
 
 @pytest.mark.slow
+def test_tables_of_documents_that_take_sessions_are_what_the_code_says() -> None:
+    if arithmetic() != json.loads(FILE.read_text())["arithmetic"]:
+        pytest.skip("sines of this machine round otherwise than those of the documents")
+    script = Path(__file__).parents[2] / "docs" / "generate.py"
+    done = subprocess.run([sys.executable, script, "--check"], capture_output=True, text=True,
+                          check=False)  # fmt: skip
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+@pytest.mark.slow
 def test_processors_that_round_otherwise_in_numpy_and_blas_give_the_same_bits() -> None:
     here = _short_sessions({})
     for processor in PROCESSORS:

@@ -349,7 +349,7 @@ def test_what_is_not_linear_is_told_in_place_of_its_numbers(
     told = {row.quantity: row for row in rows}
     assert present(told["off the lines, tissue, 100 ms"].predicted) > 100.0 * STRAY
     assert not any("tissue, share" in quantity or "Llewellyn" in quantity for quantity in told)
-    assert told["position, -3 dB, 100 ms"].predicted == pytest.approx(2.12, rel=0.02)
+    assert not any("-3 dB" in quantity for quantity in told)  # the slave goes as far as is paid for
 
 
 def test_figures_of_transparency_have_numbers_and_words(

@@ -37,6 +37,12 @@ FINE = {
 }  # fmt: skip
 
 
+def ports(*energies: float) -> dict[str, float]:
+    """Energies [mJ] in at hand and slave, then out."""
+    keys = ("hand.in_mj", "slave.in_mj", "hand.out_mj", "slave.out_mj")
+    return {f"passivity.{key}": value for key, value in zip(keys, energies, strict=True)}
+
+
 def test_a_drift_is_named_before_the_share_that_was_followed() -> None:
     drifted = FINE | {"reach.followed_share": 0.94, "asked_error_mm.max": 67.0,
                       "reach.joint_share": 0.06}  # fmt: skip
@@ -61,6 +67,8 @@ def test_a_drift_is_named_before_the_share_that_was_followed() -> None:
         ({"topics.slave/servo_cp.gaps": 1000}, "topics", "1000 messages missing (10 %)"),
         ({"fixture.penetration_max_mm": 2.5}, "fixture.penetration_max_mm", "fixture penetration"),
         ({"position_error_mm.rms": 4.0}, "position_error_mm.rms", "tracking error 4 mm RMS"),
+        (ports(40.0, 3.0, 11.0, 64.0), "passivity.slave.out_mj", "hand and slave gave 75 mJ, 32"),
+        (ports(40.0, 3.0, 11.0, 32.5), None, "nothing"),  # what is lent
     ],
 )  # fmt: skip
 def test_whatever_is_worst_comes_first(

@@ -90,7 +90,7 @@ def drive(
             for i in range(3):
                 command[i] = place[i]
             period = DT * max(there[n] - before, 1) if before >= 0 else DT
-            wave_slave(slave, right, to_slave, felt, given, heard, s, command, period)
+            wave_slave(slave, right, to_slave, felt, given, given, heard, s, command, period)
             for i in range(3):
                 given[i], to_slave[i] = command[i], 0.0
             before = there[n]

@@ -14,6 +14,8 @@ NAMED = 3
 # From where on something is a concern. Assumed, but for the overshoot of a fixture and the share of
 # the time followed, below which no published figure is compared.
 _FOLLOWED, _DRIFT_MM, _ERROR_MM, _LATENCY_MS, _SHARE = 0.99, 5.0, 1.0, 20.0, 1e-3
+_CREATED_MJ = 1.0
+"""More than passivity lends, and the last touch before a recording ends."""
 _CAUSES = {
     "joint": "at a joint's end", "workspace": "beyond the workspace", "speed": "joints too slow",
     "singularity": "near a singularity", "aligning": "aligned anew",
@@ -142,12 +144,22 @@ def _ticks(values: Values) -> Iterator[Concern]:
             yield Concern(share / fine, key, f"{text.format(count)} ({100.0 * share:.2g} %)")
 
 
+def _created(values: Values) -> Iterator[Concern]:
+    """Energy that came out of hand and slave beyond what went in, where both were recorded."""
+    into, out = ([_number(values, f"passivity.{side}.{way}_mj") for side in ("hand", "slave")]
+                 for way in ("in", "out"))  # fmt: skip
+    if None not in (*into, *out):
+        taken, given = (sum(part or 0.0 for part in parts) for parts in (into, out))
+        text = f"hand and slave gave {given:.3g} mJ, {given - taken:.3g} mJ more than they took"
+        yield Concern((given - taken) / _CREATED_MJ, "passivity.slave.out_mj", text)
+
+
 _UNTIMELY = {
     "ticks.made_up": (5e-3, "{:.0f} control ticks made up late, as on a busy machine"),
     "ticks.dropped": (_SHARE, "{:.0f} control ticks never executed"),
 }
 _CONCERNS: tuple[Callable[[Values], Iterator[Concern]], ...] = (
-    _missing, _drift, _following, _messages, _ticks,
+    _missing, _drift, _following, _messages, _ticks, _created,
     _beyond("position_error_mm.rms", _ERROR_MM, "tracking error {:.3g} mm RMS"),
     _beyond("fixture.penetration_max_mm", BOX_OVERSHOOT_MM, "fixture penetration {:.3g} mm"),
     _beyond("contact.feeding", 0.5, "non-passive contacts: {:.0f}"),

@@ -14,7 +14,7 @@ _LEVEL = "published: UVA-DSA telesurgery QoS analysis 2026, the first level of o
 class OutagesParameters:
     """How long everything passes between outages, and how long nothing does at most.
 
-    The share ``longest / (longest + 2 pause)`` is lost in the long run.
+    The share ``longest / (longest + 2 pause)`` is lost over a long time.
     """
 
     pause: float = parameter(

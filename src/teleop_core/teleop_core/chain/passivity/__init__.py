@@ -27,7 +27,7 @@ _ROW = types.float64[::1]
 HAND = types.void(
     _ROW, _ROW, _ROW, _ROW, _ROW, _ROW, _ROW, _ROW, _ROW, types.float64, types.float64
 )
-SLAVE = types.void(_ROW, _ROW, _ROW, _ROW, _ROW, _ROW, _ROW, _ROW, types.float64)
+SLAVE = types.void(_ROW, _ROW, _ROW, _ROW, _ROW, _ROW, _ROW, _ROW, _ROW, types.float64)
 """Signatures of both kernels, so that one compiled stage serves every kind."""
 MEMORY = 12
 """Numbers that each side of a kind remembers."""
@@ -35,8 +35,8 @@ MEMORY = 12
 
 @kernel
 def leave_command(
-    numbers: Array, memory: Array, flow: Array, force: Array, last: Array, heard: Array,
-    port: Array, command: Array, period: float,
+    numbers: Array, memory: Array, flow: Array, force: Array, tip: Array, last: Array,
+    heard: Array, port: Array, command: Array, period: float,
 ) -> None:  # fmt: skip
     """Let the slave have the command as it came."""
 
@@ -60,11 +60,11 @@ class Passivity:
             slave, over the gain of motion [m], all along the master's base;
             ``push`` (3,) the one that is asked for, to be made the one that is given; ``scale`` the
             hand's energy over that of the slave; ``period`` the time since the sample before [s].
-        slave: ``slave(numbers, memory, flow, force, last, heard, port, command, period)``, called
-            for every command that arrives, with a stage ``passivity`` alone. ``numbers`` are those
-            of that stage; ``force`` (6,) is on the tip [N, N m]; ``last`` (7,) the command before
-            it, as it was given; ``command`` (7,) the one that came, to be made the one that is
-            given.
+        slave: ``slave(numbers, memory, flow, force, tip, last, heard, port, command, period)``,
+            called for every command that arrives, with a stage ``passivity`` alone. ``numbers`` are
+            those of that stage; ``force`` (6,) is on the tip [N, N m], whose pose is ``tip`` (7,);
+            ``last`` (7,) the command before it, as it was given; ``command`` (7,) the one that
+            came, to be made the one that is given.
         numbers: ``numbers(parameters)`` gives what ``hand`` takes; None for the numbers of the
             parameters in their order.
         needs_slave: Whether it works with a stage ``passivity`` alone.
@@ -110,7 +110,9 @@ def _try(part: Passivity) -> None:
             part.hand(
                 numbers, memory, push.copy(), moved, moved, flow, heard, port, push, 1.0, 1e-3
             )  # fmt: skip
-            part.slave(np.ones(6), memory, flow, np.full(6, size), last, heard, port, command, 1e-3)
+            part.slave(
+                np.ones(7), memory, flow, np.full(6, size), last, last, heard, port, command, 1e-3
+            )  # fmt: skip
             is_sound = np.isfinite(push).all() and np.isfinite(command).all()
             if not (is_sound and is_whole(fence) and is_whole(behind) and is_whole(after)):
                 text = f"one whose push and command are finite, not {push!r} and {command!r}"

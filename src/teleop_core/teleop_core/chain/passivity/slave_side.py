@@ -57,15 +57,15 @@ class PassivityParameters:
         source="assumed: that of an ideal sensor",
     )  # fmt: skip
     credit: float = parameter(
-        2e-3, unit="J", lower=0.0, upper=1.0,
-        doc="energy that the arm lends in a touch before the hand has paid; what the world gives "
-        "back goes to it first, never to the hand",
-        source="assumed: what presses tissue with 0.9 N; an arm that runs into steel brings more",
+        2e-4, unit="J", lower=0.0, upper=1.0,
+        doc="energy that the arm lends before the hand has paid: once with tank and tdpa, in each "
+        "touch with wave; what the world gives back goes to it first, never to the hand",
+        source="assumed: moves the arm by half a millimetre until the hand has paid",
     )  # fmt: skip
     credit_force: float = parameter(
         1.0, unit="N", lower=1e-3, upper=100.0,
-        doc="force on the tip up to which it lends all of that; from twice the force on it lends "
-        "nothing, and what an arm that ran into something hard overdrew is given back",
+        doc="with wave, force on the tip up to which it lends all of that; from twice the force on "
+        "it lends nothing, and what an arm that ran into something hard overdrew is given back",
         source="assumed: a gentle touch",
     )  # fmt: skip
     stop_force: float = parameter(
@@ -73,6 +73,12 @@ class PassivityParameters:
         doc="force on the tip at which a tank stops a command that goes against it; the arm, which "
         "comes behind its command, presses harder",
         source="assumed: below what RCRT-1's drives give for long",
+    )  # fmt: skip
+    approach_stiffness: float = parameter(
+        1300.0, unit="N/m", lower=1.0, upper=1e6,
+        doc="stiffness of what may be met: with tank and tdpa the command is ahead of the tip no "
+        "farther than what is left pays for on the way into it",
+        source="assumed: silicone; into softer things the arm needs less, and harder ones stop it",
     )  # fmt: skip
 
 
@@ -118,7 +124,9 @@ def _observe(s: PortState, laws: Laws, row: Row, port: Array) -> None:
         turn_between(s.tip[3:7], row.slave_measured_cp[3:7], laws.turn)
         came = port_work(s.felt[0:3], laws.step)
         count(port, IN, came)
-        count(port, TURN_IN, port_work(s.felt[3:6], laws.turn))
+        turned = port_work(s.felt[3:6], laws.turn)
+        count(port, TURN_IN, turned)
+        came += turned
         laws.flow[1] += max(came, 0.0)
         laws.flow[2] += max(-came, 0.0)
     copy(row.slave_measured_cp, s.tip)
@@ -157,12 +165,11 @@ def passivity_step(p: Fields, s: PortState, laws: Laws, row: Row, dt: float) -> 
     elapsed = max(1e-9 * (row.slave_servo_cp_ns - s.command_ns), dt) if s.has_last else dt
     s.command_ns = row.slave_servo_cp_ns
     copy(row.slave_servo_cp, row.passivity_servo_cp)
-    if s.has_last == 0:
-        copy(row.slave_servo_cp, laws.last)
     law = int(port[LAW])
-    if 0 <= law < len(laws.slaves):
+    # The first command of a round is where the slave is; while it goes its own way all are.
+    if s.has_last and 0 <= law < len(laws.slaves):
         laws.slaves[law](
-            laws.numbers, laws.memory, laws.flow, s.force, laws.last, heard, port,
+            laws.numbers, laws.memory, laws.flow, s.force, s.tip, laws.last, heard, port,
             row.passivity_servo_cp, elapsed,
         )  # fmt: skip
     copy(row.passivity_servo_cp, laws.last)
@@ -181,7 +188,7 @@ class SlaveSide(RunningStage):
         slaves = tuple(PASSIVITIES.find(name).slave_pointer for name in PASSIVITIES)
         self._laws = Laws(
             slaves,
-            np.zeros(6),
+            np.zeros(7),
             np.zeros(MEMORY),
             np.zeros(3),
             np.zeros(3),
@@ -205,6 +212,7 @@ class SlaveSide(RunningStage):
         self._laws.numbers[:] = (
             parameters.recovery, parameters.recovery_speed, parameters.least_force,
             parameters.credit, parameters.credit_force, parameters.stop_force,
+            parameters.approach_stiffness,
         )  # fmt: skip
 
 

@@ -1,9 +1,9 @@
 """TDPA: observers and controllers at both ports, by energies that only grow.
 
 Each side tells the other how much of what came in at its port the other one may give. The hand's
-push is no larger than what was heard pays for until the next sample; the slave's command goes
-against the force on its tip only as far as what was heard pays for. What the command loses so is
-made up for where that costs nothing, or can be paid.
+push is no larger than what was heard pays for until the next sample; the slave's command is ahead
+of the tip only as far as what was heard pays for. What the command loses so is made up for where
+that can be paid. While the slave has little, the hand pays by a drag.
 """
 
 import math
@@ -11,22 +11,41 @@ from dataclasses import dataclass
 
 from teleop_core.base.parameters import parameter
 from teleop_core.chain.passivity import Passivity
-from teleop_core.chain.passivity.held_back import hold_back, make_up, met_way, norm
-from teleop_core.chain.passivity.port import DRIFT, IN, MARGIN, TOLD
-from teleop_core.chain.passivity.tank import READING, SPARE
+from teleop_core.chain.passivity.held_back import hold_lead, make_up, met_way, norm
+from teleop_core.chain.passivity.port import DRIFT, HEARD, IN, LAW, MARGIN, ROUND, TOLD
 from teleop_core.kernels import inner, kernel
 from teleop_core.kernels.geometry import Array
 
+READING = 0.06e-3
+"""A step of the device's reading [m]."""
+SPARE = 0.005
+"""Push that is given without any energy to pay for it [N]."""
+SPEED_TIME = 0.01
+"""Time constant of the speed that a drag answers, above the steps of the reading [s]."""
+_SPEED = 1
+"""Place of the hand's speed in its memory."""
+
 
 @dataclass(frozen=True, kw_only=True)
-class TdpaParameters:
-    """How much the hand's side keeps for itself."""
+class StoreParameters:
+    """How much the hand's side keeps for itself, and what it sees to that the slave has."""
 
     kept_way: float = parameter(
         3e-4, unit="m", lower=0.0, upper=0.01,
         doc="what the hand gave is told to the slave but for the present push over this way, which "
         "is kept so that the push outlasts a step of the reading outwards",
         source="assumed: five steps of the device's reading, 0.055 mm",
+    )  # fmt: skip
+    store: float = parameter(
+        6e-3, unit="J", lower=0.0, upper=1.0,
+        doc="energy that the slave shall have before it touches anything; while it has less the "
+        "hand feels a drag",
+        source="derived: half of approach_stiffness times the square of the 3 mm by which the arm "
+        "lags behind a command of 60 mm/s",
+    )  # fmt: skip
+    drag: float = parameter(
+        10.0, unit="N·s/m", lower=0.0, upper=100.0,
+        doc="that drag, where the slave has nothing or less", source="assumed: that of a wave",
     )  # fmt: skip
 
 
@@ -46,23 +65,33 @@ def tdpa_hand(
 ) -> None:  # fmt: skip
     """Make the push (3,) [N] no larger than what is left can pay for until the next sample.
 
-    What is left is what was heard and what came in, less what was told and what went out; a touch
-    that is over leaves nothing.
+    What is left is what was heard and what came in, less what was told and what went out. A touch
+    that is over leaves nothing, but what is owed stays owed. Where a slave's port is heard of, it
+    is told what came in; while it has less than its store, or energy is owed here, a drag on the
+    hand brings some in.
 
     Source:
         Ryu, Artigas and Preusche 2010 for the law. Theirs is a damper by a measured speed; the
-        bound for the next sample, which needs none, is that of the tank here.
+        bound for the next sample, which needs none, is that of the tank here. The drag is the
+        tank level controller of Franken, Stramigioli, Misra, Secchi and Macchelli 2011.
     """
     way = square = 0.0
     for i in range(3):
         way += abs(moved[i])
         square += push[i] * push[i]
+        memory[_SPEED + i] += (moved[i] - memory[_SPEED + i] * period) / (SPEED_TIME + period)
     port[MARGIN] += flow[0] + flow[1] - flow[2]
-    size = math.sqrt(square)
-    tell(port, numbers[0] * size / scale)
+    size, lacks = math.sqrt(square), max(-port[MARGIN], 0.0)
+    if heard[LAW] == port[LAW] and heard[ROUND] == port[ROUND]:
+        tell(port, numbers[0] * size / scale)
+        # What was told and is on its way counts as there.
+        lacks += max(numbers[1] - heard[MARGIN] - (port[TOLD] - heard[HEARD]), 0.0)
     if square == 0.0:
-        port[MARGIN] = 0.0
+        port[MARGIN] = min(port[MARGIN], 0.0)
     pay_push(port, push, size, way, scale)
+    drag = numbers[2] * min(lacks / max(numbers[1], 1e-9), 1.0)
+    for i in range(3):
+        push[i] -= drag * memory[_SPEED + i]
 
 
 @inner
@@ -77,24 +106,50 @@ def pay_push(port: Array, push: Array, size: float, way: float, scale: float) ->
             push[i] *= most / size
 
 
+@inner
+def keep_account(numbers: Array, flow: Array, force: Array, port: Array) -> float:
+    """Count what is left at the slave's port, tell of it, and return it with the credit [J].
+
+    Nothing that is owed is ever forgiven, so what the arm lends in all is bounded.
+    """
+    port[MARGIN] += flow[0] + flow[1] - flow[2]
+    tell(port, 0.0)
+    return port[MARGIN] + numbers[3]
+
+
+@inner
+def lead_slave(
+    numbers: Array, memory: Array, flow: Array, force: Array, tip: Array, last: Array, port: Array,
+    command: Array, stop: float, period: float,
+) -> None:  # fmt: skip
+    """Make of the command (7,) that came the one that is given; see :func:`tdpa_slave`."""
+    left, drift = keep_account(numbers, flow, force, port), port[DRIFT : DRIFT + 3]
+    met = met_way(command, last, drift) if norm(force) <= numbers[2] else 0.0
+    make_up(numbers, drift, met, period)
+    for i in range(3):
+        command[i] -= drift[i]
+    hold_lead(numbers, memory, left, stop, force, tip, port, command)
+
+
 @kernel
 def tdpa_slave(
-    numbers: Array, memory: Array, flow: Array, force: Array, last: Array, heard: Array,
-    port: Array, command: Array, period: float,
+    numbers: Array, memory: Array, flow: Array, force: Array, tip: Array, last: Array,
+    heard: Array, port: Array, command: Array, period: float,
 ) -> None:  # fmt: skip
-    """Let the command (7,) go against the force as far as what is left pays for.
+    """Let the command (7,) be ahead of the tip as far as what is left pays for.
 
-    What went out counts as the larger one of what the command spent, and of what the tip really
-    gave: the arm comes behind its command. ``memory`` holds what is left by the command [J]; the
-    last three numbers of ``port`` are the drift, from what is given to what was commanded [m].
+    What is left is counted at the tip, by its force and its way on all six axes: what was heard and
+    what came in, less what was told and what went out, and the credit, once for all. The last
+    numbers of ``port`` are the drift, from what is given to what was commanded [m].
 
     Args:
         numbers: Time constant [s] and largest speed [m/s] with which drift goes away, a force below
-            which nothing is touched [N], what the arm may lend in a touch [J], and up to which
-            force all of it; none from twice that force on [N]; the last is not used.
-        memory: Written.
+            which nothing is touched [N], what the arm may lend [J], two that are not used, and the
+            stiffness against which a lead is paid for [N/m].
+        memory: Direction of the last force; written.
         flow: Heard, in, out [J].
         force: On the tip (6,).
+        tip: Its pose (7,).
         last: Command before, as it was given.
         heard: Not used.
         port: Written.
@@ -106,37 +161,7 @@ def tdpa_slave(
         Singh, Lizarralde and Kondak 2019 for drift that is made up for while energy is left. That
         drift goes away in the air by the way on which the command comes back is ours.
     """
-    drift = port[DRIFT : DRIFT + 3]
-    port[MARGIN] += flow[0] + flow[1] - flow[2]
-    memory[0] += flow[0] + flow[1]
-    met = 0.0
-    if norm(force) <= numbers[2]:
-        port[MARGIN] = memory[0] = 0.0
-        met = met_way(command, last, drift)
-    told = port[TOLD]
-    tell(port, 0.0)
-    memory[0] -= port[TOLD] - told
-    make_up(numbers, drift, met, period)
-    for i in range(3):
-        command[i] -= drift[i]
-    pay_command(numbers, memory, force, last, port, command, period)
+    lead_slave(numbers, memory, flow, force, tip, last, port, command, 1e9, period)
 
 
-@inner
-def pay_command(
-    numbers: Array, memory: Array, force: Array, last: Array, port: Array, command: Array,
-    period: float,
-) -> None:  # fmt: skip
-    """Let the command (7,) go against the force as far as what is left pays for; the rest is drift.
-
-    Arguments are those of :func:`tdpa_slave`.
-    """
-    size = norm(force)
-    lent = numbers[3] * min(max(2.0 - size / numbers[4], 0.0), 1.0)
-    # What is overdrawn is given back by going back, no faster than drift goes away.
-    left = max(min(port[MARGIN], memory[0]) + lent, -size * numbers[1] * period)
-    inwards = hold_back(force, size, last, left, numbers[2], port, command)
-    memory[0] -= max(inwards, 0.0)
-
-
-TDPA = Passivity("tdpa", TdpaParameters, tdpa_hand, tdpa_slave)
+TDPA = Passivity("tdpa", StoreParameters, tdpa_hand, tdpa_slave)

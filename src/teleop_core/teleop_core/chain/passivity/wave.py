@@ -12,7 +12,7 @@ import numpy as np
 
 from teleop_core.base.parameters import parameter
 from teleop_core.chain.passivity import Passivity
-from teleop_core.chain.passivity.held_back import make_up, norm
+from teleop_core.chain.passivity.held_back import hold_back, make_up, norm
 from teleop_core.chain.passivity.port import (
     DRIFT,
     HEARD,
@@ -22,7 +22,7 @@ from teleop_core.chain.passivity.port import (
     TOLD,
     WAVE,
 )
-from teleop_core.chain.passivity.tdpa import pay_command, pay_push
+from teleop_core.chain.passivity.tdpa import SPEED_TIME, pay_push
 from teleop_core.kernels import inner, kernel
 from teleop_core.kernels.geometry import Array
 
@@ -41,8 +41,6 @@ class WaveParameters:
 
 DRAG = 1.5
 """Drag that the hand feels over what its wave takes: what is more pays for what the wave lacks."""
-SPEED_TIME = 0.01
-"""Time constant of the speed that the drag answers, above the steps of the reading [s]."""
 HASTE = 0.01
 """Time in which energy is spent on a wave that lags behind what it is to say [s]."""
 KEPT_WAY = 3e-4
@@ -146,10 +144,27 @@ def wave_hand(
         push[i] -= DRAG * b * memory[SPEED + i]
 
 
+@inner
+def pay_command(
+    numbers: Array, memory: Array, force: Array, last: Array, port: Array, command: Array,
+    period: float,
+) -> None:  # fmt: skip
+    """Let the command (7,) go against the force as far as what is left pays for; the rest is drift.
+
+    Arguments are those of :func:`wave_slave`.
+    """
+    size = norm(force)
+    lent = numbers[3] * min(max(2.0 - size / numbers[4], 0.0), 1.0)
+    # What is overdrawn is given back by going back, no faster than drift goes away.
+    left = max(min(port[MARGIN], memory[0]) + lent, -size * numbers[1] * period)
+    inwards = hold_back(force, size, last, left, numbers[2], port, command)
+    memory[0] -= max(inwards, 0.0)
+
+
 @kernel
 def wave_slave(
-    numbers: Array, memory: Array, flow: Array, force: Array, last: Array, heard: Array,
-    port: Array, command: Array, period: float,
+    numbers: Array, memory: Array, flow: Array, force: Array, tip: Array, last: Array,
+    heard: Array, port: Array, command: Array, period: float,
 ) -> None:  # fmt: skip
     """Write the command (7,) that the wave from the hand and the force on the tip ask for.
 
