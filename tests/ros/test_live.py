@@ -74,6 +74,8 @@ def test_a_live_session_is_recorded_on_every_topic(
         assert bag.topics[topic.name].count > 1000, topic.name
     measured = bag.read(topics.SLAVE_MEASURED_JS)
     assert (np.diff(measured.stamp_ns) > 0).all()
+    for topic in (topics.HAND_SERVO_CP, topics.MASTER_MEASURED_CP, topics.SLAVE_TRUE_CP):
+        assert (np.diff(bag.read(topic).stamp_ns) > 0).all(), topic.name  # none twice
     # One sample for each step, and none for the time that a busy machine dropped.
     assert (np.diff(measured.stamp_ns) % 1_000_000 == 0).all()
     statuses = {report.name: report for report in bag.reports(topics.DIAGNOSTICS)}

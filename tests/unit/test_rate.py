@@ -102,3 +102,13 @@ def test_recent_numbers_replace_the_oldest() -> None:
         recent.put(number)
     median, _, largest = recent.summary()
     assert (median, largest) == (2.0, 3.0)
+
+
+@pytest.mark.parametrize("begin_ns", [0, 1, 699_999, 700_000, 123_456_789])
+def test_a_schedule_with_a_phase_keeps_it_wherever_it_starts(begin_ns: int) -> None:
+    time = FakeTime()
+    time.now_ns = begin_ns
+    loop = schedule(time, phase_ns=700_000)
+    ticks = [loop.due() for _ in range(3)]
+    assert all(tick % 1_000_000 == 700_000 for due in ticks for tick in due)
+    assert begin_ns + 1_000_000 <= ticks[0][0] < begin_ns + 2_000_000

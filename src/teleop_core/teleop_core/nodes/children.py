@@ -9,7 +9,7 @@ import subprocess
 import sys
 import tempfile
 from collections import deque
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from typing import IO, Any, cast
 
@@ -90,7 +90,6 @@ class Child:
         starter: Who starts it.
         command: What it runs in place of the node of that name.
         nodes: Nodes that it holds; more than one, or of another name, make it a side.
-        files: Further files that it gets, by the names that stand for them in ``env``.
 
     Attributes:
         name: As given.
@@ -101,7 +100,6 @@ class Child:
     def __init__(
         self, name: str, parameters: IO[Any], env: dict[str, str], starter: Starter,
         command: Sequence[str] = (), nodes: Sequence[str] = (),
-        files: Mapping[str, int] | None = None,
     ) -> None:  # fmt: skip
         arm, _, stage = name.rpartition("/")
         self.name, self.doing = name, "starting"
@@ -116,8 +114,7 @@ class Child:
         ours += ["--ros-args", "--params-file", "/dev/fd/<parameters>"]
         ours += ["-r", f"__ns:=/{arm}"] if arm and not is_side else []
         log = self._log.fileno()
-        files = {"out": log, "err": log, "line": theirs.fileno(),
-                 "parameters": parameters.fileno(), **(files or {})}  # fmt: skip
+        files = {"out": log, "err": log, "line": theirs.fileno(), "parameters": parameters.fileno()}
         with theirs:
             self._process = starter.start(
                 command or ["teleop_core.nodes", *ours], env | {VARIABLE: "<line>"}, files,

@@ -1,10 +1,9 @@
 """Live session: the graph as one process per node, started, watched, recorded and stopped."""
 
-import os
 import tempfile
 import time
 from collections.abc import Collection, Mapping
-from contextlib import ExitStack, suppress
+from contextlib import suppress
 from copy import deepcopy
 from pathlib import Path
 from typing import IO, Any
@@ -19,7 +18,6 @@ from teleop_core.graph.layers import SESSION
 from teleop_core.graph.topics import SLAVE_SETPOINT_JS
 from teleop_core.nodes.children import Child, end_all, environment
 from teleop_core.nodes.crews import Crew, Processes, crews
-from teleop_core.nodes.feed import READS, WRITES, Pipe, fed_topics, variable
 from teleop_core.nodes.interrupt import Interrupt
 from teleop_core.nodes.keys import Keys
 from teleop_core.nodes.leftovers import remove_leftovers
@@ -85,7 +83,6 @@ def live(
     with (
         tempfile.TemporaryFile("w+") as parameters,
         Starter("" if processes is Processes.ONE else configuration.text(), env) as starter,
-        ExitStack() as pipes,
         interrupt.caught(),
         announced(int(env["ROS_DOMAIN_ID"])),
         Observer(int(env["ROS_DOMAIN_ID"])) as observer,
@@ -95,8 +92,6 @@ def live(
         parameters.flush()
         session = _Session(configuration, console, observer, parameters, env, interrupt, starter)
         session.crews = shared
-        if processes is not Processes.NODES:
-            session.feed(pipes)
         session.tell_where(out)
         for note in notes_of(configuration, transport=_TRANSPORT[processes]):
             session.say(f"note: {note}")
@@ -143,22 +138,6 @@ class _Session:
         self._children: dict[str, Child] = {}
         self._ready = 0.0
         self.crews = crews(self._graph)
-        self._pipes: dict[str, tuple[str, dict[str, int]]] = {}
-        self._ends = ExitStack()
-
-    def feed(self, stack: ExitStack) -> None:
-        """Lead a pipe from every process to the recorder; the stack holds our ends meanwhile."""
-        self._ends = stack
-        read: dict[str, Pipe] = {}
-        files: dict[str, int] = {}
-        for process, nodes in self.crews[-1].items():
-            names = fed_topics(self._graph, nodes)
-            ends = os.pipe()
-            for end in ends:
-                stack.callback(os.close, end)
-            read[process], files[process] = Pipe(f"<{process}>", names), ends[0]
-            self._pipes[process] = variable(Pipe("<feed>", names)), {"feed": ends[1]}
-        self._pipes[RECORDER_NAME] = variable(*read.values()), files
 
     def tell_where(self, out: Path) -> None:
         """Say how others find the nodes, and where they are recorded."""
@@ -185,7 +164,6 @@ class _Session:
             self._await_starter()
             for crew in self.crews:
                 self._start(crew)
-            self._ends.close()
             if self._keys.is_there:
                 self.say("space stops all arms; e lets them go on")
             self._await_operator()
@@ -206,11 +184,8 @@ class _Session:
 
     def _start(self, crew: Crew) -> None:
         for name in crew:
-            text, files = self._pipes.get(name, ("", {}))
-            variable = READS if name == RECORDER_NAME else WRITES
-            env = self._env | ({variable: text} if text else {})
             self._children[name] = Child(
-                name, self._parameters, env, self._starter, nodes=crew[name], files=files
+                name, self._parameters, self._env, self._starter, nodes=crew[name]
             )
         waiting = [node for nodes in crew.values() for node in nodes]
         home = {node: name for name, nodes in crew.items() for node in nodes}

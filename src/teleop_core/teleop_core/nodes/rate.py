@@ -65,6 +65,8 @@ class Schedule:
         max_catch_up: Largest number of missed ticks that one wake-up makes up for; what is
             missed beyond it is dropped and counted.
         period_ns: Time from tick to tick [ns].
+        phase_ns: Remainder of the times of all ticks by the period, by which loops of one machine
+            keep their order [ns]; None: whenever it starts.
     """
 
     def __init__(
@@ -73,17 +75,21 @@ class Schedule:
         sleep: Callable[[float], None],
         max_catch_up: int = 100,
         period_ns: int = TICK_NS,
+        phase_ns: int | None = None,
     ) -> None:
         self._clock, self._sleep = clock, sleep
         self._max_catch_up, self._period_ns = max_catch_up, period_ns
+        self._phase_ns = phase_ns
         self.counts = TickCounts()
         self.lateness = Recent()
         """Wake-up after the tick it was for, [ns]."""
         self.start()
 
     def start(self) -> None:
-        """Begin now: the first tick is due one period from here."""
+        """Begin now: the first tick is due one period from here, or at the next phase after it."""
         self._next_ns = self._clock() + self._period_ns
+        if self._phase_ns is not None:
+            self._next_ns += (self._phase_ns - self._next_ns) % self._period_ns
 
     def due(self) -> range:
         """Sleep until the next tick is due.

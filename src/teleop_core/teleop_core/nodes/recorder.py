@@ -22,7 +22,7 @@ from teleop_core.graph.stage import Stage
 from teleop_core.graph.topics import DIAGNOSTICS, Quality, Topic
 from teleop_core.nodes.base import SUCCESS, CoreNode
 from teleop_core.nodes.display import LiveDisplay
-from teleop_core.nodes.feed import READS, FeedReader, pipes_of_environment
+from teleop_core.nodes.feed import FeedReader, address
 from teleop_core.nodes.files import graph_of, session_of
 from teleop_core.nodes.markers import LiveMarkers
 from teleop_core.nodes.model import LiveModel, ModelTopics
@@ -41,6 +41,8 @@ end of the process costs is this time and that of writing one chunk, together be
 DISCOVERY_NS = 3_000_000_000
 """Time within which two nodes that are there have found each other [ns]; most take a tenth."""
 _PAUSE = 5e-3
+_RECENT = 1000
+"""Messages of a topic that may have come by the middleware before its feed tells of itself."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,21 +60,28 @@ class RecorderParameters(RecordingParameters):
 class _Channel:
     """One recorded topic: how much came, and how much the middleware lost on the way."""
 
-    def __init__(self, node: CoreNode, topic: Topic, *, is_fed: bool = False) -> None:
+    def __init__(self, node: CoreNode, topic: Topic) -> None:
         self.topic, self._node = topic, node
         self.received = self.lost = 0
         self._numbers: dict[bytes, int] = {}  # the last one of each publisher
         self._since_ns = 0  # since when it listens
         self._given: deque[Arrival] = deque()
         self._subscription: Subscription | None = None
-        self._inside_ns: int | None = 0 if is_fed else None
-        self._taken = 0  # number of the last message of a feed
+        self._inside_ns: int | None = None
+        self._recent: deque[int] = deque(maxlen=_RECENT)  # when what the topic brought was sent
+        self._twice = 0  # messages of a feed that the topic has brought already
         self._follow()
 
-    def join(self, is_inside: bool) -> None:
-        """Take messages from :meth:`give`, from a sender in this process, or from the topic."""
-        if is_inside is (self._inside_ns is None):
-            self._inside_ns = time.time_ns() if is_inside else None
+    def join(self, is_inside: bool, since_ns: int | None = None) -> None:
+        """Take messages from :meth:`give`, or from the topic, that were sent since then [ns].
+
+        Those that the topic has brought already do not come again.
+        """
+        if is_inside is not (self._inside_ns is None):
+            return
+        since_ns = since_ns or time.time_ns()
+        self._inside_ns = since_ns if is_inside else None
+        self._twice = sum(sent_ns >= since_ns for sent_ns in self._recent) if is_inside else 0
 
     def give(self, data: bytes, sent_ns: int) -> None:
         """Take a message from a sender in this process, whose thread may be another one.
@@ -81,10 +90,12 @@ class _Channel:
         """
         self._given.append((sent_ns, self.topic, data, sent_ns))
 
-    def take(self, number: int, data: bytes, sent_ns: int) -> None:
-        """Take a message of a feed, by its number there."""
-        self.lost += max(0, number - self._taken - 1)
-        self._taken = number
+    def take(self, data: bytes, sent_ns: int, lost: int) -> None:
+        """Take a message of a feed, before which so many were lost."""
+        self.lost += lost
+        if self._twice:
+            self._twice -= 1
+            return
         self.give(data, sent_ns)
 
     def drain(self, came: list[Arrival]) -> None:
@@ -96,6 +107,7 @@ class _Channel:
         while self._subscription is not None and (taken := self._subscription.take()) is not None:
             if inside_ns is None or taken.sent_ns < inside_ns:
                 self.count(taken.sender, taken.number)
+                self._recent.append(taken.sent_ns)
                 came.append((taken.came_ns, self.topic, taken.data, taken.sent_ns))
         self._follow()
 
@@ -141,7 +153,7 @@ class RecorderNode(CoreNode):
         self.channels: dict[str, _Channel] = {}
         self._graph = graph
         self.patience = 10.0  # a slow disk is no reason to end a session
-        self._feeds: list[FeedReader] = []
+        self._feeds: FeedReader | None = None
         self.stages: dict[str, Any] = {}
         """Parameters of the stages of the process, by their names in the graph."""
         self._writing = threading.Lock()  # held while something is written, or the file changes
@@ -211,12 +223,8 @@ class RecorderNode(CoreNode):
 
     def start(self) -> None:
         """Open the topics; latched ones send what they have."""
-        feeds = pipes_of_environment(READS)
-        fed = {name for feed in feeds for name in feed.names}
-        self.channels = {
-            topic.name: _Channel(self, topic, is_fed=topic.name in fed) for topic in self._recorded
-        }
-        self._feeds = [FeedReader(feed, self.channels) for feed in feeds]
+        self.channels = {topic.name: _Channel(self, topic) for topic in self._recorded}
+        self._feeds = FeedReader(self.channels, address())
 
     def turn(self) -> None:
         """Record what has come."""
@@ -234,8 +242,8 @@ class RecorderNode(CoreNode):
         finally:
             for channel in self.channels.values():
                 channel.close()
-            for feed in self._feeds:
-                feed.close()
+            if self._feeds is not None:
+                self._feeds.close()
 
     def teardown(self) -> None:
         """Finish the recording."""
@@ -261,8 +269,8 @@ class RecorderNode(CoreNode):
 
     def _drain(self) -> None:
         came: list[Arrival] = []
-        for feed in self._feeds:
-            feed.drain()
+        if self._feeds is not None:
+            self._feeds.drain()
         for channel in self.channels.values():
             channel.drain(came)
         came.sort(key=lambda message: message[0])

@@ -17,8 +17,9 @@ from rclpy.parameter import Parameter
 from teleop_core.base.errors import UnknownNameError
 from teleop_core.graph.graph import RECORDER_NAME, Graph, Member
 from teleop_core.graph.stage import STAGES
+from teleop_core.graph.topics import Kind
 from teleop_core.nodes.base import CoreNode
-from teleop_core.nodes.feed import WRITES, Feed, pipes_of_environment
+from teleop_core.nodes.feed import Feed, address
 from teleop_core.nodes.files import graph_of
 from teleop_core.nodes.loop import Loop
 from teleop_core.nodes.making import make_node
@@ -26,6 +27,11 @@ from teleop_core.nodes.rate import Schedule
 from teleop_core.nodes.recorder import RecorderNode
 from teleop_core.nodes.streams import Output
 from teleop_core.session.links import link_texts
+
+
+_AFTER_NS = 700_000
+"""Phase of the slave's side in the millisecond: commands of the hand's side, whose phase is 0, have
+come by then, at p99 of its lateness."""
 
 
 class TeleopSession:
@@ -56,12 +62,15 @@ class TeleopSession:
         stages = {member.name: node.parameters for member, node in pairs}
         for recorder in self._recorder:
             recorder.stages = stages
-        self._feeds = [Feed(pipe) for pipe in pipes_of_environment(WRITES)]
+        self._feed = Feed(_fed(self._stages) if names else (), address())
         self._gate = threading.Lock()
         for node in self._stages:
             node.has_own_loop, node.gate = False, self._gate
         last = self._stages[-1]
-        self._schedule = Schedule(time.monotonic_ns, time.sleep, last.options.max_catch_up)
+        self._schedule = Schedule(
+            time.monotonic_ns, time.sleep, last.options.max_catch_up,
+            phase_ns=0 if members[0] is graph.members[0] else _AFTER_NS,
+        )  # fmt: skip
         self._at_work: tuple[bool, ...] = ()
         self._pending: list[tuple[Output, int, int]] = []
         self._ticks = 0
@@ -83,8 +92,7 @@ class TeleopSession:
         if not self._loop.stop():
             for node in self._stages:
                 node.gate = threading.Lock()
-        for feed in self._feeds:
-            feed.close()
+        self._feed.close()
 
     def _turn(self) -> None:
         """All ticks that are due, each through all stages."""
@@ -125,8 +133,7 @@ class TeleopSession:
                     self._pending.clear()
             for output, stamp_ns, sent_ns in waiting:
                 output.publish(stamp_ns, sent_ns)
-            for feed in self._feeds:
-                feed.flush()
+            self._feed.flush()
             for node in self._stages:
                 if node.is_at_work:
                     node.tell()
@@ -139,8 +146,8 @@ class TeleopSession:
                 node.schedule = self._schedule
         outputs = {topic.name: out for node in active for topic, out in node.ports.outputs.items()}
         inputs = [entry for node in active for entry in node.ports.all_inputs()]
-        channels: dict[str, Any] = {}
-        for recorder in (*self._recorder, *self._feeds):
+        channels: dict[str, Any] = dict(self._feed.channels)
+        for recorder in self._recorder:
             channels |= recorder.channels
         for name, out in outputs.items():
             out.inputs = [entry for entry in inputs if entry.topic.name == name]
@@ -150,6 +157,15 @@ class TeleopSession:
             entry.join(entry.topic.name in outputs)
         for name, channel in channels.items():
             channel.join(name in outputs)
+        self._feed.flush()  # before the first message goes out by the middleware too
+
+
+def _fed(stages: Sequence[CoreNode]) -> list[str]:
+    """Names of the topics that nodes feed to a recorder: reports go by the middleware alone."""
+    return [
+        topic.of_arm(node.arm).name for node in stages for topic in node.description.writes
+        if topic.kind is not Kind.REPORT
+    ]  # fmt: skip
 
 
 def _recorder(graph: Graph, namespace: str) -> RecorderNode:
