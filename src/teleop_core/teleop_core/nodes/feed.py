@@ -90,10 +90,9 @@ class Feed:
 
     def flush(self) -> None:
         """Write what waits, as far as the socket takes it; look for a recorder now and then."""
-        if self._line is None and self._names:
-            if (now := time.monotonic()) - self._looked > _AGAIN:
-                self._looked = now
-                self._connect()
+        if self._line is None and self._names and time.monotonic() - self._looked > _AGAIN:
+            self._looked = time.monotonic()
+            self._connect()
         if self._line is not None and self.waiting:
             try:
                 written = self._line.send(self.waiting)

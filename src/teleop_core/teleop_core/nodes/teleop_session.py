@@ -28,7 +28,6 @@ from teleop_core.nodes.recorder import RecorderNode
 from teleop_core.nodes.streams import Output
 from teleop_core.session.links import link_texts
 
-
 _AFTER_NS = 700_000
 """Phase of the slave's side in the millisecond: commands of the hand's side, whose phase is 0, have
 come by then, at p99 of its lateness."""
