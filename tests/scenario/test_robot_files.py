@@ -126,7 +126,7 @@ def test_a_file_that_says_what_it_said_is_read_where_it_lies(tmp_path: Path) -> 
 
 def test_nothing_of_a_recording_is_expanded(tmp_path: Path) -> None:
     kept = {"robot": str(tmp_path / "arm.xacro"), "robot_file": XACRO}
-    with pytest.raises(ParameterError, match=r"xyz of joint \w+ is '0 0 \$"):
+    with pytest.raises(ParameterError, match="must be without macros"):
         tc.load_robot(recorded_files(kept)[kept["robot"]], tip="tool0")
 
 
