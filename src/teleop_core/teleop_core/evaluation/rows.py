@@ -84,7 +84,7 @@ def number(value: float | None, missing: str = MISSING) -> str:
 
 def fixed(value: float, decimals: int) -> str:
     """Text with so many decimals, and without a minus sign where they are all zero."""
-    return f"{round(value, decimals) + 0.0:.{decimals}f}"
+    return f"{value:z.{decimals}f}"
 
 
 _NOTHING = {MISSING, "0/0/0", "0, 0", "0/0"}

@@ -176,7 +176,7 @@ class Motion:
         assert start is not None
         mean = total / len(self.stamp_ns)
         center = {"mean": mean, "middle": 0.5 * (low + high), "start": start}[self._options.center]
-        listed = ", ".join(f"{1e3 * value:.1f}" for value in center)
+        listed = ", ".join(f"{1e3 * value:z.1f}" for value in center)
         self.told.append(f"{self._options.center} of the motion at ({listed}) mm brought to zero")
         return center
 
