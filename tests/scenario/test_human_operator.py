@@ -30,7 +30,7 @@ def scores(**changes: Any) -> list[Any]:
     return [tc.run("human", seed=seed, **changes).score() for seed in SEEDS]
 
 
-@pytest.mark.parametrize("name", sorted(set(PEOPLE) - {"speed_median_mm_s"}))
+@pytest.mark.parametrize("name", sorted(PEOPLE))
 def test_hand_moves_within_the_range_of_people(name: Any) -> None:
     low, high = PEOPLE[name]
     values = np.array(figures(name))
@@ -40,10 +40,9 @@ def test_hand_moves_within_the_range_of_people(name: Any) -> None:
     assert low - 0.02 * abs(low) <= values.mean() <= high + 0.02 * abs(high)
 
 
-def test_median_speed_is_above_that_of_surgeons_by_less_than_a_factor_of_three() -> None:
-    low, high = PEOPLE["speed_median_mm_s"]
-    assert high < min(figures("speed_median_mm_s"))
-    assert max(figures("speed_median_mm_s")) < 3.0 * low * 1.1
+def test_median_speed_is_no_more_than_that_of_the_hand_of_the_uva_study() -> None:
+    """20 mm/s; surgeons of JIGSAWS moved at 9 to 15 mm/s by task."""
+    assert np.mean(figures("speed_median_mm_s")) <= 20.0
 
 
 @pytest.mark.parametrize("name", ["frequency_50_hz", "power_1_3", "peaks_per_s", "sparc"])

@@ -538,7 +538,7 @@ def test_a_wall_gives_back_no_more_than_it_took_whatever_filters_the_slave(kind:
 def test_a_tank_pays_by_the_way_of_the_stylus_itself() -> None:
     tissue = ("world.material=silicone", "reflection.passivity=tank")
     shares = touches("palpation", 24.0, *tissue)
-    assert len(shares) >= 3
+    assert len(shares) >= 2
     assert shares.max() < 1.06  # a tank that goes by the filtered stylus gives back 3.8
 
 

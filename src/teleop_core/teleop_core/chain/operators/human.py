@@ -35,12 +35,12 @@ class HumanParameters:
     """How the hand reaches, errs, corrects, rests and trembles."""
 
     reach: float = parameter(
-        0.017, unit="m", lower=1e-3, upper=0.3, fixed=True,
+        0.0105, unit="m", lower=1e-3, upper=0.3, fixed=True,
         doc="median distance from target to target, within the region of operator.size",
         source="assumed: how far apart things are is the task's",
     )  # fmt: skip
     reach_spread: float = parameter(
-        0.45, lower=0.0, upper=2.0, fixed=True, doc="standard deviation of its logarithm",
+        0.72, lower=0.0, upper=2.0, fixed=True, doc="standard deviation of its logarithm",
         source="assumed: with reach, fits the figures of people",
     )  # fmt: skip
     turn: float = parameter(
@@ -49,35 +49,35 @@ class HumanParameters:
         source="assumed: fits the figures of people",
     )  # fmt: skip
     width: float = parameter(
-        2.8e-3, unit="m", lower=1e-4, upper=0.1, fixed=True, doc="width of a target, as of Fitts",
+        2.6e-3, unit="m", lower=1e-4, upper=0.1, fixed=True, doc="width of a target, as of Fitts",
         source="assumed: fits the figures of people",
     )  # fmt: skip
     tolerance: float = parameter(
-        2.6e-3, unit="m", lower=1e-4, upper=0.1, fixed=True,
+        2.4e-3, unit="m", lower=1e-4, upper=0.1, fixed=True,
         doc="distance from the target at which no correction is made",
         source="assumed: a little below width",
     )  # fmt: skip
     movement_time: float = parameter(
-        0.08, unit="s", lower=0.05, upper=2.0, fixed=True,
+        0.055, unit="s", lower=0.05, upper=2.0, fixed=True,
         doc="duration of a submovement of no difficulty",
         source="assumed: fits the figures of people; form of Fitts 1954",
     )  # fmt: skip
     time_per_bit: float = parameter(
-        0.17, unit="s", lower=0.0, upper=2.0, fixed=True,
+        0.195, unit="s", lower=0.0, upper=2.0, fixed=True,
         doc="what each bit of difficulty adds to the duration of a submovement",
-        source="assumed: 6 bit/s, between mouse (Soukoreff, MacKenzie 2004) and pen (Fitts 1954)",
+        source="assumed: 5 bit/s, as of a mouse (Soukoreff and MacKenzie 2004); pen: 10 (Fitts 1954)",
     )  # fmt: skip
     time_spread: float = parameter(
-        0.27, lower=0.0, upper=1.0, fixed=True, doc="standard deviation of its logarithm",
+        0.23, lower=0.0, upper=1.0, fixed=True, doc="standard deviation of its logarithm",
         source="assumed: fits the figures of people",
     )  # fmt: skip
     shortfall: float = parameter(
-        0.06, lower=0.0, upper=0.5, fixed=True,
+        0.05, lower=0.0, upper=0.5, fixed=True,
         doc="share of the distance that a first submovement aims short by",
         source="assumed: first submovements fall short (Engelbrecht, Berthier and O'Sullivan 2003)",
     )  # fmt: skip
     noise_along: float = parameter(
-        0.03, unit="s", lower=0.0, upper=0.2, fixed=True,
+        0.05, unit="s", lower=0.0, upper=0.2, fixed=True,
         doc="standard deviation of a submovement's end along its way, per mean speed",
         source="assumed: ends spread with mean speed (Schmidt et al. 1979; Meyer et al. 1988)",
     )  # fmt: skip
@@ -99,7 +99,7 @@ class HumanParameters:
         source="assumed: fits the figures of people",
     )  # fmt: skip
     dwell_spread: float = parameter(
-        0.5, lower=0.0, upper=2.0, fixed=True, doc="standard deviation of its logarithm",
+        0.4, lower=0.0, upper=2.0, fixed=True, doc="standard deviation of its logarithm",
         source="assumed: fits the figures of people",
     )  # fmt: skip
     passing: float = parameter(
