@@ -65,7 +65,7 @@ class HumanParameters:
     time_per_bit: float = parameter(
         0.195, unit="s", lower=0.0, upper=2.0, fixed=True,
         doc="what each bit of difficulty adds to the duration of a submovement",
-        source="assumed: 5 bit/s, as of a mouse (Soukoreff and MacKenzie 2004); pen: 10 (Fitts 1954)",
+        source="assumed: 5 bit/s, as of a mouse (Soukoreff, MacKenzie 2004); pen: 10 (Fitts 1954)",
     )  # fmt: skip
     time_spread: float = parameter(
         0.23, lower=0.0, upper=1.0, fixed=True, doc="standard deviation of its logarithm",
