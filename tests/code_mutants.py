@@ -148,6 +148,9 @@ CODE_MUTANTS = (
     _mutant("from_tomorrow", "poses that are stamped ahead are believed",
             "chain/master/master_bridge.py", "if abs(age) > oldest:", "if age > oldest:",
             "master_bridge"),
+    _mutant("intention_late", "the score against intention leaves out what the filter changed",
+            "evaluation/metrics/tremor_filter.py", "(tremor, after[own] - before[own] + tremor)",
+            "(tremor, tremor)", "tremor_filters"),
     # network and passivity
     _mutant("order_lost", "packets that shall keep their order overtake", _LINK,
             "due = max(due, s.last_due[k])", "due = max(due, 0)", "network"),

@@ -196,9 +196,9 @@ def test_slow_motion_passes_as_large_as_it_is_with_the_delay_stated(kind: str) -
     assert 1e3 * delay == pytest.approx(DELAY_MS[kind], abs=0.3)
 
 
-@pytest.mark.parametrize("frequency", [7.0, 8.0, 10.0, 12.0, 13.0])
+@pytest.mark.parametrize("frequency", [8.2, 9.0, 10.0, 11.0, 11.8])
 @pytest.mark.parametrize("period", [1e-3, 0.005])
-def test_the_learning_filter_finds_a_tremor_of_any_frequency_and_subtracts_it(
+def test_the_learning_filter_finds_a_tremor_of_any_frequency_in_its_band_and_subtracts_it(
     frequency: float, period: float
 ) -> None:
     times = period * np.arange(round(20.0 / period))
@@ -207,13 +207,46 @@ def test_the_learning_filter_finds_a_tremor_of_any_frequency_and_subtracts_it(
     assert np.abs(out[-round(2.0 / period) :]).max() < 2e-6
 
 
+@pytest.mark.parametrize(("frequency", "within"), [(1.0, 0.01), (2.0, 0.025), (6.0, 0.05)])
+def test_the_learning_filter_lets_a_steady_motion_beside_its_band_pass_as_large_as_it_is(
+    frequency: float, within: float
+) -> None:
+    size, _ = cosine_filter("wflc")(frequency, 1e-3)
+    assert size == pytest.approx(1e-3, rel=within)
+
+
+def test_the_filter_that_is_the_default_leads_the_slave_nearer_to_what_the_hand_means() -> None:
+    """Against intention: others are late, which costs more than tremor does."""
+    assert TremorFilterParameters().kind.kind == "wflc"
+    off = {}
+    for kind in KINDS:
+        found = tc.run("human", duration=20.0, stages=["tremor_filter"],
+                       settings={"tremor_filter.kind": kind})  # fmt: skip
+        score = found.score()
+        before, after = (
+            present(score.value(f"tremor_filter.intention_{name}_um"))
+            for name in ("before", "after")
+        )
+        # By the recorded streams, sample by sample, after the approach.
+        measured, filtered, tremor = (
+            found[name].values[-12_000:, :3]
+            for name in ("master/measured_cp", "master/filtered_cp", "hand/tremor")
+        )
+        rms = [1e6 * float(np.sqrt(((places - measured + tremor) ** 2).sum(axis=1).mean()))
+               for places in (measured, filtered)]  # fmt: skip
+        assert (before, after) == pytest.approx(rms, rel=0.1)
+        off[kind] = after / before
+    assert off["wflc"] < 0.95
+    assert min(off["band_stop"], off["notch"], off["kalman"]) > 2.0
+
+
 def test_the_learning_filter_subtracts_a_tremor_whose_frequency_changes() -> None:
     times = 1e-3 * np.arange(30_000)
     phase = 2.0 * np.pi * (9.0 * times + 0.5 * 0.1 * times**2)  # from 9 to 12 Hz
     out, _ = filtered("wflc", 1e-4 * np.sin(phase))
     kept, _ = filtered("wflc", 1e-4 * np.sin(phase), frequency_rate=0.0, frequency=9.0)
     assert out[-5000:].std() < 0.5 * kept[-5000:].std()
-    assert out[10_000:].std() < 0.2 * 1e-4 * math.sqrt(0.5)
+    assert out[10_000:].std() < 0.4 * 1e-4 * math.sqrt(0.5)
 
 
 def bits() -> str:
@@ -513,7 +546,7 @@ def test_the_slave_trembles_less_and_a_second_run_has_the_same_bits(kind: str) -
     np.testing.assert_allclose(both, first["master_measured_cp"][:, :3], rtol=0, atol=1e-15)
     trembling, calm = (tremor_power(first[f"master_{name}_cp"][8000::5, :3], 200.0)
                        for name in ("measured", "filtered"))  # fmt: skip
-    assert calm < 0.4 * trembling
+    assert calm < (0.6 if kind == "wflc" else 0.4) * trembling
 
 
 def touches(scenario: str, seconds: float, *given: Any) -> Any:
@@ -595,7 +628,8 @@ def test_without_motion_there_is_no_delay() -> None:
 
 
 def test_the_score_says_what_the_stage_did_and_nothing_without_it() -> None:
-    score = tc.run("human", duration=20.0, stages="tremor_filter").score()
+    score = tc.run("human", duration=20.0, stages="tremor_filter",
+                   settings={"tremor_filter.kind": "band_stop"}).score()  # fmt: skip
     assert 40.0 < present(score.value("tremor_filter.before_um")) < 80.0
     assert 0.2 < present(score.value("tremor_filter.left_share")) < 0.5
     after = present(score.value("tremor_filter.before_um")) * present(
@@ -607,7 +641,8 @@ def test_the_score_says_what_the_stage_did_and_nothing_without_it() -> None:
     rows = {row.label for result in score.results for row in result.rows
             if row.group == "tremor filter"}  # fmt: skip
     assert rows == {"tremor before", "tremor after", "tremor left", "delay below 2 Hz",
-                    "gain below 2 Hz"}  # fmt: skip
+                    "gain below 2 Hz", "stylus against intention, RMS",
+                    "filtered against intention, RMS"}  # fmt: skip
     plain = tc.run("human", duration=3.0).score()
     assert plain.value("tremor_filter.left_share") is None
     assert plain.value("tremor_filter.delay_ms") is None

@@ -36,7 +36,7 @@ _FADE = 0.2
 class TremorFilterParameters:
     """Parameters of :class:`RunningTremorFilter`."""
 
-    kind: Choice = choice(TREMOR_FILTERS, "band_stop", doc="how tremor is taken out")
+    kind: Choice = choice(TREMOR_FILTERS, "wflc", doc="how tremor is taken out")
     longest_pause: float = parameter(
         0.3, unit="s", lower=0.002, upper=5.0,
         doc="after a longer pause of the master the filter begins anew at the reading",

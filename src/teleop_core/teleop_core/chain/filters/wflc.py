@@ -14,7 +14,8 @@ _PHASE, RATE, _HEARD, _SUBTRACTED = range(3 * WIDTH, 3 * WIDTH + 8, 2)
 """Places in the memory behind three sections: phase [rad]; by how much the rate is
 above the one at the beginning [rad/s]; weights of sine and cosine [m] of the first combiner, which
 finds the rate, and of the second, which is subtracted."""
-_LOWEST, _HIGHEST = 2.0 * math.pi * 6.0, 2.0 * math.pi * 14.0
+_REACH = 2.0 * math.pi * 2.0
+"""By how much the learned rate may differ from the one at the beginning [rad/s]: 8 to 12 Hz."""
 _FAINT = 5e-6
 """Amplitude below which a tremor says little of its frequency [m]."""
 _DAMPING, _WIDE = math.sqrt(2.0), 0.6
@@ -29,16 +30,19 @@ class WflcParameters:
         10.0, unit="Hz", lower=6.0, upper=14.0, doc="of the tremor, at the beginning"
     )
     high_pass: float = parameter(
-        4.0, unit="Hz", lower=0.5, upper=6.0,
+        6.0, unit="Hz", lower=0.5, upper=6.0,
         doc="motion that is slower is taken as meant, and not learned",
     )  # fmt: skip
     amplitude_rate: float = parameter(
-        25.0, unit="1/s", lower=0.1, upper=50.0,
-        doc="inverse of the time in which the amplitude is learned",
+        6.0, unit="1/s", lower=0.1, upper=50.0,
+        doc="inverse of the time in which the amplitude is learned; the larger, the farther from "
+        "the tremor's frequency motion is taken for tremor",
+        source="derived: least distance from what was meant, of a hand as in scenario human",
     )  # fmt: skip
     frequency_rate: float = parameter(
         0.3, unit="1/s", lower=0.0, upper=5.0,
-        doc="inverse of the time in which the frequency is learned, from 6 to 14 Hz; 0: it is kept",
+        doc="inverse of the time in which the frequency is learned, within 2 Hz of frequency; "
+        "0: it is kept",
     )  # fmt: skip
 
 
@@ -81,7 +85,7 @@ def wflc_filter(numbers: Array, memory: Array, value: float, period: float) -> f
     error = heard - learned
     power = learned * learned + turned * turned + _FAINT * _FAINT
     drift = 2.0 * numbers[2] * numbers[3] * period * error * turned / power
-    memory[RATE] = min(max(rate + drift, _LOWEST), _HIGHEST) - 2.0 * math.pi * numbers[0]
+    memory[RATE] = min(max(memory[RATE] + drift, -_REACH), _REACH)
     _teach(memory, _HEARD, 2.0 * numbers[2] * period * error, sine, cosine)
     learned = memory[_SUBTRACTED] * sine + memory[_SUBTRACTED + 1] * cosine
     turned = memory[_SUBTRACTED] * cosine - memory[_SUBTRACTED + 1] * sine

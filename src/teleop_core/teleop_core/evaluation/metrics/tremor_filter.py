@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from teleop_core.evaluation.accumulators import Integers
 from teleop_core.evaluation.context import Context
 from teleop_core.evaluation.metric import Metric, figure, keys_of
 from teleop_core.evaluation.metrics.motion import approach_end_ns
@@ -17,7 +18,7 @@ from teleop_core.evaluation.motion_measures import (
 from teleop_core.evaluation.motion_samples import MotionSamples
 from teleop_core.evaluation.rows import Row, row
 from teleop_core.evaluation.windows import Window
-from teleop_core.graph.topics import MASTER_FILTERED_CP, MASTER_MEASURED_CP
+from teleop_core.graph.topics import HAND_TREMOR, MASTER_FILTERED_CP, MASTER_MEASURED_CP
 from teleop_core.kernels.geometry import Array
 
 GROUP = "tremor filter"
@@ -41,6 +42,13 @@ class TremorFilterScore:
     )
     gain: float | None = figure(
         "1", "how large motion below 2 Hz comes out: in phase with it, over all of it"
+    )
+    intention_before_um: float | None = figure(
+        "um", "RMS distance of the stylus from what the hand meant, against intention: its tremor; "
+        "null where no hand/tremor was recorded"
+    )  # fmt: skip
+    intention_after_um: float | None = figure(
+        "um", "the same of the filtered stylus, with what its delay and gain cost"
     )
 
 
@@ -92,13 +100,14 @@ class TremorFilterMetric(Metric):
 
     name = "tremor_filter"
     keys = keys_of("tremor_filter", TremorFilterScore)
-    topics = (MASTER_MEASURED_CP, MASTER_FILTERED_CP)
+    topics = (MASTER_MEASURED_CP, MASTER_FILTERED_CP, HAND_TREMOR)
 
     def __init__(self, context: Context) -> None:
         begin_ns = approach_end_ns(context) if context.span is None else context.span.first_ns
         self._start_ns = context.bag.start_ns
         self._begin_s = (begin_ns - self._start_ns) * 1e-9
         self._before, self._after = MotionSamples(), MotionSamples()
+        self._off, self._count = np.zeros(2), 0  # squares from what was meant, before and after
 
     def add(self, window: Window) -> None:
         """Take one window: the readings that have an answer, by their stamps."""
@@ -112,6 +121,18 @@ class TremorFilterMetric(Metric):
         times = np.asarray((stamps - self._start_ns) * 1e-9, np.float64)
         self._before.add(times, readings.values[first, :7])
         self._after.add(times, answers.values[second, :7])
+        self._add_intention(stamps, readings.values[first, :3], answers.values[second, :3], window)
+
+    def _add_intention(self, stamps: Integers, before: Array, after: Array, window: Window) -> None:
+        """Add how far both motions (N, 3) are from the one without tremor, after the approach."""
+        tremors = window.around(HAND_TREMOR)
+        common, own, other = np.intersect1d(stamps, tremors.stamp_ns, return_indices=True)
+        counts = (common - self._start_ns) * 1e-9 >= self._begin_s
+        own, tremor = own[counts], tremors.values[other[counts], :3]
+        if tremor.any():
+            off = (tremor, after[own] - before[own] + tremor)
+            self._off += [float((part * part).sum()) for part in off]
+            self._count += len(own)
 
     def values(self) -> TremorFilterScore:
         """Score of everything so far."""
@@ -121,7 +142,10 @@ class TremorFilterMetric(Metric):
         left = None if before is None or after is None or before == 0.0 else after / before
         found = self._passage()
         delay, gain = (None, None) if found is None else (1e3 * found[0], found[1])
-        return TremorFilterScore(before, after, left, delay, gain)
+        off = [None, None]
+        if self._count:
+            off = (1e6 * np.sqrt(self._off / self._count)).tolist()
+        return TremorFilterScore(before, after, left, delay, gain, *off)
 
     def _passage(self) -> tuple[float, float] | None:
         """Delay and gain over the longest stretch without a gap."""
@@ -148,4 +172,6 @@ class TremorFilterMetric(Metric):
             row(GROUP, "tremor left", "%", left),
             row(GROUP, "delay below 2 Hz", "ms", score.delay_ms),
             row(GROUP, "gain below 2 Hz", "%", gain),
+            row(GROUP, "stylus against intention, RMS", "µm", score.intention_before_um),
+            row(GROUP, "filtered against intention, RMS", "µm", score.intention_after_um),
         ]
