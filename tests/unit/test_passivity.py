@@ -28,7 +28,8 @@ from teleop_core.chain.passivity.port import (
 from teleop_core.chain.passivity.slave_side import PASSIVITY, PassivityParameters
 from teleop_core.chain.passivity.tank import tank_slave
 from teleop_core.chain.passivity.tdpa import tdpa_hand, tdpa_slave
-from teleop_core.graph.topics import ENERGY, OPERATION
+from teleop_core.evaluation.metrics.contact import TOUCH_J
+from teleop_core.graph.topics import ENERGY, MASTER_CONTACT, OPERATION
 from teleop_core.kernels.geometry import Array
 from teleop_core.session.configuration import configure
 from teleop_core.session.virtual import VirtualTime
@@ -584,6 +585,44 @@ def test_no_network_and_no_world_makes_passivity_give_the_hand_energy(
         else:
             scale = float(next(t for t in texts if "force_gain" in t).partition("=")[2])
             assert left_at_the_hand(rows, scale) > -3.3 * STEP, texts
+
+
+def wall_shares(kind: str, stiffness: float) -> tuple[float, float]:
+    """Largest share and energy [J] that a contact with the wall of a box gave beyond what it took.
+
+    The hand is that of ``coarse_box``; the slave touches nothing.
+    """
+    texts = ("reflection.architecture=position_force", f"reflection.passivity={kind}",
+             f"fixture.stiffness={stiffness}", "fixture.damping=10.0")  # fmt: skip
+    contact = VirtualTime(configure("coarse_box", settings=texts)).run(30_000)["master_contact"]
+    ends = np.flatnonzero(np.diff(contact[:, 0], append=-1.0))
+    taken, returned = (
+        contact[ends, MASTER_CONTACT.columns.index(name)] for name in ("taken", "returned")
+    )
+    is_contact = taken > TOUCH_J
+    assert is_contact.sum() >= 5
+    shares = returned[is_contact] / taken[is_contact]
+    return float(shares.max()), float((returned - taken).max())
+
+
+@pytest.mark.parametrize("stiffness", [2310.0, 5000.0])
+def test_a_stiff_wall_gives_back_no_more_than_it_took_with_passivity(stiffness: float) -> None:
+    share, gain = wall_shares("none", stiffness)
+    assert share > 1.1
+    assert gain > 5e-6
+    share, gain = wall_shares("tank", stiffness)
+    assert share < 1.02  # the device bends, which its reading does not see
+    assert gain < 5e-7
+
+
+@pytest.mark.parametrize("kind", ["tank", "tdpa"])
+def test_a_session_begins_without_a_blow(kind: str) -> None:
+    """The slave is at home, so that the hand leads it from the first sample on."""
+    texts = ("teleop.stages=[passivity]", "reflection.architecture=position_force",
+             f"reflection.passivity={kind}")  # fmt: skip
+    rows = VirtualTime(configure("coarse_box", settings=texts)).run(1000)
+    assert rows["teleop_state"][100, 0] == 1.0
+    assert np.linalg.norm(rows["master_servo_cf"][:, :3], axis=1).max() < 0.3
 
 
 def steel(kind: str) -> float:

@@ -13,6 +13,7 @@ from teleop_core.chain.passivity.port import (
     IMPEDANCE,
     IN,
     LAW,
+    MARGIN,
     ROUND,
     WAVE,
     WITHHELD,
@@ -21,6 +22,7 @@ from teleop_core.chain.passivity.port import (
     hear_energy,
     port_work,
 )
+from teleop_core.chain.passivity.tdpa import pay_push
 from teleop_core.graph.row import Row
 from teleop_core.graph.signals import copy
 from teleop_core.graph.topics import ENERGY
@@ -79,12 +81,14 @@ class Law(NamedTuple):
     flow: Array
     heard: Array  # energies of the slave, its wave along the master's base
     port: Array
+    wall: Array  # force of fixture and limits since the sample before [N]
+    walls: Array  # its energies
 
     def clear(self) -> None:
         """Forget what happened."""
         for array in (
             self.memory, self.felt, self.away, self.out, self.left, self.last, self.moved,
-            self.led, self.asked, self.flow, self.heard, self.port,
+            self.led, self.asked, self.flow, self.heard, self.port, self.wall, self.walls,
         ):  # fmt: skip
             array[:] = 0.0
 
@@ -95,6 +99,7 @@ def make_law(part: Architecture, numbers: Array, passivity: Passivity, kept: Arr
         part.push_pointer, numbers, np.zeros(MEMORY), np.zeros(3), np.zeros(3), np.zeros(3),
         passivity.hand_pointer, kept, np.zeros(PASSIVE_MEMORY), np.zeros(3), np.zeros(3),
         np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(len(ENERGY)), np.zeros(len(ENERGY)),
+        np.zeros(3), np.zeros(len(ENERGY)),
     )  # fmt: skip
 
 
@@ -136,8 +141,29 @@ def reflect(
     for i in range(3):
         law.asked[p.axis[i]] = p.sign[i] * law.out[i]
     _make_passive(p, s, law, period, row)
+    if p.law != 0.0:
+        _hold_wall(law, row.master_servo_cf)
     for i in range(3):
         row.master_servo_cf[i] += s.push[i]
+
+
+@inner
+def _hold_wall(law: Law, force: Array) -> None:
+    """Make the force (3,) of fixture and limits no larger than what they took pays for.
+
+    It is of the hand's port too: with passivity a wall gives back no more than it took, however
+    stiff. Its energy is its own, so that neither side can spend it.
+    """
+    square = way = 0.0
+    for i in range(3):
+        law.walls[MARGIN] -= law.wall[i] * law.moved[i]
+        way += abs(law.moved[i])
+        square += force[i] * force[i]
+    if square == 0.0:
+        law.walls[MARGIN] = min(law.walls[MARGIN], 0.0)
+    pay_push(law.walls, force, math.sqrt(square), way, 1.0)
+    for i in range(3):
+        law.wall[i] = force[i]
 
 
 @inner
@@ -181,6 +207,7 @@ def _count(
         s.scale = scale
         begin_round(law.port, p.law, 1e-9 * row.master_measured_cp_ns)
         copy(s.command, s.led_from)
+        copy(stylus, s.pushed_at)  # where it was before may be another grip, or nowhere yet
     for i in range(3):
         law.moved[i] = stylus[i] - s.pushed_at[i]
         s.pushed_at[i] = stylus[i]
