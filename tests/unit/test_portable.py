@@ -29,9 +29,11 @@ ELSEWHERE = {
     "robots/inertias.py": "asks for signs alone",
     "robots/mma_balance.py": "springs of the handle, printed and plotted",
     "robots/mobility.py": "asks for a rank alone",
+    "robots/rank.py": "asks for ranks, and for directions that differ by more than rounding",
     "robots/rps3_modes.py": "all ways to assemble it, which no session asks for",
     "robots/stewart.py": "asks for ranks and signs alone",
     "session/exchange/orientation.py": "turns what a file says, once, before it is recorded",
+    "session/exchange/times.py": "asks which rows stay, once, before they are recorded",
 }
 """Files of these rooms that decide no bits of a session, and why."""
 BLAS = {"linalg", "dot", "matmul", "inner", "vdot", "tensordot", "einsum", "cov", "corrcoef"}

@@ -129,11 +129,18 @@ def replayed_blocks(session: VirtualTime, bag: Bag) -> tuple[Iterator[Any], int]
 def _lead_ns(session: VirtualTime, bag: Bag, first_ns: int) -> int:
     """Time [ns] that arms need before the first sample; none where the hand waited as long."""
     lead_ns = session.lead * TICK_NS
-    if not lead_ns or "configuration" not in bag.metadata or TELEOP_STATE.name not in bag.topics:
+    states = [TELEOP_STATE.of_arm(arm) for arm in session.graph.namespaces]
+    is_known = all(state.name in bag.topics for state in states)
+    if not lead_ns or "configuration" not in bag.metadata or not is_known:
         return lead_ns
-    reports = bag.reports(TELEOP_STATE)
-    follows = [r.stamp_ns for r in reports if r.values.get("is_following") == "1.0"]
-    return max(0, lead_ns - (min(follows) - first_ns)) if follows else lead_ns
+    begins = [_follows_ns(bag, state) for state in states]  # of an arm that is near its start, soon
+    return lead_ns if None in begins else max(0, lead_ns - (max(filter(None, begins)) - first_ns))
+
+
+def _follows_ns(bag: Bag, state: Topic) -> int | None:
+    """When an arm began to follow its hand [ns]; None if it never did."""
+    told = (r.stamp_ns for r in bag.reports(state) if r.values.get("is_following") == "1.0")
+    return min(told, default=None)
 
 
 def _hold(series: Series, later_ns: int, samples: Any, field: str) -> None:
