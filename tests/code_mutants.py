@@ -324,6 +324,8 @@ CODE_MUTANTS = (
             "chain/devices/pilot.py", "        self._leads_jaw = False\n", "", "devices"),
     _mutant("jaw_sticks", "friction of the pads has no bound", _GRIP,
             "share = most / apart if apart > most else 1.0", "share = 1.0", "jaw"),
+    _mutant("jaw_opens", "an object that the hand lets go of counts as dropped", _GRIP,
+            "if is_lost and not _is_opened(s) and", "if is_lost and", "jaw"),
     _mutant("peg_soft", "a peg holds nothing across its axis", _GRIP,
             "    if far <= p.clearance:\n        return 0.0", "    if True:\n        return 0.0",
             "jaw"),

@@ -367,6 +367,18 @@ def test_an_object_that_is_let_go_falls_as_a_stone_and_stays_where_it_lands() ->
     assert bench.grip[DROPS] == 0  # it was let go
 
 
+@pytest.mark.parametrize("speed", [4.0, 0.5, 0.1])
+def test_a_hand_that_opens_the_jaw_in_the_air_lets_go_at_any_speed(speed: float) -> None:
+    bench = Bench()
+    bench.run(CLOSED, 600)
+    bench.carry(CLOSED, lift(0.05))
+    for command in np.arange(CLOSED, OPEN, 1e-3 * speed):
+        bench.tick(float(command))
+    bench.run(OPEN, 200)
+    assert bench.object[2] == PLACE[2]
+    assert (bench.grip[[IS_GRIPPED, GRIPS, SLIPS, DROPS]] == (0, 1, 0, 0)).all()
+
+
 def test_an_object_that_slides_out_above_the_table_has_dropped_and_lies_there() -> None:
     bench = Bench()
     bench.run(CLOSED, 600)

@@ -33,6 +33,7 @@ _NONE = -1  # peg of an object that is on none
 _LOST = 1e-3  # so far above the table an object that is lost has dropped [m]
 _ROUNDS = 20  # of the equation for the speed that is left where a peg stops the object
 _OPEN = 1e-3  # fingers that are so much wider than the object have let go, others bounce [m]
+_LETS_GO = 0.01  # a setpoint so much wider than the grip's tightest opens the jaw [rad], assumed
 
 
 class GripNumbers(DriveNumbers):
@@ -63,6 +64,7 @@ class GripState(DriveState):
     transferred: int
     dropped: int
     is_gripped: int
+    tightest: float  # setpoint of the present grip [rad]
     slid: float  # in the present grip [m]
     grips: int
     slips: int
@@ -127,15 +129,22 @@ def _rub(p: GripNumbers, s: GripState, room: GripRoom, cut: float, dt: float) ->
 
 
 @inner
+def _is_opened(s: GripState) -> bool:
+    """Whether the hand opens the jaw: what slides or falls then is let go, not lost."""
+    return s.setpoint > s.tightest + _LETS_GO
+
+
+@inner
 def _count(p: GripNumbers, s: GripState, is_lost: bool) -> None:
     """Begin and end a grip; it ends where the fingers are wider than the object, or it is lost."""
     if s.force > 0.0 and s.is_gripped == 0:
-        s.is_gripped, s.slid = 1, 0.0
+        s.is_gripped, s.slid, s.tightest = 1, 0.0, s.setpoint
         s.grips += 1
     elif s.is_gripped and (is_lost or width(p, s.angle) > p.size + _OPEN):
         s.is_gripped = 0
-        if is_lost and s.object[2] - p.place[2] > _LOST:
+        if is_lost and not _is_opened(s) and s.object[2] - p.place[2] > _LOST:
             s.drops += 1
+    s.tightest = min(s.tightest, s.setpoint)
 
 
 @inner
@@ -143,7 +152,7 @@ def _slide(s: GripState, way: float) -> None:
     """Take note of a way [m] that the object slid between the fingers."""
     before = s.slid
     s.slid += way
-    if before <= SLIP < s.slid:
+    if before <= SLIP < s.slid and not _is_opened(s):
         s.slips += 1
 
 
