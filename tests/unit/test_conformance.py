@@ -1,8 +1,11 @@
 """Conformance: what is made of trails of an arm that measures, or says that it measures."""
 
+import sys
+
 import numpy as np
 import pytest
 
+from teleop_core.cli import main
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot
 from teleop_drill.conformance.agreement import LATEST, Trail, adds_up, follows, obeys
@@ -69,3 +72,14 @@ def test_a_measured_tip_is_held_against_forward_kinematics(factor: float, is_rig
     tip = Trail(TIMES, TIMES, tips[0] + factor * (tips - tips[0]), np.empty((0, 0)))
     told = obeys(Trail(TIMES, TIMES, joints, np.empty((0, 0))), tip, robot.fk, 1e-4)
     assert (told == "") is is_right
+
+
+def test_without_the_messages_of_crtk_one_line_says_how_they_are_made(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    pytest.importorskip("rclpy")
+    monkeypatch.setitem(sys.modules, "crtk_msgs.msg", None)
+    monkeypatch.setitem(sys.modules, "crtk_msgs", None)
+    assert main(["conformance", "slave", "--read-only"]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "`make crtk_msgs`" in line

@@ -7,6 +7,7 @@ import pytest
 from teleop_core.base.errors import (
     ClosureError,
     KernelError,
+    MessageTypeError,
     ParameterError,
     PartError,
     RecordingError,
@@ -24,6 +25,7 @@ RAISED = (
     PartError("stage", "mine", "a Stage"),
     KernelError("mine.py:3", "no such name"),
     ShapeError("q", (6,), (5,)),
+    MessageTypeError("crtk_msgs/msg/OperatingState", "crtk_msgs"),
     RecordingError("bags/one", "is empty"),
     SessionError("first\nsecond"),
 )

@@ -93,6 +93,18 @@ class ShapeError(TeleopError, ValueError):
         super().__init__(f"{name} must have shape {expected}, has {received}")
 
 
+class MessageTypeError(TeleopError, ImportError):
+    """A message whose package is not installed: carries ``ros_type`` and ``package``."""
+
+    def __init__(self, ros_type: str, package: str) -> None:
+        self.ros_type, self.package = ros_type, package
+        build = "run `make crtk_msgs`, or " if package == "crtk_msgs" else ""
+        super().__init__(
+            f"{ros_type} needs the package {package}, which is not installed: {build}source a "
+            "workspace that has it"
+        )
+
+
 class RecordingError(TeleopError):
     """A recording cannot be written or read: carries its ``path`` and the ``reason``."""
 

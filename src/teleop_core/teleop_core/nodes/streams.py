@@ -29,6 +29,7 @@ from teleop_core.bags.messages import (
     read_reports,
     report,
 )
+from teleop_core.base.errors import MessageTypeError
 from teleop_core.graph.topics import NO_COMMAND_NS, Kind, Topic
 from teleop_core.kernels.geometry import Array
 from teleop_core.nodes.quality import NO_OVERRIDES, QualityOverrides
@@ -48,11 +49,15 @@ def message_type(ros_type: str) -> Any:
     """Class of a message, from a name like ``sensor_msgs/msg/JointState``.
 
     Raises:
-        ImportError: Its package is not installed.
+        MessageTypeError: Its package is not installed.
         AttributeError: The package has no such message.
     """
     package, _, name = ros_type.split("/")
-    return getattr(import_module(f"{package}.msg"), name)
+    try:
+        module = import_module(f"{package}.msg")
+    except ModuleNotFoundError as error:
+        raise MessageTypeError(ros_type, package) from error
+    return getattr(module, name)
 
 
 class Subscription(Taker):

@@ -71,9 +71,14 @@ class Arm(Guest):
     Args:
         namespace: Where its topics are, such as ``/PSM1`` or ``slave``.
         domain: ROS domain; None for that of the environment.
+
+    Raises:
+        MessageTypeError: A package of messages is not installed, such as crtk_msgs.
     """
 
     def __init__(self, namespace: str, domain: int | None = None) -> None:
+        for row in ROWS:  # before anything moves
+            message_type(row.ros_type)
         super().__init__("teleop_conformance", domain)
         self.namespace = "/" + namespace.strip("/")
         self._taps: dict[str, Tap] = {}
