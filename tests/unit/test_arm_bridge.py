@@ -10,8 +10,10 @@ import numpy as np
 import pytest
 import yaml
 
+from present import present
 from teleop_core.base.errors import ParameterError
 from teleop_core.base.parameters import build
+from teleop_core.robots import load_robot
 from teleop_core.session.configuration import configure
 from teleop_core.slave.bridges import BRIDGES, Command
 from teleop_core.slave.bridges.arm_bridge import RATES, ArmBridge, ArmBridgeParameters
@@ -203,6 +205,36 @@ def test_an_arm_that_the_server_left_behind_is_not_passed_on_while_it_is_enabled
     made.signals["slave_operation"][0] = State.FAULT
     assert hear(now + 152 * MS)
     assert made.command(now + 153 * MS, 0.0, True) is not None
+
+
+@pytest.mark.parametrize("moved", [0.0, 0.1])
+def test_an_arm_that_was_left_behind_at_its_last_command_goes_the_rest_slowly_and_is_led_again(
+    moved: float,
+) -> None:
+    made, now = bridge(), 10**9
+    made.signals["slave_operation"][0] = State.ENABLED
+    setpoint, robot = made.signals["slave_setpoint_js"], load_robot(ArmBridgeParameters().robot)
+    speed = present(robot.drives).speed_limit
+    setpoint[:] = at = robot.home.copy()
+
+    def tick() -> bool:
+        nonlocal now
+        now += 2 * MS
+        is_heard = made.hear(Sample(made.joints.theirs, at.tolist(), (), (), now), now)
+        if (command := made.command(now, 0.0, True)) is not None:
+            share = 1.2 if made.lead_arm.is_leading else 0.1
+            assert (np.abs(command.position - at) <= share * 2e-3 * speed + 1e-12).all()
+            at[:] = command.position
+        return is_heard
+
+    assert tick()
+    now += 400 * MS  # nothing is heard of the arm, and the server goes on
+    setpoint[0] += 0.05
+    assert made.command(now, 0.0, True) is None
+    at[1] += moved  # by somebody
+    heard = [tick() for _ in range(900)]
+    assert not all(heard)
+    assert heard[-1] == made.lead_arm.is_leading == (not moved)
 
 
 @pytest.mark.parametrize("rate", RATES)

@@ -203,18 +203,18 @@ class ControllerBridge(RunningStage):
         return bool(self.signals["slave_operation"][_BRAKED] > 0.0)
 
     def _leads(self, setpoint: Array, now_ns: int, elapsed: float) -> bool:
-        """Go towards the setpoint, unless the server went on without the arm."""
-        is_led = not self._is_left(now_ns) and self.lead_arm.step(
-            setpoint, self.hearing.position, self.joints.ours, elapsed
-        )
-        self._left_ns = 0 if is_led else self._left_ns or now_ns
-        return is_led
+        """Go towards the setpoint; where the server went on without the arm, once it is at rest."""
+        lead = self.lead_arm
+        go = lead.rejoin if self._is_left(now_ns) else lead.step
+        goes = go(setpoint, self.hearing.position, self.joints.ours, elapsed)
+        self._left_ns = 0 if lead.is_leading else self._left_ns or now_ns
+        return goes
 
     def trouble(self) -> str:
         """Why the arm holds, or what it says that is not believed, in one line; empty if well."""
         if self.hearing.wrong:
             return f"the arm's state is not believed: {self.hearing.wrong}: holds"
-        return "" if self.lead_arm.is_leading else f"commands nothing: {self.lead_arm.waits}"
+        return self.lead_arm.waits
 
     def concerns(self) -> list[str]:
         """Why the arm holds."""

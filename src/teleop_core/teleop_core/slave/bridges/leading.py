@@ -6,6 +6,7 @@ from teleop_core.kernels.geometry import Array
 
 _CATCHING_UP = 1.2
 """Largest speed of commands in rated speeds: setpoints keep 1, the rest makes up for late ones."""
+_SLOWLY = 0.1  # rated speeds, of an arm that catches up with a setpoint that went on without it
 _LONGEST = 2.0  # periods for which one command may make up
 
 
@@ -25,7 +26,7 @@ class Lead:
         position: The last command (n,) [rad or m].
         velocity: How fast it went there (n,) [rad/s or m/s].
         is_leading: Whether the arm is led to the setpoint.
-        waits: Why it is not, in words.
+        waits: What is commanded in place of that, and why; empty if it is led.
     """
 
     def __init__(
@@ -37,13 +38,14 @@ class Lead:
         self._lower, self._upper, self._speed_limit = lower, upper, speed_limit
         self.tolerance, self._period = tolerance, period
         self.position, self.velocity, self._braked = np.zeros(n), np.zeros(n), np.zeros(n)
+        self._setpoint = np.full(n, np.nan)
         self._is_braked = self.is_leading = False
-        self.waits = "nothing has come yet"
+        self.waits = "commands nothing: nothing has come yet"
 
     def let_go(self, reason: str) -> bool:
         """Command nothing; the controller holds the arm at the last command. False, as `step`."""
         self.is_leading = self._is_braked = False
-        self.waits = reason
+        self.waits = f"commands nothing: {reason}"
         return False
 
     def step(
@@ -73,6 +75,26 @@ class Lead:
         self._approach(np.clip(setpoint, self._lower, self._upper), elapsed)
         return True
 
+    def rejoin(
+        self, setpoint: Array, measured: Array, names: tuple[str, ...], elapsed: float
+    ) -> bool:
+        """Go on slowly to a setpoint that went on without the arm; otherwise as :meth:`step`.
+
+        Only to one that stands still, and only an arm that was led and stands at the last command:
+        one that somebody moved meanwhile is commanded nothing. It is led again when it arrives.
+        """
+        is_still = bool((setpoint == self._setpoint).all())
+        self._setpoint[:] = setpoint
+        off = np.abs(measured - self.position)
+        if not self._has_led or not is_still or not (off <= self.tolerance).all():
+            return False
+        self.is_leading = bool((np.abs(setpoint - measured) <= self.tolerance).all())
+        if self.is_leading:
+            return self.step(setpoint, measured, names, elapsed)
+        self.waits = "goes slowly to the setpoint, which went on without the arm"
+        self._approach(np.clip(setpoint, self._lower, self._upper), elapsed, _SLOWLY)
+        return True
+
     def brake(self, measured: Array, elapsed: float) -> bool:
         """Bring the arm to where it is when its brakes close; whether there is a command."""
         if not self.is_leading and not self._is_braked:
@@ -80,13 +102,13 @@ class Lead:
         if self.is_leading:
             self._braked[:] = measured
             self.is_leading, self._is_braked = False, True
-            self.waits = "its brakes hold it"
+            self.waits = "commands nothing: its brakes hold it"
         self._approach(self._braked, elapsed)
         return True
 
-    def _approach(self, goal: Array, elapsed: float) -> None:
+    def _approach(self, goal: Array, elapsed: float, speeds: float = _CATCHING_UP) -> None:
         elapsed = min(max(elapsed, 1e-3), _LONGEST * self._period)
-        reach = _CATCHING_UP * elapsed * self._speed_limit
+        reach = speeds * elapsed * self._speed_limit
         step = np.clip(goal - self.position, -reach, reach)
         self.position += step
         self.velocity[:] = step / elapsed
