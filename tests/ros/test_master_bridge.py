@@ -52,6 +52,9 @@ class Device:
         self.node.create_subscription(WrenchStamped, "touch/force", self._push, quality)
         self._timer = self.node.create_timer(0.002, self._tick)
 
+    bridge: Any
+    has_stamps = True
+
     def stop(self) -> None:
         self.node.destroy_timer(self._timer)
 
@@ -61,7 +64,7 @@ class Device:
 
     def _tick(self) -> None:
         message, (x, y, z) = self._kind(), self.place.tolist()
-        if self._kind is not Pose:
+        if self._kind is not Pose and self.has_stamps:
             message.header.stamp = self.node.get_clock().now().to_msg()
         if self._kind is TransformStamped:
             there, turn = message.transform.translation, message.transform.rotation
@@ -75,7 +78,7 @@ class Device:
 
 def started(peer: "Peer", kind: str = "PoseStamped") -> Device:
     device = Device(peer, kind)
-    peer.start(
+    device.bridge = peer.start(
         "master_bridge", pose_topic="/touch/pose", device_axes=AXES, unit=0.001,
         pose_message=f"geometry_msgs/msg/{kind}", buttons_topic="/touch/joy",
         button_places=[1, -1, 0], force_topic="/touch/force", largest_force=2.0,
@@ -105,6 +108,18 @@ def test_poses_of_each_type_arrive_in_the_axes_of_the_master_in_metres(
     pressed = [1.0, 0.0, 0.0]
     peer.wait(
         turning(peer, lambda: buttons.take() and list(buttons.values[-1]) == pressed), "clutch"
+    )
+
+
+def test_a_device_whose_poses_have_no_stamp_is_refused_with_a_line_in_the_log(
+    peer: "Peer",
+) -> None:
+    device = started(peer)
+    device.has_stamps = False
+    peer.wait(turning(peer, lambda: "have no stamp" in device.bridge.stderr.read_text()), "a line")
+    device.has_stamps = True
+    peer.wait(
+        turning(peer, lambda: "follows the device" in device.bridge.stderr.read_text()), "its end"
     )
 
 

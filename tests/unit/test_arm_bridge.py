@@ -89,6 +89,7 @@ def test_names_in_another_order_among_others_are_read_by_name() -> None:
         (sample(3, (0.1, np.nan)), Wrong.FORM, "finite"),
         (sample(2), Wrong.STAMP, "does not rise"),
         (sample(1), Wrong.STAMP, "does not rise"),
+        (sample(0), Wrong.STAMP, "no stamp; stamps: sent"),
         (sample(200), Wrong.STAMP, "old, at most 0.1"),
         (sample(3, (0.2, 0.2)), Wrong.JUMP, "a jumped by 0.1"),
     ],

@@ -132,6 +132,12 @@ def test_a_pose_that_is_none_is_refused_counted_and_told_and_a_sound_one_ends_th
     assert not stage.concerns()
 
 
+def test_a_device_whose_poses_have_no_stamp_is_told_so_with_the_option_that_does_without() -> None:
+    stage = bridge()
+    assert not stage.hear(pose(), 0, NOW_NS)
+    assert "no stamp; pose_stamps: sent" in stage.concerns()[0]
+
+
 def test_buttons_are_taken_from_where_they_are_and_missing_ones_are_released() -> None:
     stage = bridge(button_places=(2, -1, 0))
     assert stage.press([1, 1, 0])

@@ -1,6 +1,5 @@
 """Nodes ``arm_bridge`` and ``jaw_bridge``: real controllers in the place of simulated drives."""
 
-import re
 import time
 from collections.abc import Callable, Iterable
 from typing import Any
@@ -8,6 +7,7 @@ from typing import Any
 from rclpy.serialization import deserialize_message
 
 from teleop_core.graph.topics import SLAVE_OPERATION, Kind, Topic
+from teleop_core.nodes.news import Trouble
 from teleop_core.nodes.streams import Subscription, message_type
 from teleop_core.nodes.ticking import TickingNode
 from teleop_core.slave.bridges import BRIDGES, Command
@@ -15,7 +15,6 @@ from teleop_core.slave.bridges.arm_bridge import BridgeParameters
 from teleop_core.slave.bridges.hearing import Sample
 
 _WAITING = 20  # messages of the arm that wait while the loop is late
-_CALM_NS = 1_000_000_000  # the same words are logged again after this [ns]
 
 
 class ArmBridgeNode(TickingNode):
@@ -38,8 +37,8 @@ class ArmBridgeNode(TickingNode):
         self._sender = self.open_publisher(told)
         self._setpoint = self.input(self.description.reads[0])
         self._output = self.ports.output(self.description.writes[0])
-        self._told, self._told_ns, self.commands = "", 0, 0
-        self._has_server = False
+        self._trouble = Trouble(self, "leads the arm")
+        self.commands, self._has_server = 0, False
 
     def teardown(self) -> None:
         """Close what :meth:`setup` opened."""
@@ -58,7 +57,7 @@ class ArmBridgeNode(TickingNode):
             self._kind.write(message, command, self.parameters.kind.parameters, self._make)
             self._sender.publish(message)
             self.commands += 1
-        self._tell_trouble()
+        self._trouble.tell(self.stage.concerns())
 
     def _listen(self) -> None:
         if not self._has_server:  # one that is found late would go on without the arm
@@ -79,20 +78,6 @@ class ArmBridgeNode(TickingNode):
         is_led = self.input(SLAVE_OPERATION).stamp_ns is not None
         found: Command | None = self.stage.command(now_ns, self._setpoint.age(), is_led)
         return found
-
-    def _tell_trouble(self) -> None:
-        """Log what makes the arm hold, or that it goes on, once each."""
-        text = re.sub(r"[\d.]+", "", self.stage.trouble())  # not again for another number
-        now_ns = time.monotonic_ns()
-        if text == self._told or now_ns - self._told_ns < _CALM_NS or self.executor is None:
-            return
-        self._told, self._told_ns = text, now_ns
-        # A line in the log takes milliseconds, which the loop has not.
-        self.executor.create_task(self._log, self.stage.trouble())
-
-    def _log(self, text: str) -> None:
-        log = self.get_logger()
-        log.error(text) if text else log.info("leads the arm")
 
     def values(self) -> dict[str, str]:
         """How many commands went out, and how many samples of the arm were refused."""

@@ -16,6 +16,7 @@ from teleop_core.graph.topics import (
     Quality,
     Topic,
 )
+from teleop_core.nodes.news import Trouble
 from teleop_core.nodes.streams import Subscription, message_type
 from teleop_core.nodes.ticking import TickingNode
 
@@ -45,6 +46,7 @@ class MasterBridgeNode(TickingNode):
         if p.force_topic:
             told = Topic(p.force_topic, Kind.WRENCH, quality=Quality.STREAM)
             self._forces, self._wrench = self.open_publisher(told), message_type(told.ros_type)()
+        self._trouble = Trouble(self, "follows the device")
         self._pose_out = self.ports.output(MASTER_MEASURED_CP)
         self._buttons_out, self._said_ns = self.ports.output(MASTER_BUTTONS), 0
 
@@ -66,6 +68,7 @@ class MasterBridgeNode(TickingNode):
         if is_new or (is_heard and now_ns - self._said_ns >= _BUTTONS_AGAIN_NS):
             self._buttons_out.send(now_ns)
             self._said_ns = now_ns
+        self._trouble.tell(self.stage.concerns())
         if self._forces is not None:
             push = self._wrench.wrench.force
             push.x, push.y, push.z = force.tolist()

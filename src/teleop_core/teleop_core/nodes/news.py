@@ -1,5 +1,7 @@
 """News: lines for the log, said once, where something that matters has changed."""
 
+import re
+import time
 from collections.abc import Iterable
 from typing import Any
 
@@ -8,6 +10,7 @@ from rclpy.node import Node
 from teleop_core.graph.stage import Stage
 from teleop_core.nodes.streams import Input
 
+_CALM_NS = 1_000_000_000  # the same trouble is logged again after this [ns]
 _COMMANDS = ("servo_", "move_", "interpolate_")
 
 
@@ -62,3 +65,30 @@ class Commanders:
 def full_name(info: Any) -> str:
     """Node of an endpoint, with its namespace."""
     return f"{info.node_namespace.rstrip('/')}/{info.node_name}"
+
+
+class Trouble:
+    """Log of why a bridge holds: each reason once, without regard to its numbers, and its end.
+
+    Args:
+        node: The node.
+        well: What is logged when nothing is wrong any more.
+    """
+
+    def __init__(self, node: Node, well: str) -> None:
+        self._node, self._well = node, well
+        self._told, self._told_ns = "", 0
+
+    def tell(self, concerns: list[str]) -> None:
+        """Log what is wrong now, unless that is known; returns at once."""
+        text = "; ".join(concerns)
+        words = re.sub(r"[\d.]+", "", text)
+        now_ns, executor = time.monotonic_ns(), self._node.executor
+        if words == self._told or now_ns - self._told_ns < _CALM_NS or executor is None:
+            return
+        self._told, self._told_ns = words, now_ns
+        executor.create_task(self._log, text)  # a line takes milliseconds, which no loop has
+
+    def _log(self, text: str) -> None:
+        log = self._node.get_logger()
+        log.error(text) if text else log.info(self._well)

@@ -25,6 +25,7 @@ from teleop_core.kernels.geometry import (
 )
 from teleop_core.kernels.portable import dot
 from teleop_core.robots import load_robot_set
+from teleop_core.slave.bridges.hearing import wrong_stamp
 from teleop_core.slave.bridges.names import JointMap
 
 POSE_MESSAGES = (
@@ -240,13 +241,9 @@ class MasterBridge(RunningStage):
         size = float((pose[3:7] ** 2).sum()) if np.isfinite(pose).all() else math.nan
         if not abs(size - 1.0) <= _OFF_UNIT:
             return "form", f"its pose is not seven finite numbers with a unit quaternion: {pose}"
-        if stamp_ns <= self._stamp_ns:
-            behind = 1e-9 * (self._stamp_ns - stamp_ns)
-            return "stamp", f"its stamp does not rise: {behind:.4g} s behind the newest one"
-        age, oldest = 1e-9 * (now_ns - stamp_ns), self.parameters.oldest_pose
-        if abs(age) > oldest:
-            return "stamp", f"its stamp is {age:.4g} s old, at most {oldest:g} s to either side"
-        return "", ""
+        oldest = self.parameters.oldest_pose
+        text = wrong_stamp(stamp_ns, self._stamp_ns, now_ns, oldest, "pose_stamps")
+        return ("stamp", text) if text else ("", "")
 
 
 def _nothing(row: object, dt: float) -> None:

@@ -108,7 +108,7 @@ class Hearing:
         theirs = _numbers(sample.position, sample.names, places)
         if theirs is None or not np.isfinite(theirs).all():
             return Wrong.FORM, "not one finite position for each name"
-        if text := self._wrong_stamp(sample.stamp_ns, now_ns):
+        if text := wrong_stamp(sample.stamp_ns, self.stamp_ns, now_ns, self.oldest, "stamps"):
             return Wrong.STAMP, text
         position = self._joints.position(theirs)
         if text := self._jump(position, sample.stamp_ns):
@@ -116,15 +116,6 @@ class Hearing:
             return Wrong.JUMP, text
         self._take(sample, position, places, now_ns)
         return None
-
-    def _wrong_stamp(self, stamp_ns: int, now_ns: int) -> str:
-        if stamp_ns <= self.stamp_ns:
-            behind = 1e-9 * (self.stamp_ns - stamp_ns)
-            return f"its stamp does not rise: {behind:.4g} s behind the newest one"
-        age = 1e-9 * (now_ns - stamp_ns)
-        if 0.0 < self.oldest < abs(age):
-            return f"its stamp is {age:.4g} s old, at most {self.oldest:g} s to either side"
-        return ""
 
     def _jump(self, position: Array, stamp_ns: int) -> str:
         if not self.stamp_ns:
@@ -160,3 +151,24 @@ def _numbers(values: Sequence[float], names: Sequence[str], places: list[int]) -
     if len(values) != len(names):
         return None
     return np.array([values[place] for place in places], dtype=np.float64)
+
+
+def wrong_stamp(stamp_ns: int, newest_ns: int, now_ns: int, oldest: float, option: str) -> str:
+    """Why the stamp of a sample is not believed, in words; empty if it is.
+
+    Args:
+        stamp_ns: The stamp [ns].
+        newest_ns: That of the newest sound sample [ns].
+        now_ns: Time [ns].
+        oldest: Largest difference between a stamp and our clock [s]; 0: stamps only have to rise.
+        option: Parameter that takes the times of sending in place of stamps.
+    """
+    if stamp_ns == 0:
+        return f"its messages have no stamp; {option}: sent takes the time when each was sent"
+    if stamp_ns <= newest_ns:
+        behind = 1e-9 * (newest_ns - stamp_ns)
+        return f"its stamp does not rise: {behind:.4g} s behind the newest one"
+    age = 1e-9 * (now_ns - stamp_ns)
+    if 0.0 < oldest < abs(age):
+        return f"its stamp is {age:.4g} s old, at most {oldest:g} s to either side"
+    return ""
