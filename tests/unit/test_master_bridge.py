@@ -216,3 +216,48 @@ def test_the_configuration_of_each_device_has_parameters_that_exist(file: Path) 
     groups = {k: v["ros__parameters"] for k, v in yaml.safe_load(file.read_text()).items()}
     made = build(MasterBridgeParameters, groups["master_bridge"])
     assert made.pose_topic
+
+
+@pytest.mark.parametrize(
+    ("name", "axes", "direction", "turn"),
+    [
+        ("joy", [0.0, 1.0], (0, 0, -1), (0, 0, 0)),  # left stick pushed away
+        ("joy", [1.0, 0.0], (-1, 0, 0), (0, 0, 0)),  # to the left
+        ("joy", [0.0, 0.0, 1.0, 0.0, 1.0], (0, 1, 0), (0, 0, 0)),  # up; a trigger is no axis
+        ("joy", [0.0, 0.0, 0.0, 1.0], (0, 0, 0), (0, 1, 0)),
+        ("spacenav", [1.0], (0, 0, -1), (0, 0, 0)),
+        ("spacenav", [0.0, 0.0, 1.0, 0.0, 0.0, 1.0], (0, 1, 0), (0, 1, 0)),
+    ],
+)
+def test_rates_of_a_joy_move_the_stylus_in_the_axes_of_the_master(
+    name: str, axes: list[float], direction: tuple[int, ...], turn: tuple[int, ...]
+) -> None:
+    (file,) = (path for path in MASTERS if path.stem == name)
+    given = yaml.safe_load(file.read_text())["master_bridge"]["ros__parameters"]
+    stage = MasterBridge(build(MasterBridgeParameters, given))
+    axes, held = [*axes, *[0.0] * (8 - len(axes))], [0, 0, 0, 0, 1]
+
+    def after(seconds: float, buttons: list[int], start_ns: int) -> int:
+        end_ns = start_ns + round(1e9 * seconds)
+        for now_ns in range(start_ns, end_ns, 20_000_000):
+            assert stage.hear_joy(axes, buttons, now_ns, now_ns)
+        return end_ns
+
+    after(0.02, held, NOW_NS - 20_000_000)
+    start = said(stage)[1]
+    end_ns = after(1.0, held, NOW_NS)
+    place, turned = said(stage)
+    assert np.allclose(place, 0.04 * np.array(direction), rtol=0, atol=1e-12)
+    assert np.allclose((turned * start.inv()).as_rotvec(), 0.6 * np.array(turn), rtol=0, atol=1e-12)
+    if name == "joy":  # nothing moves while the shoulder button is released
+        end_ns = after(1.0, [0, 0, 0, 0, 0], end_ns)
+        assert np.array_equal(said(stage)[0], place)
+    after(10.0, held, end_ns)
+    assert np.abs(said(stage)[0]).max() <= 0.1 + 1e-12
+
+
+def test_a_joy_with_fewer_axes_than_are_named_is_refused_and_moves_nothing() -> None:
+    stage = bridge(pose_message="sensor_msgs/msg/Joy")
+    assert not stage.hear_joy([1.0, 0.0], [], NOW_NS, NOW_NS)
+    assert "fewer than are named" in stage.concerns()[0]
+    assert not stage.hear_joy([np.nan] * 6, [], NOW_NS + 1, NOW_NS)

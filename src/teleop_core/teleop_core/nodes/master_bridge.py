@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from rclpy.serialization import deserialize_message
 
-from teleop_core.chain.master.master_bridge import MasterBridgeParameters
+from teleop_core.chain.master.master_bridge import RATE_MESSAGE, MasterBridgeParameters
 from teleop_core.graph.topics import (
     MASTER_BUTTONS,
     MASTER_MEASURED_CP,
@@ -95,6 +95,8 @@ class MasterBridgeNode(TickingNode):
 
     def _hear(self, message: Any, stamp_ns: int) -> bool:
         now_ns = time.time_ns()
+        if self.parameters.pose_message == RATE_MESSAGE:
+            return bool(self.stage.hear_joy(message.axes, message.buttons, stamp_ns, now_ns))
         if self.parameters.says_joints:
             return bool(self.stage.hear_joints(message.name, message.position, stamp_ns, now_ns))
         return bool(self.stage.hear(pose_of(message), stamp_ns, now_ns))

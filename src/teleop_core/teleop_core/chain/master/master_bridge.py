@@ -7,13 +7,14 @@ shall give. What it does not believe it does not pass on: the slave holds then.
 import math
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from teleop_core.base.errors import ParameterError
 from teleop_core.base.parameters import parameter
 from teleop_core.chain.mapping.parameters import AXES, axis_map
+from teleop_core.chain.master.joy_rates import JoyParameters, JoyRates
 from teleop_core.graph.signals import DT
 from teleop_core.graph.stage import RunningStage, Stage
 from teleop_core.graph.topics import MASTER_BUTTONS, MASTER_MEASURED_CP, MASTER_SERVO_CF
@@ -33,6 +34,8 @@ POSE_MESSAGES = (
     "geometry_msgs/msg/Pose", "sensor_msgs/msg/JointState",
 )  # fmt: skip
 """Messages in which devices say where their stylus is; the last one says where their joints are."""
+RATE_MESSAGE = "sensor_msgs/msg/Joy"
+"""Message in which gamepads and 3-D mice say how fast the stylus goes."""
 _OFF_UNIT = 1e-2  # of a quaternion's length
 _THREE = ("+x", "+y", "+z")
 
@@ -45,8 +48,10 @@ class MasterBridgeParameters:
         "device/measured_cp", fixed=True, doc="where the device says where its stylus is"
     )
     pose_message: str = parameter(
-        POSE_MESSAGES[0], choices=POSE_MESSAGES, fixed=True, doc="type of these messages"
-    )
+        POSE_MESSAGES[0], choices=(*POSE_MESSAGES, RATE_MESSAGE), fixed=True,
+        doc="type of these messages",
+    )  # fmt: skip
+    joy: JoyParameters = field(default_factory=JoyParameters)
     device_axes: tuple[str, ...] = parameter(
         _THREE, choices=AXES, length=3, fixed=True,
         doc="the x (right), y (up), z (towards the person) of master_base as axes of the device; "
@@ -126,8 +131,8 @@ class MasterBridgeParameters:
 class MasterBridge(RunningStage):
     """Stage that says where a real device's stylus is, and what force the device shall give.
 
-    Its node calls it: ``hear`` or ``hear_joints`` for each message of the device, ``press`` for
-    its buttons, ``force`` for what it is sent.
+    Its node calls it: ``hear``, ``hear_joints`` or ``hear_joy`` for each message of the device,
+    ``press`` for its buttons, ``force`` for what it is sent.
 
     Attributes:
         wrong: What is wrong with the newest pose, in words; empty if it is sound.
@@ -148,6 +153,7 @@ class MasterBridge(RunningStage):
         quaternion_from_rotation(columns, self._stylus)
         self.refused: Counter[str] = Counter()
         self.wrong, self.heard_ns, self._stamp_ns = "", 0, 0
+        self._rates = JoyRates(p.joy)
         if p.says_joints:
             self._robot = load_robot_set(p.handle, p.handle_geometry)
             self._joints = JointMap(
@@ -194,6 +200,16 @@ class MasterBridge(RunningStage):
         if np.isfinite(theirs).all():
             pose_from_transform(self._robot.fk(self._joints.position(theirs)), pose)
         return self.hear(pose, stamp_ns, now_ns)
+
+    def hear_joy(
+        self, axes: Sequence[float], buttons: Sequence[int], stamp_ns: int, now_ns: int
+    ) -> bool:
+        """Take the axes of a Joy, as rates of the stylus; otherwise as :meth:`hear`."""
+        if text := self._rates.step(axes, buttons, stamp_ns):
+            self.wrong = text
+            self.refused["form"] += 1
+            return False
+        return self.hear(self._rates.pose, stamp_ns, now_ns)
 
     def press(self, buttons: Sequence[int]) -> bool:
         """Take the buttons of the device; false if it has fewer than are named."""
