@@ -393,6 +393,14 @@ def test_missing_rows_are_dropped_and_make_a_gap(tmp_path: Path) -> None:
     assert report.gaps == ((pytest.approx(0.99), pytest.approx(0.21)),)
 
 
+def test_holes_of_a_file_are_not_messages_that_are_missing_in_its_session(tmp_path: Path) -> None:
+    frame(rows=np.delete(TABLE, slice(100, 171), axis=0)).to_csv(tmp_path / "a.csv", index=False)
+    report, _ = imported(tmp_path / "a.csv", tmp_path)
+    session = tc.replay(report.recording)
+    for recording in (session, tc.replay(session)):
+        assert {topic.gaps for topic in recording.score().topics.values()} <= {0, None}
+
+
 def test_short_stretches_of_missing_rows_are_bridged_on_request(tmp_path: Path) -> None:
     rows = TABLE.copy()
     rows[100:105, 1:4] = np.nan

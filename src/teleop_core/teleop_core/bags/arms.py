@@ -22,6 +22,8 @@ from teleop_core.graph.topics import DIAGNOSTICS, SLAVE_MEASURED_CP, Topic
 
 ARMS_KEY = "arms"
 NAMESPACE_KEY = "namespace"
+PLAYED_KEY = "played"
+"""Entry with the stage up to which topics were taken from a file, as a replay does."""
 _OF_ONE_ARM = {
     "robot", "robot_file", "robot_meshes", "seed", "mesh", "mesh_file", "drives", "drives_file"
 }  # fmt: skip

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
+from teleop_core.bags.arms import PLAYED_KEY
 from teleop_core.bags.reader import Bag
 from teleop_core.base import plain_yaml
 from teleop_core.base.errors import TeleopError
@@ -13,7 +14,7 @@ from teleop_core.base.texts import shown
 from teleop_core.chain.mapping.motion_scaling import MOTION_SCALING
 from teleop_core.chain.mapping.parameters import MotionScalingParameters, axis_map, tool_maps
 from teleop_core.chain.master.operator import OPERATOR
-from teleop_core.graph.graph import Graph, build_graph
+from teleop_core.graph.graph import DEVICE, HAND, Graph, build_graph
 from teleop_core.graph.layers import SESSION, Layer, SessionParameters, parse_layer
 from teleop_core.graph.stage import STAGES
 from teleop_core.graph.topics import Topic
@@ -21,6 +22,7 @@ from teleop_core.kernels.geometry import Array
 from teleop_core.slave.slave import SLAVE
 from teleop_core.slave.slave_sim import SLAVE_SIM
 
+_BEGINS = (HAND, DEVICE)
 _GRAPH = ("arms", "stages", "delays")
 _WORLD = "world."
 _TOOL = ("axes", "tool_axes", "tool_roll", "rotation_gain")
@@ -43,6 +45,7 @@ class Origin:
             one since it is the arm's server that tells it.
         world: What is stored of the object that the slave touches, by names without ``world.``.
         missing: Parts that the recording names and that are not known here, each as a text.
+        begin: Stage up to which topics were taken from a file; empty if none were.
         tool: Quaternions (4,) of the maps from the master's base to the slave's axes, and from the
             stylus to the tool; None where the tool does not turn as much as the stylus.
     """
@@ -58,6 +61,7 @@ class Origin:
     lag: int = 0
     world: Mapping[str, object] = field(default_factory=dict)
     missing: tuple[str, ...] = ()
+    begin: str = ""
 
     @cached_property
     def chain(self) -> tuple[tuple[str, Topic], ...]:
@@ -68,6 +72,22 @@ class Origin:
     def streams(self) -> tuple[Topic, ...]:
         """Topics of an arm with one message per step."""
         return tuple(topic for topic in self.graph.streams if not topic.arm)
+
+    @property
+    def sources(self) -> dict[str, Topic]:
+        """Topic whose stamps each passes on, by its name."""
+        return {
+            written.name: link.topic
+            for link in self.graph.links
+            for written in link.reader.stage.writes
+            if not link.reader.arm and written.stamp.of == link.port.name
+        }
+
+    @property
+    def played(self) -> frozenset[str]:
+        """Names of topics that were taken from a file, as a replay does."""
+        stages = (member.stage for member in self.graph.played(self.begin) if not member.arm)
+        return frozenset(topic.name for stage in stages for topic in stage.writes)
 
     def writer(self, topic: Topic) -> str:
         """Name of the stage that writes a topic; empty if none does."""
@@ -91,6 +111,7 @@ def read_origin(bag: Bag, arm: str = "") -> Origin:
         _graph(layer), _axes(layer, arm), _operator(layer, arm), _interpolation(layer, arm),
         _tool(layer, arm), *_slave(layer, arm), _geometry(layer, arm),
         int(has_server), _world(layer, arm), tuple(dict.fromkeys(_missing(layer, arm))),
+        begin if (begin := bag.metadata.get(PLAYED_KEY, "")) in _BEGINS else "",
     )  # fmt: skip
 
 

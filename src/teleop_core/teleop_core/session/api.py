@@ -312,7 +312,7 @@ class _Memory:
             stamps, values, logs = (np.concatenate(column) for column in zip(*parts, strict=True))
             names = topic.names(self._session.joint_names[topic.arm])
             series[topic] = Series(stamps, logs, values, names, topic.frame_id)
-        about = describe(made)
+        about = describe(made) | self._session.about
         return MemoryBag(about["scenario"] or "session", series, self._messages, about)
 
 

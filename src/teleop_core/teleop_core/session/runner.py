@@ -7,7 +7,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from teleop_core.bags.arms import ARMS_KEY
+from teleop_core.bags.arms import ARMS_KEY, PLAYED_KEY
 from teleop_core.bags.kept_files import (
     FIXTURE,
     TOUCHED,
@@ -105,6 +105,7 @@ def replayed_blocks(session: VirtualTime, bag: Bag) -> tuple[Iterator[Any], int]
     played = session.played_topics
     needed = session.needed_topics
     bag.require(needed)
+    session.plays_file = PLAYED_KEY in bag.metadata or not bag.metadata.get("configuration")
     recorded = [t for t in played if t.name in bag.topics and bag.topics[t.name].count]
     series = {name: in_order(found) for name, found in bag.read_many(recorded).items()}
     name = needed[0].name
@@ -236,7 +237,7 @@ def open_writer(
         (*session.graph.topics, *further),
         session.joint_names,
         parameters=configuration.groups[RECORDER_NAME],
-        metadata=describe(configuration),
+        metadata=describe(configuration) | session.about,
     )
 
 

@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from teleop_core.bags.arms import PLAYED_KEY
 from teleop_core.base.errors import PartError, ShapeError
 from teleop_core.chain.operators.parameters import insist_on_virtual
 from teleop_core.graph.graph import BUILT_IN
@@ -36,7 +37,10 @@ class VirtualTime:
         stages: Stages at work, by the names of their members.
         joint_names: Joint names of each arm by its namespace; empty for an arm without a robot.
         now_ns: Time of the last tick [ns]; the first tick is one tick after 0.
+        plays_file: Whether what is played was made elsewhere, with holes of its own.
     """
+
+    plays_file = False
 
     def __init__(
         self, configuration: Configuration, tick_ns: int = TICK_NS, *, played: str = ""
@@ -94,6 +98,11 @@ class VirtualTime:
         """Those of :attr:`played_topics` without which there is nothing to replay."""
         members = [m for m in self.graph.members if m.stage.name == self._last_played]
         return tuple(t for member in members for t in member.writes if t.kind is Kind.POSE)
+
+    @property
+    def about(self) -> dict[str, str]:
+        """What is stored with a recording of it, beside its configuration."""
+        return {PLAYED_KEY: self._last_played} if self.plays_file else {}
 
     @property
     def played_topics(self) -> tuple[Topic, ...]:

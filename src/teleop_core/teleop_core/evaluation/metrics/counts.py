@@ -133,7 +133,8 @@ class TopicsMetric(Metric):
         Key("topics.<name>.count", "1", "messages"),
         Key("topics.<name>.gaps", "1",
             "messages missing by their stamps, lost or passed over by a stage that takes only the "
-            "newest; null if not a stream, or one that is sent where it changes"),
+            "newest; a hole counts where it begins, and not at all in a file that was replayed; "
+            "null if not a stream, or one that is sent where it changes"),
         Key("topics.<name>.lost", "1",
             "messages that were sent and did not reach the recorder, by its own count; null if "
             "uncounted"),
