@@ -359,6 +359,8 @@ CODE_MUTANTS = (
     _mutant("jaw_delay", "a grip's delay begins at the end of the hand's closing", _JAW_SCORE,
             "closes[1:] & ~closes[:-1]", "~closes[1:] & closes[:-1]",
             "evaluation_scores"),
+    _mutant("delay_asked", "a delay beyond what was asked for is no concern",
+            "evaluation/verdict.py", "(whole - asked) / _LATENCY_MS", "(asked - asked)", "verdict"),
     _mutant("holes_lost", "holes of a user's file count as messages lost in every topic",
             "evaluation/stamps.py", ", side=\"left\") > before", ", side=\"left\") >= before",
             "import_tables"),

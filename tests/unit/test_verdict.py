@@ -60,6 +60,10 @@ def test_a_drift_is_named_before_the_share_that_was_followed() -> None:
         ({}, None, "nothing stands out: followed 99.9 % of the time, tracking error 0.3 mm RMS"),
         ({"asked_error_mm.max": 12.0, "command_error_mm.max": 11.0}, None, "nothing"),  # filters
         ({"latency_ms.total.p99": 80.0}, "latency_ms.total.p99", "delay p99 80 ms"),
+        ({"latency_ms.total.p99": 103.0, "latency_ms.asked.p99": 100.0}, None, "nothing"),
+        ({"latency_ms.total.p99": 130.0, "latency_ms.asked.p99": 100.0}, "latency_ms.total.p99",
+         "delay p99 130 ms, hand to setpoint, 100 ms of it asked for"),
+        ({"topics.network/servo_cp.gaps": 1000}, None, "nothing"),  # losses that were asked for
         ({"ticks.made_up": 300}, "ticks.made_up", "300 control ticks made up late"),
         ({"ticks.dropped": 300}, "ticks.dropped", "300 control ticks never executed (3 %)"),
         ({"topics.slave/servo_cp.gaps": 1000, "topics.slave/servo_cp.lost": 400}, "topics",
@@ -77,6 +81,22 @@ def test_whatever_is_worst_comes_first(
     found = verdict_of(FINE | changes)
     assert found.worst == worst
     assert found.text.startswith(text)
+
+
+@pytest.mark.parametrize(
+    ("stages", "asked"),
+    [
+        ([], {"teleop.delays": ["slave/servo_cp@inverse_kinematics=0.1"]}),
+        (["network"], {"network.there.least_delay": 0.06,
+                       "teleop.delays": ["slave/servo_jp=0.04"]}),
+    ],
+)  # fmt: skip
+def test_a_delay_that_was_asked_for_is_no_concern(stages: list[str], asked: Any) -> None:
+    score = tc.run("coarse_box", duration=4.0, stages=stages, settings=asked).score()
+    values = score.to_dict()
+    assert values["latency_ms.asked.p99"] == pytest.approx(100.0, abs=1.5)
+    assert values["latency_ms.total.p99"] == pytest.approx(100.0, abs=1.5)
+    assert "delay" not in score.verdict.text
 
 
 @pytest.fixture(scope="module")

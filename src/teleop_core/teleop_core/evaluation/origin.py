@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import pairwise
 from typing import Any
 
 from teleop_core.bags.arms import PLAYED_KEY
@@ -72,6 +73,13 @@ class Origin:
     def streams(self) -> tuple[Topic, ...]:
         """Topics of an arm with one message per step."""
         return tuple(topic for topic in self.graph.streams if not topic.arm)
+
+    @property
+    def chain_delay(self) -> float:
+        """Time [s] that the session was told to add along the chain."""
+        steps = {(topic, stage) for (_, topic), (stage, _) in pairwise(self.chain)}
+        links = (link for link in self.graph.links if not link.reader.arm)
+        return sum(link.delay for link in links if (link.topic, link.reader.stage.name) in steps)
 
     @property
     def sources(self) -> dict[str, Topic]:

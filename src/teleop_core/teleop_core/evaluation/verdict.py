@@ -127,12 +127,23 @@ def _messages(values: Values) -> Iterator[Concern]:
 
 
 def _of_topics(values: Values, name: str) -> int:
-    """Sum of a number of all topics."""
+    """Sum of a number of all topics; a simulated network loses what it is told to."""
     return sum(
         int(value)
         for key, value in values.items()
-        if key.startswith("topics.") and key.endswith(f".{name}") and isinstance(value, int | float)
-    )
+        if key.startswith("topics.") and not key.startswith("topics.network/")
+        and key.endswith(f".{name}") and isinstance(value, int | float)
+    )  # fmt: skip
+
+
+def _delay(values: Values) -> Iterator[Concern]:
+    """Delay beyond what was asked for, of a simulated network and of links."""
+    key = "latency_ms.total.p99"
+    asked = _number(values, "latency_ms.asked.p99") or 0.0
+    if (whole := _number(values, key)) is not None:
+        text = f"delay p99 {whole:.3g} ms, hand to setpoint"
+        text += f", {asked:.3g} ms of it asked for" if asked else ""
+        yield Concern((whole - asked) / _LATENCY_MS, key, text)
 
 
 def _ticks(values: Values) -> Iterator[Concern]:
@@ -159,9 +170,8 @@ _UNTIMELY = {
     "ticks.dropped": (_SHARE, "{:.0f} control ticks never executed"),
 }
 _CONCERNS: tuple[Callable[[Values], Iterator[Concern]], ...] = (
-    _missing, _drift, _following, _messages, _ticks, _created,
+    _missing, _drift, _following, _messages, _ticks, _created, _delay,
     _beyond("position_error_mm.rms", _ERROR_MM, "tracking error {:.3g} mm RMS"),
     _beyond("fixture.penetration_max_mm", BOX_OVERSHOOT_MM, "fixture penetration {:.3g} mm"),
     _beyond("contact.feeding", 0.5, "non-passive contacts: {:.0f}"),
-    _beyond("latency_ms.total.p99", _LATENCY_MS, "delay p99 {:.3g} ms, hand to setpoint"),
 )  # fmt: skip

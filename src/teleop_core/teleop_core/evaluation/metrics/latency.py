@@ -11,13 +11,13 @@ from teleop_core.evaluation.metric import Key, Metric
 from teleop_core.evaluation.pairing import NONE, same_stamp
 from teleop_core.evaluation.rows import MISSING, Row, fixed, number
 from teleop_core.evaluation.windows import Window
-from teleop_core.graph.topics import Topic
+from teleop_core.graph.topics import NETWORK_SERVO_CP, Topic
 
 _NEVER = 2**62
 _BINS = 150
 _COLORS = (FIRST, "#e69f00", SECOND, THIRD, DARK)
-TOTAL = "total"
-"""Name of the delay of the whole chain."""
+TOTAL, ASKED = "total", "asked"
+"""Names of the delay of the whole chain, and of what was asked for of it."""
 
 
 class LatencyMetric(Metric):
@@ -34,7 +34,7 @@ class LatencyMetric(Metric):
             "own delay of each stage between the hand and the slave: from the arrival at the "
             "recorder of what it answers to that of its answer; of the first, and "
             f"{TOTAL}: from the stamp of the hand's sample to the arrival of the sample and of the "
-            "last answer"),
+            f"last answer; {ASKED}: what a simulated network and teleop.delays are to add to it"),
     )  # fmt: skip
 
     def __init__(self, context: Context) -> None:
@@ -42,6 +42,8 @@ class LatencyMetric(Metric):
         self._command = self._chain[:2][-1][1]  # what is made of the hand's sample first
         self._delays = {stage: Distribution() for stage, _ in self._chain}
         self._delays[TOTAL] = Distribution()
+        self._asked_ms = 1e3 * context.origin.chain_delay
+        self._network = next((s for s, topic in self._chain if topic == NETWORK_SERVO_CP), "")
         context.read(topic for _, topic in self._chain)
 
     def add(self, window: Window) -> None:
@@ -57,8 +59,13 @@ class LatencyMetric(Metric):
         self._delays[TOTAL].add((logs - stamps)[is_command])
 
     def values(self) -> dict[str, Delay]:
-        """Delay of each stage."""
-        return {stage: distribution.delay() for stage, distribution in self._delays.items()}
+        """Delay of each stage; what was asked for, if anything was."""
+        found = {stage: distribution.delay() for stage, distribution in self._delays.items()}
+        own = found.get(self._network, Delay(0.0, 0.0, 0.0))
+        parts = (own.median, own.p99, own.max)
+        if any(parts) or self._asked_ms:
+            found[ASKED] = Delay(*(None if p is None else p + self._asked_ms for p in parts))
+        return found
 
     def rows(self) -> list[Row]:
         """One row per stage."""
