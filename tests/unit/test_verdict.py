@@ -83,6 +83,26 @@ def test_whatever_is_worst_comes_first(
     assert found.text.startswith(text)
 
 
+def test_an_error_that_encoders_do_not_see_is_named_where_all_else_is_well() -> None:
+    assert verdict_of(FINE | {"true_error_mm.rms": 0.31}).text.endswith("error 0.3 mm RMS")
+    text = verdict_of(FINE | {"true_error_mm.rms": 5.6}).text
+    assert text.endswith("0.3 mm RMS at the encoders and 5.6 mm at the true tip")
+
+
+def test_every_concern_says_what_it_means_and_what_to_do() -> None:
+    wrong = {
+        "reach.followed_share": 0.5, "asked_error_mm.max": 60.0, "position_error_mm.rms": 9.0,
+        "latency_ms.total.p99": 80.0, "ticks.made_up": 3000, "ticks.dropped": 3000,
+        "topics.slave/servo_cp.gaps": 900, "fixture.penetration_max_mm": 9.0,
+        "contact.feeding": 3,
+    }  # fmt: skip
+    alone = [verdict_of(FINE | {key: value}) for key, value in wrong.items()]
+    found = [*alone, verdict_of(FINE | ports(1.0, 1.0, 9.0, 9.0))]
+    assert len({one.worst for one in found}) == len(found)
+    assert all(one.advice for one in found)
+    assert verdict_of(FINE).advice is None
+
+
 @pytest.mark.parametrize(
     ("stages", "asked"),
     [
@@ -116,11 +136,14 @@ def test_one_line_opens_table_json_page_and_python(drifting: Any, tmp_path: Path
     console = Console(file=shown, width=100)
     paths = tmp_path / "s.json", tmp_path / "page.html"
     evaluate_bags([drifting.path], *paths, console)
-    assert shown.getvalue().splitlines()[0] == f"drifting: {text}"
+    advice = drifting.score().verdict.advice
+    assert shown.getvalue().splitlines()[:2] == [f"drifting: {text}", f"  {advice}"]
     assert json.loads(paths[0].read_text())[0]["verdict"]["text"] == text
     page = paths[1].read_text()
     opening = page[: page.index("<details")]
-    assert f'<p class="verdict bad">{text}</p>' in opening.replace("&#x27;", "'")
+    assert f'<p class="verdict bad">{text}</p><p class="advice">{advice}</p>' in opening.replace(
+        "&#x27;", "'"
+    )
     assert opening.count("<dd>") == 5
     assert opening.count("<svg") == 2
     assert text in repr(drifting.score())

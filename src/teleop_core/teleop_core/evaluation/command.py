@@ -46,6 +46,8 @@ def evaluate_bags(
     for score in scores:
         line = f"{score.session.place}: {score.verdict}"
         console.print(printable(line), markup=False, highlight=False, soft_wrap=True)
+        if advice := score.verdict.advice:
+            console.print(f"  {advice}", markup=False, highlight=False, soft_wrap=True)
     for table in score_tables(scores, console.width):
         console.print(table)
     if json_file is not None:

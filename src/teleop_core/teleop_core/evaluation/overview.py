@@ -19,6 +19,7 @@ _FIGURES = (
     (SHARE, "%", "time followed"),
     ("asked_error_mm.max", "mm", "largest lag behind the hand"),
     ("position_error_mm.rms", "mm", "tracking error RMS"),
+    ("true_error_mm.rms", "mm", "error of the true tip RMS"),
     ("orientation_error_deg.angle.rms", "°", "orientation error RMS"),
     ("fixture.penetration_max_mm", "mm", "largest fixture penetration"),
     ("latency_ms.total.p99", "ms", "delay p99, hand to setpoint"),
@@ -45,7 +46,8 @@ def overview(
 
 def _verdict(found: Verdict) -> str:
     kind = "good" if found.is_good else "bad"
-    return f'<p class="verdict {kind}">{escape(found.text)}</p>'
+    advice = f'<p class="advice">{escape(found.advice)}</p>' if found.advice else ""
+    return f'<p class="verdict {kind}">{escape(found.text)}</p>{advice}'
 
 
 def _figures(score: Score) -> str:

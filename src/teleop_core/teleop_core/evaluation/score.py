@@ -35,6 +35,7 @@ SESSION_KEYS = (
     Key("session.missing", "1", "parts it names that are not known here; null if all are known"),
     Key("verdict.text", "1", "one line that names the worst first"),
     Key("verdict.worst", "1", "key of the worst; null if nothing is beyond what is fine"),
+    Key("verdict.advice", "1", "what the worst means and what to do; null if nothing is wrong"),
 )
 """Keys of what is told about a recording, beside those of its metrics."""
 Record = TypeVar("Record")

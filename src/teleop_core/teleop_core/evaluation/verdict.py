@@ -20,6 +20,23 @@ _CAUSES = {
     "joint": "at a joint's end", "workspace": "beyond the workspace", "speed": "joints too slow",
     "singularity": "near a singularity", "aligning": "aligned anew",
 }  # fmt: skip
+_BUSY = "the machine was busy: close other programs, or give the session real-time priority"
+_ADVICE = {
+    SHARE: "the slave could not go where the hand led: keep to its reach, or lead it more slowly",
+    "asked_error_mm.max": "the tip fell behind the hand: lead it more slowly, or lower the gain",
+    "position_error_mm.rms": "the drives do not hold the setpoint: lead it more slowly, or give "
+    "the controller other gains",
+    "topics": "stages or the recorder were too late to take them: the machine or the network was "
+    "busy",
+    "ticks.made_up": _BUSY, "ticks.dropped": _BUSY,
+    "latency_ms.total.p99": "commands came late: the table of latencies names the stage",
+    "passivity.slave.out_mj": "delayed forces gave energy, which makes touches bounce: choose "
+    "reflection.passivity",
+    "contact.feeding": "a wall pushed the hand harder on its way out than in: lower its stiffness "
+    "or the delay, or choose reflection.passivity",
+    "fixture.penetration_max_mm": "the hand pushed through the fixture: raise its stiffness, or "
+    "push less",
+}  # fmt: skip
 Values = Mapping[str, Leaf]
 """Numbers of a score by their keys."""
 
@@ -39,10 +56,12 @@ class Verdict:
     Attributes:
         text: One line, the worst first.
         worst: Key of the worst; None if nothing is beyond what is fine.
+        advice: What the worst means and what to do, one line; None if nothing is wrong.
     """
 
     text: str
     worst: str | None
+    advice: str | None = None
 
     @property
     def is_good(self) -> bool:
@@ -58,12 +77,15 @@ def verdict_of(values: Values) -> Verdict:
     found = [c for concerns in _CONCERNS for c in concerns(values) if c.weight > 1.0]
     found.sort(key=lambda concern: -concern.weight)
     if found:
-        return Verdict("; ".join(concern.text for concern in found[:NAMED]), found[0].key)
+        text = "; ".join(concern.text for concern in found[:NAMED])
+        return Verdict(text, found[0].key, _ADVICE.get(found[0].key))
     parts = ["nothing stands out"]
     if (share := _number(values, SHARE)) is not None:
         parts.append(f"followed {percent(share)} % of the time")
     if (error := _number(values, "position_error_mm.rms")) is not None:
         parts.append(f"tracking error {error:.3g} mm RMS")
+        if (true := _number(values, "true_error_mm.rms")) is not None and true > _ERROR_MM:
+            parts[-1] += f" at the encoders and {true:.3g} mm at the true tip"
     return Verdict(f"{parts[0]}: {', '.join(parts[1:])}" if parts[1:] else parts[0], None)
 
 
