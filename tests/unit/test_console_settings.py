@@ -9,7 +9,7 @@ from teleop_core.base.parameters import specs, values_of
 from teleop_core.base.plain_yaml import parse
 from teleop_core.console.link import ParameterInfo
 from teleop_core.console.server import ConsoleServer
-from teleop_core.console.settings import SettingsPanel, _parsed, _shown, _text
+from teleop_core.console.settings import SettingsPanel, _control, _parsed, _shown, _text
 from teleop_core.graph.layers import declared_groups
 
 MODE, GAIN = ("motion_scaling", "mode"), ("motion_scaling", "fine_gain")
@@ -52,6 +52,17 @@ def test_a_setting_text_is_read_by_the_session_as_the_value(
 ) -> None:
     found = parse(_text(value)) if not isinstance(value, bool) else {"True": True}[_text(value)]
     assert (tuple(found) if isinstance(found, list) else found) == value
+
+
+@pytest.mark.parametrize(
+    ("doc", "unit"),
+    [("delay of a link [s]", " [s]"), ("one of [a, b] things", ""), ("no unit", ""), ("", ""),
+     ("weight [kg m] or length [m]", " [m]")],
+)  # fmt: skip
+def test_a_label_has_the_unit_that_ends_the_meaning(doc: str, unit: str) -> None:
+    with ConsoleServer(0) as server:
+        control = _control(server.viser.gui, "x", ParameterInfo("slave", "x", 1.0, doc))
+        assert control.label == f"x{unit}"
 
 
 def test_value_that_a_button_of_the_stylus_changed_is_shown_as_it_is_and_can_be_set_back() -> None:

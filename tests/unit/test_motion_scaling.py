@@ -17,6 +17,7 @@ from teleop_core.chain.mapping.motion_scaling import (
 from teleop_core.chain.mapping.parameters import FixtureParameters, MotionScalingParameters
 from teleop_core.chain.operators.rest import REST_POSITION, REST_TILT
 from teleop_core.graph.signals import TICK_NS
+from teleop_core.graph.topics import NO_COMMAND_NS
 from teleop_core.kernels.geometry import (
     Array,
     quaternion_from_rotation,
@@ -414,3 +415,18 @@ def test_fine_gain_above_the_coarse_one_is_refused() -> None:
     with pytest.raises(ParameterError) as error:
         MotionScalingParameters(coarse_gain=0.5, fine_gain=0.6)
     assert (error.value.name, error.value.value) == ("fine_gain", 0.6)
+
+
+def test_a_slave_that_does_not_follow_for_long_is_aligned_anew_once() -> None:
+    desk = Desk()
+    desk.row["slave_setpoint_cp_ns"] = NO_COMMAND_NS
+    for _ in range(1000):  # it homes
+        desk.step(does_follow=False)
+    assert not any("anew" in text for text in desk.scaling.concerns())
+    for _ in range(2):
+        for _ in range(50):
+            desk.step((MM, 0, 0))
+        for _ in range(1000):
+            desk.step(does_follow=False)
+    (told,) = desk.scaling.concerns()
+    assert "2 times" in told

@@ -234,7 +234,7 @@ def _control(gui: viser.GuiApi, label: str, info: ParameterInfo) -> Any:
         low = "−∞" if info.lower is None else f"{info.lower:g}"
         bounds = f" ({low} to {'∞' if info.upper is None else f'{info.upper:g}'})"
     hint = f"{info.doc}{bounds}" + (" — takes effect in a new session" if info.is_fixed else "")
-    value = _shown(info.value)
+    value, label = _shown(info.value), f"{label}{_unit(info.doc)}"
     if isinstance(value, bool):
         return gui.add_checkbox(label, value, hint=hint)
     if info.choices and not isinstance(info.value, tuple):
@@ -244,6 +244,12 @@ def _control(gui: viser.GuiApi, label: str, info: ParameterInfo) -> Any:
         step = 1 if isinstance(value, int) else _step(value)
         return gui.add_number(label, value, step=step, hint=hint)
     return gui.add_text(label, str(value), hint=hint)
+
+
+def _unit(doc: str) -> str:
+    """Unit in brackets as it ends a meaning, with a space before it; empty without one."""
+    _, bracket, unit = doc.rpartition(" [")
+    return f"{bracket}{unit}" if unit.endswith("]") else ""
 
 
 def _step(value: float) -> float:

@@ -121,7 +121,8 @@ class ScalingState(
     must_latch: int
     is_fixture_on: int
     stylus: Vector3
-    aligned: int
+    has_led: int  # the last sample led the slave
+    aligned: int  # how often it was led and then aligned anew
 
 
 _FOLLOWING, _CLUTCHED = STATE["is_following"], STATE["is_clutched"]
@@ -349,8 +350,9 @@ def motion_scaling_step(
         s.must_latch = 1
         if not is_doubtful:
             copy(row.slave_setpoint_cp, s.command)
-    if s.must_latch and s.is_engaged and s.last_ns != 0:
+    if s.must_latch and s.has_led:
         s.aligned += 1
+    s.has_led = 1 - s.must_latch
     if s.must_latch or clutch > 0.0 or s.buttons[0] > 0.0:
         _latch(s, stylus)
     else:
@@ -491,9 +493,10 @@ class MotionScaling(RunningStage):
         if count > told[0]:
             found.append(f"held {count - told[0]} samples of the master that no hand can make")
         elif aligned > told[1]:
+            often = f", {aligned - told[1]} times" if aligned - told[1] > 1 else ""
             found.append(
-                "aligned hand and slave anew, which shifts the one against the other, "
-                f"{aligned - told[1]} times: the master paused, or the slave did not follow"
+                f"aligned hand and slave anew, which shifts the one against the other{often}: the "
+                "master paused, or the slave did not follow"
             )
         if self.state["is_lost"]:
             found.append("the buttons fell silent: holds as if clutched")
