@@ -1,12 +1,14 @@
 """What the page remembers: the last thirty seconds, and figures that numpy finds too."""
 
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
 
 from teleop_core.console.history import SPAN, History, LiveScores
 from teleop_core.console.link import Arm, ArmView
+from teleop_core.console.plots import Plots
+from teleop_core.console.server import ConsoleServer
 from teleop_core.graph.topics import (
     ENERGY,
     MASTER_ENERGY,
@@ -115,3 +117,13 @@ def test_what_the_clutch_holds_does_not_count_as_followed() -> None:
         view.state["is_clutched"] = float(i >= 100)
         scores.add(0.03 * i, view)
     assert scores.time == pytest.approx(99 * 0.03)
+
+
+def test_each_plot_has_an_axis_of_times_and_room_for_a_negative_number_beside_it() -> None:
+    with ConsoleServer(0) as server:
+        plots = Plots(server.viser.gui, History(ARM))
+        for handle in (plots._joint_plot, *plots._plots):
+            times, numbers = cast(Any, handle.axes)
+            assert times is not numbers  # one object for both is drawn once
+            assert numbers["size"] >= 8 * len("-0.00025")
+            assert "size" not in times

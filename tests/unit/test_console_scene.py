@@ -23,6 +23,7 @@ from teleop_core.console.recorded import RecordedLink
 from teleop_core.console.scene import Scene
 from teleop_core.console.server import ConsoleServer
 from teleop_core.console.world_nodes import object_outline
+from teleop_core.graph.topics import Limit
 from teleop_core.kernels.geometry import Array, rotations_from_quaternions
 from teleop_core.robots.bodies import Solid
 from teleop_core.robots.bodies.meshes import mesh_of
@@ -238,6 +239,21 @@ def test_a_joint_at_its_limit_is_drawn_in_another_colour(server: Server) -> None
     assert WRONG not in colours(robot.start)
     assert colours(at_limit) == {WRONG}
     assert WRONG not in colours(robot.start)
+
+
+def test_no_joint_is_red_at_home_unless_the_session_says_that_it_is_in_the_way(
+    server: Server,
+) -> None:
+    server.scene.reset()
+    robot = tc.load_robot("rcrt1")  # its home is the end of d3
+    scene = Scene(server, [Arm("", robot)])
+    drawn, slide = scene.arms[""].drawn, robot.joint_names.index("d3")
+    told = {"limit": float(Limit.JOINT), "limited_joint": float(slide)}
+    measured = {"slave/measured_js": np.concatenate((robot.home, np.zeros(2 * robot.n)))}
+    said: list[tuple[dict[str, float], int]] = [({}, 0), (told, 1)]
+    for state, marked in said:
+        scene.draw(View(arms={"": ArmView(measured, state=state)}))
+        assert len(drawn._marked) == marked
 
 
 def test_two_arms_stand_beside_each_other_and_each_tip_is_where_it_was_measured(

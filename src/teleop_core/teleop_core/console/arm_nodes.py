@@ -203,10 +203,14 @@ class ArmNodes:
             self.master.outline.draw(look, around, scale / gain, is_touched=is_touched)
 
     def _at_limit(self, joints: Array, state: dict[str, float]) -> frozenset[int]:
-        """Joints that are at the ends of their ranges, or that the session says are."""
-        room = _AT * (self._robot.upper - self._robot.lower)
-        is_at = (joints <= self._robot.lower + room) | (joints >= self._robot.upper - room)
-        found = set(np.flatnonzero(is_at).tolist())
+        """Joints that are at the ends of their ranges, or that the session says are.
+
+        One whose end is its home is at rest there: only the session says that it is in the way.
+        """
+        robot = self._robot
+        room = _AT * (robot.upper - robot.lower)
+        is_at = (joints <= robot.lower + room) | (joints >= robot.upper - room)
+        found = set(np.flatnonzero(is_at & (np.abs(joints - robot.home) > room)).tolist())
         told = state.get("limited_joint", -1.0)  # NaN in recordings of early versions
         if state.get("limit") == Limit.JOINT and 0 <= told < self._robot.n:
             found.add(int(told))

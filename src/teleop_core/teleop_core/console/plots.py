@@ -12,6 +12,7 @@ from teleop_core.console.look import CURVES
 from teleop_core.kernels.geometry import Array
 
 _PERIOD = 0.25  # between two drawings [s]
+_NUMBERS = 66  # pixels that "-0.00025" needs beside a plot
 _POINTS = 400  # in a curve: more than the panel has pixels
 
 
@@ -68,13 +69,14 @@ class Plots:
                 for i, label in enumerate(labels[:count])
             ]  # fmt: skip
         grey = "#888888"
-        axis = uplot.Axis(stroke=grey, grid=uplot.Axis_Grid(stroke="rgba(128,128,128,0.2)"))
+        grid = uplot.Axis_Grid(stroke="rgba(128,128,128,0.2)")
+        axes = uplot.Axis(stroke=grey, grid=grid), uplot.Axis(stroke=grey, grid=grid, size=_NUMBERS)
         return gui.add_uplot(
             tuple(np.zeros(1) for _ in series), tuple(series), title=title, height=170,
             padding=(10, 8, 0, 0),  # the uppermost number has room under the title
             scales={"x": uplot.Scale(time=False, auto=False, range=(-SPAN, 0.0)),
                     "y": uplot.Scale(auto=True)},
-            axes=(axis, axis), legend=uplot.Legend(show=count > 1, live=False),
+            axes=axes, legend=uplot.Legend(show=count > 1, live=False),
         )  # fmt: skip
 
     def draw(self) -> None:
