@@ -409,12 +409,14 @@ def test_long_path_in_a_plane_becomes_the_time_that_was_spent(
 # -- narrow, without scripts -----------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("width", [500, 1200])
-def test_page_fits_into_the_window(opened: Callable[..., Any], short: Any, width: int) -> None:
+@pytest.mark.parametrize(("width", "columns"), [(500, 1), (1200, 2)])
+def test_page_fits_into_the_window(
+    opened: Callable[..., Any], short: Any, width: int, columns: int
+) -> None:
     tab = opened(short[0], width)
     assert tab.value("document.documentElement.scrollWidth") <= width
     for name, plot in plots(tab).items():
-        assert plot["width"] > 0.8 * min(width, 1180), name
+        assert plot["width"] > 0.8 * width / columns, name
         assert plot["right"] <= width, name
 
 

@@ -57,10 +57,12 @@ def _run(arguments: argparse.Namespace) -> int:
     if arguments.bag is not None and arguments.attach:
         raise ParameterError("BAG", str(arguments.bag), "a recording, or --attach, not both")
     try:
+        from teleop_core.console.answers import Situation
         from teleop_core.console.server import ConsoleServer
     except ModuleNotFoundError as error:
         raise TeleopError(f"needs {error.name}: pip install 'teleop_core[console]'") from error
     with ConsoleServer(arguments.port, arguments.host, arguments.token) as server:
+        server.answers.situation = Situation(doing="starting …")
         print(f"console at {server.url}; Ctrl-C ends it", flush=True)
         if not arguments.no_browser and not webbrowser.open(server.url):
             print("there is no browser here: open this address in one", flush=True)

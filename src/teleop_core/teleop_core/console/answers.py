@@ -60,7 +60,7 @@ class Answers:
     """
 
     def __init__(self, drivers: Drivers) -> None:
-        self.situation = Situation(doing="starting …")
+        self.situation = Situation()
         self.stop: Callable[[], None] | None = None
         self._drivers = drivers
         self._pages: dict[str, int] = {}  # by names that no other page can guess

@@ -55,7 +55,9 @@ def directions_of(robot: "Robot", lever: float) -> Directions:
 
 
 def _rank(jacobians: Array) -> int:
-    """Largest rank of several Jacobians (k, 6, n)."""
+    """Largest rank of several Jacobians (k, 6, n); that of any arm if a number is beyond all."""
+    if not np.isfinite(jacobians).all():
+        return len(DIRECTIONS)
     return int((np.linalg.svd(jacobians, compute_uv=False) > _NONE).sum(axis=1).max())
 
 
