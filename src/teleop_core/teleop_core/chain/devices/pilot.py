@@ -15,12 +15,9 @@ _LONGEST = 0.05  # a reader that slept longer has lost time, not made way [s]
 
 
 @dataclass(frozen=True, kw_only=True)
-class PilotParameters:
-    """How a device that says rates moves the stylus."""
+class RateParameters:
+    """How fast a device that says rates moves the stylus."""
 
-    device: str = parameter(
-        "", fixed=True, doc="part of the device's name; empty: the first that is found"
-    )
     speed: float = parameter(
         0.04, unit="m/s", lower=1e-3, upper=0.5, fixed=True, doc="speed at full deflection",
         source="assumed: through the Phantom's workspace in four seconds",
@@ -33,6 +30,15 @@ class PilotParameters:
         0.12, lower=0.0, upper=0.9, fixed=True, doc="share of the deflection that counts as none",
         source="assumed: sticks of gamepads rest within a tenth of the middle",
     )  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True)
+class PilotParameters(RateParameters):
+    """How a device that says rates moves the stylus."""
+
+    device: str = parameter(
+        "", fixed=True, doc="part of the device's name; empty: the first that is found"
+    )
 
 
 def beyond(rates: Array, dead_zone: float) -> Array:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from teleop_core.base.parameters import parameter
-from teleop_core.chain.devices.pilot import beyond
+from teleop_core.chain.devices.pilot import RateParameters, beyond
 from teleop_core.kernels.geometry import Array, turn_by
 from teleop_core.kernels.portable import length
 
@@ -14,7 +14,7 @@ _LONGEST = 0.1  # a driver that was silent for longer has lost time, not made wa
 
 
 @dataclass(frozen=True, kw_only=True)
-class JoyParameters:
+class JoyParameters(RateParameters):
     """How a device that says rates as a Joy moves the stylus, in the device's own frame."""
 
     axes: tuple[int, ...] = parameter(
@@ -24,18 +24,6 @@ class JoyParameters:
     held_button: int = parameter(
         -1, lower=-1, upper=63, fixed=True, doc="button that must be held to move; -1: none"
     )
-    speed: float = parameter(
-        0.04, unit="m/s", lower=1e-3, upper=0.5, fixed=True, doc="speed at full deflection",
-        source="assumed: through the Phantom's workspace in four seconds",
-    )  # fmt: skip
-    turn_speed: float = parameter(
-        0.6, unit="rad/s", lower=0.01, upper=6.0, fixed=True,
-        doc="speed of the turn at full deflection", source="assumed: a right angle in 2.6 s",
-    )  # fmt: skip
-    dead_zone: float = parameter(
-        0.12, lower=0.0, upper=0.9, fixed=True, doc="share of the deflection that counts as none",
-        source="assumed: sticks of gamepads rest within a tenth of the middle",
-    )  # fmt: skip
     reach: float = parameter(
         0.1, unit="m", lower=0.001, upper=1.0, fixed=True, source="assumed",
         doc="largest way from the start along each axis",
