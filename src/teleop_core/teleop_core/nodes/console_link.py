@@ -86,6 +86,9 @@ class _Seen:
                 self._subscription = Subscription(self._node, self._own, self._name, 1)
 
 
+_HEARTBEAT = "operation.heartbeat"
+
+
 class LiveLink(Observer):
     """A :class:`~teleop_core.console.link.Link` to a running session.
 
@@ -171,6 +174,8 @@ class LiveLink(Observer):
     def _robot(self, arm: str) -> Robot:
         slave = "/".join(filter(None, (arm, "slave")))
         values = self._client.values(slave, ["robot", "geometry"])  # no answer is no RCRT-1
+        told = self._client.values(slave, [_HEARTBEAT])  # which a slave of others may lack
+        self.has_heartbeat = self.has_heartbeat or bool(told.get(_HEARTBEAT))
         geometry = values.get("geometry")
         texts = tuple(map(str, geometry)) if isinstance(geometry, tuple) else ()
         return load_robot_set(str(values.get("robot", "rcrt1")), texts)

@@ -29,6 +29,7 @@ from teleop_core.nodes.starter import START_TIMEOUT, Starter
 from teleop_core.session.configuration import Configuration
 from teleop_core.session.links import link_texts
 from teleop_core.session.notes import notes_of
+from teleop_core.slave.slave import SlaveParameters
 
 SILENCE = 30.0
 """A node at work that has not reported for this long serves nobody [s].
@@ -92,6 +93,10 @@ def live(
         parameters.flush()
         session = _Session(configuration, console, observer, parameters, env, interrupt, starter)
         session.crews = shared
+        observer.has_heartbeat = any(
+            isinstance(group, SlaveParameters) and group.operation.heartbeat > 0.0
+            for group in configuration.groups.values()
+        )
         session.tell_where(out)
         for note in notes_of(configuration, transport=_TRANSPORT[processes]):
             session.say(f"note: {note}")

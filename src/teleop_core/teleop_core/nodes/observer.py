@@ -44,6 +44,7 @@ class Observer(Guest):
     Attributes:
         statuses: Newest report of each node.
         malformed: Messages that were no reports.
+        has_heartbeat: Whether an arm expects its stop buttons to speak again and again.
     """
 
     def __init__(
@@ -55,7 +56,7 @@ class Observer(Guest):
     ) -> None:
         super().__init__(name, domain, **options)
         self.statuses: dict[str, Status] = {}
-        self.malformed = 0
+        self.malformed, self.has_heartbeat = 0, False
         self._reports = Subscription(self.node, DIAGNOSTICS, f"/{DIAGNOSTICS.name}", 100)
         self._button = button or StopButton(self.node)
         self._waiter = Waiter(self._context, self._reports)
@@ -72,7 +73,8 @@ class Observer(Guest):
 
     def take(self) -> bool:
         """Take all reports that have come; whether there were any."""
-        self._button.beat()
+        if self.has_heartbeat:
+            self._button.beat()
         is_new = False
         while (taken := self._reports.take()) is not None:
             try:
