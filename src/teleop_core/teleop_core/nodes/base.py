@@ -17,6 +17,7 @@ from teleop_core.graph.signals import TICK_NS
 from teleop_core.graph.stage import Stage, joints_of
 from teleop_core.graph.topics import Kind, Topic
 from teleop_core.nodes.diagnostics import Reporter, input_values, recent_values, tick_values
+from teleop_core.nodes.feed import Feed, address
 from teleop_core.nodes.loop import Loop
 from teleop_core.nodes.news import Commanders, introduction
 from teleop_core.nodes.ports import NO_PORTS, Ports
@@ -62,6 +63,7 @@ class CoreNode(TunedNode):
         """Whether the node works in a thread of its own, or in that of a whole session."""
         self.is_at_work = self.has_worked = False
         self._loop: Loop | None = None
+        self._feed: Feed | None = None
         self.ports = NO_PORTS
         self._own_publishers: list[Any] = []
         self._report: Topic | None = None
@@ -243,11 +245,27 @@ class CoreNode(TunedNode):
         self.start()
         self.is_at_work = self.has_worked = True
         if self.has_own_loop:
+            self._open_feed()
             self.schedule.start()
-            self._loop = Loop(
-                self.get_name(), self.turn, self.fail, self.prepare, self.patience
-            )  # fmt: skip
+            turn = self._fed_turn if self._feed is not None else self.turn
+            self._loop = Loop(self.get_name(), turn, self.fail, self.prepare, self.patience)
             self._loop.start()
+
+    def _open_feed(self) -> None:
+        """Feed what it sends to the recorder of this machine, if there is one."""
+        outputs = {topic.name: output for topic, output in self.ports.outputs.items()}
+        if not outputs:
+            return
+        self._feed = Feed(outputs, address())
+        for name, output in outputs.items():
+            output.tap = self._feed.channels[name].give
+            self._feed.channels[name].join(True)
+        self._feed.flush()  # before the first message goes out by the middleware too
+
+    def _fed_turn(self) -> None:
+        self.turn()
+        if self._feed is not None:
+            self._feed.flush()
 
     def _halt(self) -> None:
         if not self.is_at_work:
@@ -258,6 +276,9 @@ class CoreNode(TunedNode):
         self.is_at_work = False
         if is_free:
             self.gate.release()
+        if self._feed is not None and has_stopped:
+            self._feed.close()
+            self._feed = None
         if not (has_stopped and is_free):  # its outputs are silent: who sends them hangs
             raise SessionError(f"{self.member_name} hangs and is left behind")
         self.stop()

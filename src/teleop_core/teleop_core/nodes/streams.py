@@ -313,7 +313,7 @@ class Output:
         for entry in self.inputs:
             entry.give(stamp_ns, self._source)
         if self.pending is None:
-            self.publish(stamp_ns, 0)
+            self.publish(stamp_ns, 0 if self.tap is None else time.time_ns())
         else:
             self.pending.append((self, stamp_ns, time.time_ns()))
 
