@@ -135,6 +135,7 @@ def test_conformance_passes_unchanged_through_the_bridge(peer: "Peer") -> None:
     assert done.returncode == 0, done.stdout + done.stderr
 
 
+@pytest.mark.soak
 def test_an_arm_that_jumps_is_told_nothing_more_and_begins_anew_after_the_fault(
     peer: "Peer",
 ) -> None:
