@@ -31,7 +31,7 @@ def test_a_broken_safety_is_found(name: Any) -> None:
 
 
 @pytest.mark.soak
-def test_the_short_form_of_the_fault_matrix_holds_in_a_process_for_each_node(tmp_path: Path) -> None:
+def test_the_short_form_of_the_fault_matrix_holds_for_lone_nodes(tmp_path: Path) -> None:
     code, text, outcomes = run_drill(tmp_path, "--short", "--out", str(tmp_path / "bags"))
     assert set(outcomes) == set(SHORT)
     for one in outcomes.values():
