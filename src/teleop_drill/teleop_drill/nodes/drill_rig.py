@@ -84,7 +84,15 @@ class LiveRig:
         self._node, self._own = (self._make_node("drill"), self._make_node("drill_hand"))
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self._node)
-        self._buttons: dict[int, Any] = {}
+        # As anybody's, which keep no state. Made long before they are pressed: a message sent while
+        # a button and the slave discover each other arrives a tenth of a second later.
+        self._buttons = [
+            self._node.create_publisher(
+                Bool, STOP_TOPIC, 100,
+                event_callbacks=PublisherEventCallbacks(use_default_callbacks=False),
+            )
+            for _ in range(2)
+        ]  # fmt: skip
         self._speeds = self._node.create_publisher(JointState, "/slave/servo_jv", 10)
         self._services = {
             name: self._node.create_client(Trigger, f"/slave/{name}") for name in COMMANDS
@@ -297,11 +305,6 @@ class LiveRig:
 
     def press(self, *, is_pressed: bool, button: int = 0) -> None:
         """Send a message of a stop button: the first one, or another."""
-        if button not in self._buttons:  # as anybody's, which keeps no state
-            self._buttons[button] = self._node.create_publisher(
-                Bool, STOP_TOPIC, 100,
-                event_callbacks=PublisherEventCallbacks(use_default_callbacks=False),
-            )  # fmt: skip
         own, deadline = self._buttons[button], time.monotonic() + _FOUND
         while own.get_subscription_count() == 0 and time.monotonic() < deadline:
             time.sleep(2e-3)
