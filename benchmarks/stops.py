@@ -28,6 +28,7 @@ from std_msgs.msg import Bool
 from teleop_core.bags.layouts import layout
 from teleop_core.graph.topics import SLAVE_SETPOINT_JS
 from teleop_core.nodes.children import environment, free_domain
+from teleop_core.nodes.guest import Guest
 from teleop_core.nodes.operation import STOP_TOPIC
 from teleop_core.nodes.remote_control import RemoteControl
 from teleop_core.nodes.streams import Subscription
@@ -46,8 +47,9 @@ class Tap:
         self._context = Context()
         self._context.init(args=[], domain_id=domain)
         self._node = Node("stops", context=self._context, use_global_arguments=False)
+        self._own = Guest("stops_tap", domain)
         topic = SLAVE_SETPOINT_JS
-        self._setpoints = Subscription(self._node, topic, f"/{topic.name}", 5000)
+        self._setpoints = Subscription(self._own, topic, f"/{topic.name}", 5000)
         self._layout = layout(topic, _JOINTS)
         self.button = self._node.create_publisher(Bool, STOP_TOPIC, 10)
         self._heard = self._node.create_subscription(Bool, STOP_TOPIC, lambda _: None, 10)

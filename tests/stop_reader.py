@@ -10,13 +10,13 @@ import os
 import sys
 import time
 
-import rclpy
-
+from teleop_core.middleware.ros import ROS
+from teleop_core.nodes.guest import Guest
 from teleop_core.nodes.operation import STOP_TOPIC, StopInput
 
-rclpy.init()
-node = rclpy.create_node("stop_reader")
-stop, end, is_found, missing = StopInput(node), float("inf"), False, int(sys.argv[1])
+ROS.init([])
+guest = Guest("stop_reader")
+stop, end, is_found, missing = StopInput(guest), float("inf"), False, int(sys.argv[1])
 stop.take()
 print("ready", flush=True)
 while time.monotonic() < end:
@@ -26,7 +26,7 @@ while time.monotonic() < end:
         os._exit(0)
     if heard:
         end = min(end, time.monotonic() + 3.0)
-    if not is_found and node.count_publishers(STOP_TOPIC):
+    if not is_found and guest.ros.count_publishers(STOP_TOPIC):
         is_found = True
         print("found", flush=True)
     time.sleep(0.001)

@@ -38,6 +38,9 @@ from teleop_core.bags.reader import Bag
 from teleop_core.base.parameters import specs
 from teleop_core.graph.graph import BUILT_IN, RECORDER_NAME
 from teleop_core.graph.topics import Topic
+from teleop_core.middleware.ros import RosWorld
+from teleop_core.middleware.ros_node import RosNode, profile_of
+from teleop_core.middleware.world import Owner
 from teleop_core.nodes.children import environment, free_domain
 from teleop_core.nodes.crews import Processes
 from teleop_core.nodes.interrupt import Interrupt
@@ -72,8 +75,8 @@ class Listener:
     The middleware keeps no more than 5000 messages for it; take some now and then.
     """
 
-    def __init__(self, node: Node, topic: Topic) -> None:
-        self.topic, self._subscription = topic, Subscription(node, topic, topic.name, 5000)
+    def __init__(self, owner: Owner, topic: Topic) -> None:
+        self.topic, self._subscription = topic, Subscription(owner, topic, topic.name, 5000)
         self._layout: Any = None
         self._number = self.lost = 0
         self.stamps: list[int] = []
@@ -193,6 +196,7 @@ class Peer:
         self.node = Node(
             "peer", context=self.context, use_global_arguments=False, enable_rosout=False
         )
+        self.world, self.ros = RosWorld(self.context), RosNode(self.node)
         self._executor = SingleThreadedExecutor(context=self.context)
         self._executor.add_node(self.node)
         self.observer = Observer(int(self.domain))
@@ -325,13 +329,13 @@ class Peer:
     # -- topics ----------------------------------------------------------------------------------
 
     def listen(self, topic: Topic) -> Listener:
-        return Listener(self.node, topic)
+        return Listener(self, topic)
 
     def publisher(self, topic: Topic, readers: int = 1) -> Any:
         """Publisher of a topic, once that many subscriptions are there."""
         if topic.name not in self._publishers:
             kind = message_type(topic.kind.ros_type)
-            reliable = profile(topic) if readers else QoSProfile(depth=10)
+            reliable = profile_of(profile(topic)) if readers else QoSProfile(depth=10)
             self._publishers[topic.name] = self.node.create_publisher(kind, topic.name, reliable)
         own = self._publishers[topic.name]
         self.wait(lambda: own.get_subscription_count() >= readers, f"readers of {topic.name}")

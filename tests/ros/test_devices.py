@@ -14,6 +14,7 @@ from teleop_core.base.errors import SessionError
 from teleop_core.chain.operators import OPERATORS
 from teleop_core.chain.operators.remote import AHEAD, RemoteHand
 from teleop_core.graph.topics import HAND_BUTTONS
+from teleop_core.middleware.ros import ROS
 from teleop_core.nodes.device_hand import DeviceHand
 from virtual_pad import VirtualPad
 
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
     from ros.conftest import Peer
 
 pytestmark = pytest.mark.ros
-NODE = SimpleNamespace(get_logger=lambda: get_logger("devices"))
+NODE = SimpleNamespace(ros=SimpleNamespace(get_logger=lambda: get_logger("devices")), world=ROS)
 
 
 @pytest.fixture

@@ -75,7 +75,7 @@ def operation(peer: Any) -> Any:
         from teleop_core.bags.reports import read_reports
         from teleop_core.nodes.streams import Subscription
 
-        peer.operation, peer.read = Subscription(peer.node, SLAVE_OPERATION, "slave/operation"), {}
+        peer.operation, peer.read = Subscription(peer, SLAVE_OPERATION, "slave/operation"), {}
         peer.read_reports = read_reports
     while (taken := peer.operation.take()) is not None:
         for report in peer.read_reports(taken.data):
@@ -224,7 +224,7 @@ def test_a_press_while_the_slave_stands_still_stops_the_arm(
 
 
 def test_a_button_that_was_pressed_before_the_slave_began_stops_it(peer: "Peer") -> None:
-    button = StopButton(peer.node)
+    button = StopButton(peer)
     button.say(is_pressed=True)
     peer.start("slave")
     peer.wait(lambda: state(peer) is State.FAULT, "FAULT by a button that was pressed before")

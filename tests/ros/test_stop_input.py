@@ -100,11 +100,11 @@ def test_presses_of_buttons_that_were_made_while_the_listener_stood_still_are_he
 def test_a_button_that_was_released_before_it_was_found_is_released_after_a_standstill_too(
     peer: "Peer",
 ) -> None:
-    button = StopButton(peer.node)
+    button = StopButton(peer)
     button.say(is_pressed=True)
     button.say(is_pressed=False)
     heard: list[Any] = []
-    stop = StopInput(peer.node)
+    stop = StopInput(peer)
 
     def take() -> bool:
         heard.extend(stop.take(is_idle=True))
@@ -128,7 +128,7 @@ def test_what_a_button_said_before_it_was_found_counts_unless_the_listener_is_id
     for _ in range(3):
         button.publish(Bool(data=False))
     heard: list[Any] = []
-    stop = StopInput(peer.node)
+    stop = StopInput(peer)
 
     def take() -> bool:
         heard.extend(stop.take(is_idle=is_idle))

@@ -21,8 +21,8 @@ from teleop_core.graph import topics
 from teleop_core.graph.graph import BUILT_IN, RECORDER_NAME
 from teleop_core.graph.layers import RealTimeParameters
 from teleop_core.graph.topics import STREAMS
+from teleop_core.middleware.real_time import apply_options, is_priority_granted
 from teleop_core.nodes.crews import Processes
-from teleop_core.nodes.real_time import apply_options, is_priority_granted
 from teleop_core.robots import load_robot
 from teleop_core.session.configuration import configure
 from teleop_core.session.virtual import VirtualTime
@@ -180,7 +180,7 @@ def test_with_a_priority_all_threads_come_before_other_processes_but_not_what_th
         pytest.skip("the system grants no priority")
     script = """
 import os, subprocess, sys, threading
-from teleop_core.nodes.real_time import apply_options, is_priority_granted
+from teleop_core.middleware.real_time import apply_options, is_priority_granted
 from teleop_core.graph.layers import RealTimeParameters
 threading.Thread(target=sys.stdin.read).start()
 assert apply_options(RealTimeParameters(priority=10, freeze_gc=False)) == []

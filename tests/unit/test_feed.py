@@ -10,11 +10,23 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from teleop_core.graph.graph import build_graph
+from teleop_core.middleware.ros import ROS, RosWorld
 from teleop_core.nodes.crews import Processes, crews
-from teleop_core.nodes.feed import MOST, Feed, FeedReader, address
+from teleop_core.nodes.feed import MOST, Feed, FeedReader
 
 NAMES = ("a", "b/c")
-PLACES = (f"\0teleop_core.test.{os.getpid()}.{number}" for number in count())
+NUMBERS = count()
+
+
+class Machine(RosWorld):
+    """A world in which one recorder alone is found."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.place = f"\0teleop_core.test.{os.getpid()}.{next(NUMBERS)}"
+
+    def feed_place(self) -> str:
+        return self.place
 
 
 class Taker:
@@ -38,9 +50,9 @@ Ends = tuple[Feed, FeedReader, dict[str, Taker]]
 
 
 def made() -> Ends:
-    place = next(PLACES)
+    world = Machine()
     takers = {name: Taker() for name in NAMES}
-    reader, feed = FeedReader(takers, place), Feed(NAMES, place)
+    reader, feed = FeedReader(takers, world), Feed(NAMES, world)
     feed.flush()  # finds it
     for channel in feed.channels.values():
         channel.join(True)
@@ -131,7 +143,7 @@ def test_a_recorder_that_ends_costs_a_loop_nothing_and_the_next_one_is_found(
     assert not feed.is_open
     assert not feed.waiting
     monkeypatch.setattr("teleop_core.nodes.feed._AGAIN", 0.0)
-    again = FeedReader(takers, feed._place)
+    again = FeedReader(takers, feed.world)
     feed.flush()
     feed.channels["a"].give(b"y", 5)
     all_of(feed, again)
@@ -142,9 +154,9 @@ def test_a_recorder_that_ends_costs_a_loop_nothing_and_the_next_one_is_found(
 
 
 def test_a_second_recorder_of_a_machine_hears_no_loop_and_takes_none_away() -> None:
-    place, takers = next(PLACES), {name: Taker() for name in NAMES}
-    first, second = FeedReader(takers, place), FeedReader({}, place)
-    feed = Feed(NAMES, place)
+    world, takers = Machine(), {name: Taker() for name in NAMES}
+    first, second = FeedReader(takers, world), FeedReader({}, world)
+    feed = Feed(NAMES, world)
     feed.flush()
     feed.channels["a"].give(b"x", 1)
     feed.flush()
@@ -161,7 +173,7 @@ def test_a_second_recorder_of_a_machine_hears_no_loop_and_takes_none_away() -> N
 def test_bytes_that_are_no_feed_end_with_their_line(ends: Callable[[], Ends], sent: bytes) -> None:
     feed, reader, takers = ends()
     with socket.socket(socket.AF_UNIX) as other:
-        other.connect(feed._place)
+        other.connect(feed.world.feed_place())
         other.sendall(sent)
         reader.drain()
         assert other.recv(1) == b""  # it is heard no more
@@ -172,9 +184,9 @@ def test_bytes_that_are_no_feed_end_with_their_line(ends: Callable[[], Ends], se
 
 def test_each_ros_domain_has_a_place_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("ROS_DOMAIN_ID", "41")
-    one = address()
+    one = ROS.feed_place()
     monkeypatch.setenv("ROS_DOMAIN_ID", "42")
-    assert address() != one
+    assert ROS.feed_place() != one
 
 
 def test_sides_meet_at_the_slave_and_two_arms_share_them() -> None:

@@ -17,6 +17,7 @@ from numba import njit
 from present import present
 from teleop_core.kernels import IS_COMPILED
 from teleop_core.kernels.progress import compiled_count, is_compiling
+from teleop_core.middleware.ros import ROS
 from teleop_core.nodes.chances import Chances
 from teleop_core.nodes.loop import Loop
 from teleop_core.nodes.parent import VARIABLE, Parent
@@ -38,7 +39,7 @@ def test_a_loop_that_never_comes_back_is_left_behind_and_says_where_it_is() -> N
         is_inside.set()
         may_go.wait()
 
-    loop = Loop("deaf", stand_still, print)
+    loop = Loop(ROS, "deaf", stand_still, print)
     loop.start()
     assert is_inside.wait(10)
     loop.is_hung = True
@@ -60,7 +61,7 @@ def test_a_loop_that_works_stops_after_its_turn() -> None:
             ready.set()
             loop.stop()  # from within: ends after this turn
 
-    loop = Loop("short", turn, print, prepare=lambda: None)
+    loop = Loop(ROS, "short", turn, print, prepare=lambda: None)
     loop.start()
     assert ready.wait(10)
     assert loop.stop()

@@ -101,7 +101,7 @@ def _attach(arguments: argparse.Namespace, server: "ConsoleServer") -> None:
         raise ParameterError("--domain", None, f"one of {named}: several sessions run here")
     domain = found[0] if found else 0
     with Guest("teleop_console_stop", domain, start_parameter_services=False) as guest:
-        button = StopButton(guest.node)
+        button = StopButton(guest)
         server.answers.stop = partial(button.say, is_pressed=True)
         with splash(server) as say:
             say("looks for an arm …")

@@ -1,12 +1,10 @@
 """Answering node: one step of its stage for every message of its trigger, under the same stamp."""
 
-import time
 from typing import Any
 
 from teleop_core.graph.signals import DT
 from teleop_core.graph.topics import Topic
 from teleop_core.nodes.base import CoreNode
-from teleop_core.nodes.streams import Waiter
 
 
 class AnsweringNode(CoreNode):
@@ -24,7 +22,6 @@ class AnsweringNode(CoreNode):
         self._question = self.input(self._trigger)
         self._needed = [self.input(topic) for topic in self.description.needs]
         self._stamp_fields = (f"{self._trigger.field}_ns", "now_ns")
-        self._waiter: Waiter | None = None
 
     def start(self) -> None:
         """Start from where the slave is, whatever was before."""
@@ -35,11 +32,9 @@ class AnsweringNode(CoreNode):
 
     def turn(self) -> None:
         """Answer the next message."""
-        if self._waiter is None:
-            assert self._question.subscription is not None
-            self._waiter = Waiter(self.context, self._question.subscription)
+        assert self._question.subscription is not None
         # What is held back on a slow link comes without a message to wait for.
-        self._waiter.wait(DT if self._question.delay else 0.1)
+        self._question.subscription.wait(DT if self._question.delay else 0.1)
         self.work()
 
     def tick(self, tick_ns: int) -> None:
@@ -65,7 +60,7 @@ class AnsweringNode(CoreNode):
         if is_silent and not self._was_silent:
             with self.lock:
                 self.stage.fall_silent()
-            self.send_report(time.time_ns())
+            self.send_report(self.world.time_ns())
         self._was_silent = is_silent
 
     def answer(self, stamp_ns: int) -> None:
@@ -76,7 +71,7 @@ class AnsweringNode(CoreNode):
             self.stage.step()
         self.ports.send(stamp_ns)
         self.counts.ticks += 1
-        self.delay.put(time.time_ns() - stamp_ns)
+        self.delay.put(self.world.time_ns() - stamp_ns)
         self.send_report(stamp_ns)
 
     def concerns(self) -> list[str]:

@@ -1,12 +1,10 @@
 """Nodes ``arm_bridge`` and ``jaw_bridge``: real controllers in the place of simulated drives."""
 
-import time
 from collections.abc import Callable, Iterable
 from typing import Any
 
-from rclpy.serialization import deserialize_message
-
 from teleop_core.graph.topics import SLAVE_OPERATION, Kind, Topic
+from teleop_core.middleware.ros_messages import read_message
 from teleop_core.nodes.news import Trouble
 from teleop_core.nodes.streams import Subscription, message_type
 from teleop_core.nodes.ticking import TickingNode
@@ -63,7 +61,7 @@ class ArmBridgeNode(TickingNode):
         if not self._has_server:  # one that is found late would go on without the arm
             self._has_server = self._setpoint.publishers() > 0
         while (taken := self._arm.take()) is not None:
-            message = deserialize_message(taken.data, self._arm.type)
+            message = read_message(taken.data, self._arm.type)
             stamp = message.header.stamp
             stamp_ns = stamp.sec * 1_000_000_000 + stamp.nanosec
             if self.parameters.stamps == "sent":
@@ -71,7 +69,7 @@ class ArmBridgeNode(TickingNode):
             sample = Sample(
                 message.name, message.position, message.velocity, message.effort, stamp_ns
             )
-            if self.stage.hear(sample, time.time_ns()) and self._has_server:
+            if self.stage.hear(sample, self.world.time_ns()) and self._has_server:
                 self._output.send(stamp_ns)
 
     def _command(self, now_ns: int) -> Command | None:

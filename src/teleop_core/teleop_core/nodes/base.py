@@ -1,38 +1,26 @@
 """Base of all nodes: a lifecycle node around one stage of the graph."""
 
-import threading
-import time
 import traceback
-from collections.abc import Callable, Iterator
-from functools import partial
+from collections.abc import Callable
+from concurrent.futures import Future
 from typing import Any
-
-from rclpy.impl.implementation_singleton import rclpy_implementation
-from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
-from rclpy.task import Future
 
 from teleop_core.bags.reports import read_reports
 from teleop_core.base.errors import SessionError, TeleopError
 from teleop_core.graph.signals import TICK_NS
 from teleop_core.graph.stage import Stage, joints_of
 from teleop_core.graph.topics import Kind, Topic
+from teleop_core.middleware.world import Outcome, Publisher
 from teleop_core.nodes.diagnostics import Reporter, input_values, recent_values, tick_values
-from teleop_core.nodes.feed import Feed, address
+from teleop_core.nodes.feed import Feed
 from teleop_core.nodes.loop import Loop
 from teleop_core.nodes.news import Commanders, introduction
 from teleop_core.nodes.ports import NO_PORTS, Ports
 from teleop_core.nodes.quality import profile
 from teleop_core.nodes.rate import Recent, Schedule, TickCounts
-from teleop_core.nodes.real_time import apply_options
 from teleop_core.nodes.streams import Input, message_type
-from teleop_core.nodes.taking import Unattended
 from teleop_core.nodes.tuned import TunedNode
 from teleop_core.session.runner import report_of
-
-SUCCESS, FAILURE, ERROR = (
-    TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILURE,
-    TransitionCallbackReturn.ERROR,
-)  # fmt: skip
 
 _GATE_PATIENCE = 1.0  # a tick of a whole session takes a hundredth of it on a busy machine
 _NEWS = {"active": "at work", "finalized": "ended"}  # others: the state itself
@@ -53,8 +41,9 @@ class CoreNode(TunedNode):
         """The stage at work, which :attr:`runner` is too; None for a node without one."""
         self.row: Any = None
         """The stage's signals, by the names of their fields."""
-        self.gate = threading.Lock()  # held by a session while the node works in its thread
-        self.ended, self.exit_code = Future(), 0
+        self.gate = self.world.lock()  # held by a session while the node works in its thread
+        self.ended: Future[None] = Future()
+        self.exit_code = 0
         self.has_ended = False
         """Whether the node was shut down: nothing more is to come from it."""
         self.patience = self.options.real_time.patience
@@ -65,17 +54,15 @@ class CoreNode(TunedNode):
         self._loop: Loop | None = None
         self._feed: Feed | None = None
         self.ports = NO_PORTS
-        self._own_publishers: list[Any] = []
+        self._own_publishers: list[Publisher] = []
         self._report: Topic | None = None
         self._reported: tuple[bytes, Any] = (b"", None)
         self._fresh_counts()
         self._word = "unconfigured"
         self._reporter, self._commanders = Reporter(self), Commanders(self, self.description)
-        self._report_timer = self.create_timer(1.0, self._report_in_time)
-        self.ending = threading.Lock()
+        self._report_timer = self.ros.create_timer(1.0, self._report_in_time)
+        self.ending = self.world.lock()
         """Held while the end is told; shared by the nodes of a process, as ``ended`` is."""
-        own = self._service_change_state
-        own.callback = partial(self._change_state, own.callback)
 
     # -- what subclasses fill in -----------------------------------------------------------------
 
@@ -149,12 +136,12 @@ class CoreNode(TunedNode):
 
     # -- topics ----------------------------------------------------------------------------------
 
-    def open_publisher(self, topic: Topic) -> Any:
+    def open_publisher(self, topic: Topic) -> Publisher:
         """Publisher that is silent unless the node is active, and closed at cleanup."""
         kind = message_type(topic.ros_type)
-        name = self.resolve_topic_name(topic.name)
+        name = self.ros.resolve_topic_name(topic.name)
         offered = self.overrides.apply(name, "publisher", profile(topic))
-        publisher = self.create_lifecycle_publisher(kind, topic.name, offered)
+        publisher = self.ros.create_lifecycle_publisher(kind, topic.name, offered)
         self._own_publishers.append(publisher)
         return publisher
 
@@ -162,7 +149,7 @@ class CoreNode(TunedNode):
         """Leave what the stage writes to another node, until the next configuration."""
         self.ports.mute()
         for publisher in self._own_publishers:
-            self.destroy_lifecycle_publisher(publisher)
+            self.ros.destroy(publisher)
         self._own_publishers = []
 
     def _open_report(self) -> None:
@@ -197,44 +184,41 @@ class CoreNode(TunedNode):
     def _close(self) -> None:
         self.ports.close()
         for publisher in self._own_publishers:
-            self.destroy_lifecycle_publisher(publisher)
+            self.ros.destroy(publisher)
         self.ports, self._own_publishers = NO_PORTS, []
         self.stage = self.runner = self.row = None
 
     # -- lifecycle -------------------------------------------------------------------------------
 
-    def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
+    def on_configure(self) -> Outcome:
         """Make the stage and open its topics; a refusal leaves nothing open."""
         self._fresh_counts()
         result = self._guard("configure", lambda: self.setup(self.parameters), "inactive")
-        if result is not SUCCESS:
+        if result is not Outcome.SUCCESS:
             self._close()
         return result
 
-    def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Open the publishers and start to work."""
-        super().on_activate(state)
+    def on_activate(self) -> Outcome:
+        """Start to work."""
         return self._guard("activate", self._begin, "active")
 
-    def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Stop to work, then close the publishers."""
-        result = self._guard("deactivate", self._halt, "inactive")
-        super().on_deactivate(state)
-        return result
+    def on_deactivate(self) -> Outcome:
+        """Stop to work."""
+        return self._guard("deactivate", self._halt, "inactive")
 
-    def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
+    def on_cleanup(self) -> Outcome:
         """Close everything: the node can be configured anew."""
         return self._guard("cleanup", self._clear, "unconfigured")
 
-    def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
+    def on_shutdown(self) -> Outcome:
         """Stop and close everything for good."""
         self.has_ended = True
         result = self._guard("shutdown", self._clear, "finalized")
-        if result is not SUCCESS:
+        if result is not Outcome.SUCCESS:
             self.exit_code = self.exit_code or 1
         return result
 
-    def on_error(self, state: LifecycleState) -> TransitionCallbackReturn:
+    def on_error(self) -> Outcome:
         """After a crash: close everything, so that a supervisor can configure the node anew."""
         return self._guard("recovery", self._clear, "unconfigured")
 
@@ -248,7 +232,9 @@ class CoreNode(TunedNode):
             self._open_feed()
             self.schedule.start()
             turn = self._fed_turn if self._feed is not None else self.turn
-            self._loop = Loop(self.get_name(), turn, self.fail, self.prepare, self.patience)
+            self._loop = Loop(
+                self.world, self.ros.get_name(), turn, self.fail, self.prepare, self.patience
+            )
             self._loop.start()
 
     def _open_feed(self) -> None:
@@ -256,7 +242,7 @@ class CoreNode(TunedNode):
         outputs = {topic.name: output for topic, output in self.ports.outputs.items()}
         if not outputs:
             return
-        self._feed = Feed(outputs, address())
+        self._feed = Feed(outputs, self.world)
         for name, output in outputs.items():
             output.tap = self._feed.channels[name].give
             self._feed.channels[name].join(True)
@@ -272,7 +258,7 @@ class CoreNode(TunedNode):
             return
         loop, self._loop = self._loop, None
         has_stopped = loop is None or loop.stop()
-        is_free = self.gate.acquire(timeout=_GATE_PATIENCE)
+        is_free = self.gate.acquire(True, _GATE_PATIENCE)
         self.is_at_work = False
         if is_free:
             self.gate.release()
@@ -293,37 +279,35 @@ class CoreNode(TunedNode):
             finally:
                 self._close()
 
-    def _guard(
-        self, transition: str, action: Callable[[], None], word: str
-    ) -> TransitionCallbackReturn:
+    def _guard(self, transition: str, action: Callable[[], None], word: str) -> Outcome:
         try:
             action()
         except TeleopError as error:  # a refusal, in one readable line
-            self.get_logger().error(f"{transition} refused: {error}")
-            return FAILURE
+            self.ros.get_logger().error(f"{transition} refused: {error}")
+            return Outcome.FAILURE
         except Exception:  # rclpy would turn it into ERROR without a word
-            self.get_logger().fatal(f"{transition} crashed:\n{traceback.format_exc()}")
-            return ERROR
+            self.ros.get_logger().fatal(f"{transition} crashed:\n{traceback.format_exc()}")
+            return Outcome.ERROR
         if self._word not in {"unconfigured", "failed"} or word != "finalized":
-            self.get_logger().info(self.news(_NEWS.get(word, word)))
+            self.ros.get_logger().info(self.news(_NEWS.get(word, word)))
         self._word = word
         self.report()
-        return SUCCESS
+        return Outcome.SUCCESS
 
     def prepare(self) -> None:
         """Take the real-time options for the thread that calls; say what the system refuses."""
-        for refusal in apply_options(self.options.real_time):
-            self.get_logger().warning(refusal)
+        for refusal in self.world.take_real_time(self.options.real_time):
+            self.ros.get_logger().warning(refusal)
 
     def fail(self, reason: str, is_expected: bool) -> None:
         """End the work from within the loop: the outputs fall silent, and the process ends."""
-        log = self.get_logger()
+        log = self.ros.get_logger()
         log.error(reason) if is_expected else log.fatal(f"crashed:\n{reason}")
         self._word = "failed"
         if self.options.autostart:
             self.end(1)
-        elif self.executor is not None:
-            self.executor.create_task(self._deactivate)
+        else:
+            self.ros.defer(self._deactivate)
 
     def end(self, exit_code: int) -> None:
         """Let the process end; may be called from any thread."""
@@ -334,35 +318,24 @@ class CoreNode(TunedNode):
 
     def _deactivate(self) -> None:
         if self.is_at_work:  # a supervisor may have been faster
-            self.trigger_deactivate()
+            self.ros.trigger("deactivate")
 
     def finish(self) -> None:
         """Shut down from whatever state the node is in; what was shut down stays so."""
         self._report_timer.cancel()
         if not self.has_ended:
-            self.trigger_shutdown()
+            self.ros.trigger("shutdown")
 
-    def _change_state(self, change: Callable[..., Any], request: Any, response: Any) -> Any:
-        """Answer a service that asks for a transition; one that there is not is refused."""
-        try:
-            return change(request, response)
-        except rclpy_implementation.RCLError:  # it would end the process
-            wanted = request.transition.label or request.transition.id
-            self.get_logger().error(f"no transition {wanted} while {self._word}")
-            response.success = False
-            return response
-
-    @property
-    def subscriptions(self) -> Iterator[Any]:
-        """Those that the executor serves: others are opened and closed by any thread."""
-        for entry in tuple(super().subscriptions):
-            if not isinstance(entry.callback_group, Unattended):
-                yield entry
+    def on_no_transition(self, wanted: str) -> None:
+        """Say that a transition was asked for that there is not now."""
+        self.ros.get_logger().error(f"no transition {wanted} while {self._word}")
 
     # -- diagnostics -----------------------------------------------------------------------------
 
     def _fresh_counts(self) -> None:
-        self.schedule = Schedule(time.monotonic_ns, time.sleep, self.options.max_catch_up)
+        self.schedule = Schedule(
+            self.world.monotonic_ns, self.world.sleep, self.options.max_catch_up
+        )
         self.delay = Recent()  # from the master's sample to what was made of it, [ns]
 
     @property
@@ -375,7 +348,7 @@ class CoreNode(TunedNode):
         try:
             self.report()
         except Exception:
-            self.get_logger().error(
+            self.ros.get_logger().error(
                 f"cannot report:\n{traceback.format_exc()}", throttle_duration_sec=60.0
             )
 
@@ -403,7 +376,7 @@ class CoreNode(TunedNode):
         values |= recent_values("delay", self.delay) | (self.values() if is_active else {})
         self._reporter.send(concerns, self._word, values)
         for line in self._commanders.news(inputs):
-            self.get_logger().info(line)
+            self.ros.get_logger().info(line)
 
     def flush(self) -> None:
         """Wait a moment until the last report has arrived."""

@@ -14,9 +14,6 @@ from types import MappingProxyType
 from typing import Any
 
 import numpy as np
-from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
-from rclpy.node import Node
-from rclpy.qos import QoSProfile
 from std_srvs.srv import Trigger
 
 from teleop_core.bags.messages import Layout, layout, read_any, read_numbers
@@ -32,6 +29,7 @@ from teleop_core.graph.topics import (
     Topic,
 )
 from teleop_core.kernels.geometry import Array
+from teleop_core.middleware.world import Owner, Qos, WorldEndedError
 from teleop_core.nodes.display import SEEN, displayed
 from teleop_core.nodes.observer import WARNING, Observer
 from teleop_core.nodes.operation import StopButton
@@ -52,12 +50,12 @@ _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}")
 class _Seen:
     """Newest sample of one stream of one arm."""
 
-    def __init__(self, node: Node, topic: Topic, arm: Arm) -> None:
+    def __init__(self, owner: Owner, topic: Topic, arm: Arm) -> None:
         self.topic, self._joints = topic, arm.robot.joint_names
         self._layout: Layout = layout(topic, self._joints)
-        self._node, self._own = node, topic.of_arm(arm.name)
+        self._owner, self._own = owner, topic.of_arm(arm.name)
         self._name, self._since = displayed(self._own).name, time.monotonic()
-        self._subscription = Subscription(node, self._own, self._name, 1)
+        self._subscription = Subscription(owner, self._own, self._name, 1)
 
     def take(self, view: ArmView) -> bool:
         """Write the newest sample into a view; whether there was one."""
@@ -80,10 +78,10 @@ class _Seen:
         is_slow = self._name.startswith("/display/")
         if is_slow and time.monotonic() - self._since > _SILENCE:
             self._since = time.monotonic()
-            if not self._node.count_publishers(self._name):
+            if not self._owner.ros.count_publishers(self._name):
                 self._subscription.close()
                 self._name = f"/{self._own.name}"
-                self._subscription = Subscription(self._node, self._own, self._name, 1)
+                self._subscription = Subscription(self._owner, self._own, self._name, 1)
 
 
 _HEARTBEAT = "operation.heartbeat"
@@ -110,15 +108,15 @@ class LiveLink(Observer):
     ) -> None:  # fmt: skip
         super().__init__(domain, "teleop_console", button, start_parameter_services=False)
         self.domain = domain
-        self._executor = SingleThreadedExecutor(context=self._context)
-        self._executor.add_node(self.node)
+        self._executor = self.world.executor()
+        self._executor.add_node(self.ros)
         self._is_closed = False
         self._thread = threading.Thread(target=self._spin, name="console link", daemon=True)
         self._thread.start()
         self._lock = threading.Lock()
         self._pressing = threading.Lock()
         self._clients: dict[str, Any] = {}
-        self._client, self._events = ParameterClient(self.node), ParameterEvents(self.node)
+        self._client, self._events = ParameterClient(self), ParameterEvents(self)
         self._known: dict[tuple[str, str], ParameterInfo] = {}
         self._runs, self._is_pressed = 0, False
         try:
@@ -134,13 +132,13 @@ class LiveLink(Observer):
         self._executor.wake()
         self._thread.join(PATIENCE)
         self._executor.shutdown()
-        self._context.try_shutdown()
+        self.world.shutdown()
         with suppress(Exception):  # the middleware may have let go already
-            self.node.destroy_node()
+            self.ros.destroy_node()
 
     def _spin(self) -> None:
-        with suppress(ExternalShutdownException):
-            while self._context.ok() and not self._is_closed:
+        with suppress(WorldEndedError):
+            while not self._is_closed:
                 self._executor.spin_once(timeout_sec=0.1)
 
     # -- finding ---------------------------------------------------------------------------------
@@ -149,7 +147,7 @@ class LiveLink(Observer):
         """Find arms and their robots."""
         end, suffix, names = time.monotonic() + patience, f"/{SLAVE_OPERATION.name}", set[str]()
         while not names:
-            topics = self.node.get_topic_names_and_types()
+            topics = self.ros.get_topic_names_and_types()
             names = {name.removesuffix(suffix).strip("/") for name, _ in topics
                      if name.endswith(suffix)}  # fmt: skip
             if not names and time.monotonic() > end:
@@ -159,15 +157,15 @@ class LiveLink(Observer):
                 )
             time.sleep(0.02)
         self.arms = tuple(Arm(name, self._robot(name)) for name in sorted(names))
-        self._seen = {arm.name: [_Seen(self.node, t, arm) for t in SEEN] for arm in self.arms}
+        self._seen = {arm.name: [_Seen(self, t, arm) for t in SEEN] for arm in self.arms}
         self._told = {
             arm.name: [
-                Subscription(self.node, topic.of_arm(arm.name), f"/{topic.of_arm(arm.name).name}")
+                Subscription(self, topic.of_arm(arm.name), f"/{topic.of_arm(arm.name).name}")
                 for topic in (SLAVE_OPERATION, TELEOP_STATE)
             ]
             for arm in self.arms
         }  # fmt: skip
-        self._hands = {arm.name: _Hand(self.node, arm.name) for arm in self.arms}
+        self._hands = {arm.name: _Hand(self, arm.name) for arm in self.arms}
         self._view = View(arms={arm.name: ArmView() for arm in self.arms})
         self._begun = self._heard = time.monotonic()
 
@@ -182,7 +180,7 @@ class LiveLink(Observer):
 
     def _recorder(self) -> str:
         """Recorder of the session, in its namespace."""
-        services, end = self.node.get_service_names_and_types(), f"/{RECORDER_NAME}{_SPLIT}"
+        services, end = self.ros.get_service_names_and_types(), f"/{RECORDER_NAME}{_SPLIT}"
         found = (name.removesuffix(_SPLIT) for name, _ in services if name.endswith(end))
         return next(found, RECORDER_NAME).strip("/")
 
@@ -246,7 +244,7 @@ class LiveLink(Observer):
     def _trigger(self, name: str) -> tuple[bool, str]:
         with self._lock:
             if name not in self._clients:
-                self._clients[name] = self.node.create_client(Trigger, name)
+                self._clients[name] = self.ros.create_client(Trigger, name)
         try:
             answer = call(self._clients[name], Trigger.Request(), PATIENCE)
         except SessionError as error:
@@ -273,7 +271,7 @@ class LiveLink(Observer):
     def parameters(self) -> Parameters:
         """All parameters of all nodes, asked for anew."""
         found: dict[tuple[str, str], ParameterInfo] = {}
-        services = [name for name, _ in self.node.get_service_names_and_types()]
+        services = [name for name, _ in self.ros.get_service_names_and_types()]
         for node in sorted(
             name.removesuffix(_LIST).strip("/") for name in services if name.endswith(_LIST)
         ):
@@ -335,14 +333,14 @@ class LiveLink(Observer):
 class _Hand:
     """Publishers of a person's hand on one arm."""
 
-    def __init__(self, node: Node, arm: str) -> None:
+    def __init__(self, owner: Owner, arm: str) -> None:
         self._layout, self._pressed = layout(OPERATOR_SERVO_CP, ()), layout(OPERATOR_BUTTONS, ())
         self._lock, self._pressing = threading.Lock(), threading.Lock()
         self._publishers = [
-            node.create_publisher(
+            owner.ros.create_publisher(
                 message_type(topic.kind.ros_type),
                 f"/{topic.of_arm(arm).name}",
-                QoSProfile(depth=10),
+                Qos(depth=10),
             )
             for topic in (OPERATOR_SERVO_CP, OPERATOR_BUTTONS)
         ]

@@ -65,7 +65,7 @@ class ConsoleSession:
         self._console = Console(file=_Lines(say), width=200)  # type: ignore[arg-type]
         self._interrupt, self._error = Interrupt(), ""
         self._guest = Guest("teleop_console_stop", self.domain, start_parameter_services=False)
-        self.button = StopButton(self._guest.node)
+        self.button = StopButton(self._guest)
         self._thread = threading.Thread(target=self._run, name="session")
         self._thread.start()
 

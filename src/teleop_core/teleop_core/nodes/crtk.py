@@ -6,15 +6,13 @@
 installed, an arm has its services and reports alone.
 """
 
-import time
 from collections import deque
 from collections.abc import Callable
 from typing import Any
 
-from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
-
 from teleop_core.bags.messages import SECOND_NS
 from teleop_core.base.errors import TeleopError
+from teleop_core.middleware.world import Qos
 from teleop_core.nodes.streams import message_type
 from teleop_core.slave.operation.states import COMMANDS, Answer
 
@@ -35,22 +33,12 @@ def is_installed() -> bool:
     return True
 
 
-def single() -> QoSProfile:
-    """Quality of commands that are sent once: none is lost, of senders who care."""
-    return QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
-
-
-def streamed() -> QoSProfile:
-    """Quality of commands that come in streams, from senders of every kind: the newest counts."""
-    return QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
-
-
-def latched() -> QoSProfile:
-    """Quality of a state: who comes late gets the last one, if he asks for it."""
-    return QoSProfile(
-        depth=10, reliability=ReliabilityPolicy.RELIABLE,
-        durability=DurabilityPolicy.TRANSIENT_LOCAL,
-    )  # fmt: skip
+SINGLE = Qos(depth=10)
+"""Quality of commands that are sent once: none is lost, of senders who care."""
+STREAMED = Qos(depth=1, is_reliable=False)
+"""Quality of commands that come in streams, from senders of every kind: the newest counts."""
+_LATCHED = Qos(depth=10, is_latched=True)
+"""Quality of a state: who comes late gets the last one, if he asks for it."""
 
 
 class OperatingState:
@@ -76,14 +64,14 @@ class OperatingState:
         self._node, self._request, self._condition = node, request, condition
         self._kind = message_type(OPERATING_STATE)
         self._changes: deque[tuple[int, Condition]] = deque(maxlen=100)
-        self._publisher = node.create_lifecycle_publisher(
-            self._kind, f"{arm}/operating_state", latched()
+        self._publisher = node.ros.create_lifecycle_publisher(
+            self._kind, f"{arm}/operating_state", _LATCHED
         )
-        self._commands = node.create_subscription(
-            message_type(STATE_COMMAND), f"{arm}/state_command", self._take, single()
+        self._commands = node.ros.create_subscription(
+            message_type(STATE_COMMAND), f"{arm}/state_command", self._take, SINGLE
         )
-        self._guard = node.create_guard_condition(self._send_changes)
-        self._timer = node.create_timer(_PERIOD, self._send)
+        self._guard = node.ros.create_guard_condition(self._send_changes)
+        self._timer = node.ros.create_timer(_PERIOD, self._send)
 
     def note(self, stamp_ns: int) -> None:
         """Have the present condition sent soon, under its stamp [ns]; from any thread."""
@@ -92,13 +80,13 @@ class OperatingState:
 
     def close(self) -> None:
         """Withdraw them."""
-        self._node.destroy_timer(self._timer)
-        self._node.destroy_guard_condition(self._guard)
-        self._node.destroy_subscription(self._commands)
-        self._node.destroy_lifecycle_publisher(self._publisher)
+        self._node.ros.destroy(self._timer)
+        self._node.ros.destroy(self._guard)
+        self._node.ros.destroy(self._commands)
+        self._node.ros.destroy(self._publisher)
 
     def _take(self, message: Any) -> None:
-        name, log = message.string.strip(), self._node.get_logger()
+        name, log = message.string.strip(), self._node.ros.get_logger()
         if name not in COMMANDS:
             known = ", ".join(COMMANDS)
             log.warning(f"no state command {name!r:.40}; known: {known}")
@@ -117,7 +105,7 @@ class OperatingState:
 
     def _send(self) -> None:
         self._send_changes()
-        self._publish(time.time_ns(), self._condition())
+        self._publish(self._node.world.time_ns(), self._condition())
 
     def _publish(self, stamp_ns: int, condition: Condition) -> None:
         message = self._kind(state=condition[0], is_homed=condition[1], is_busy=condition[2])
@@ -140,10 +128,10 @@ class Refusals:
     def add(self, topic: str, text: str) -> None:
         """Take note of a refused command."""
         self._counts[topic] = self._counts.get(topic, 0) + 1
-        now = time.monotonic()
+        now = 1e-9 * self._node.world.monotonic_ns()
         if now - self._told.get(topic, -_QUIET) >= _QUIET:
             self._told[topic] = now
-            self._node.get_logger().warning(f"{topic}: {text}")
+            self._node.ros.get_logger().warning(f"{topic}: {text}")
 
     def values(self) -> dict[str, str]:
         """Counts for the node's report."""

@@ -6,7 +6,6 @@ executor: commands that come once, or some hundred times a second. A thousand a 
 ``slave/servo_jp`` and ``slave/servo_cp``.
 """
 
-import time
 from collections.abc import Callable
 from typing import Any
 
@@ -22,12 +21,12 @@ from teleop_core.kernels.geometry import (
     transform_from_pose,
 )
 from teleop_core.nodes.crtk import (
+    SINGLE,
+    STREAMED,
     Condition,
     OperatingState,
     Refusals,
     is_installed,
-    single,
-    streamed,
 )
 from teleop_core.nodes.streams import message_type, profile
 from teleop_core.slave.motion_commands import Told
@@ -66,7 +65,7 @@ class CrtkSlave:
         if is_installed():
             self._state = OperatingState(node, "slave", stage.request, self._condition)
         else:
-            node.get_logger().info("crtk_msgs is not installed: no slave/operating_state")
+            node.ros.get_logger().info("crtk_msgs is not installed: no slave/operating_state")
         self._subscriptions = [self._listen(*entry) for entry in self._commands()]
         self._measured = Measured(node, stage)
 
@@ -84,7 +83,7 @@ class CrtkSlave:
         if self._state is not None:
             self._state.close()
         for subscription in self._subscriptions:
-            self._node.destroy_subscription(subscription)
+            self._node.ros.destroy(subscription)
         self._measured.close()
 
     def _condition(self) -> Condition:
@@ -95,7 +94,7 @@ class CrtkSlave:
 
     def _commands(self) -> list[tuple[str, str, bool, Callable[[Any], Told]]]:
         """Name, message type, whether it comes in a stream, and what takes it."""
-        motion, now = self._motion, time.time_ns
+        motion, now = self._motion, self._node.world.time_ns
         return [
             ("move_jp", _JOINTS, False, lambda m: self._locked(motion.move, self._of(m))),
             ("move_jr", _JOINTS, False, lambda m: self._locked(motion.move_by, self._of(m))),
@@ -115,12 +114,14 @@ class CrtkSlave:
     def _listen(
         self, name: str, kind: str, is_streamed: bool, command: Callable[[Any], Told]
     ) -> Any:
-        quality = streamed() if is_streamed else single()
+        quality = STREAMED if is_streamed else SINGLE
 
         def take(message: Any) -> None:
             self._take(name, command, message)
 
-        return self._node.create_subscription(message_type(kind), f"slave/{name}", take, quality)
+        return self._node.ros.create_subscription(
+            message_type(kind), f"slave/{name}", take, quality
+        )
 
     def _take(self, name: str, command: Callable[[Any], Told], message: Any) -> None:
         if not self._node.is_at_work:
@@ -134,7 +135,7 @@ class CrtkSlave:
             self._refusals.add(f"slave/{name}", text)
         elif name != self._source:
             self._source = name
-            self._node.get_logger().info(f"slave/{name} commands the arm")
+            self._node.ros.get_logger().info(f"slave/{name} commands the arm")
 
     def _locked(self, command: Callable[..., Told], *arguments: Any) -> Told:
         with self._node.lock:
@@ -159,7 +160,7 @@ class CrtkSlave:
         found = self._motion.solve(_transform(message))
         if isinstance(found, tuple):
             return found
-        return self._locked(self._motion.servo, found, time.time_ns())
+        return self._locked(self._motion.servo, found, self._node.world.time_ns())
 
 
 class CommandError(TeleopError):
@@ -198,27 +199,27 @@ class Measured:
         self._node, self._stage = node, stage
         names = stage.robot.joint_names
         self._publishers = {
-            topic: node.create_lifecycle_publisher(
+            topic: node.ros.create_lifecycle_publisher(
                 message_type(topic.kind.ros_type), topic.name, profile(topic)
             )
             for topic in (MEASURED_CV, GOAL_JS, GOAL_CP, BODY_CF, SPATIAL_CF)
         }
         self._layouts = {t: layout(t.of_arm(node.arm), names) for t in self._publishers}
-        self._jacobian = node.create_lifecycle_publisher(
+        self._jacobian = node.ros.create_lifecycle_publisher(
             message_type(_MATRIX), JACOBIAN, profile(MEASURED_CV)
         )
         self._force: Any = None  # newest message of it
         self._forces: Any = None  # subscription, as long as somebody reads them in other frames
-        self._timer = node.create_timer(_PERIOD, self._send)
+        self._timer = node.ros.create_timer(_PERIOD, self._send)
         self._timer.cancel()
-        self._look = node.create_timer(_LOOK, self._look_for_readers)
+        self._look = node.ros.create_timer(_LOOK, self._look_for_readers)
 
     def close(self) -> None:
         """Withdraw them."""
         for timer in (self._timer, self._look):
-            self._node.destroy_timer(timer)
+            self._node.ros.destroy(timer)
         for publisher in (*self._publishers.values(), self._jacobian):
-            self._node.destroy_lifecycle_publisher(publisher)
+            self._node.ros.destroy(publisher)
         self._listen(is_read=False)
 
     def _look_for_readers(self) -> None:
@@ -234,11 +235,11 @@ class Measured:
         """Begin to take what the force sensor tells, or end it."""
         if is_read and self._forces is None:
             kind = message_type(SLAVE_MEASURED_CF.kind.ros_type)
-            self._forces = self._node.create_subscription(
-                kind, SLAVE_MEASURED_CF.name, self._take, streamed()
+            self._forces = self._node.ros.create_subscription(
+                kind, SLAVE_MEASURED_CF.name, self._take, STREAMED
             )
         elif not is_read and self._forces is not None:
-            self._node.destroy_subscription(self._forces)
+            self._node.ros.destroy(self._forces)
             self._forces = self._force = None
 
     def _take(self, message: Any) -> None:

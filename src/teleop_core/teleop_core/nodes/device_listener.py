@@ -3,15 +3,14 @@
 import time
 from typing import Any
 
-from rclpy.serialization import deserialize_message
-
 from teleop_core.base.errors import SessionError
 from teleop_core.chain.master.master_bridge import POSE_MESSAGES
 from teleop_core.graph.topics import Kind, Topic
 from teleop_core.kernels.geometry import Array
+from teleop_core.middleware.ros_messages import read_message
 from teleop_core.nodes.guest import Guest
 from teleop_core.nodes.master_bridge import pose_of
-from teleop_core.nodes.streams import Subscription, Waiter
+from teleop_core.nodes.streams import Subscription
 
 PATIENCE = 5.0
 """Time in which the topic must be found, and a message must come [s]."""
@@ -39,8 +38,7 @@ class DeviceListener(Guest):
             self.topic = topic if topic.startswith("/") else f"/{topic}"
             self.message = self._find(domain, patience)
             heard = Topic(self.topic, Kind.POSE, message=self.message)
-            self._subscription = Subscription(self.node, heard, self.topic, 1)
-            self._waiter = Waiter(self._context, self._subscription)
+            self._subscription = Subscription(self, heard, self.topic, 1)
         except BaseException:
             self.close()
             raise
@@ -79,19 +77,23 @@ class DeviceListener(Guest):
             if newest is None:
                 if time.monotonic() > end:
                     raise SessionError(f"{self.topic} is there, but silent: does the driver run?")
-                self._waiter.wait(0.1)
+                self._wait(0.1)
         return newest
+
+    def _wait(self, seconds: float) -> None:
+        assert self._subscription is not None
+        self._subscription.wait(seconds)
 
     def _newest(self) -> Any:
         """Message that waits, if any; of those before it nothing is kept."""
         assert self._subscription is not None
         taken = self._subscription.take()
-        return None if taken is None else deserialize_message(taken.data, self._subscription.type)
+        return None if taken is None else read_message(taken.data, self._subscription.type)
 
     def _find(self, domain: int, patience: float) -> str:
         end = time.monotonic() + patience
         while True:
-            known = dict(self.node.get_topic_names_and_types())
+            known = dict(self.ros.get_topic_names_and_types())
             found = [kind for kind in known.get(self.topic, ()) if kind in POSE_MESSAGES]
             if found:
                 return found[0]

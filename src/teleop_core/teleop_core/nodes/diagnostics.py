@@ -1,15 +1,13 @@
 """Diagnostics: what a node says about itself once a second."""
 
-import time
 from collections import Counter
 from collections.abc import Mapping
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-from rclpy.duration import Duration
-from rclpy.node import Node
 
-from teleop_core.bags.messages import Refusal
+from teleop_core.bags.messages import SECOND_NS, Refusal
 from teleop_core.graph.topics import DIAGNOSTICS
+from teleop_core.middleware.world import Owner
 from teleop_core.nodes.quality import NO_OVERRIDES, profile
 from teleop_core.nodes.rate import Recent, TickCounts
 from teleop_core.nodes.sender import Sender
@@ -23,36 +21,36 @@ class Reporter:
     """Sender of a node's ``diagnostics``.
 
     Args:
-        node: The node; its name, with the namespace, is that of the status.
+        owner: The node; its name, with the namespace, is that of the status.
     """
 
-    def __init__(self, node: Node) -> None:
-        self._node = node
-        name, overrides = f"/{DIAGNOSTICS.name}", getattr(node, "overrides", NO_OVERRIDES)
-        self._publisher = node.create_publisher(
+    def __init__(self, owner: Owner) -> None:
+        self._owner, self._world = owner, owner.world
+        name, overrides = f"/{DIAGNOSTICS.name}", getattr(owner, "overrides", NO_OVERRIDES)
+        self._publisher = owner.ros.create_publisher(
             DiagnosticArray, name, overrides.apply(name, "publisher", profile(DIAGNOSTICS))
         )
-        self._last_time, self._last_ticks, self._elapsed = time.monotonic(), 0, 1.0
+        self._last_ns, self._last_ticks, self._elapsed = self._world.monotonic_ns(), 0, 1.0
         self._last_refused: dict[Input, Counter[Refusal]] = {}
         self._last_received: dict[Input, int] = {}
-        self._offset_ns = time.time_ns() - time.monotonic_ns()
+        self._offset_ns = self._world.time_ns() - self._world.monotonic_ns()
 
     def clock_step(self) -> float:
         """By how much the system's clock was stepped since the last call [s]; 0 if it was not."""
-        offset_ns = time.time_ns() - time.monotonic_ns()
+        offset_ns = self._world.time_ns() - self._world.monotonic_ns()
         step_ns, self._offset_ns = offset_ns - self._offset_ns, offset_ns
         return step_ns * 1e-9 if abs(step_ns) > _STEP_NS else 0.0
 
     def flush(self) -> None:
         """Wait a moment until the last report has arrived."""
-        self._publisher.wait_for_all_acked(Duration(nanoseconds=300_000_000))
+        self._publisher.wait_for_all_acked(0.3)
 
     def rate(self, ticks: int) -> float:
         """Ticks per second since the last call."""
-        now = time.monotonic()
-        self._elapsed = max(now - self._last_time, 1e-3)
+        now_ns = self._world.monotonic_ns()
+        self._elapsed = max(1e-9 * (now_ns - self._last_ns), 1e-3)
         rate = (ticks - self._last_ticks) / self._elapsed
-        self._last_time, self._last_ticks = now, max(ticks, 0)
+        self._last_ns, self._last_ticks = now_ns, max(ticks, 0)
         return max(rate, 0.0)
 
     def input_concerns(self, inputs: list[Input]) -> list[str]:
@@ -83,13 +81,14 @@ class Reporter:
 
     def send(self, concerns: list[str], text: str, values: Mapping[str, str]) -> None:
         """Publish one status: a warning if there are concerns."""
-        name = f"{self._node.get_namespace()}/{self._node.get_name()}".strip("/")
+        name = f"{self._owner.ros.get_namespace()}/{self._owner.ros.get_name()}".strip("/")
         status = DiagnosticStatus(name=name, hardware_id="teleop_core")
         status.level = DiagnosticStatus.WARN if concerns else DiagnosticStatus.OK
         status.message = "; ".join(concerns) or text
         status.values = [KeyValue(key=key, value=value) for key, value in values.items()]
         message = DiagnosticArray(status=[status])
-        message.header.stamp = self._node.get_clock().now().to_msg()
+        stamp = message.header.stamp
+        stamp.sec, stamp.nanosec = divmod(self._world.time_ns(), SECOND_NS)
         self._publisher.publish(message)
 
 

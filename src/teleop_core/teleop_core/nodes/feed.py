@@ -7,27 +7,19 @@ from another machine, the recorder hears by the middleware.
 """
 
 import json
-import os
-import socket
 import struct
-import time
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from typing import Protocol
+
+from teleop_core.middleware.world import Line, Listener, World
 
 MOST = 16 << 20
 """Bytes that wait for a recorder that takes nothing; about 7 s of a session of one arm."""
 _HEAD = struct.Struct("<IHHIq")  # size, topic, word, number, time [ns]
 _NAMES, _MESSAGE, _JOINED, _LEFT = 0, 1, 2, 3
-_AGAIN = 1.0  # from one look for a recorder to the next [s]
+_AGAIN_NS = 1_000_000_000  # from one look for a recorder to the next
 _READ = 1 << 20  # bytes at once
-_LOOPS = 64  # that may be waiting to be heard
-_CREDENTIALS = struct.Struct("3i")  # process, user, group
-
-
-def address() -> str:
-    """Where the recorder of this machine and of the ROS domain of this process listens."""
-    return f"\0teleop_core.recorder.{os.environ.get('ROS_DOMAIN_ID') or 0}"
 
 
 class Channel:
@@ -58,7 +50,7 @@ class Channel:
         """Say it again, to a recorder that does not know."""
         if self._feed.is_open:
             word = _JOINED if self._is_inside else _LEFT
-            self._feed.put(self._index, word, time_ns=time.time_ns())
+            self._feed.put(self._index, word, time_ns=self._feed.world.time_ns())
 
 
 class Feed:
@@ -66,18 +58,19 @@ class Feed:
 
     Args:
         names: Topics that it may send, as the recorder knows them.
-        place: Where the recorder listens, as of :func:`address`.
+        world: Where the loop is.
 
     Attributes:
+        world: As given.
         channels: Where the messages of each topic go, by its name.
         waiting: What is to be written.
         is_open: Whether a recorder listens.
     """
 
-    def __init__(self, names: Iterable[str], place: str) -> None:
-        self._names, self._place = tuple(names), place
-        self._line: socket.socket | None = None
-        self._looked = -_AGAIN
+    def __init__(self, names: Iterable[str], world: World) -> None:
+        self._names, self.world = tuple(names), world
+        self._line: Line | None = None
+        self._looked_ns = -_AGAIN_NS
         self.waiting, self.is_open = bytearray(), False
         self.channels = {name: Channel(self, index) for index, name in enumerate(self._names)}
 
@@ -90,9 +83,11 @@ class Feed:
 
     def flush(self) -> None:
         """Write what waits, as far as the socket takes it; look for a recorder now and then."""
-        if self._line is None and self._names and time.monotonic() - self._looked > _AGAIN:
-            self._looked = time.monotonic()
-            self._connect()
+        if self._line is None and self._names:
+            now_ns = self.world.monotonic_ns()
+            if now_ns - self._looked_ns > _AGAIN_NS:
+                self._looked_ns = now_ns
+                self._connect()
         if self._line is not None and self.waiting:
             try:
                 written = self._line.send(self.waiting)
@@ -113,12 +108,9 @@ class Feed:
         self.waiting.clear()
 
     def _connect(self) -> None:
-        line = socket.socket(socket.AF_UNIX)
-        line.setblocking(False)
         try:
-            line.connect(self._place)
+            line = self.world.connect(self.world.feed_place())
         except OSError:  # nobody listens
-            line.close()
             return
         self._line, self.is_open = line, True
         self.put(0, _NAMES, json.dumps(self._names).encode())
@@ -141,32 +133,20 @@ class FeedReader:
 
     Args:
         channels: Who takes the messages of each topic, by its name.
-        place: Where it listens, as of :func:`address`; where another recorder does, it hears none.
+        world: Where it is; where another recorder listens already, it hears none.
     """
 
-    def __init__(self, channels: Mapping[str, Fed], place: str) -> None:
-        self._channels = channels
+    def __init__(self, channels: Mapping[str, Fed], world: World) -> None:
+        self._channels, self._world = channels, world
         self._loops: list[_Loop] = []
-        self._opened: socket.socket | None = socket.socket(socket.AF_UNIX)
-        self._opened.setblocking(False)
-        try:
-            self._opened.bind(place)
-            self._opened.listen(_LOOPS)
-        except OSError:
-            self._opened.close()
-            self._opened = None
+        self._opened: Listener | None = None
+        with suppress(OSError):
+            self._opened = world.listen(world.feed_place())
 
     def drain(self) -> None:
         """Hand on all that has come."""
-        while self._opened is not None:
-            try:
-                line, _ = self._opened.accept()
-            except OSError:
-                break
-            if _is_ours(line):
-                self._loops.append(_Loop(line, self._channels))
-            else:
-                line.close()
+        while self._opened is not None and (line := self._opened.accept()) is not None:
+            self._loops.append(_Loop(line, self._channels, self._world))
         for one in self._loops:
             one.drain()
         self._loops = [one for one in self._loops if one.is_open]
@@ -183,9 +163,8 @@ class FeedReader:
 class _Loop:
     """What one loop feeds; where it ends, its topics are left to others."""
 
-    def __init__(self, line: socket.socket, channels: Mapping[str, Fed]) -> None:
-        line.setblocking(False)
-        self._line, self._known, self._came = line, channels, bytearray()
+    def __init__(self, line: Line, channels: Mapping[str, Fed], world: World) -> None:
+        self._line, self._known, self._world, self._came = line, channels, world, bytearray()
         self._channels: list[Fed | None] = []
         self._last: dict[int, int] = {}
         self.is_open = True
@@ -212,7 +191,7 @@ class _Loop:
         self.is_open = False
         for channel in self._channels:
             if channel is not None:
-                channel.join(False, time.time_ns())
+                channel.join(False, self._world.time_ns())
 
     def _hand_on(self) -> None:
         """Hand on whole frames; who sends others is no loop of ours, and is heard no more."""
@@ -242,9 +221,3 @@ class _Loop:
                     channel.join(word == _JOINED, time_ns)
             at = end
         del came[:at]
-
-
-def _is_ours(line: socket.socket) -> bool:
-    """Whether the other side is of the same user."""
-    told = line.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, _CREDENTIALS.size)
-    return int(_CREDENTIALS.unpack(told)[1]) == os.getuid()

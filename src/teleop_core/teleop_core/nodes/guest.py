@@ -2,8 +2,8 @@
 
 from typing import Any, Self
 
-from rclpy.context import Context
-from rclpy.node import Node
+from teleop_core.middleware.ros import ROS
+from teleop_core.middleware.world import World
 
 
 class Guest:
@@ -12,18 +12,19 @@ class Guest:
     Args:
         name: What the node is called.
         domain: ROS domain; None for that of the environment.
+        world: Where it is.
         options: Further ones of the node, as rclpy has them.
 
     Attributes:
-        node: The node.
+        world: Where it is, as a guest.
+        ros: The node.
     """
 
-    def __init__(self, name: str, domain: int | None = None, **options: Any) -> None:
-        self._context = Context()
-        self._context.init(args=[], domain_id=domain)
-        self.node = Node(
-            name, context=self._context, use_global_arguments=False, enable_rosout=False, **options
-        )
+    def __init__(
+        self, name: str, domain: int | None = None, world: World = ROS, **options: Any
+    ) -> None:
+        self.world = world.guest(domain)
+        self.ros = self.world.node(name, use_global_arguments=False, enable_rosout=False, **options)
 
     def __enter__(self) -> Self:
         return self
@@ -33,5 +34,5 @@ class Guest:
 
     def close(self) -> None:
         """Leave."""
-        self.node.destroy_node()
-        self._context.try_shutdown()
+        self.ros.destroy_node()
+        self.world.shutdown()

@@ -16,13 +16,13 @@ from teleop_core.base.texts import printable
 from teleop_core.graph.graph import HAND, RECORDER_NAME
 from teleop_core.graph.layers import SESSION
 from teleop_core.graph.topics import SLAVE_SETPOINT_JS
+from teleop_core.middleware.real_time import is_priority_granted
 from teleop_core.nodes.children import Child, end_all, environment
 from teleop_core.nodes.crews import Crew, Processes, crews
 from teleop_core.nodes.interrupt import Interrupt
 from teleop_core.nodes.keys import Keys
 from teleop_core.nodes.leftovers import remove_leftovers
 from teleop_core.nodes.observer import WARNING, Observer, Status
-from teleop_core.nodes.real_time import is_priority_granted
 from teleop_core.nodes.remote_control import RemoteControl
 from teleop_core.nodes.sessions import announced
 from teleop_core.nodes.starter import START_TIMEOUT, Starter

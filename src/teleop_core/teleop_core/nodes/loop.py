@@ -1,11 +1,11 @@
 """Loop: the thread of a node that does its work, beside the executor that serves its parameters."""
 
 import sys
-import threading
 import traceback
 from collections.abc import Callable
 
 from teleop_core.base.errors import TeleopError
+from teleop_core.middleware.world import World
 
 _END_PATIENCE = 8.0  # the last turn may compile a kernel, or wait for a slow disk
 
@@ -14,6 +14,7 @@ class Loop:
     """Thread that takes one turn after another until it is stopped.
 
     Args:
+        world: Where it is.
         name: Name of the thread.
         turn: One turn; blocks for a tenth of a second at most.
         fail: Told in words, and whether it was expected, why a turn could not be finished; the
@@ -34,6 +35,7 @@ class Loop:
 
     def __init__(
         self,
+        world: World,
         name: str,
         turn: Callable[[], None],
         fail: Callable[[str, bool], None],
@@ -43,8 +45,8 @@ class Loop:
         self.name, self.turns, self.patience = name, 0, patience
         self.is_ready = self.is_hung = False
         self._turn, self._fail, self._prepare = turn, fail, prepare
-        self.is_running = True
-        self._thread = threading.Thread(target=self._run, name=name, daemon=True)
+        self.is_running, self._world = True, world
+        self._thread = world.thread(name, self._run)
 
     def start(self) -> None:
         """Begin with the turns."""
@@ -53,7 +55,7 @@ class Loop:
     def stop(self) -> bool:
         """End after the present turn; whether it did, or is left behind because it hangs."""
         self.is_running = False
-        if threading.current_thread() is self._thread:
+        if self._world.thread_ident() == self._thread.ident:
             return True
         self._thread.join(0.0 if self.is_hung else _END_PATIENCE)
         return not self._thread.is_alive()

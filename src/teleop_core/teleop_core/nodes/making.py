@@ -15,6 +15,6 @@ def node_class(stage: Stage) -> Any:
 
 
 def make_node(stage: Stage, **options: Any) -> CoreNode:
-    """Node of a stage; ``options`` as of :class:`rclpy.lifecycle.LifecycleNode`."""
+    """Node of a stage; ``options`` as of :class:`~teleop_core.nodes.tuned.TunedNode`."""
     node: CoreNode = node_class(stage)(stage, **options)
     return node

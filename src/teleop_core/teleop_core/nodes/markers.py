@@ -1,6 +1,5 @@
 """Live markers: what RViz and Foxglove draw beside the robot, while somebody looks."""
 
-import time
 from typing import Any
 
 import numpy as np
@@ -39,8 +38,12 @@ class LiveMarkers:
 
     def __init__(self, node: CoreNode, arm: str, axes: Array | None = None) -> None:
         self._topics = {topic: topic.of_arm(arm) for topic in _READ}
-        self._drawn, self._cadence = ArmMarkers(arm, axes), Cadence(PERIOD_NS)
-        self._publisher: Any = node.open_publisher(absolute(MARKERS.of_arm(arm)))
+        self._drawn, self._cadence = (
+            ArmMarkers(arm, axes),
+            Cadence(node.world.monotonic_ns, PERIOD_NS),
+        )
+        self._publisher = node.open_publisher(absolute(MARKERS.of_arm(arm)))
+        self._time_ns = node.world.time_ns
 
     def show(self, newest: Newest) -> None:
         """Publish what is due while somebody listens."""
@@ -49,7 +52,7 @@ class LiveMarkers:
         if not self._publisher.get_subscription_count():
             self._drawn.forget()
             return
-        self._publisher.publish(marker_message(time.time_ns(), self._markers(newest)))
+        self._publisher.publish(marker_message(self._time_ns(), self._markers(newest)))
 
     def _markers(self, newest: Newest) -> list[Marker]:
         wrench = self._values(newest, MASTER_MEASURED_CF)

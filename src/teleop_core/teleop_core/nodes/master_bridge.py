@@ -1,11 +1,9 @@
 """Node ``master_bridge``: a real device in the place of ``haptic_master``."""
 
-import time
 from collections.abc import Callable, Iterable
 from typing import Any
 
 import numpy as np
-from rclpy.serialization import deserialize_message
 
 from teleop_core.chain.master.master_bridge import RATE_MESSAGE, MasterBridgeParameters
 from teleop_core.graph.topics import (
@@ -16,6 +14,7 @@ from teleop_core.graph.topics import (
     Quality,
     Topic,
 )
+from teleop_core.middleware.ros_messages import read_message
 from teleop_core.nodes.news import Trouble
 from teleop_core.nodes.streams import Subscription, message_type
 from teleop_core.nodes.ticking import TickingNode
@@ -63,8 +62,8 @@ class MasterBridgeNode(TickingNode):
         now_ns = self.epoch_ns + max(ticks)
         with self.lock:
             is_new = self._listen()
-            is_heard = self.stage.is_heard(time.time_ns())
-            force = self.stage.force(self.input(MASTER_SERVO_CF).age(), time.time_ns())
+            is_heard = self.stage.is_heard(self.world.time_ns())
+            force = self.stage.force(self.input(MASTER_SERVO_CF).age(), self.world.time_ns())
         if is_new or (is_heard and now_ns - self._said_ns >= _BUTTONS_AGAIN_NS):
             self._buttons_out.send(now_ns)
             self._said_ns = now_ns
@@ -79,7 +78,7 @@ class MasterBridgeNode(TickingNode):
     def _listen(self) -> bool:
         """Take what has come; whether the buttons were pressed or released."""
         while (taken := self._poses.take()) is not None:
-            message = deserialize_message(taken.data, self._poses.type)
+            message = read_message(taken.data, self._poses.type)
             has_stamp = self.parameters.pose_stamps == "header" and hasattr(message, "header")
             stamp_ns = _nanoseconds(message.header.stamp) if has_stamp else taken.sent_ns
             if self._hear(message, stamp_ns):
@@ -87,14 +86,14 @@ class MasterBridgeNode(TickingNode):
         is_new = False
         while self._presses is not None and (taken := self._presses.take()) is not None:
             before = self.stage.signals[MASTER_BUTTONS.field].copy()
-            buttons = deserialize_message(taken.data, self._presses.type).buttons
+            buttons = read_message(taken.data, self._presses.type).buttons
             is_sound = self.stage.press(buttons)
             after = self.stage.signals[MASTER_BUTTONS.field]
             is_new = is_new or (is_sound and not np.array_equal(before, after))
         return is_new
 
     def _hear(self, message: Any, stamp_ns: int) -> bool:
-        now_ns = time.time_ns()
+        now_ns = self.world.time_ns()
         if self.parameters.pose_message == RATE_MESSAGE:
             return bool(self.stage.hear_joy(message.axes, message.buttons, stamp_ns, now_ns))
         if self.parameters.says_joints:

@@ -1,6 +1,5 @@
 """Node ``network``: delays and loses what goes between both sides, whoever publishes it."""
 
-import time
 from typing import Any
 
 from teleop_core.chain.network.network import BACK, THERE
@@ -36,7 +35,7 @@ class NetworkNode(TickingNode):
         for tick_ns in due[:-1]:
             self.make_tick(tick_ns, self.send_report)
         self.read_ports()
-        state["behind"] = (time.monotonic_ns() - due[-1]) // TICK_NS
+        state["behind"] = (self.world.monotonic_ns() - due[-1]) // TICK_NS
         self.make_tick(due[-1], self.send_report)
 
     def send(self, now_ns: int) -> None:

@@ -1,6 +1,6 @@
 """Newest: the last message of each topic that the recorder has, for those who show them."""
 
-import time
+from collections.abc import Callable
 
 from teleop_core.bags.layouts import layout
 from teleop_core.bags.messages import Refusal, read_any
@@ -46,15 +46,16 @@ class Cadence:
     """When it is time again.
 
     Args:
+        clock: Monotonic time [ns].
         period_ns: From one time to the next, at least [ns].
     """
 
-    def __init__(self, period_ns: int) -> None:
-        self._period_ns, self._last_ns = period_ns, 0
+    def __init__(self, clock: Callable[[], int], period_ns: int) -> None:
+        self._clock, self._period_ns, self._last_ns = clock, period_ns, 0
 
     def is_due(self) -> bool:
         """Whether it is time; it is not again before the period is over."""
-        now_ns = time.monotonic_ns()
+        now_ns = self._clock()
         if now_ns - self._last_ns < self._period_ns:
             return False
         self._last_ns = now_ns

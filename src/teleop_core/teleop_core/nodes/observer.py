@@ -1,15 +1,16 @@
 """Observer: what all nodes of a graph say in ``diagnostics``."""
 
 import math
-import time
 from dataclasses import dataclass, field
 from typing import Any
 
 from teleop_core.bags.messages import read_reports
 from teleop_core.graph.topics import DIAGNOSTICS
+from teleop_core.middleware.ros import ROS
+from teleop_core.middleware.world import World
 from teleop_core.nodes.guest import Guest
 from teleop_core.nodes.operation import StopButton
-from teleop_core.nodes.streams import Subscription, Waiter
+from teleop_core.nodes.streams import Subscription
 
 WARNING = 1
 
@@ -39,6 +40,7 @@ class Observer(Guest):
         domain: ROS domain.
         name: What its node is called.
         button: Stop button of its own, which outlives it; None: it makes one.
+        world: Where it is.
         options: Further ones of the node, as rclpy has them.
 
     Attributes:
@@ -52,14 +54,14 @@ class Observer(Guest):
         domain: int,
         name: str = "teleop_live",
         button: StopButton | None = None,
+        world: World = ROS,
         **options: Any,
     ) -> None:
-        super().__init__(name, domain, **options)
+        super().__init__(name, domain, world, **options)
         self.statuses: dict[str, Status] = {}
         self.malformed, self.has_heartbeat = 0, False
-        self._reports = Subscription(self.node, DIAGNOSTICS, f"/{DIAGNOSTICS.name}", 100)
-        self._button = button or StopButton(self.node)
-        self._waiter = Waiter(self._context, self._reports)
+        self._reports = Subscription(self, DIAGNOSTICS, f"/{DIAGNOSTICS.name}", 100)
+        self._button = button or StopButton(self)
 
     def close(self) -> None:
         """Leave."""
@@ -68,7 +70,7 @@ class Observer(Guest):
 
     def listen(self, timeout: float) -> None:
         """Take all reports that come within ``timeout`` [s] of the first one or of now."""
-        self._waiter.wait(timeout)
+        self._reports.wait(timeout)
         self.take()
 
     def take(self) -> bool:
@@ -84,7 +86,7 @@ class Observer(Guest):
                 continue
             for one in reports:
                 self.statuses[one.name] = Status(
-                    one.level, one.message, one.values, time.monotonic()
+                    one.level, one.message, one.values, 1e-9 * self.world.monotonic_ns()
                 )
                 is_new = True
         return is_new
@@ -95,7 +97,7 @@ class Observer(Guest):
 
     def senders(self, topic: str) -> int:
         """Publishers of a topic that were found."""
-        return int(self.node.count_publishers(f"/{topic}"))
+        return int(self.ros.count_publishers(f"/{topic}"))
 
     def is_active(self, name: str) -> bool:
         """Whether a node has reported that it is at work."""

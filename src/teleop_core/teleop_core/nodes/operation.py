@@ -1,16 +1,13 @@
 """Operation on topics and services: the emergency stop of all arms, and the commands of each."""
 
-import time
 from collections.abc import Callable, Iterable
 from functools import partial
 from typing import Any, Protocol
 
-from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from std_msgs.msg import Bool
 from std_srvs.srv import Trigger
 
-from teleop_core.nodes.news import full_name
-from teleop_core.nodes.taking import Taker
+from teleop_core.middleware.world import Owner, Qos
 from teleop_core.slave.operation.presses import Presses
 from teleop_core.slave.operation.states import COMMANDS, Answer
 
@@ -19,38 +16,32 @@ STOP_TOPIC = "/teleop/stop"
 RELEASE = "release"
 """Service that overrides stop buttons which are pressed; it is no command of the arm's state."""
 _EVERY = 4
-_BEAT = 0.1
-"""A button of this package that has spoken says its state again so often [s]."""
+_BEAT_NS = 100_000_000
+"""A button of this package that has spoken says its state again so often [ns]."""
 _BYTES = 5
 """A Bool as CDR: four bytes of encapsulation, one of data."""
-_RELIABLE, _BEST_EFFORT = ReliabilityPolicy.RELIABLE, ReliabilityPolicy.BEST_EFFORT
-_VOLATILE, _LATCHED = DurabilityPolicy.VOLATILE, DurabilityPolicy.TRANSIENT_LOCAL
-_READERS = ((_RELIABLE, _VOLATILE), (_RELIABLE, _LATCHED), (_BEST_EFFORT, _VOLATILE))
+READERS = (
+    Qos(keeps_all=True),
+    Qos(keeps_all=True, is_latched=True),
+    Qos(keeps_all=True, is_reliable=False),
+)
 """Readers of the stop: for all who send reliably; for the state that a button had before it was
-found; for those who send at best effort, whom a reliable reader does not hear."""
-
-
-def stop_profile(
-    reliability: ReliabilityPolicy = _RELIABLE, durability: DurabilityPolicy = _VOLATILE
-) -> QoSProfile:
-    """QoS of a reader of the stop: it keeps all, for a press must not make room for a release."""
-    return QoSProfile(
-        history=HistoryPolicy.KEEP_ALL, reliability=reliability, durability=durability
-    )
+found; for those who send at best effort, whom a reliable reader does not hear. They keep all, for a
+press must not make room for a release."""
 
 
 class StopButton:
     """Emergency stop button: says its state, and tells it to whoever comes later too.
 
     Args:
-        node: Node that owns it.
+        owner: Node that owns it.
     """
 
-    def __init__(self, node: Any) -> None:
-        profile = QoSProfile(depth=1, reliability=_RELIABLE, durability=_LATCHED)
-        self._own = node.create_publisher(Bool, STOP_TOPIC, profile)
+    def __init__(self, owner: Owner) -> None:
+        self._world = owner.world
+        self._own = owner.ros.create_publisher(Bool, STOP_TOPIC, Qos(depth=1, is_latched=True))
         self._is_pressed: bool | None = None
-        self._said = 0.0
+        self._said_ns = 0
 
     def say(self, *, is_pressed: bool) -> None:
         """Say that it is pressed, or that it is not; from any thread.
@@ -67,11 +58,12 @@ class StopButton:
 
         A slave with a heartbeat misses every button that it has heard.
         """
-        if self._is_pressed is not None and time.monotonic() - self._said > _BEAT:
+        silence_ns = self._world.monotonic_ns() - self._said_ns
+        if self._is_pressed is not None and silence_ns > _BEAT_NS:
             self._say(self._is_pressed)
 
     def _say(self, is_pressed: bool) -> None:
-        self._is_pressed, self._said = is_pressed, time.monotonic()
+        self._is_pressed, self._said_ns = is_pressed, self._world.monotonic_ns()
         self._own.publish(Bool(data=is_pressed))
 
     @property
@@ -90,15 +82,15 @@ class StopInput:
     said long ago, too.
 
     Args:
-        node: Node that owns it.
+        owner: Node that owns it.
 
     Attributes:
         has_new: Whether a button was heard for the first time; set it back before :meth:`learn`.
     """
 
-    def __init__(self, node: Any) -> None:
-        self._node, self.has_new = node, False
-        self._takers = [Taker(node, Bool, STOP_TOPIC, stop_profile(*kind)) for kind in _READERS]
+    def __init__(self, owner: Owner) -> None:
+        self._ros, self.has_new = owner.ros, False
+        self._takers = [self._ros.create_taker(Bool, STOP_TOPIC, qos) for qos in READERS]
         self._presses, self._ticks = Presses(), 0
         self._names: dict[bytes, str] = {}
 
@@ -175,12 +167,7 @@ class StopInput:
 
     def _look_up(self) -> dict[bytes, tuple[str, bool]]:
         """Name of each button that is there, and whether it tells its state to who comes late."""
-        there = {
-            bytes(info.endpoint_gid): (
-                full_name(info), info.qos_profile.durability == _LATCHED
-            )
-            for info in self._node.get_publishers_info_by_topic(STOP_TOPIC)
-        }  # fmt: skip
+        there = {end.sender: (end.node, end.is_latched) for end in self._ros.publishers(STOP_TOPIC)}
         self._names |= {sender: name for sender, (name, _) in there.items()}
         return there
 
@@ -214,7 +201,7 @@ class CommandServices:
         self._node, self._arm, self._stop, self._holders = node, arm, stop, holders
         calls = {name: partial(self._command, name) for name in COMMANDS}
         self._own = [
-            node.create_service(Trigger, f"slave/{name}", call)
+            node.ros.create_service(Trigger, f"slave/{name}", call)
             for name, call in (calls | {RELEASE: self._release}).items()
         ]
 
@@ -242,4 +229,4 @@ class CommandServices:
     def close(self) -> None:
         """Withdraw them."""
         for service in self._own:
-            self._node.destroy_service(service)
+            self._node.ros.destroy(service)

@@ -73,8 +73,8 @@ class HandInput:
         """Whether somebody holds the stylus, and who sends the poses."""
         if self._poses is None:
             return {}
-        found = self._node.get_publishers_info_by_topic(f"/{self._poses.topic.name}")
-        names = sorted(f"{i.node_namespace.rstrip('/')}/{i.node_name}" for i in found)
+        found = self._node.ros.publishers(f"/{self._poses.topic.name}")
+        names = sorted(end.node for end in found)
         return {"hand": " ".join(names), "hand.is_held": str(int(self._hand.is_held))}
 
 

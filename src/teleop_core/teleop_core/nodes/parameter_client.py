@@ -7,12 +7,11 @@ from typing import Any
 
 from rcl_interfaces.msg import ParameterDescriptor, ParameterEvent, ParameterType
 from rcl_interfaces.srv import DescribeParameters, GetParameters, ListParameters, SetParameters
-from rclpy.node import Node
-from rclpy.parameter import Parameter, parameter_value_to_python
-from rclpy.qos import qos_profile_parameter_events
 
 from teleop_core.base.errors import SessionError
 from teleop_core.console.link import ParameterInfo, Setting
+from teleop_core.middleware.ros_parameters import EVENTS, from_message, to_message
+from teleop_core.middleware.world import Client, Owner
 
 PATIENCE = 3.0
 """Time that a node has for an answer [s]."""
@@ -25,15 +24,14 @@ class ParameterEvents:
     """Changes of parameters that nodes tell; an executor of the caller's must be spinning.
 
     Args:
-        node: Node that hears them.
+        owner: Node that hears them.
     """
 
-    def __init__(self, node: Node) -> None:
+    def __init__(self, owner: Owner) -> None:
         self._lock = threading.Lock()
         self._changed: dict[tuple[str, str], Setting] = {}
-        profile = qos_profile_parameter_events
-        self._own = node.create_subscription(
-            ParameterEvent, "/parameter_events", self._hear, profile
+        self._own = owner.ros.create_subscription(
+            ParameterEvent, "/parameter_events", self._hear, EVENTS
         )
 
     def take(self) -> dict[tuple[str, str], Setting]:
@@ -46,7 +44,7 @@ class ParameterEvents:
         found = (*event.new_parameters, *event.changed_parameters)
         with self._lock:
             for one in found:
-                value = _plain(parameter_value_to_python(one.value))
+                value = _plain(from_message(one.value))
                 self._changed[event.node.strip("/"), one.name] = value
 
 
@@ -54,12 +52,12 @@ class ParameterClient:
     """Asks nodes for their parameters; an executor of the caller's must be spinning.
 
     Args:
-        node: Whose clients they are.
+        owner: Whose clients they are.
     """
 
-    def __init__(self, node: Node) -> None:
-        self._node = node
-        self._clients: dict[tuple[type, str], Any] = {}
+    def __init__(self, owner: Owner) -> None:
+        self._node = owner.ros
+        self._clients: dict[tuple[type, str], Client] = {}
 
     def read(self, name: str) -> dict[str, ParameterInfo]:
         """All parameters of a node, by their names.
@@ -85,16 +83,14 @@ class ParameterClient:
         answer = self._ask(GetParameters, name, "get_parameters", request)
         found = zip(names, answer.values, strict=True)
         return {
-            one: _plain(parameter_value_to_python(value))
+            one: _plain(from_message(value))
             for one, value in found
             if value.type != ParameterType.PARAMETER_NOT_SET
         }
 
     def change(self, name: str, parameter: str, value: Setting) -> str:
         """Set a parameter of a node; returns why it was refused, empty if it was taken."""
-        given: Any = list(value) if isinstance(value, tuple) else value
-        message = Parameter(parameter, value=given).to_parameter_msg()
-        request = SetParameters.Request(parameters=[message])
+        request = SetParameters.Request(parameters=[to_message(parameter, value)])
         try:
             (result,) = self._ask(SetParameters, name, "set_parameters", request).results
         except SessionError as error:
@@ -108,7 +104,7 @@ class ParameterClient:
         return call(self._clients[key], request, PATIENCE)
 
 
-def call(client: Any, request: object, patience: float) -> Any:
+def call(client: Client, request: object, patience: float) -> Any:
     """Answer of a service, asked from another thread than the executor's.
 
     Raises:

@@ -8,17 +8,18 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from rclpy.duration import Duration
-from rclpy.serialization import serialize_message
-from rclpy.time import Time
+from builtin_interfaces.msg import Time
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rosgraph_msgs.msg import Clock
 
+from teleop_core.bags.messages import SECOND_NS
 from teleop_core.bags.reader import Bag
 from teleop_core.bags.transforms import ROBOT_DESCRIPTION, TF
 from teleop_core.base.errors import ParameterError, RecordingError
 from teleop_core.graph.topics import BY_NAME, Quality
+from teleop_core.middleware.ros_messages import write_message
+from teleop_core.middleware.world import Qos
 from teleop_core.nodes.discovery import choose_transport
 from teleop_core.nodes.guest import Guest
 from teleop_core.nodes.quality import profile
@@ -101,7 +102,7 @@ def _paced(
     for name, _, log_ns, data in bag.raw(names):
         while clock_ns and told_ns <= log_ns:
             wait(told_ns)
-            yield CLOCK, told_ns, serialize_message(Clock(clock=Time(nanoseconds=told_ns).to_msg()))
+            yield CLOCK, told_ns, _clock(told_ns)
             told_ns += clock_ns
         wait(log_ns)
         yield name, log_ns, data
@@ -113,16 +114,16 @@ def _publishers(bag: Bag, names: list[str], *, has_clock: bool) -> Iterator[dict
     choose_transport()
     types = {name: _type_in(bag, name) for name in names}
     with Guest("teleop_play") as guest:
-        node, publishers = guest.node, {}
+        ros, publishers = guest.ros, {}
         for name, kind in types.items():
             topic = _KNOWN.get(name)
-            publishers[name] = node.create_publisher(kind, name, profile(topic) if topic else 10)
+            publishers[name] = ros.create_publisher(kind, name, profile(topic) if topic else Qos())
         if has_clock:
-            publishers[CLOCK] = node.create_publisher(Clock, f"/{CLOCK}", 1)
+            publishers[CLOCK] = ros.create_publisher(Clock, f"/{CLOCK}", Qos(depth=1))
         yield publishers
         for name, publisher in publishers.items():
             if name not in _KNOWN or _KNOWN[name].quality is not Quality.STREAM:
-                publisher.wait_for_all_acked(Duration(seconds=1))
+                publisher.wait_for_all_acked(1.0)
 
 
 def _is_installed(bag: Bag, name: str) -> bool:
@@ -157,3 +158,9 @@ def _progress(bag: Bag, console: Console) -> Iterator[Any]:
                 next_ns = log_ns + 100_000_000
 
         yield show
+
+
+def _clock(time_ns: int) -> bytes:
+    """Message of ``/clock`` at a time [ns]."""
+    seconds, nanoseconds = divmod(time_ns, SECOND_NS)
+    return write_message(Clock(clock=Time(sec=seconds, nanosec=nanoseconds)))

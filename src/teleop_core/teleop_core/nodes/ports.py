@@ -5,7 +5,6 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from rclpy.lifecycle import LifecyclePublisher
 
 from teleop_core.bags.layouts import layout
 from teleop_core.bags.messages import BUTTONS
@@ -16,6 +15,7 @@ from teleop_core.graph.stage import Stage
 from teleop_core.graph.topics import SELDOM_NS, Kind, Topic
 from teleop_core.kernels.fields import Cells
 from teleop_core.kernels.geometry import Array
+from teleop_core.middleware.world import Publisher
 from teleop_core.nodes.streams import Input, Output
 
 Feeds = Callable[[str], list[tuple[str, float]]]
@@ -26,7 +26,7 @@ class Ports:
     """Inputs and outputs of one stage.
 
     Args:
-        node: Node that owns them.
+        owner: Node that owns them.
         arm: Its namespace, without the slash before it.
         stage: What they are the ports of.
         signals: Record of the stage.
@@ -43,13 +43,13 @@ class Ports:
 
     def __init__(
         self,
-        node: Any,
+        owner: Any,
         arm: str,
         stage: Stage,
         signals: Any,
         joint_names: tuple[str, ...],
         feeds: Feeds,
-        publisher: Callable[[Topic], LifecyclePublisher],
+        publisher: Callable[[Topic], Publisher],
         buttons: tuple[int, ...] = BUTTONS,
     ) -> None:
         self._arm, self._stage, self.row = arm, stage, Cells(signals)
@@ -65,7 +65,7 @@ class Ports:
             targets = [own] if len(given) == 1 else [own.copy() for _ in given]
             self.inputs[port.name] = [
                 Input(
-                    node,
+                    owner,
                     replace(port, name=name).of_arm(arm),
                     name,
                     joint_names,
@@ -85,7 +85,7 @@ class Ports:
         for topic in stage.writes:
             if topic.kind is not Kind.REPORT:
                 form = layout(topic.of_arm(arm), joint_names)
-                output = Output(publisher(topic), form, signals[topic.field], topic.name)
+                output = Output(owner, publisher(topic), form, signals[topic.field], topic.name)
                 self.outputs[topic.of_arm(arm)] = output
                 self._stamped.append((output, self._stamp_field(topic)))
                 if topic.stamp.of and not topic.stamp.is_in_force:

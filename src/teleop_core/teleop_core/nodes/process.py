@@ -7,25 +7,16 @@ import sys
 import traceback
 from collections.abc import Callable
 from contextlib import ExitStack
-
-import rclpy
-import rclpy.utilities
-from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
-from rclpy.impl.implementation_singleton import rclpy_implementation
-from rclpy.signals import SignalHandlerOptions
+from typing import Protocol
 
 from teleop_core.base.errors import TeleopError
-from teleop_core.nodes.base import SUCCESS, CoreNode
+from teleop_core.middleware.ros import BAD_ARGUMENTS, ROS
+from teleop_core.middleware.world import Executor, Outcome, World, WorldEndedError
+from teleop_core.nodes.base import CoreNode
 from teleop_core.nodes.discovery import beyond_this_machine, choose_transport
 from teleop_core.nodes.files import checked_arguments
 from teleop_core.nodes.parent import Parent
 from teleop_core.nodes.watch import Crew, Watch, signal_pipe
-
-_BAD_ARGUMENTS = (
-    rclpy_implementation.RCLError,
-    rclpy_implementation.UnknownROSArgsError,
-    rclpy_implementation.RCLInvalidROSArgsError,
-)
 
 
 def run(make_crew: Callable[[], Crew]) -> int:
@@ -43,37 +34,47 @@ def run(make_crew: Callable[[], Crew]) -> int:
     try:
         sys.argv[:] = checked_arguments(sys.argv)
         choose_transport()
-        rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+        ROS.init(sys.argv)
         crew = make_crew()
     except TeleopError as error:
         print(error, file=sys.stderr)
         return _finish(2)
-    except _BAD_ARGUMENTS as error:
+    except BAD_ARGUMENTS as error:
         print(f"ROS arguments: {' '.join(str(error).split())}", file=sys.stderr)
         return _finish(2)
     if reach := beyond_this_machine():
-        crew.nodes[0].get_logger().info(reach)
+        crew.nodes[0].ros.get_logger().info(reach)
     # Two threads share the interpreter: the loop must not wait 5 ms for its turn.
     sys.setswitchinterval(2e-4)
     watch = Watch(crew, signals, parent)
-    code = _serve(crew, watch)
+    code = serve(crew, watch, ROS)
     if not code:
         watch.word = "leaving"  # all that matters is done
         for node in crew.nodes:
-            node.destroy_node()
+            node.ros.destroy_node()
         _finish(code)
     _leave(code)
     return code
 
 
-def _serve(crew: Crew, watch: Watch) -> int:
+class Watching(Protocol):
+    """Who sees to the end of a process.
+
+    Attributes:
+        word: What the process is doing: starting, at work, ending, leaving.
+    """
+
+    word: str
+
+
+def serve(crew: Crew, watch: Watching, world: World) -> int:
     """Start, work and end; returns the exit code."""
-    executor, nodes = SingleThreadedExecutor(), crew.nodes
+    executor, nodes = world.executor(), crew.nodes
     first = nodes[0]
     for node in nodes:
-        executor.add_node(node)
+        executor.add_node(node.ros)
         node.ended, node.ending = first.ended, first.ending
-    first.ended.add_done_callback(lambda _: executor.create_task(_wake))
+    first.ended.add_done_callback(lambda _: executor.wake())
     with ExitStack() as end:  # last first, and each whatever becomes of the others
         end.callback(executor.shutdown)
         for node in reversed(nodes):
@@ -88,23 +89,19 @@ def _serve(crew: Crew, watch: Watch) -> int:
     return max(code, *(node.exit_code for node in nodes), 0)
 
 
-def _spin_once(executor: SingleThreadedExecutor, node: CoreNode) -> None:
+def _spin_once(executor: Executor, node: CoreNode) -> None:
     """Serve one parameter, service or timer of any node."""
     try:
         executor.spin_once()
-    except ExternalShutdownException:
+    except WorldEndedError:
         node.end(1)
     except Exception:  # of a request that cannot be read, such as one that others forged
-        node.get_logger().error(
+        node.ros.get_logger().error(
             f"a request failed:\n{traceback.format_exc()}", throttle_duration_sec=10.0
         )
 
 
-def _wake() -> None:
-    """Have something to do, so that the executor looks whether it is to end."""
-
-
-def _begin_end(crew: Crew, watch: Watch) -> None:
+def _begin_end(crew: Crew, watch: Watching) -> None:
     watch.word = "ending"
     with crew.nodes[0].ending:  # who asked for the end uses the executor no longer
         pass
@@ -117,16 +114,16 @@ def _autostart(nodes: tuple[CoreNode, ...]) -> int:
     for node in willing:
         if node.ended.done():
             return 0
-        if node.trigger_configure() is not SUCCESS:
+        if node.ros.trigger("configure") is not Outcome.SUCCESS:
             return 2
     gc.collect()  # compiling leaves millions of objects; to look through them at work takes seconds
     if nodes[0].ended.done():
         return 0
-    return 1 if any(node.trigger_activate() is not SUCCESS for node in willing) else 0
+    return 1 if any(node.ros.trigger("activate") is not Outcome.SUCCESS for node in willing) else 0
 
 
 def _finish(code: int) -> int:
-    rclpy.utilities.try_shutdown()
+    ROS.shutdown()
     return code
 
 

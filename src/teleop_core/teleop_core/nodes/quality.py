@@ -6,30 +6,26 @@ a node has for a topic, by its full name.
 """
 
 from collections.abc import Mapping
-from typing import Literal
-
-from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from dataclasses import replace
+from typing import Any, Literal
 
 from teleop_core.base.errors import ParameterError
 from teleop_core.graph.topics import Quality, Topic
+from teleop_core.middleware.world import Qos
 
 PREFIX = "qos_overrides."
 Side = Literal["publisher", "subscription"]
 _SIDES: tuple[Side, ...] = ("publisher", "subscription")
 _DEPTHS = {Quality.STREAM: 1, Quality.LATCHED: 1, Quality.REPORT: 10}
-_CHOICES: dict[str, dict[str, object]] = {
-    "reliability": {
-        "reliable": ReliabilityPolicy.RELIABLE, "best_effort": ReliabilityPolicy.BEST_EFFORT,
-    },
-    "durability": {
-        "volatile": DurabilityPolicy.VOLATILE, "transient_local": DurabilityPolicy.TRANSIENT_LOCAL,
-    },
-    "history": {"keep_last": HistoryPolicy.KEEP_LAST, "keep_all": HistoryPolicy.KEEP_ALL},
-}  # fmt: skip
+_CHOICES: dict[str, tuple[str, dict[str, bool]]] = {
+    "reliability": ("is_reliable", {"reliable": True, "best_effort": False}),
+    "durability": ("is_latched", {"volatile": False, "transient_local": True}),
+    "history": ("keeps_all", {"keep_last": False, "keep_all": True}),
+}
 _DEPTH_MAX = 100_000
 
 
-def profile(topic: Topic, depth: int | None = None, side: Side = "publisher") -> QoSProfile:
+def profile(topic: Topic, depth: int | None = None, side: Side = "publisher") -> Qos:
     """How a topic is transported, before overrides.
 
     A stream is offered reliable, so that subscribers of both kinds get it, and asked for best
@@ -40,13 +36,11 @@ def profile(topic: Topic, depth: int | None = None, side: Side = "publisher") ->
         depth: In place of the topic's own, for deep queues.
         side: Which end of it.
     """
-    is_stream, is_latched = topic.quality is Quality.STREAM, topic.quality is Quality.LATCHED
-    is_best_effort = is_stream and side == "subscription"
-    return QoSProfile(
-        history=HistoryPolicy.KEEP_LAST,
+    is_best_effort = topic.quality is Quality.STREAM and side == "subscription"
+    return Qos(
         depth=depth or _DEPTHS[topic.quality],
-        reliability=ReliabilityPolicy.BEST_EFFORT if is_best_effort else ReliabilityPolicy.RELIABLE,
-        durability=DurabilityPolicy.TRANSIENT_LOCAL if is_latched else DurabilityPolicy.VOLATILE,
+        is_reliable=not is_best_effort,
+        is_latched=topic.quality is Quality.LATCHED,
     )
 
 
@@ -66,11 +60,11 @@ class QualityOverrides:
         }
         self._used: set[str] = set()
 
-    def apply(self, name: str, side: Side, base: QoSProfile) -> QoSProfile:
-        """Profile of one end of a topic with its full name, changed in place and returned."""
+    def apply(self, name: str, side: Side, base: Qos) -> Qos:
+        """Quality of one end of a topic with its full name, as overrides change it."""
         for key, (policy, value) in self._values.items():
             if key.startswith(f"{PREFIX}{name}.{side}."):
-                setattr(base, policy, value)
+                base = replace(base, **{policy: value})
                 self._used.add(key)
         return base
 
@@ -88,8 +82,8 @@ NO_OVERRIDES = QualityOverrides({})
 """Those of a node that was given none."""
 
 
-def _checked(name: str, value: object) -> tuple[str, object]:
-    """Policy and value of one override."""
+def _checked(name: str, value: object) -> tuple[str, Any]:
+    """Attribute of :class:`Qos` and value of one override."""
     topic, _, policy = name.removeprefix(PREFIX).rpartition(".")
     topic, _, side = topic.rpartition(".")
     if not topic.startswith("/") or side not in _SIDES:
@@ -99,10 +93,10 @@ def _checked(name: str, value: object) -> tuple[str, object]:
         return policy, _depth(name, value)
     if policy not in _CHOICES:
         raise ParameterError(name, value, f"one of {', '.join((*_CHOICES, 'depth'))}, by its name")
-    choices = _CHOICES[policy]
+    attribute, choices = _CHOICES[policy]
     if not isinstance(value, str) or value not in choices:
         raise ParameterError(name, value, f"one of {', '.join(choices)}")
-    return policy, choices[value]
+    return attribute, choices[value]
 
 
 def _depth(name: str, value: object) -> int:

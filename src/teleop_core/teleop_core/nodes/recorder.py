@@ -1,7 +1,6 @@
 """Node ``recorder``: every message of the graph as it came, in an MCAP recording."""
 
 import sys
-import threading
 import time
 from collections import deque
 from dataclasses import dataclass
@@ -20,9 +19,10 @@ from teleop_core.graph.graph import RECORDER_NAME, Graph
 from teleop_core.graph.layers import SESSION, parse_text
 from teleop_core.graph.stage import Stage
 from teleop_core.graph.topics import DIAGNOSTICS, Quality, Topic
-from teleop_core.nodes.base import SUCCESS, CoreNode
+from teleop_core.middleware.world import Outcome
+from teleop_core.nodes.base import CoreNode
 from teleop_core.nodes.display import LiveDisplay
-from teleop_core.nodes.feed import FeedReader, address
+from teleop_core.nodes.feed import FeedReader
 from teleop_core.nodes.files import graph_of, session_of
 from teleop_core.nodes.markers import LiveMarkers
 from teleop_core.nodes.model import LiveModel, ModelTopics
@@ -61,7 +61,7 @@ class _Channel:
     """One recorded topic: how much came, and how much the middleware lost on the way."""
 
     def __init__(self, node: CoreNode, topic: Topic) -> None:
-        self.topic, self._node = topic, node
+        self.topic, self._node, self._world = topic, node, node.world
         self.received = self.lost = 0
         self._numbers: dict[bytes, int] = {}  # the last one of each publisher
         self._since_ns = 0  # since when it listens
@@ -79,7 +79,7 @@ class _Channel:
         """
         if is_inside is not (self._inside_ns is None):
             return
-        since_ns = since_ns or time.time_ns()
+        since_ns = since_ns or self._world.time_ns()
         self._inside_ns = since_ns if is_inside else None
         self._twice = sum(sent_ns >= since_ns for sent_ns in self._recent) if is_inside else 0
 
@@ -118,7 +118,7 @@ class _Channel:
         elif self._subscription is None:
             depth = 10 if self.topic.quality is Quality.LATCHED else DEPTH
             self._numbers.clear()
-            self._since_ns = time.monotonic_ns()
+            self._since_ns = self._world.monotonic_ns()
             self._subscription = Subscription(self._node, self.topic, f"/{self.topic.name}", depth)
 
     def close(self) -> None:
@@ -141,7 +141,7 @@ class _Channel:
 
     def _is_new_there(self) -> bool:
         """Whether a publisher that was not heard yet cannot have sent before the recorder came."""
-        listens_ns = time.monotonic_ns() - self._since_ns
+        listens_ns = self._world.monotonic_ns() - self._since_ns
         return self.topic.quality is Quality.STREAM and listens_ns > DISCOVERY_NS
 
 
@@ -156,7 +156,7 @@ class RecorderNode(CoreNode):
         self._feeds: FeedReader | None = None
         self.stages: dict[str, Any] = {}
         """Parameters of the stages of the process, by their names in the graph."""
-        self._writing = threading.Lock()  # held while something is written, or the file changes
+        self._writing = self.world.lock()  # held while something is written, or the file changes
         self._is_recording, self._part, self._marks = False, 0, 0
         self._last: dict[Topic, bytes] = {}  # of latched topics, for the next recording
         serve(self, self, self.fail)
@@ -190,7 +190,7 @@ class RecorderNode(CoreNode):
 
     def _begin_recording(self, path: Path) -> None:
         """Make a recording, which begins with the last messages of latched topics."""
-        now_ns = time.time_ns()
+        now_ns = self.world.time_ns()
         self._writer = self.stage = self._open(path, start_ns=now_ns)
         self._is_recording = True
         self._model.forget()
@@ -213,7 +213,7 @@ class RecorderNode(CoreNode):
         try:
             return LiveModel(Model(configuration, parameters.tf_rate, self.arm))
         except TeleopError as error:
-            self.get_logger().warning(f"records no model of the robot: {error}")
+            self.ros.get_logger().warning(f"records no model of the robot: {error}")
             return LiveModel(Model(configuration, 0.0))
 
     def _about(self, configuration: Configuration) -> dict[str, str]:
@@ -224,11 +224,11 @@ class RecorderNode(CoreNode):
     def start(self) -> None:
         """Open the topics; latched ones send what they have."""
         self.channels = {topic.name: _Channel(self, topic) for topic in self._recorded}
-        self._feeds = FeedReader(self.channels, address())
+        self._feeds = FeedReader(self.channels, self.world)
 
     def turn(self) -> None:
         """Record what has come."""
-        time.sleep(_PAUSE)
+        self.world.sleep(_PAUSE)
         with self._writing:
             self._drain()
         self.counts.ticks += 1
@@ -288,7 +288,7 @@ class RecorderNode(CoreNode):
                 self._writer.write(topic, received_ns, data, sent_ns)
             for topic, data, received_ns in drawn:
                 self._writer.write(topic, received_ns, data)
-            self._writer.flush_older(time.time_ns())
+            self._writer.flush_older(self.world.time_ns())
         except RecordingError:
             self._is_broken = True  # said once; what is safe has been closed
             self.exit_code = self.exit_code or 1
@@ -299,8 +299,9 @@ class RecorderNode(CoreNode):
     def start_recording(self) -> str:
         """Record again, in a new directory; raises as :class:`Recorder` says."""
         if self.stage is None:
-            if self.trigger_configure() is not SUCCESS or self.trigger_activate() is not SUCCESS:
-                raise SessionError("did not start; its log says why")
+            for transition in ("configure", "activate"):
+                if self.ros.trigger(transition) is not Outcome.SUCCESS:
+                    raise SessionError("did not start; its log says why")
             return f"records to {self._writer.path}"
         self._insist(is_recording=False)
         with self._writing:
@@ -328,7 +329,7 @@ class RecorderNode(CoreNode):
         self._insist(is_recording=True)
         with self._writing:
             self._drain()
-            now_ns, self._marks = time.time_ns(), self._marks + 1
+            now_ns, self._marks = self.world.time_ns(), self._marks + 1
             text = self.parameters.mark or str(self._marks)
             data = report(now_ns, self.member_name, 0, text, {"number": str(self._marks)})
             self._writer.write(self._mark_topic, now_ns, data, now_ns)

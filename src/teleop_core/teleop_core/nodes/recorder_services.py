@@ -3,10 +3,10 @@
 from collections.abc import Callable
 from typing import Protocol
 
-from rclpy.node import Node
 from std_srvs.srv import Trigger
 
 from teleop_core.base.errors import RecordingError, SessionError
+from teleop_core.middleware.world import Owner
 
 
 class Recorder(Protocol):
@@ -30,11 +30,11 @@ class Recorder(Protocol):
         """Note that something happens now."""
 
 
-def serve(node: Node, recorder: Recorder, fail: Callable[[str, bool], None]) -> None:
+def serve(owner: Owner, recorder: Recorder, fail: Callable[[str, bool], None]) -> None:
     """Offer the services below the node's name, in its executor.
 
     Args:
-        node: Whose they are.
+        owner: Whose they are.
         recorder: Who does it.
         fail: Told why the recording cannot be written any more.
     """
@@ -49,7 +49,7 @@ def serve(node: Node, recorder: Recorder, fail: Callable[[str, bool], None]) -> 
         def answer(request: object, response: Trigger.Response) -> object:
             try:
                 response.message, response.success = action(), True
-                node.get_logger().info(response.message)
+                owner.ros.get_logger().info(response.message)
             except SessionError as error:
                 response.message = str(error)
             except RecordingError as error:
@@ -60,4 +60,4 @@ def serve(node: Node, recorder: Recorder, fail: Callable[[str, bool], None]) -> 
         return answer
 
     for name, action in actions.items():
-        node.create_service(Trigger, f"~/{name}", answering(action))
+        owner.ros.create_service(Trigger, f"~/{name}", answering(action))

@@ -1,16 +1,16 @@
 """Remote control: stops and commands the arms of a ROS domain, and tells how they are."""
 
-import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
-from rclpy.executors import SingleThreadedExecutor
 from std_srvs.srv import Trigger
 
 from teleop_core.bags.messages import read_reports
 from teleop_core.base.errors import SessionError
 from teleop_core.graph.topics import OPERATION, SLAVE_OPERATION
+from teleop_core.middleware.ros import ROS
+from teleop_core.middleware.world import World
 from teleop_core.nodes.guest import Guest
 from teleop_core.nodes.operation import StopButton
 from teleop_core.nodes.streams import Subscription
@@ -43,25 +43,29 @@ class RemoteControl(Guest):
     Args:
         domain: ROS domain.
         patience: Time that an arm has to be found, and to answer [s].
+        world: Where it is.
 
     Attributes:
         domain: ROS domain.
         arms: State of every arm that was found, by its namespace.
     """
 
-    def __init__(self, domain: int, patience: float = 3.0) -> None:
-        super().__init__("teleop_remote_control", domain)
+    def __init__(self, domain: int, patience: float = 3.0, world: World = ROS) -> None:
+        super().__init__("teleop_remote_control", domain, world)
         self.domain, self._patience = domain, patience
         self.arms: dict[str, ArmState] = {}
-        self._executor = SingleThreadedExecutor(context=self._context)
-        self._executor.add_node(self.node)
-        self._button = StopButton(self.node)
+        self._executor = self.world.executor()
+        self._executor.add_node(self.ros)
+        self._button = StopButton(self)
         self._reports: dict[str, Subscription] = {}
 
     def close(self) -> None:
         """Leave the arms as they are."""
         self._executor.shutdown()
         super().close()
+
+    def _now(self) -> float:
+        return 1e-9 * self.world.monotonic_ns()
 
     def look(self) -> dict[str, ArmState]:
         """State of every arm, by its namespace, as soon as each has reported.
@@ -85,13 +89,13 @@ class RemoteControl(Guest):
         Raises:
             SessionError: There is no arm, or one did not answer; the stop was sent nevertheless.
         """
-        begin = time.monotonic()
+        begin = self._now()
 
         def is_stopped() -> bool:
             self._button.say(is_pressed=True)
             for arm in self.arms.values():
                 if arm.values.get("is_stopped") and arm.stopped_after < 0.0:
-                    arm.stopped_after = time.monotonic() - begin
+                    arm.stopped_after = self._now() - begin
             return bool(self.arms) and all(
                 arm.values.get("is_stopped") and arm.values["rest_time"] > 0.0
                 for arm in self.arms.values()
@@ -125,9 +129,9 @@ class RemoteControl(Guest):
 
     def _command_at_rest(self, name: str, arm: str) -> str:
         """Send a command again until the arm has come to rest for it; what it answers."""
-        deadline = time.monotonic() + self._patience
+        deadline = self._now() + self._patience
         while (answer := self.command(name, arm)[1]).endswith(AT_REST_ONLY):
-            if time.monotonic() > deadline:
+            if self._now() > deadline:
                 break
             self.listen()
         return answer
@@ -144,7 +148,7 @@ class RemoteControl(Guest):
             SessionError: The arm does not answer.
         """
         service = f"/{arm}/slave/{name}" if arm else f"/slave/{name}"
-        client = self.node.create_client(Trigger, service)
+        client = self.ros.create_client(Trigger, service)
         self._until(client.service_is_ready, f"{service} on ROS domain {self.domain}")
         future = client.call_async(Trigger.Request())
         self._until(future.done, f"an answer of {service}")
@@ -153,9 +157,9 @@ class RemoteControl(Guest):
 
     def _until(self, condition: Callable[[], Any], what: str = "", *, must: bool = True) -> bool:
         """Wait until something is so, as long as there is patience."""
-        deadline = time.monotonic() + self._patience
+        deadline = self._now() + self._patience
         while not condition():
-            if time.monotonic() > deadline:
+            if self._now() > deadline:
                 if must:
                     raise SessionError(f"no {what}")
                 return False
@@ -164,9 +168,9 @@ class RemoteControl(Guest):
 
     def listen(self) -> None:
         """Take what has come; look for arms."""
-        for name, kinds in self.node.get_topic_names_and_types():
+        for name, kinds in self.ros.get_topic_names_and_types():
             if name.endswith(f"/{SLAVE_OPERATION.name}") and name not in self._reports and kinds:
-                self._reports[name] = Subscription(self.node, SLAVE_OPERATION, name)
+                self._reports[name] = Subscription(self, SLAVE_OPERATION, name)
                 self.arms[name.removesuffix(SLAVE_OPERATION.name).strip("/")] = ArmState()
         for name, reports in self._reports.items():
             arm = self.arms[name.removesuffix(SLAVE_OPERATION.name).strip("/")]

@@ -1,6 +1,5 @@
 """Node ``slave``: the server of any arm, one step per elapsed millisecond."""
 
-import time
 from collections.abc import Callable, Iterable
 
 from teleop_core.bags.messages import Refusal
@@ -63,7 +62,7 @@ class SlaveNode(TickingNode):
         super().work(ticks, report)
         stamp_ns = self.row["slave_setpoint_js_ns"]
         if stamp_ns != before_ns:
-            self.delay.put(time.time_ns() - stamp_ns)
+            self.delay.put(self.world.time_ns() - stamp_ns)
 
     def advance(self, now_ns: int) -> None:
         """Take the emergency stop, then make one step, also of many that are to be made up for."""
@@ -84,16 +83,16 @@ class SlaveNode(TickingNode):
         self._seen, self._missed = counts, counts.missed
         if 0.0 < longest < missed:
             self._fail(Fault.STALL, missed, longest)
-        if self._stop.has_new and self.executor is not None:
+        if self._stop.has_new:
             self._stop.has_new = False
-            self.executor.create_task(self._stop.learn)
+            self.ros.defer(self._stop.learn)
         self._turns += 1
         if self._turns % _SELDOM == 0:
             self._look_around()
 
     def _look_around(self) -> None:
         """Find a clock that was stepped, and two publishers of commands."""
-        offset_ns = time.time_ns() - time.monotonic_ns()
+        offset_ns = self.world.time_ns() - self.world.monotonic_ns()
         if abs(offset_ns - self._offset_ns) > _CLOCK_STEP_NS:
             step = 1e-9 * (offset_ns - self._offset_ns)
             self._offset_ns = offset_ns
@@ -123,14 +122,14 @@ class SlaveNode(TickingNode):
         if self._reported is not before:
             self._crtk.note(stamp_ns)
         state = int(self._state[0])
-        if state != self._told_state and self.executor is not None:
+        if state != self._told_state:
             self._told_state = state
             text = operation_text(self.stage.operation, self.stage.robot.joint_names)
             # A line in the log takes milliseconds, which the loop has not.
-            self.executor.create_task(self._tell, text, state == State.FAULT)
+            self.ros.defer(self._tell, text, state == State.FAULT)
 
     def _tell(self, text: str, is_bad: bool) -> None:
-        log = self.get_logger()
+        log = self.ros.get_logger()
         log.error(text) if is_bad else log.info(text)
 
     def concerns(self) -> list[str]:

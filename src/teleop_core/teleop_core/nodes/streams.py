@@ -5,17 +5,12 @@ message of the type (another frame, other names, another order) is deserialised 
 Both give the same values.
 """
 
-import time
 from collections import Counter, deque
 from collections.abc import Callable
 from importlib import import_module
 from typing import Any
 
 import numpy as np
-from rclpy.context import Context
-from rclpy.impl.implementation_singleton import rclpy_implementation
-from rclpy.lifecycle import LifecyclePublisher
-from rclpy.node import Node
 
 from teleop_core.bags.messages import (
     BUTTONS,
@@ -32,10 +27,10 @@ from teleop_core.bags.messages import (
 from teleop_core.base.errors import MessageTypeError
 from teleop_core.graph.topics import NO_COMMAND_NS, Kind, Topic
 from teleop_core.kernels.geometry import Array
+from teleop_core.middleware.world import Owner, Publisher, Taken
 from teleop_core.nodes.quality import NO_OVERRIDES, QualityOverrides
 from teleop_core.nodes.quality import profile as profile  # noqa: PLC0414  for importers of both
 from teleop_core.nodes.sender import Sender
-from teleop_core.nodes.taking import Taker
 
 SILENCE_NS = 2_000_000_000
 """After this long without a sound message a sender may start anew with any stamp [ns]."""
@@ -60,43 +55,40 @@ def message_type(ros_type: str) -> Any:
     return getattr(module, name)
 
 
-class Subscription(Taker):
+class Subscription:
     """Messages of a topic of the graph, taken by hand.
 
     Args:
-        node: Node that owns it.
+        owner: Node that owns it.
         topic: What it listens to.
         name: Its name for the middleware.
         depth: Length of the queue; None for the topic's own.
+
+    Attributes:
+        topic: As given.
+        type: Class of its messages.
     """
 
-    def __init__(self, node: Node, topic: Topic, name: str, depth: int | None = None) -> None:
-        self.topic = topic
-        overrides: QualityOverrides = getattr(node, "overrides", NO_OVERRIDES)
+    def __init__(self, owner: Owner, topic: Topic, name: str, depth: int | None = None) -> None:
+        self.topic, self._owner = topic, owner
+        overrides: QualityOverrides = getattr(owner, "overrides", NO_OVERRIDES)
         wanted = profile(topic, depth, "subscription")
-        wanted = overrides.apply(node.resolve_topic_name(name), "subscription", wanted)
-        super().__init__(node, message_type(topic.ros_type), name, wanted)
-
-
-class Waiter:
-    """Waits until a subscription has a message, without an executor (1 µs in place of 200)."""
-
-    def __init__(self, context: Context, subscription: Subscription) -> None:
-        self._handle = subscription.handle
-        self._set = rclpy_implementation.WaitSet(1, 0, 0, 0, 0, 0, context.handle)
-
-    def wait(self, timeout: float) -> None:
-        """Return when there is a message or after ``timeout`` [s]."""
-        self._set.clear_entities()
-        self._set.add_subscription(self._handle)
-        self._set.wait(int(timeout * 1e9))
+        wanted = overrides.apply(owner.ros.resolve_topic_name(name), "subscription", wanted)
+        self.type = message_type(topic.ros_type)
+        own = owner.ros.create_taker(self.type, name, wanted)
+        self.take: Callable[[], Taken | None] = own.take
+        """Oldest waiting message; None if there is none."""
+        self.wait: Callable[[float], None] = own.wait
+        """Return when there is a message, or after some time [s]."""
+        self.close: Callable[[], None] = own.close
+        """Stop listening."""
 
 
 class Input:
     """Newest sound message of one topic, for a port of a stage.
 
     Args:
-        node: Node that owns it.
+        owner: Node that owns it.
         topic: What it listens to, in its namespace.
         name: Its name for the middleware, below the node's namespace.
         joint_names: Order of the joints in the signals.
@@ -114,7 +106,7 @@ class Input:
 
     def __init__(
         self,
-        node: Node,
+        owner: Owner,
         topic: Topic,
         name: str,
         joint_names: tuple[str, ...],
@@ -122,9 +114,10 @@ class Input:
         delay: float = 0.0,
         buttons: tuple[int, ...] = BUTTONS,
     ) -> None:
-        self.topic, self._node, self._name = topic, node, name
+        self.topic, self._owner, self._name = topic, owner, name
+        self._world = owner.world
         self._waiting = _PRESSES if topic.kind is Kind.BUTTONS else _WAITING
-        self.subscription: Subscription | None = Subscription(node, topic, name, self._waiting)
+        self.subscription: Subscription | None = Subscription(owner, topic, name, self._waiting)
         self._is_new = False
         self._joint_names, self._target = topic.names(joint_names), target
         is_report = topic.kind is Kind.REPORT
@@ -135,7 +128,7 @@ class Input:
         self._delay_ns = round(delay * 1e9)
         self._held: deque[tuple[int, int, Values]] = deque()
         self.received, self.refused = 0, Counter[Refusal]()
-        options = getattr(node, "options", None)
+        options = getattr(owner, "options", None)
         self.sender = options.sender() if options is not None else Sender()
         self._is_fault = options is not None and options.second_publisher == "fault"
         self.stamp_ns: int | None = None
@@ -180,7 +173,7 @@ class Input:
         """Next message of the subscription that can be read."""
         while self.subscription is not None and (taken := self.subscription.take()) is not None:
             self.received += 1
-            if reason := self.sender.admit(taken.sender, taken.number, time.monotonic_ns()):
+            if reason := self.sender.admit(taken.sender, taken.number, self._world.monotonic_ns()):
                 self.refused[reason] += 1
                 continue
             known = None
@@ -195,8 +188,8 @@ class Input:
     def _take_held(self) -> bool:
         """As :meth:`take`, of messages whose time has come."""
         while (found := self._next()) is not None:
-            self._held.append((time.monotonic_ns() + self._delay_ns, *found))
-        now_ns = time.monotonic_ns()
+            self._held.append((self._world.monotonic_ns() + self._delay_ns, *found))
+        now_ns = self._world.monotonic_ns()
         while self._held and self._held[0][0] <= now_ns:
             _, stamp_ns, values = self._held.popleft()
             if self._accept(stamp_ns, values):
@@ -204,7 +197,7 @@ class Input:
         return False
 
     def _accept(self, stamp_ns: int, values: Values) -> bool:
-        now_ns, last_ns = time.monotonic_ns(), self.stamp_ns
+        now_ns, last_ns = self._world.monotonic_ns(), self.stamp_ns
         may_repeat = self.topic.stamp.is_in_force or self._layout is None
         if now_ns - self.arrival_ns > SILENCE_NS or (may_repeat and stamp_ns <= NO_COMMAND_NS):
             last_ns = None
@@ -219,7 +212,7 @@ class Input:
         if may_repeat:
             self.sender.fault = None
         else:
-            self.sender.note_stamp(stamp_ns, time.time_ns())
+            self.sender.note_stamp(stamp_ns, self._world.time_ns())
         self._target[:] = values
         self.stamp_ns, self.arrival_ns = stamp_ns, now_ns
         return True
@@ -234,7 +227,7 @@ class Input:
         """Time since the last sound message was taken [s]; infinite before the first."""
         if self.stamp_ns is None:
             return float("inf")
-        return (time.monotonic_ns() - self.arrival_ns) * 1e-9
+        return (self._world.monotonic_ns() - self.arrival_ns) * 1e-9
 
     def forget(self) -> None:
         """Throw away what waits and start anew: the first message may have any stamp."""
@@ -252,7 +245,7 @@ class Input:
 
     def publishers(self) -> int:
         """How many publishers the topic has now."""
-        return self._node.count_publishers(self._name)  # type: ignore[no-any-return]
+        return self._owner.ros.count_publishers(self._name)
 
     # -- within a process that holds the sender too ----------------------------------------------
 
@@ -261,16 +254,18 @@ class Input:
         if is_inside and self.subscription is not None:
             self.close()
         elif not is_inside and self.subscription is None:
-            self.subscription = Subscription(self._node, self.topic, self._name, self._waiting)
+            self.subscription = Subscription(self._owner, self.topic, self._name, self._waiting)
 
     def give(self, stamp_ns: int, values: Values) -> None:
         """Take a sound sample from a sender in this process."""
         self.received += 1
         if self._delay_ns:
-            self._held.append((time.monotonic_ns() + self._delay_ns, stamp_ns, values.copy()))
+            self._held.append(
+                (self._world.monotonic_ns() + self._delay_ns, stamp_ns, values.copy())
+            )
             return
         self._target[:] = values
-        self.stamp_ns, self.arrival_ns = stamp_ns, time.monotonic_ns()
+        self.stamp_ns, self.arrival_ns = stamp_ns, self._world.monotonic_ns()
         self._is_new = True
 
     def close(self) -> None:
@@ -284,6 +279,7 @@ class Output:
     """Publisher of one topic from the signals of a stage.
 
     Args:
+        owner: Node that owns it.
         publisher: Where the bytes go.
         form: Layout of the messages.
         source: Where the values stand, shape (width,).
@@ -298,10 +294,9 @@ class Output:
     """
 
     def __init__(
-        self, publisher: LifecyclePublisher, form: Layout, source: Array, name: str = ""
+        self, owner: Owner, publisher: Publisher, form: Layout, source: Array, name: str = ""
     ) -> None:
-        self.name = name
-        self._publisher, self._handle = publisher, publisher.handle
+        self.name, self._time_ns, self._send = name, owner.world.time_ns, publisher.send
         self._encode, self._source = form.encode_one, source
         self.sent = 0
         self.inputs: list[Input] = []
@@ -313,16 +308,14 @@ class Output:
         for entry in self.inputs:
             entry.give(stamp_ns, self._source)
         if self.pending is None:
-            self.publish(stamp_ns, 0 if self.tap is None else time.time_ns())
+            self.publish(stamp_ns, 0 if self.tap is None else self._time_ns())
         else:
-            self.pending.append((self, stamp_ns, time.time_ns()))
+            self.pending.append((self, stamp_ns, self._time_ns()))
 
     def publish(self, stamp_ns: int, sent_ns: int) -> None:
         """Publish the present values under a stamp, handed on inside at ``sent_ns`` [ns]."""
         data = self._encode(stamp_ns, self._source)
-        if self._publisher.is_activated:
-            with self._handle:
-                self._handle.publish_raw(data)
+        self._send(data)
         if self.tap is not None:
             self.tap(data, sent_ns)
         self.sent += 1

@@ -7,19 +7,17 @@ the topic instead: a real device, or a node elsewhere, takes its place.
 """
 
 import sys
-import threading
-import time
 from collections.abc import Sequence
 from typing import Any
-
-from rclpy.parameter import Parameter
 
 from teleop_core.base.errors import UnknownNameError
 from teleop_core.graph.graph import RECORDER_NAME, Graph, Member
 from teleop_core.graph.stage import STAGES
 from teleop_core.graph.topics import Kind
+from teleop_core.middleware.ros import ROS
+from teleop_core.middleware.world import World
 from teleop_core.nodes.base import CoreNode
-from teleop_core.nodes.feed import Feed, address
+from teleop_core.nodes.feed import Feed
 from teleop_core.nodes.files import graph_of
 from teleop_core.nodes.loop import Loop
 from teleop_core.nodes.making import make_node
@@ -43,37 +41,46 @@ class TeleopSession:
         namespace: Where all of it is, without the slash before it; arms are below.
         names: Nodes of this process, with the namespaces of their arms; empty: all, and the
             recorder. What others do, these hear of by topics.
+        world: Where it is.
+        graph: What runs; None: what the parameter files of the command line say.
 
     Raises:
         UnknownNameError: The graph has no such node.
     """
 
-    def __init__(self, namespace: str = "", names: Sequence[str] = ()) -> None:
-        graph = graph_of(sys.argv)
+    def __init__(
+        self,
+        namespace: str = "",
+        names: Sequence[str] = (),
+        world: World = ROS,
+        graph: Graph | None = None,
+    ) -> None:
+        self._world = world
+        graph = graph or graph_of(sys.argv)
         known = [member.name for member in graph.members]
         for name in names:
             if name not in known:
                 raise UnknownNameError("node of the session", name, known)
         members = [member for member in graph.members if member.name in names or not names]
-        self._recorder = () if names else (_recorder(graph, namespace),)
-        self._stages = tuple(_node(graph, member, namespace) for member in members)
+        self._recorder = () if names else (_recorder(graph, namespace, world),)
+        self._stages = tuple(_node(graph, member, namespace, world) for member in members)
         pairs = zip(members, self._stages, strict=True)
         stages = {member.name: node.parameters for member, node in pairs}
         for recorder in self._recorder:
             recorder.stages = stages
-        self._feed = Feed(_fed(self._stages) if names else (), address())
-        self._gate = threading.Lock()
+        self._feed = Feed(_fed(self._stages) if names else (), world)
+        self._gate = world.lock()
         for node in self._stages:
             node.has_own_loop, node.gate = False, self._gate
         last = self._stages[-1]
         self._schedule = Schedule(
-            time.monotonic_ns, time.sleep, last.options.max_catch_up,
+            world.monotonic_ns, world.sleep, last.options.max_catch_up,
             phase_ns=0 if members[0] is graph.members[0] else _AFTER_NS,
         )  # fmt: skip
         self._at_work: tuple[bool, ...] = ()
         self._pending: list[tuple[Output, int, int]] = []
         self._ticks = 0
-        self._loop = Loop("session", self._turn, last.fail, patience=last.patience)
+        self._loop = Loop(world, "session", self._turn, last.fail, patience=last.patience)
         self._loop.start()
 
     @property
@@ -90,7 +97,7 @@ class TeleopSession:
         """Stop the loop; where it hangs, its nodes end without it."""
         if not self._loop.stop():
             for node in self._stages:
-                node.gate = threading.Lock()
+                node.gate = self._world.lock()
         self._feed.close()
 
     def _turn(self) -> None:
@@ -105,7 +112,7 @@ class TeleopSession:
                 self._link()
                 self._at_work = at_work
         if not self._loop.is_ready or not any(at_work):
-            time.sleep(0.01)
+            self._world.sleep(0.01)
             self._schedule.start()
             return
         for tick_ns in self._schedule.due():
@@ -167,12 +174,13 @@ def _fed(stages: Sequence[CoreNode]) -> list[str]:
     ]  # fmt: skip
 
 
-def _recorder(graph: Graph, namespace: str) -> RecorderNode:
-    return RecorderNode(STAGES.find(RECORDER_NAME), graph=graph, namespace=namespace)
+def _recorder(graph: Graph, namespace: str, world: World) -> RecorderNode:
+    stage = STAGES.find(RECORDER_NAME)
+    return RecorderNode(stage, graph=graph, namespace=namespace, world=world)
 
 
-def _node(graph: Graph, member: Member, namespace: str) -> CoreNode:
+def _node(graph: Graph, member: Member, namespace: str, world: World) -> CoreNode:
     texts = link_texts(graph, member)
-    given = [Parameter("links", Parameter.Type.STRING_ARRAY, texts)] if texts else []
+    given = {"links": tuple(texts)} if texts else {}
     where = "/".join(filter(None, (namespace, member.arm)))
-    return make_node(member.stage, parameter_overrides=given, namespace=where)
+    return make_node(member.stage, values=given, namespace=where, world=world)

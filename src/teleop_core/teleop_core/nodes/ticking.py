@@ -1,6 +1,5 @@
 """Ticking node: one step of its stage per millisecond, on a clock of its own."""
 
-import time
 from collections.abc import Callable, Iterable
 
 from teleop_core.nodes.base import CoreNode
@@ -11,7 +10,7 @@ class TickingNode(CoreNode):
 
     def start(self) -> None:
         """Relate the monotonic time of the loop to the stamps."""
-        self.epoch_ns = time.time_ns() - time.monotonic_ns()
+        self.epoch_ns = self.world.time_ns() - self.world.monotonic_ns()
 
     def turn(self) -> None:
         """Make all steps that are due."""

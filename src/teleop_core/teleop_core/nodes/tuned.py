@@ -1,19 +1,16 @@
 """Tuned node: a lifecycle node whose parameters are those of its stage, set before and at work."""
 
-import threading
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from rcl_interfaces.msg import SetParametersResult
-from rclpy.lifecycle import LifecycleNode
-from rclpy.parameter import Parameter
-
 from teleop_core.bags.messages import BUTTONS
 from teleop_core.base.errors import ParameterError, SessionError, TeleopError
-from teleop_core.base.parameters import build, parameter, specs, values_of
+from teleop_core.base.parameters import Value, build, parameter, specs, values_of
 from teleop_core.graph.layers import RealTimeParameters
 from teleop_core.graph.stage import Runner, Stage
-from teleop_core.nodes.declaration import declare, plain, typed
+from teleop_core.middleware.ros import ROS
+from teleop_core.middleware.world import Hooks, LifecycleNode, World
 from teleop_core.nodes.quality import PREFIX, QualityOverrides
 from teleop_core.nodes.sender import Sender
 
@@ -81,54 +78,47 @@ class NodeParameters:
         return found or [(port, 0.0)]
 
 
-def _sim_time(node: str) -> ParameterError:
-    """Refusal of a clock that others set: a step is a millisecond, of drives too."""
-    requirement = (
-        "false: nodes step in real time; teleop sim and replay go as fast as the machine can, "
-        "teleop play --clock publishes /clock"
-    )
-    return ParameterError(f"{node}.use_sim_time", True, requirement)
-
-
-class TunedNode(LifecycleNode):  # type: ignore[misc]
+class TunedNode(Hooks):
     """Lifecycle node that declares and takes parameters: its own, and those of a stage.
 
     Args:
         stage: What the node is in the graph.
         group: Parameters in place of the stage's own.
-        options: Options of :class:`rclpy.lifecycle.LifecycleNode`.
+        world: Where it is.
+        options: Of :meth:`~teleop_core.middleware.world.World.lifecycle_node`.
+
+    Attributes:
+        ros: Node of the middleware.
 
     Raises:
         TeleopError: A given parameter is unknown or not allowed.
     """
 
-    def __init__(self, stage: Stage, group: type | None = None, **options: Any) -> None:
-        super().__init__(stage.name, **options)
-        if self.get_parameter("use_sim_time").value:
-            raise _sim_time(self.member_name)
+    def __init__(
+        self, stage: Stage, group: type | None = None, world: World = ROS, **options: Any
+    ) -> None:
+        self.world = world
+        self.ros: LifecycleNode = world.lifecycle_node(stage.name, self, **options)
         self.runner: Runner | None = None
         """The stage at work; None before it is made, and for a node without one."""
-        self.lock = threading.Lock()  # held while the stage works or takes parameters
+        self.lock = world.lock()  # held while the stage works or takes parameters
         self._groups = (NodeParameters, group or stage.parameters)
         self._specs = {spec.name: spec for entry in self._groups for spec in specs(entry)}
-        given = {name: entry.value for name, entry in self._parameter_overrides.items()}
-        self.overrides = QualityOverrides(given)
+        self.overrides = QualityOverrides(self.ros.given)
         self.options, self.parameters = self._built(self._overrides())
-        declare(self, self._specs.values(), values_of(self.options) | values_of(self.parameters))
-        self.add_pre_set_parameters_callback(self._type_empty_lists)
-        self.add_on_set_parameters_callback(self._accept)
-        self._shows_present = False
-        self._present = self.create_guard_condition(self._show_present)
+        values = values_of(self.options) | values_of(self.parameters)
+        self.ros.declare(self._specs.values(), values, self._accept)
+        self._present = self.ros.create_guard_condition(self._show_present)
 
     @property
     def arm(self) -> str:
         """Namespace of the node, without the slash before it."""
-        return str(self.get_namespace()).strip("/")
+        return self.ros.get_namespace().strip("/")
 
     @property
     def member_name(self) -> str:
         """Name of the node with its namespace, without the slash before it."""
-        return f"{self.arm}/{self.get_name()}" if self.arm else str(self.get_name())
+        return f"{self.arm}/{self.ros.get_name()}".strip("/")
 
     def show_present(self) -> None:
         """Let the executor show what the stage has changed by itself: setting it takes long."""
@@ -136,12 +126,11 @@ class TunedNode(LifecycleNode):  # type: ignore[misc]
             self._present.trigger()
 
     def _overrides(self) -> dict[str, Any]:
-        """What the command line and parameter files say, less what rclpy itself has declared."""
-        given = self._parameter_overrides.items()
+        """What the command line and parameter files say of these parameters."""
         return {
-            name: plain(self._specs.get(name), entry.value)
-            for name, entry in given
-            if not self.has_parameter(name) and not name.startswith(PREFIX)
+            name: () if value is None and name in self._specs else value
+            for name, value in self.ros.given.items()
+            if not name.startswith(PREFIX)
         }
 
     def _built(self, values: dict[str, Any]) -> tuple[NodeParameters, Any]:
@@ -153,30 +142,21 @@ class TunedNode(LifecycleNode):  # type: ignore[misc]
             build(group, {k: v for k, v in values.items() if k not in own}, prefix),
         )
 
-    def _type_empty_lists(self, changes: list[Parameter]) -> list[Parameter]:
-        return [typed(self._specs.get(change.name), change) for change in changes]
-
-    def _accept(self, changes: list[Parameter]) -> SetParametersResult:
+    def _accept(self, changes: Mapping[str, Value]) -> str:
         """Take all changes or none: the group is built anew, and the stage must take it."""
-        if self._shows_present:
-            return SetParametersResult(successful=True)
-        if any(change.name == "use_sim_time" and change.value for change in changes):
-            return SetParametersResult(successful=False, reason=str(_sim_time(self.member_name)))
         self._take_present()
-        own = [change for change in changes if change.name in self._specs]
-        values = values_of(self.options) | values_of(self.parameters)
-        values |= {c.name: plain(self._specs[c.name], c.value) for c in own}
+        values = values_of(self.options) | values_of(self.parameters) | dict(changes)
         try:
             _, parameters = self._built(values)
             self._retune(parameters)
         except TeleopError as error:
-            return SetParametersResult(successful=False, reason=str(error))
+            return str(error)
         self.parameters = parameters
-        return SetParametersResult(successful=True)
+        return ""
 
     def _take_present(self) -> None:
         """Take parameters that the stage has changed by itself, as the mode button does."""
-        if self._changes_itself() and self.lock.acquire(timeout=_LOCK_PATIENCE):
+        if self._changes_itself() and self.lock.acquire(True, _LOCK_PATIENCE):
             assert self.runner is not None
             self.parameters = self.runner.present()
             self.lock.release()
@@ -192,17 +172,13 @@ class TunedNode(LifecycleNode):  # type: ignore[misc]
         self._take_present()
         changed = {k: v for k, v in values_of(self.parameters).items() if v != before[k]}
         if changed:
-            self._shows_present = True
-            try:
-                self.set_parameters([Parameter(k, value=v) for k, v in changed.items()])
-            finally:
-                self._shows_present = False
+            self.ros.show(changed)
 
     def _retune(self, parameters: Any) -> None:
         if self.runner is None:
             return
         self.runner.examine(parameters)  # takes long: beside the loop, which goes on meanwhile
-        if not self.lock.acquire(timeout=_LOCK_PATIENCE):
+        if not self.lock.acquire(True, _LOCK_PATIENCE):
             raise SessionError(f"{self.member_name} is in a step that takes too long; try again")
         try:
             self.runner.retune(parameters)

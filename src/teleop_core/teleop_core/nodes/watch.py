@@ -104,7 +104,7 @@ class Watch:
                 self._ask(0)
             if self._parent in ready and self._parent is not None and self._parent.has_gone():
                 files.remove(self._parent)
-                self._first.get_logger().error("the session that started this is gone: ends")
+                self._first.ros.get_logger().error("the session that started this is gone: ends")
                 self._ask(0)
             if not ready:
                 self._look()
@@ -153,7 +153,7 @@ class Watch:
         loop.is_hung = True
         text = f"{loop.name} hangs: nothing came of it for {loop.patience:g} s in which it could "
         text += "work; it is here:"
-        self._first.get_logger().fatal(f"{text}\n{loop.place()}")
+        self._first.ros.get_logger().fatal(f"{text}\n{loop.place()}")
         self._ask(1)
 
     def _ask(self, exit_code: int) -> None:
@@ -164,7 +164,7 @@ class Watch:
     def _leave(self) -> None:
         """End the process without the main thread, which hangs or compiles."""
         code = max(node.exit_code for node in self._crew.nodes)
-        self._first.get_logger().error(f"cannot end in order ({self._doing()}): leaves at once")
+        self._first.ros.get_logger().error(f"cannot end in order ({self._doing()}): leaves at once")
         is_starting = self.word == "starting"
         try:
             for node in self._crew.nodes:

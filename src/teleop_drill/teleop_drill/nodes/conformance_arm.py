@@ -10,9 +10,9 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
 
 from teleop_core.bags.messages import SECOND_NS
+from teleop_core.middleware.ros_taking import RosTaker
 from teleop_core.nodes.guest import Guest
 from teleop_core.nodes.streams import message_type
-from teleop_core.nodes.taking import Taker
 from teleop_drill.conformance.rows import ROWS
 
 _ROWS = {row.name: row for row in ROWS}
@@ -20,7 +20,7 @@ _TURN = 0.005
 _SETTLED = 15  # tenths of a second without new ends after which all are known
 
 
-class Tap(Taker):
+class Tap(RosTaker):
     """What comes on one topic: how many messages, and the newest.
 
     Args:
@@ -80,6 +80,8 @@ class Arm(Guest):
         for row in ROWS:  # before anything moves
             message_type(row.ros_type)
         super().__init__("teleop_conformance", domain)
+        ros: Any = self.ros
+        self.node = ros.own  # of rclpy: stock clients know no other
         self.namespace = "/" + namespace.strip("/")
         self._taps: dict[str, Tap] = {}
         self._keeping: dict[str, Tap] = {}

@@ -11,8 +11,8 @@ import numpy as np
 
 from teleop_core.base.errors import SessionError
 from teleop_core.base.own_parts import VARIABLE, load_own_parts
+from teleop_core.middleware.real_time import is_priority_granted
 from teleop_core.nodes.children import environment, free_domain
-from teleop_core.nodes.real_time import is_priority_granted
 from teleop_core.session import api
 from teleop_core.session.configuration import Configuration
 from teleop_drill.drill import hand, inside

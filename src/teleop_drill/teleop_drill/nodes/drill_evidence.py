@@ -1,7 +1,5 @@
 """Evidence of a drill: what a session says of a fault, what the tap hears, what recovery takes."""
 
-import time
-
 from teleop_core.graph.topics import (
     SLAVE_MEASURED_CP,
     SLAVE_MEASURED_JS,
@@ -81,8 +79,8 @@ def _is_expected(report: dict[str, float], exercise: Exercise) -> bool:
 
 def recover(outcome: Outcome, rig: LiveRig) -> None:
     """Wait until the arm follows again; help it more and more."""
-    begin, used = time.monotonic(), Cure.NOTHING
-    while (elapsed := time.monotonic() - begin) < _LONGEST:
+    begin, used = rig.now(), Cure.NOTHING
+    while (elapsed := rig.now() - begin) < _LONGEST:
         if rig.is_following():
             outcome.recovered, outcome.cure = elapsed, used
             break

@@ -2,18 +2,12 @@
 
 import re
 import signal
-import time
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from rcl_interfaces.srv import SetParameters
-from rclpy.context import Context
-from rclpy.event_handler import PublisherEventCallbacks
-from rclpy.executors import SingleThreadedExecutor
-from rclpy.node import Node
-from rclpy.parameter import Parameter
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool
 from std_srvs.srv import Trigger
@@ -28,6 +22,10 @@ from teleop_core.graph.topics import (
     Topic,
 )
 from teleop_core.kernels.geometry import Array
+from teleop_core.middleware.ros import ROS
+from teleop_core.middleware.ros_parameters import to_message
+from teleop_core.middleware.world import Qos, World
+from teleop_core.nodes.guest import Guest
 from teleop_core.nodes.observer import WARNING, Observer
 from teleop_core.nodes.operation import STOP_TOPIC
 from teleop_core.nodes.streams import message_type, profile
@@ -43,7 +41,7 @@ from teleop_drill.nodes.drill_tap import Tap
 
 _NUMBERS = re.compile(r"[-+]?[0-9][0-9.e]*")
 _SLAVE = ("slave", "slave_sim")
-_EMPTY = {"operation.reported": Parameter.Type.STRING_ARRAY}
+_TEXTS = ("operation.reported",)
 _PERIOD_NS = 1_000_000_000  # of reports: what comes later tells of the time since the fault
 _ANSWER = 3.0  # patience with a service [s]
 _FOUND = 3.0  # patience with discovery [s]
@@ -62,43 +60,39 @@ class LiveRig:
         is_composed: Whether all nodes share one process.
         master: Who moves the hand.
         foreign: Commands of processes that are none of ours, by name.
+        world: Where it is.
     """
 
     def __init__(
         self, configuration: Configuration, robot: Robot, folder: Path, env: dict[str, str], *,
         is_composed: bool, master: Master, foreign: Mapping[str, Sequence[str]],
+        world: World = ROS,
     ) -> None:  # fmt: skip
         assert robot.drives is not None
-        self.is_composed, self._robot = is_composed, robot
+        self.is_composed, self._robot, self._world = is_composed, robot, world
         self._speed_limit = np.array(robot.drives.speed_limit)
         domain = int(env["ROS_DOMAIN_ID"])
         self._control = inside.Control.make(folder / "control")
         env = env | {inside.VARIABLE: str(folder / "control")}
-        self.observer = Observer(domain)
+        self.observer = Observer(domain, world=world)
         self.session = DrillSession(
             configuration, folder, env, self.observer, is_composed=is_composed, master=master,
             foreign=foreign,
         )  # fmt: skip
-        self._context = Context()
-        self._context.init(args=[], domain_id=domain)
-        self._node, self._own = (self._make_node("drill"), self._make_node("drill_hand"))
-        self._executor = SingleThreadedExecutor(context=self._context)
-        self._executor.add_node(self._node)
+        self._node, self._own = Guest("drill", domain, world), Guest("drill_hand", domain, world)
+        self._executor = self._node.world.executor()
+        self._executor.add_node(self._node.ros)
         # As anybody's, which keep no state. Made long before they are pressed: a message sent while
         # a button and the slave discover each other arrives a tenth of a second later.
         self._buttons = [
-            self._node.create_publisher(
-                Bool, STOP_TOPIC, 100,
-                event_callbacks=PublisherEventCallbacks(use_default_callbacks=False),
-            )
-            for _ in range(2)
-        ]  # fmt: skip
-        self._speeds = self._node.create_publisher(JointState, "/slave/servo_jv", 10)
+            self._node.ros.create_publisher(Bool, STOP_TOPIC, Qos(depth=100)) for _ in range(2)
+        ]
+        self._speeds = self._node.ros.create_publisher(JointState, "/slave/servo_jv", Qos())
         self._services = {
-            name: self._node.create_client(Trigger, f"/slave/{name}") for name in COMMANDS
+            name: self._node.ros.create_client(Trigger, f"/slave/{name}") for name in COMMANDS
         }
         self._settings = {
-            node: self._node.create_client(SetParameters, f"/{node}/set_parameters")
+            node: self._node.ros.create_client(SetParameters, f"/{node}/set_parameters")
             for node in _SLAVE
         }
         self._intruders: dict[str, Any] = {}
@@ -109,9 +103,6 @@ class LiveRig:
             has_hand=master is Master.DRILL,
         )  # fmt: skip
 
-    def _make_node(self, name: str) -> Node:
-        return Node(name, context=self._context, use_global_arguments=False, enable_rosout=False)
-
     def close(self) -> None:
         """End the processes and leave."""
         try:
@@ -120,15 +111,14 @@ class LiveRig:
             self.tap.close()
             self.observer.close()
             self._executor.shutdown()
-            self._node.destroy_node()
-            self._own.destroy_node()
-            self._context.try_shutdown()
+            self._node.close()
+            self._own.close()
 
     # -- what is seen ----------------------------------------------------------------------------
 
     def mark(self) -> None:
         """The fault begins now."""
-        self.begin_ns, self.warned, self.said = time.time_ns(), {}, ""
+        self.begin_ns, self.warned, self.said = self._world.time_ns(), {}, ""
         self._warned_before = self._warnings()
 
     def _warnings(self) -> dict[str, str]:
@@ -142,16 +132,20 @@ class LiveRig:
 
     def now_ns(self) -> int:
         """Time [ns]."""
-        return time.time_ns()
+        return self._world.time_ns()
+
+    def now(self) -> float:
+        """Time of a clock that never goes back [s]."""
+        return 1e-9 * self._world.monotonic_ns()
 
     def wait(self, seconds: float) -> None:
         """Let time pass [s]; warnings of nodes are noted with their time."""
-        deadline = time.monotonic() + seconds
-        while (left := deadline - time.monotonic()) > 0.0:
+        deadline = self.now() + seconds
+        while (left := deadline - self.now()) > 0.0:
             self.observer.listen(min(left, 0.02))
             for name, text in self._warnings().items():
                 arrival = self.observer.statuses[name].arrival
-                arrival_ns = time.time_ns() - round(1e9 * (time.monotonic() - arrival))
+                arrival_ns = self._world.time_ns() - round(1e9 * (self.now() - arrival))
                 is_new = self._warned_before.get(name) != text
                 if name not in self.warned and (is_new or arrival_ns > self.begin_ns + _PERIOD_NS):
                     self.warned[name] = arrival_ns
@@ -176,8 +170,8 @@ class LiveRig:
 
     def drive(self, speeds: Array, seconds: float) -> None:
         """Drive the joints (n,) at speeds [rad/s or m/s] for a time [s], as a CRTK client does."""
-        deadline = time.monotonic() + seconds
-        while time.monotonic() < deadline:
+        deadline = self.now() + seconds
+        while self.now() < deadline:
             self._speeds.publish(JointState(velocity=speeds.tolist()))
             self.wait(_DRIVE_PERIOD)
 
@@ -231,13 +225,13 @@ class LiveRig:
         """Stop a node's process for a time [s], do something, then let it go on."""
         self.mark()
         self.session.send(node, signal.SIGSTOP)
-        begin = time.monotonic()
+        begin = self.now()
         try:
             meanwhile()
-            self.wait(seconds - (time.monotonic() - begin))
+            self.wait(seconds - (self.now() - begin))
         finally:
             if self.is_composed or node in _SLAVE:
-                self.woken_ns = time.time_ns()
+                self.woken_ns = self._world.time_ns()
             self.session.send(node, signal.SIGCONT)
 
     def limit_files(self, node: str, room: int | None) -> None:
@@ -287,27 +281,27 @@ class LiveRig:
         """Close that other publisher."""
         publisher = self._intruders.pop(topic.name, None)
         if publisher is not None:
-            self._own.destroy_publisher(publisher)
+            self._own.ros.destroy(publisher)
 
     def _intruder(self, topic: Topic) -> Any:
         """Other publisher of a topic, once somebody hears it; the fault begins with it."""
         if topic.name not in self._intruders:
             kind = message_type(topic.kind.ros_type)
-            made = self._own.create_publisher(kind, f"/{topic.name}", profile(topic))
+            made = self._own.ros.create_publisher(kind, f"/{topic.name}", profile(topic))
             self._intruders[topic.name] = made
             is_first = len(self._intruders) == 1
-            deadline = time.monotonic() + _FOUND
-            while made.get_subscription_count() == 0 and time.monotonic() < deadline:
-                time.sleep(2e-3)
+            deadline = self.now() + _FOUND
+            while made.get_subscription_count() == 0 and self.now() < deadline:
+                self._world.sleep(2e-3)
             if is_first:
                 self.mark()
         return self._intruders[topic.name]
 
     def press(self, *, is_pressed: bool, button: int = 0) -> None:
         """Send a message of a stop button: the first one, or another."""
-        own, deadline = self._buttons[button], time.monotonic() + _FOUND
-        while own.get_subscription_count() == 0 and time.monotonic() < deadline:
-            time.sleep(2e-3)
+        own, deadline = self._buttons[button], self.now() + _FOUND
+        while own.get_subscription_count() == 0 and self.now() < deadline:
+            self._world.sleep(2e-3)
         if is_pressed:
             self.mark()
         own.publish(Bool(data=is_pressed))
@@ -328,12 +322,9 @@ class LiveRig:
 
     def set(self, node: str, name: str, value: object) -> bool:
         """Set a parameter of a running node; whether it was taken."""
-        entry = (
-            Parameter(name, _EMPTY.get(name, Parameter.Type.DOUBLE_ARRAY), [])
-            if value == []
-            else Parameter(name, value=value)
-        )
-        request = SetParameters.Request(parameters=[entry.to_parameter_msg()])
+        kind = str if name in _TEXTS else float
+        given = tuple(value) if isinstance(value, list) else value
+        request = SetParameters.Request(parameters=[to_message(name, given, kind)])
         found = self._call(self._settings[node], request)
         return bool(found is not None and all(one.successful for one in found.results))
 
@@ -345,5 +336,7 @@ class LiveRig:
 
     def _answer(self, future: Any) -> Any:
         """What a service answered; None if it did not in time."""
-        self._executor.spin_until_future_complete(future, _ANSWER)
+        deadline = self.now() + _ANSWER
+        while not future.done() and (left := deadline - self.now()) > 0.0:
+            self._executor.spin_once(left)
         return future.result() if future.done() else None

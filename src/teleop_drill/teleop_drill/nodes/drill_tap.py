@@ -1,14 +1,10 @@
 """Tap of a drill: the hand of the drill on its topics, and what the slave says, in one thread."""
 
 import struct
-import threading
-import time
 from array import array
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
-from rclpy.node import Node
 
 from teleop_core.bags.messages import (
     SECOND_NS,
@@ -33,7 +29,7 @@ from teleop_core.graph.topics import (
     Topic,
 )
 from teleop_core.kernels.geometry import Array
-from teleop_core.nodes.real_time import apply_options
+from teleop_core.middleware.world import Owner
 from teleop_core.nodes.streams import Subscription, message_type, profile
 from teleop_drill.drill import hand
 from teleop_drill.drill.hand import Distortion, Sample
@@ -57,7 +53,7 @@ class Tap:
     """Hears the slave, and moves the hand if asked to; works from its making until :meth:`close`.
 
     Args:
-        node: Node that owns its topics; no executor serves it.
+        owner: Node that owns its topics; no executor serves it.
         joint_names: Of the slave.
         real_time: What its thread asks of the system.
         has_hand: Whether it is the master.
@@ -68,20 +64,20 @@ class Tap:
     """
 
     def __init__(
-        self, node: Node, joint_names: tuple[str, ...], real_time: RealTimeParameters, *,
+        self, owner: Owner, joint_names: tuple[str, ...], real_time: RealTimeParameters, *,
         has_hand: bool,
     ) -> None:  # fmt: skip
-        self._real_time = real_time
+        self._real_time, self._world = real_time, owner.world
         self.distortion: Distortion = hand.faithful
         self.is_mute, self._joint_names = False, joint_names
         self._heard: dict[str, Heard] = {topic.name: [] for topic in _HEARD}
         self._counted = {topic.name: (array("q"), array("q")) for topic in STREAMS_HEARD}
         self._late: list[tuple[int, float]] = []
         self._listened_ns = 0  # when it last began to take what had come
-        self._subscriptions = [Subscription(node, t, f"/{t.name}", _QUEUE) for t in _HEARD]
-        self._hand = _Hand(node, self) if has_hand else None
-        self._is_running, self._lock = True, threading.Lock()
-        self._thread = threading.Thread(target=self._run, name="tap", daemon=True)
+        self._subscriptions = [Subscription(owner, t, f"/{t.name}", _QUEUE) for t in _HEARD]
+        self._hand = _Hand(owner, self) if has_hand else None
+        self._is_running, self._lock = True, self._world.lock()
+        self._thread = self._world.thread("tap", self._run)
         self._thread.start()
 
     def close(self) -> None:
@@ -152,7 +148,7 @@ class Tap:
         """Time since the newest message of a topic was sent [s]; infinite before the first."""
         with self._lock:
             heard = self._heard[topic.name]
-            return 1e-9 * (time.time_ns() - heard[-1][0]) if heard else float("inf")
+            return 1e-9 * (self._world.time_ns() - heard[-1][0]) if heard else float("inf")
 
     def reports(self, topic: Topic) -> list[tuple[int, dict[str, float]]]:
         """Reports of a topic, each with the time at which it was sent [ns]."""
@@ -165,26 +161,29 @@ class Tap:
             if isinstance(one, tuple)
         ]
 
+    def _now(self) -> float:
+        return 1e-9 * self._world.monotonic_ns()
+
     def _run(self) -> None:
-        apply_options(self._real_time)
-        due = time.monotonic()
+        self._world.take_real_time(self._real_time)
+        due = self._now()
         while self._is_running:
             if self._hand is not None:
                 self._hand.move()
             self._listen()
             due += hand.PERIOD
-            now = time.monotonic()
+            now = self._now()
             if (
                 due <= now
             ):  # its own work took longer than a period: nothing is known of the machine
                 due = now if due < now - _FAR_BEHIND else due
                 continue
-            time.sleep(due - now)
-            self._late.append((time.time_ns(), max(0.0, time.monotonic() - due)))
+            self._world.sleep(due - now)
+            self._late.append((self._world.time_ns(), max(0.0, self._now() - due)))
 
     def _listen(self) -> None:
         with self._lock:
-            self._listened_ns = time.time_ns()
+            self._listened_ns = self._world.time_ns()
             for subscription in self._subscriptions:
                 heard = self._heard[subscription.topic.name]
                 while (taken := subscription.take()) is not None:
@@ -210,15 +209,16 @@ class Tap:
 class _Hand:
     """Publishers of the hand."""
 
-    def __init__(self, node: Node, tap: Tap) -> None:
-        self._tap, self._begin, self._count = tap, time.monotonic(), 0
-        self._pose = sender(node, MASTER_MEASURED_CP, ())
-        self._buttons = sender(node, MASTER_BUTTONS, ())
+    def __init__(self, owner: Owner, tap: Tap) -> None:
+        self._tap, self._world, self._count = tap, owner.world, 0
+        self._begin_ns = self._world.monotonic_ns()
+        self._pose = sender(owner, MASTER_MEASURED_CP, ())
+        self._buttons = sender(owner, MASTER_BUTTONS, ())
 
     def move(self) -> None:
         """Send what is due."""
-        stamp_ns = time.time_ns()
-        pose = hand.circle(time.monotonic() - self._begin)
+        stamp_ns = self._world.time_ns()
+        pose = hand.circle(1e-9 * (self._world.monotonic_ns() - self._begin_ns))
         if self._count % _BUTTONS_EVERY == 0 and not self._tap.is_mute:
             self._buttons(stamp_ns, np.zeros(3))
         for sample in self._tap.distortion(Sample(stamp_ns, pose)):
@@ -226,9 +226,11 @@ class _Hand:
         self._count += 1
 
 
-def sender(node: Node, topic: Topic, joint_names: tuple[str, ...]) -> Callable[[int, Array], None]:
+def sender(
+    owner: Owner, topic: Topic, joint_names: tuple[str, ...]
+) -> Callable[[int, Array], None]:
     """Sender of stamps [ns] and values as a message of a topic."""
-    publisher: Any = node.create_publisher(
+    publisher = owner.ros.create_publisher(
         message_type(topic.kind.ros_type), f"/{topic.name}", profile(topic)
     )
     form = layout(topic, joint_names)
@@ -237,21 +239,21 @@ def sender(node: Node, topic: Topic, joint_names: tuple[str, ...]) -> Callable[[
 
 def stand_by() -> None:
     """Listen to all streams as a process of others, and say so; until it is killed."""
-    import rclpy
-
     from teleop_core.graph.topics import STREAMS
+    from teleop_core.middleware.ros import ROS
 
-    rclpy.init()
-    node = rclpy.create_node("drill_bystander")
+    ROS.init([])
+    node, executor = ROS.node("drill_bystander"), ROS.executor()
+    executor.add_node(node)
     heard = [0]
 
-    def hear(_: bytes) -> None:
+    def hear(_: object) -> None:
         heard[0] += 1
         if heard[0] == 100:
             print("listens", flush=True)
 
     for topic in STREAMS:
         kind = message_type(topic.kind.ros_type)
-        node.create_subscription(kind, f"/{topic.name}", hear, profile(topic, 10), raw=True)
+        node.create_subscription(kind, f"/{topic.name}", hear, profile(topic, 10))
     while True:
-        rclpy.spin_once(node)
+        executor.spin_once()

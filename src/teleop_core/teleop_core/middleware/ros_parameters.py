@@ -6,10 +6,13 @@ from typing import Any
 
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 from rclpy.node import Node
-from rclpy.parameter import Parameter
+from rclpy.parameter import Parameter, parameter_value_to_python
 
 from teleop_core.base.parameters import Spec, Value
+from teleop_core.middleware.world import Qos
 
+EVENTS = Qos(depth=1000)
+"""Quality of the topic on which nodes tell of changed parameters."""
 _SCALARS = {
     bool: Parameter.Type.BOOL,
     int: Parameter.Type.INTEGER,
@@ -85,3 +88,16 @@ def typed(spec: Spec | None, parameter: Parameter) -> Parameter:
     if spec is None or spec.kind is not tuple or plain(spec, parameter.value) != ():
         return parameter
     return Parameter(parameter.name, ros_type(spec), [])
+
+
+def to_message(name: str, value: Any, element: type = float) -> Any:
+    """Parameter as services of parameters take it; ``element`` is that of an empty list."""
+    if value == ():
+        return Parameter(name, _ARRAYS[element], []).to_parameter_msg()
+    given = list(value) if isinstance(value, tuple) else value
+    return Parameter(name, value=given).to_parameter_msg()
+
+
+def from_message(value: Any) -> Any:
+    """Python value of a parameter as services and events tell it."""
+    return parameter_value_to_python(value)

@@ -1,0 +1,182 @@
+"""ROS: the world of nodes that work in real time, on rclpy and the system's clock."""
+
+import os
+import socket
+import struct
+import threading
+import time
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import rclpy
+import rclpy.utilities
+from rclpy.context import Context
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.impl.implementation_singleton import rclpy_implementation
+from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
+
+from teleop_core.graph.layers import RealTimeParameters
+from teleop_core.middleware.real_time import apply_options
+from teleop_core.middleware.ros_lifecycle import RosLifecycleNode
+from teleop_core.middleware.ros_node import RosNode
+from teleop_core.middleware.world import (
+    Executor,
+    Hooks,
+    LifecycleNode,
+    Line,
+    Listener,
+    Lock,
+    Thread,
+    World,
+    WorldEndedError,
+)
+from teleop_core.middleware.world import Node as LocalNode
+
+BAD_ARGUMENTS = (
+    rclpy_implementation.RCLError,
+    rclpy_implementation.UnknownROSArgsError,
+    rclpy_implementation.RCLInvalidROSArgsError,
+)
+"""What :meth:`RosWorld.init` and nodes raise where ROS cannot read its arguments."""
+_LOOPS = 64  # that may be waiting to be heard
+_CREDENTIALS = struct.Struct("3i")  # process, user, group
+
+
+class RosWorld:
+    """Real time and ROS.
+
+    Args:
+        context: Of rclpy; None for the one of the whole process.
+    """
+
+    def __init__(self, context: Context | None = None) -> None:
+        self._context = context
+
+    monotonic_ns = staticmethod(time.monotonic_ns)
+    time_ns = staticmethod(time.time_ns)
+    sleep = staticmethod(time.sleep)
+    thread_ident = staticmethod(threading.get_ident)
+    take_real_time: Callable[[RealTimeParameters], list[str]] = staticmethod(apply_options)
+
+    def lock(self) -> Lock:
+        """As of :class:`~teleop_core.middleware.world.World`."""
+        return threading.Lock()
+
+    def thread(self, name: str, work: Callable[[], None]) -> Thread:
+        """As of :class:`~teleop_core.middleware.world.World`."""
+        return threading.Thread(target=work, name=name, daemon=True)
+
+    def connect(self, place: str) -> Line:
+        """As of :class:`~teleop_core.middleware.world.World`."""
+        line = socket.socket(socket.AF_UNIX)
+        line.setblocking(False)
+        try:
+            line.connect(place)
+        except OSError:
+            line.close()
+            raise
+        return line
+
+    def listen(self, place: str) -> Listener:
+        """As of :class:`~teleop_core.middleware.world.World`."""
+        return _Listener(place)
+
+    def feed_place(self) -> str:
+        """As of :class:`~teleop_core.middleware.world.World`."""
+        return f"\0teleop_core.recorder.{os.environ.get('ROS_DOMAIN_ID') or 0}"
+
+    def node(self, name: str, **options: Any) -> LocalNode:
+        """As of :class:`~teleop_core.middleware.world.World`."""
+        return RosNode(Node(name, context=self._context, **options))
+
+    def lifecycle_node(self, name: str, hooks: Hooks, **options: Any) -> LifecycleNode:
+        """As of :class:`~teleop_core.middleware.world.World`."""
+        return RosLifecycleNode(name, hooks, **options)
+
+    def executor(self) -> Executor:
+        """As of :class:`~teleop_core.middleware.world.World`."""
+        return RosExecutor(self._context)
+
+    def guest(self, domain: int | None = None) -> World:
+        """As of :class:`~teleop_core.middleware.world.World`."""
+        context = Context()
+        context.init(args=[], domain_id=domain)
+        return RosWorld(context)
+
+    def init(self, arguments: Sequence[str]) -> None:
+        """Start the middleware with the arguments of a command line; signals stay as they are."""
+        rclpy.init(args=list(arguments), signal_handler_options=SignalHandlerOptions.NO)
+
+    def shutdown(self) -> None:
+        """As of :class:`~teleop_core.middleware.world.World`."""
+        rclpy.utilities.try_shutdown(context=self._context)
+
+    def ok(self) -> bool:
+        """Whether the middleware works still."""
+        return bool(rclpy.utilities.ok(context=self._context))
+
+
+class RosExecutor:
+    """As of :class:`~teleop_core.middleware.world.Executor`."""
+
+    def __init__(self, context: Context | None) -> None:
+        self._own = SingleThreadedExecutor(context=context)
+
+    def add_node(self, node: Any) -> None:
+        """Serve a node of :class:`RosWorld` too."""
+        self._own.add_node(node.own)
+
+    def spin_once(self, timeout_sec: float | None = None) -> None:
+        """Serve one thing, or none within the time [s]; raises WorldEndedError."""
+        try:
+            self._own.spin_once(timeout_sec)
+        except ExternalShutdownException as error:
+            raise WorldEndedError from error
+
+    def wake(self) -> None:
+        """Let :meth:`spin_once` return; from any thread."""
+        self._own.create_task(_nothing)
+
+    def shutdown(self) -> None:
+        """Serve nothing any more."""
+        self._own.shutdown()
+
+
+def _nothing() -> None:
+    """Have something to do, so that the executor returns."""
+
+
+class _Listener:
+    """Where loops of this machine and of the same user reach its recorder."""
+
+    def __init__(self, place: str) -> None:
+        self._own = socket.socket(socket.AF_UNIX)
+        self._own.setblocking(False)
+        try:
+            self._own.bind(place)
+            self._own.listen(_LOOPS)
+        except OSError:
+            self._own.close()
+            raise
+
+    def accept(self) -> Line | None:
+        """Next line of a process of this user; None if there is none."""
+        while True:
+            try:
+                line, _ = self._own.accept()
+            except OSError:
+                return None
+            told = line.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, _CREDENTIALS.size)
+            if int(_CREDENTIALS.unpack(told)[1]) == os.getuid():
+                line.setblocking(False)
+                return line
+            line.close()
+
+    def close(self) -> None:
+        """Accept none any more."""
+        self._own.close()
+
+
+ROS = RosWorld()
+"""The world of a process that has one context of rclpy."""

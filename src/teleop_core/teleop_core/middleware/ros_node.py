@@ -1,0 +1,128 @@
+"""Node on rclpy."""
+
+from collections.abc import Callable
+from typing import Any
+
+from rclpy.client import Client
+from rclpy.duration import Duration
+from rclpy.guard_condition import GuardCondition
+from rclpy.lifecycle import LifecyclePublisher
+from rclpy.node import Node
+from rclpy.publisher import Publisher
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.service import Service
+from rclpy.subscription import Subscription
+from rclpy.timer import Timer
+
+from teleop_core.middleware.ros_taking import RosTaker
+from teleop_core.middleware.world import Endpoint, Qos
+
+_DESTROY = {
+    LifecyclePublisher: "destroy_lifecycle_publisher",
+    Publisher: "destroy_publisher",
+    Subscription: "destroy_subscription",
+    Service: "destroy_service",
+    Client: "destroy_client",
+    Timer: "destroy_timer",
+    GuardCondition: "destroy_guard_condition",
+}
+
+
+def profile_of(qos: Qos) -> QoSProfile:
+    """Quality of service as rclpy has it."""
+    return QoSProfile(
+        history=HistoryPolicy.KEEP_ALL if qos.keeps_all else HistoryPolicy.KEEP_LAST,
+        depth=qos.depth,
+        reliability=(
+            ReliabilityPolicy.RELIABLE if qos.is_reliable else ReliabilityPolicy.BEST_EFFORT
+        ),
+        durability=(
+            DurabilityPolicy.TRANSIENT_LOCAL if qos.is_latched else DurabilityPolicy.VOLATILE
+        ),
+    )
+
+
+class RosPublisher:
+    """As of :class:`~teleop_core.middleware.world.Publisher`.
+
+    Args:
+        own: Publisher of rclpy.
+    """
+
+    def __init__(self, own: Publisher) -> None:
+        self.own: Any = own
+        self._handle = own.handle
+        self._is_managed = isinstance(own, LifecyclePublisher)
+        self.publish: Callable[[Any], None] = own.publish
+        self.get_subscription_count: Callable[[], int] = own.get_subscription_count
+
+    def send(self, data: bytes) -> None:
+        """Send bytes, if the node is active."""
+        if self._is_managed and not self.own.is_activated:
+            return
+        with self._handle:
+            self._handle.publish_raw(data)
+
+    def wait_for_all_acked(self, seconds: float) -> None:
+        """Wait until all readers have all messages, for some time [s] at most."""
+        self.own.wait_for_all_acked(Duration(nanoseconds=round(seconds * 1e9)))
+
+
+class RosNode:
+    """As of :class:`~teleop_core.middleware.world.Node`.
+
+    Args:
+        own: Node of rclpy.
+    """
+
+    def __init__(self, own: Node) -> None:
+        self.own: Any = own
+        self.get_name = self.own.get_name
+        self.get_namespace = self.own.get_namespace
+        self.get_logger = self.own.get_logger
+        self.resolve_topic_name = self.own.resolve_topic_name
+        self.create_service = self.own.create_service
+        self.create_client = self.own.create_client
+        self.create_timer = self.own.create_timer
+        self.create_guard_condition = self.own.create_guard_condition
+        self.count_publishers = self.own.count_publishers
+        self.get_topic_names_and_types = self.own.get_topic_names_and_types
+        self.get_service_names_and_types = self.own.get_service_names_and_types
+        self.destroy_node = self.own.destroy_node
+
+    def create_publisher(self, kind: Any, name: str, qos: Qos) -> RosPublisher:
+        """Publisher of messages of a class."""
+        return RosPublisher(self.own.create_publisher(kind, name, profile_of(qos)))
+
+    def create_taker(self, kind: Any, name: str, qos: Qos) -> RosTaker:
+        """Subscription whose messages are taken by hand."""
+        return RosTaker(self.own, kind, name, profile_of(qos))
+
+    def create_subscription(
+        self, kind: Any, name: str, callback: Callable[[Any], None], qos: Qos
+    ) -> Any:
+        """Subscription whose messages the executor hands over."""
+        return self.own.create_subscription(kind, name, callback, profile_of(qos))
+
+    def destroy(self, entity: Any) -> None:
+        """Withdraw what one of the methods above has made."""
+        own = entity.own if isinstance(entity, RosPublisher) else entity
+        destroy = next(name for kind, name in _DESTROY.items() if isinstance(own, kind))
+        getattr(self.own, destroy)(own)
+
+    def defer(self, work: Callable[..., object], *arguments: object) -> None:
+        """Have the executor do something soon; nothing without one. From any thread."""
+        executor = self.own.executor
+        if executor is not None:
+            executor.create_task(work, *arguments)
+
+    def publishers(self, name: str) -> list[Endpoint]:
+        """Publishers of a topic that were found."""
+        return [
+            Endpoint(
+                f"{info.node_namespace.rstrip('/')}/{info.node_name}",
+                bytes(info.endpoint_gid),
+                info.qos_profile.durability == DurabilityPolicy.TRANSIENT_LOCAL,
+            )
+            for info in self.own.get_publishers_info_by_topic(name)
+        ]
