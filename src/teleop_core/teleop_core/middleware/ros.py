@@ -1,5 +1,6 @@
 """ROS: the world of nodes that work in real time, on rclpy and the system's clock."""
 
+import gc
 import os
 import socket
 import struct
@@ -66,6 +67,10 @@ class RosWorld:
     def thread(self, name: str, work: Callable[[], None]) -> Thread:
         """As of :class:`~teleop_core.middleware.world.World`."""
         return threading.Thread(target=work, name=name, daemon=True)
+
+    def tidy(self) -> None:
+        """As of :class:`~teleop_core.middleware.world.World`."""
+        gc.collect()  # compiling leaves millions of objects; to look through them takes seconds
 
     def connect(self, place: str) -> Line:
         """As of :class:`~teleop_core.middleware.world.World`."""

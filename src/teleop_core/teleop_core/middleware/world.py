@@ -404,6 +404,9 @@ class World(Protocol):
     def take_real_time(self, options: RealTimeParameters) -> list[str]:
         """Take options for the thread that calls; one line for everything that is refused."""
 
+    def tidy(self) -> None:
+        """Throw away what the start has left behind, before loops work."""
+
     def connect(self, place: str) -> Line:
         """Line to who listens at a place of this machine; raises OSError if nobody does."""
 

@@ -1,7 +1,6 @@
 """Process: the only main loop of the nodes, from the command line to a clean end."""
 
 import atexit
-import gc
 import os
 import sys
 import traceback
@@ -82,7 +81,7 @@ def serve(crew: Crew, watch: Watching, world: World) -> int:
         for node in nodes:  # the one that was started first sees all others end
             end.callback(node.finish)
         end.callback(_begin_end, crew, watch)
-        code = _autostart(nodes)
+        code = _autostart(nodes, world)
         watch.word = "at work"
         while not code and not first.ended.done():
             _spin_once(executor, first)
@@ -108,7 +107,7 @@ def _begin_end(crew: Crew, watch: Watching) -> None:
     crew.halt()
 
 
-def _autostart(nodes: tuple[CoreNode, ...]) -> int:
+def _autostart(nodes: tuple[CoreNode, ...], world: World) -> int:
     """Configure all, which takes long, before any is at work; returns the exit code so far."""
     willing = [node for node in nodes if node.options.autostart]
     for node in willing:
@@ -116,7 +115,7 @@ def _autostart(nodes: tuple[CoreNode, ...]) -> int:
             return 0
         if node.ros.trigger("configure") is not Outcome.SUCCESS:
             return 2
-    gc.collect()  # compiling leaves millions of objects; to look through them at work takes seconds
+    world.tidy()
     if nodes[0].ended.done():
         return 0
     return 1 if any(node.ros.trigger("activate") is not Outcome.SUCCESS for node in willing) else 0

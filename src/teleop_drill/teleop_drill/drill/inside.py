@@ -9,9 +9,10 @@ import os
 import struct
 import threading
 import time
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
-from weakref import WeakKeyDictionary
+from typing import Any, Protocol
+from weakref import WeakKeyDictionary, WeakSet
 
 from teleop_core.base.errors import PartError
 from teleop_core.base.parameters import NoParameters
@@ -35,7 +36,7 @@ WORKS, HANGS, RAISES, STICKS, RACES = 0, 1, 2, 3, 4
 """What the stage does; or what the joints do, which no parameter of a session makes stick or race.
 """
 _BRAKED = OPERATION.index("is_braked")
-_TURN = 5e-3  # from one look of the joints at what they do to the next [s]
+TURN = 5e-3  # from one look at what joints are to do to the next [s]
 
 
 class Control:
@@ -73,15 +74,29 @@ class Control:
 DRILLED_CP = Topic("slave/drilled_cp", Kind.POSE, passed_on(SLAVE_SERVO_CP.name), "slave_base")
 
 
-class _Passing(RunningStage):
-    """Passes every command on, as long as it works."""
+class Steered(Protocol):
+    """Who says what the stage does."""
 
-    control: Control | None = None
+    @property
+    def word(self) -> int:
+        """What it does."""
+
+
+class Passing(RunningStage):
+    """Passes every command on, as long as it works.
+
+    Attributes:
+        control: Who says what it does.
+        sleep: How it waits while it hangs [s].
+    """
+
+    control: Steered | None = None
+    sleep: Callable[[float], None] = staticmethod(time.sleep)
 
     def step(self) -> None:
         """Pass a command on; or hang, or raise."""
         while self.control is not None and self.control.word == HANGS:
-            time.sleep(0.01)
+            self.sleep(0.01)
         if self.control is not None and self.control.word == RAISES:
             raise RuntimeError("broken by the drill")
         self.signals[DRILLED_CP.field] = self.signals[SLAVE_SERVO_CP.field]
@@ -91,8 +106,8 @@ class _Passing(RunningStage):
         return lambda: None
 
 
-def _make(_: Any, dt: float) -> _Passing:
-    return _Passing(STAGES.find(STAGE_NAME), 0, dt)
+def _make(_: Any, dt: float) -> Passing:
+    return Passing(STAGES.find(STAGE_NAME), 0, dt)
 
 
 def _step_clock(control: Control) -> None:
@@ -101,26 +116,45 @@ def _step_clock(control: Control) -> None:
     time.time_ns = lambda: right() + control.offset_ns
 
 
-class _Joints:
-    """Joints of all simulated slaves of the process: they stick as long as they are told to.
+class Joints:
+    """Joints of simulated slaves: they stick as long as they are told to.
 
     Their dry friction is then twice what the drives can give, as under a load far too heavy. Or the
     first one races: it is pushed to twice its speed until the brakes hold it.
     """
 
+    def __init__(self) -> None:
+        self._before: WeakKeyDictionary[SlaveSim, Array] = WeakKeyDictionary()
+
+    def obey(self, slave: SlaveSim, word: int) -> None:
+        """Do what a word says."""
+        friction = slave.parameters["coulomb"]
+        if word == STICKS:
+            self._before.setdefault(slave, friction.copy())
+            friction[:] = 2.0 * slave.parameters["effort_limit"]
+        elif slave in self._before:
+            friction[:] = self._before.pop(slave)
+        is_braked = slave.signals[SLAVE_OPERATION.field][_BRAKED] > 0.0
+        if word == RACES and not is_braked:
+            slave.arm.dq[0] = 2.0 * slave.parameters["speed_limit"][0]
+
+
+class _Watched:
+    """All simulated slaves of the process, each of which obeys from its making on."""
+
     def __init__(self, control: Control) -> None:
-        self._control = control
-        self._slaves: WeakKeyDictionary[SlaveSim, Array | None] = WeakKeyDictionary()
+        self._control, self._joints = control, Joints()
+        self._slaves: WeakSet[SlaveSim] = WeakSet()
         self._make, self._owner = SlaveSim.__init__, 0
 
     def follow(self) -> None:
         """Know every slave that is made from now on."""
-        joints = self
+        watched = self
 
         def make(slave: SlaveSim, *arguments: Any, **options: Any) -> None:
-            joints._make(slave, *arguments, **options)
-            joints._slaves[slave] = None
-            joints._start()
+            watched._make(slave, *arguments, **options)
+            watched._slaves.add(slave)
+            watched._start()
 
         SlaveSim.__init__ = make  # type: ignore[method-assign, assignment]
 
@@ -132,17 +166,9 @@ class _Joints:
 
     def _run(self) -> None:
         while True:
-            time.sleep(_TURN)
-            for slave, before in tuple(self._slaves.items()):
-                friction, sticks = slave.parameters["coulomb"], self._control.word == STICKS
-                if sticks:
-                    self._slaves[slave] = friction.copy() if before is None else before
-                    friction[:] = 2.0 * slave.parameters["effort_limit"]
-                elif before is not None:
-                    friction[:], self._slaves[slave] = before, None
-                is_braked = slave.signals[SLAVE_OPERATION.field][_BRAKED] > 0.0
-                if self._control.word == RACES and not is_braked:
-                    slave.arm.dq[0] = 2.0 * slave.parameters["speed_limit"][0]
+            time.sleep(TURN)
+            for slave in tuple(self._slaves):
+                self._joints.obey(slave, self._control.word)
 
 
 def _install() -> None:
@@ -157,9 +183,9 @@ def _install() -> None:
         return
     if not Path(file).is_file():
         raise PartError("file of a drill", file, "one that the drill has made")
-    _Passing.control = Control(Path(file))
-    _step_clock(_Passing.control)
-    _Joints(_Passing.control).follow()
+    control = Passing.control = Control(Path(file))
+    _step_clock(control)
+    _Watched(control).follow()
 
 
 if __name__.startswith("teleop_own_parts"):

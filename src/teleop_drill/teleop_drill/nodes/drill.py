@@ -3,16 +3,14 @@
 import math
 import os
 import sys
-import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from teleop_core.base.errors import SessionError
-from teleop_core.base.own_parts import VARIABLE, load_own_parts
+from teleop_core.base.own_parts import load_own_parts
 from teleop_core.middleware.real_time import is_priority_granted
-from teleop_core.nodes.children import environment, free_domain
 from teleop_core.session import api
 from teleop_core.session.configuration import Configuration
 from teleop_drill.drill import hand, inside
@@ -22,8 +20,8 @@ from teleop_drill.drill.numbers import WARNED, Numbers, Scheduling
 from teleop_drill.drill.outcome import Outcome
 from teleop_drill.drill.recordings import Counted, Recorded, judge_recording
 from teleop_drill.nodes.drill_evidence import help_on, note_state, recover, seen_of
-from teleop_drill.nodes.drill_rig import LiveRig
-from teleop_drill.nodes.drill_session import ARM, SIMULATOR, DrillSession
+from teleop_drill.nodes.drill_rig import LiveRig, Session, Site
+from teleop_drill.nodes.drill_session import ARM, SIMULATOR, LiveSite
 
 _PRIORITY = 30
 _BEFORE = 0.2  # motion that is seen before a fault [s]
@@ -75,14 +73,43 @@ def drill(
         texts = (f"real_time.priority={_PRIORITY}", *texts)
     sys.setswitchinterval(2e-4)  # the drill's own hand must not wait 5 ms for its turn
     foreign = {SIMULATOR: drives, ARM: arm}
+
+    def site(master: Master, made: Configuration, place: Path) -> Site:
+        return LiveSite(made, place, master, is_composed=is_composed, foreign=foreign)
+
+    own = [one for one in exercises if not (drives and one.breaks_simulator)]
+    return drill_at(site, own, folder, say, files, texts)
+
+
+Sites = Callable[[Master, Configuration, Path], Site]
+"""Where a session is drilled, by who moves the hand, what runs, and where its files go."""
+
+
+def drill_at(
+    site: Sites,
+    exercises: Sequence[Exercise],
+    folder: Path,
+    say: Say,
+    files: Sequence[Path] = (),
+    texts: Sequence[str] = (),
+) -> list[Outcome]:
+    """As :func:`drill`, at any site.
+
+    Args:
+        site: Makes the site of each session.
+        exercises: What is done.
+        folder: Where recordings go.
+        say: Told a line about each.
+        files: Parameter files over the scenario ``free_motion``.
+        texts: Parameters ``key=value`` over all files.
+    """
     outcomes: list[Outcome] = []
     for master in Master:
-        own = [o for o in exercises if o.master is master and not (drives and o.breaks_simulator)]
+        own = [one for one in exercises if one.master is master]
         if own:
             place = folder / master.name.lower()
             place.mkdir(parents=True)
-            made = _configuration(master, files, texts)
-            part = _Drill(master, made, place, say, is_composed=is_composed, foreign=foreign)
+            part = _Drill(site, master, _configuration(master, files, texts), place, say)
             outcomes += part.run(own)
             if part.is_over:
                 break
@@ -94,19 +121,17 @@ class _Drill:
     """Exercises with one master."""
 
     def __init__(
-        self, master: Master, configuration: Configuration, folder: Path, say: Say, *,
-        is_composed: bool, foreign: Mapping[str, Sequence[str]],
-    ) -> None:  # fmt: skip
-        self._foreign = foreign
-        self._master, self._folder, self._say = master, folder, say
-        self._is_composed, self._configuration = is_composed, configuration
+        self, site: Sites, master: Master, configuration: Configuration, folder: Path, say: Say
+    ) -> None:
+        self._site, self._master, self._folder, self._say = site, master, folder, say
+        self._configuration = configuration
         self._numbers, self._scheduling = Numbers.of(configuration), Scheduling()
         self._rig: LiveRig | None = None
         self._sessions = 0
         self._open: dict[Path, list[tuple[int, Outcome]]] = {}
         self._killed: dict[Path, int] = {}
         self._counted: dict[Path, Counted] = {}
-        self._sessions_of: dict[Path, DrillSession] = {}
+        self._sessions_of: dict[Path, Session] = {}
         self.is_over = False
         """Whether it was stopped before its end."""
 
@@ -155,11 +180,9 @@ class _Drill:
             self._sessions += 1
             folder = self._folder / f"session_{self._sessions}"
             folder.mkdir()
-            self._rig = LiveRig(
-                self._configuration, self._numbers.robot, folder, _environment(self._master),
-                is_composed=self._is_composed, master=self._master, foreign=self._foreign,
-            )  # fmt: skip
-            way = "one process" if self._is_composed else "a process for each node"
+            site = self._site(self._master, self._configuration, folder)
+            self._rig = LiveRig(site, self._configuration, self._numbers.robot)
+            way = "one process" if site.is_composed else "a process for each node"
             self._say(f"starts a session: {way}, the hand is that of {_who(self._master)}")
             self._rig.session.start()
             self._await_following(self._rig)
@@ -169,7 +192,7 @@ class _Drill:
 
     def _measure_scheduling(self, rig: LiveRig) -> None:
         """How late this machine wakes the drill's own thread while the session works."""
-        since_ns = time.time_ns()
+        since_ns = rig.now_ns()
         rig.wait(_MEASURED)
         found = self._scheduling = rig.tap.scheduling(since_ns)
         late = f"{1e3 * found.usual:.2f} ms usually, {1e3 * found.worst:.1f} ms at worst"
@@ -177,7 +200,7 @@ class _Drill:
 
     def _await_following(self, rig: LiveRig) -> None:
         """Wait until the slave follows, and help it; raises SessionError where it does not."""
-        deadline = time.monotonic() + _FOLLOWS
+        deadline = rig.now() + _FOLLOWS
         steady = 0
         while steady < _STEADY:
             if rig.is_following():
@@ -187,7 +210,7 @@ class _Drill:
                 rig.session.check()
                 help_on(rig)  # a busy machine may have paused it already
             rig.wait(0.1)
-            if time.monotonic() > deadline:
+            if rig.now() > deadline:
                 raise SessionError(f"the slave does not follow: {rig.complaints()}")
 
     def _close(self) -> None:
@@ -241,20 +264,20 @@ class _Drill:
         rig.wait(_BEFORE)
         rig.tap.clear()
         outcome = Outcome(exercise=exercise, load=os.getloadavg()[0] / (os.cpu_count() or 1))
-        self._open.setdefault(rig.session.recordings[-1], []).append((time.time_ns(), outcome))
+        self._open.setdefault(rig.session.recordings[-1], []).append((rig.now_ns(), outcome))
         before = rig.operation()
         rig.mark()
         rig.wait(0.0)
         exercise.inject(rig)
         rig.wait(exercise.watch)
-        end_ns = time.time_ns()
+        end_ns = rig.now_ns()
         note_state(outcome, rig, before)
         outcome.note, begin_ns = rig.said, rig.begin_ns
         if exercise.cuts_recording:
             self._killed[rig.session.recordings[-1]] = begin_ns
         exercise.undo(rig)
         recover(outcome, rig)
-        while exercise.warns and not rig.warned and time.time_ns() - begin_ns < 1.2e9 * WARNED:
+        while exercise.warns and not rig.warned and rig.now_ns() - begin_ns < 1.2e9 * WARNED:
             rig.wait(0.05)
         seen = seen_of(outcome, rig, (begin_ns, end_ns), self._scheduling)
         outcome.measures = {m.name: m for m in judge(exercise, seen, self._numbers)}
@@ -269,13 +292,6 @@ def _configuration(master: Master, files: Sequence[Path], texts: Sequence[str]) 
         load_own_parts([Path(inside.__file__)])
         own = (*own, f"teleop.stages=[{inside.STAGE_NAME}]")
     return api.configuration("free_motion", files=files, texts=(*own, *texts))
-
-
-def _environment(master: Master) -> dict[str, str]:
-    env = environment() | {"ROS_DOMAIN_ID": free_domain()}
-    if master is Master.DEVICE:
-        env.pop(VARIABLE, None)
-    return env
 
 
 def _who(master: Master) -> str:

@@ -2,9 +2,9 @@
 
 import re
 import signal
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from rcl_interfaces.srv import SetParameters
@@ -22,7 +22,6 @@ from teleop_core.graph.topics import (
     Topic,
 )
 from teleop_core.kernels.geometry import Array
-from teleop_core.middleware.ros import ROS
 from teleop_core.middleware.ros_parameters import to_message
 from teleop_core.middleware.world import Qos, World
 from teleop_core.nodes.guest import Guest
@@ -36,7 +35,6 @@ from teleop_core.slave.operation.states import COMMANDS
 from teleop_drill.drill import inside, measure
 from teleop_drill.drill.exercise import Master
 from teleop_drill.drill.hand import Distortion
-from teleop_drill.nodes.drill_session import DrillSession
 from teleop_drill.nodes.drill_tap import Tap
 
 _NUMBERS = re.compile(r"[-+]?[0-9][0-9.e]*")
@@ -49,36 +47,100 @@ _DRIVE_PERIOD = 0.01
 _FRESH = 0.3  # a setpoint that is older is none of a running slave [s]
 
 
+class Session(Protocol):
+    """Processes of a session, as a drill starts, breaks and ends them.
+
+    Attributes:
+        recordings: Recordings so far, the present one last.
+    """
+
+    recordings: list[Path]
+
+    def start(self) -> None:
+        """Start what does not run, and wait until all are at work; raises SessionError."""
+
+    def check(self) -> None:
+        """Make sure that all processes run; raises SessionError."""
+
+    def close(self) -> None:
+        """End all, in order."""
+
+    def until_ns(self, recording: Path) -> int:
+        """When the recording after one was begun [ns]; later than all without another."""
+
+    def is_running(self, node: str) -> bool:
+        """Whether the process of a node runs."""
+
+    def dead(self) -> list[str]:
+        """Processes that have ended."""
+
+    def send(self, node: str, number: int) -> None:
+        """Send a signal to a node's process."""
+
+    def await_end(self, node: str, timeout: float) -> None:
+        """Wait until a node's process has ended, or for so long [s]."""
+
+    def limit_files(self, node: str, room: int | None) -> None:
+        """Let files of a node's process grow by so many bytes only; None: as they like."""
+
+    def hog(self) -> None:
+        """Keep all processors busy."""
+
+    def relieve(self) -> None:
+        """Let them rest."""
+
+    def start_bystander(self) -> None:
+        """Start a process of others that listens to all streams."""
+
+    def kill_bystander(self) -> None:
+        """Kill it."""
+
+
+class Steering(Protocol):
+    """Who says to the processes what is to break inside of them."""
+
+    def write(self, word: int = inside.WORKS, offset_ns: int = 0) -> None:
+        """Say what the stage does and by how much the clock is off [ns]."""
+
+
+class Site(Protocol):
+    """Where a session is drilled: this machine, or a simulated one.
+
+    Attributes:
+        world: As the drill itself sees it.
+        domain: ROS domain.
+        is_composed: Whether all nodes share one process.
+        master: Who moves the hand.
+        control: What breaks inside of processes.
+    """
+
+    world: World
+    domain: int
+    is_composed: bool
+    master: Master
+    control: Steering
+
+    def session(self, observer: Observer) -> Session:
+        """Processes of a session, of which an observer hears."""
+
+
 class LiveRig:
     """A session of processes with the drill's own nodes beside them.
 
     Args:
+        site: Where it is.
         configuration: What runs.
         robot: The slave.
-        folder: Where recordings and the drill's own file go.
-        env: Environment of the processes, with their ROS domain.
-        is_composed: Whether all nodes share one process.
-        master: Who moves the hand.
-        foreign: Commands of processes that are none of ours, by name.
-        world: Where it is.
     """
 
-    def __init__(
-        self, configuration: Configuration, robot: Robot, folder: Path, env: dict[str, str], *,
-        is_composed: bool, master: Master, foreign: Mapping[str, Sequence[str]],
-        world: World = ROS,
-    ) -> None:  # fmt: skip
+    def __init__(self, site: Site, configuration: Configuration, robot: Robot) -> None:
         assert robot.drives is not None
-        self.is_composed, self._robot, self._world = is_composed, robot, world
+        self.is_composed, self._robot, world = site.is_composed, robot, site.world
+        self._world, domain = world, site.domain
         self._speed_limit = np.array(robot.drives.speed_limit)
-        domain = int(env["ROS_DOMAIN_ID"])
-        self._control = inside.Control.make(folder / "control")
-        env = env | {inside.VARIABLE: str(folder / "control")}
+        self._control = site.control
         self.observer = Observer(domain, world=world)
-        self.session = DrillSession(
-            configuration, folder, env, self.observer, is_composed=is_composed, master=master,
-            foreign=foreign,
-        )  # fmt: skip
+        self.session: Session = site.session(self.observer)
         self._node, self._own = Guest("drill", domain, world), Guest("drill_hand", domain, world)
         self._executor = self._node.world.executor()
         self._executor.add_node(self._node.ros)
@@ -100,7 +162,7 @@ class LiveRig:
         self.woken_ns, self._warned_before = 0, dict[str, str]()
         self.tap = Tap(
             self._own, robot.joint_names, configuration.groups[SESSION].real_time,
-            has_hand=master is Master.DRILL,
+            has_hand=site.master is Master.DRILL,
         )  # fmt: skip
 
     def close(self) -> None:

@@ -15,14 +15,19 @@ from typing import IO, Any
 import yaml
 
 from teleop_core.base.errors import SessionError
+from teleop_core.base.own_parts import VARIABLE
 from teleop_core.graph.graph import RECORDER_NAME
-from teleop_core.nodes.children import Child, end_all
+from teleop_core.middleware.ros import ROS
+from teleop_core.middleware.world import World
+from teleop_core.nodes.children import Child, end_all, environment, free_domain
 from teleop_core.nodes.live import parameter_file
 from teleop_core.nodes.observer import Observer
 from teleop_core.nodes.start import SESSION as SESSION_NODE
 from teleop_core.nodes.starter import START_TIMEOUT, Starter
 from teleop_core.session.configuration import Configuration
+from teleop_drill.drill import inside
 from teleop_drill.drill.exercise import Master
+from teleop_drill.nodes.drill_rig import Steering
 
 _NEVER_NS = 2**62
 _HAND, _MASTER = "operator", "haptic_master"
@@ -222,3 +227,38 @@ class DrillSession:
         if self._bystander is not None:
             self._bystander.kill()
             self._bystander.wait()
+
+
+class LiveSite:
+    """This machine, on a ROS domain of its own.
+
+    Args:
+        configuration: What runs.
+        folder: Where recordings and the drill's own file go.
+        master: Who moves the hand.
+        is_composed: Whether all nodes share one process.
+        foreign: Commands of processes that are none of ours, by name.
+    """
+
+    world: World = ROS
+
+    def __init__(
+        self, configuration: Configuration, folder: Path, master: Master, *, is_composed: bool,
+        foreign: Mapping[str, Sequence[str]],
+    ) -> None:  # fmt: skip
+        self.is_composed, self.master = is_composed, master
+        self._configuration, self._folder, self._foreign = configuration, folder, foreign
+        self._env = environment() | {"ROS_DOMAIN_ID": free_domain()}
+        if master is Master.DEVICE:
+            self._env.pop(VARIABLE, None)
+        self.domain = int(self._env["ROS_DOMAIN_ID"])
+        file = folder / "control"
+        self.control: Steering = inside.Control.make(file)
+        self._env[inside.VARIABLE] = str(file)
+
+    def session(self, observer: Observer) -> DrillSession:
+        """Processes of a session, of which an observer hears."""
+        return DrillSession(
+            self._configuration, self._folder, self._env, observer, is_composed=self.is_composed,
+            master=self.master, foreign=self._foreign,
+        )  # fmt: skip

@@ -1,0 +1,432 @@
+"""Bus: topics and services between simulated processes, as ROS 2 on Fast DDS carries them.
+
+What matters of it: both sides of a topic discover each other at different times; what is sent
+before is not heard, but by who asks for the last messages of a latched topic; a queue that is full
+loses its oldest; a socket that nobody reads loses what comes, and reliable writers send it again as
+far as they still have it; each writer numbers its messages.
+"""
+
+from bisect import insort
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+from random import Random
+from typing import Any
+
+from teleop_core.middleware.world import Endpoint, Qos, Taken
+from teleop_drill.simulation.machine import Process
+from teleop_drill.simulation.scheduler import Scheduler, Strand
+
+_PUBLISH_NS, _TAKE_NS = 12_000, 900
+"""What the middleware needs to hand a message over, measured with rclpy."""
+_SOCKET = 4 << 20
+"""Bytes that wait for a process that stands still, as the middleware's profile has it."""
+_LEASE_NS = 20_000_000_000
+"""Time after which a process that was killed counts as gone [ns]."""
+_GID = 16
+_CALL_NS, _SPREAD_NS = 150_000, 300_000
+"""Least time that a request or an answer takes, and what may be added [ns]."""
+
+
+@dataclass
+class Line:
+    """What becomes of messages between two processes.
+
+    Attributes:
+        loss: Share that is lost on the way.
+        delay: Time that each takes beside what this machine needs [s].
+        jitter: Mean of the time beside that [s].
+        repeats: Share that comes twice.
+        reorders: Share that is overtaken.
+    """
+
+    loss: float = 0.0
+    delay: float = 0.0
+    jitter: float = 0.0
+    repeats: float = 0.0
+    reorders: float = 0.0
+
+
+@dataclass
+class _Link:
+    """A writer and a reader that have found each other, or will have."""
+
+    reader: "Reader"
+    writer_knows_ns: int
+    reader_knows_ns: int
+    is_reliable: bool
+    last_ns: int = 0
+
+
+class Writer:
+    """One end of a topic; as of :class:`~teleop_core.middleware.world.Publisher`.
+
+    Args:
+        bus: Where it is.
+        process: Whose it is.
+        node: Name of its node, with the namespace.
+        topic: Full name.
+        qos: Its quality.
+        encode: Bytes of a message.
+    """
+
+    def __init__(
+        self, bus: "Bus", process: Process, node: str, topic: str, qos: Qos,
+        encode: Callable[[Any], bytes],
+    ) -> None:  # fmt: skip
+        self._bus, self.process, self.node, self.topic, self.qos = bus, process, node, topic, qos
+        self._encode = encode
+        self.sender = bus.next_gid()
+        self.number, self.is_open, self.is_active = 0, True, True
+        self.links: list[_Link] = []
+        self.history: deque[Taken] = deque(maxlen=None if qos.keeps_all else qos.depth)
+
+    def publish(self, message: Any) -> None:
+        """Send a message, or the bytes of one."""
+        self.send(message if isinstance(message, bytes) else self._encode(message))
+
+    def send(self, data: bytes) -> None:
+        """Send bytes, if the node is active."""
+        if not (self.is_active and self.is_open):
+            return
+        bus = self._bus
+        bus.scheduler.charge(_PUBLISH_NS)
+        self.number += 1
+        now_ns = bus.scheduler.now_ns
+        taken = Taken(data, self.sender, self.number, bus.time_of(self.process), 0)
+        self.history.append(taken)
+        for link in self.links:
+            if link.writer_knows_ns <= now_ns:
+                bus.carry(self, link, taken)
+
+    def get_subscription_count(self) -> int:
+        """Readers that were found."""
+        now_ns = self._bus.scheduler.now_ns
+        return sum(link.writer_knows_ns <= now_ns for link in self.links)
+
+    def wait_for_all_acked(self, seconds: float) -> None:
+        """Wait until all readers have all messages: a moment, here."""
+        self._bus.scheduler.sleep(min(seconds, 1e-3))
+
+
+class Reader:
+    """Other end of a topic; as of :class:`~teleop_core.middleware.world.Taker`.
+
+    Args:
+        bus: Where it is.
+        process: Whose it is.
+        kind: Class of its messages.
+        topic: Full name.
+        qos: Its quality.
+        node: Name of its node, with the namespace.
+    """
+
+    def __init__(
+        self, bus: "Bus", process: Process, kind: Any, topic: str, qos: Qos, node: str
+    ) -> None:
+        self._bus, self.process, self.type, self.topic, self.qos = bus, process, kind, topic, qos
+        self.node = node
+        self.lost = 0
+        self.is_open = True
+        self.coming: deque[tuple[int, int, Taken]] = deque()
+        self._ready: deque[tuple[int, int, Taken]] = deque(
+            maxlen=None if qos.keeps_all else qos.depth
+        )
+        self.waiting: Strand | None = None
+        self.told: Callable[[], None] | None = None
+        """Called where a message comes, for those that an executor serves."""
+
+    def take(self) -> Taken | None:
+        """Oldest waiting message; None if there is none."""
+        scheduler = self._bus.scheduler
+        scheduler.charge(_TAKE_NS)
+        coming, ready = self.coming, self._ready
+        while coming and coming[0][0] <= scheduler.now_ns:
+            ready.append(coming.popleft())
+        if not ready or not self.is_open:
+            return None
+        came_ns, _, taken = ready.popleft()
+        return taken._replace(came_ns=came_ns + self._bus.offset_of(self.process))
+
+    def wait(self, seconds: float) -> None:
+        """Return when there is a message, or after some time [s]."""
+        scheduler = self._bus.scheduler
+        if self._ready or (self.coming and self.coming[0][0] <= scheduler.now_ns):
+            return
+        self.waiting = scheduler.current
+        if self.coming:
+            scheduler.at(self.coming[0][0], self.tell)
+        scheduler.wait(seconds)
+        self.waiting = None
+
+    def tell(self) -> None:
+        """A message has come."""
+        if self.waiting is not None:
+            self._bus.scheduler.wake(self.waiting)
+        if self.told is not None:
+            self.told()
+
+    def close(self) -> None:
+        """Stop listening."""
+        self._bus.leave_reader(self)
+
+    def put(self, came_ns: int, taken: Taken) -> None:
+        """Let a message come at a time [ns]."""
+        entry = (came_ns, self._bus.next_order(), taken)
+        if self.coming and self.coming[-1][0] > came_ns:
+            ordered = list(self.coming)
+            insort(ordered, entry)
+            self.coming = deque(ordered)
+        else:
+            self.coming.append(entry)
+        if self.waiting is not None or self.told is not None:
+            self._bus.scheduler.at(came_ns, self.tell)
+
+    def wake_up(self, since_ns: int, room: int) -> int:
+        """Keep of what came to a process that stood still what its socket took.
+
+        Args:
+            since_ns: Since when it stood still [ns].
+            room: Bytes that the socket still takes.
+
+        Returns:
+            The room that is left.
+        """
+        now_ns, kept, lost = self._bus.scheduler.now_ns, deque[tuple[int, int, Taken]](), []
+        for entry in self.coming:
+            if not since_ns <= entry[0] <= now_ns:
+                kept.append(entry)
+            elif room >= len(entry[2].data):
+                room -= len(entry[2].data)
+                kept.append(entry)
+            else:
+                lost.append(entry[2])
+        self.coming = kept
+        for taken in lost:
+            if not self._bus.send_again(self, taken):
+                self.lost += 1
+        return room
+
+
+class Service:
+    """Service of a node.
+
+    Args:
+        process: Whose it is.
+        answer: Told a request; has the answer sent.
+    """
+
+    def __init__(self, process: Process, answer: Callable[[Any, Callable[[Any], None]], None]):
+        self.process, self.answer, self.is_open = process, answer, True
+
+
+class Bus:
+    """The middleware of all processes.
+
+    Args:
+        scheduler: Time.
+    """
+
+    def __init__(self, scheduler: Scheduler) -> None:
+        self.scheduler = scheduler
+        self._random = scheduler.random("bus")
+        self._finding: Random = scheduler.random("discovery")
+        self.writers: dict[str, list[Writer]] = {}
+        self.readers: dict[str, list[Reader]] = {}
+        self.services: dict[str, Service] = {}
+        self._known: dict[tuple[Process, object], int] = {}
+        self._gids = self._orders = 0
+        self.lines: dict[tuple[str, str], Line] = {}
+        """Lines that are not perfect, by the names of both processes; * for any."""
+        self._plain = Line()
+        self.find = (0.07, 0.3, 1.6)
+        """Least, usual and longest time in which one end finds another [s]."""
+
+    # -- who is there ----------------------------------------------------------------------------
+
+    def next_gid(self) -> bytes:
+        """Number of a new writer."""
+        self._gids += 1
+        return self._gids.to_bytes(_GID, "big")
+
+    def next_order(self) -> int:
+        """Number of a message that comes, which orders those of one moment."""
+        self._orders += 1
+        return self._orders
+
+    def time_of(self, process: Process) -> int:
+        """Time of the system's clock of a process [ns]."""
+        return self.scheduler.now_ns + self.offset_of(process)
+
+    def offset_of(self, process: Process) -> int:
+        """What that clock is ahead of time [ns]."""
+        return process.machine.epoch_ns(process)
+
+    def watch(self, process: Process) -> None:
+        """Take part in the life of a process."""
+        process.on_end.append(lambda is_orderly: self._leave(process, is_orderly=is_orderly))
+        process.on_resume.append(lambda since_ns: self._wake_up(process, since_ns))
+
+    def open_writer(self, writer: Writer) -> Writer:
+        """Let others find a writer."""
+        self.writers.setdefault(writer.topic, []).append(writer)
+        for reader in self.readers.get(writer.topic, ()):
+            self._match(writer, reader)
+        self._know(writer.process, writer, writer.topic)
+        return writer
+
+    def open_reader(self, reader: Reader) -> Reader:
+        """Let others find a reader."""
+        self.readers.setdefault(reader.topic, []).append(reader)
+        for writer in self.writers.get(reader.topic, ()):
+            self._match(writer, reader)
+        return reader
+
+    def leave_writer(self, writer: Writer) -> None:
+        """Withdraw a writer."""
+        writer.is_open, writer.links = False, []
+        if writer in self.writers.get(writer.topic, ()):
+            self.writers[writer.topic].remove(writer)
+
+    def leave_reader(self, reader: Reader) -> None:
+        """Withdraw a reader."""
+        reader.is_open = False
+        if reader in self.readers.get(reader.topic, ()):
+            self.readers[reader.topic].remove(reader)
+        for writer in self.writers.get(reader.topic, ()):
+            writer.links = [link for link in writer.links if link.reader is not reader]
+
+    def publishers(self, process: Process, topic: str) -> list[Endpoint]:
+        """Writers of a topic that a process has found."""
+        return [
+            Endpoint(one.node, one.sender, one.qos.is_latched)
+            for one in self.writers.get(topic, ())
+            if self.knows(process, one)
+        ]
+
+    def knows(self, process: Process, entity: Writer | Service) -> bool:
+        """Whether a process has found an entity."""
+        key = (process, entity)
+        if key not in self._known:
+            self._known[key] = self.scheduler.now_ns + self._discovery(process, entity.process)
+        return self._known[key] <= self.scheduler.now_ns
+
+    def _know(self, process: Process, entity: Writer | Service, topic: str) -> None:
+        """Let processes with readers of a topic find a writer in their own time."""
+        for reader in self.readers.get(topic, ()):
+            self.knows(reader.process, entity)
+
+    def topics(self) -> list[str]:
+        """Topics that have writers or readers."""
+        names = {
+            *(t for t, w in self.writers.items() if w),
+            *(t for t, r in self.readers.items() if r),
+        }
+        return sorted(names)
+
+    def _discovery(self, one: Process, other: Process) -> int:
+        """Time in which one process finds an end of another [ns]."""
+        if one is other:
+            return 200_000
+        least, usual, longest = self.find
+        return round(1e9 * min(longest, least + self._finding.expovariate(1.0 / (usual - least))))
+
+    def _match(self, writer: Writer, reader: Reader) -> None:
+        """Let a writer and a reader find each other, if their qualities go together."""
+        wanted, offered = reader.qos, writer.qos
+        if wanted.is_reliable and not offered.is_reliable:
+            return
+        if wanted.is_latched and not offered.is_latched:
+            return
+        now_ns = self.scheduler.now_ns
+        link = _Link(
+            reader,
+            now_ns + self._discovery(writer.process, reader.process),
+            now_ns + self._discovery(reader.process, writer.process),
+            wanted.is_reliable and offered.is_reliable,
+        )
+        writer.links.append(link)
+        self._known[reader.process, writer] = link.reader_knows_ns
+        if wanted.is_latched:
+            self.scheduler.at(link.writer_knows_ns, lambda: self._send_last(writer, link))
+
+    def _send_last(self, writer: Writer, link: _Link) -> None:
+        """Send a late reader what a latched topic has."""
+        if writer.is_open and not writer.process.is_dead:
+            for taken in tuple(writer.history):
+                self.carry(writer, link, taken)
+
+    # -- messages --------------------------------------------------------------------------------
+
+    def line(self, one: Process, other: Process) -> Line:
+        """What becomes of messages between two processes."""
+        if not self.lines or one is other:
+            return self._plain
+        for key in ((one.name, other.name), (one.name, "*"), ("*", other.name), ("*", "*")):
+            if key in self.lines:
+                return self.lines[key]
+        return self._plain
+
+    def carry(self, writer: Writer, link: _Link, taken: Taken) -> None:
+        """Bring a message to a reader."""
+        reader, draw = link.reader, self._random.random
+        line = self.line(writer.process, reader.process)
+        now_ns = self.scheduler.now_ns
+        came_ns = now_ns + 40_000 + round(60_000 * draw())
+        if line is not self._plain:
+            came_ns += round(1e9 * line.delay)
+            if line.jitter:
+                came_ns += round(1e9 * self._random.expovariate(1.0 / line.jitter))
+            if line.loss and draw() < line.loss:
+                if not link.is_reliable:
+                    reader.lost += 1
+                    return
+                came_ns += round(2e6 + 2e7 * draw())
+        if came_ns < link.reader_knows_ns:
+            if not link.is_reliable:
+                return
+            came_ns = link.reader_knows_ns
+        if not (line.reorders and not link.is_reliable and draw() < line.reorders):
+            came_ns = max(came_ns, link.last_ns + 1)
+        link.last_ns = max(came_ns, link.last_ns)
+        reader.put(came_ns, taken)
+        if line.repeats and not link.is_reliable and draw() < line.repeats:
+            reader.put(came_ns + 50_000, taken)
+
+    def send_again(self, reader: Reader, taken: Taken) -> bool:
+        """Whether a message that a reader's socket did not take comes all the same."""
+        for writer in self.writers.get(reader.topic, ()):
+            if writer.sender != taken.sender:
+                continue
+            for link in writer.links:
+                if link.reader is reader and link.is_reliable and taken in writer.history:
+                    reader.put(max(self.scheduler.now_ns + 3_000_000, link.last_ns + 1), taken)
+                    return True
+        return False
+
+    def _wake_up(self, process: Process, since_ns: int) -> None:
+        room = _SOCKET
+        for readers in tuple(self.readers.values()):
+            for reader in tuple(readers):
+                if reader.process is process:
+                    room = reader.wake_up(since_ns, room)
+
+    def _leave(self, process: Process, *, is_orderly: bool) -> None:
+        """A process has ended: at once for itself, and for others when they hear of it."""
+        for reader in [r for rs in self.readers.values() for r in rs if r.process is process]:
+            self.leave_reader(reader)
+        writers = [w for ws in self.writers.values() for w in ws if w.process is process]
+        services = [name for name, s in self.services.items() if s.process is process]
+
+        def forget() -> None:
+            for writer in writers:
+                self.leave_writer(writer)
+
+        for name in services:
+            self.services.pop(name).is_open = False
+        self.scheduler.at(self.scheduler.now_ns + (1_000_000 if is_orderly else _LEASE_NS), forget)
+
+    def later(self, event: Callable[[], object]) -> None:
+        """Let something happen after the time that a request or an answer takes."""
+        delay_ns = _CALL_NS + round(_SPREAD_NS * self._random.random())
+        self.scheduler.at(self.scheduler.now_ns + delay_ns, event)

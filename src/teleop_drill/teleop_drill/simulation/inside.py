@@ -1,0 +1,56 @@
+"""Inside: what the drill breaks within simulated processes, and clocks that are off."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from teleop_drill.drill import inside
+from teleop_drill.simulation.machine import Machine
+
+if TYPE_CHECKING:
+    from teleop_drill.simulation.session import SimulatedSession
+
+
+class SimulatedSteering:
+    """As of :class:`~teleop_drill.nodes.drill_rig.Steering`.
+
+    Args:
+        machine: Where the processes are.
+
+    Attributes:
+        session: The processes.
+    """
+
+    def __init__(self, machine: Machine) -> None:
+        self._machine, self._joints = machine, inside.Joints()
+        self.word = inside.WORKS
+        self.session: SimulatedSession | None = None
+        inside.Passing.control = self
+        machine.scheduler.at(0, self._look)
+
+    @staticmethod
+    @contextmanager
+    def installed(machine: Machine) -> Iterator[None]:
+        """Let stages that the drill breaks wait in simulated time."""
+        before = inside.Passing.sleep
+        inside.Passing.sleep = staticmethod(machine.scheduler.sleep)
+        try:
+            yield
+        finally:
+            inside.Passing.control, inside.Passing.sleep = None, before
+
+    def write(self, word: int = inside.WORKS, offset_ns: int = 0) -> None:
+        """Say what the stage does and by how much the clock is off [ns]."""
+        self.word = word
+        for process in self._machine.processes:
+            if process.name != "drill":
+                process.clock = replace(self._machine.clock, offset_ns=offset_ns)
+
+    def _look(self) -> None:
+        """Let the joints of the simulated arm do what they are told."""
+        scheduler = self._machine.scheduler
+        node = None if self.session is None else self.session.node("slave_sim")
+        if node is not None and node.stage is not None:
+            self._joints.obey(node.stage, self.word)
+        scheduler.at(scheduler.now_ns + round(1e9 * inside.TURN), self._look)

@@ -1,0 +1,224 @@
+"""Machine: simulated processes, what may become of them, and the sockets between them."""
+
+import traceback
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+from teleop_drill.simulation.scheduler import BEGIN_NS, EPOCH_NS, Scheduler, Turns
+
+_ROOM = 212_992
+"""Bytes that wait in a socket of the machine, as Linux has it."""
+
+
+@dataclass
+class Clock:
+    """The system's clock of a machine.
+
+    Attributes:
+        offset_ns: By how much it is off [ns].
+        drift: By how much faster than right it goes.
+    """
+
+    offset_ns: int = 0
+    drift: float = 0.0
+
+
+@dataclass
+class Said:
+    """Line of a log."""
+
+    time_ns: int
+    node: str
+    level: str
+    text: str
+
+
+class Process(Turns):
+    """Process of a machine.
+
+    Args:
+        machine: Where it is.
+        name: What it is called.
+        work: Its main thread; what it returns is the exit code.
+
+    Attributes:
+        exit_code: Of its end; None as long as it runs, negative where a signal ended it.
+    """
+
+    def __init__(self, machine: "Machine", name: str, work: Callable[[], int]) -> None:
+        super().__init__()
+        self.machine, self.name, self._work = machine, name, work
+        self.exit_code: int | None = None
+        self.stopped_ns, self.clock = 0, machine.clock
+        self.lines: list[SocketEnd] = []
+        self.listeners: list[Listener] = []
+        self.on_end: list[Callable[[bool], None]] = []
+        """Told when it ends, and whether it could say so."""
+        self.on_resume: list[Callable[[int], None]] = []
+        """Told when it goes on, and since when it stood still [ns]."""
+        self.main = machine.scheduler.spawn(self, "main", self._run)
+
+    def start(self) -> None:
+        """Begin."""
+        self.main.start()
+
+    def stop(self) -> None:
+        """Stand still from now on, as by SIGSTOP."""
+        if not self.is_stopped:
+            self.is_stopped, self.stopped_ns = True, self.machine.scheduler.now_ns
+
+    def go_on(self) -> None:
+        """Go on, as by SIGCONT."""
+        if self.is_stopped and not self.is_dead:
+            for told in self.on_resume:
+                told(self.stopped_ns)
+            self.machine.scheduler.resume(self)
+
+    def end(self, exit_code: int, *, is_orderly: bool) -> None:
+        """Be gone, with all threads."""
+        if self.is_dead:
+            return
+        self.is_dead, self.exit_code = True, exit_code
+        for line in self.lines:
+            line.close()
+        for listener in self.listeners:
+            listener.close()
+        for told in self.on_end:
+            told(is_orderly)
+
+    def _run(self) -> None:
+        code = 1
+        try:
+            code = self._work()
+        except BaseException as error:
+            self.main.error = error
+            self.machine.fail(self, error)
+        self.end(code, is_orderly=True)
+
+
+class Listener:
+    """As of :class:`~teleop_core.middleware.world.Listener`."""
+
+    def __init__(self, machine: "Machine", place: str) -> None:
+        self._machine, self._place = machine, place
+        self.waiting: list[SocketEnd] = []
+
+    def accept(self) -> "SocketEnd | None":
+        """Next line; None if there is none."""
+        return self.waiting.pop(0) if self.waiting else None
+
+    def close(self) -> None:
+        """Accept none any more."""
+        self._machine.places.pop(self._place, None)
+
+
+class SocketEnd:
+    """As of :class:`~teleop_core.middleware.world.Line`."""
+
+    def __init__(self) -> None:
+        self.came = bytearray()
+        self.other: SocketEnd | None = None
+        self.is_open = True
+
+    def send(self, data: bytes | bytearray) -> int:
+        """Write what it takes; raises BlockingIOError or OSError."""
+        other = self.other
+        if not self.is_open or other is None or not other.is_open:
+            raise BrokenPipeError
+        taken = min(len(data), _ROOM - len(other.came))
+        if taken <= 0:
+            raise BlockingIOError
+        other.came += data[:taken]
+        return taken
+
+    def recv(self, size: int) -> bytes:
+        """Read what has come; raises BlockingIOError."""
+        if not self.came:
+            if self.other is None or not self.other.is_open:
+                return b""
+            raise BlockingIOError
+        data = bytes(self.came[:size])
+        del self.came[:size]
+        return data
+
+    def close(self) -> None:
+        """Close it."""
+        self.is_open = False
+
+
+@dataclass
+class Machine:
+    """One computer.
+
+    Attributes:
+        scheduler: Its time.
+        clock: Its system's clock, of the processes that do not have one of their own.
+        processes: All that ever were, in their order.
+        places: Who listens where.
+        log: What nodes have said.
+    """
+
+    scheduler: Scheduler
+    clock: Clock = field(default_factory=Clock)
+    processes: list[Process] = field(default_factory=list)
+    places: dict[str, Listener] = field(default_factory=dict)
+    log: list[Said] = field(default_factory=list)
+
+    def start(self, name: str, work: Callable[[Process], int], after: float = 0.0) -> Process:
+        """Start a process, which begins to work after a time [s]."""
+        box: list[Process] = []
+
+        def main() -> int:
+            if after:
+                self.scheduler.sleep(after)
+            return work(box[0])
+
+        box.append(Process(self, name, main))
+        self.processes.append(box[0])
+        box[0].start()
+        return box[0]
+
+    def run(self, work: Callable[[Process], Any]) -> Any:
+        """Do something in a process of its own, and let time pass until it is done."""
+        found: list[Any] = []
+
+        def main() -> int:
+            found.append(work(process))
+            return 0
+
+        process = Process(self, "drill", main)
+        self.processes.append(process)
+        self.scheduler.run(process.main)
+        if process.main.error is not None:
+            raise process.main.error
+        return found[0]
+
+    def epoch_ns(self, process: Process) -> int:
+        """What the system's clock of a process is ahead of the monotonic one [ns]."""
+        clock, now_ns = process.clock, self.scheduler.now_ns
+        return EPOCH_NS + clock.offset_ns + round(clock.drift * (now_ns - BEGIN_NS))
+
+    def fail(self, process: Process, error: BaseException) -> None:
+        """Note what has ended a process that nobody expected."""
+        text = "".join(traceback.format_exception(error))
+        self.log.append(Said(self.scheduler.now_ns, process.name, "fatal", text))
+
+    def connect(self, process: Process, place: str) -> SocketEnd:
+        """Line to who listens at a place; raises ConnectionRefusedError."""
+        listener = self.places.get(place)
+        if listener is None:
+            raise ConnectionRefusedError(place)
+        near, far = SocketEnd(), SocketEnd()
+        near.other, far.other = far, near
+        process.lines.append(near)
+        listener.waiting.append(far)
+        return near
+
+    def listen(self, process: Process, place: str) -> Listener:
+        """Listen at a place; raises OSError if another one does."""
+        if place in self.places:
+            raise OSError(place)
+        self.places[place] = listener = Listener(self, place)
+        process.listeners.append(listener)
+        return listener

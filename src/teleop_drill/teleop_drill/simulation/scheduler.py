@@ -1,0 +1,261 @@
+"""Scheduler: simulated time, and the strands that take turns in it.
+
+A strand is a thread of a simulated process. One runs at a time, until it waits: for time, for a
+lock, for a message. Strands of one process share its interpreter, so that they exclude each other;
+processes run beside each other. Whatever happens is ordered by time, then by when it was arranged.
+"""
+
+import heapq
+from collections.abc import Callable
+from itertools import count
+from random import Random
+from typing import Any
+
+from greenlet import greenlet
+
+BEGIN_NS = 1_000_000_000_000
+"""Where monotonic clocks begin [ns]."""
+EPOCH_NS = 1_800_000_000_000_000_000
+"""What the system's clocks are ahead of them [ns]."""
+_LOOK_NS = 60
+"""What reading a clock costs: a loop that only looks at it goes on all the same [ns]."""
+
+
+class Deadlock(Exception):  # noqa: N818
+    """Nothing will ever happen any more, and what was asked for has not."""
+
+
+class Costs:
+    """How long things take, in nanoseconds.
+
+    Args:
+        random: Where it is drawn from.
+    """
+
+    def __init__(self, random: Random) -> None:
+        self._random = random
+        self.hiccups = 2e-4
+        """Share of the turns after which a process gets no processor for a while."""
+        self.crowd_ns = 0.0
+        """Mean of what a process without priority waits for a processor while others work."""
+
+    def turn(self) -> int:
+        """Of a turn, beside what it publishes."""
+        random = self._random.random
+        cost = 20_000.0 + 40_000.0 * random()
+        if random() < self.hiccups:
+            cost += 4e6 * random()
+        return round(cost)
+
+    def wake(self, *, has_priority: bool) -> int:
+        """From the time at which a strand is to go on until it does."""
+        late = self._random.expovariate(1.0 / 50_000.0)
+        if self.crowd_ns and not has_priority:
+            late += self._random.expovariate(1.0 / self.crowd_ns)
+        return round(late)
+
+
+class Strand:
+    """Thread of a process.
+
+    Args:
+        scheduler: Who lets it run.
+        process: Whose it is.
+        name: Of the thread.
+        work: What it does.
+
+    Attributes:
+        error: What ended it, if that was an error.
+    """
+
+    _numbers = count(1)
+
+    def __init__(
+        self, scheduler: "Scheduler", process: "Turns", name: str, work: Callable[[], object]
+    ) -> None:
+        self.name, self.process, self._work, self._scheduler = name, process, work, scheduler
+        self.ident: int | None = next(self._numbers)
+        self.native_id = self.ident
+        self.token = 0  # a wake-up for an earlier wait is none
+        self.has_priority = False
+        self.error: BaseException | None = None
+        self.greenlet = greenlet(self._run)
+        self._has_begun = self._has_ended = False
+        self._joined: list[Strand] = []
+
+    def start(self) -> None:
+        """Begin."""
+        self._has_begun = True
+        self._scheduler.wake(self)
+
+    def join(self, timeout: float | None = None) -> None:
+        """Wait for its end, for ``timeout`` [s] at most."""
+        if self.is_alive():
+            self._joined.append(self._scheduler.current)
+            self._scheduler.wait(timeout)
+
+    def is_alive(self) -> bool:
+        """Whether it works still."""
+        return self._has_begun and not self._has_ended and not self.process.is_dead
+
+    def _run(self, _: object) -> None:
+        try:
+            self._work()
+        except BaseException as error:
+            self.error = error
+        self._has_ended = True
+        for strand in self._joined:
+            self._scheduler.wake(strand)
+
+
+class Turns:
+    """What the scheduler knows of a process."""
+
+    def __init__(self) -> None:
+        self.busy_ns = 0  # until when its interpreter works
+        self.is_dead = self.is_stopped = False
+        self.parked: list[tuple[Strand, int, bool]] = []
+
+
+class Lock:
+    """As of :class:`~teleop_core.middleware.world.Lock`."""
+
+    def __init__(self, scheduler: "Scheduler") -> None:
+        self._scheduler, self._waiting = scheduler, list[Strand]()
+        self._is_taken = False
+
+    def acquire(self, blocking: bool = True, timeout: float = -1.0, /) -> bool:
+        """Take it; whether that was possible within the timeout [s]."""
+        scheduler = self._scheduler
+        deadline_ns = scheduler.now_ns + round(1e9 * timeout)
+        while self._is_taken:
+            left_ns = deadline_ns - scheduler.now_ns
+            if not blocking or (timeout >= 0.0 and left_ns <= 0):
+                return False
+            self._waiting.append(scheduler.current)
+            scheduler.wait(None if timeout < 0.0 else 1e-9 * left_ns)
+        self._is_taken = True
+        return True
+
+    def release(self) -> None:
+        """Give it back."""
+        self._is_taken = False
+        if self._waiting:
+            self._scheduler.wake(self._waiting.pop(0))
+
+    def __enter__(self) -> object:
+        return self.acquire()
+
+    def __exit__(self, *_: object) -> None:
+        self.release()
+
+
+class Scheduler:
+    """Simulated time.
+
+    Args:
+        seed: What everything is drawn from.
+
+    Attributes:
+        now_ns: Time, as monotonic clocks have it [ns].
+        current: Who runs.
+        costs: How long things take.
+    """
+
+    def __init__(self, seed: int) -> None:
+        self.seed, self.now_ns = seed, BEGIN_NS
+        self.costs = Costs(self.random("costs"))
+        self.current: Strand = None  # type: ignore[assignment]
+        self._queue: list[tuple[int, int, Any, int, bool]] = []
+        self._orders, self._hub = count(), greenlet.getcurrent()
+        self._kept: list[Strand] = []  # a greenlet that is thrown away would run its `finally`
+
+    def random(self, name: str) -> Random:
+        """Source of numbers for one purpose, which nothing else draws from."""
+        return Random(f"{self.seed}/{name}")
+
+    # -- for strands -----------------------------------------------------------------------------
+
+    def charge(self, nanoseconds: int) -> None:
+        """Let what runs take so long [ns]."""
+        self.now_ns += nanoseconds
+
+    def look_ns(self) -> int:
+        """Time [ns], for whoever reads a clock."""
+        self.now_ns += _LOOK_NS
+        return self.now_ns
+
+    def sleep(self, seconds: float) -> None:
+        """Wait [s]."""
+        late = self.costs.wake(has_priority=self.current.has_priority)
+        self._switch(self.now_ns + max(0, round(1e9 * seconds)) + late)
+
+    def wait(self, seconds: float | None) -> bool:
+        """Wait until somebody wakes this strand, for some time [s] at most; whether one did."""
+        return self._switch(None if seconds is None else self.now_ns + round(1e9 * seconds))
+
+    def _switch(self, until_ns: int | None) -> bool:
+        strand = self.current
+        if until_ns is not None:
+            self._push(until_ns, strand, strand.token, False)
+        return bool(self._hub.switch())
+
+    # -- for whoever arranges --------------------------------------------------------------------
+
+    def wake(self, strand: Strand) -> None:
+        """Let a strand that waits go on soon."""
+        late = self.costs.wake(has_priority=strand.has_priority)
+        self._push(self.now_ns + late, strand, strand.token, True)
+
+    def at(self, time_ns: int, event: Callable[[], object]) -> None:
+        """Let something happen at a time [ns]."""
+        self._push(max(time_ns, self.now_ns), event, 0, False)
+
+    def spawn(self, process: Turns, name: str, work: Callable[[], object]) -> Strand:
+        """New strand, which is to be started."""
+        strand = Strand(self, process, name, work)
+        self._kept.append(strand)
+        return strand
+
+    def resume(self, process: Turns) -> None:
+        """Let a process that stood still go on."""
+        process.is_stopped = False
+        process.busy_ns = max(process.busy_ns, self.now_ns)
+        parked, process.parked = process.parked, []
+        for strand, token, value in parked:
+            self._push(self.now_ns, strand, token, value)
+
+    def run(self, strand: Strand) -> None:
+        """Let time pass until a strand has ended.
+
+        Raises:
+            Deadlock: It never will.
+        """
+        strand.start()
+        queue, pop = self._queue, heapq.heappop
+        while strand.is_alive():
+            if not queue:
+                raise Deadlock("everything waits for something else")
+            time_ns, _, what, token, value = pop(queue)
+            if not isinstance(what, Strand):
+                self.now_ns = time_ns
+                what()
+                continue
+            process = what.process
+            if token != what.token or process.is_dead:
+                continue
+            if process.is_stopped:
+                process.parked.append((what, token, value))
+                continue
+            if process.busy_ns > time_ns:
+                self._push(process.busy_ns, what, token, value)
+                continue
+            self.now_ns, self.current = time_ns, what
+            what.token += 1
+            what.greenlet.switch(value)
+            process.busy_ns = self.now_ns + self.costs.turn()
+        if strand.error is not None:
+            raise strand.error
+
+    def _push(self, time_ns: int, what: Any, token: int, value: bool) -> None:
+        heapq.heappush(self._queue, (time_ns, next(self._orders), what, token, value))

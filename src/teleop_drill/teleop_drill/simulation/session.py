@@ -1,0 +1,238 @@
+"""Session: the processes of a session on a simulated machine, started, broken and ended."""
+
+import signal
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from teleop_core.base.errors import SessionError
+from teleop_core.graph.graph import RECORDER_NAME
+from teleop_core.graph.stage import STAGES
+from teleop_core.nodes.base import CoreNode
+from teleop_core.nodes.live import parameter_file
+from teleop_core.nodes.making import make_node
+from teleop_core.nodes.observer import Observer
+from teleop_core.nodes.process import serve
+from teleop_core.nodes.start import SESSION
+from teleop_core.nodes.teleop_session import TeleopSession
+from teleop_core.nodes.watch import Crew
+from teleop_core.session.configuration import Configuration
+from teleop_drill.drill.exercise import Master
+from teleop_drill.simulation.bus import Bus
+from teleop_drill.simulation.machine import Process
+from teleop_drill.simulation.stand_ins import SimulatedWatch, stand_by
+from teleop_drill.simulation.world import SimulatedWorld
+
+_START = 0.4  # of a process, until its node is made [s]
+_STARTED = 60.0  # patience with the start [s]
+_ENDED = 10.0  # patience with the end [s]
+_NEVER_NS = 2**62
+_DRILLED = ("operator", "haptic_master")
+"""Nodes in whose place the drill may be."""
+Processes = Mapping[str, tuple[str, ...]]
+"""Names of processes, each with its nodes; the recorder's comes first."""
+
+
+class SimulatedSession:
+    """As of :class:`~teleop_drill.nodes.drill_rig.Session`.
+
+    Args:
+        bus: The middleware.
+        owner: Process of the drill.
+        configuration: What runs.
+        processes: How the nodes are shared out.
+        folder: Where the recordings go.
+        observer: Who hears what nodes say of themselves.
+        master: Who moves the hand.
+    """
+
+    def __init__(
+        self, bus: Bus, owner: Process, configuration: Configuration, processes: Processes,
+        folder: Path, observer: Observer, master: Master,
+    ) -> None:  # fmt: skip
+        self._bus, self._machine, self._configuration = bus, owner.machine, configuration
+        self._folder, self._observer, self._master = folder, observer, master
+        left_out = () if master is Master.DEVICE else _DRILLED
+        self._processes = {
+            name: tuple(node for node in nodes if node not in left_out)
+            for name, nodes in processes.items()
+        }
+        self._processes = {name: nodes for name, nodes in self._processes.items() if nodes}
+        self.running: dict[str, Process] = {}
+        """Newest process of each name."""
+        self.crews: dict[Process, Crew] = {}
+        """What works in each process."""
+        self.recordings: list[Path] = []
+        self._begun_ns: list[int] = []
+        self._bystander: Process | None = None
+
+    # -- start and end ---------------------------------------------------------------------------
+
+    def start(self) -> None:
+        """Start what does not run, the recorder first, and wait until all are at work."""
+        first = {n: k for n, k in self._processes.items() if RECORDER_NAME in k}
+        rest = {n: k for n, k in self._processes.items() if RECORDER_NAME not in k}
+        for crew in (first, rest):
+            new = [name for name in crew if name not in self.running or self.running[name].is_dead]
+            for name in new:
+                self._launch(name, crew[name])
+            self._await([node for name in new for node in crew[name]])
+
+    def _launch(self, name: str, nodes: tuple[str, ...]) -> None:
+        if RECORDER_NAME in nodes:
+            self.recordings.append(self._folder / f"recording_{len(self.recordings) + 1}")
+            self._begun_ns.append(self._observer.world.time_ns())
+        given = self._given()
+
+        def work(process: Process) -> int:
+            world = SimulatedWorld(self._bus, process, given)
+            crew = self._crew(nodes, world)
+            self.crews[process] = crew
+            watch = SimulatedWatch(world, crew, process)
+            return serve(crew, watch, world)
+
+        self.running[name] = self._machine.start(name, work, after=_START)
+        self._bus.watch(self.running[name])
+
+    def _crew(self, nodes: tuple[str, ...], world: SimulatedWorld) -> Crew:
+        graph = self._configuration.graph
+        if len(nodes) > 1:
+            own = () if RECORDER_NAME in nodes else nodes
+            return TeleopSession("", own, world, graph)
+        if nodes == (RECORDER_NAME,):
+            return make_node(STAGES.find(RECORDER_NAME), world=world)
+        (member,) = (one for one in graph.members if one.name == nodes[0])
+        return make_node(member.stage, namespace=member.arm, world=world)
+
+    def _given(self) -> dict[str, dict[str, Any]]:
+        """Parameters of all nodes, as their file has them."""
+        text = parameter_file(self._configuration, str(self.recordings[-1]))
+        content: dict[str, Any] = yaml.safe_load(text)
+        content.pop(SESSION, None)
+        found = {
+            name.strip("/"): dict(_flat(node["ros__parameters"])) for name, node in content.items()
+            if "ros__parameters" in node
+        }  # fmt: skip
+        if self._master is not Master.DEVICE:
+            for name in _DRILLED:
+                found[name]["autostart"] = False
+        return found
+
+    def _await(self, nodes: list[str]) -> None:
+        for name in nodes:
+            self._observer.statuses.pop(name, None)
+        scheduler = self._machine.scheduler
+        deadline_ns = scheduler.now_ns + round(1e9 * _STARTED)
+        while not all(self._observer.is_active(name) for name in nodes):
+            self._observer.listen(0.05)
+            self.check()
+            if scheduler.now_ns > deadline_ns:
+                raise SessionError(f"{', '.join(nodes)}: not at work after {_STARTED:g} s")
+
+    def check(self) -> None:
+        """Make sure that all processes run; raises SessionError."""
+        for process in self.running.values():
+            if process.is_dead:
+                said = [one.text for one in self._machine.log if one.level in {"error", "fatal"}]
+                raise SessionError(f"{process.name} has ended: {'; '.join(said[-2:])}")
+
+    def close(self) -> None:
+        """End all, in order; the recorder last."""
+        self.kill_bystander()
+        last = [p for n, p in self.running.items() if RECORDER_NAME in self._processes[n]]
+        for crew in ([p for p in self.running.values() if p not in last], last):
+            self._end(crew)
+        self.running.clear()
+
+    def _end(self, processes: list[Process]) -> None:
+        scheduler = self._machine.scheduler
+        deadline_ns = scheduler.now_ns + round(1e9 * _ENDED)
+        for process in processes:
+            process.go_on()
+            if not process.is_dead and process in self.crews:
+                self.crews[process].nodes[0].end(0)
+        while not all(one.is_dead for one in processes) and scheduler.now_ns < deadline_ns:
+            scheduler.sleep(0.01)
+        for process in processes:
+            process.end(-signal.SIGKILL, is_orderly=False)
+
+    def until_ns(self, recording: Path) -> int:
+        """When the recording after one was begun [ns]; later than all without another."""
+        place = self.recordings.index(recording) + 1
+        return self._begun_ns[place] if place < len(self._begun_ns) else _NEVER_NS
+
+    # -- what can be done to them ----------------------------------------------------------------
+
+    def process_of(self, node: str) -> Process | None:
+        """Process that holds a node; None if none does."""
+        names = (n for n, nodes in self._processes.items() if node in nodes)
+        return self.running.get(next(names, ""))
+
+    def node(self, name: str) -> CoreNode | None:
+        """A node at work, to be looked into; None if there is none."""
+        process = self.process_of(name)
+        crew = None if process is None or process.is_dead else self.crews.get(process)
+        found = crew.nodes if crew is not None else ()
+        return next((one for one in found if one.member_name == name), None)
+
+    def is_running(self, node: str) -> bool:
+        """Whether the process of a node runs."""
+        process = self.process_of(node)
+        return process is not None and not process.is_dead
+
+    def dead(self) -> list[str]:
+        """Processes that have ended."""
+        return [name for name, process in self.running.items() if process.is_dead]
+
+    def send(self, node: str, number: int) -> None:
+        """Send a signal to a node's process."""
+        process = self.process_of(node)
+        if process is None or process.is_dead:
+            raise ProcessLookupError(node)
+        what: dict[int, Callable[[], None]] = {
+            signal.SIGSTOP: process.stop,
+            signal.SIGCONT: process.go_on,
+            signal.SIGKILL: lambda: process.end(-signal.SIGKILL, is_orderly=False),
+        }
+        what[number]()
+
+    def await_end(self, node: str, timeout: float) -> None:
+        """Wait until a node's process has ended: it has."""
+
+    def limit_files(self, node: str, room: int | None) -> None:
+        """Let files of a node's process grow by so many bytes only; None: as they like."""
+
+    def hog(self) -> None:
+        """Keep all processors busy: who has no priority waits for one."""
+        self._machine.scheduler.costs.crowd_ns = 3e6
+
+    def relieve(self) -> None:
+        """Let them rest."""
+        self._machine.scheduler.costs.crowd_ns = 0.0
+
+    def start_bystander(self) -> None:
+        """Start a process of others that listens to all streams."""
+        self._bystander = self._machine.start(
+            "bystander", lambda process: stand_by(SimulatedWorld(self._bus, process))
+        )
+        self._bus.watch(self._bystander)
+        self._machine.scheduler.sleep(0.5)
+
+    def kill_bystander(self) -> None:
+        """Kill it."""
+        if self._bystander is not None:
+            self._bystander.end(-signal.SIGKILL, is_orderly=False)
+            self._bystander = None
+
+
+def _flat(values: Mapping[str, Any], prefix: str = "") -> "list[tuple[str, Any]]":
+    """Parameters with dotted names; lists as tuples."""
+    found: list[tuple[str, Any]] = []
+    for name, value in values.items():
+        if isinstance(value, dict):
+            found += _flat(value, f"{prefix}{name}.")
+        else:
+            found.append((f"{prefix}{name}", tuple(value) if isinstance(value, list) else value))
+    return found

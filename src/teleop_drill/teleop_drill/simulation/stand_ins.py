@@ -1,0 +1,69 @@
+"""Stand-ins: the watch of a process, whose own needs signals and the system's accounts; a stranger."""
+
+from teleop_core.graph.topics import STREAMS
+from teleop_core.nodes.loop import Loop
+from teleop_core.nodes.quality import profile
+from teleop_core.nodes.streams import message_type
+from teleop_core.nodes.watch import Crew
+from teleop_drill.simulation.machine import Process
+from teleop_drill.simulation.world import SimulatedWorld
+
+_PERIOD = 0.1
+_END_PATIENCE = 4.0
+
+
+class SimulatedWatch:
+    """Finds loops that hang, and ends a process that does not come to its end.
+
+    Args:
+        world: Where it is.
+        crew: What is watched.
+        process: What ends.
+
+    Attributes:
+        word: What the process is doing.
+    """
+
+    def __init__(self, world: SimulatedWorld, crew: Crew, process: Process) -> None:
+        self.word = "starting"
+        self._world, self._crew, self._process = world, crew, process
+        self._still: dict[Loop, tuple[int, float]] = {}
+        self._asked = 0.0
+        world.thread("watch", self._run).start()
+
+    def _run(self) -> None:
+        while True:
+            self._world.sleep(_PERIOD)
+            if self.word == "at work":
+                self._find_hung()
+            self._asked += _PERIOD * self._crew.nodes[0].ended.done()
+            if self._asked > _END_PATIENCE:
+                self._leave()
+
+    def _find_hung(self) -> None:
+        still: dict[Loop, tuple[int, float]] = {}
+        for loop, number in self._crew.watched():
+            before, since = self._still.get(loop, (number, 0.0))
+            seconds = since + _PERIOD if before == number else 0.0
+            still[loop] = number, seconds
+            if 0.0 < loop.patience <= seconds and loop.is_alive:
+                loop.is_hung = True
+                self._crew.nodes[0].ros.get_logger().fatal(f"{loop.name} hangs")
+                self._crew.nodes[0].end(1)
+        self._still = still
+
+    def _leave(self) -> None:
+        for node in self._crew.nodes:
+            node.abandon()
+        self._process.end(1, is_orderly=False)
+
+
+def stand_by(world: SimulatedWorld) -> int:
+    """Listen to all streams, until it is killed."""
+    node, executor = world.node("bystander"), world.executor()
+    executor.add_node(node)
+    for topic in STREAMS:
+        kind = message_type(topic.kind.ros_type)
+        node.create_subscription(kind, f"/{topic.name}", lambda _: None, profile(topic, 10))
+    while True:
+        executor.spin_once()

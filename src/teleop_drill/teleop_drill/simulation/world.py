@@ -1,0 +1,89 @@
+"""World: what one simulated process sees of everything, as nodes ask for it."""
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from teleop_core.graph.layers import RealTimeParameters
+from teleop_core.middleware.world import Hooks
+from teleop_drill.simulation.bus import Bus
+from teleop_drill.simulation.machine import Listener, Process, SocketEnd
+from teleop_drill.simulation.nodes import SimulatedExecutor, SimulatedLifecycleNode, SimulatedNode
+from teleop_drill.simulation.scheduler import Lock, Strand
+
+_PLACE = "recorder"
+
+
+class SimulatedWorld:
+    """As of :class:`~teleop_core.middleware.world.World`.
+
+    Args:
+        bus: The middleware.
+        process: The process.
+        given: Parameters of its file, by the full names of nodes without the slash before them.
+    """
+
+    def __init__(
+        self, bus: Bus, process: Process, given: Mapping[str, Mapping[str, Any]] | None = None
+    ) -> None:
+        self._bus, self._process, self._given = bus, process, given or {}
+        self._scheduler = process.machine.scheduler
+        self.monotonic_ns: Callable[[], int] = self._scheduler.look_ns
+        self.sleep: Callable[[float], None] = self._scheduler.sleep
+
+    def time_ns(self) -> int:
+        """Time of the system's clock [ns]."""
+        return self._scheduler.look_ns() + self._process.machine.epoch_ns(self._process)
+
+    def lock(self) -> Lock:
+        """Lock between threads."""
+        return Lock(self._scheduler)
+
+    def thread(self, name: str, work: Callable[[], None]) -> Strand:
+        """Thread that does something, once it is started."""
+        return self._scheduler.spawn(self._process, name, work)
+
+    def thread_ident(self) -> int:
+        """Number of the thread that calls."""
+        return self._scheduler.current.ident or 0
+
+    def take_real_time(self, options: RealTimeParameters) -> list[str]:
+        """Take a priority for the thread that calls."""
+        self._scheduler.current.has_priority = options.priority > 0
+        return []
+
+    def tidy(self) -> None:
+        """Throw away what the start has left behind: there is nothing."""
+
+    def connect(self, place: str) -> SocketEnd:
+        """Line to who listens at a place."""
+        return self._process.machine.connect(self._process, place)
+
+    def listen(self, place: str) -> Listener:
+        """Listen at a place."""
+        return self._process.machine.listen(self._process, place)
+
+    def feed_place(self) -> str:
+        """Where the recorder of this machine listens."""
+        return _PLACE
+
+    def node(self, name: str, **options: Any) -> SimulatedNode:
+        """A node."""
+        return SimulatedNode(self._bus, self._process, name, **options)
+
+    def lifecycle_node(self, name: str, hooks: Hooks, **options: Any) -> SimulatedLifecycleNode:
+        """A node with parameters and a lifecycle."""
+        full = f"{str(options.get('namespace', '')).strip('/')}/{name}".strip("/")
+        return SimulatedLifecycleNode(
+            self._bus, self._process, name, hooks, self._given.get(full, {}), **options
+        )
+
+    def executor(self) -> SimulatedExecutor:
+        """Executor of the nodes of this process."""
+        return SimulatedExecutor(self._process.machine)
+
+    def guest(self, domain: int | None = None) -> "SimulatedWorld":
+        """The same world: there is one domain."""
+        return self
+
+    def shutdown(self) -> None:
+        """Leave the middleware: the end of the process does it."""
