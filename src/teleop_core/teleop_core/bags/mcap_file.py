@@ -29,6 +29,7 @@ from mcap.records import (
 )
 
 from teleop_core import __version__
+from teleop_core.bags.background import SYSTEM, Background
 from teleop_core.bags.chunks import Chunk
 
 MAGIC = b"\x89MCAP0\r\n"
@@ -55,6 +56,7 @@ class McapFile:
         metadata: Name of a metadata record to its entries.
         compression: Name in the chunk's record: ``zstd``, ``lz4`` or empty.
         compress: Function that does it.
+        background: Who writes.
 
     Raises:
         OSError: The file cannot be created or written.
@@ -68,7 +70,9 @@ class McapFile:
         metadata: Mapping[str, dict[str, str]],
         compression: str,
         compress: Callable[[bytes], bytes],
+        background: Background = SYSTEM,
     ) -> None:
+        self._background = background
         self.path, self.schemas, self.channels = path, schemas, channels
         self._compression, self._compress = compression.encode(), compress
         # Of a long recording there are many chunks: their index is kept as the bytes it will be.
@@ -88,7 +92,7 @@ class McapFile:
     def _write(self, data: bytes | bytearray) -> None:
         view = memoryview(data)
         while view:
-            view = view[self._file.write(view) :]
+            view = view[self._background.write(self._file, view) :]
 
     def append(self, chunk: Chunk) -> None:
         """Compress and write a chunk and its message indexes.

@@ -4,9 +4,7 @@ Building, compressing and writing happen in a thread of their own, in the order 
 that the same calls give the same bytes. Everything given to the writer is copied first.
 """
 
-import queue
-import threading
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
@@ -15,6 +13,7 @@ import numpy as np
 
 from teleop_core.bags import compression as compressions
 from teleop_core.bags import ending, rosbag2
+from teleop_core.bags.background import SYSTEM, Background
 from teleop_core.bags.chunks import Assembly, Messages, Single, Stretch
 from teleop_core.bags.layouts import SECOND_NS, Layout, Stamps, Values, layout
 from teleop_core.bags.mcap_file import McapFile
@@ -59,6 +58,7 @@ class BagWriter:
         hold_ns: Longest log time for which single messages wait for more of them, [ns]. Shorter
             than a second means a live recording: what was handed over is brought to the disk at
             once, so that neither the end of the process nor a loss of power costs more.
+        background: Its thread, queue and disk.
 
     Raises:
         RecordingError: The path exists already or cannot be written.
@@ -75,6 +75,7 @@ class BagWriter:
         metadata: Mapping[str, str] | None = None,
         start_ns: int = 0,
         hold_ns: int = SECOND_NS,
+        background: Background = SYSTEM,
     ) -> None:
         self.path, self._start_ns, self._hold_ns = Path(path), start_ns, hold_ns
         self.parameters = parameters or RecordingParameters()
@@ -96,21 +97,20 @@ class BagWriter:
         self._bytes, self._first_ns = 0, 0
         self._failure: BaseException | None = None
         self._is_open = True
-        self._mcap = self._create({METADATA_NAME: dict(metadata or {})})
-        self._jobs: queue.Queue[Messages | None] = queue.Queue(
-            maxsize=QUEUE_LENGTH * max(1, SECOND_NS // hold_ns)
-        )
-        self._worker = threading.Thread(target=self._work, name="bag writer", daemon=True)
+        self._mcap = self._create({METADATA_NAME: dict(metadata or {})}, background)
+        self._jobs = background.queue(QUEUE_LENGTH * max(1, SECOND_NS // hold_ns))
+        self._worker = background.thread("bag writer", self._work)
         self._worker.start()
 
-    def _create(self, metadata: dict[str, dict[str, str]]) -> McapFile:
+    def _create(self, metadata: dict[str, dict[str, str]], background: Background) -> McapFile:
         name = self.parameters.compression
         compress = compressions.compressor(name, self.parameters.compression_level)
         schemas, channels = rosbag2.records_of(self._topics)
         with rosbag2.new_directory(self.path) as file:
             return McapFile(
-                file, schemas, channels, metadata, "" if name == "none" else name, compress
-            )
+                file, schemas, channels, metadata, "" if name == "none" else name, compress,
+                background,
+            )  # fmt: skip
 
     # -- what callers do -------------------------------------------------------------------------
 
@@ -238,7 +238,8 @@ class BagWriter:
     # -- the writing thread ----------------------------------------------------------------------
 
     def _work(self) -> None:
-        jobs, assembly = iter(self._jobs.get, None), Assembly(CHUNK_BYTES)
+        jobs: Iterator[Messages] = iter(self._jobs.get, None)
+        assembly = Assembly(CHUNK_BYTES)
         stopped: OSError | None = None
         try:
             for stretches, singles in jobs:

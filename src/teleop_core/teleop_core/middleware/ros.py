@@ -17,6 +17,7 @@ from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
+from teleop_core.bags.background import SYSTEM, Background
 from teleop_core.graph.layers import RealTimeParameters
 from teleop_core.middleware.real_time import apply_options
 from teleop_core.middleware.ros_lifecycle import RosLifecycleNode
@@ -54,6 +55,7 @@ class RosWorld:
     def __init__(self, context: Context | None = None) -> None:
         self._context = context
 
+    background: Background = SYSTEM
     monotonic_ns = staticmethod(time.monotonic_ns)
     time_ns = staticmethod(time.time_ns)
     sleep = staticmethod(time.sleep)

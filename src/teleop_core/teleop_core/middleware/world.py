@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Any, NamedTuple, Protocol
 
+from teleop_core.bags.background import Background
 from teleop_core.base.parameters import Spec, Value
 from teleop_core.graph.layers import RealTimeParameters
 
@@ -382,6 +383,10 @@ class WorldEndedError(Exception):
 
 class World(Protocol):
     """Everything outside of the nodes of one process."""
+
+    @property
+    def background(self) -> Background:
+        """Where recordings are written."""
 
     def monotonic_ns(self) -> int:
         """Time of a clock that never goes back [ns]."""

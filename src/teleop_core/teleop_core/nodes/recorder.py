@@ -184,6 +184,7 @@ class RecorderNode(CoreNode):
         self._open = partial(
             BagWriter, topics=(*topics, self._mark_topic, *self._model.topics), joint_names={},
             parameters=parameters, metadata=self._about(configuration), hold_ns=HOLD_NS,
+            background=self.world.background,
         )  # fmt: skip
         self._begin_recording(self._path)
         self._is_broken = False

@@ -171,13 +171,19 @@ class _Watched:
                 self._joints.obey(slave, self._control.word)
 
 
-def _install() -> None:
+def register() -> None:
+    """Register the stage that breaks, once."""
+    if STAGE_NAME in STAGES:
+        return
     stage = Stage(
         STAGE_NAME, NoParameters, reads=(SLAVE_SERVO_CP,), writes=(DRILLED_CP,),
         trigger=SLAVE_SERVO_CP, replaces=SLAVE_SERVO_CP, make=_make,
     )  # fmt: skip
-    if STAGE_NAME not in STAGES:
-        register_stage(stage)
+    register_stage(stage)
+
+
+def _install() -> None:
+    register()
     file = os.environ.get(VARIABLE)
     if file is None:
         return

@@ -76,7 +76,7 @@ class Writer:
     ) -> None:  # fmt: skip
         self._bus, self.process, self.node, self.topic, self.qos = bus, process, node, topic, qos
         self._encode = encode
-        self.sender = bus.next_gid()
+        self.sender, self.born_ns = bus.next_gid(), bus.scheduler.now_ns
         self.number, self.is_open, self.is_active = 0, True, True
         self.links: list[_Link] = []
         self.history: deque[Taken] = deque(maxlen=None if qos.keeps_all else qos.depth)
@@ -93,7 +93,7 @@ class Writer:
         bus.scheduler.charge(_PUBLISH_NS)
         self.number += 1
         now_ns = bus.scheduler.now_ns
-        taken = Taken(data, self.sender, self.number, bus.time_of(self.process), 0)
+        taken = Taken(data, self.sender, self.number, now_ns + bus.offset_of(self.process), 0)
         self.history.append(taken)
         for link in self.links:
             if link.writer_knows_ns <= now_ns:
@@ -214,10 +214,16 @@ class Service:
     Args:
         process: Whose it is.
         answer: Told a request; has the answer sent.
+        born_ns: When it was made [ns].
     """
 
-    def __init__(self, process: Process, answer: Callable[[Any, Callable[[Any], None]], None]):
-        self.process, self.answer, self.is_open = process, answer, True
+    def __init__(
+        self,
+        process: Process,
+        answer: Callable[[Any, Callable[[Any], None]], object],
+        born_ns: int,
+    ) -> None:
+        self.process, self.answer, self.born_ns, self.is_open = process, answer, born_ns, True
 
 
 class Bus:
@@ -235,6 +241,8 @@ class Bus:
         self.readers: dict[str, list[Reader]] = {}
         self.services: dict[str, Service] = {}
         self._known: dict[tuple[Process, object], int] = {}
+        self._born_ns: dict[Process, int] = {}
+        self._called_ns: dict[tuple[Process, Process], int] = {}
         self._gids = self._orders = 0
         self.lines: dict[tuple[str, str], Line] = {}
         """Lines that are not perfect, by the names of both processes; * for any."""
@@ -254,16 +262,16 @@ class Bus:
         self._orders += 1
         return self._orders
 
-    def time_of(self, process: Process) -> int:
-        """Time of the system's clock of a process [ns]."""
-        return self.scheduler.now_ns + self.offset_of(process)
-
     def offset_of(self, process: Process) -> int:
-        """What that clock is ahead of time [ns]."""
-        return process.machine.epoch_ns(process)
+        """What the clock of the middleware of a process is ahead of time [ns].
+
+        A clock that the drill steps is that of Python alone.
+        """
+        return process.machine.epoch_ns(process.machine.clock)
 
     def watch(self, process: Process) -> None:
         """Take part in the life of a process."""
+        self._born_ns[process] = self.scheduler.now_ns
         process.on_end.append(lambda is_orderly: self._leave(process, is_orderly=is_orderly))
         process.on_resume.append(lambda since_ns: self._wake_up(process, since_ns))
 
@@ -272,7 +280,6 @@ class Bus:
         self.writers.setdefault(writer.topic, []).append(writer)
         for reader in self.readers.get(writer.topic, ()):
             self._match(writer, reader)
-        self._know(writer.process, writer, writer.topic)
         return writer
 
     def open_reader(self, reader: Reader) -> Reader:
@@ -308,13 +315,9 @@ class Bus:
         """Whether a process has found an entity."""
         key = (process, entity)
         if key not in self._known:
-            self._known[key] = self.scheduler.now_ns + self._discovery(process, entity.process)
+            both_ns = max(entity.born_ns, self._born_ns.get(process, 0))
+            self._known[key] = both_ns + self._discovery(process, entity.process)
         return self._known[key] <= self.scheduler.now_ns
-
-    def _know(self, process: Process, entity: Writer | Service, topic: str) -> None:
-        """Let processes with readers of a topic find a writer in their own time."""
-        for reader in self.readers.get(topic, ()):
-            self.knows(reader.process, entity)
 
     def topics(self) -> list[str]:
         """Topics that have writers or readers."""
@@ -426,7 +429,9 @@ class Bus:
             self.services.pop(name).is_open = False
         self.scheduler.at(self.scheduler.now_ns + (1_000_000 if is_orderly else _LEASE_NS), forget)
 
-    def later(self, event: Callable[[], object]) -> None:
-        """Let something happen after the time that a request or an answer takes."""
-        delay_ns = _CALL_NS + round(_SPREAD_NS * self._random.random())
-        self.scheduler.at(self.scheduler.now_ns + delay_ns, event)
+    def call(self, one: Process, other: Process, event: Callable[[], object]) -> None:
+        """Let something happen after the time that a request or an answer takes, in their order."""
+        due_ns = self.scheduler.now_ns + _CALL_NS + round(_SPREAD_NS * self._random.random())
+        due_ns = max(due_ns, self._called_ns.get((one, other), 0) + 1)
+        self._called_ns[one, other] = due_ns
+        self.scheduler.at(due_ns, event)

@@ -33,6 +33,7 @@ class SimulatedSteering:
     @contextmanager
     def installed(machine: Machine) -> Iterator[None]:
         """Let stages that the drill breaks wait in simulated time."""
+        inside.register()
         before = inside.Passing.sleep
         inside.Passing.sleep = staticmethod(machine.scheduler.sleep)
         try:

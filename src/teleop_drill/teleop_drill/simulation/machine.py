@@ -51,6 +51,10 @@ class Process(Turns):
         self.machine, self.name, self._work = machine, name, work
         self.exit_code: int | None = None
         self.stopped_ns, self.clock = 0, machine.clock
+        self.room: int | None = None
+        """Bytes that it may write still; None: as many as it likes."""
+        self.disk_delay = 0.0
+        """What each of its writes waits for the disk [s]."""
         self.lines: list[SocketEnd] = []
         self.listeners: list[Listener] = []
         self.on_end: list[Callable[[bool], None]] = []
@@ -194,9 +198,9 @@ class Machine:
             raise process.main.error
         return found[0]
 
-    def epoch_ns(self, process: Process) -> int:
-        """What the system's clock of a process is ahead of the monotonic one [ns]."""
-        clock, now_ns = process.clock, self.scheduler.now_ns
+    def epoch_ns(self, clock: Clock) -> int:
+        """What a system's clock is ahead of the monotonic one [ns]."""
+        now_ns = self.scheduler.now_ns
         return EPOCH_NS + clock.offset_ns + round(clock.drift * (now_ns - BEGIN_NS))
 
     def fail(self, process: Process, error: BaseException) -> None:

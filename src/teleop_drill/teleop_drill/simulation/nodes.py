@@ -167,15 +167,15 @@ class Client:
 
     def call_async(self, request: Any) -> Answer:
         """Ask."""
-        answer, bus = Answer(), self._node.bus
+        answer, bus, own = Answer(), self._node.bus, self._node.process
         service = bus.services.get(self.srv_name)
         if service is None:
             return answer
 
         def reply(response: Any) -> None:
-            bus.later(lambda: self._node.post(lambda: answer.set(response)))
+            bus.call(service.process, own, lambda: self._node.post(lambda: answer.set(response)))
 
-        bus.later(lambda: service.is_open and service.answer(request, reply))
+        bus.call(own, service.process, lambda: service.is_open and service.answer(request, reply))
         return answer
 
     def remove_pending_request(self, future: Any) -> None:
@@ -270,7 +270,8 @@ class SimulatedNode:
         def answer(request: Any, reply: Callable[[Any], None]) -> None:
             self.post(lambda: reply(callback(request, kind.Response())))
 
-        made = self.bus.services[self.resolve_topic_name(name)] = Service(self.process, answer)
+        made = Service(self.process, answer, self.machine.scheduler.now_ns)
+        self.bus.services[self.resolve_topic_name(name)] = made
         return made
 
     def create_client(self, kind: Any, name: str) -> Client:

@@ -203,6 +203,9 @@ class SimulatedSession:
 
     def limit_files(self, node: str, room: int | None) -> None:
         """Let files of a node's process grow by so many bytes only; None: as they like."""
+        process = self.process_of(node)
+        if process is not None:
+            process.room = room
 
     def hog(self) -> None:
         """Keep all processors busy: who has no priority waits for one."""

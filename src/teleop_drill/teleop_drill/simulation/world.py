@@ -3,9 +3,11 @@
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from teleop_core.bags.background import Background
 from teleop_core.graph.layers import RealTimeParameters
 from teleop_core.middleware.world import Hooks
 from teleop_drill.simulation.bus import Bus
+from teleop_drill.simulation.disk import Disk
 from teleop_drill.simulation.machine import Listener, Process, SocketEnd
 from teleop_drill.simulation.nodes import SimulatedExecutor, SimulatedLifecycleNode, SimulatedNode
 from teleop_drill.simulation.scheduler import Lock, Strand
@@ -28,11 +30,12 @@ class SimulatedWorld:
         self._bus, self._process, self._given = bus, process, given or {}
         self._scheduler = process.machine.scheduler
         self.monotonic_ns: Callable[[], int] = self._scheduler.look_ns
+        self.background: Background = Disk(process)
         self.sleep: Callable[[float], None] = self._scheduler.sleep
 
     def time_ns(self) -> int:
         """Time of the system's clock [ns]."""
-        return self._scheduler.look_ns() + self._process.machine.epoch_ns(self._process)
+        return self._scheduler.look_ns() + self._process.machine.epoch_ns(self._process.clock)
 
     def lock(self) -> Lock:
         """Lock between threads."""

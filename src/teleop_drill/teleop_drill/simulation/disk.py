@@ -1,0 +1,81 @@
+"""Disk: where a simulated process writes its recording, and the thread that does it."""
+
+import errno
+import os
+from collections import deque
+from collections.abc import Callable
+from typing import Any, BinaryIO
+
+from teleop_drill.simulation.machine import Process
+from teleop_drill.simulation.scheduler import Strand
+
+_BYTE_NS = 2
+"""What writing a byte takes [ns]."""
+
+
+class Jobs:
+    """As of :class:`~teleop_core.bags.background.Jobs`."""
+
+    def __init__(self, process: Process, size: int) -> None:
+        self._scheduler, self._size = process.machine.scheduler, size
+        self._jobs: deque[Any] = deque()
+        self._waiting: list[Strand] = []
+
+    def put(self, job: Any) -> None:
+        """Append, as soon as there is room."""
+        while len(self._jobs) >= self._size:
+            self._wait()
+        self._jobs.append(job)
+        self._tell()
+
+    def get(self) -> Any:
+        """Take the oldest, as soon as there is one."""
+        while not self._jobs:
+            self._wait()
+        job = self._jobs.popleft()
+        self._tell()
+        return job
+
+    def empty(self) -> bool:
+        """Whether nothing waits."""
+        return not self._jobs
+
+    def _wait(self) -> None:
+        self._waiting.append(self._scheduler.current)
+        self._scheduler.wait(None)
+
+    def _tell(self) -> None:
+        waiting, self._waiting = self._waiting, []
+        for strand in waiting:
+            self._scheduler.wake(strand)
+
+
+class Disk:
+    """As of :class:`~teleop_core.bags.background.Background`, of one process.
+
+    Args:
+        process: Who writes.
+    """
+
+    def __init__(self, process: Process) -> None:
+        self._process = process
+
+    def queue(self, size: int) -> Jobs:
+        """Queue of so many jobs."""
+        return Jobs(self._process, size)
+
+    def thread(self, name: str, work: Callable[[], None]) -> Strand:
+        """Thread that does something, once it is started."""
+        return self._process.machine.scheduler.spawn(self._process, name, work)
+
+    def write(self, file: BinaryIO, data: bytes | memoryview) -> int:
+        """Write, as far as the process may; raises OSError."""
+        room, scheduler = self._process.room, self._process.machine.scheduler
+        scheduler.sleep(self._process.disk_delay + 1e-9 * _BYTE_NS * len(data))
+        if room is None:
+            return file.write(data)
+        taken = file.write(data[: max(0, room)])
+        self._process.room = room - taken
+        if not taken:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        return taken
