@@ -84,6 +84,7 @@ setup(
             "ruff",
             "mypy",
             "types-PyYAML",
+            "types-greenlet",
             "psutil",
             "sympy",
             "colcon-common-extensions",

@@ -15,6 +15,7 @@ setup(
     python_requires=">=3.11",
     install_requires=[
         f"teleop_core=={VERSION}",
+        "greenlet",
         "lazy_loader",
         "mcap",
         "numpy",

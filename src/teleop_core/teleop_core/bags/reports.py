@@ -19,7 +19,14 @@ class Report(NamedTuple):
     values: dict[str, str]
 
 
-def report(stamp_ns: int, name: str, level: int, message: str, values: Mapping[str, str]) -> bytes:
+def report(
+    stamp_ns: int,
+    name: str,
+    level: int,
+    message: str,
+    values: Mapping[str, str],
+    hardware: str = "",
+) -> bytes:
     """CDR bytes of a report with one status.
 
     Args:
@@ -28,10 +35,11 @@ def report(stamp_ns: int, name: str, level: int, message: str, values: Mapping[s
         level: 0 ok, 1 warning, 2 error, 3 stale.
         message: One line for people.
         values: Names and texts of what is reported.
+        hardware: What it is a report of.
     """
     types = ros_types.typestore().types
     pairs = [types["diagnostic_msgs/msg/KeyValue"](key, text) for key, text in values.items()]
-    status = types["diagnostic_msgs/msg/DiagnosticStatus"](level, name, message, "", pairs)
+    status = types["diagnostic_msgs/msg/DiagnosticStatus"](level, name, message, hardware, pairs)
     time = types["builtin_interfaces/msg/Time"](*divmod(stamp_ns, SECOND_NS))
     header = types["std_msgs/msg/Header"](time, "")
     return ros_types.serialise(types[Kind.REPORT.ros_type](header, [status]))

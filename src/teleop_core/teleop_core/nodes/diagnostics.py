@@ -3,9 +3,9 @@
 from collections import Counter
 from collections.abc import Mapping
 
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from diagnostic_msgs.msg import DiagnosticArray
 
-from teleop_core.bags.messages import SECOND_NS, Refusal
+from teleop_core.bags.messages import Refusal, report
 from teleop_core.graph.topics import DIAGNOSTICS
 from teleop_core.middleware.world import Owner
 from teleop_core.nodes.quality import NO_OVERRIDES, profile
@@ -13,6 +13,8 @@ from teleop_core.nodes.rate import Recent, TickCounts
 from teleop_core.nodes.sender import Sender
 from teleop_core.nodes.streams import Input
 
+OK, WARNING = 0, 1
+"""Levels of a report."""
 _STEP_NS = 50_000_000
 """A clock that moves by more against the monotonic one within a second was stepped [ns]."""
 
@@ -82,14 +84,9 @@ class Reporter:
     def send(self, concerns: list[str], text: str, values: Mapping[str, str]) -> None:
         """Publish one status: a warning if there are concerns."""
         name = f"{self._owner.ros.get_namespace()}/{self._owner.ros.get_name()}".strip("/")
-        status = DiagnosticStatus(name=name, hardware_id="teleop_core")
-        status.level = DiagnosticStatus.WARN if concerns else DiagnosticStatus.OK
-        status.message = "; ".join(concerns) or text
-        status.values = [KeyValue(key=key, value=value) for key, value in values.items()]
-        message = DiagnosticArray(status=[status])
-        stamp = message.header.stamp
-        stamp.sec, stamp.nanosec = divmod(self._world.time_ns(), SECOND_NS)
-        self._publisher.publish(message)
+        level, message = (WARNING, "; ".join(concerns)) if concerns else (OK, text)
+        now_ns = self._world.time_ns()
+        self._publisher.publish(report(now_ns, name, level, message, values, "teleop_core"))
 
 
 def tick_values(state: str, rate: float, counts: TickCounts, period_ms: float) -> dict[str, str]:

@@ -19,6 +19,8 @@ without a name all faults are injected, which takes minutes:
   teleop drill --list                      what there is
   teleop drill stop_topic kill_motion_scaling
   teleop drill --short                     five faults, less than a minute
+  teleop drill --simulated                 all on a simulated machine: the same bits every time
+  teleop drill --simulated --seed 7 flood  with other delays, costs and discoveries
   teleop drill --composed --json drill.json
   teleop drill --drives "python examples/foreign_slave.py"    drives of your own
   teleop drill --drives "arm_bridge --ros-args --params-file arm.yaml" --arm "./controller"
@@ -35,6 +37,13 @@ def add(commands: Any) -> None:
     parser.add_argument("names", nargs="*", metavar="NAME", help="faults (default: all)")
     parser.add_argument("--composed", action="store_true", help="all nodes in one process")
     parser.add_argument("--short", action="store_true", help="the most telling five faults")
+    parser.add_argument(
+        "--simulated", action="store_true",
+        help="processes, clocks, disk and middleware are simulated, drawn from --seed",
+    )  # fmt: skip
+    parser.add_argument(
+        "--seed", type=int, default=0, metavar="N", help="of the simulated machine (default 0)"
+    )
     parser.add_argument("--list", action="store_true", dest="is_list", help="list the faults")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write all numbers as JSON")
     parser.add_argument("--markdown", type=Path, metavar="FILE", help="write the table as Markdown")
@@ -64,6 +73,10 @@ def _run(arguments: argparse.Namespace) -> int:
         return 0
     if arguments.drives and arguments.composed:
         raise ParameterError("--drives", shlex.join(arguments.drives), "without --composed")
+    if arguments.simulated and arguments.drives:
+        raise ParameterError("--drives", shlex.join(arguments.drives), "without --simulated")
+    if arguments.seed and not arguments.simulated:
+        raise ParameterError("--seed", arguments.seed, "with --simulated")
     if arguments.arm and not arguments.drives:
         raise ParameterError("--arm", shlex.join(arguments.arm), "with --drives, which lead it")
     check_places(arguments.json, arguments.markdown)
@@ -82,11 +95,23 @@ def _outcomes(exercises: "tuple[Exercise, ...]", arguments: argparse.Namespace) 
     from rich.console import Console
 
     console, out = Console(), arguments.out
+
+    def say(line: str) -> None:
+        console.print(line, highlight=False, markup=False, soft_wrap=True)
+
     with ExitStack() as end:
         folder = out or Path(end.enter_context(tempfile.TemporaryDirectory(prefix="drill_")))
+        if arguments.simulated:
+            from teleop_core.nodes.crews import Processes
+
+            return ros_module("drill", "teleop_drill.simulation").simulated_drill(  # type: ignore[no-any-return]
+                exercises, folder, say, seed=arguments.seed,
+                processes=Processes.ONE if arguments.composed else Processes.NODES,
+                files=arguments.config, texts=arguments.settings,
+            )  # fmt: skip
         return ros_module("drill", "teleop_drill.nodes").drill(  # type: ignore[no-any-return]
             exercises, folder,
-            lambda line: console.print(line, highlight=False, markup=False, soft_wrap=True),
+            say,
             is_composed=arguments.composed, files=arguments.config, texts=arguments.settings,
             drives=arguments.drives, arm=arguments.arm,
         )  # fmt: skip

@@ -1,7 +1,6 @@
 """Drill: breaks a running session in one way after the other, and measures what the arm does."""
 
 import math
-import os
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -263,7 +262,7 @@ class _Drill:
     def _once(self, exercise: Exercise, rig: LiveRig) -> Outcome:
         rig.wait(_BEFORE)
         rig.tap.clear()
-        outcome = Outcome(exercise=exercise, load=os.getloadavg()[0] / (os.cpu_count() or 1))
+        outcome = Outcome(exercise=exercise, load=rig.site.load())
         self._open.setdefault(rig.session.recordings[-1], []).append((rig.now_ns(), outcome))
         before = rig.operation()
         rig.mark()

@@ -123,6 +123,9 @@ class Site(Protocol):
     def session(self, observer: Observer) -> Session:
         """Processes of a session, of which an observer hears."""
 
+    def load(self) -> float:
+        """Load of the machine, per processor."""
+
 
 class LiveRig:
     """A session of processes with the drill's own nodes beside them.
@@ -135,6 +138,7 @@ class LiveRig:
 
     def __init__(self, site: Site, configuration: Configuration, robot: Robot) -> None:
         assert robot.drives is not None
+        self.site = site
         self.is_composed, self._robot, world = site.is_composed, robot, site.world
         self._world, domain = world, site.domain
         self._speed_limit = np.array(robot.drives.speed_limit)

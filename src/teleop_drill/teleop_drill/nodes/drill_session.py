@@ -256,6 +256,10 @@ class LiveSite:
         self.control: Steering = inside.Control.make(file)
         self._env[inside.VARIABLE] = str(file)
 
+    def load(self) -> float:
+        """Load of the machine, per processor."""
+        return os.getloadavg()[0] / (os.cpu_count() or 1)
+
     def session(self, observer: Observer) -> DrillSession:
         """Processes of a session, of which an observer hears."""
         return DrillSession(

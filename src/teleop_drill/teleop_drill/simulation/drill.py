@@ -3,12 +3,16 @@
 from collections.abc import Sequence
 from pathlib import Path
 
+from teleop_core.graph.graph import RECORDER_NAME
+from teleop_core.middleware.world import World
 from teleop_core.nodes.crews import Processes, crews
 from teleop_core.nodes.observer import Observer
+from teleop_core.nodes.start import SESSION
 from teleop_core.session.configuration import Configuration
 from teleop_drill.drill.exercise import Exercise, Master
 from teleop_drill.drill.outcome import Outcome
 from teleop_drill.nodes.drill import Say, drill_at
+from teleop_drill.nodes.drill_rig import Site, Steering
 from teleop_drill.simulation.bus import Bus
 from teleop_drill.simulation.inside import SimulatedSteering
 from teleop_drill.simulation.machine import Machine, Process
@@ -38,21 +42,25 @@ class SimulatedSite:
         self.is_composed = processes is Processes.ONE
         self.master, self._configuration, self._folder = master, configuration, folder
         self._bus, self._owner, self._processes = bus, owner, processes
-        self.world = SimulatedWorld(bus, owner)
-        self.control = SimulatedSteering(owner.machine)
+        self.world: World = SimulatedWorld(bus, owner)
+        self._steering = SimulatedSteering(owner.machine)
+        self.control: Steering = self._steering
+
+    def load(self) -> float:
+        """Load of the machine: none that is not simulated."""
+        return 0.0
 
     def session(self, observer: Observer) -> SimulatedSession:
         """Processes of a session, of which an observer hears."""
-        shared = {
-            name: nodes
-            for crew in crews(self._configuration.graph, self._processes)
-            for name, nodes in crew.items()
-        }
+        graph = self._configuration.graph
+        shared = {n: nodes for crew in crews(graph, self._processes) for n, nodes in crew.items()}
+        if self.is_composed:  # the recorder too, as of `ros2 run teleop_core teleop_session`
+            shared = {SESSION: (RECORDER_NAME, *(member.name for member in graph.members))}
         made = SimulatedSession(
             self._bus, self._owner, self._configuration, shared, self._folder, observer,
             self.master,
         )  # fmt: skip
-        self.control.session = made
+        self._steering.session = made
         return made
 
 
@@ -85,11 +93,13 @@ def simulated_drill(
 
     def work(owner: Process) -> list[Outcome]:
         bus.watch(owner)
+
+        def site(master: Master, made: Configuration, place: Path) -> Site:
+            return SimulatedSite(bus, owner, made, place, master, processes)
+
+        given = ("real_time.priority=30", *texts)
         with SimulatedSteering.installed(machine):
-            return drill_at(
-                lambda master, made, place: SimulatedSite(bus, owner, made, place, master, processes),
-                exercises, folder, say, files, ("real_time.priority=30", *texts),
-            )  # fmt: skip
+            return drill_at(site, exercises, folder, say, files, given)
 
     found: list[Outcome] = machine.run(work)
     return found

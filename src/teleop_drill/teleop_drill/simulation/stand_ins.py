@@ -1,4 +1,4 @@
-"""Stand-ins: the watch of a process, whose own needs signals and the system's accounts; a stranger."""
+"""Stand-ins: a watch of processes without signals and accounts of the system; a stranger."""
 
 from teleop_core.graph.topics import STREAMS
 from teleop_core.nodes.loop import Loop

@@ -8,8 +8,9 @@ from teleop_core.graph.layers import RealTimeParameters
 from teleop_core.middleware.world import Hooks
 from teleop_drill.simulation.bus import Bus
 from teleop_drill.simulation.disk import Disk
+from teleop_drill.simulation.lifecycle import SimulatedLifecycleNode
 from teleop_drill.simulation.machine import Listener, Process, SocketEnd
-from teleop_drill.simulation.nodes import SimulatedExecutor, SimulatedLifecycleNode, SimulatedNode
+from teleop_drill.simulation.nodes import SimulatedExecutor, SimulatedNode
 from teleop_drill.simulation.scheduler import Lock, Strand
 
 _PLACE = "recorder"

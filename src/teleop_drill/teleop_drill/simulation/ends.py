@@ -1,0 +1,196 @@
+"""Ends: writers and readers of simulated topics, and services."""
+
+from bisect import insort
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from teleop_core.middleware.world import Qos, Taken
+from teleop_drill.simulation.machine import Process
+from teleop_drill.simulation.scheduler import Strand
+
+if TYPE_CHECKING:
+    from teleop_drill.simulation.bus import Bus
+
+_PUBLISH_NS, _TAKE_NS = 12_000, 900
+"""What the middleware needs to hand a message over, measured with rclpy."""
+
+
+@dataclass
+class Link:
+    """A writer and a reader that have found each other, or will have."""
+
+    reader: "Reader"
+    writer_knows_ns: int
+    reader_knows_ns: int
+    is_reliable: bool
+    last_ns: int = 0
+
+
+class Writer:
+    """One end of a topic; as of :class:`~teleop_core.middleware.world.Publisher`.
+
+    Args:
+        bus: Where it is.
+        process: Whose it is.
+        node: Name of its node, with the namespace.
+        topic: Full name.
+        qos: Its quality.
+        encode: Bytes of a message.
+    """
+
+    def __init__(
+        self, bus: "Bus", process: Process, node: str, topic: str, qos: Qos,
+        encode: Callable[[Any], bytes],
+    ) -> None:  # fmt: skip
+        self._bus, self.process, self.node, self.topic, self.qos = bus, process, node, topic, qos
+        self._encode = encode
+        self.sender, self.born_ns = bus.next_gid(), bus.scheduler.now_ns
+        self.number, self.is_open, self.is_active = 0, True, True
+        self.links: list[Link] = []
+        self.history: deque[Taken] = deque(maxlen=None if qos.keeps_all else qos.depth)
+
+    def publish(self, message: Any) -> None:
+        """Send a message, or the bytes of one."""
+        self.send(message if isinstance(message, bytes) else self._encode(message))
+
+    def send(self, data: bytes) -> None:
+        """Send bytes, if the node is active."""
+        if not (self.is_active and self.is_open):
+            return
+        bus = self._bus
+        bus.scheduler.charge(_PUBLISH_NS)
+        self.number += 1
+        now_ns = bus.scheduler.now_ns
+        taken = Taken(data, self.sender, self.number, now_ns + bus.offset_of(self.process), 0)
+        self.history.append(taken)
+        for link in self.links:
+            if link.writer_knows_ns <= now_ns:
+                bus.carry(self, link, taken)
+
+    def get_subscription_count(self) -> int:
+        """Readers that were found."""
+        now_ns = self._bus.scheduler.now_ns
+        return sum(link.writer_knows_ns <= now_ns for link in self.links)
+
+    def wait_for_all_acked(self, seconds: float) -> None:
+        """Wait until all readers have all messages: a moment, here."""
+        self._bus.scheduler.sleep(min(seconds, 1e-3))
+
+
+class Reader:
+    """Other end of a topic; as of :class:`~teleop_core.middleware.world.Taker`.
+
+    Args:
+        bus: Where it is.
+        process: Whose it is.
+        kind: Class of its messages.
+        topic: Full name.
+        qos: Its quality.
+        node: Name of its node, with the namespace.
+    """
+
+    def __init__(
+        self, bus: "Bus", process: Process, kind: Any, topic: str, qos: Qos, node: str
+    ) -> None:
+        self._bus, self.process, self.type, self.topic, self.qos = bus, process, kind, topic, qos
+        self.node = node
+        self.lost = 0
+        self.is_open = True
+        self.coming: deque[tuple[int, int, Taken]] = deque()
+        self._ready: deque[tuple[int, int, Taken]] = deque(
+            maxlen=None if qos.keeps_all else qos.depth
+        )
+        self.waiting: Strand | None = None
+        self.told: Callable[[], None] | None = None
+        """Called where a message comes, for those that an executor serves."""
+
+    def take(self) -> Taken | None:
+        """Oldest waiting message; None if there is none."""
+        scheduler = self._bus.scheduler
+        scheduler.charge(_TAKE_NS)
+        coming, ready = self.coming, self._ready
+        while coming and coming[0][0] <= scheduler.now_ns:
+            ready.append(coming.popleft())
+        if not ready or not self.is_open:
+            return None
+        came_ns, _, taken = ready.popleft()
+        return taken._replace(came_ns=came_ns + self._bus.offset_of(self.process))
+
+    def wait(self, seconds: float) -> None:
+        """Return when there is a message, or after some time [s]."""
+        scheduler = self._bus.scheduler
+        if self._ready or (self.coming and self.coming[0][0] <= scheduler.now_ns):
+            return
+        self.waiting = scheduler.current
+        if self.coming:
+            scheduler.at(self.coming[0][0], self.tell)
+        scheduler.wait(seconds)
+        self.waiting = None
+
+    def tell(self) -> None:
+        """A message has come."""
+        if self.waiting is not None:
+            self._bus.scheduler.wake(self.waiting)
+        if self.told is not None:
+            self.told()
+
+    def close(self) -> None:
+        """Stop listening."""
+        self._bus.leave_reader(self)
+
+    def put(self, came_ns: int, taken: Taken) -> None:
+        """Let a message come at a time [ns]."""
+        entry = (came_ns, self._bus.next_order(), taken)
+        if self.coming and self.coming[-1][0] > came_ns:
+            ordered = list(self.coming)
+            insort(ordered, entry)
+            self.coming = deque(ordered)
+        else:
+            self.coming.append(entry)
+        if self.waiting is not None or self.told is not None:
+            self._bus.scheduler.at(came_ns, self.tell)
+
+    def wake_up(self, since_ns: int, room: int) -> int:
+        """Keep of what came to a process that stood still what its socket took.
+
+        Args:
+            since_ns: Since when it stood still [ns].
+            room: Bytes that the socket still takes.
+
+        Returns:
+            The room that is left.
+        """
+        now_ns, kept, lost = self._bus.scheduler.now_ns, deque[tuple[int, int, Taken]](), []
+        for entry in self.coming:
+            if not since_ns <= entry[0] <= now_ns:
+                kept.append(entry)
+            elif room >= len(entry[2].data):
+                room -= len(entry[2].data)
+                kept.append(entry)
+            else:
+                lost.append(entry[2])
+        self.coming = kept
+        for taken in lost:
+            if not self._bus.send_again(self, taken):
+                self.lost += 1
+        return room
+
+
+class Service:
+    """Service of a node.
+
+    Args:
+        process: Whose it is.
+        answer: Told a request; has the answer sent.
+        born_ns: When it was made [ns].
+    """
+
+    def __init__(
+        self,
+        process: Process,
+        answer: Callable[[Any, Callable[[Any], None]], object],
+        born_ns: int,
+    ) -> None:
+        self.process, self.answer, self.born_ns, self.is_open = process, answer, born_ns, True
