@@ -65,6 +65,8 @@ class Writer:
         now_ns = bus.scheduler.now_ns
         taken = Taken(data, self.sender, self.number, now_ns + bus.offset_of(self.process), 0)
         self.history.append(taken)
+        if self.topic in bus.seen:
+            bus.seen[self.topic](data)
         for link in self.links:
             if link.writer_knows_ns <= now_ns:
                 bus.carry(self, link, taken)

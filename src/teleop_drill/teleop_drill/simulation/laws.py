@@ -1,0 +1,192 @@
+"""Laws: what must hold whatever goes wrong, judged by who sees all at once."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from teleop_core.bags.messages import layout
+from teleop_core.graph.signals import DT
+from teleop_core.graph.topics import SLAVE_SETPOINT_JS
+from teleop_core.kernels.geometry import Array
+from teleop_core.slave.operation import State
+from teleop_drill.drill.numbers import Numbers
+from teleop_drill.simulation.machine import Process
+from teleop_drill.simulation.stage import Stage
+
+_LOOK_NS = 5_000_000
+_SLACK = 1e-6
+_TELL = 0.3
+"""Time within which the operator is told a new state [s], of the time in which the arm works."""
+_OBEY = 0.1
+"""Time within which a pressed stop is in force [s], of the time in which the arm works."""
+_QUEUES = 20_000
+"""Messages that may wait anywhere."""
+
+
+@dataclass(frozen=True)
+class Broken:
+    """A law that did not hold.
+
+    Attributes:
+        law: Its name.
+        at: When, from the time at which the arm followed [s].
+        text: What happened.
+    """
+
+    law: str
+    at: float
+    text: str
+
+
+class Laws:
+    """Judge of one session; looks at every setpoint, and at all else two hundred times a second.
+
+    Args:
+        stage: The session.
+        numbers: What its drives and its parameters say.
+
+    Attributes:
+        broken: First breach of each law.
+        looks: How often each law was looked at.
+    """
+
+    def __init__(self, stage: Stage, numbers: Numbers) -> None:
+        self._stage, self._numbers = stage, numbers
+        self._scheduler = stage.machine.scheduler
+        self._form = layout(SLAVE_SETPOINT_JS, stage.robot.joint_names)
+        self.broken: dict[str, Broken] = {}
+        self.looks: dict[str, int] = {}
+        self.begin_ns = self._scheduler.now_ns
+        self._last: tuple[Array, Process | None] | None = None
+        self._braking = float(np.max(numbers.speed_limit / numbers.braking))
+        self._slave: Any = None
+        self._worked = 0.0
+        """Time for which the slave has worked [s]: it does nothing while it stands still."""
+        self._seen_state, self._since = -1, 0.0
+        self._resting_since: float | None = None
+        self._moved_at = 0.0
+        self._press: tuple[int, float] | None = None
+        self._presses = 0
+        stage.bus.seen[f"/{SLAVE_SETPOINT_JS.name}"] = self._judge_setpoint
+        self._scheduler.at(0, self._look)
+
+    def _break(self, law: str, text: str) -> None:
+        at = 1e-9 * (self._scheduler.now_ns - self.begin_ns)
+        self.broken.setdefault(law, Broken(law, at, text))
+
+    def _count(self, law: str) -> None:
+        self.looks[law] = self.looks.get(law, 0) + 1
+
+    # -- at every setpoint -----------------------------------------------------------------------
+
+    def _judge_setpoint(self, data: bytes) -> None:
+        found = self._form.decode_one(data)
+        slave = self._stage.session.node("slave")
+        if found is None or slave is None:
+            self._last = None
+            return
+        q = np.array(found[1][: self._stage.robot.n])
+        process = self._stage.session.process_of("slave")
+        if self._last is not None and self._last[1] is process:
+            self._judge_speed(q - self._last[0])
+        self._last = q, process
+
+    def _judge_speed(self, step: Array) -> None:
+        self._count("speed")
+        speed = np.abs(step) / DT
+        if (speed > self._numbers.speed_limit * (1.0 + _SLACK)).any():
+            joint = int(np.argmax(speed / self._numbers.speed_limit))
+            self._break(
+                "speed", f"joint {joint + 1} was sent at {speed[joint]:.3g}, beyond its drive's "
+                f"{self._numbers.speed_limit[joint]:.3g}"
+            )  # fmt: skip
+        if speed.max() > _SLACK:
+            self._moved_at = self._worked
+
+    # -- now and then ----------------------------------------------------------------------------
+
+    def _look(self) -> None:
+        self._scheduler.at(self._scheduler.now_ns + _LOOK_NS, self._look)
+        stage = self._stage
+        slave, process = stage.session.node("slave"), stage.session.process_of("slave")
+        works = slave is not None and process is not None and not process.is_stopped
+        if slave is not self._slave:
+            self._slave, self._seen_state, self._press = slave, -1, None
+            self._presses = len(stage.presses)
+        if works and slave is not None and slave.stage is not None and slave.is_at_work:
+            self._worked += 1e-9 * _LOOK_NS
+            self._judge_state(slave)
+            self._judge_stop(slave)
+        self._judge_ends()
+        self._judge_queues()
+
+    def _judge_state(self, slave: Any) -> None:
+        """An arm that may not move rests; its state is told in time."""
+        state = int(slave.stage.operation["state"])
+        if state != self._seen_state:
+            self._seen_state, self._since = state, self._worked
+        in_force = self._worked - self._since
+        self._count("motion")
+        moves = self._worked - self._moved_at < 1e-9 * _LOOK_NS
+        if moves and state != State.ENABLED and in_force > self._braking + 0.3:
+            self._break("motion", f"moves {in_force:.2f} s after it became {State(state).name}")
+        self._count("told")
+        told = self._stage.operation.get("state")
+        if in_force > _TELL and told != state:
+            was = "nothing" if told is None else State(int(told)).name
+            self._break("told", f"is {State(state).name} for {in_force:.2f} s and has told {was}")
+
+    def _judge_stop(self, slave: Any) -> None:
+        """A pressed stop is in force soon, and never lost."""
+        presses = self._stage.presses
+        if len(presses) > self._presses:
+            self._presses = len(presses)
+            self._press = presses[-1], self._worked
+        if self._press is None:
+            return
+        self._count("stop")
+        if slave.stage.operation["is_stopped"] or slave.stage.operation["is_pressed"]:
+            self._press = None
+        elif self._worked - self._press[1] > _OBEY + self._late():
+            self._press = None
+            self._break("stop", f"a stop was pressed, and {_OBEY:g} s later none is in force")
+
+    def _late(self) -> float:
+        """What the machine itself may take [s]: bad lines, and processors that others keep busy."""
+        lines = self._stage.bus.lines.values()
+        on_the_way = max((line.delay + 20.0 * line.jitter for line in lines), default=0.0)
+        lost = 0.2 * any(line.loss for line in lines)
+        return on_the_way + lost + 20e-9 * self._scheduler.costs.crowd_ns + 0.05
+
+    def _judge_ends(self) -> None:
+        """No process ends that was not told to."""
+        self._count("ends")
+        for process in self._stage.session.running.values():
+            if process.is_dead and process not in self._stage.killed:
+                self._stage.killed.add(process)
+                said = [one.text for one in self._stage.machine.log if one.level == "fatal"]
+                self._break("ends", f"{process.name} has ended: {' '.join(said[-1:])[-300:]}")
+
+    def _judge_queues(self) -> None:
+        """Nothing waits without end."""
+        self._count("queues")
+        for readers in self._stage.bus.readers.values():
+            for reader in readers:
+                if len(reader.coming) > _QUEUES and not reader.process.is_stopped:
+                    self._break("queues", f"{len(reader.coming)} messages of {reader.topic} wait")
+
+    # -- at the end ------------------------------------------------------------------------------
+
+    def judge_recovery(self, seconds: float | None, bound: float) -> None:
+        """After the cure the arm follows again, or says why not.
+
+        Args:
+            seconds: After how long it did [s]; None if it did not.
+            bound: Within which it must [s].
+        """
+        self._count("recovery")
+        if seconds is None:
+            told = self._stage.operation
+            name = State(int(told["state"])).name if told else "nothing"
+            self._break("recovery", f"does not follow {bound:g} s after the cure; it says {name}")

@@ -1,0 +1,189 @@
+"""Schedules: faults and commands at random times, drawn from a seed."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from random import Random
+
+import numpy as np
+
+from teleop_core.bags.messages import layout
+from teleop_core.graph.topics import MASTER_BUTTONS, SLAVE_SERVO_JP
+from teleop_core.slave.operation.states import COMMANDS
+from teleop_drill.simulation.bus import Line
+from teleop_drill.simulation.stage import Stage
+
+BEGIN, END = 1.0, 9.0
+"""Within this time of a session all faults begin [s]."""
+_LONGEST = 3.0  # that one lasts [s]
+_CLOCK_NS = (200_000_000, 3_600_000_000_000)
+
+
+@dataclass(frozen=True)
+class Fault:
+    """Something that goes wrong, or somebody does.
+
+    Attributes:
+        at: When it begins, from the time at which the arm follows [s].
+        kind: What it is.
+        where: Process that it befalls; empty for all.
+        seconds: How long it lasts.
+        amount: How much of it, from 0 to 1.
+    """
+
+    at: float
+    kind: str
+    where: str
+    seconds: float
+    amount: float
+
+    def text(self) -> str:
+        """The same in words."""
+        where = f" of {self.where}" if self.where else ""
+        return f"at {self.at:.3f} s {self.kind}{where} for {self.seconds:.3f} s ({self.amount:.2f})"
+
+
+Act = Callable[[Stage, Fault], Callable[[], None] | None]
+"""Begins a fault; what ends it, None where nothing does."""
+
+
+def draw(seed: int, processes: tuple[str, ...]) -> tuple[Fault, ...]:
+    """One to five faults of a seed, in the order of their times.
+
+    Args:
+        seed: What they are drawn from.
+        processes: Names of the processes that they may befall.
+    """
+    random = Random(f"{seed}/schedule")
+    faults = []
+    for _ in range(random.randint(1, 5)):
+        kind = random.choice(sorted(KINDS))
+        where = random.choice(processes) if kind in _OF_PROCESS else ""
+        seconds = min(_LONGEST, random.expovariate(1.0))
+        faults.append(Fault(random.uniform(BEGIN, END), kind, where, seconds, random.random()))
+    return tuple(sorted(faults, key=lambda fault: fault.at))
+
+
+def _stop(stage: Stage, fault: Fault) -> Callable[[], None]:
+    process = stage.process(fault.where)
+    process.stop()
+    stage.note_stop(process)
+    return process.go_on
+
+
+def _kill(stage: Stage, fault: Fault) -> Callable[[], None]:
+    stage.kill(fault.where)
+    return lambda: None
+
+
+def _crowd(stage: Stage, fault: Fault) -> Callable[[], None]:
+    costs = stage.machine.scheduler.costs
+    costs.crowd_ns = 1e7 * fault.amount
+    return lambda: setattr(costs, "crowd_ns", 0.0)
+
+
+def _hiccups(stage: Stage, fault: Fault) -> Callable[[], None]:
+    costs, before = stage.machine.scheduler.costs, stage.machine.scheduler.costs.hiccups
+    costs.hiccups = 0.1 * fault.amount
+    return lambda: setattr(costs, "hiccups", before)
+
+
+def _line(make: Callable[[float], Line]) -> Act:
+    def act(stage: Stage, fault: Fault) -> Callable[[], None]:
+        keys = ((fault.where, "*"), ("*", fault.where))
+        for key in keys:
+            stage.bus.lines[key] = make(fault.amount)
+
+        def mend() -> None:
+            for key in keys:
+                stage.bus.lines.pop(key, None)
+
+        return mend
+
+    return act
+
+
+def _clock(stage: Stage, fault: Fault) -> Callable[[], None]:
+    least, most = _CLOCK_NS
+    offset_ns = round(least * (most / least) ** fault.amount)
+    clock = stage.machine.clock
+    clock.offset_ns += offset_ns if int(1e6 * fault.amount) % 2 else -offset_ns
+    return lambda: setattr(clock, "offset_ns", 0)
+
+
+def _drift(stage: Stage, fault: Fault) -> Callable[[], None]:
+    stage.machine.clock.drift = 1e-3 * (fault.amount - 0.5)
+    return lambda: setattr(stage.machine.clock, "drift", 0.0)
+
+
+def _disk(stage: Stage, fault: Fault) -> Callable[[], None]:
+    process = stage.process("recorder")
+    process.disk_delay = 0.2 * fault.amount
+    return lambda: setattr(process, "disk_delay", 0.0)
+
+
+def _press(stage: Stage, fault: Fault) -> Callable[[], None]:
+    button = int(1e6 * fault.amount) % 2
+    stage.press(button, is_pressed=True)
+    return lambda: stage.press(button, is_pressed=False)
+
+
+def _command(stage: Stage, fault: Fault) -> None:
+    names = sorted((*COMMANDS, "release"))
+    stage.command(names[int(fault.amount * len(names)) % len(names)])
+
+
+def _drive(stage: Stage, fault: Fault) -> Callable[[], None]:
+    """Drive the joints as a client of CRTK does, far faster than they may go."""
+    speeds = np.sin(np.arange(1.0, stage.robot.n + 1.0) * (1.0 + 9.0 * fault.amount)) * 5.0
+    return stage.every(0.01, lambda: stage.drive(speeds))
+
+
+def _intrude(stage: Stage, fault: Fault) -> Callable[[], None]:
+    """Command the joints as another publisher of the same topic does."""
+    form = layout(SLAVE_SERVO_JP, stage.robot.joint_names)
+    place = stage.robot.home + 0.3 * np.sin(np.arange(stage.robot.n) + 10.0 * fault.amount)
+
+    def send() -> None:
+        stage.publish(SLAVE_SERVO_JP, form.encode_one(stage.world.time_ns(), place))
+
+    return stage.every(0.002, send)
+
+
+def _garbage(stage: Stage, fault: Fault) -> Callable[[], None]:
+    """Send bytes that are no message."""
+    data = bytes(int(255 * fault.amount) ^ k & 255 for k in range(int(200 * fault.amount)))
+    return stage.every(0.001, lambda: stage.publish(SLAVE_SERVO_JP, data))
+
+
+def _clutch(stage: Stage, fault: Fault) -> Callable[[], None]:
+    """Press the buttons of the stylus as a second publisher does."""
+    form = layout(MASTER_BUTTONS, ())
+    pressed = np.array([1.0, float(fault.amount > 0.5), 0.0])
+
+    def send() -> None:
+        stage.publish(MASTER_BUTTONS, form.encode_one(stage.world.time_ns(), pressed))
+
+    return stage.every(0.005, send)
+
+
+KINDS: dict[str, Act] = {
+    "standstill": _stop,
+    "kill": _kill,
+    "crowd": _crowd,
+    "hiccups": _hiccups,
+    "loss": _line(lambda amount: Line(loss=amount)),
+    "delay": _line(lambda amount: Line(delay=0.3 * amount * amount, jitter=0.05 * amount)),
+    "disorder": _line(lambda amount: Line(reorders=0.5 * amount, jitter=0.005)),
+    "repeats": _line(lambda amount: Line(repeats=amount)),
+    "clock step": _clock,
+    "clock drift": _drift,
+    "slow disk": _disk,
+    "press": _press,
+    "command": _command,
+    "drive": _drive,
+    "intruder": _intrude,
+    "garbage": _garbage,
+    "buttons": _clutch,
+}
+"""All kinds of faults, by their names."""
+_OF_PROCESS = ("standstill", "kill", "loss", "delay", "disorder", "repeats")

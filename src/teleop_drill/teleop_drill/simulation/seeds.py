@@ -1,0 +1,165 @@
+"""Seeds: random schedules, the laws that must hold in each, and the shortest that breaks one."""
+
+import os
+import tempfile
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass, field
+from functools import partial
+from multiprocessing import get_context
+from pathlib import Path
+
+from teleop_core.session import api
+from teleop_core.slave.operation import State
+from teleop_drill.drill import hand
+from teleop_drill.drill.numbers import Numbers
+from teleop_drill.simulation.bus import Bus
+from teleop_drill.simulation.laws import Broken, Laws
+from teleop_drill.simulation.machine import Machine, Process
+from teleop_drill.simulation.scheduler import Scheduler
+from teleop_drill.simulation.schedules import KINDS, Fault, draw
+from teleop_drill.simulation.stage import Stage
+
+PROCESSES = ("hand_side", "slave_side", "recorder")
+"""What a schedule may befall."""
+_START, _CURED = 20.0, 15.0
+"""Time in which the arm must follow, at first and after all is cured [s]."""
+_CIRCLE = (
+    "operator.kind=circle", f"operator.size=[{2 * hand.RADIUS}, 0.0, {2 * hand.RADIUS}]",
+    f"operator.period={hand.ROUND}", "operator.approach_time=1.0", "operator.patience=0.0",
+    "operator.rotation=0.0",
+)  # fmt: skip
+_PER_CHILD = 25  # sessions of one process of this machine: what was killed in them stays
+
+
+@dataclass
+class Found:
+    """What became of one schedule.
+
+    Attributes:
+        seed: Of everything.
+        faults: What was done.
+        broken: Laws that did not hold.
+        met: How often each fault met each state of the arm.
+        looks: How often each law was looked at.
+        seconds: Simulated time [s].
+    """
+
+    seed: int
+    faults: tuple[Fault, ...]
+    broken: tuple[Broken, ...] = ()
+    met: Counter[tuple[str, str]] = field(default_factory=Counter)
+    looks: Counter[str] = field(default_factory=Counter)
+    seconds: float = 0.0
+
+
+def run_seed(seed: int, faults: Sequence[Fault] | None = None, folder: Path | None = None) -> Found:
+    """Run one schedule.
+
+    Args:
+        seed: Of the machine, and of the schedule if none is given.
+        faults: The schedule.
+        folder: Where its recording goes; None: nowhere.
+    """
+    planned = draw(seed, PROCESSES) if faults is None else tuple(faults)
+    with tempfile.TemporaryDirectory(prefix="drill_") as place:
+        machine = Machine(Scheduler(seed))
+        bus = Bus(machine.scheduler)
+        found: Found = machine.run(
+            lambda owner: _Run(bus, owner, seed, planned, folder or Path(place)).run()
+        )
+    return found
+
+
+class _Run:
+    """One schedule."""
+
+    def __init__(
+        self, bus: Bus, owner: Process, seed: int, faults: tuple[Fault, ...], folder: Path
+    ) -> None:
+        bus.watch(owner)
+        made = api.configuration("free_motion", texts=(*_CIRCLE, "real_time.priority=20"))
+        numbers = Numbers.of(made)
+        self._found, self._scheduler = Found(seed, faults), owner.machine.scheduler
+        self._stage = Stage(bus, owner, made, numbers.robot, folder)
+        self._laws = Laws(self._stage, numbers)
+        self._ends: list[Callable[[], None]] = []
+
+    def run(self) -> Found:
+        """Do it."""
+        begin_ns = self._scheduler.now_ns
+        self._stage.session.start()
+        self._laws.judge_recovery(self._await(_START), _START)
+        self._laws.begin_ns = self._scheduler.now_ns
+        for fault in self._found.faults:
+            at_ns = self._laws.begin_ns + round(1e9 * fault.at)
+            self._scheduler.at(at_ns, partial(self._begin, fault))
+        last = max((fault.at + fault.seconds for fault in self._found.faults), default=0.0)
+        self._wait(last + 0.5)
+        for end in self._ends:
+            end()
+        self._stage.command("release")
+        self._laws.judge_recovery(self._await(_CURED), _CURED)
+        self._found.seconds = 1e-9 * (self._scheduler.now_ns - begin_ns)
+        for process in self._stage.session.running.values():
+            self._stage.killed.add(process)  # from now on they are told to
+        self._stage.session.close()
+        self._found.broken = tuple(self._laws.broken.values())
+        self._found.looks.update(self._laws.looks)
+        return self._found
+
+    def _begin(self, fault: Fault) -> None:
+        state = self._stage.operation.get("state")
+        word = "none" if state is None else State(int(state)).name
+        self._found.met[fault.kind, word] += 1
+        process = self._stage.session.running.get(fault.where)
+        if process is not None and process.is_dead:
+            return
+        end = KINDS[fault.kind](self._stage, fault)
+        if end is not None:
+            self._ends.append(end)
+            self._scheduler.at(self._scheduler.now_ns + round(1e9 * fault.seconds), end)
+
+    def _wait(self, seconds: float) -> None:
+        self._scheduler.sleep(seconds)
+
+    def _await(self, patience: float) -> float | None:
+        """Wait until the arm follows, and help it; after how long it did [s]."""
+        begin_ns = self._scheduler.now_ns
+        steady = 0
+        while (elapsed := 1e-9 * (self._scheduler.now_ns - begin_ns)) < patience:
+            steady = steady + 1 if self._stage.follows() else 0
+            if steady >= 4:
+                return elapsed
+            if not steady:
+                self._stage.help()
+            self._wait(0.1)
+        return None
+
+
+def shrink(found: Found, law: str) -> Found:
+    """Fewest faults of a schedule under which a law is broken still."""
+    best, must_look = found, True
+    while must_look:
+        must_look = False
+        for left_out in range(len(best.faults)):
+            fewer = best.faults[:left_out] + best.faults[left_out + 1 :]
+            again = run_seed(found.seed, fewer)
+            if any(one.law == law for one in again.broken):
+                best, must_look = again, True
+                break
+    return best
+
+
+def run_seeds(seeds: Sequence[int], workers: int | None = None) -> Iterator[Found]:
+    """Run schedules on all cores, in the order in which they end.
+
+    Args:
+        seeds: Of the schedules.
+        workers: How many at once; None: one for each core.
+    """
+    count = workers or os.cpu_count() or 1
+    context = get_context("forkserver")
+    with ProcessPoolExecutor(count, context, max_tasks_per_child=_PER_CHILD) as pool:
+        yield from pool.map(run_seed, seeds)

@@ -1,0 +1,173 @@
+"""Stage: a session by side on a simulated machine, with all that a schedule does to it."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Bool
+from std_srvs.srv import Trigger
+
+from teleop_core.bags.messages import read_numbers
+from teleop_core.graph.graph import RECORDER_NAME
+from teleop_core.graph.topics import OPERATION, SLAVE_OPERATION, TELEOP_STATE, Topic
+from teleop_core.kernels.geometry import Array
+from teleop_core.middleware.world import Qos
+from teleop_core.nodes.crews import Processes, crews
+from teleop_core.nodes.observer import Observer
+from teleop_core.nodes.operation import STOP_TOPIC
+from teleop_core.nodes.streams import message_type
+from teleop_core.robots import Robot
+from teleop_core.session.configuration import Configuration
+from teleop_core.slave.operation import State
+from teleop_core.slave.operation.states import COMMANDS
+from teleop_drill.drill.exercise import Master
+from teleop_drill.simulation.bus import Bus
+from teleop_drill.simulation.machine import Process
+from teleop_drill.simulation.session import SimulatedSession
+from teleop_drill.simulation.world import SimulatedWorld
+
+_RELEASE = "release"
+
+
+class Stage:
+    """A session, and who does things to it; one process holds all of the drill.
+
+    Args:
+        bus: The middleware.
+        owner: Process of the drill.
+        configuration: What runs.
+        robot: The slave.
+        folder: Where recordings go.
+    """
+
+    def __init__(
+        self, bus: Bus, owner: Process, configuration: Configuration, robot: Robot, folder: Path
+    ) -> None:
+        self.bus, self.machine, self.robot = bus, owner.machine, robot
+        self.world = SimulatedWorld(bus, owner)
+        self._executor = self.world.executor()
+        self._node = self.world.node("drill")
+        self._executor.add_node(self._node)
+        self.world.thread("executor", self._spin).start()
+        observer = Observer(0, world=self.world)
+        shared = {
+            name: nodes
+            for crew in crews(configuration.graph, Processes.SIDES)
+            for name, nodes in crew.items()
+        }
+        self.names = tuple(shared)
+        self.session = SimulatedSession(
+            bus, owner, configuration, shared, folder, observer, Master.DEVICE
+        )
+        self.killed: set[Process] = set()
+        """Processes that were told to end."""
+        self.stopped: list[tuple[Process, int]] = []
+        """Processes that were stopped, each with the time [ns]."""
+        self.presses: list[int] = []
+        """When a stop was pressed [ns]."""
+        self._buttons = [
+            self._node.create_publisher(Bool, STOP_TOPIC, Qos(depth=100)) for _ in range(2)
+        ]
+        self._speeds = self._node.create_publisher(JointState, "/slave/servo_jv", Qos())
+        self._clients = {
+            name: self._node.create_client(Trigger, f"/slave/{name}")
+            for name in (*COMMANDS, _RELEASE)
+        }
+        self._publishers: dict[str, Any] = {}
+        self.operation: dict[str, float] = {}
+        """Newest report of the slave, by the names of its numbers."""
+        self.is_following = False
+        """Whether the mapping has said so."""
+        bus.seen[f"/{SLAVE_OPERATION.name}"] = self._note_operation
+        bus.seen[f"/{TELEOP_STATE.name}"] = self._note_state
+
+    def _spin(self) -> None:
+        while True:
+            self._executor.spin_once()
+
+    def _note_operation(self, data: bytes) -> None:
+        found = read_numbers(data, OPERATION)
+        if isinstance(found, tuple):
+            self.operation = dict(zip(OPERATION, found[1].tolist(), strict=True))
+
+    def _note_state(self, data: bytes) -> None:
+        found = read_numbers(data, TELEOP_STATE.columns)
+        if isinstance(found, tuple):
+            self.is_following = found[1][0] > 0.0
+
+    # -- what is done ----------------------------------------------------------------------------
+
+    def process(self, name: str) -> Process:
+        """Newest process of a name."""
+        return self.session.running[name]
+
+    def note_stop(self, process: Process) -> None:
+        """Note that a process stands still from now on."""
+        self.stopped.append((process, self.machine.scheduler.now_ns))
+
+    def kill(self, name: str) -> None:
+        """Kill a process, and let it be started again."""
+        process = self.process(name)
+        self.killed.add(process)
+        process.end(-9, is_orderly=False)
+
+    def press(self, button: int, *, is_pressed: bool) -> None:
+        """Send a message of a stop button."""
+        if is_pressed:
+            self.presses.append(self.machine.scheduler.now_ns)
+        self._buttons[button].publish(Bool(data=is_pressed))
+
+    def command(self, name: str) -> None:
+        """Ask the slave for something, without waiting for its answer."""
+        self._clients[name].call_async(Trigger.Request())
+
+    def drive(self, speeds: Array) -> None:
+        """Send speeds (n,) of the joints [rad/s or m/s]."""
+        self._speeds.publish(JointState(velocity=speeds.tolist()))
+
+    def publish(self, topic: Topic, data: bytes) -> None:
+        """Send bytes on a topic, as another publisher of it."""
+        if topic.name not in self._publishers:
+            kind = message_type(topic.kind.ros_type)
+            self._publishers[topic.name] = self._node.create_publisher(
+                kind, f"/{topic.name}", Qos(depth=1)
+            )
+        self._publishers[topic.name].publish(data)
+
+    def every(self, period: float, work: Callable[[], None]) -> Callable[[], None]:
+        """Do something again and again after a period [s]; what is returned ends it."""
+        timer = self._node.create_timer(period, work)
+        return timer.cancel
+
+    # -- how it goes on --------------------------------------------------------------------------
+
+    def help(self) -> None:
+        """Do what the arm's state asks an operator for."""
+        dead = self.session.dead()
+        if dead:
+            self.session.start()
+            return
+        told = self.operation
+        state = told.get("state")
+        if state == State.PAUSED:
+            self.command("resume")
+        elif state == State.FAULT:
+            self.command("reset")
+        elif state == State.DISABLED:
+            self.command("enable")
+        elif state == State.ENABLED and not told["is_homed"] and not told["is_busy"]:
+            self.command("home")
+
+    def follows(self) -> bool:
+        """Whether the arm says that it goes where the hand leads."""
+        told = self.operation
+        return bool(
+            not self.session.dead() and self.is_following and told.get("state") == State.ENABLED
+            and told["is_homed"] and not told["is_busy"]
+        )  # fmt: skip
+
+    @property
+    def recorder(self) -> Process:
+        """Newest process of the recorder."""
+        return self.process(RECORDER_NAME)
