@@ -4,12 +4,14 @@
     python tests/mutants.py stop_late braking_weak --composed
 
 A mutant is a copy of the package in a directory of its own with a few words of its source replaced,
-and comes first in the path of the processes that the drill starts; the drill itself is the sound
-one. What a mutant compiles is kept in its own directory, and used again in the next run.
+and comes first in the path of the drill and of what it starts. The machine is a simulated one, so
+that what is found is found every time; ``--live`` takes this one. What a mutant compiles is kept in its own directory, and used again in the next run.
 """
 
 import argparse
+import json
 import os
+import subprocess
 import sys
 import tempfile
 import time
@@ -203,25 +205,24 @@ def _put(data: bytes, file: Path) -> None:
     file.write_bytes(data)
 
 
-def drilled(mutant: Mutant, rows: Sequence[str], *, is_composed: bool) -> dict[str, list[str]]:
+def drilled(
+    mutant: Mutant, rows: Sequence[str], *, is_composed: bool, is_live: bool = False
+) -> dict[str, list[str]]:
     """What the drill finds wrong with a mutant, by row."""
-    from teleop_drill.drill import chosen
-    from teleop_drill.nodes.drill import drill
-
-    os.environ["PYTHONPATH"] = str(tree(mutant))
     with tempfile.TemporaryDirectory(prefix="mutant_") as folder:
-        outcomes = drill(
-            chosen(tuple(rows), is_composed=is_composed), Path(folder), _silent,
-            is_composed=is_composed, texts=(PRIORITY,),
-        )  # fmt: skip
-    return {one.exercise.name: one.failures() for one in outcomes}
+        file = Path(folder) / "drill.json"
+        command = [sys.executable, "-m", "teleop_core.cli", "drill", *rows, "--json", str(file)]
+        command += ["--set", PRIORITY] if is_live else ["--simulated"]
+        command += ["--composed"] if is_composed else []
+        env = os.environ | {"PYTHONPATH": str(tree(mutant))}
+        done = subprocess.run(command, check=False, capture_output=True, text=True, env=env)
+        if not file.exists():
+            raise RuntimeError((done.stdout + done.stderr)[-2000:])
+        found = json.loads(file.read_text(encoding="utf-8"))["faults"]
+    return {one["fault"]: one["failures"] for one in found}
 
 
-def _silent(_: str) -> None:
-    """Say nothing of single rows."""
-
-
-def hunt(mutants: Sequence[Mutant], *, is_composed: bool) -> list[str]:
+def hunt(mutants: Sequence[Mutant], *, is_composed: bool, is_live: bool) -> list[str]:
     """Drill mutants; returns the names of those that were not found."""
     missed = []
     for mutant in mutants:
@@ -229,7 +230,7 @@ def hunt(mutants: Sequence[Mutant], *, is_composed: bool) -> list[str]:
             continue
         begin = time.monotonic()
         try:
-            found = drilled(mutant, rows, is_composed=is_composed)
+            found = drilled(mutant, rows, is_composed=is_composed, is_live=is_live)
         except Exception as error:  # a session that does not start is not found by its rows
             found = {}
             print(f"  {type(error).__name__}: {error}", flush=True)
@@ -242,10 +243,12 @@ def hunt(mutants: Sequence[Mutant], *, is_composed: bool) -> list[str]:
     return missed
 
 
-def check_sound(mutants: Sequence[Mutant], *, is_composed: bool) -> list[str]:
+def check_sound(
+    mutants: Sequence[Mutant], *, is_composed: bool, is_live: bool
+) -> list[str]:
     """Do the rows of all mutants with a copy that is sound; returns what they find all the same."""
     rows = {row: None for one in mutants for row in one.rows_of(is_composed=is_composed)}
-    found = drilled(SOUND, tuple(rows), is_composed=is_composed)
+    found = drilled(SOUND, tuple(rows), is_composed=is_composed, is_live=is_live)
     wrong = [f"{row}: {text}" for row, texts in found.items() for text in texts]
     way = "composed" if is_composed else "processes"
     print(f"sound ({way}): {len(found)} rows, {'; '.join(wrong) or 'none fails'}", flush=True)
@@ -258,6 +261,7 @@ def main() -> int:
     parser.add_argument("names", nargs="*", help="mutants (default: all, and the sound copy)")
     parser.add_argument("--composed", action="store_true", help="in one process only")
     parser.add_argument("--processes", action="store_true", help="in a process for each node only")
+    parser.add_argument("--live", action="store_true", help="on this machine, not a simulated one")
     parser.add_argument("--list", action="store_true", dest="is_list")
     asked = parser.parse_args()
     chosen = [one for one in MUTANTS if not asked.names or one.name in asked.names]
@@ -272,8 +276,8 @@ def main() -> int:
         if asked.processes if is_composed else asked.composed:
             continue
         if not asked.names:
-            wrong += check_sound(chosen, is_composed=is_composed)
-        wrong += hunt(chosen, is_composed=is_composed)
+            wrong += check_sound(chosen, is_composed=is_composed, is_live=asked.live)
+        wrong += hunt(chosen, is_composed=is_composed, is_live=asked.live)
     minutes = (time.monotonic() - begin) / 60.0
     print(f"{len(chosen)} mutants, {minutes:.0f} minutes; {len(wrong)} not as they should be")
     return 1 if wrong else 0

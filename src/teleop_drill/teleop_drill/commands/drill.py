@@ -21,6 +21,7 @@ without a name all faults are injected, which takes minutes:
   teleop drill --short                     five faults, less than a minute
   teleop drill --simulated                 all on a simulated machine: the same bits every time
   teleop drill --simulated --seed 7 flood  with other delays, costs and discoveries
+  teleop drill --seeds 100                 random faults at random times, and laws that must hold
   teleop drill --composed --json drill.json
   teleop drill --drives "python examples/foreign_slave.py"    drives of your own
   teleop drill --drives "arm_bridge --ros-args --params-file arm.yaml" --arm "./controller"
@@ -44,6 +45,13 @@ def add(commands: Any) -> None:
     parser.add_argument(
         "--seed", type=int, default=0, metavar="N", help="of the simulated machine (default 0)"
     )
+    parser.add_argument(
+        "--seeds", type=int, default=0, metavar="N",
+        help="run so many random schedules of faults, simulated, from --seed on",
+    )  # fmt: skip
+    parser.add_argument(
+        "--faults", metavar="I,K", help="of one schedule, these faults alone; -: none"
+    )
     parser.add_argument("--list", action="store_true", dest="is_list", help="list the faults")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write all numbers as JSON")
     parser.add_argument("--markdown", type=Path, metavar="FILE", help="write the table as Markdown")
@@ -65,6 +73,10 @@ def _run(arguments: argparse.Namespace) -> int:
     from teleop_core.evaluation.command import check_places
     from teleop_drill.drill import SHORT, chosen
 
+    if arguments.seeds or arguments.faults is not None:
+        from teleop_drill.commands.seeds import run_schedules
+
+        return run_schedules(arguments)
     names = (*arguments.names, *(SHORT if arguments.short else ()))
     exercises = chosen(names, is_composed=arguments.composed)
     if arguments.is_list:

@@ -1,0 +1,76 @@
+"""Report: what random schedules have found, and which faults met which states."""
+
+from collections import Counter
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+
+from teleop_core.slave.operation import State
+from teleop_drill.simulation.schedules import KINDS
+from teleop_drill.simulation.seeds import Found
+
+_NONE = "none"
+
+
+@dataclass
+class Coverage:
+    """What was tried so far.
+
+    Attributes:
+        sessions: How many schedules were run.
+        seconds: Simulated time [s].
+        met: How often each fault met each state of the arm.
+        looks: How often each law was looked at.
+        broken: How many schedules broke each law.
+    """
+
+    sessions: int = 0
+    seconds: float = 0.0
+    met: Counter[tuple[str, str]] = field(default_factory=Counter)
+    looks: Counter[str] = field(default_factory=Counter)
+    broken: Counter[str] = field(default_factory=Counter)
+
+    def add(self, found: Found) -> None:
+        """Take one more schedule."""
+        self.sessions += 1
+        self.seconds += found.seconds
+        self.met.update(found.met)
+        self.looks.update(found.looks)
+        self.broken.update(one.law for one in found.broken)
+
+    def table(self) -> list[list[str]]:
+        """Faults and states of the arm, with how often they met; the first row is the head."""
+        states = [state.name for state in State] + [_NONE]
+        return [
+            ["fault", *states],
+            *([kind, *(str(self.met[kind, state]) for state in states)] for kind in sorted(KINDS)),
+        ]
+
+    def lines(self) -> list[str]:
+        """What was found, in a few lines."""
+        laws = [f"{law}: {self.looks[law]} looks, {self.broken[law]} broken" for law in self.looks]
+        return [f"{self.sessions} sessions of {self.seconds:.0f} s in all", *sorted(laws)]
+
+
+def told(found: Found, shortest: Found, law: str) -> list[str]:
+    """What broke a law, and how to see it again.
+
+    Args:
+        found: The schedule as it was drawn.
+        shortest: What of it is needed.
+        law: Which law.
+    """
+    (one,) = (broken for broken in shortest.broken if broken.law == law)
+    kept = ",".join(str(found.faults.index(fault)) for fault in shortest.faults)
+    return [
+        f"seed {found.seed} breaks `{law}`, {one.at:.3f} s after the arm followed: {one.text}",
+        *(f"    {fault.text()}" for fault in shortest.faults),
+        f"    again: teleop drill --seeds 1 --seed {found.seed} --faults {kept or '-'} --out DIR",
+    ]
+
+
+def merged(all_found: Iterable[Found]) -> Coverage:
+    """Coverage of some schedules."""
+    coverage = Coverage()
+    for found in all_found:
+        coverage.add(found)
+    return coverage
