@@ -5,7 +5,8 @@
 
 A mutant is a copy of the package in a directory of its own with a few words of its source replaced,
 and comes first in the path of the drill and of what it starts. The machine is a simulated one, so
-that what is found is found every time; ``--live`` takes this one. What a mutant compiles is kept in its own directory, and used again in the next run.
+that what is found is found every time; ``--live`` takes this one. What a mutant compiles is kept in
+its own directory, and used again in the next run.
 """
 
 import argparse
@@ -243,9 +244,7 @@ def hunt(mutants: Sequence[Mutant], *, is_composed: bool, is_live: bool) -> list
     return missed
 
 
-def check_sound(
-    mutants: Sequence[Mutant], *, is_composed: bool, is_live: bool
-) -> list[str]:
+def check_sound(mutants: Sequence[Mutant], *, is_composed: bool, is_live: bool) -> list[str]:
     """Do the rows of all mutants with a copy that is sound; returns what they find all the same."""
     rows = {row: None for one in mutants for row in one.rows_of(is_composed=is_composed)}
     found = drilled(SOUND, tuple(rows), is_composed=is_composed, is_live=is_live)

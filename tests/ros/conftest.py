@@ -9,7 +9,6 @@ import subprocess
 import sys
 import tempfile
 import time
-import warnings
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager
@@ -17,98 +16,38 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 import yaml
-from rcl_interfaces.msg import Parameter as ParameterMessage
-from rcl_interfaces.srv import SetParameters, SetParametersAtomically
 from rclpy.context import Context
-from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
-from rclpy.parameter import Parameter
-from rclpy.qos import QoSProfile
 from rich.console import Console
 
 import patience
-from live_process import has_recorded
-from middleware_faults import MiddlewareLossError, check_end
+from middleware_faults import check_end
+from peers import JOINTS as JOINTS  # noqa: PLC0414  for tests
+from peers import TIMEOUT, AnyPeer
+from peers import Listener as Listener  # noqa: PLC0414
 from present import present
-from teleop_core.bags.messages import discover, layout
 from teleop_core.bags.reader import Bag
-from teleop_core.base.parameters import specs
 from teleop_core.graph.graph import BUILT_IN, RECORDER_NAME
-from teleop_core.graph.topics import Topic
 from teleop_core.middleware.ros import RosWorld
-from teleop_core.middleware.ros_node import RosNode, profile_of
-from teleop_core.middleware.world import Owner
+from teleop_core.middleware.ros_node import RosNode
 from teleop_core.nodes.children import environment, free_domain
 from teleop_core.nodes.crews import Processes
 from teleop_core.nodes.interrupt import Interrupt
 from teleop_core.nodes.live import live
 from teleop_core.nodes.observer import Observer
-from teleop_core.nodes.quality import profile
 from teleop_core.nodes.starter import NODE, Started, Starter
-from teleop_core.nodes.streams import Subscription, message_type
 from teleop_core.robots import load_robot
 from teleop_core.session.configuration import Configuration, configure
-from teleop_core.slave.slave import SlaveParameters
-from teleop_core.slave.slave_sim import SlaveSimParameters
 
-with warnings.catch_warnings():
-    warnings.simplefilter("ignore")  # its parser imports a deprecated module of Python
-    import rosidl_generator_py  # noqa: F401
-
-TIMEOUT = 90.0
 SESSION_TIMEOUT = 300.0
 """Of a whole session, whose kernels may have to be compiled first [s]."""
-JOINTS = load_robot("rcrt1").joint_names
 
 
 def wait_until(condition: Callable[[], Any], what: str, timeout: float = TIMEOUT) -> Any:
     """Result of ``condition`` as soon as it is true."""
     return patience.wait_until(condition, what, timeout, pause=0.002)
-
-
-class Listener:
-    """What came on one topic since the test listens: stamps and values.
-
-    The middleware keeps no more than 5000 messages for it; take some now and then.
-    """
-
-    def __init__(self, owner: Owner, topic: Topic) -> None:
-        self.topic, self._subscription = topic, Subscription(owner, topic, topic.name, 5000)
-        self._layout: Any = None
-        self._number = self.lost = 0
-        self.stamps: list[int] = []
-        self.values: list[np.ndarray] = []
-
-    def take(self) -> int:
-        """Take what has come; returns how many there are in all."""
-        while (taken := self._subscription.take()) is not None:
-            if self._layout is None:
-                self._layout = discover(self.topic.kind, taken.data)
-            number = taken.number
-            self.lost += number - self._number - 1 if 0 < self._number < number else 0
-            self._number = number
-            stamp_ns, values = self._layout.decode_one(taken.data)
-            self.stamps.append(stamp_ns)
-            self.values.append(values)
-        return len(self.stamps)
-
-    def insist_on_all(self) -> None:
-        """Make sure that every sample came since the first one, of the one publisher there is.
-
-        Raises:
-            MiddlewareLossError: Some did not.
-        """
-        self.take()
-        if self.lost:
-            raise MiddlewareLossError(f"{self.lost} of {self.topic.name} on the way to the test")
-
-    def forget(self) -> None:
-        """Throw away what has come so far."""
-        self.take()
-        self.stamps, self.values = [], []
 
 
 @cache
@@ -173,22 +112,11 @@ class NodeProcess:
         return code
 
 
-def _is_of_arm(key: str) -> bool:
-    """Whether a parameter, with double underscores for dots, is that of a simulated arm alone."""
-    name = key.replace("__", ".")
-    mine, its = ({spec.name for spec in specs(g)} for g in (SlaveParameters, SlaveSimParameters))
-    return name in its - mine
-
-
-def _is_of_hand(key: str) -> bool:
-    """Whether a parameter, with double underscores for dots, is that of the operator alone."""
-    return key == "patience" or key.startswith(("operator__", "buttons__"))
-
-
-class Peer:
+class Peer(AnyPeer):
     """A ROS node of the test beside the nodes under test, on a domain of its own."""
 
     def __init__(self, folder: Path) -> None:
+        super().__init__()
         self.domain, self._folder = free_domain(), folder
         environment()
         self.context = Context()
@@ -197,11 +125,9 @@ class Peer:
             "peer", context=self.context, use_global_arguments=False, enable_rosout=False
         )
         self.world, self.ros = RosWorld(self.context), RosNode(self.node)
-        self._executor = SingleThreadedExecutor(context=self.context)
-        self._executor.add_node(self.node)
+        self.executor = self.world.executor()
+        self.executor.add_node(self.ros)
         self.observer = Observer(int(self.domain))
-        self.nodes: list[NodeProcess] = []
-        self._publishers: dict[str, Any] = {}
 
     def close(self) -> None:
         """End the nodes, then leave: a participant that goes while others talk to it can crash.
@@ -218,169 +144,17 @@ class Peer:
                 process.kill()
                 process.wait()
         self.observer.close()
-        self._executor.shutdown()
+        self.executor.shutdown()
         self.node.destroy_node()
         self.context.try_shutdown()
 
-    def wait(self, condition: Callable[[], Any], what: str, timeout: float = TIMEOUT) -> Any:
-        """Result of ``condition`` as soon as it is true.
+    def launch(
+        self, name: str, parameters: dict[str, Any], arm: str, env: Mapping[str, str] | None
+    ) -> NodeProcess:
+        return NodeProcess(name, parameters, self.domain, self._folder, arm, env)
 
-        Raises:
-            AssertionError: It did not become true; with what each node says.
-        """
-        try:
-            return wait_until(condition, what, timeout)
-        except AssertionError as error:
-            self.observer.listen(0.0)
-            said = (f"{name}: {each.message}" for name, each in self.observer.statuses.items())
-            raise AssertionError("\n".join([str(error), *said])) from error
-
-    # -- nodes -----------------------------------------------------------------------------------
-
-    def start(
-        self, name: str, wait: str = "active", arm: str = "", env: Mapping[str, str] | None = None,
-        has_arm: bool = True, **parameters: Any,
-    ) -> NodeProcess:  # fmt: skip
-        """Start a node; double underscores in names stand for dots.
-
-        A slave starts at home unless it is told otherwise, so that it follows at once. With one
-        that is to work, its simulated arm is started, which gets the parameters that are its own,
-        and with a haptic master the operator who holds it.
-        """
-        if name == "haptic_master":
-            own = {key: parameters.pop(key) for key in set(parameters) if _is_of_hand(key)}
-            if (
-                has_arm
-                and parameters.get("autostart", True)
-                and self._runs("operator", arm) is None
-            ):
-                named = {key.removeprefix("operator__"): value for key, value in own.items()}
-                self.start("operator", wait, arm=arm, env=env, **named)
-        if name == "slave_sim" and not parameters and (running := self._runs(name, arm)):
-            return running
-        if name == "slave":
-            own = {key: parameters.pop(key) for key in set(parameters) if _is_of_arm(key)}
-            if (
-                has_arm
-                and parameters.get("autostart", True)
-                and self._runs("slave_sim", arm) is None
-            ):
-                robot = {key: parameters[key] for key in ("robot",) if key in parameters}
-                self.start("slave_sim", wait, arm=arm, env=env, **robot, **own)
-            home = load_robot(parameters.get("robot", "rcrt1")).home.tolist()
-            parameters = {"start": home} | parameters
-        named = {key.replace("__", "."): value for key, value in parameters.items()}
-        node = NodeProcess(name, named, self.domain, self._folder, arm, env)
-        self.nodes.append(node)
-        self.observer.statuses.pop(node.name, None)
-        if wait:
-            self.wait_state(node.name, wait)
-        return node
-
-    def _runs(self, stage: str, arm: str) -> NodeProcess | None:
-        """Node of a stage in a namespace that runs."""
-        name = f"{arm}/{stage}" if arm else stage
-        found = (n for n in self.nodes if n.name == name and n.process.poll() is None)
-        return next(found, None)
-
-    def status(self, name: str) -> Any:
-        """Newest report of a node; None before the first."""
-        self.observer.listen(0.0)
-        return self.observer.statuses.get(name)
-
-    def wait_state(self, name: str, state: str) -> None:
-        def reached() -> bool:
-            for node in self.nodes:
-                died = node.name == name and node is self._newest(name) and node.process.poll()
-                assert not died or node.wait() == 0, node.stderr.read_text()
-            status = self.status(name)
-            return status is not None and status.values["state"] == state
-
-        self.wait(reached, f"{name} {state}")
-
-    def _newest(self, name: str) -> NodeProcess:
-        return next(node for node in reversed(self.nodes) if node.name == name)
-
-    def wait_value(self, name: str, key: str, accept: Callable[[float], bool]) -> float:
-        """Number that a node reports under a key, once it is accepted."""
-
-        def accepted() -> tuple[float] | None:
-            status = self.status(name)
-            number = status.number(key) if status else 0.0
-            return (number,) if status and accept(number) else None
-
-        return self.wait(accepted, f"{name} {key}")[0]
-
-    def has_recorded(self, counts: Mapping[str, int], recorder: str = "recorder") -> bool:
-        """Whether a recorder reports more samples than these of each topic."""
-        return has_recorded(self.status(recorder), counts)
-
-    def insist_on_all(self, recorder: str) -> None:
-        """Make sure that the last report of a recorder knows of no sample that was lost.
-
-        Raises:
-            MiddlewareLossError: It does.
-        """
-        values = self.status(recorder).values
-        lost = {key: n for key, n in values.items() if key.startswith("lost.") and n != "0"}
-        if lost:
-            raise MiddlewareLossError(f"{lost} on the way to {recorder}")
-
-    # -- topics ----------------------------------------------------------------------------------
-
-    def listen(self, topic: Topic) -> Listener:
-        return Listener(self, topic)
-
-    def publisher(self, topic: Topic, readers: int = 1) -> Any:
-        """Publisher of a topic, once that many subscriptions are there."""
-        if topic.name not in self._publishers:
-            kind = message_type(topic.kind.ros_type)
-            reliable = profile_of(profile(topic)) if readers else QoSProfile(depth=10)
-            self._publishers[topic.name] = self.node.create_publisher(kind, topic.name, reliable)
-        own = self._publishers[topic.name]
-        self.wait(lambda: own.get_subscription_count() >= readers, f"readers of {topic.name}")
-        return own
-
-    def send(self, topic: Topic, stamp_ns: int, values: Any, readers: int = 1) -> None:
-        """Publish one message as our own nodes would, once that many subscriptions are there."""
-        data = layout(topic, JOINTS).encode_one(stamp_ns, np.asarray(values, np.float64))
-        self.publisher(topic, readers).publish(data)
-
-    def spin(self) -> Any:
-        """Serve what has come for the test's own node; returns nothing, in front of an ``or``."""
-        self._executor.spin_once(0.01)
-
-    def slave_holds(self) -> bool:
-        """Whether the slave says that it holds: for want of commands, or paused since."""
-        message = self.status("slave").message
-        return "holds" in message or "PAUSED" in message
-
-    # -- services --------------------------------------------------------------------------------
-
-    def call(self, service: Any, name: str, request: Any) -> Any:
-        """Answer of a service."""
-        client = self.node.create_client(service, name)
-        try:
-            self.wait(client.service_is_ready, f"service {name}")
-            future = client.call_async(request)
-            self._executor.spin_until_future_complete(future, TIMEOUT)
-            assert future.done(), f"no answer from {name}"
-            return future.result()
-        finally:
-            self.node.destroy_client(client)
-
-    def set(self, name: str, at_once: bool = False, **values: Any) -> list[Any]:
-        """Results of setting parameters over the node's services."""
-        messages: list[ParameterMessage] = [
-            Parameter(key.replace("__", "."), value=value).to_parameter_msg()
-            for key, value in values.items()
-        ]
-        if at_once:
-            request = SetParametersAtomically.Request(parameters=messages)
-            kind, service = SetParametersAtomically, "set_parameters_atomically"
-            return [self.call(kind, f"/{name}/{service}", request).result]
-        request = SetParameters.Request(parameters=messages)
-        return self.call(SetParameters, f"/{name}/set_parameters", request).results  # type: ignore[no-any-return]
+    def until(self, condition: Callable[[], Any], what: str, timeout: float) -> Any:
+        return wait_until(condition, what, timeout)
 
 
 @contextmanager

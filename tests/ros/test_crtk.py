@@ -71,7 +71,7 @@ class StockClient:
         return take
 
     def spin(self) -> None:
-        self.peer._executor.spin_once(timeout_sec=0.02)
+        self.peer.executor.spin_once(timeout_sec=0.02)
 
     def wait(self, condition: Callable[[], object] | Callable[[], bool], what: str) -> Any:
         def turn() -> object:

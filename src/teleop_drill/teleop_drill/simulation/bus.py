@@ -20,6 +20,8 @@ _SOCKET = 4 << 20
 _LEASE_NS = 20_000_000_000
 """Time after which a process that was killed counts as gone [ns]."""
 _GID = 16
+_TOLD_NS, _TOLD_SPREAD_NS = 1_000_000, 20_000_000
+"""Time in which one that is known tells of a new topic, and what may be added [ns]."""
 _CALL_NS, _SPREAD_NS = 150_000, 300_000
 """Least time that a request or an answer takes, and what may be added [ns]."""
 
@@ -58,6 +60,7 @@ class Bus:
         self.readers: dict[str, list[Reader]] = {}
         self.services: dict[str, Service] = {}
         self._known: dict[tuple[Process, object], int] = {}
+        self._meetings: dict[tuple[Process, Process], int] = {}
         self._born_ns: dict[Process, int] = {}
         self._called_ns: dict[tuple[Process, Process], int] = {}
         self._gids = self._orders = 0
@@ -130,13 +133,32 @@ class Bus:
             if self.knows(process, one)
         ]
 
-    def knows(self, process: Process, entity: Writer | Service) -> bool:
+    def knows(self, process: Process, entity: Writer | Reader | Service) -> bool:
         """Whether a process has found an entity."""
+        return self.found_ns(process, entity) <= self.scheduler.now_ns
+
+    def found_ns(self, process: Process, entity: Writer | Reader | Service) -> int:
+        """When a process has found an entity of another, or will have [ns].
+
+        Processes find each other first, which takes long; then what each has is told in a moment.
+        """
         key = (process, entity)
         if key not in self._known:
-            both_ns = max(entity.born_ns, self._born_ns.get(process, 0))
-            self._known[key] = both_ns + self._discovery(process, entity.process)
-        return self._known[key] <= self.scheduler.now_ns
+            moment = _TOLD_NS + round(_TOLD_SPREAD_NS * self._finding.random())
+            since_ns = max(self._met(process, entity.process), entity.born_ns)
+            self._known[key] = since_ns + (0 if process is entity.process else moment)
+        return self._known[key]
+
+    def _met(self, one: Process, other: Process) -> int:
+        """When one process has found another, or will have [ns]."""
+        pair = one, other
+        if pair not in self._meetings:
+            both_ns = max(self._born_ns.get(process, 0) for process in pair)
+            least, usual, longest = self.find
+            drawn = least + self._finding.expovariate(1.0 / (usual - least))
+            took = 0.0 if one is other else min(longest, drawn)
+            self._meetings[pair] = both_ns + round(1e9 * took)
+        return self._meetings[pair]
 
     def topics(self) -> list[str]:
         """Topics that have writers or readers."""
@@ -146,13 +168,6 @@ class Bus:
         }
         return sorted(names)
 
-    def _discovery(self, one: Process, other: Process) -> int:
-        """Time in which one process finds an end of another [ns]."""
-        if one is other:
-            return 200_000
-        least, usual, longest = self.find
-        return round(1e9 * min(longest, least + self._finding.expovariate(1.0 / (usual - least))))
-
     def _match(self, writer: Writer, reader: Reader) -> None:
         """Let a writer and a reader find each other, if their qualities go together."""
         wanted, offered = reader.qos, writer.qos
@@ -160,15 +175,13 @@ class Bus:
             return
         if wanted.is_latched and not offered.is_latched:
             return
-        now_ns = self.scheduler.now_ns
         link = Link(
             reader,
-            now_ns + self._discovery(writer.process, reader.process),
-            now_ns + self._discovery(reader.process, writer.process),
+            self.found_ns(writer.process, reader),
+            self.found_ns(reader.process, writer),
             wanted.is_reliable and offered.is_reliable,
         )
         writer.links.append(link)
-        self._known[reader.process, writer] = link.reader_knows_ns
         if wanted.is_latched:
             self.scheduler.at(link.writer_knows_ns, lambda: self._send_last(writer, link))
 

@@ -98,8 +98,7 @@ class Reader:
     ) -> None:
         self._bus, self.process, self.type, self.topic, self.qos = bus, process, kind, topic, qos
         self.node = node
-        self.lost = 0
-        self.is_open = True
+        self.lost, self.born_ns, self.is_open = 0, bus.scheduler.now_ns, True
         self.coming: deque[tuple[int, int, Taken]] = deque()
         self._ready: deque[tuple[int, int, Taken]] = deque(
             maxlen=None if qos.keeps_all else qos.depth

@@ -158,16 +158,17 @@ class Scheduler:
 
     Attributes:
         now_ns: Time, as monotonic clocks have it [ns].
-        current: Who runs.
+        current: Who runs: a strand, or whoever made the scheduler and stands outside.
         costs: How long things take.
     """
 
     def __init__(self, seed: int) -> None:
         self.seed, self.now_ns = seed, BEGIN_NS
         self.costs = Costs(self.random("costs"))
-        self.current: Strand = None  # type: ignore[assignment]
         self._queue: list[tuple[int, int, Any, int, bool]] = []
         self._orders, self._hub = count(), greenlet.getcurrent()
+        self._outside = Strand(self, Turns(), "outside", lambda: None)
+        self.current = self._outside
         self._kept: list[Strand] = []  # a greenlet that is thrown away would run its `finally`
 
     def random(self, name: str) -> Random:
@@ -198,7 +199,7 @@ class Scheduler:
         strand = self.current
         if until_ns is not None:
             self._push(until_ns, strand, strand.token, False)
-        return bool(self._hub.switch())
+        return self._pump() if strand is self._outside else bool(self._hub.switch())
 
     # -- for whoever arranges --------------------------------------------------------------------
 
@@ -226,16 +227,20 @@ class Scheduler:
             self._push(self.now_ns, strand, token, value)
 
     def run(self, strand: Strand) -> None:
-        """Let time pass until a strand has ended.
+        """Let time pass until a strand has ended; raises what ended it.
 
         Raises:
             Deadlock: It never will.
         """
         strand.start()
+        strand.join()
+        if strand.error is not None:
+            raise strand.error
+
+    def _pump(self) -> bool:
+        """Let everything happen until whoever stands outside goes on; whether somebody woke it."""
         queue, pop = self._queue, heapq.heappop
-        while strand.is_alive():
-            if not queue:
-                raise Deadlock("everything waits for something else")
+        while queue:
             time_ns, _, what, token, value = pop(queue)
             if not isinstance(what, Strand):
                 self.now_ns = time_ns
@@ -252,10 +257,11 @@ class Scheduler:
                 continue
             self.now_ns, self.current = time_ns, what
             what.token += 1
+            if what is self._outside:
+                return value
             what.greenlet.switch(value)
             process.busy_ns = self.now_ns + self.costs.turn()
-        if strand.error is not None:
-            raise strand.error
+        raise Deadlock("everything waits for something else")
 
     def _push(self, time_ns: int, what: Any, token: int, value: bool) -> None:
         heapq.heappush(self._queue, (time_ns, next(self._orders), what, token, value))
