@@ -16,7 +16,6 @@ from teleop_core.bags.transforms import TF
 from teleop_core.evaluation import scores
 from teleop_core.graph import topics
 from teleop_core.nodes.children import environment
-from teleop_core.nodes.start import taken_names
 from teleop_core.robots import load_robot
 
 if TYPE_CHECKING:
@@ -120,12 +119,3 @@ def test_arms_of_a_session_in_a_namespace_stay_apart_below_it(
     assert (left.session.arm, left.session.robot) == ("left", "rcrt1")
     assert (right.session.arm, right.session.robot) == ("right", "puma560")
     assert min(left.session.duration_s, right.session.duration_s) > 1.0
-
-
-def test_names_for_all_nodes_of_a_process_are_taken_out_and_others_are_kept() -> None:
-    given = ["node", "-r", "__ns:=/x", "--ros-args", "-r", "__ns:=/lab", "--remap", "__node:=arm",
-             "-r", "slave:__node:=other", "-r", "a:=b", "--", "-r", "__ns:=/y"]  # fmt: skip
-    kept = ["node", "-r", "__ns:=/x", "--ros-args", "-r", "slave:__node:=other", "-r", "a:=b",
-            "--", "-r", "__ns:=/y"]  # fmt: skip
-    assert taken_names(given) == (kept, {"__ns": "/lab", "__node": "arm"})
-    assert taken_names(kept) == (kept, {})

@@ -15,7 +15,7 @@ from std_msgs.msg import Bool
 
 from present import present
 from teleop_core.nodes.children import environment
-from teleop_core.nodes.operation import STOP_TOPIC, StopButton, StopInput
+from teleop_core.nodes.operation import STOP_TOPIC
 
 if TYPE_CHECKING:
     from ros.conftest import Peer
@@ -95,52 +95,3 @@ def test_presses_of_buttons_that_were_made_while_the_listener_stood_still_are_he
         say(button_of(peer), 100)
     go_on(peer, reader, since)
     assert reader.wait(30) == 0
-
-
-def test_a_button_that_was_released_before_it_was_found_is_released_after_a_standstill_too(
-    peer: "Peer",
-) -> None:
-    button = StopButton(peer)
-    button.say(is_pressed=True)
-    button.say(is_pressed=False)
-    heard: list[Any] = []
-    stop = StopInput(peer)
-
-    def take() -> bool:
-        heard.extend(stop.take(is_idle=True))
-        return False
-
-    try:
-        stop.take()
-        since = time.monotonic()
-        peer.wait(lambda: button.listeners == 3 and time.monotonic() > since + 0.3, "a while")
-        peer.wait(lambda: take() or heard, "its state")
-    finally:
-        stop.close()
-    assert heard == [False]
-
-
-@pytest.mark.parametrize("is_idle", [True, False])
-def test_what_a_button_said_before_it_was_found_counts_unless_the_listener_is_idle(
-    peer: "Peer", is_idle: bool
-) -> None:
-    button = peer.node.create_publisher(Bool, STOP_TOPIC, 10)
-    for _ in range(3):
-        button.publish(Bool(data=False))
-    heard: list[Any] = []
-    stop = StopInput(peer)
-
-    def take() -> bool:
-        heard.extend(stop.take(is_idle=is_idle))
-        return False
-
-    try:
-        peer.wait(lambda: button.get_subscription_count() == 2, "both who hear reliable senders")
-        assert not take()
-        assert "peer" in stop.unheard()
-        button.publish(Bool(data=False))
-        peer.wait(lambda: take() or heard, "the fourth message")
-        assert not stop.unheard()
-    finally:
-        stop.close()
-    assert heard == [False] if is_idle else heard == [True, False]

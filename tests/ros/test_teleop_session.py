@@ -1,10 +1,6 @@
 """The composed session: all nodes in one process, and others in the place of some."""
 
-import ast
-import os
 import signal
-import subprocess
-import sys
 from collections.abc import Callable
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
@@ -15,13 +11,10 @@ from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
 from std_srvs.srv import Trigger
 
-from present import present
 from teleop_core.bags.reader import Bag
 from teleop_core.graph import topics
 from teleop_core.graph.graph import BUILT_IN, RECORDER_NAME
-from teleop_core.graph.layers import RealTimeParameters
 from teleop_core.graph.topics import STREAMS
-from teleop_core.middleware.real_time import apply_options, is_priority_granted
 from teleop_core.nodes.crews import Processes
 from teleop_core.robots import load_robot
 from teleop_core.session.configuration import configure
@@ -162,43 +155,6 @@ def test_live_composed_records_all_topics_at_times_that_rise_from_stage_to_stage
         _, i, j = np.intersect1d(before.stamp_ns, after.stamp_ns, return_indices=True)
         assert len(i) > 500
         assert (after.log_ns[j] >= before.log_ns[i]).all()
-
-
-def test_real_time_options_are_taken_or_refused_in_one_line() -> None:
-    allowed = os.sched_getaffinity(0)
-    try:
-        (refusal,) = apply_options(RealTimeParameters(cpus=(4096,), freeze_gc=False))
-        assert "real_time.cpus" in refusal
-        assert str(sorted(allowed)) in refusal
-        assert apply_options(RealTimeParameters(cpus=tuple(allowed), freeze_gc=False)) == []
-    finally:
-        os.sched_setaffinity(0, allowed)
-
-
-def test_with_a_priority_all_threads_come_before_other_processes_but_not_what_they_start() -> None:
-    if not is_priority_granted(10):
-        pytest.skip("the system grants no priority")
-    script = """
-import os, subprocess, sys, threading
-from teleop_core.middleware.real_time import apply_options, is_priority_granted
-from teleop_core.graph.layers import RealTimeParameters
-threading.Thread(target=sys.stdin.read).start()
-assert apply_options(RealTimeParameters(priority=10, freeze_gc=False)) == []
-threads = sorted(map(int, os.listdir("/proc/self/task")))
-print([os.sched_getparam(thread).sched_priority for thread in threads])
-started = "import os; print(os.sched_getparam(0).sched_priority)"
-subprocess.run([sys.executable, "-c", started], check=True)
-"""
-    process = subprocess.Popen(
-        [sys.executable, "-uc", script], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
-    )
-    with process:
-        said = [present(process.stdout).readline().strip() for _ in range(2)]
-        present(process.stdin).close()
-    main, *others = ast.literal_eval(said[0])
-    assert main == 10
-    assert set(others) == {1}
-    assert said[1] == "0"
 
 
 def rest_of(measured: "Listener") -> Any:

@@ -1,7 +1,8 @@
 """Nodes in simulated processes, and a peer that talks to them over simulated topics."""
 
 import signal
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -150,3 +151,23 @@ def compose(peer: SimulatedPeer, tmp_path: Path) -> Callable[..., SimulatedNode]
         return peer.compose(namespace, recorder=recorder, **parameters)
 
     return start
+
+
+@pytest.fixture(scope="module")
+def common_peer() -> SimulatedPeer:
+    """A peer that the tests of a file share."""
+    return SimulatedPeer()
+
+
+@pytest.fixture(scope="module")
+def composed_session(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Any]:
+    """Composed session that tests of a file share, as a context: peer, process, recording."""
+
+    @contextmanager
+    def run(**parameters: Any) -> Iterator[tuple[SimulatedPeer, SimulatedNode, Path]]:
+        peer, bag = SimulatedPeer(), tmp_path_factory.mktemp("session") / "bag"
+        made = peer.compose(recorder={"out": str(bag)}, **parameters)
+        yield peer, made, bag
+        made.end()
+
+    return run

@@ -3,12 +3,20 @@
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState, GetState
 from rcl_interfaces.msg import Parameter as ParameterMessage
 from rcl_interfaces.msg import SetParametersResult
-from rcl_interfaces.srv import GetParameters, SetParameters
+from rcl_interfaces.srv import (
+    DescribeParameters,
+    GetParameters,
+    ListParameters,
+    SetParameters,
+    SetParametersAtomically,
+)
 
 from teleop_core.base.parameters import Spec, Value
-from teleop_core.middleware.ros_parameters import from_message, to_message
+from teleop_core.middleware.ros_parameters import descriptor, from_message, to_message
 from teleop_core.middleware.world import Hooks, Outcome, Qos
 from teleop_drill.simulation.bus import Bus
 from teleop_drill.simulation.ends import Writer
@@ -23,6 +31,16 @@ _STATES = {
     ("unconfigured", "shutdown"): "finalized",
     ("inactive", "shutdown"): "finalized",
     ("active", "shutdown"): "finalized",
+}
+
+_WORDS = {
+    Transition.TRANSITION_CONFIGURE: "configure",
+    Transition.TRANSITION_ACTIVATE: "activate",
+    Transition.TRANSITION_DEACTIVATE: "deactivate",
+    Transition.TRANSITION_CLEANUP: "cleanup",
+    Transition.TRANSITION_UNCONFIGURED_SHUTDOWN: "shutdown",
+    Transition.TRANSITION_INACTIVE_SHUTDOWN: "shutdown",
+    Transition.TRANSITION_ACTIVE_SHUTDOWN: "shutdown",
 }
 
 
@@ -50,7 +68,12 @@ class SimulatedLifecycleNode(SimulatedNode):
         self._values: dict[str, Any] = {}
         self._accept: Callable[[Mapping[str, Value]], str] = lambda _: ""
         self.create_service(SetParameters, "~/set_parameters", self._set)
+        self.create_service(SetParametersAtomically, "~/set_parameters_atomically", self._set_all)
         self.create_service(GetParameters, "~/get_parameters", self._get)
+        self.create_service(DescribeParameters, "~/describe_parameters", self._describe)
+        self.create_service(ListParameters, "~/list_parameters", self._list)
+        self.create_service(ChangeState, "~/change_state", self._change_state)
+        self.create_service(GetState, "~/get_state", self._get_state)
 
     def create_lifecycle_publisher(self, kind: Any, name: str, qos: Qos) -> Writer:
         """Publisher that is silent unless the node is active."""
@@ -96,21 +119,51 @@ class SimulatedLifecycleNode(SimulatedNode):
             writer.is_active = is_active
 
     def _set(self, request: Any, response: Any) -> Any:
-        response.results = [self._set_one(one) for one in request.parameters]
+        response.results = [self._take([one]) for one in request.parameters]
         return response
 
-    def _set_one(self, parameter: ParameterMessage) -> SetParametersResult:
-        spec = self._specs.get(parameter.name)
-        if spec is None or spec.fixed:
-            reason = "is not declared" if spec is None else "is read-only"
-            return SetParametersResult(successful=False, reason=f"{parameter.name} {reason}")
-        value = from_message(parameter.value)
-        if not isinstance(value, bool | int | float | str):
-            value = tuple(value or ())
-        reason = self._accept({parameter.name: value})
+    def _set_all(self, request: Any, response: Any) -> Any:
+        response.result = self._take(request.parameters)
+        return response
+
+    def _take(self, parameters: list[ParameterMessage]) -> SetParametersResult:
+        """Take all changes or none."""
+        changes: dict[str, Any] = {}
+        for one in parameters:
+            spec = self._specs.get(one.name)
+            if spec is None or spec.fixed:
+                reason = "is not declared" if spec is None else "is read-only"
+                return SetParametersResult(successful=False, reason=f"{one.name} {reason}")
+            value = from_message(one.value)
+            is_plain = isinstance(value, bool | int | float | str)
+            changes[one.name] = value if is_plain else tuple(value or ())
+        reason = self._accept(changes)
         if not reason:
-            self._values[parameter.name] = value
+            self._values |= changes
         return SetParametersResult(successful=not reason, reason=reason)
+
+    def _describe(self, request: Any, response: Any) -> Any:
+        response.descriptors = [
+            descriptor(self._specs[name]) for name in request.names if name in self._specs
+        ]
+        return response
+
+    def _list(self, _: Any, response: Any) -> Any:
+        response.result.names = sorted(self._specs)
+        return response
+
+    def _get_state(self, _: Any, response: Any) -> Any:
+        response.current_state.label = self.state
+        return response
+
+    def _change_state(self, request: Any, response: Any) -> Any:
+        word = request.transition.label or _WORDS.get(request.transition.id, "")
+        if (self.state, word) not in _STATES:
+            self._hooks.on_no_transition(word or str(request.transition.id))
+            response.success = False
+        else:
+            response.success = self.trigger(word) is Outcome.SUCCESS
+        return response
 
     def _get(self, request: Any, response: Any) -> Any:
         known = [self._values.get(name) for name in request.names]
