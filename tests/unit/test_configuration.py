@@ -151,7 +151,7 @@ def test_two_stages_for_different_robots_are_refused() -> None:
 
 
 def write(path: Path, content: Any) -> Path:
-    path.write_text(yaml.safe_dump(content))
+    path.write_text(yaml.safe_dump(content, sort_keys=False))
     return path
 
 
