@@ -386,7 +386,7 @@ CODE_MUTANTS = (
     # graph, parts, nodes, console
     _mutant("delays_largest", "of delays that fit one link the longest counts", "graph/graph.py",
             "return sum(d.seconds for d in fitting if d.reader in {\"\", reader.name})",
-            "return max((d.seconds for d in fitting if d.reader in {\"\", reader.name}), default=0.0)",
+            "return max([d.seconds for d in fitting if d.reader in {\"\", reader.name}] + [0.0])",
             "graph"),
     _mutant("delays_in_row", "of delays in a row the longest counts", "session/notes.py",
             "return sum(\n        link.delay", "return max(\n        link.delay", "contacts"),

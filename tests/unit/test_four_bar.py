@@ -180,18 +180,6 @@ def test_robot_draws_the_coupler_where_the_closure_says(mode: float) -> None:
         assert np.allclose(tip, wanted, atol=CLOSED)
 
 
-@pytest.mark.parametrize("name", ["four_bar", "parallelogram"])
-def test_jacobian_is_the_finite_difference(name: str) -> None:
-    robot, step = load_robot(name), 1e-6
-    for theta1 in np.linspace(-3.0, 3.0, 20):
-        ahead, behind = robot.fk([theta1 + step]), robot.fk([theta1 - step])
-        J = robot.jacobian([theta1])[:, 0]
-        # Central differences: error of third order in the step plus rounding over the step.
-        assert np.allclose(J[:3], (ahead - behind)[:3, 3] / (2 * step), atol=1e-8)
-        turn = (ahead[:3, :3] - behind[:3, :3]) @ robot.fk([theta1])[:3, :3].T / (2 * step)
-        assert math.isclose(J[5], turn[1, 0], abs_tol=1e-8)
-
-
 @pytest.mark.parametrize("geometry", [{}, {"mode": -1.0}, {"l0": 4, "l1": 3, "l2": 3, "l3": 2}])
 def test_inverse_finds_the_crank_of_every_reachable_point(geometry: dict[str, float]) -> None:
     robot = load_robot("four_bar", **geometry)

@@ -169,18 +169,6 @@ def test_poses_and_legs_are_inverse_to_each_other_and_found_among_the_modes() ->
         assert np.allclose(robot.ik_all(T), [legs], atol=SOLVED)
 
 
-def test_jacobian_is_the_finite_difference() -> None:
-    robot, rng, step = load_robot("rps3"), np.random.default_rng(7), 1e-6
-    for q in rng.uniform(1.0, 1.4, (10, 3)):
-        J, T = robot.jacobian(q), robot.fk(q)
-        for leg in range(3):
-            change = step * np.eye(3)[leg]
-            slope = (robot.fk(q + change) - robot.fk(q - change)) / (2.0 * step)
-            spin = slope[:3, :3] @ T[:3, :3].T
-            assert np.allclose(J[:3, leg], slope[:3, 3], atol=1e-7)
-            assert np.allclose(J[3:, leg], [spin[2, 1], spin[0, 2], spin[1, 0]], atol=1e-7)
-
-
 def test_strokes_stop_the_legs() -> None:
     robot = load_robot("rps3")
     result = robot.ik(transform(np.eye(3), np.array([0.0, 0.0, 3.0])))

@@ -139,21 +139,6 @@ def test_robot_legs_and_poses_are_inverse_to_each_other() -> None:
     assert np.allclose(robot.ik_all(wanted[0]), result.q[:1], atol=1e-15)
 
 
-def test_robot_jacobian_is_the_finite_difference() -> None:
-    robot, rng, step = load_robot("stewart"), np.random.default_rng(6), 1e-6
-    for T in poses(rng, 5):
-        q = robot.ik(T).q
-        J = robot.jacobian(q)
-        for leg in range(6):
-            change = step * np.eye(6)[leg]
-            ahead, behind = robot.fk(q + change), robot.fk(q - change)
-            slope = (ahead - behind) / (2.0 * step)
-            spin = slope[:3, :3] @ T[:3, :3].T
-            # Rounding of the pose over the step, third derivative times its square.
-            assert np.allclose(J[:3, leg], slope[:3, 3], atol=1e-6)
-            assert np.allclose(J[3:, leg], [spin[2, 1], spin[0, 2], spin[1, 0]], atol=1e-5)
-
-
 def test_strokes_stop_the_legs_and_the_rest_is_residual() -> None:
     robot = load_robot("stewart")
     T = transform(np.eye(3), np.array([0.0, 0.0, 0.5]))

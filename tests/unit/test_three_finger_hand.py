@@ -146,19 +146,6 @@ def test_inverse_follows_the_object_next_to_the_seed(robot: Robot, hand: Hand) -
         assert math.isclose(np.abs(result.q - robot.home).max(), nearest, abs_tol=SOLVED)
 
 
-def test_jacobian_is_the_finite_difference(robot: Robot) -> None:
-    rng, step = np.random.default_rng(6), 1e-6
-    for T in moves(robot, rng, 10):
-        q = robot.ik(T).q
-        J = robot.jacobian(q)
-        for joint in range(9):
-            change = step * np.eye(9)[joint]
-            slope = (robot.fk(q + change) - robot.fk(q - change)) / (2.0 * step)
-            spin = slope[:3, :3] @ T[:3, :3].T
-            assert np.allclose(J[:3, joint], slope[:3, 3], atol=1e-9)
-            assert np.allclose(J[3:, joint], [spin[2, 1], spin[0, 2], spin[1, 0]], atol=1e-8)
-
-
 def test_six_actuated_joints_fix_the_other_three(robot: Robot, hand: Hand) -> None:
     rng = np.random.default_rng(7)
     for T in moves(robot, rng, 50):
