@@ -129,6 +129,14 @@ def test_table_read_as_modified_convention_points_home_straight_up() -> None:  #
     assert np.linalg.norm(wrong[:3, 3] - ARM.fk(ARM.home)[:3, 3]) > 0.4
 
 
+def test_ranges_of_the_joints_are_those_of_table_6_2() -> None:
+    for end, wanted in (
+        (ARM.lower, joints(-80, 50, 0, -170, -80, -170)),
+        (ARM.upper, joints(80, 160, 421, 170, 80, 170)),
+    ):
+        assert np.allclose(end, wanted, rtol=0, atol=ROUNDING)
+
+
 def test_home_is_where_the_joint_table_puts_it() -> None:  # case 2
     pose = ARM.fk(ARM.home)
     # Half of the last digit given.

@@ -6,12 +6,14 @@ from collections.abc import Sequence
 from itertools import groupby
 from typing import TYPE_CHECKING
 
+import numpy as np
 from rich.box import SIMPLE
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
 from teleop_core.evaluation.rows import MISSING
+from teleop_lab.experiments.outcome import BASES
 
 if TYPE_CHECKING:
     from teleop_lab.experiments.outcome import Outcome, Row
@@ -72,14 +74,17 @@ def spread(row: "Row") -> str:
 
 def within(row: "Row") -> str:
     """What counts as agreement."""
-    return row.within.text(row.unit) if row.within is not None else ""
+    if row.within is None:
+        return ""
+    return row.within.text(row.unit) + f", {row.basis}" * (row.basis != "printed")
 
 
 def summary(outcomes: "Sequence[Outcome]") -> str:
-    """One line: how many figures agree."""
-    judged, agreeing = (sum(getattr(o, n) for o in outcomes) for n in ("judged", "agreeing"))
-    rows = sum(len(outcome.rows) for outcome in outcomes)
-    return f"{agreeing} of {judged} published figures agree; {rows - judged} rows are not judged"
+    """One line: how many figures agree, how many laws and goals are kept."""
+    found = {basis: np.sum([o.count(basis) for o in outcomes], axis=0) for basis in BASES}
+    told = [f"{kept} of {of} {BASES[b]}" for b, (kept, of) in found.items() if of or b == "printed"]
+    rest = sum(len(o.rows) for o in outcomes) - sum(of for _, of in found.values())
+    return "; ".join((*told, f"{rest} rows are not judged"))
 
 
 def outcome_table(outcome: "Outcome") -> Table:

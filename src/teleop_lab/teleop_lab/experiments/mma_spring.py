@@ -22,9 +22,6 @@ from teleop_lab.experiments.outcome import EXACT, Findings, Row, absolute, perce
 
 _OPEN, _SQUARE = math.radians(135.0), math.radians(90.0)
 _SAFETY = 1.15
-# Table 5.1 [g]; packing is the last row.
-_MASSES_G = {"L2": 37.73, "L3": 25.87, "L3a": 7.46, "L3b": 25.87, "L4": 25.57, "L5": 16.93,
-             "L6": 12.09, "L7": 152.59, "packing": 3.25}  # fmt: skip
 _CLOSE = percent(0.1)
 
 
@@ -32,15 +29,10 @@ def _measure(_: Bench) -> Findings:
     total = sum(MASSES.values())
     spring = ShoulderSpring()
     rows = [
-        Row(quantity=f"mass of {name}", unit="g", published=printed, predicted=1e3 * MASSES[name],
-            within=EXACT, group="masses, table 5.1")
-        for name, printed in _MASSES_G.items()
-    ]  # fmt: skip
-    rows.append(
         Row(quantity="total mass", unit="g", published=310.36, predicted=1e3 * total,
             within=EXACT, group="masses, table 5.1",
             note="not the sum of its rows, 307.36, with which it computes")
-    )  # fmt: skip
+    ]  # fmt: skip
     first, second = (float(gravity_torque(total, arm)) for arm in (ARM_AT_45_DEGREES, ARM_LEVEL))
     group = "torque about the shoulder"
     rows += [

@@ -129,7 +129,7 @@ def _rows(found: Mapping[Job, Puncture]) -> tuple[Row, ...]:
             continue
         rows += [
             Row(quantity=f"noticed after{told}", unit="ms", group=group, published=500.0 * late,
-                predicted=1e3 * each.notice, within=absolute(_TICKS_MS)),
+                basis="law", predicted=1e3 * each.notice, within=absolute(_TICKS_MS)),
             Row(quantity=f"overshoot{told}", unit="mm", group=group,
                 published=1e3 * least_overshoot(late), predicted=1e3 * each.overshoot),
         ]  # fmt: skip

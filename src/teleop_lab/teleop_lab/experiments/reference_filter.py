@@ -59,7 +59,7 @@ def _measure(bench: Bench) -> Findings:
     ]  # fmt: skip
     rows += [
         Row(quantity=f"unit step after {k} ticks", published=printed, predicted=value,
-            within=EXACT, group=rows[0].group, note="of the equation, not printed")
+            within=EXACT, basis="law", group=rows[0].group)
         for k, (printed, value) in enumerate(zip(_STEP, step_response(3), strict=True), start=1)
     ]  # fmt: skip
     rows += [

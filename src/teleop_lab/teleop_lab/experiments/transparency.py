@@ -110,7 +110,8 @@ def _rows(found: list[Number], group: str, told: str, *, is_judged: bool) -> lis
         within = _NEAR if not each.law or "Llewellyn" in each.quantity else _WITHIN
         rows.append(
             Row(quantity=each.quantity + told, unit=each.unit, published=law,
-                predicted=each.measured, within=None if law is None else within, group=group)
+                basis="law", predicted=each.measured, within=None if law is None else within,
+                group=group)
         )  # fmt: skip
     return rows
 
@@ -143,8 +144,8 @@ def _lag_rows(cell: Cell) -> list[Row]:
         off = np.abs(cell.hybrid[:, i, k] - exact[:, i, k]) / size
         rows.append(
             Row(quantity=f"h{i + 1}{k + 1}, farthest from the exact one", unit="%",
-                published=0.0, predicted=100.0 * float(off.max()), within=absolute(5.0),
-                group=group)
+                published=0.0, basis="law", predicted=100.0 * float(off.max()),
+                within=absolute(5.0), group=group)
         )  # fmt: skip
     return rows + _rows(numbers(cell, exact), group, "", is_judged=True)
 
