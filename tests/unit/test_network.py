@@ -144,7 +144,7 @@ def drawn(
 ) -> Array:
     """What a kind says of packets sent in a row (packets,)."""
     part = NETWORKS.find(name)
-    numbers, memory = part.numbers_of(build(part.parameters, values)), np.zeros(4)
+    numbers, memory = part.numbers(build(part.parameters, values)), np.zeros(4)
     chances = np.random.default_rng(seed).random((packets, 3))
     return np.array([part.draw(numbers, memory, c, i * period) for i, c in enumerate(chances)])
 

@@ -49,7 +49,7 @@ periods = st.sampled_from([5e-4, 1e-3, 2e-3, 1 / 300, 0.01])
 
 def numbers_of(kind: str, **given: float) -> Array:
     part = TREMOR_FILTERS.find(kind)
-    return part.numbers_of(build(part.parameters, given))
+    return part.numbers(build(part.parameters, given))
 
 
 def filtered(kind: str, values: Any, period: float = 1e-3, **given: float) -> tuple[Array, Array]:

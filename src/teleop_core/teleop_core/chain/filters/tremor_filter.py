@@ -178,7 +178,7 @@ class RunningTremorFilter(RunningStage):
         take_hand(self.parameters, parameters.plausible)
         self.parameters["pause_ns"] = math.floor(parameters.longest_pause * 1e9 + 0.5)
         kind = TREMOR_FILTERS.find(parameters.kind.kind)
-        numbers, step = kind.numbers_of(parameters.kind.parameters), kind.filter_pointer
+        numbers, step = kind.numbers(parameters.kind.parameters), kind.filter_pointer
         if step is self._part.filter and len(numbers) == len(self._part.numbers):
             self.state["is_retuned"] |= not np.array_equal(numbers, self._part.numbers)
             self._part.numbers[:] = numbers  # the tick that is composed already goes on

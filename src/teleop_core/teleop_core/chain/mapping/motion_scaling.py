@@ -464,7 +464,7 @@ class MotionScaling(RunningStage):
         p["law"] = PASSIVITIES.names().index(passivity.name)
         p["force_scale"] = part.force_scale(chosen.parameters)
         p["lead_gain"] = part.lead_gain(chosen.parameters)
-        numbers = part.numbers_of(chosen.parameters)
+        numbers = part.numbers(chosen.parameters)
         kept = passivity.numbers_of(reflection.passivity.parameters)
         law = self._law
         if (part.push_pointer, passivity.hand_pointer) == (law.push, law.hand) and (

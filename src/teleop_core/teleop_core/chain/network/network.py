@@ -260,7 +260,7 @@ class NetworkLink(RunningStage):
     @staticmethod
     def _made(width: int, topics: tuple[Topic, ...], given: WayParameters) -> Way:
         kind = NETWORKS.find(given.kind.kind)
-        numbers = kind.numbers_of(given.kind.parameters)
+        numbers = kind.numbers(given.kind.parameters)
         return make_way(width, message_sizes(topics), kind.draw_pointer, numbers)
 
     def reset(self) -> None:
@@ -289,7 +289,7 @@ class NetworkLink(RunningStage):
 
     def _take_kind(self, k: int, given: WayParameters) -> None:
         way, kind = self._ways[k], NETWORKS.find(given.kind.kind)
-        numbers = kind.numbers_of(given.kind.parameters)
+        numbers = kind.numbers(given.kind.parameters)
         if kind.draw_pointer is way.draw and len(numbers) == len(way.numbers):
             way.numbers[:] = numbers  # the tick that is composed already goes on
             return
