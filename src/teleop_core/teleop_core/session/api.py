@@ -49,6 +49,7 @@ from teleop_core.session.runner import (
     replayed_blocks,
     run_blocks,
     session_ticks,
+    silent,
 )
 from teleop_core.session.virtual import VirtualTime
 from teleop_core.slave.controllers import CONTROLLERS, Controller
@@ -69,10 +70,6 @@ columns are time [s] and what :data:`~teleop_core.chain.operators.Motion` says; 
 data frame with columns called as those of such a table."""
 Setting = float | str | bool | Sequence[float] | Sequence[str]
 """Value of a parameter."""
-
-
-def _silent(done: int, total: int) -> None:
-    """Show no progress."""
 
 
 def configuration(
@@ -151,7 +148,7 @@ def run(
     duration: float | None = None,
     seed: int | None = None,
     out: Path | str | None = None,
-    progress: Progress = _silent,
+    progress: Progress = silent,
     files: Iterable[Path | str] = (),
     settings: Mapping[str, Setting] | None = None,
     operator: OperatorLike | None = None,
@@ -220,7 +217,7 @@ def replay(
     recording: Recording | Path | str,
     *,
     out: Path | str | None = None,
-    progress: Progress = _silent,
+    progress: Progress = silent,
     files: Iterable[Path | str] = (),
     settings: Mapping[str, Setting] | None = None,
     texts: Iterable[str] = (),

@@ -34,11 +34,11 @@ from teleop_core.slave.operation import operation_level, operation_text
 Progress = Callable[[int, int], None]
 
 
-def _silent(done: int, total: int) -> None:
+def silent(*_: object) -> None:
     """Show no progress."""
 
 
-def simulate(configuration: Configuration, out: Path, progress: Progress = _silent) -> int:
+def simulate(configuration: Configuration, out: Path, progress: Progress = silent) -> int:
     """Run a session in virtual time and record it.
 
     Args:
@@ -71,7 +71,7 @@ def run_blocks(session: VirtualTime, ticks: int) -> Iterator[Any]:
 
 
 def replay(
-    bag: Bag, configuration: Configuration, out: Path, progress: Progress = _silent,
+    bag: Bag, configuration: Configuration, out: Path, progress: Progress = silent,
     begin: str = DEVICE,
 ) -> int:  # fmt: skip
     """Run recorded masters, or hands, through the graph again, in virtual time, and record it.
@@ -195,7 +195,7 @@ def record_blocks(
     out: Path,
     blocks: Iterable[Any],
     ticks: int,
-    progress: Progress = _silent,
+    progress: Progress = silent,
 ) -> int:
     """Record blocks of rows as they come.
 

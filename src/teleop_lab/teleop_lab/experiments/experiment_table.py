@@ -13,13 +13,13 @@ from rich.markup import escape
 from rich.table import Table
 
 from teleop_core.evaluation.rows import MISSING
-from teleop_lab.experiments.outcome import BASES
 
 if TYPE_CHECKING:
     from teleop_lab.experiments.outcome import Outcome, Row
 
 MARKS = {True: "✓", False: "✗", None: ""}
 _COLORS = {True: "green", False: "red", None: "default"}
+_KEPT = {"printed": "published figures agree", "law": "laws hold", "goal": "goals are kept"}
 _WIDTH = 110
 _DIGITS = 6  # after the point, the most that any source prints
 
@@ -81,8 +81,8 @@ def within(row: "Row") -> str:
 
 def summary(outcomes: "Sequence[Outcome]") -> str:
     """One line: how many figures agree, how many laws and goals are kept."""
-    found = {basis: np.sum([o.count(basis) for o in outcomes], axis=0) for basis in BASES}
-    told = [f"{kept} of {of} {BASES[b]}" for b, (kept, of) in found.items() if of or b == "printed"]
+    found = {basis: np.sum([o.count(basis) for o in outcomes], axis=0) for basis in _KEPT}
+    told = [f"{kept} of {of} {_KEPT[b]}" for b, (kept, of) in found.items() if of or b == "printed"]
     rest = sum(len(o.rows) for o in outcomes) - sum(of for _, of in found.values())
     return "; ".join((*told, f"{rest} rows are not judged"))
 

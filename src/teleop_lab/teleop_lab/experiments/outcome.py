@@ -10,8 +10,8 @@ from teleop_core.evaluation.figure import Figure
 Plain = str | int | float | bool | None | list["Plain"] | dict[str, "Plain"]
 _KINDS = ("exact", "share", "absolute", "factor")
 _ROUNDING = 1e-9
-BASES = {"printed": "published figures agree", "law": "laws hold", "goal": "goals are kept"}
-"""What a row is judged against, and what it says of those that keep to it."""
+BASES = ("printed", "law", "goal")
+"""What a row is judged against."""
 
 
 @dataclass(frozen=True)
