@@ -10,13 +10,7 @@ import pytest
 import roboticstoolbox as rtb
 import sympy
 
-from teleop_core.base.errors import (
-    ParameterError,
-    RecordingError,
-    ShapeError,
-    TeleopError,
-    UnknownNameError,
-)
+from teleop_core.base import errors
 from teleop_core.kernels.geometry import Array, rotation, transform
 from teleop_core.robots import IkStatus, load_robot
 from teleop_core.robots.dh import CONVENTIONS, DhTable, elementary, load_table, parse_table
@@ -275,7 +269,7 @@ def test_signs_offsets_limits_and_homes_are_read_in_the_table_unit() -> None:
 def test_malformed_rows_are_refused_by_name(
     rows: str | Sequence[int | dict[str, str | float | bool | list[int]]], named: str
 ) -> None:
-    with pytest.raises(ParameterError) as caught:
+    with pytest.raises(errors.ParameterError) as caught:
         table(rows)
     assert caught.value.name == named
 
@@ -297,12 +291,12 @@ def test_malformed_rows_are_refused_by_name(
 def test_malformed_tables_are_refused(
     content: list[object] | Mapping[str, str | int | list[str | dict[str, str]]] | None,
 ) -> None:
-    with pytest.raises(TeleopError):
+    with pytest.raises(errors.TeleopError):
         parse_table(content)
 
 
 def test_unknown_conventions_list_the_known_ones() -> None:
-    with pytest.raises(UnknownNameError) as caught:
+    with pytest.raises(errors.UnknownNameError) as caught:
         table([{"theta": "q"}], convention="distant")
     assert set(caught.value.alternatives) == set(CONVENTIONS)
 
@@ -311,14 +305,14 @@ def test_files_that_are_not_yaml_or_not_there_are_refused(tmp_path: Path) -> Non
     broken = tmp_path / "broken.yaml"
     broken.write_text("rows: [", encoding="utf-8")
     for path in (broken, tmp_path / "missing.yaml"):
-        with pytest.raises(RecordingError) as caught:
+        with pytest.raises(errors.RecordingError) as caught:
             load_table(path)
         assert caught.value.path == path
 
 
 def test_joint_vectors_of_another_length_are_refused() -> None:
     chain = table([{"theta": "q"}])
-    with pytest.raises(ShapeError):
+    with pytest.raises(errors.ShapeError):
         chain.link_transforms([0.0, 1.0])
-    with pytest.raises(ParameterError):
+    with pytest.raises(errors.ParameterError):
         chain.link_transforms([math.nan])

@@ -6,18 +6,9 @@ import numpy as np
 
 from teleop_core.base.errors import ClosureError, ParameterError
 from teleop_core.base.parameters import Choice, choice, parameter
+from teleop_core.graph import topics
 from teleop_core.graph.signals import DT, assign
 from teleop_core.graph.stage import RunningStage, Stage
-from teleop_core.graph.topics import (
-    NO_COMMAND_NS,
-    SLAVE_ESTIMATED_CF,
-    SLAVE_MEASURED_CF,
-    SLAVE_MEASURED_JS,
-    SLAVE_OPERATION,
-    SLAVE_SETPOINT_JS,
-    SLAVE_TRUE_CF,
-    SLAVE_TRUE_CP,
-)
 from teleop_core.kernels import pointer
 from teleop_core.kernels.fields import fields_of, record, record_array
 from teleop_core.kernels.geometry import Array
@@ -173,7 +164,7 @@ class SlaveSim(RunningStage):
         row["slave_setpoint_js"], row["slave_measured_js"] = home, 0.0
         row["slave_true_cf"] = row["slave_measured_cf"] = row["slave_estimated_cf"] = 0.0
         row["slave_measured_js"][: self.robot.n] = s["measured"]
-        row["slave_measured_js_ns"] = NO_COMMAND_NS  # where it stands before the first tick
+        row["slave_measured_js_ns"] = topics.NO_COMMAND_NS  # where it stands before the first tick
 
     @property
     def punctures(self) -> int:
@@ -337,13 +328,13 @@ class SlaveSim(RunningStage):
 SLAVE_SIM = Stage(
     "slave_sim",
     SlaveSimParameters,
-    reads=(SLAVE_SETPOINT_JS, SLAVE_OPERATION),
+    reads=(topics.SLAVE_SETPOINT_JS, topics.SLAVE_OPERATION),
     writes=(
-        SLAVE_MEASURED_JS,
-        SLAVE_MEASURED_CF,
-        SLAVE_ESTIMATED_CF,
-        SLAVE_TRUE_CP,
-        SLAVE_TRUE_CF,
+        topics.SLAVE_MEASURED_JS,
+        topics.SLAVE_MEASURED_CF,
+        topics.SLAVE_ESTIMATED_CF,
+        topics.SLAVE_TRUE_CP,
+        topics.SLAVE_TRUE_CF,
     ),
     make=SlaveSim,
     node="teleop_core.nodes.slave_sim:SlaveSimNode",

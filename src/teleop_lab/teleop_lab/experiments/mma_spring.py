@@ -5,16 +5,7 @@ import math
 import numpy as np
 
 from teleop_core.evaluation.figure import DARK, SECOND, THIRD, Figure
-from teleop_core.robots.mma_balance import (
-    ARM_AT_45_DEGREES,
-    ARM_LEVEL,
-    MASSES,
-    ShoulderSpring,
-    coil,
-    gravity_torque,
-    matching_rate,
-    shoulder_load,
-)
+from teleop_core.robots import mma_balance
 from teleop_lab.experiments.bench import Bench
 from teleop_lab.experiments.drawing import axis, line, published_points
 from teleop_lab.experiments.experiment import Experiment
@@ -26,14 +17,17 @@ _CLOSE = percent(0.1)
 
 
 def _measure(_: Bench) -> Findings:
-    total = sum(MASSES.values())
-    spring = ShoulderSpring()
+    total = sum(mma_balance.MASSES.values())
+    spring = mma_balance.ShoulderSpring()
     rows = [
         Row(quantity="total mass", unit="g", published=310.36, predicted=1e3 * total,
             within=EXACT, group="masses, table 5.1",
             note="not the sum of its rows, 307.36, with which it computes")
     ]  # fmt: skip
-    first, second = (float(gravity_torque(total, arm)) for arm in (ARM_AT_45_DEGREES, ARM_LEVEL))
+    first, second = (
+        float(mma_balance.gravity_torque(total, arm))
+        for arm in (mma_balance.ARM_AT_45_DEGREES, mma_balance.ARM_LEVEL)
+    )
     group = "torque about the shoulder"
     rows += [
         Row(quantity=name, unit="N·m", published=printed, predicted=value, within=absolute(1e-4),
@@ -44,7 +38,7 @@ def _measure(_: Bench) -> Findings:
         )
     ]  # fmt: skip
     rows += [*_spring_rows(spring, second - first), *_coil_rows()]
-    load = shoulder_load(np.radians([-45.0, 0.0]), spring)
+    load = mma_balance.shoulder_load(np.radians([-45.0, 0.0]), spring)
     rows += [
         Row(quantity=f"left for the hand, link 2 {pose}", unit="N·m", predicted=float(left),
             group="what the spring does")
@@ -59,9 +53,9 @@ _NOTES = (
 )
 
 
-def _spring_rows(spring: ShoulderSpring, difference: float) -> list[Row]:
+def _spring_rows(spring: mma_balance.ShoulderSpring, difference: float) -> list[Row]:
     deflection = float(spring.length(_OPEN) - spring.length(_SQUARE))
-    rate = matching_rate(difference, deflection, float(spring.lever(_SQUARE)))
+    rate = mma_balance.matching_rate(difference, deflection, float(spring.lever(_SQUARE)))
     found = (
         ("length at 45°", "mm", 51.7372, 1e3 * float(spring.length(_OPEN))),
         ("lever at 45°", "mm", 10.7151, 1e3 * float(spring.lever(_OPEN))),
@@ -79,7 +73,7 @@ def _spring_rows(spring: ShoulderSpring, difference: float) -> list[Row]:
 
 
 def _coil_rows() -> list[Row]:
-    wound = coil()
+    wound = mma_balance.coil()
     found = (
         ("turns", "", 13.0, float(wound.turns)),
         ("slenderness", "", 3.69, wound.slenderness),
@@ -95,9 +89,9 @@ def _coil_rows() -> list[Row]:
     ]  # fmt: skip
 
 
-def _figure(spring: ShoulderSpring) -> Figure:
+def _figure(spring: mma_balance.ShoulderSpring) -> Figure:
     degrees = np.linspace(-90.0, 30.0, 121)
-    load = shoulder_load(np.radians(degrees), spring)
+    load = mma_balance.shoulder_load(np.radians(degrees), spring)
     traces = [
         line(degrees, load.gravity, "gravity", DARK, 2.0, "N·m"),
         line(degrees, load.spring, "spring", SECOND, 2.0, "N·m"),

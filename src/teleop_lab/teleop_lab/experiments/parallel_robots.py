@@ -3,13 +3,8 @@
 import numpy as np
 
 from teleop_core.evaluation.figure import FIRST, SECOND, Figure
+from teleop_core.robots import mobility
 from teleop_core.robots.four_bar_loop import FourBar
-from teleop_core.robots.mobility import (
-    PLANAR,
-    SPATIAL,
-    degrees_of_freedom,
-    passive_joints,
-)
 from teleop_lab.experiments.bench import Bench
 from teleop_lab.experiments.drawing import axis, line
 from teleop_lab.experiments.experiment import Experiment
@@ -17,10 +12,10 @@ from teleop_lab.experiments.outcome import EXACT, Findings, Row
 
 # Mechanism: space, links, joints, freedoms of the joints, and the printed freedom.
 _COUNTS = {
-    "planar 4-bar": (PLANAR, 4, 4, 4, 1),
-    "3-RPS": (SPATIAL, 8, 9, 15, 3),
-    "three-fingered hand": (SPATIAL, 11, 12, 18, 6),
-    "Stewart platform": (SPATIAL, 14, 18, 36, 6),
+    "planar 4-bar": (mobility.PLANAR, 4, 4, 4, 1),
+    "3-RPS": (mobility.SPATIAL, 8, 9, 15, 3),
+    "three-fingered hand": (mobility.SPATIAL, 11, 12, 18, 6),
+    "Stewart platform": (mobility.SPATIAL, 14, 18, 36, 6),
 }
 _LOOP = FourBar(4.0, 1.0, 3.5, 2.5)
 
@@ -29,14 +24,14 @@ def _count_rows() -> list[Row]:
     group = "mobility, eq. 1"
     rows = [
         Row(quantity=f"freedoms, {name}", published=float(printed),
-            predicted=float(degrees_of_freedom(links, joints, freedoms, space=space)),
+            predicted=float(mobility.degrees_of_freedom(links, joints, freedoms, space=space)),
             within=EXACT, group=group,
             note="spoken as three; the formula gives six" * (name == "three-fingered hand"))
         for name, (space, links, joints, freedoms, printed) in _COUNTS.items()
     ]  # fmt: skip
     return rows + [
         Row(quantity=f"passive joints, {name}", published=float(printed),
-            predicted=float(passive_joints(joints, freedoms)), within=EXACT, group=group)
+            predicted=float(mobility.passive_joints(joints, freedoms)), within=EXACT, group=group)
         for name, joints, freedoms, printed in (("4-bar", 4, 1, 3), ("3-RPS", 9, 3, 6))
     ]  # fmt: skip
 

@@ -10,14 +10,9 @@ import numpy as np
 
 from teleop_core.base.errors import ParameterError
 from teleop_core.base.parameters import Choice, choice, parameter
+from teleop_core.graph import topics
 from teleop_core.graph.signals import DT
 from teleop_core.graph.stage import RunningStage, Stage
-from teleop_core.graph.topics import (
-    OPERATION,
-    SLAVE_MEASURED_JS,
-    SLAVE_OPERATION,
-    SLAVE_SETPOINT_JS,
-)
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot_set
 from teleop_core.robots.parameters import RobotParameters
@@ -29,7 +24,7 @@ from teleop_core.slave.operation.states import State
 
 RATES = (100, 125, 200, 250, 500, 1000)
 """Commands a second that whole milliseconds allow."""
-_STATE, _BRAKED = OPERATION.index("state"), OPERATION.index("is_braked")
+_STATE, _BRAKED = topics.OPERATION.index("state"), topics.OPERATION.index("is_braked")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -245,8 +240,8 @@ def _nothing(row: object, dt: float) -> None:
 ARM_BRIDGE = Stage(
     "arm_bridge",
     ArmBridgeParameters,
-    reads=(SLAVE_SETPOINT_JS, SLAVE_OPERATION),
-    writes=(SLAVE_MEASURED_JS,),
+    reads=(topics.SLAVE_SETPOINT_JS, topics.SLAVE_OPERATION),
+    writes=(topics.SLAVE_MEASURED_JS,),
     make=ArmBridge,
     node="teleop_core.nodes.arm_bridge:ArmBridgeNode",
 )
