@@ -33,9 +33,7 @@ endings = st.one_of(st.just(0.0), lengths)
 def valid(group: type[object], **values: SearchStrategy) -> SearchStrategy:
     """Groups of parameters, those that do not fit together left out."""
 
-    def make(
-        chosen: Mapping[str, float | tuple[float, float, float]],
-    ) -> Any:
+    def make(chosen: Mapping[str, float | tuple[float, float, float]]) -> Any:
         try:
             return group(**chosen)
         except ParameterError:

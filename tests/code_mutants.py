@@ -20,9 +20,7 @@ from mutants import ROOT, Mutant, tree
 UNIT = "tests/unit/test_"
 
 
-def _mutant(
-    name: str, text: str, file: str, before: str, after: str, *tests: str
-) -> Mutant:  # fmt: skip
+def _mutant(name: str, text: str, file: str, before: str, after: str, *tests: str) -> Mutant:
     files = tuple(one if "/" in one else f"{UNIT}{one}.py" for one in tests)
     return Mutant(name, text, ((file, before, after),), files)
 

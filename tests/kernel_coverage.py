@@ -69,9 +69,10 @@ def run_tests(settings: Path) -> int:
     coverage_run = ["coverage", "run", "--rcfile", str(settings), "-m"]
     pytest = ["pytest", "-q", "-n", "2", "-p", Path(__file__).stem, *files]
     return subprocess.call(
-        [sys.executable, "-m", *coverage_run, *pytest], cwd=ROOT,
+        [sys.executable, "-m", *coverage_run, *pytest],
+        cwd=ROOT,
         env={**os.environ, "NUMBA_DISABLE_JIT": "1", "PYTHONPATH": str(Path(__file__).parent)},
-    )  # fmt: skip
+    )
 
 
 def pytest_collection_modifyitems(items: list[Any]) -> None:

@@ -13,14 +13,7 @@ setup(
     packages=find_packages(include=["teleop_drill", "teleop_drill.*"]),
     package_data={"teleop_drill": ["py.typed", "*.pyi"]},
     python_requires=">=3.11",
-    install_requires=[
-        f"teleop_core=={VERSION}",
-        "lazy_loader",
-        "mcap",
-        "numpy",
-        "pyyaml",
-        "rich",
-    ],
+    install_requires=[f"teleop_core=={VERSION}", "lazy_loader", "mcap", "numpy", "pyyaml", "rich"],
     extras_require={"ros": ["teleop_core[ros]"]},
     data_files=[
         ("share/ament_index/resource_index/packages", ["resource/teleop_drill"]),

@@ -39,11 +39,7 @@ class Streamer:
         self.peer.send(SLAVE_SERVO_JP, time.time_ns(), goal)
         self.setpoints.take()
 
-    def until(
-        self,
-        condition: Any,
-        what: str,
-    ) -> Any:
+    def until(self, condition: Any, what: str) -> Any:
         """Send commands until something is so."""
 
         def turn() -> object:

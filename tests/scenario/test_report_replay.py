@@ -63,8 +63,9 @@ def record(path: Path, name: str, duration: float = DURATION, rate: int = RATE) 
     )
     rows[topics.SLAVE_MEASURED_JS] = states
     metadata = recipe.metadata | {"robot": name}
-    with BagWriter(path, recipe.topics, robot.joint_names, metadata=metadata,
-                   start_ns=START_NS) as writer:  # fmt: skip
+    with BagWriter(
+        path, recipe.topics, robot.joint_names, metadata=metadata, start_ns=START_NS
+    ) as writer:
         for at, is_on in ((0.0, 0.0), (FIXTURE_ON[0], 1.0), (FIXTURE_ON[1], 0.0)):
             stamp = START_NS + round(at * 1e9)
             center = dict(zip(("fixture_center_x", "fixture_center_y", "fixture_center_z"),

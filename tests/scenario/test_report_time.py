@@ -331,8 +331,9 @@ def test_zooming_in_shows_every_sample(
         assert mode == "lines+markers"
     x, _, _ = curve(tab, ERROR, "against filtered reference", name)
     assert "every sample, 1 ms apart" in tab.value("document.querySelector('.told').textContent")
-    for axis, trace in enumerate(t for t in plots(tab)[f"{name}/{POSITION}"]["traces"]
-                                 if t["name"] == "measured"):  # fmt: skip
+    for axis, trace in enumerate(
+        t for t in plots(tab)[f"{name}/{POSITION}"]["traces"] if t["name"] == "measured"
+    ):
         at = np.round(np.array(trace["x"]) * 1e3).astype(int) - (first - 1)
         assert np.abs(np.array(trace["y"]) - measured[at, axis]).max() < ROUNDING_MM
 

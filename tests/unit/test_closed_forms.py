@@ -94,8 +94,9 @@ def test_every_legal_pose_is_found_with_all_its_solutions(
             branches = arm.ik_all(wanted)
             assert 1 <= len(branches) <= 8
             assert apart(joints, branches) < 1e-5
-            np.testing.assert_allclose(arm.fk(branches), np.tile(wanted, (len(branches), 1, 1)),
-                                       atol=1e-9)  # fmt: skip
+            np.testing.assert_allclose(
+                arm.fk(branches), np.tile(wanted, (len(branches), 1, 1)), atol=1e-9
+            )
 
 
 @pytest.mark.parametrize(("kind", "make", "word", "side"), EACH, ids=NAMES)
@@ -314,12 +315,14 @@ def test_the_arcs_of_the_swivel_hold_a_legal_posture_without_any_search(
 ) -> None:
     rng = np.random.default_rng(40 + seed)
     middle, half = rng.uniform(-2.5, 2.5, 7), rng.uniform(0.02, 0.5, 7)
-    arm = load(swivel_axes(rng), [(float(m - h), float(m + h))
-                                  for m, h in zip(middle, half, strict=True)])  # fmt: skip
+    arm = load(
+        swivel_axes(rng), [(float(m - h), float(m + h)) for m, h in zip(middle, half, strict=True)]
+    )
     found, work = np.empty((13, 8)), np.empty((60, 4))
     for q in rng.uniform(arm.lower, arm.upper, (100, 7)):
-        count, _ = swivel._branches(arm.fk(q), arm.geometry_row, arm.home.copy(), arm.limits(),
-                                    True, found, work)  # fmt: skip
+        count, _ = swivel._branches(
+            arm.fk(q), arm.geometry_row, arm.home.copy(), arm.limits(), True, found, work
+        )
         off = (found[:count, :7] - middle + math.pi) % (2.0 * math.pi) - math.pi
         assert ((abs(off) <= half + 1e-9).all(axis=1) & (found[:count, 7] > 0.5)).any()
 
@@ -448,7 +451,8 @@ def test_far_from_singular_postures_the_least_move_alone_is_made(
 ) -> None:
     arm = load(IIWA14, IIWA14_LIMITS)
     joints = np.array([0.3, 0.8, -0.4, 1.2, 0.5, -0.9, 0.2]) + 0.1 * np.sin(
-        np.linspace(0.0, 6.0, 3000)[:, None] + np.arange(7))  # fmt: skip
+        np.linspace(0.0, 6.0, 3000)[:, None] + np.arange(7)
+    )
     plain = moved_least(arm, arm.fk(joints), joints[0])
     np.testing.assert_array_equal(check_path(arm, joints).q[:3000], plain)
 

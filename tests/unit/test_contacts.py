@@ -28,8 +28,7 @@ from teleop_core.session.notes import notes_of, passive_note, rendered_note
 COLUMN = {name: index for index, name in enumerate(MASTER_CONTACT.columns)}
 CALM = HandParameters()
 STILL = build(
-    OperatorParameters,
-    {"kind": "hold", "rotation": 0.0, "tremor_amplitude": 0.0, "patience": 0.0},
+    OperatorParameters, {"kind": "hold", "rotation": 0.0, "tremor_amplitude": 0.0, "patience": 0.0}
 )
 
 

@@ -197,8 +197,9 @@ def test_adaptive_law_stays_within_its_bounds_whatever_it_is_asked_for() -> None
     reach = 0.05 * present(ARM.drives).speed_limit
     way = np.clip(
         ARM.home + np.cumsum(rng.uniform(-reach, reach, (3000, 6)), axis=0) * 0.2,
-        ARM.lower, ARM.upper,
-    )  # fmt: skip
+        ARM.lower,
+        ARM.upper,
+    )
     _, _, efforts = run(arm, way)
     memory, drives = arm.simulated.arm.memory, ARM.drives
     assert np.isfinite(efforts).all()

@@ -16,17 +16,11 @@ from teleop_core.robots import IkStatus, load_robot
 from teleop_core.robots.dh import CONVENTIONS, DhTable, elementary, load_table, parse_table
 
 ROUNDING = 1e-14
-TABLES = (
-    "puma560", "rcrt1", "scara", "planar_3r", "five_axis_standard", "five_axis_sheth_uicker"
-)  # fmt: skip
+TABLES = ("puma560", "rcrt1", "scara", "planar_3r", "five_axis_standard", "five_axis_sheth_uicker")
 REACHED = 1e-9
 
 
-def table(
-    rows: Any,
-    convention: str = "modified",
-    **entries: object,
-) -> DhTable:
+def table(rows: Any, convention: str = "modified", **entries: object) -> DhTable:
     return parse_table(
         {"name": "chain", "convention": convention, "angles": "degrees", "rows": rows, **entries}
     )

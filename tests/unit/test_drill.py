@@ -222,11 +222,7 @@ BEGIN: Any = 1_500 * MS
 
 
 def seen(
-    joints: Array,
-    lies: float = 1.0,
-    told: Any = None,
-    warned: Any = None,
-    late: float = 0.0,
+    joints: Array, lies: float = 1.0, told: Any = None, warned: Any = None, late: float = 0.0
 ) -> Seen:
     """What a tap hears of an arm whose setpoint and measured joints are these, each millisecond."""
     joints = np.asarray(joints)

@@ -16,17 +16,7 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from any_fixture import (
-    BALL,
-    BEYOND,
-    KINDS,
-    THIN,
-    beyond_line,
-    beyond_path,
-    found,
-    pieces,
-    places,
-)
+from any_fixture import BALL, BEYOND, KINDS, THIN, beyond_line, beyond_path, found, pieces, places
 from teleop_core.base.errors import ParameterError
 from teleop_core.base.parameters import build
 from teleop_core.chain.fixtures import FIXTURES

@@ -26,9 +26,7 @@ TARGET = ARM.home + np.array([0.5, -0.4, -0.04, 0.6, 0.5, 0.4])
 
 
 def slave(
-    plant: str = "hardware",
-    controller: str = "source_pid",
-    **settings: Any,
+    plant: str = "hardware", controller: str = "source_pid", **settings: Any
 ) -> ArmParameters:
     given = {"plant.kind": plant, "controller.kind": controller}
     return build(ArmParameters, given | settings)
@@ -128,9 +126,10 @@ def test_every_fault_can_be_left_out_alone(fault: str) -> None:
     with_it = HARDWARE.physics(slave().plant.kind.parameters, ARM)
     without = HARDWARE.physics(kind.parameters, ARM)
     differ = {
-        name for name in vars(with_it)
+        name
+        for name in vars(with_it)
         if not np.array_equal(getattr(with_it, name), getattr(without, name))
-    }  # fmt: skip
+    }
     expected = {
         "friction": {"coulomb"}, "sticking": {"bristle"}, "wandering": {"wander"},
         "bias": {"bias"}, "weights": {"dynamics"}, "drive_steps": {"effort_step"},
@@ -212,10 +211,7 @@ def test_wrong_numbers_of_a_plant_name_what_is_possible(setting: str, needed: st
         ({"sources": {"play": "somewhere"}}, errors.ParameterError),
     ],
 )
-def test_impossible_hardware_is_refused(
-    changed: Any,
-    kind: type[errors.TeleopError],
-) -> None:
+def test_impossible_hardware_is_refused(changed: Any, kind: type[errors.TeleopError]) -> None:
     zero = np.zeros(2)
     given = {"coulomb": zero, "bias": zero, "wander": zero, "play": zero,
              "coupling": np.zeros((2, 2))}  # fmt: skip

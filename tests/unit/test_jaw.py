@@ -36,11 +36,7 @@ class Bench:
     """An open jaw, its drive, and a hand that leads it; the tip is led by hand too."""
 
     def __init__(
-        self,
-        *,
-        jaw: Mapping[str, Any] | None = None,
-        places: Array = PLACE,
-        **thing: float,
+        self, *, jaw: Mapping[str, Any] | None = None, places: Array = PLACE, **thing: float
     ) -> None:
         self.given = JawSimParameters(
             **(jaw or {}), object=GripObjectParameters(place=tuple(np.ravel(places)), **thing)
@@ -378,8 +374,9 @@ def test_an_object_that_slides_out_above_the_table_has_dropped_and_lies_there() 
     bench = Bench()
     bench.run(CLOSED, 600)
     bench.carry(CLOSED, lift(0.05))
-    bench.carry(CLOSED, bench.tip[:3] + 400.0 * 0.5 * (1e-3 * np.arange(20)[:, None]) ** 2
-                * [1.0, 0.0, 0.0])  # fmt: skip
+    bench.carry(
+        CLOSED, bench.tip[:3] + 400.0 * 0.5 * (1e-3 * np.arange(20)[:, None]) ** 2 * [1.0, 0.0, 0.0]
+    )
     bench.run(CLOSED, 500)
     assert (bench.grip[[IS_GRIPPED, GRIPS, SLIPS, DROPS]] == (0, 1, 1, 1)).all()
     assert bench.object[2] == PLACE[2]

@@ -185,9 +185,7 @@ def test_what_no_device_can_be_is_refused_by_its_name(values: Mapping[str, Any],
 
 
 @pytest.mark.parametrize("axes", FRAMES, ids="".join)
-def test_axes_and_unit_come_out_of_three_motions_that_are_not_quite_straight(
-    axes: Any,
-) -> None:
+def test_axes_and_unit_come_out_of_three_motions_that_are_not_quite_straight(axes: Any) -> None:
     rng = np.random.default_rng(len(axes))
     for unit in UNITS:
         ways = (

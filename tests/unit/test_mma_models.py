@@ -151,11 +151,10 @@ def test_readings_and_serial_joints_are_inverse_maps() -> None:
 @pytest.mark.parametrize(
     ("serial", "shared", "place", "quaternion"),
     [
-        ((30, -90, 90, 0, 90, 0, 0), (0, 90), (38.7787, -59.9066, 482.08),
-         (0, 0, 0.9659, -0.2588)),
+        ((30, -90, 90, 0, 90, 0, 0), (0, 90), (38.7787, -59.9066, 482.08), (0, 0, 0.9659, -0.2588)),
         ((0, -60, 70, -10, 90, 0, 0), (-30, 70), (94.9177, -71.27, 429.0494), (0, 0, 1, 0)),
     ],
-)  # fmt: skip
+)
 def test_further_points_of_the_specification(
     mma: Robot,
     serial: tuple[int, ...],

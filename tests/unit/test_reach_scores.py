@@ -336,7 +336,7 @@ def turned_session(cut_from: int = COUNT, **parameters: Any) -> Any:
 @pytest.mark.parametrize(
     "parameters",
     [{}, {"tool_roll": 0.4}, {"axes": ("+x", "+y", "+z"), "tool_axes": ("-x", "+y", "-z")}],
-)  # fmt: skip
+)
 def test_a_tool_that_turns_as_the_hand_is_where_it_was_asked_to_be(
     path: Path, parameters: Any
 ) -> None:

@@ -11,12 +11,7 @@ from scipy.signal import lfilter, lsim
 from present import present
 from teleop_core.base.errors import ParameterError
 from teleop_lab.experiments import Bench, two_port
-from teleop_lab.experiments.transmission import (
-    AIR,
-    Cell,
-    measure_cells,
-    predicted_hybrid,
-)
+from teleop_lab.experiments.transmission import AIR, Cell, measure_cells, predicted_hybrid
 from teleop_lab.experiments.transparency import LAG, STRAY, lag_cell, report
 
 TIMES: Any = np.arange(3000, 26_000) * 1e-3

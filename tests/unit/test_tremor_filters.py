@@ -220,8 +220,9 @@ def test_the_filter_that_is_the_default_leads_the_slave_nearer_to_what_the_hand_
     assert TremorFilterParameters().kind.kind == "wflc"
     off = {}
     for kind in KINDS:
-        found = tc.run("human", duration=20.0, stages=["tremor_filter"],
-                       settings={"tremor_filter.kind": kind})  # fmt: skip
+        found = tc.run(
+            "human", duration=20.0, stages=["tremor_filter"], settings={"tremor_filter.kind": kind}
+        )
         score = found.score()
         before, after = (
             present(score.value(f"tremor_filter.intention_{name}_um"))
@@ -281,10 +282,7 @@ def stage(kind: str = "band_stop", **given: object) -> RunningTremorFilter:
 
 
 def through(
-    runner: RunningTremorFilter,
-    places: Any,
-    period_ns: int = MS,
-    first_ns: int = MS,
+    runner: RunningTremorFilter, places: Any, period_ns: int = MS, first_ns: int = MS
 ) -> Array:
     """Filtered places (N, 3) of a master that is at places (N, 3), sample by sample."""
     row, found = runner.signals, []
@@ -510,9 +508,10 @@ def test_the_mapping_reads_the_filtered_stylus_and_the_operator_the_stylus_itsel
     at_port = {link.reader.name: link.topic.name for link in graph.links
                if link.port.name == "master/measured_cp"}  # fmt: skip
     assert at_port == {
-        "operator": "master/measured_cp", "tremor_filter": "master/measured_cp",
+        "operator": "master/measured_cp",
+        "tremor_filter": "master/measured_cp",
         "motion_scaling": "master/filtered_cp",
-    }  # fmt: skip
+    }
     assert not graph.notes
     way = [name for name, _ in graph.chain()]
     assert way[:3] == ["haptic_master", "tremor_filter", "motion_scaling"]
@@ -628,8 +627,9 @@ def test_without_motion_there_is_no_delay() -> None:
 
 
 def test_the_score_says_what_the_stage_did_and_nothing_without_it() -> None:
-    score = tc.run("human", duration=20.0, stages="tremor_filter",
-                   settings={"tremor_filter.kind": "band_stop"}).score()  # fmt: skip
+    score = tc.run(
+        "human", duration=20.0, stages="tremor_filter", settings={"tremor_filter.kind": "band_stop"}
+    ).score()
     assert 40.0 < present(score.value("tremor_filter.before_um")) < 80.0
     assert 0.2 < present(score.value("tremor_filter.left_share")) < 0.5
     after = present(score.value("tremor_filter.before_um")) * present(
@@ -638,8 +638,9 @@ def test_the_score_says_what_the_stage_did_and_nothing_without_it() -> None:
     assert score.value("tremor_filter.after_um") == pytest.approx(after)
     assert score.value("tremor_filter.delay_ms") == pytest.approx(9.5, abs=0.5)
     assert score.value("tremor_filter.gain") == pytest.approx(1.0, abs=0.01)
-    rows = {row.label for result in score.results for row in result.rows
-            if row.group == "tremor filter"}  # fmt: skip
+    rows = {
+        row.label for result in score.results for row in result.rows if row.group == "tremor filter"
+    }
     assert rows == {"tremor before", "tremor after", "tremor left", "delay below 2 Hz",
                     "gain below 2 Hz", "stylus against intention, RMS",
                     "filtered against intention, RMS"}  # fmt: skip

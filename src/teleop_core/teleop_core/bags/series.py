@@ -112,7 +112,7 @@ class Column:
             f"{self.frame_id!r}"
             for frame, count in self._frames.items()
             if frame != self.frame_id and not self.kind.has_names
-        ]  # fmt: skip
+        ]
 
     def _begin(self, data: Bytes, begins: Stamps, sizes: Stamps) -> None:
         """Learn from the first message that can be read, of those of the commonest size first."""

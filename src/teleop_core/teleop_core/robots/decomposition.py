@@ -46,10 +46,7 @@ class Solution:
 SEARCH = Solution(
     text="search: damped least squares from the seed, then from 24 starts or more",
     kernels=Kernels(
-        fk=dh_kernels.fk,
-        jacobian=dh_kernels.jacobian,
-        ik=dh_kernels.ik,
-        ik_all=dh_kernels.ik_all,
+        fk=dh_kernels.fk, jacobian=dh_kernels.jacobian, ik=dh_kernels.ik, ik_all=dh_kernels.ik_all
     ),
 )
 

@@ -45,13 +45,7 @@ from teleop_core.robots.rps3_modes import (
     joint_points,
     leg_coordinates,
 )
-from teleop_core.robots.rps3_search import (
-    angles_of,
-    assemble,
-    assemblies,
-    is_near_singular,
-    lean,
-)
+from teleop_core.robots.rps3_search import angles_of, assemble, assemblies, is_near_singular, lean
 from teleop_core.robots.stewart_legs import invert
 
 __all__ = [

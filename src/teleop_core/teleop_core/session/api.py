@@ -104,9 +104,10 @@ def configuration(
     """
     named: dict[str, object] = {}
     for name, registry, part in (
-        ("fixture", FIXTURES, fixture), ("controller", CONTROLLERS, controller),
+        ("fixture", FIXTURES, fixture),
+        ("controller", CONTROLLERS, controller),
         ("plant", PLANTS, plant),
-    ):  # fmt: skip
+    ):
         if part is not None:
             named[f"{name}.kind"] = part if isinstance(part, str) else _known(registry, part)
     if robot is not None:

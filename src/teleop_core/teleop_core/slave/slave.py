@@ -83,16 +83,18 @@ class SlaveParameters(RobotParameters):
         doc="joints to which the slave moves from home before it follows; empty: the robot's start",
     )  # fmt: skip
     starts_at_home: bool = parameter(
-        False, fixed=True,
+        False,
+        fixed=True,
         doc="whether it starts where it is, at home, if no start is given; a URDF states no home",
-    )  # fmt: skip
+    )
     start_speed: float = parameter(
         0.5, lower=0.01, upper=1.0, fixed=True, doc="share of the speed limits used on that move"
     )
     interpolation: str = parameter(
-        "linear", choices=INTERPOLATIONS,
+        "linear",
+        choices=INTERPOLATIONS,
         doc="way between commands that come slower than the ticks, which takes one period of them",
-    )  # fmt: skip
+    )
     reference_filter: ReferenceFilterParameters = field(default_factory=ReferenceFilterParameters)
     operation: OperationParameters = field(default_factory=OperationParameters)
 

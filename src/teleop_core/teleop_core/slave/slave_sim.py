@@ -54,9 +54,10 @@ class SlaveSimParameters(RobotParameters):
     seed: int = parameter(1, lower=0, fixed=True, doc="seed of everything random in the session")
 
     gravity_compensation: str = parameter(
-        "published", choices=("published", "all", "none"),
+        "published",
+        choices=("published", "all", "none"),
         doc="axes whose gravity is fed forward: those of the source (axis 2), all, none",
-    )  # fmt: skip
+    )
     integration_steps: int = parameter(
         2, lower=1, upper=50, doc="Runge-Kutta steps in each control tick"
     )
@@ -71,10 +72,11 @@ class SlaveSimParameters(RobotParameters):
     force_sensor: ForceSensorParameters = field(default_factory=ForceSensorParameters)
     controller: ControllerParameters = field(default_factory=ControllerParameters)
     trials: str = parameter(
-        "all", choices=("all", "small"),
+        "all",
+        choices=("all", "small"),
         doc="errors that the loop must let die before it is used: small ones and those after a "
         "dash at full speed, or small ones alone, as for experiments with bad laws",
-    )  # fmt: skip
+    )
 
 
 class SlaveSim(RunningStage):
@@ -232,9 +234,9 @@ class SlaveSim(RunningStage):
         self.arm.limit[:] = drives.effort_limit
         self._take_world(parameters.world)
         parameters.force_sensor.write(p, self.dt)
-        compensated = {
-            "published": robot.dynamics.compensated, "all": 1.0, "none": 0.0
-        }[parameters.gravity_compensation]  # fmt: skip
+        compensated = {"published": robot.dynamics.compensated, "all": 1.0, "none": 0.0}[
+            parameters.gravity_compensation
+        ]
         relieved = self._gravity(self.arm.model)
         self._law.shift(self.arm.memory, relieved * (p["compensated"] - compensated))
         p["compensated"] = compensated

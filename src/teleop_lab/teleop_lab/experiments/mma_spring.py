@@ -97,7 +97,7 @@ def _figure(spring: mma_balance.ShoulderSpring) -> Figure:
         line(degrees, load.spring, "spring", SECOND, 2.0, "N·m"),
         line(degrees, load.residual, "left for the hand", THIRD, 2.0, "N·m"),
         published_points(np.array([-45.0, 0.0]), np.array([1.0349, 1.1926]), "published", "N·m"),
-    ]  # fmt: skip
+    ]
     layout = {"xaxis": axis("link 2 (0 level, -90 upright)", "°"), "yaxis": axis("torque", "N·m")}
     sentence = "Torque about the shoulder: what gravity asks for and what the spring gives."
     return Figure("Balance of the shoulder", sentence, traces, layout, 340)

@@ -121,9 +121,7 @@ def _measure(bench: Bench) -> Findings:
     rows: list[Row] = []
     blind = _visits(bench, PREDICTED, seeing=False)
     seen = _visits(bench, PREDICTED, seeing=True)
-    ours = {
-        "blind": _visits(bench, OURS, seeing=False), "seen": _visits(bench, OURS, seeing=True)
-    }  # fmt: skip
+    ours = {"blind": _visits(bench, OURS, seeing=False), "seen": _visits(bench, OURS, seeing=True)}
 
     def add(
         which: str, text: str, unit: str, value: Callable[[Visits], float],

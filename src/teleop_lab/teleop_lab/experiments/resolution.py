@@ -80,9 +80,10 @@ def _figure(steps: dict[str, float]) -> Figure:
     traces = [
         joined(reach * 1e3, each["theta1"], "theta1 or theta2 alone", FIRST, "µm"),
         joined(reach * 1e3, total, "theta1, theta2 and d3", SECOND, "µm"),
-        points(np.array([460.0, 460.0]), np.array([_TIP_UM, _TIP_ALL_UM]), "published", "#111",
-               "µm", 0),
-    ]  # fmt: skip
+        points(
+            np.array([460.0, 460.0]), np.array([_TIP_UM, _TIP_ALL_UM]), "published", "#111", "µm", 0
+        ),
+    ]
     for trace in traces[:2]:
         trace["mode"] = "lines"
     layout = {"xaxis": axis("reach", "mm"),

@@ -14,11 +14,7 @@ from teleop_lab.experiments.drawing import Trace, axis, level, line, points
 from teleop_lab.experiments.experiment import Experiment
 from teleop_lab.experiments.one_axis import Grip, sampled_boundary
 from teleop_lab.experiments.outcome import Findings, Row, absolute, percent
-from teleop_lab.experiments.sampled_wall import (
-    passive_boundary,
-    restless_boundary,
-    wall_boundary,
-)
+from teleop_lab.experiments.sampled_wall import passive_boundary, restless_boundary, wall_boundary
 from teleop_lab.experiments.stability import GRIPS
 
 BARE = Grip(0.045, 1.0, 2.0)

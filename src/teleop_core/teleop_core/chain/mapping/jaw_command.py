@@ -24,9 +24,10 @@ class JawCommandParameters:
     """What closes the jaw, and how far."""
 
     source: str = parameter(
-        "hand", choices=SOURCES,
+        "hand",
+        choices=SOURCES,
         doc="what closes it: hand/jaw, by its share, or a button, which keeps its own meaning too",
-    )  # fmt: skip
+    )
     toggles: bool = parameter(
         False, doc="whether each press closes or opens it, not the button as long as it is held"
     )

@@ -50,13 +50,7 @@ from teleop_core.chain.mapping.reflection import (
     make_law,
     reflect,
 )
-from teleop_core.chain.mapping.side import (
-    Shape,
-    SideNumbers,
-    SideState,
-    hold_slave,
-    let_go,
-)
+from teleop_core.chain.mapping.side import Shape, SideNumbers, SideState, hold_slave, let_go
 from teleop_core.chain.mapping.walls import (
     WALLS,
     WallNumbers,
@@ -86,12 +80,7 @@ from teleop_core.graph.topics import (
 )
 from teleop_core.kernels import inner, kernel
 from teleop_core.kernels.fields import Integers, Quaternion, Vector3, record, record_array
-from teleop_core.kernels.geometry import (
-    Array,
-    multiply_quaternions,
-    rotate_by_vector,
-    turn_within,
-)
+from teleop_core.kernels.geometry import Array, multiply_quaternions, rotate_by_vector, turn_within
 from teleop_core.kernels.room import room
 
 
@@ -468,8 +457,9 @@ class MotionScaling(RunningStage):
         kept = passivity.numbers_of(reflection.passivity.parameters)
         law = self._law
         if (part.push_pointer, passivity.hand_pointer) == (law.push, law.hand) and (
-            len(numbers), len(kept)
-        ) == (len(law.numbers), len(law.kept)):  # fmt: skip
+            len(numbers),
+            len(kept),
+        ) == (len(law.numbers), len(law.kept)):
             law.numbers[:], law.kept[:] = numbers, kept  # the tick that is composed already goes on
             return
         if part.push_pointer is not law.push:

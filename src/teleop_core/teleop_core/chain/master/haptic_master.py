@@ -46,11 +46,7 @@ from teleop_core.graph.topics import (
 )
 from teleop_core.kernels import inner, kernel
 from teleop_core.kernels.fields import PoseRow, record
-from teleop_core.kernels.geometry import (
-    Array,
-    rotation,
-    transform,
-)
+from teleop_core.kernels.geometry import Array, rotation, transform
 from teleop_core.kernels.room import room
 from teleop_core.slave.operation.states import State
 

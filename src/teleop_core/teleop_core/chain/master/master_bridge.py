@@ -61,9 +61,10 @@ class MasterBridgeParameters:
         doc="length in which the device counts: 0.001 for millimetres",
     )  # fmt: skip
     handle: str = parameter(
-        "", fixed=True,
+        "",
+        fixed=True,
         doc="robot whose tip is the stylus, by name or file, where the device says its joints",
-    )  # fmt: skip
+    )
     handle_geometry: tuple[str, ...] = parameter(
         (), fixed=True, doc="symbol=value in place of its lengths and options [m, rad]"
     )
@@ -94,9 +95,10 @@ class MasterBridgeParameters:
         doc="poses whose stamps differ by more from our clock are refused",
     )  # fmt: skip
     force_topic: str = parameter(
-        "", fixed=True,
+        "",
+        fixed=True,
         doc="where the device takes forces, as geometry_msgs/WrenchStamped; empty: it has none",
-    )  # fmt: skip
+    )
     force_gain: float = parameter(
         1.0, lower=0.0, upper=10.0, doc="force of the device over the one that is asked for"
     )

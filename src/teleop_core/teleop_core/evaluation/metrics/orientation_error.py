@@ -112,10 +112,11 @@ class OrientationErrorMetric(Metric):
         traces = [
             {
                 **line(times, values[:, 2 + row], name, color, 1.2, "deg"),
-                "yaxis": f"y{axis_suffix(row)}", "showlegend": False,
+                "yaxis": f"y{axis_suffix(row)}",
+                "showlegend": False,
             }
             for row, (name, color) in enumerate(zip(TURNS, (FIRST, SECOND, THIRD), strict=True))
-        ]  # fmt: skip
+        ]
         layout = stacked_axes(TURNS, "deg") | {"hovermode": "x unified"}
         return [Figure("Orientation error", _sentence(self.values()), traces, layout, 480)]
 

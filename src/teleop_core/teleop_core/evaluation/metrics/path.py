@@ -178,9 +178,10 @@ def _in_space(path: _Path, outlines: list[Outline], sentence: str) -> Figure:
     reference, measured = (
         _line3(points, name, color, 4)
         for points, name, color in (
-            (path.reference, "reference", REFERENCE), (path.measured, "measured", MEASURED)
+            (path.reference, "reference", REFERENCE),
+            (path.measured, "measured", MEASURED),
         )
-    )  # fmt: skip
+    )
     measured |= {"showlegend": False}  # its colours are told by the bar
     measured["line"] |= {"colorscale": "Viridis", "showscale": True, "colorbar": _TIME_BAR}
     traces = [
@@ -215,8 +216,9 @@ def _in_planes(path: _Path, outlines: list[Outline]) -> Figure:
     """The same along each axis; behind it all of the path, or where it spent its time."""
     shown = path.shown
     fixtures = largest(outlines)
-    every = np.concatenate([shown, path.reference[np.isfinite(shown[:, 0])],
-                            *(outline.points for outline in fixtures)])  # fmt: skip
+    every = np.concatenate(
+        [shown, path.reference[np.isfinite(shown[:, 0])], *(outline.points for outline in fixtures)]
+    )
     ranges = [span(every[:, axis]) or [0.0, 1.0] for axis in range(3)]
     traces: list[dict[str, Any]] = []
     layout: dict[str, Any] = {"grid": {"rows": 1, "columns": 3, "pattern": "independent"}}
@@ -246,8 +248,9 @@ def _in_planes(path: _Path, outlines: list[Outline]) -> Figure:
 def _plane_lines(path: _Path, across: int, up: int) -> list[dict[str, Any]]:
     """Reference and tip seen along an axis."""
     lines = (
-        (path.reference, "reference", REFERENCE, 6.0), (path.measured, "measured", MEASURED, 1.6)
-    )  # fmt: skip
+        (path.reference, "reference", REFERENCE, 6.0),
+        (path.measured, "measured", MEASURED, 1.6),
+    )
     return [
         along(line(points[:, across], points[:, up], name, color, width), path.times, path.during)
         for points, name, color, width in lines
@@ -269,7 +272,7 @@ def _surroundings(
         return time_spent(shown[:, across], shown[:, up], ranges, sample_s)
     points = path.measured
     whole = line(points[:, across], points[:, up], "whole path", SURROUNDING, 1.0)
-    return {**along(whole, path.times, path.during, whole=True), "hoverinfo": "skip"}  # fmt: skip
+    return {**along(whole, path.times, path.during, whole=True), "hoverinfo": "skip"}
 
 
 def _plane_axes(

@@ -38,9 +38,10 @@ class TremorFilterScore:
         "1", "how large motion below 2 Hz comes out: in phase with it, over all of it"
     )
     intention_before_um: float | None = figure(
-        "um", "RMS distance of the stylus from what the hand meant, against intention: its tremor; "
-        "null where no hand/tremor was recorded"
-    )  # fmt: skip
+        "um",
+        "RMS distance of the stylus from what the hand meant, against intention: its tremor; "
+        "null where no hand/tremor was recorded",
+    )
     intention_after_um: float | None = figure(
         "um", "the same of the filtered stylus, with what its delay and gain cost"
     )

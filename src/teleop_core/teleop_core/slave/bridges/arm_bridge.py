@@ -38,9 +38,10 @@ class BridgeParameters:
         "", fixed=True, doc="where the controller takes commands; empty: where its kind does"
     )
     state_topic: str = parameter(
-        "", fixed=True,
+        "",
+        fixed=True,
         doc="where the arm's JointState comes from; empty: from where that of its kind does",
-    )  # fmt: skip
+    )
     rate: int = parameter(
         500, unit="1/s", lower=100, upper=1000, fixed=True, source="assumed",
         doc="commands a second, one of " + ", ".join(map(str, RATES)),
@@ -89,10 +90,11 @@ class ArmBridgeParameters(RobotParameters, BridgeParameters):
         (), unit="rad or m", fixed=True, doc="of each of our joints; empty: 0.0"
     )
     order: tuple[str, ...] = parameter(
-        (), fixed=True,
+        (),
+        fixed=True,
         doc="the arm's joints in the order of its commands, which a forward command does not name; "
         "empty: the robot's order",
-    )  # fmt: skip
+    )
     start_tolerance: float = parameter(
         0.02, unit="rad or m", lower=1e-4, upper=0.1, fixed=True, source="assumed",
         doc="the arm is commanded once each joint is as near to its setpoint",

@@ -97,9 +97,7 @@ def disturbance_observer_gains(
     """
     p = parameters
     drives, pole = drives_and_poles(robot, "disturbance_observer", p.bandwidth)
-    fading = fading_of(
-        robot, pole, p.observer_ratio, stiffness=1.0, damping=2.0, rejection=1.0
-    )  # fmt: skip
+    fading = fading_of(robot, pole, p.observer_ratio, stiffness=1.0, damping=2.0, rejection=1.0)
     friction = p.friction_share * known_friction(robot)
     count = drives.encoder_step
     table = np.empty((robot.n, 8))

@@ -56,8 +56,9 @@ class WorldObject:
 
 
 _STEP = 1e-6  # along the normal, over which the distance must grow by as much [m]
-_TRIED = np.array([(0.31, 0.02, 0.05), (0.01, 0.43, -0.03), (-0.02, 0.04, 0.37),
-                   (-0.29, 0.23, -0.41)])  # fmt: skip
+_TRIED = np.array(
+    [(0.31, 0.02, 0.05), (0.01, 0.43, -0.03), (-0.02, 0.04, 0.37), (-0.29, 0.23, -0.41)]
+)
 """Offsets at which an object is tried [m]."""
 
 

@@ -43,9 +43,7 @@ def cylinder_outline(parameters: CylinderParameters) -> Array:
     angle = np.linspace(0.0, 2.0 * math.pi, 41)
     x, y = parameters.radius * np.cos(angle), parameters.radius * np.sin(angle)
     half = 0.5 * parameters.height
-    return np.concatenate(
-        [np.stack((x, y, np.full(41, z)), axis=1) for z in (-half, half)]
-    )  # fmt: skip
+    return np.concatenate([np.stack((x, y, np.full(41, z)), axis=1) for z in (-half, half)])
 
 
 CYLINDER = WorldObject("cylinder", CylinderParameters, cylinder_distance, cylinder_outline)
