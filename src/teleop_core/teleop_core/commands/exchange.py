@@ -58,7 +58,6 @@ def _add_import(commands: Any) -> None:
 
 
 def _options(parser: argparse.ArgumentParser) -> None:
-    """What can be said of one hand."""
     # `--axes +y -x +z`: -x is a value; argparse lets only what looks like a number be one.
     parser._negative_number_matcher = re.compile(r"-([xyz]|\d+|\d*\.\d+)$")
     _time(parser.add_argument_group("time"))
@@ -263,7 +262,6 @@ def _of_arm(name: str, text: str) -> argparse.Namespace:
 
 
 def _given(arguments: argparse.Namespace) -> dict[str, Any]:
-    """Options that were given, by name."""
     given = vars(arguments)
     names = ImportOptions.__dataclass_fields__
     return {name: given[name] for name in names if given.get(name) is not None}

@@ -154,7 +154,6 @@ class _Chain:
 
 
 def _degrees(sine: float) -> float:
-    """Angle in degrees."""
     return math.degrees(math.asin(min(sine, 1.0)))
 
 

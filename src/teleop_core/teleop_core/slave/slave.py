@@ -305,7 +305,6 @@ def _request(p: SlaveNumbers, s: SlaveState, event: int) -> int:
 
 @kernel
 def _fail(p: SlaveNumbers, s: SlaveState, fault: int, value: float, bound: float) -> None:
-    """Take note of a fault."""
     fail(p, s, fault, -1, value, bound)
 
 

@@ -52,7 +52,6 @@ def _moves(p: SlaveNumbers, s: SlaveState) -> bool:
 
 @inner
 def _is_still(s: SlaveState) -> bool:
-    """Whether the setpoint stands still."""
     moves = 0
     for i in range(s.step.shape[0]):
         moves += s.step[i] != 0.0

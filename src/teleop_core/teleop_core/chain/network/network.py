@@ -191,7 +191,6 @@ def _take_there(p: NetworkNumbers, s: NetworkState, there: Way, row: Row) -> Non
 
 @inner
 def _take_back(s: NetworkState, back: Way, row: Row) -> None:
-    """Take what arrived from the slave."""
     take_packet(s, back, BACK)
     if s.arrived[BACK] == 0:
         return

@@ -248,7 +248,6 @@ class RemoteHand:
         return rows
 
     def _listen(self, now: float) -> None:
-        """Take what is wanted now."""
         wanted, before = self._wanted, self._seen
         self._seen = wanted
         came = now if math.isnan(wanted.time) else min(wanted.time, now)
