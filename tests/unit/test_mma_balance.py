@@ -106,31 +106,6 @@ def test_spring_never_pulls() -> None:
     assert (torques[openings > AT_45_DEGREES + 1e-3] == 0.0).all()
 
 
-@pytest.mark.parametrize(("moment", "rate"), [(0.3, 100.0), (1.2, 656.0), (5.0, 20.0)])
-def test_cam_pulley_balances_the_link_everywhere(moment: float, rate: float) -> None:  # H19
-    theta = np.linspace(0.05, math.pi - 0.05, 50)
-    radius = mma_balance.cam_pulley_radius(theta, moment, rate)
-    slope = 0.5 * math.sqrt(moment / rate) * np.cos(0.5 * theta)
-    gap = rate * radius**3 - moment * np.sin(theta) * slope + moment * radius * np.cos(theta)
-    # Relative to the largest term.
-    assert np.abs(gap).max() < 1e-14 * moment * radius.max() * 10.0
-    tension = 2.0 * math.sqrt(rate * moment) * np.cos(0.5 * theta)
-    assert np.allclose(tension * radius, moment * np.sin(theta), rtol=1e-12)
-
-
-def test_cam_profile_is_the_envelope_of_the_cable() -> None:  # H19
-    theta = np.linspace(0.05, math.pi - 0.05, 50)
-    distance, angle = mma_balance.cam_profile(theta, 1.2, 656.0)
-    radius, step = mma_balance.cam_pulley_radius(theta, 1.2, 656.0), 1e-6
-    ahead, behind = (mma_balance.cam_pulley_radius(theta + h, 1.2, 656.0) for h in (step, -step))
-    slope = (ahead - behind) / (2.0 * step)
-    assert np.allclose(distance, np.hypot(radius, slope), rtol=1e-8)
-    assert np.allclose(np.tan(angle), slope / radius, rtol=1e-6)
-    closed = np.sqrt(1.2 / 656.0 * (0.25 * np.cos(theta / 2) ** 2 + np.sin(theta / 2) ** 2))
-    assert np.allclose(distance, closed, rtol=1e-12)
-    assert np.allclose(angle, np.arctan(0.5 / np.tan(theta / 2)), rtol=1e-12)
-
-
 @pytest.mark.parametrize(
     ("call", "name"),
     [
@@ -139,8 +114,6 @@ def test_cam_profile_is_the_envelope_of_the_cable() -> None:  # H19
         (lambda: mma_balance.matching_rate(0.1, 0.0, 0.02), "deflection"),
         (lambda: mma_balance.coil(wire=-1.0), "wire"),
         (lambda: mma_balance.coil(rate=1e6), "rate"),
-        (lambda: mma_balance.cam_pulley_radius(1.0, -1.0, 10.0), "weight_moment"),
-        (lambda: mma_balance.cam_profile(1.0, 1.0, 0.0), "rate"),
     ],
 )
 def test_impossible_springs_are_refused(call: Callable[..., object], name: str) -> None:

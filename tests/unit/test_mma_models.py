@@ -20,7 +20,6 @@ from teleop_core.robots.mma_models import (
     loop_closure,
     model_table,
     passive_angles,
-    readings_of_serial,
 )
 from teleop_core.robots.robot import Robot
 
@@ -141,11 +140,6 @@ def test_closed_form_is_the_product_of_both_tables_for_random_readings(mma: Robo
         pose = mma.fk(q)
         assert np.abs(pose - tool_of_model(mma, q, "C")).max() < EXACT
         assert np.abs(pose - tool_of_model(mma, q, "B")).max() < EXACT
-
-
-def test_readings_and_serial_joints_are_inverse_maps() -> None:
-    for q in random_readings(20):
-        assert np.allclose(readings_of_serial(joints_of_model(q, "B")), q, rtol=0, atol=1e-14)
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,6 @@
 """Mobility: the counts of the lectures and the thesis."""
 
 from collections.abc import Callable
-from itertools import pairwise
 
 import pytest
 
@@ -47,20 +46,6 @@ def test_independent_loops_of_mma_parallelogram_and_stewart_platform(
     assert mobility.independent_loops(links, joints) == expected
 
 
-def stewart_loop(first: int, second: int) -> list[int]:
-    """Links of the loop through two legs: base 0, lower and upper leg halves, platform 13."""
-    return [0, 1 + 2 * first, 2 + 2 * first, 13, 2 + 2 * second, 1 + 2 * second]
-
-
-def test_the_twelve_loops_of_the_stewart_platform_have_rank_five() -> None:
-    edges = [edge for leg in range(6) for edge in pairwise([0, 1 + 2 * leg, 2 + 2 * leg, 13])]
-    loops = [stewart_loop(i, i + gap) for gap in (1, 2, 3) for i in range(6 - gap)]
-    assert len(loops) == 12
-    assert mobility.loop_rank(edges, loops) == 5 == mobility.independent_loops(14, len(edges))
-    assert mobility.loop_rank(edges, loops[:5]) == 5
-    assert mobility.loop_rank(edges, []) == 0
-
-
 @pytest.mark.parametrize(
     ("call", "name"),
     [
@@ -71,7 +56,6 @@ def test_the_twelve_loops_of_the_stewart_platform_have_rank_five() -> None:
         (lambda: mobility.degrees_of_freedom(4, 4, 4, space=4), "space"),
         (lambda: mobility.independent_loops(5, 3), "joints"),
         (lambda: mobility.passive_joints(3, 4), "freedoms"),
-        (lambda: mobility.loop_rank([(0, 1)], [[0, 1, 2]]), "loops"),
     ],
 )
 def test_counts_that_no_mechanism_has_are_refused_by_name(
