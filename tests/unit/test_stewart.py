@@ -11,6 +11,7 @@ from teleop_core.base.errors import ClosureError, ParameterError, ShapeError, Un
 from teleop_core.kernels.geometry import Array, rotation, transform
 from teleop_core.robots import FkStatus, IkStatus, list_robots, load_robot
 from teleop_core.robots.stewart import PAIRED, DirectStatus, Layout
+from ways import stepped
 
 SIXTHS = np.radians([0.0, 60.0, 120.0, 180.0, 240.0, 300.0])
 # Lengths of the hybrid's source in centimetres, as the specification prints them.
@@ -149,19 +150,11 @@ def test_strokes_stop_the_legs_and_the_rest_is_residual() -> None:
 
 
 def test_along_a_path_through_the_singularity_the_legs_keep_their_step_and_go_on() -> None:
-    robot, step = load_robot("stewart"), 5e-4
-    limits = robot.limits()
-    limits[2] = step
+    robot, up = load_robot("stewart"), np.array([0.0, 0.0, 0.2])
     angles = np.linspace(0.0, math.radians(110.0), 400)
-    q, worst = robot.home.copy(), 0.0
-    for angle in angles:
-        T = transform(rotation("z", angle), np.array([0.0, 0.0, 0.2]))
-        found, residual = np.empty(6), np.empty(2)
-        robot.kernels.ik(T, q, limits, robot.geometry_row, found, residual)
-        assert np.isfinite(residual).all()
-        worst, q = max(worst, np.abs(found - q).max()), found
-    assert worst <= step + 1e-15
-    assert np.allclose(q, robot.ik_all(T)[0], atol=1e-12)
+    path = [transform(rotation("z", angle), up) for angle in angles]
+    found, _ = stepped(robot, path, robot.home, 5e-4)
+    assert np.allclose(found[-1], robot.ik_all(path[-1])[0], atol=1e-12)
 
 
 def test_any_layout_loads_as_a_robot_and_the_singular_one_refuses() -> None:
