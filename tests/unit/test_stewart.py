@@ -52,21 +52,6 @@ def test_published_hexagons_give_the_published_legs() -> None:
     assert np.allclose(HEXAGONS.legs(EXAMPLE), printed, atol=5e-5)
 
 
-def test_leg_jacobian_is_the_finite_difference_of_the_legs() -> None:
-    rng, step = np.random.default_rng(2), 1e-6
-    for T in poses(rng, 10):
-        for axis in range(6):
-            ahead, behind = T.copy(), T.copy()
-            if axis < 3:
-                ahead[axis, 3] += step
-                behind[axis, 3] -= step
-            else:
-                ahead[:3, :3] = rotation("xyz"[axis - 3], step) @ T[:3, :3]
-                behind[:3, :3] = rotation("xyz"[axis - 3], -step) @ T[:3, :3]
-            slope = (PAIRED.legs(ahead) - PAIRED.legs(behind)) / (2.0 * step)
-            assert np.allclose(PAIRED.leg_jacobian(T)[:, axis], slope, atol=1e-9)
-
-
 def test_published_hexagons_have_rank_five_in_every_pose() -> None:
     assert HEXAGONS.is_architecturally_singular
     rng = np.random.default_rng(3)
