@@ -9,23 +9,7 @@ import numpy as np
 from teleop_core.base.parameters import values_of
 from teleop_core.chain.architectures import ARCHITECTURES
 from teleop_core.chain.fixtures import FIXTURES
-from teleop_core.chain.mapping.following import (
-    FollowingNumbers,
-    FollowingState,
-    follows,
-    hear,
-    is_in_doubt,
-)
-from teleop_core.chain.mapping.limits import (
-    SENT,
-    LimitState,
-    Sent,
-    align,
-    draw_back,
-    forget_limits,
-    measure_depth,
-    remember,
-)
+from teleop_core.chain.mapping import following, limits, walls
 from teleop_core.chain.mapping.parameters import (
     MODES,
     FixtureParameters,
@@ -51,14 +35,6 @@ from teleop_core.chain.mapping.reflection import (
     reflect,
 )
 from teleop_core.chain.mapping.side import Shape, SideNumbers, SideState, hold_slave, let_go
-from teleop_core.chain.mapping.walls import (
-    WALLS,
-    WallNumbers,
-    WallState,
-    damped_wall,
-    forget_wall,
-    wall_force,
-)
 from teleop_core.chain.passivity import PASSIVITIES
 from teleop_core.graph.row import Row
 from teleop_core.graph.signals import DT, STATE, assign, copy
@@ -85,7 +61,11 @@ from teleop_core.kernels.room import room
 
 
 class ScalingNumbers(
-    WallNumbers, SideNumbers, ReflectionNumbers, PlausibilityNumbers, FollowingNumbers
+    walls.WallNumbers,
+    SideNumbers,
+    ReflectionNumbers,
+    PlausibilityNumbers,
+    following.FollowingNumbers,
 ):
     """Parameter record of the motion scaling."""
 
@@ -101,7 +81,12 @@ class ScalingNumbers(
 
 
 class ScalingState(
-    LimitState, WallState, SideState, PlausibilityState, ReflectionState, FollowingState
+    limits.LimitState,
+    walls.WallState,
+    SideState,
+    PlausibilityState,
+    ReflectionState,
+    following.FollowingState,
 ):
     """State record of the motion scaling."""
 
@@ -178,8 +163,8 @@ def _latch(s: ScalingState, stylus: Array) -> None:
     if s.is_engaged:
         for i in range(3):
             s.center[i] += stylus[i] - s.stylus[i]
-    align(s)
-    forget_limits(s)
+    limits.align(s)
+    limits.forget_limits(s)
 
 
 @inner
@@ -202,7 +187,7 @@ def _move(
     else:
         x, y, z = turn[0] * p.rotation_gain, turn[1] * p.rotation_gain, turn[2] * p.rotation_gain
         rotate_by_vector(s.command[3:7], x, y, z, s.command[3:7])
-        align(s)
+        limits.align(s)
     # One Newton step keeps the product of many unit quaternions a unit quaternion.
     square = 0.0
     for i in range(3, 7):
@@ -222,12 +207,12 @@ def _wall(
             fixture.offset[i] = stylus[i] - s.center[i]
         length = fixture.depth(fixture.offset, fixture.numbers, fixture.out)
     if p.is_damped == 0:
-        wall_force(fixture.out, length, p.stiffness, p.max_force, force)
+        walls.wall_force(fixture.out, length, p.stiffness, p.max_force, force)
         return
     if period <= 0.0 or period > 1e-9 * p.pause_ns:
-        forget_wall(s, stylus)
+        walls.forget_wall(s, stylus)
         period = _LONG
-    damped_wall(p, s, stylus, fixture.out, length, period, force)
+    walls.damped_wall(p, s, stylus, fixture.out, length, period, force)
 
 
 @inner
@@ -264,7 +249,7 @@ def _report(p: ScalingNumbers, s: ScalingState, gain: float, is_following: bool,
 def _refuse(
     p: ScalingNumbers,
     s: ScalingState,
-    sent: Sequence[Sent],
+    sent: Sequence[limits.Sent],
     is_following: bool,
     is_doubtful: bool,
     stylus: Array,
@@ -272,8 +257,8 @@ def _refuse(
 ) -> None:
     """Answer a sample that no hand can have made: hold, push with nothing, begin anew after it."""
     s.must_latch = 1
-    remember(s, sent, row.master_measured_cp_ns)
-    forget_wall(s, stylus)
+    limits.remember(s, sent, row.master_measured_cp_ns)
+    walls.forget_wall(s, stylus)
     for i in range(6):
         row.master_servo_cf[i] = 0.0
     for i in range(3):
@@ -290,7 +275,7 @@ def _refuse(
 def motion_scaling_step(
     p: ScalingNumbers,
     s: ScalingState,
-    sent: Sequence[Sent],
+    sent: Sequence[limits.Sent],
     fixture: Shape,
     law: Law,
     row: Row,
@@ -322,10 +307,10 @@ def motion_scaling_step(
     for i in range(3):
         stylus[i] = pose[i] + row.master_filtered_out[i]
     period = 1e-9 * (row.master_measured_cp_ns - s.last_ns)
-    hear(s, row)
-    is_following = follows(p, s, row)
-    is_doubtful = is_in_doubt(p, s, is_following, row)
-    draw_back(s, sent, p.gain[s.is_fine], row)
+    following.hear(s, row)
+    is_following = following.follows(p, s, row)
+    is_doubtful = following.is_in_doubt(p, s, is_following, row)
+    limits.draw_back(s, sent, p.gain[s.is_fine], row)
     if not is_plausible(p, s, pose, row.master_measured_cp_ns):
         _refuse(p, s, sent, is_following, is_doubtful, stylus, row)
         return
@@ -346,14 +331,14 @@ def motion_scaling_step(
         _latch(s, stylus)
     else:
         _move(p, s, fixture, gain, pose, turn)
-        measure_depth(s, p.reach_depth, row.master_measured_cp_ns)
+        limits.measure_depth(s, p.reach_depth, row.master_measured_cp_ns)
     _toggle_fixture(s, buttons, stylus)
     s.is_engaged, s.must_latch = 1, 0
     for i in range(3):
         s.master[i], s.stylus[i], s.buttons[i] = pose[i], stylus[i], buttons[i]
     s.buttons[0] = clutch
     s.last_ns = row.master_measured_cp_ns
-    remember(s, sent, s.last_ns)
+    limits.remember(s, sent, s.last_ns)
     _wall(p, s, fixture, period, stylus, row.master_servo_cf)
     _push_back(p, s, row.master_servo_cf)
     reflect(p, s, law, is_following, period, stylus, row)
@@ -370,7 +355,7 @@ class MotionScaling(RunningStage):
         super().__init__(MOTION_SCALING, 0, dt)
         self.changes_itself = True  # its mode, by a button
         self.parameters, self.state = record(ScalingNumbers), record(ScalingState)
-        self._sent = record_array(Sent, SENT)
+        self._sent = record_array(limits.Sent, limits.SENT)
         self._values = parameters
         self.kernel = motion_scaling_step
         self._shape = Shape(None, np.empty(0), np.zeros(3), np.zeros(3))
@@ -397,7 +382,7 @@ class MotionScaling(RunningStage):
         p["slave_master"], p["stylus_tool"] = tool_maps(parameters)
         p["axis"], p["sign"] = np.abs(axes).argmax(axis=1), axes.sum(axis=1)
         self._take_fixture(fixture)
-        wall = WALLS[fixture.wall]
+        wall = walls.WALLS[fixture.wall]
         p["stiffness"] = wall.spring(fixture.stiffness, fixture.max_force)
         p["max_force"], p["damping"] = fixture.max_force, fixture.damping
         p["is_damped"] = wall.is_damped

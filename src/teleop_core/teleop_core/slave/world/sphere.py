@@ -11,6 +11,10 @@ from teleop_core.kernels.geometry import Array
 from teleop_core.slave.world import WorldObject
 
 
+MIDDLE = 1e-150
+"""Nearer to the middle than this [m] squares underflow, and no way leads out."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class SphereParameters:
     """A ball."""
@@ -25,7 +29,7 @@ def sphere_distance(offset: Array, shape: Array, normal: Array) -> float:
     distance = math.sqrt(x * x + y * y + z * z)
     normal[0] = normal[1] = 0.0
     normal[2] = 1.0
-    if distance > 0.0:
+    if distance > MIDDLE:
         normal[0], normal[1], normal[2] = x / distance, y / distance, z / distance
     return distance - shape[0]
 
