@@ -10,7 +10,6 @@ from teleop_core.kernels import kernel
 from teleop_core.kernels.geometry import Array
 from teleop_core.slave.world import WorldObject
 
-
 MIDDLE = 1e-150
 """Nearer to the middle than this [m] squares underflow, and no way leads out."""
 
