@@ -9,7 +9,7 @@ import numpy as np
 from teleop_core.base.parameters import values_of
 from teleop_core.chain.architectures import ARCHITECTURES
 from teleop_core.chain.fixtures import FIXTURES
-from teleop_core.chain.mapping import following, limits, walls
+from teleop_core.chain.mapping import following, limits, plausibility, walls
 from teleop_core.chain.mapping.parameters import (
     MODES,
     FixtureParameters,
@@ -18,13 +18,6 @@ from teleop_core.chain.mapping.parameters import (
     ReflectionParameters,
     axis_map,
     tool_maps,
-)
-from teleop_core.chain.mapping.plausibility import (
-    PlausibilityNumbers,
-    PlausibilityState,
-    has_lost_buttons,
-    is_plausible,
-    take_hand,
 )
 from teleop_core.chain.mapping.reflection import (
     Law,
@@ -64,7 +57,7 @@ class ScalingNumbers(
     walls.WallNumbers,
     SideNumbers,
     ReflectionNumbers,
-    PlausibilityNumbers,
+    plausibility.PlausibilityNumbers,
     following.FollowingNumbers,
 ):
     """Parameter record of the motion scaling."""
@@ -84,7 +77,7 @@ class ScalingState(
     limits.LimitState,
     walls.WallState,
     SideState,
-    PlausibilityState,
+    plausibility.PlausibilityState,
     ReflectionState,
     following.FollowingState,
 ):
@@ -311,10 +304,10 @@ def motion_scaling_step(
     is_following = following.follows(p, s, row)
     is_doubtful = following.is_in_doubt(p, s, is_following, row)
     limits.draw_back(s, sent, p.gain[s.is_fine], row)
-    if not is_plausible(p, s, pose, row.master_measured_cp_ns):
+    if not plausibility.is_plausible(p, s, pose, row.master_measured_cp_ns):
         _refuse(p, s, sent, is_following, is_doubtful, stylus, row)
         return
-    clutch = 1.0 if has_lost_buttons(p, s, row) else buttons[0]
+    clutch = 1.0 if plausibility.has_lost_buttons(p, s, row) else buttons[0]
     _toggle_mode(s, buttons)
     gain = p.gain[s.is_fine]
     turn = room(3)
@@ -389,7 +382,7 @@ class MotionScaling(RunningStage):
         p["timeout_ns"] = round(parameters.feedback_timeout * 1e9)
         p["pause_ns"] = round(parameters.longest_pause * 1e9)
         p["rotation_gain"] = parameters.rotation_gain
-        take_hand(p, parameters.plausible)
+        plausibility.take_hand(p, parameters.plausible)
         p["silence_ns"] = round(parameters.plausible.button_silence * 1e9)
         self._take_reach_force(parameters.reach_force)
         self._take_reflection(parameters.reflection)
