@@ -3,28 +3,22 @@
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 import roboticstoolbox as rtb
 import sympy
 
+from random_arms import table
 from teleop_core.base import errors
 from teleop_core.kernels.geometry import Array, rotation, transform
 from teleop_core.robots import IkStatus, load_robot
-from teleop_core.robots.dh import CONVENTIONS, DhTable, elementary, load_table, parse_table
+from teleop_core.robots.dh import CONVENTIONS, elementary, load_table, parse_table
 from ways import stepped
 
 ROUNDING = 1e-14
 TABLES = ("puma560", "rcrt1", "scara", "planar_3r", "five_axis_standard", "five_axis_sheth_uicker")
 REACHED = 1e-9
-
-
-def table(rows: Any, convention: str = "modified", **entries: object) -> DhTable:
-    return parse_table(
-        {"name": "chain", "convention": convention, "angles": "degrees", "rows": rows, **entries}
-    )
 
 
 def modified_link(alpha: float, a: float, d: float, theta: float) -> Array:
@@ -60,13 +54,7 @@ def test_d1_equation_10_is_the_product_of_its_four_motions_symbolically() -> Non
 
 def test_d1_a_modified_row_is_equation_10() -> None:
     for alpha, a, d, theta in np.random.default_rng(1).uniform(-2.0, 2.0, (100, 4)):
-        chain = parse_table(
-            {
-                "name": "row",
-                "convention": "modified",
-                "rows": [{"alpha": alpha, "a": a, "d": d, "theta": "q"}],
-            }
-        )
+        chain = table([{"alpha": alpha, "a": a, "d": d, "theta": "q"}], angles="radians")
         assert np.abs(
             chain.link_transforms([theta])[0] - modified_link(alpha, a, d, theta)
         ).max() < (ROUNDING)
@@ -78,13 +66,8 @@ def test_d1_a_modified_row_is_equation_10() -> None:
 def test_roboticstoolbox_builds_the_same_chain(convention: str, link: str) -> None:
     rng = np.random.default_rng(2)
     numbers = rng.uniform(-1.5, 1.5, (6, 3))
-    ours = parse_table(
-        {
-            "name": "chain",
-            "convention": convention,
-            "rows": [{"alpha": k, "a": a, "d": d, "theta": "q"} for k, a, d in numbers],
-        }
-    ).robot()
+    rows = [{"alpha": k, "a": a, "d": d, "theta": "q"} for k, a, d in numbers]
+    ours = table(rows, convention, angles="radians").robot()
     theirs = rtb.DHRobot([getattr(rtb, link)(alpha=k, a=a, d=d) for k, a, d in numbers])
     for q in rng.uniform(-3.0, 3.0, (50, 6)):
         assert np.abs(ours.fk(q) - theirs.fkine(q).A).max() < 1e-12

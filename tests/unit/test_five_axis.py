@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from random_arms import table
 from teleop_core.kernels.geometry import Array, rotation, transform
 from teleop_core.robots import IkStatus, load_robot
-from teleop_core.robots.dh import DhTable, load_table, parse_table
+from teleop_core.robots.dh import DhTable, load_table
 from teleop_core.robots.five_axis import pitch_and_roll
 from ways import followed
 
@@ -20,21 +21,15 @@ DT = 1e-3
 
 def proximal_table(home_of_4: int) -> DhTable:
     """Table 3.4 of the thesis; its theta4 counted from a home position."""
-    return parse_table(
-        {
-            "name": "proximal",
-            "convention": "modified",
-            "angles": "degrees",
-            "rows": [
-                {"d": D1, "theta": "q"},
-                {"alpha": -90, "theta": "q"},
-                {"a": A2, "theta": "q"},
-                {"a": A3, "theta": f"q {home_of_4:+d}"},
-                {"alpha": -90, "theta": "q"},
-                {"d": D5},
-            ],
-        }
-    )
+    rows = [
+        {"d": D1, "theta": "q"},
+        {"alpha": -90, "theta": "q"},
+        {"a": A2, "theta": "q"},
+        {"a": A3, "theta": f"q {home_of_4:+d}"},
+        {"alpha": -90, "theta": "q"},
+        {"d": D5},
+    ]
+    return table(rows)
 
 
 def random_joints(count: int = 100, seed: int = 1) -> Array:

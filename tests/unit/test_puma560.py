@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 import roboticstoolbox as rtb
 
+import random_arms
 from teleop_core.kernels.geometry import Array, rotation, transform
 from teleop_core.robots import IkStatus, load_robot
-from teleop_core.robots.dh import DhTable, load_table, parse_table
+from teleop_core.robots.dh import DhTable, load_table
 from ways import followed
 
 ARM = load_robot("puma560")
@@ -22,14 +23,7 @@ A2, A3, D3, D4 = ARM.geometry_row
 def table(a2: float, a3: float, d3: float, d4: float) -> DhTable:
     """Section 3 of the spec, as a table."""
     rows = [(0, 0, 0), (-90, 0, 0), (0, a2, d3), (-90, a3, d4), (90, 0, 0), (-90, 0, 0)]
-    return parse_table(
-        {
-            "name": "puma",
-            "convention": "modified",
-            "angles": "degrees",
-            "rows": [{"alpha": alpha, "a": a, "d": d, "theta": "q"} for alpha, a, d in rows],
-        }
-    )
+    return random_arms.table([{"alpha": k, "a": a, "d": d, "theta": "q"} for k, a, d in rows])
 
 
 def printed_links(q: Array) -> Array:
