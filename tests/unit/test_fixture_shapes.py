@@ -23,8 +23,7 @@ from teleop_core.chain.fixtures import FIXTURES
 from teleop_core.chain.fixtures.cone import ConeParameters
 from teleop_core.chain.fixtures.cylinder import CylinderParameters
 from teleop_core.chain.fixtures.half_space import HalfSpaceParameters
-from teleop_core.chain.fixtures.keep_out_box import KeepOutBoxParameters
-from teleop_core.chain.fixtures.keep_out_sphere import KeepOutSphereParameters
+from teleop_core.chain.fixtures.keep_out import KeepOutBoxParameters, KeepOutSphereParameters
 from teleop_core.chain.fixtures.line import LineParameters
 from teleop_core.chain.fixtures.path import PathParameters, path_depth
 from teleop_core.chain.mapping.parameters import FixtureParameters
