@@ -249,6 +249,8 @@ CODE_MUTANTS = (
     _mutant("bristle_shared", "all points of a tool bend one bristle", _CONTACT,
             "_touch_at(p, contacts[point], arm,", "_touch_at(p, contacts[0], arm,",
             "tool_points"),
+    _mutant("underflow", "next to the middle of a ball the way out is of any length",
+            "slave/world/sphere.py", "if distance > MIDDLE:", "if distance > 0.0:", "world"),
     _mutant("hole_closed", "the wall of a hole pushes outwards", "slave/world/hole.py",
             "distance, way_out, way_up = radius - out, -1.0, 0.0",
             "distance, way_out, way_up = radius - out, 1.0, 0.0", "hole"),

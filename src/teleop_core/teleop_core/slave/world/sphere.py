@@ -11,7 +11,7 @@ from teleop_core.kernels.geometry import Array
 from teleop_core.slave.world import WorldObject
 
 MIDDLE = 1e-150
-"""Nearer to the middle than this [m] squares underflow, and no way leads out."""
+"""Of ways shorter than this [m] squares underflow, so that they lead nowhere."""
 
 
 @dataclass(frozen=True, kw_only=True)
