@@ -75,7 +75,7 @@ format: $(VENV)/.tested
 CORE := $(BIN)/pytest -n 2 --dist loadfile
 LIVE := $(BIN)/pytest -n 2 --dist worksteal tests/ros
 ALONE := $(BIN)/pytest -n 1 tests/ros
-test: lint crtk_msgs
+test: $(VENV)/.tested crtk_msgs
 	@code=0; set -x; \
 	$(CORE) -m "not ros and not slow" || code=1; \
 	$(LIVE) -m "ros and not slow" || code=1; \

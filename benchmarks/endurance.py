@@ -130,10 +130,11 @@ def main() -> int:
         ThreadPoolExecutor(given.jobs) as pool,
     ):
         runs = [
-            pool.submit(run_session, kinds[number % len(kinds)], Path(folder) / str(number),
-                        given.seconds)
+            pool.submit(
+                run_session, kinds[number % len(kinds)], Path(folder) / str(number), given.seconds
+            )
             for number in range(total)
-        ]  # fmt: skip
+        ]
         for run in as_completed(runs):
             ends.append(end := run.result())
             print(f"{len(ends)}/{total}", end="\r", file=sys.stderr, flush=True)

@@ -64,9 +64,8 @@ def _spin(position: int, style: str, handle: Any) -> None:
     node, qos = rclpy.create_node(f"hop{position}"), _quality(style)
     publisher = node.create_publisher(PoseStamped, f"hop{position + 1}", qos)
     node.create_subscription(
-        PoseStamped, f"hop{position}", lambda data: handle(publisher, data), qos,
-        raw=style == "raw",
-    )  # fmt: skip
+        PoseStamped, f"hop{position}", lambda data: handle(publisher, data), qos, raw=style == "raw"
+    )
     executor = SingleThreadedExecutor()
     executor.add_node(node)
     try:

@@ -10,9 +10,7 @@ import numpy as np
 
 import teleop_core as tc
 
-QUIET = {
-    "feedback_timeout": 1.0, "reach_force.is_on": False, "gimbal_noise": 0.0,
-}  # fmt: skip
+QUIET = {"feedback_timeout": 1.0, "reach_force.is_on": False, "gimbal_noise": 0.0}
 
 
 def touch(passivity: str, round_trip: float, material: str = "tissue") -> tuple[float, ...]:

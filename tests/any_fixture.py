@@ -15,8 +15,7 @@ from teleop_core.chain.fixtures.box import BoxParameters
 from teleop_core.chain.fixtures.cone import ConeParameters
 from teleop_core.chain.fixtures.cylinder import CylinderParameters
 from teleop_core.chain.fixtures.half_space import HalfSpaceParameters
-from teleop_core.chain.fixtures.keep_out_box import KeepOutBoxParameters
-from teleop_core.chain.fixtures.keep_out_sphere import KeepOutSphereParameters
+from teleop_core.chain.fixtures.keep_out import KeepOutBoxParameters, KeepOutSphereParameters
 from teleop_core.chain.fixtures.line import LineParameters
 from teleop_core.chain.fixtures.path import PathParameters
 from teleop_core.chain.fixtures.sphere import SphereParameters
@@ -33,9 +32,7 @@ endings = st.one_of(st.just(0.0), lengths)
 def valid(group: type[object], **values: SearchStrategy) -> SearchStrategy:
     """Groups of parameters, those that do not fit together left out."""
 
-    def make(
-        chosen: Mapping[str, float | tuple[float, float, float]],
-    ) -> Any:
+    def make(chosen: Mapping[str, float | tuple[float, float, float]]) -> Any:
         try:
             return group(**chosen)
         except ParameterError:

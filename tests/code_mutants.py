@@ -20,9 +20,7 @@ from mutants import ROOT, Mutant, tree
 UNIT = "tests/unit/test_"
 
 
-def _mutant(
-    name: str, text: str, file: str, before: str, after: str, *tests: str
-) -> Mutant:  # fmt: skip
+def _mutant(name: str, text: str, file: str, before: str, after: str, *tests: str) -> Mutant:
     files = tuple(one if "/" in one else f"{UNIT}{one}.py" for one in tests)
     return Mutant(name, text, ((file, before, after),), files)
 
@@ -251,6 +249,8 @@ CODE_MUTANTS = (
     _mutant("bristle_shared", "all points of a tool bend one bristle", _CONTACT,
             "_touch_at(p, contacts[point], arm,", "_touch_at(p, contacts[0], arm,",
             "tool_points"),
+    _mutant("underflow", "next to the middle of a ball the way out is of any length",
+            "slave/world/sphere.py", "if distance > MIDDLE:", "if distance > 0.0:", "world"),
     _mutant("hole_closed", "the wall of a hole pushes outwards", "slave/world/hole.py",
             "distance, way_out, way_up = radius - out, -1.0, 0.0",
             "distance, way_out, way_up = radius - out, 1.0, 0.0", "hole"),
@@ -307,8 +307,8 @@ CODE_MUTANTS = (
             "is_seen = s.sampled_ns != 0 and row.now_ns - s.seen_ns <= p.timeout_ns",
             "is_seen = True", "jaw"),
     _mutant("jaw_back", "a jaw that others opened while it was silent closes again", _JAW,
-            "if row.slave_jaw_setpoint_js_ns == NO_COMMAND_NS or is_elsewhere:",
-            "if row.slave_jaw_setpoint_js_ns == NO_COMMAND_NS:", "jaw"),
+            "if row.slave_jaw_setpoint_js_ns == topics.NO_COMMAND_NS or is_elsewhere:",
+            "if row.slave_jaw_setpoint_js_ns == topics.NO_COMMAND_NS:", "jaw"),
     _mutant("jaw_no_number", "a command that is no number leads the jaw", _JAW,
             "is_sound = math.isfinite(row.slave_jaw_servo_jp[0])", "is_sound = True", "jaw"),
     _mutant("jaw_lets_go", "after a stop the jaw opens for a hand that was opened meanwhile", _JAW,
@@ -384,6 +384,24 @@ CODE_MUTANTS = (
             "evaluation/tracking.py", "difference[is_degenerate, ::2] = np.nan", "pass",
             "evaluation_scores"),
     # graph, parts, nodes, console
+    _mutant("delays_largest", "of delays that fit one link the longest counts", "graph/graph.py",
+            "return sum(d.seconds for d in fitting if d.reader in {\"\", reader.name})",
+            "return max([d.seconds for d in fitting if d.reader in {\"\", reader.name}] + [0.0])",
+            "graph"),
+    _mutant("delays_in_row", "of delays in a row the longest counts", "session/notes.py",
+            "return sum(\n        link.delay", "return max(\n        link.delay", "contacts"),
+    _mutant("every_last", "what holds for every node wins over what one says", "graph/layers.py",
+            "key=lambda item: item[0] != _EVERY", "key=lambda item: 0", "configuration"),
+    _mutant("peace_made", "a conflict of senders is forgotten with the owner", "nodes/sender.py",
+            "self.conflict = self.conflict or self.has_other", "self.conflict = self.has_other",
+            "sender"),
+    _mutant("slow_restarts", "slow commands start from the slave's joints each time",
+            "chain/mapping/inverse_kinematics.py", "max(p.timeout_ns, 2 * elapsed_ns)",
+            "p.timeout_ns", "inverse_kinematics"),
+    _mutant("upright_pose", "only the pose itself says whether roll and yaw are defined",
+            "evaluation/tracking.py",
+            "np.maximum(np.abs(angles[:, 1]), np.abs(others[:, 1]))", "np.abs(angles[:, 1])",
+            "evaluation_statistics"),
     _mutant("delay_of_all", "a delay for one reader is one for all", "graph/graph.py",
             'if d.reader in {"", reader.name}', "", "graph"),
     _mutant("part_replaced", "a part takes the name of another without being asked",

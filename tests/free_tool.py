@@ -53,11 +53,7 @@ def _turn(axis: Array, by: Array) -> None:
 
 
 @kernel
-def _place(
-    arm: Any,
-    q: Array,
-    axis: Array,
-) -> None:
+def _place(arm: Any, q: Array, axis: Array) -> None:
     for k in range(3):
         arm.T[k, 3], arm.T[k, 2] = q[k], axis[k]
 

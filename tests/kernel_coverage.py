@@ -24,7 +24,7 @@ TESTS = (
     "geometry", "filters", "fixtures", "pid", "haptic_master", "motion_scaling", "slave_sim",
     "inverse_kinematics", "operators", "end_stops", "rcrt1", "rcrt1_dynamics", "stewart", "rps3",
     "four_bar", "scara", "planar_3r", "five_axis", "puma560", "mma", "mma_models", "mma_balance",
-    "mma_ik", "three_finger_hand", "scara_stewart", "dh", "dh_arms", "robots", "fixture_parts",
+    "mma_ik", "three_finger_hand", "scara_stewart", "dh", "robot_laws", "robots", "fixture_parts",
     "controller_parts", "limits", "interpolation", "source_pid", "rigid_body", "motion_estimates",
     "fixture_shapes",
 )  # fmt: skip
@@ -69,9 +69,10 @@ def run_tests(settings: Path) -> int:
     coverage_run = ["coverage", "run", "--rcfile", str(settings), "-m"]
     pytest = ["pytest", "-q", "-n", "2", "-p", Path(__file__).stem, *files]
     return subprocess.call(
-        [sys.executable, "-m", *coverage_run, *pytest], cwd=ROOT,
+        [sys.executable, "-m", *coverage_run, *pytest],
+        cwd=ROOT,
         env={**os.environ, "NUMBA_DISABLE_JIT": "1", "PYTHONPATH": str(Path(__file__).parent)},
-    )  # fmt: skip
+    )
 
 
 def pytest_collection_modifyitems(items: list[Any]) -> None:

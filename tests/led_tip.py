@@ -82,12 +82,7 @@ def _stored(p: SimulationNumbers, s: Any) -> Any:
 
 @kernel
 def _lead(
-    p: SimulationNumbers,
-    contacts: Any,
-    arm: Any,
-    way: Array,
-    felt: Array,
-    lost: Array,
+    p: SimulationNumbers, contacts: Any, arm: Any, way: Array, felt: Array, lost: Array
 ) -> None:
     """Lead the tip along ``way`` (N, 3), a tick each ``PIECES`` rows.
 

@@ -69,9 +69,9 @@ class Controller(Node):
         message, told, says = COMMANDS[kind]
         self._sender = self.create_publisher(JointState, says, 10)
         self._witness = self.create_publisher(Float64MultiArray, "witness", 10)
-        take = {
-            "forward_command": self._array, "joint_trajectory": self._trajectory
-        }.get(kind, self._joint_state)  # fmt: skip
+        take = {"forward_command": self._array, "joint_trajectory": self._trajectory}.get(
+            kind, self._joint_state
+        )
         self._taken = [
             (self.create_subscription(message, told, take, 1000), take),  # none is lost
             (self.create_subscription(String, "misbehave", self._misbehave, 10), self._misbehave),

@@ -6,10 +6,17 @@ from typing import Any
 import numpy as np
 
 from teleop_core.kernels.geometry import Array
+from teleop_core.robots.dh import DhTable, parse_table
 
 SHOULDERS = ("skew", "1 and 2 parallel", "2 and 3 parallel", "1 and 2 meet", "2 and 3 meet")
 PARALLEL = ("5 and 6 meet", "5 and 6 apart")
 WIDE = (-2.0 * math.pi, 2.0 * math.pi)
+
+
+def table(rows: Any, convention: str = "modified", **entries: object) -> DhTable:
+    """Table of rows in degrees."""
+    whole = {"name": "chain", "convention": convention, "angles": "degrees", "rows": rows}
+    return parse_table(whole | entries)
 
 
 def direction(rng: np.random.Generator, *beside: Array) -> Array:

@@ -9,16 +9,8 @@ from scipy.spatial.transform import Rotation
 from teleop_core.bags.reader import Bag
 from teleop_core.bags.reports import report
 from teleop_core.bags.writer import BagWriter
+from teleop_core.graph import topics
 from teleop_core.graph.signals import STATE_FIELDS, TICK_NS
-from teleop_core.graph.topics import (
-    ALL,
-    SLAVE_MEASURED_CP,
-    SLAVE_SERVO_CP,
-    SLAVE_SETPOINT_CP,
-    TELEOP_STATE,
-    Limit,
-    Topic,
-)
 from teleop_core.kernels.geometry import Array
 
 JOINTS = tuple(f"joint_{i}" for i in range(1, 7))
@@ -35,7 +27,9 @@ def pose_rows(
     return np.tile([*position, w, x, y, z], (count, 1))
 
 
-def state(stamp_ns: int, described: dict[str, str] | None = None, **values: float | Limit) -> bytes:
+def state(
+    stamp_ns: int, described: dict[str, str] | None = None, **values: float | topics.Limit
+) -> bytes:
     """Message of teleop/state with everything else zero, but gain 1, of a slave that follows.
 
     ``described`` holds further names and texts, such as the kind of the fixture.
@@ -53,21 +47,21 @@ class Recipe:
         poses = pose_rows(count)
         self.rows = {
             topic: (stamps, poses.copy(), stamps)
-            for topic in (SLAVE_SERVO_CP, SLAVE_SETPOINT_CP, SLAVE_MEASURED_CP)
+            for topic in (topics.SLAVE_SERVO_CP, topics.SLAVE_SETPOINT_CP, topics.SLAVE_MEASURED_CP)
         }
         self.stamps = stamps
-        self.singles = [(TELEOP_STATE, START_NS, state(START_NS))]
+        self.singles = [(topics.TELEOP_STATE, START_NS, state(START_NS))]
         self.metadata = {"scenario": "at_rest", "robot": "rcrt1", "seed": "7"}
-        self.topics = list(ALL)
+        self.topics = list(topics.ALL)
 
-    def values(self, topic: Topic) -> Array:
+    def values(self, topic: topics.Topic) -> Array:
         return self.rows[topic][1]
 
     def drop(self, topic: Any, lost: Any) -> None:
         kept = np.setdiff1d(np.arange(len(self.rows[topic][0])), lost)
         self.rows[topic] = tuple(column[kept] for column in self.rows[topic])
 
-    def delay(self, topic: Topic, delay_ns: int) -> None:
+    def delay(self, topic: topics.Topic, delay_ns: int) -> None:
         stamps, values, logs = self.rows[topic]
         self.rows[topic] = (stamps, values, logs + delay_ns)
 

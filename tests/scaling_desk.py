@@ -9,12 +9,7 @@ from teleop_core.chain.mapping.parameters import MotionScalingParameters
 from teleop_core.chain.mapping.plausibility import PlausibilityParameters
 from teleop_core.chain.operators.rest import REST_POSITION
 from teleop_core.graph.signals import STATE, TICK_NS
-from teleop_core.kernels.geometry import (
-    Array,
-    pose_from_transform,
-    rotation_from_quaternion,
-    transform,
-)
+from teleop_core.kernels import geometry
 from teleop_core.robots import load_robot
 
 ANY_HAND = PlausibilityParameters(
@@ -35,7 +30,7 @@ class Desk:
         self.hand, self.turn = np.array(REST_POSITION), np.eye(3)
         self.pressed = np.zeros(3)
         self.row["master_measured_cp_ns"] = self.row["slave_setpoint_cp_ns"] = TICK_NS
-        pose_from_transform(HOME, self.row["slave_setpoint_cp"])
+        geometry.pose_from_transform(HOME, self.row["slave_setpoint_cp"])
 
     def step(
         self,
@@ -44,12 +39,14 @@ class Desk:
         *,
         stamp_step_ns: int = TICK_NS,
         does_follow: bool = True,
-    ) -> Array:
+    ) -> geometry.Array:
         """One sample after the hand's step [m]; returns the slave command's place."""
         row, self.hand = self.row, self.hand + np.asarray(move, dtype=float)
         self.turn = self.turn if turn is None else turn @ self.turn
         row["master_measured_cp_ns"] += stamp_step_ns
-        pose_from_transform(transform(self.turn, self.hand), row["master_measured_cp"])
+        geometry.pose_from_transform(
+            geometry.transform(self.turn, self.hand), row["master_measured_cp"]
+        )
         row["master_buttons"] = self.pressed
         self.scaling.step()
         if does_follow:
@@ -57,7 +54,7 @@ class Desk:
             row["slave_setpoint_cp_ns"] = row["master_measured_cp_ns"]
         return row["slave_servo_cp"][:3].copy()
 
-    def press(self, button: str) -> Array:
+    def press(self, button: str) -> geometry.Array:
         """Sample with a button pressed, then one with it released; the hand rests."""
         index = ("clutch", "fixture", "mode").index(button)
         self.pressed[index] = 1.0
@@ -68,15 +65,15 @@ class Desk:
     def hold(self, button: str, is_held: bool = True) -> None:
         self.pressed[("clutch", "fixture", "mode").index(button)] = float(is_held)
 
-    def attitude(self) -> Array:
+    def attitude(self) -> geometry.Array:
         out = np.empty((3, 3))
-        rotation_from_quaternion(np.ascontiguousarray(self.row["slave_servo_cp"][3:]), out)
+        geometry.rotation_from_quaternion(np.ascontiguousarray(self.row["slave_servo_cp"][3:]), out)
         return out
 
     def state(self, name: str) -> float:
         return self.row["teleop_state"][STATE[name]]
 
-    def box(self) -> tuple[Array, Array]:
+    def box(self) -> tuple[geometry.Array, geometry.Array]:
         start, size = STATE["fixture_center_x"], STATE["fixture_size_x"]
         state = self.row["teleop_state"]
         return state[start : start + 3].copy(), state[size : size + 3].copy()

@@ -49,10 +49,11 @@ def session(
     master = HeldMaster(
         replace(person, buttons=ButtonParameters(fixture=(0.002,))),
         HapticMasterParameters(
-            seed=seed, hand=HandParameters(**{k: v for k, v in hand.items() if k not in own}),
+            seed=seed,
+            hand=HandParameters(**{k: v for k, v in hand.items() if k not in own}),
             device=DeviceParameters(**(device or {})),
         ),
-    )  # fmt: skip
+    )
     values = {"box.size": (2.0 * HALF,) * 3, **fixture}
     scaling = MotionScaling(MotionScalingParameters(fixture=build(FixtureParameters, values)))
     felt, told = master.signals, scaling.signals

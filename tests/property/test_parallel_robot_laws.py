@@ -68,19 +68,6 @@ def test_residual_is_what_forward_kinematics_leaves(name: str, geometry: str) ->
         assert abs(gap - result.residual[0]) < 1e-6
 
 
-@pytest.mark.parametrize(("name", "geometry"), ROBOTS)
-def test_a_batch_is_the_same_as_its_single_questions(name: str, geometry: str) -> None:
-    robot, rng = load_robot_set(name, settings(geometry)), np.random.default_rng(3)
-    poses = np.array([any_pose(rng) for _ in range(20)])
-    batch: Any = robot.ik(poses)
-    reached = robot.solve_fk_batch(batch.q).T
-    for k, T in enumerate(poses):
-        single = robot.ik(T)
-        assert np.array_equal(single.q, batch.q[k])
-        assert single.status == batch.status[k]
-        assert np.array_equal(reached[k], robot.solve_fk(single.q).T)
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize(("name", "geometry"), ROBOTS)
 def test_every_robot_is_led_through_the_graph_with_all_its_actuators(

@@ -310,8 +310,9 @@ def assert_command_moves_with_the_hand(block: NDArray[np.void], first: int) -> N
 @given(
     st.integers(0, 1000),
     st.lists(seconds, max_size=4, unique=True).filter(lambda t: len(t) % 2 == 0),
-    presses, presses,
-)  # fmt: skip
+    presses,
+    presses,
+)
 @settings(max_examples=25)
 def test_buttons_in_a_running_session_never_move_the_slave(
     seed: int, clutch: list[float], fixture: list[float], mode: list[float]

@@ -227,9 +227,7 @@ def composed_session(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., 
     """Composed session that tests of a file share, as a context: peer, process, recording."""
 
     @contextmanager
-    def run(
-        **parameters: Any,
-    ) -> Iterator[tuple[Peer, "subprocess.Popen[bytes]", Path]]:
+    def run(**parameters: Any) -> Iterator[tuple[Peer, "subprocess.Popen[bytes]", Path]]:
         folder = tmp_path_factory.mktemp("session")
         with _made_peer() as peer, _composed(peer, folder, "", parameters) as process:
             yield peer, process, folder / "bag"

@@ -111,9 +111,7 @@ def test_poses_of_each_type_arrive_in_the_axes_of_the_master_in_metres(
     )
 
 
-def test_a_device_whose_poses_have_no_stamp_is_refused_with_a_line_in_the_log(
-    peer: "Peer",
-) -> None:
+def test_a_device_whose_poses_have_no_stamp_is_refused_with_a_line_in_the_log(peer: "Peer") -> None:
     device = started(peer)
     device.has_stamps = False
     peer.wait(turning(peer, lambda: "have no stamp" in device.bridge.stderr.read_text()), "a line")

@@ -79,9 +79,7 @@ def test_a_loss_that_comes_every_time_is_a_failure(run: Callable[..., Any]) -> N
     assert "MiddlewareLossError 2" in out
 
 
-def test_a_crash_in_a_thread_of_the_middleware_is_rerun_and_named(
-    run: Callable[..., Any],
-) -> None:
+def test_a_crash_in_a_thread_of_the_middleware_is_rerun_and_named(run: Callable[..., Any]) -> None:
     body = "def test_it():\n    if count() == 1:\n        abort_outside_python()\n"
     code, out, runs = run(body, "-n", "1")
     assert (code, runs) == (0, 2), out

@@ -36,9 +36,7 @@ def served() -> Any:
 
 @pytest.mark.parametrize("attack", hostile.HOSTILE, ids=lambda attack: attack.__name__)
 def test_page_that(
-    attack: Callable[[PageClient, PageClient], None],
-    served: Any,
-    caplog: pytest.LogCaptureFixture,
+    attack: Callable[[PageClient, PageClient], None], served: Any, caplog: pytest.LogCaptureFixture
 ) -> None:
     server, desk, driver = served
     with PageClient(server.port) as watcher:

@@ -194,9 +194,7 @@ def test_client_that_never_reads_costs_little_and_is_dropped_while_others_are_se
         body = scene.add_frame("/body")
         mesh = scene.add_point_cloud("/cloud", **cloud(0))
         told, dead = handshake(
-            server.port,
-            Origin=f"http://127.0.0.1:{server.port}",
-            Sec_WebSocket_Protocol=SPOKEN,
+            server.port, Origin=f"http://127.0.0.1:{server.port}", Sec_WebSocket_Protocol=SPOKEN
         )
         assert "101" in told
         until(lambda: server.viser.connections() == 1, "the page that never reads")

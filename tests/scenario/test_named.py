@@ -26,13 +26,13 @@ from teleop_lab import experiments
 BRIEF = ("--duration", "2")
 FORMS = ["brief", pytest.param("whole", marks=pytest.mark.soak)]
 AGREEING = {
-    "resolution": 17, "tendons": 3, "poses": 73, "workspace": 13, "filter": 10, "precision": 5,
+    "resolution": 16, "tendons": 3, "poses": 73, "workspace": 1, "filter": 10, "precision": 5,
     "repeatability": 6, "responses": 5, "accuracy": 30, "master_slave": 7, "controllers": 2,
     "gravity": 6, "robustness": 0, "shares": 0, "points24": 1, "stability": 15, "zwidth": 29,
-    "transparency": 112, "drift": 42, "puncture": 27, "mma_frames": 39, "mma_balance": 24,
-    "hybrid": 18, "parallel_robots": 17, "dh_robots": 33,
+    "transparency": 112, "drift": 42, "puncture": 27, "mma_frames": 39, "mma_balance": 15,
+    "hybrid": 18, "parallel_robots": 6,
 }  # fmt: skip
-"""Published figures that each experiment agrees with."""
+"""Published figures, laws and goals that each experiment agrees with."""
 TRACKED_MM = {"coarse_box": 0.289, "fine_box": 0.260, "human": 0.114}
 """Root mean square of each scenario's position error, where it is above a tenth."""
 
@@ -40,7 +40,8 @@ TRACKED_MM = {"coarse_box": 0.289, "fine_box": 0.260, "human": 0.114}
 @pytest.mark.slow
 @pytest.mark.parametrize("name", experiments.EXPERIMENTS.names())
 def test_every_experiment_runs_to_its_end_and_agrees_as_it_did(name: str) -> None:
-    assert experiments.run(name).agreeing == AGREEING[name]
+    rows = experiments.run(name).rows
+    assert sum(row.agrees is True for row in rows) == AGREEING[name]
 
 
 @pytest.mark.slow

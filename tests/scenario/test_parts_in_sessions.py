@@ -132,8 +132,9 @@ def test_command_notes_an_answer_that_nobody_reads_and_scores_without_its_file(
     teleop: "Run", forgetful: Path, tmp_path: Path
 ) -> None:
     out, scores = tmp_path / "bag", tmp_path / "scores.json"
-    done = teleop("sim", "--parts", forgetful, "--duration", 0.5, "--out", out,
-                  "--set", "stages=[own]")  # fmt: skip
+    done = teleop(
+        "sim", "--parts", forgetful, "--duration", 0.5, "--out", out, "--set", "stages=[own]"
+    )
     notes = [line for line in done.stderr.splitlines() if not line.startswith("compiling kernels")]
     (note,) = notes
     assert note.startswith("note: stage 'own' writes test/answer, which no stage reads; replaces")

@@ -16,13 +16,7 @@ from teleop_core.bags.writer import BagWriter
 from teleop_core.evaluation.command import evaluate_bags
 from teleop_core.evaluation.metrics import replay as metric
 from teleop_core.evaluation.replay_figure import ROOM
-from teleop_core.graph.topics import (
-    SLAVE_MEASURED_CP,
-    SLAVE_MEASURED_JS,
-    SLAVE_SERVO_CP,
-    SLAVE_SETPOINT_CP,
-    TELEOP_STATE,
-)
+from teleop_core.graph import topics
 from teleop_core.kernels.geometry import Array, pose_from_transform
 from teleop_core.robots import load_robot
 from teleop_core.robots.robot import Robot
@@ -64,23 +58,26 @@ def record(path: Path, name: str, duration: float = DURATION, rate: int = RATE) 
     recipe = Recipe(1)
     stamps = START_NS + np.round(times * 1e9).astype(np.int64)
     states = np.concatenate((q, np.zeros((len(q), 2 * robot.n))), axis=1)
-    rows = dict.fromkeys((SLAVE_SERVO_CP, SLAVE_SETPOINT_CP, SLAVE_MEASURED_CP), poses)
-    rows[SLAVE_MEASURED_JS] = states
+    rows = dict.fromkeys(
+        (topics.SLAVE_SERVO_CP, topics.SLAVE_SETPOINT_CP, topics.SLAVE_MEASURED_CP), poses
+    )
+    rows[topics.SLAVE_MEASURED_JS] = states
     metadata = recipe.metadata | {"robot": name}
-    with BagWriter(path, recipe.topics, robot.joint_names, metadata=metadata,
-                   start_ns=START_NS) as writer:  # fmt: skip
+    with BagWriter(
+        path, recipe.topics, robot.joint_names, metadata=metadata, start_ns=START_NS
+    ) as writer:
         for at, is_on in ((0.0, 0.0), (FIXTURE_ON[0], 1.0), (FIXTURE_ON[1], 0.0)):
             stamp = START_NS + round(at * 1e9)
             center = dict(zip(("fixture_center_x", "fixture_center_y", "fixture_center_z"),
                               poses[0, :3], strict=True))  # fmt: skip
             told = state(stamp, is_fixture_on=is_on, **FIXTURE, **center)
-            writer.write(TELEOP_STATE, stamp, told)
+            writer.write(topics.TELEOP_STATE, stamp, told)
         for i in range(0, len(q), 1000):
             part = slice(i, i + 1000)
             block = {
                 topic: (stamps[part], values[part], stamps[part]) for topic, values in rows.items()
             }
-            block[SLAVE_MEASURED_JS] = (stamps[part], states[part], stamps[part])
+            block[topics.SLAVE_MEASURED_JS] = (stamps[part], states[part], stamps[part])
             writer.write_block(block)
     return times, 1e3 * poses[:, :3]
 

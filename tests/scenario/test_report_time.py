@@ -14,15 +14,8 @@ from rich.console import Console
 from headless import Headless
 from recipes import START_NS, Recipe, state
 from teleop_core.evaluation.command import evaluate_bags
+from teleop_core.graph import topics
 from teleop_core.graph.signals import TICK_NS
-from teleop_core.graph.topics import (
-    MASTER_MEASURED_CF,
-    SLAVE_MEASURED_CP,
-    SLAVE_SERVO_CP,
-    SLAVE_SETPOINT_CP,
-    TELEOP_STATE,
-    Limit,
-)
 from teleop_core.kernels.geometry import Array
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
@@ -32,7 +25,11 @@ LONG, SHORT = 600_000, 20_000
 LARGEST_PAGE = 10_000_000
 # Curves are rounded to less than this.
 ROUNDING_MM, ROUNDING_N = 1e-3, 1e-3
-LIMITED = ((4.0, 6.5, Limit.JOINT), (9.0, 9.25, Limit.SPEED), (12.0, 15.0, Limit.JOINT))
+LIMITED = (
+    (4.0, 6.5, topics.Limit.JOINT),
+    (9.0, 9.25, topics.Limit.SPEED),
+    (12.0, 15.0, topics.Limit.JOINT),
+)
 # Plots of a recording with a time axis, by their titles.
 POSITION, ERROR, FORCE = "Position against time", "Position error", "Force on the hand"
 PLOTS = """
@@ -81,19 +78,19 @@ def noisy(count: int, seed: int) -> Recipe:
     t = np.arange(count) * 1e-3
     curve = 0.02 * np.stack((np.sin(0.7 * t), np.sin(1.3 * t + seed), np.cos(1.1 * t)), axis=1)
     for topic, scale in (
-        (SLAVE_SERVO_CP, 0.0),
-        (SLAVE_SETPOINT_CP, 1e-6),
-        (SLAVE_MEASURED_CP, 2e-5),
+        (topics.SLAVE_SERVO_CP, 0.0),
+        (topics.SLAVE_SETPOINT_CP, 1e-6),
+        (topics.SLAVE_MEASURED_CP, 2e-5),
     ):
         recipe.values(topic)[:, :3] += curve + rng.normal(scale=scale, size=(count, 3))
     force = np.zeros((count, 6))
     force[:, :3] = np.maximum(np.sin(0.9 * t), 0.0)[:, None] * (0.0, 1.0, 0.2)
-    recipe.rows[MASTER_MEASURED_CF] = (recipe.stamps, force, recipe.stamps)
+    recipe.rows[topics.MASTER_MEASURED_CF] = (recipe.stamps, force, recipe.stamps)
     for begin, end, limit in LIMITED:
-        for at, cause in ((begin, limit), (end, Limit.NONE)):
+        for at, cause in ((begin, limit), (end, topics.Limit.NONE)):
             stamp_ns = START_NS + round(at * 1e3) * TICK_NS
             recipe.singles.append(
-                (TELEOP_STATE, stamp_ns, state(stamp_ns, limit=cause, limited_joint=2))
+                (topics.TELEOP_STATE, stamp_ns, state(stamp_ns, limit=cause, limited_joint=2))
             )
     return recipe
 
@@ -116,7 +113,7 @@ def long(tmp_path_factory: pytest.TempPathFactory) -> Any:
     """Ten minutes at 1 kHz with more noise than a device has."""
     folder = tmp_path_factory.mktemp("long")
     recipe = noisy(LONG, 3)
-    recipe.values(SLAVE_MEASURED_CP)[432_100, :3] += 0.004  # a single sample
+    recipe.values(topics.SLAVE_MEASURED_CP)[432_100, :3] += 0.004  # a single sample
     recipe.write(folder / "long")
     evaluate_bags([folder / "long"], None, folder / "page.html", cast(Console, _Silent()))
     return folder / "page.html", recipe
@@ -311,9 +308,9 @@ def test_zooming_in_shows_every_sample(
     show(tab, first * 1e-3, last * 1e-3)
     # One more on each side, so that lines reach the ends.
     rows = slice(first - 1, last + 2)
-    measured = recipe.values(SLAVE_MEASURED_CP)[rows, :3] * 1e3
-    setpoint = recipe.values(SLAVE_SETPOINT_CP)[rows, :3] * 1e3
-    force = recipe.rows[MASTER_MEASURED_CF][1][rows, :3]
+    measured = recipe.values(topics.SLAVE_MEASURED_CP)[rows, :3] * 1e3
+    setpoint = recipe.values(topics.SLAVE_SETPOINT_CP)[rows, :3] * 1e3
+    force = recipe.rows[topics.MASTER_MEASURED_CF][1][rows, :3]
     expected = {
         (ERROR, "against filtered reference"): (
             np.linalg.norm(measured - setpoint, axis=1),
@@ -331,8 +328,9 @@ def test_zooming_in_shows_every_sample(
         assert mode == "lines+markers"
     x, _, _ = curve(tab, ERROR, "against filtered reference", name)
     assert "every sample, 1 ms apart" in tab.value("document.querySelector('.told').textContent")
-    for axis, trace in enumerate(t for t in plots(tab)[f"{name}/{POSITION}"]["traces"]
-                                 if t["name"] == "measured"):  # fmt: skip
+    for axis, trace in enumerate(
+        t for t in plots(tab)[f"{name}/{POSITION}"]["traces"] if t["name"] == "measured"
+    ):
         at = np.round(np.array(trace["x"]) * 1e3).astype(int) - (first - 1)
         assert np.abs(np.array(trace["y"]) - measured[at, axis]).max() < ROUNDING_MM
 

@@ -94,8 +94,9 @@ def test_tables_of_documents_that_take_sessions_are_what_the_code_says() -> None
     if arithmetic() != json.loads(FILE.read_text())["arithmetic"]:
         pytest.skip("sines of this machine round otherwise than those of the documents")
     script = Path(__file__).parents[2] / "docs" / "generate.py"
-    done = subprocess.run([sys.executable, script, "--check"], capture_output=True, text=True,
-                          check=False)  # fmt: skip
+    done = subprocess.run(
+        [sys.executable, script, "--check"], capture_output=True, text=True, check=False
+    )
     assert done.returncode == 0, done.stdout + done.stderr
 
 

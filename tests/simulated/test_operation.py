@@ -37,11 +37,7 @@ class Streamer:
         self.peer.send(SLAVE_SERVO_JP, self.peer.time_ns(), goal)
         self.setpoints.take()
 
-    def until(
-        self,
-        condition: Any,
-        what: str,
-    ) -> Any:
+    def until(self, condition: Any, what: str) -> Any:
         """Send commands until something is so."""
 
         def turn() -> object:

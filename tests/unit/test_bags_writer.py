@@ -58,11 +58,7 @@ def block(
 
 
 def record(
-    path: Path,
-    rng: np.random.Generator,
-    blocks: int = 3,
-    count: int = 50,
-    **options: Any,
+    path: Path, rng: np.random.Generator, blocks: int = 3, count: int = 50, **options: Any
 ) -> dict[str, int]:
     with BagWriter(path, topics.ALL, JOINTS, **options) as writer:
         for number in range(blocks):

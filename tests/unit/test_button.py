@@ -125,9 +125,8 @@ def test_no_motion_gets_energy_from_a_button(
     )  # fmt: skip
     way = wandering(seed)
     _, _, lost, _ = press(
-        way=way, button=button, world_stiffness=stiffness, damping=damping,
-        world_friction=friction,
-    )  # fmt: skip
+        way=way, button=button, world_stiffness=stiffness, damping=damping, world_friction=friction
+    )
     # Where the force has a corner, the sum over the pieces of a tick errs by as much.
     piece = np.abs(np.diff(way, axis=0)).max() / PIECES
     steepest = stiffness + 11.0 * click / min(travel, more)

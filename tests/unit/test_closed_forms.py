@@ -35,6 +35,8 @@ from teleop_core.robots.kinematics import IkResult
 from teleop_core.robots.robot import Robot
 from teleop_core.robots.swivel_arcs import ARCS, MARGIN, cut_circle, swivel_of
 
+Case = tuple[str, Callable[[np.random.Generator, str], list[tuple[Array, Array]]], str, int]
+Load = Callable[..., Robot]
 REACHED = (IkStatus.FOLLOWED, IkStatus.NEAR_SINGULAR)
 SIX = [(kind, wrist_axes, "spherical") for kind in SHOULDERS]
 SIX += [(kind, parallel_axes, "three parallel axes") for kind in PARALLEL]
@@ -71,14 +73,9 @@ def apart(q: Array, others: Array) -> float:
     return abs(turns).max(axis=-1).min(initial=math.inf)
 
 
-@pytest.mark.parametrize(("kind", "make", "word", "side"), EACH, ids=NAMES)
-def test_every_legal_pose_is_found_with_all_its_solutions(
-    kind: str,
-    make: Callable[[np.random.Generator, str], list[tuple[Array, Array]]],
-    word: str,
-    side: int,
-    load: Callable[..., Robot],
-) -> None:
+@pytest.mark.parametrize("case", EACH, ids=NAMES)
+def test_every_legal_pose_is_found_with_all_its_solutions(case: Case, load: Load) -> None:
+    kind, make, word, side = case
     rng = np.random.default_rng(len(kind))
     for _ in range(3):
         axes, limits = make(rng, kind)[::side], narrow(rng)
@@ -94,18 +91,14 @@ def test_every_legal_pose_is_found_with_all_its_solutions(
             branches = arm.ik_all(wanted)
             assert 1 <= len(branches) <= 8
             assert apart(joints, branches) < 1e-5
-            np.testing.assert_allclose(arm.fk(branches), np.tile(wanted, (len(branches), 1, 1)),
-                                       atol=1e-9)  # fmt: skip
+            np.testing.assert_allclose(
+                arm.fk(branches), np.tile(wanted, (len(branches), 1, 1)), atol=1e-9
+            )
 
 
-@pytest.mark.parametrize(("kind", "make", "word", "side"), EACH, ids=NAMES)
-def test_a_search_from_200_starts_finds_no_further_solution(
-    kind: str,
-    make: Callable[[np.random.Generator, str], list[tuple[Array, Array]]],
-    word: str,
-    side: int,
-    load: Callable[..., Robot],
-) -> None:
+@pytest.mark.parametrize("case", EACH, ids=NAMES)
+def test_a_search_from_200_starts_finds_no_further_solution(case: Case, load: Load) -> None:
+    kind, make, _word, side = case
     rng, found = np.random.default_rng(3), np.empty((64, 6))
     arm = load(make(rng, kind)[::side])
     for q in rng.uniform(arm.lower, arm.upper, (4, 6)):
@@ -122,7 +115,7 @@ TWO_ROUNDS = [WIDE, WIDE, (-1.0, 5.5), WIDE, (-6.0, 0.5), WIDE]
 
 @pytest.mark.parametrize("limits", [TWO_ROUNDS, [(-0.3, 4.5)] * 6], ids=["two rounds", "one side"])
 def test_the_nearest_branch_inside_the_limits_answers_whole_turns_included(
-    limits: list[tuple[float, float]], load: Callable[..., Robot]
+    limits: list[tuple[float, float]], load: Load
 ) -> None:
     arm = load(UR5E, limits)
     rng = np.random.default_rng(8)
@@ -170,14 +163,9 @@ def check_path(arm: Robot, joints: Array) -> IkResult[Any]:
     return answer
 
 
-@pytest.mark.parametrize(("kind", "make", "word", "side"), EACH[1::3], ids=NAMES[1::3])
-def test_paths_are_followed_without_a_flip_and_within_speeds(
-    kind: str,
-    make: Callable[[np.random.Generator, str], list[tuple[Array, Array]]],
-    word: str,
-    side: int,
-    load: Callable[..., Robot],
-) -> None:
+@pytest.mark.parametrize("case", EACH[1::3], ids=NAMES[1::3])
+def test_paths_are_followed_without_a_flip_and_within_speeds(case: Case, load: Load) -> None:
+    kind, make, _word, side = case
     rng = np.random.default_rng(21)
     regular = singular = late = 0
     while regular < 4 or singular < 4:
@@ -220,9 +208,7 @@ def test_out_of_reach_the_nearest_posture_answers_and_motion_goes_on(kind: str, 
     assert answer.status[-1] in REACHED
 
 
-def test_rounded_files_are_recognised_and_solved_to_the_last_digit(
-    load: Callable[..., Robot],
-) -> None:
+def test_rounded_files_are_recognised_and_solved_to_the_last_digit(load: Load) -> None:
     axes = [(np.round(w, 5), np.round(o, 5)) for w, o in UR5E]
     axes[3] = (axes[3][0] + np.array([4e-6, 0.0, 3e-6]), axes[3][1])
     arm = load(axes)
@@ -258,7 +244,7 @@ def test_files_that_say_1_571_are_solved_in_closed_form_beside_the_seed(
 
 @pytest.mark.parametrize(("tilt", "told"), [(2e-3, "0.162°"), (0.1, "8.05°")])
 def test_arms_that_do_not_decompose_are_searched_and_say_what_their_axes_miss(
-    tilt: float, told: str, load: Callable[..., Robot]
+    tilt: float, told: str, load: Load
 ) -> None:
     axes = list(UR5E)
     axes[3] = (axes[3][0] + np.array([tilt, 0.0, tilt]), axes[3][1])
@@ -268,13 +254,13 @@ def test_arms_that_do_not_decompose_are_searched_and_say_what_their_axes_miss(
     assert "axes 4, 5, 6 miss a point by 1" in solution
 
 
-def test_the_arm_as_built_has_the_constants_of_its_chain_alone(load: Callable[..., Robot]) -> None:
+def test_the_arm_as_built_has_the_constants_of_its_chain_alone(load: Load) -> None:
     arm = load(UR5E)
     np.testing.assert_array_equal(present(chain_of(arm)).fixed[0][3], [0.0, 0.0, 0.0, 1.0])
 
 
 @pytest.mark.parametrize("kind", ["2 and 3 parallel", "1 and 2 meet", "5 and 6 meet"])
-def test_eaik_knows_as_many_solutions(kind: str, load: Callable[..., Robot]) -> None:
+def test_eaik_knows_as_many_solutions(kind: str, load: Load) -> None:
     rng = np.random.default_rng(12)
     axes = MAKERS[kind](rng, kind)
     arm = load(axes)
@@ -291,9 +277,7 @@ def test_eaik_knows_as_many_solutions(kind: str, load: Callable[..., Robot]) -> 
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_narrow_limits_of_seven_axes_lose_no_reachable_pose(
-    seed: int, load: Callable[..., Robot]
-) -> None:
+def test_narrow_limits_of_seven_axes_lose_no_reachable_pose(seed: int, load: Load) -> None:
     rng = np.random.default_rng(seed)
     for _ in range(4):
         middle, half = rng.uniform(-2.5, 2.5, 7), rng.uniform(0.05, 0.6, 7)
@@ -310,16 +294,18 @@ def test_narrow_limits_of_seven_axes_lose_no_reachable_pose(
 
 @pytest.mark.parametrize("seed", range(3))
 def test_the_arcs_of_the_swivel_hold_a_legal_posture_without_any_search(
-    seed: int, load: Callable[..., Robot]
+    seed: int, load: Load
 ) -> None:
     rng = np.random.default_rng(40 + seed)
     middle, half = rng.uniform(-2.5, 2.5, 7), rng.uniform(0.02, 0.5, 7)
-    arm = load(swivel_axes(rng), [(float(m - h), float(m + h))
-                                  for m, h in zip(middle, half, strict=True)])  # fmt: skip
+    arm = load(
+        swivel_axes(rng), [(float(m - h), float(m + h)) for m, h in zip(middle, half, strict=True)]
+    )
     found, work = np.empty((13, 8)), np.empty((60, 4))
     for q in rng.uniform(arm.lower, arm.upper, (100, 7)):
-        count, _ = swivel._branches(arm.fk(q), arm.geometry_row, arm.home.copy(), arm.limits(),
-                                    True, found, work)  # fmt: skip
+        count, _ = swivel._branches(
+            arm.fk(q), arm.geometry_row, arm.home.copy(), arm.limits(), True, found, work
+        )
         off = (found[:count, :7] - middle + math.pi) % (2.0 * math.pi) - math.pi
         assert ((abs(off) <= half + 1e-9).all(axis=1) & (found[:count, 7] > 0.5)).any()
 
@@ -353,9 +339,7 @@ def write_at(
     turn(q, seed, limits, 0, 7)
 
 
-def test_no_legal_swivel_is_nearer_to_the_seed_than_the_answer_less_its_margin(
-    load: Callable[..., Robot],
-) -> None:
+def test_no_legal_swivel_is_nearer_to_the_seed_than_the_answer_less_its_margin(load: Load) -> None:
     rng, scan, legal = np.random.default_rng(6), np.arange(-3.14, 3.14, 0.02), 0
     for _ in range(4):
         arm, found, work = (
@@ -380,7 +364,7 @@ def test_no_legal_swivel_is_nearer_to_the_seed_than_the_answer_less_its_margin(
 
 @pytest.mark.parametrize("limits", [IIWA14_LIMITS, [(-0.9, 0.7)] * 7], ids=["iiwa 14", "narrow"])
 def test_seven_axes_use_their_freedom_to_follow_paths_within_speeds_and_limits(
-    limits: list[tuple[float, float]], load: Callable[..., Robot]
+    limits: list[tuple[float, float]], load: Load
 ) -> None:
     arm, rng, regular = load(IIWA14, limits), np.random.default_rng(5), 0
     for _ in range(10):
@@ -426,7 +410,7 @@ def least_manipulability(arm: Robot, joints: Array) -> float:
 
 @pytest.mark.parametrize(("flat", "beside"), [(1, 2), (5, 4)], ids=["shoulder", "wrist"])
 def test_slow_paths_past_a_singular_posture_keep_more_manipulability(
-    flat: int, beside: int, load: Callable[..., Robot]
+    flat: int, beside: int, load: Load
 ) -> None:
     arm, rng = load(IIWA14, IIWA14_LIMITS), np.random.default_rng(3)
     for _ in range(5):
@@ -443,19 +427,18 @@ def test_slow_paths_past_a_singular_posture_keep_more_manipulability(
         np.testing.assert_array_equal(arm.follow(arm.fk(joints), joints[0]).q, answer.q[:5000])
 
 
-def test_far_from_singular_postures_the_least_move_alone_is_made(
-    load: Callable[..., Robot],
-) -> None:
+def test_far_from_singular_postures_the_least_move_alone_is_made(load: Load) -> None:
     arm = load(IIWA14, IIWA14_LIMITS)
     joints = np.array([0.3, 0.8, -0.4, 1.2, 0.5, -0.9, 0.2]) + 0.1 * np.sin(
-        np.linspace(0.0, 6.0, 3000)[:, None] + np.arange(7))  # fmt: skip
+        np.linspace(0.0, 6.0, 3000)[:, None] + np.arange(7)
+    )
     plain = moved_least(arm, arm.fk(joints), joints[0])
     np.testing.assert_array_equal(check_path(arm, joints).q[:3000], plain)
 
 
 @pytest.mark.parametrize("beside", [0.0, 0.02, 0.1])
 def test_seven_axes_stay_in_the_branch_of_the_seed_and_give_up_the_margin_first(
-    beside: float, load: Callable[..., Robot]
+    beside: float, load: Load
 ) -> None:
     rng = np.random.default_rng(8)
     arms = [load(IIWA14, IIWA14_LIMITS), *(load(swivel_axes(rng), narrow(rng, 7)) for _ in "abc")]

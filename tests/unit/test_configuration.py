@@ -8,15 +8,8 @@ import pytest
 import yaml
 
 from teleop_core.base.errors import ParameterError, TeleopError, UnknownNameError
+from teleop_core.graph import layers
 from teleop_core.graph.graph import BUILT_IN, RECORDER_NAME
-from teleop_core.graph.layers import (
-    SESSION,
-    config_folder,
-    list_scenarios,
-    load_file,
-    parse_layer,
-    parse_setting,
-)
 from teleop_core.session.configuration import Configuration, configure
 
 SCENARIOS = ("coarse_box", "fine_box", "free_motion", "mode_switching")
@@ -24,8 +17,8 @@ SCENARIOS = ("coarse_box", "fine_box", "free_motion", "mode_switching")
 
 @pytest.mark.parametrize("name", SCENARIOS)
 def test_scenario_builds_every_group_and_says_what_it_is(name: str) -> None:
-    assert list_scenarios()[name]
-    assert set(configure(name).groups) == {SESSION, *BUILT_IN, RECORDER_NAME}
+    assert layers.list_scenarios()[name]
+    assert set(configure(name).groups) == {layers.SESSION, *BUILT_IN, RECORDER_NAME}
 
 
 def test_unknown_scenario_is_refused_with_the_scenarios() -> None:
@@ -42,23 +35,23 @@ def test_default_file_changes_no_default_of_the_code() -> None:
 @pytest.mark.parametrize("name", SCENARIOS)
 def test_text_of_a_configuration_reads_back_the_same(name: str) -> None:
     configuration = configure(name, settings=["seed=7", "pid.bandwidth=[50,50,50,70,70,70]"])
-    layer = parse_layer(yaml.safe_load(configuration.text()), "text")
+    layer = layers.parse_layer(yaml.safe_load(configuration.text()), "text")
     assert Configuration.from_layers([layer], name) == configuration
 
 
 def test_setting_with_its_stage_sets_that_parameter_alone() -> None:
-    assert parse_setting("haptic_master.hand.stiffness=250") == {
+    assert layers.parse_setting("haptic_master.hand.stiffness=250") == {
         "haptic_master": {"hand.stiffness": 250.0}
     }
 
 
 def test_bare_key_sets_every_stage_that_has_it() -> None:
-    layer = parse_setting("robot=mma")
+    layer = layers.parse_setting("robot=mma")
     assert layer == {
         name: {"robot": "mma"}
         for name in ("inverse_kinematics", "slave", "slave_sim", "arm_bridge")
     }
-    assert parse_setting("seed=5") == {
+    assert layers.parse_setting("seed=5") == {
         name: {"seed": 5} for name in ("operator", "haptic_master", "network", "slave_sim")
     }
 
@@ -81,7 +74,7 @@ def test_bare_key_sets_every_stage_that_has_it() -> None:
 def test_setting_is_read_as_its_declaration_wants(
     text: str, stage: str, name: str, value: str | float | bool | tuple[float, ...]
 ) -> None:
-    layer = parse_setting(text)
+    layer = layers.parse_setting(text)
     assert layer == {stage: {name: value}}
     assert type(layer[stage][name]) is type(value)
 
@@ -96,25 +89,25 @@ def test_setting_is_read_as_its_declaration_wants(
 )
 def test_unknown_key_suggests_the_near_ones(key: str, meant: str) -> None:
     with pytest.raises(UnknownNameError) as error:
-        parse_setting(f"{key}=1")
+        layers.parse_setting(f"{key}=1")
     assert meant in error.value.alternatives
     assert len(error.value.alternatives) <= 3
 
 
 def test_key_like_no_other_is_refused_with_all_keys() -> None:
     with pytest.raises(UnknownNameError) as error:
-        parse_setting("zzzzzz=1")
+        layers.parse_setting("zzzzzz=1")
     assert "motion_scaling.coarse_gain" in error.value.alternatives
 
 
 def test_setting_without_equals_sign_is_refused() -> None:
     with pytest.raises(TeleopError, match="key=value"):
-        parse_setting("duration")
+        layers.parse_setting("duration")
 
 
 def test_setting_whose_value_is_no_yaml_is_refused() -> None:
     with pytest.raises(TeleopError, match="YAML"):
-        parse_setting("duration=[1")
+        layers.parse_setting("duration=[1")
 
 
 @pytest.mark.parametrize(
@@ -151,7 +144,7 @@ def test_two_stages_for_different_robots_are_refused() -> None:
 
 
 def write(path: Path, content: Any) -> Path:
-    path.write_text(yaml.safe_dump(content))
+    path.write_text(yaml.safe_dump(content, sort_keys=False))
     return path
 
 
@@ -193,14 +186,14 @@ def test_file_of_another_shape_is_refused_with_its_name(
     path = tmp_path / "mine.yaml"
     path.write_text(text)
     with pytest.raises(TeleopError, match=says) as error:
-        load_file(path)
+        layers.load_file(path)
     assert "mine.yaml" in str(error.value)
     assert "\n" not in str(error.value)
 
 
 def test_missing_file_is_refused_with_its_name(tmp_path: Path) -> None:
     with pytest.raises(TeleopError, match=r"nowhere\.yaml.*cannot be read"):
-        load_file(tmp_path / "nowhere.yaml")
+        layers.load_file(tmp_path / "nowhere.yaml")
 
 
 def test_unknown_name_in_a_file_is_refused_with_its_stage(tmp_path: Path) -> None:
@@ -216,7 +209,7 @@ def test_what_stands_under_every_node_holds_for_those_that_have_it_and_say_nothi
 ) -> None:
     own = {"slave": {"ros__parameters": {"robot": "mma"}}}
     every = {"/**": {"ros__parameters": {"robot": "puma560", "command_timeout": 0.3}}}
-    layer = load_file(write(tmp_path / "mine.yaml", own | every))
+    layer = layers.load_file(write(tmp_path / "mine.yaml", own | every))
     assert layer["slave"] == {"robot": "mma", "command_timeout": 0.3}
     assert layer["inverse_kinematics"]["robot"] == layer["slave_sim"]["robot"] == "puma560"
     wrong = write(tmp_path / "wrong.yaml", {"/**": {"ros__parameters": {"robto": "mma"}}})
@@ -225,7 +218,7 @@ def test_what_stands_under_every_node_holds_for_those_that_have_it_and_say_nothi
 
 
 def test_parameter_files_lie_where_the_package_finds_them() -> None:
-    assert (config_folder() / "teleop.yaml").is_file()
+    assert (layers.config_folder() / "teleop.yaml").is_file()
 
 
 def test_groups_of_a_configuration_cannot_be_changed_behind_its_back() -> None:
@@ -254,7 +247,7 @@ def test_groups_of_a_configuration_cannot_be_changed_behind_its_back() -> None:
 def test_former_name_sets_what_it_is_called_now(
     key: str, value: str | float, stage: str, name: str, meant: str | float | tuple[float, ...]
 ) -> None:
-    assert parse_setting(f"{key}={value}") == {stage: {name: meant}}
+    assert layers.parse_setting(f"{key}={value}") == {stage: {name: meant}}
 
 
 def test_file_with_former_names_gives_the_same_configuration(tmp_path: Path) -> None:

@@ -37,9 +37,7 @@ def test_a_value_that_is_shown_is_read_as_itself(node: str, name: str, value: An
     ],
 )  # fmt: skip
 def test_lists_are_read_as_people_write_them(
-    shown: str | int | bool,
-    present: Any,
-    wanted: float | bool | tuple[str | float, ...] | None,
+    shown: str | int | bool, present: Any, wanted: float | bool | tuple[str | float, ...] | None
 ) -> None:
     assert _parsed(shown, ParameterInfo("node", "name", present)) == wanted
 
@@ -47,9 +45,7 @@ def test_lists_are_read_as_people_write_them(
 @pytest.mark.parametrize(
     "value", [(0.1, 2.0), ("a=0.1", "b"), ("ball at=[0, 1]", "box"), (), True, 3, 0.25, "hold"]
 )
-def test_a_setting_text_is_read_by_the_session_as_the_value(
-    value: Any,
-) -> None:
+def test_a_setting_text_is_read_by_the_session_as_the_value(value: Any) -> None:
     found = parse(_text(value)) if not isinstance(value, bool) else {"True": True}[_text(value)]
     assert (tuple(found) if isinstance(found, list) else found) == value
 

@@ -228,8 +228,9 @@ def test_a_ball_that_slides_ends_rolling_with_five_sevenths_of_its_speed() -> No
     ours = fly((0.0, 0.0, radius - MASS * G / stiffness), (0.7, 0.0, 0.0), 500, mass=MASS,
                inertia=inertia, tool_radius=radius, world_friction=0.3, world_damping=1.0,
                world_stiffness=stiffness, gravity=(0.0, 0.0, -G))  # fmt: skip
-    other = Other((0.0, 0.0, radius), radius=radius, friction=0.3, joints=SLIDES + HINGE,
-                  inertia=inertia)  # fmt: skip
+    other = Other(
+        (0.0, 0.0, radius), radius=radius, friction=0.3, joints=SLIDES + HINGE, inertia=inertia
+    )
     _, dq = other.fly((0.7, 0.0, 0.0), 500)
     assert ours["speed"][-1, 0] == pytest.approx(0.5, rel=0.01)
     assert ours["speed"][-1, 4] == pytest.approx(0.5 / radius, rel=0.02)

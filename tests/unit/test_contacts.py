@@ -28,8 +28,7 @@ from teleop_core.session.notes import notes_of, passive_note, rendered_note
 COLUMN = {name: index for index, name in enumerate(MASTER_CONTACT.columns)}
 CALM = HandParameters()
 STILL = build(
-    OperatorParameters,
-    {"kind": "hold", "rotation": 0.0, "tremor_amplitude": 0.0, "patience": 0.0},
+    OperatorParameters, {"kind": "hold", "rotation": 0.0, "tremor_amplitude": 0.0, "patience": 0.0}
 )
 
 
@@ -245,6 +244,10 @@ def test_passive_stiffness_falls_with_delay_and_coarse_readings_and_gains_nothin
 def test_a_declared_delay_between_device_and_wall_counts() -> None:
     late = configuration("coarse_box", delays={"master/servo_cf": 1e-3})
     assert "2 ms from sample to force it is passive up to 333 N/m" in " ".join(notes_of(late))
+    both = dict.fromkeys(("master/measured_cp", "master/servo_cf"), 1e-3)
+    assert "3 ms from sample to force" in " ".join(
+        notes_of(configuration("coarse_box", delays=both))
+    )
     elsewhere = configuration("coarse_box", delays={"slave/servo_cp": 1e-3})
     assert not notes_of(elsewhere)
     assert len(notes_of(configuration("coarse_box"), transport=1e-3)) == 1

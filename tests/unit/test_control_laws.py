@@ -14,13 +14,7 @@ from teleop_core.graph.signals import TICK_NS
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot
 from teleop_core.robots.robot import Robot
-from teleop_core.slave.controllers import CONTROLLERS, Controller, register_controller
-from teleop_core.slave.controllers.adaptive import (
-    _LOAD,
-    _MORE_FRICTION,
-    _MORE_INERTIA,
-    _MORE_VISCOUS,
-)
+from teleop_core.slave.controllers import CONTROLLERS, Controller, adaptive, register_controller
 from teleop_core.slave.controllers.computed_torque import COMPUTED_TORQUE, computed_torque_control
 from teleop_core.slave.controllers.motion_estimates import known_friction
 from teleop_core.slave.pair import ArmParameters, SimulatedArm
@@ -192,7 +186,7 @@ def test_adaptive_law_learns_the_friction_there_is() -> None:
     arm = slave("adaptive", faults=STEADY, own={"adaptive.friction_share": 0.4})
     run(arm, circling(12000))
     known = 0.4 * known_friction(ARM)
-    learned = known + arm.simulated.arm.memory[:, _MORE_FRICTION]
+    learned = known + arm.simulated.arm.memory[:, adaptive._MORE_FRICTION]
     # Bounded at twice what it began with; the amplifier's bias and the weight are load instead.
     assert np.allclose(learned[:2], np.minimum(known_friction(ARM), 2.0 * known)[:2], rtol=0.25)
 
@@ -203,15 +197,18 @@ def test_adaptive_law_stays_within_its_bounds_whatever_it_is_asked_for() -> None
     reach = 0.05 * present(ARM.drives).speed_limit
     way = np.clip(
         ARM.home + np.cumsum(rng.uniform(-reach, reach, (3000, 6)), axis=0) * 0.2,
-        ARM.lower, ARM.upper,
-    )  # fmt: skip
+        ARM.lower,
+        ARM.upper,
+    )
     _, _, efforts = run(arm, way)
     memory, drives = arm.simulated.arm.memory, ARM.drives
     assert np.isfinite(efforts).all()
-    assert (np.abs(memory[:, _MORE_INERTIA]) <= 0.5 * present(drives).inertia).all()
-    assert (np.abs(memory[:, _MORE_VISCOUS]) <= present(drives).viscous).all()
-    assert (np.abs(memory[:, _MORE_FRICTION]) <= 0.8 * known_friction(ARM) * (1 + 1e-12)).all()
-    assert (np.abs(memory[:, _LOAD]) <= present(drives).effort_limit).all()
+    assert (np.abs(memory[:, adaptive._MORE_INERTIA]) <= 0.5 * present(drives).inertia).all()
+    assert (np.abs(memory[:, adaptive._MORE_VISCOUS]) <= present(drives).viscous).all()
+    assert (
+        np.abs(memory[:, adaptive._MORE_FRICTION]) <= 0.8 * known_friction(ARM) * (1 + 1e-12)
+    ).all()
+    assert (np.abs(memory[:, adaptive._LOAD]) <= present(drives).effort_limit).all()
 
 
 # Saturation.
@@ -249,16 +246,8 @@ def test_law_gets_the_model_that_is_known_behind_the_gravity_that_is_compensated
 ) -> None:
     seen = []
 
-    def control(
-        gains: Array,
-        memory: Array,
-        setpoint: Array,
-        measured: Array,
-        feedforward: Array,
-        limit: Array,
-        dt: float,
-        effort: Array,
-    ) -> None:
+    def control(*arrays: Any) -> None:
+        feedforward, effort = arrays[4], arrays[-1]
         seen.append(np.array(feedforward))
         effort[:] = 0.0
 
@@ -299,16 +288,8 @@ def test_law_that_uses_the_model_in_plain_python_gives_the_same_bits(own_parts: 
 def test_law_that_does_not_ask_for_the_model_gets_gravity_alone(own_parts: None) -> None:
     lengths = []
 
-    def control(
-        gains: Array,
-        memory: Array,
-        setpoint: Array,
-        measured: Array,
-        feedforward: Array,
-        limit: Array,
-        dt: float,
-        effort: Array,
-    ) -> None:
+    def control(*arrays: Any) -> None:
+        feedforward, effort = arrays[4], arrays[-1]
         lengths.append(len(feedforward) - len(effort))
         effort[:] = 0.0
 

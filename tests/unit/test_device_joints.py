@@ -10,12 +10,8 @@ import yaml
 
 from teleop_core.base.errors import ParameterError, SessionError
 from teleop_core.base.parameters import build
+from teleop_core.chain.master import master_bridge
 from teleop_core.chain.master.device_joints import DeviceJoints
-from teleop_core.chain.master.master_bridge import (
-    POSE_MESSAGES,
-    MasterBridge,
-    MasterBridgeParameters,
-)
 from teleop_core.commands.map_device import mapped
 from teleop_core.robots import load_robot
 
@@ -30,7 +26,7 @@ MOTIONS = {"to the right": (0, -1, 0), "up": (0, 0, 1), "towards you": (-1, 0, 0
 class Leader:
     """A handle of other names, signs, zeros and order, and a person who does what is asked."""
 
-    topic, message = "/leader/joint_states", POSE_MESSAGES[-1]
+    topic, message = "/leader/joint_states", master_bridge.POSE_MESSAGES[-1]
 
     def __init__(self, name: str, geometry: list[str], seed: int, offset: float = 1.0) -> None:
         rng = np.random.default_rng(seed)
@@ -83,7 +79,7 @@ def test_the_bridge_knows_where_a_handle_is_whose_joints_a_person_moved_as_the_w
     monkeypatch.setattr("builtins.input", leader)
     text = mapped(leader, name, geometry)
     values = yaml.safe_load(text)["master_bridge"]["ros__parameters"]
-    bridge = MasterBridge(build(MasterBridgeParameters, values))
+    bridge = master_bridge.MasterBridge(build(master_bridge.MasterBridgeParameters, values))
     q = leader.q = leader.robot.home + np.random.default_rng(seed).uniform(-0.1, 0.1, len(leader.q))
     said = leader.joints()
     assert bridge.hear_joints(list(said), list(said.values()), 10**18, 10**18)
@@ -146,14 +142,14 @@ def test_joints_need_a_robot_poses_take_none_and_motions_need_a_person(
     leader = Leader("scara", [], 0)
     with pytest.raises(ParameterError, match="handle"):
         mapped(leader, "", [])
-    leader.message = POSE_MESSAGES[0]
+    leader.message = master_bridge.POSE_MESSAGES[0]
     with pytest.raises(ParameterError, match="handle"):
         mapped(leader, "scara", [])
 
     def nobody(text: str) -> None:
         raise EOFError
 
-    leader.message = POSE_MESSAGES[-1]
+    leader.message = master_bridge.POSE_MESSAGES[-1]
     monkeypatch.setattr("builtins.input", nobody)
     with pytest.raises(SessionError, match="person"):
         mapped(leader, "scara", [])

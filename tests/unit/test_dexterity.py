@@ -7,14 +7,7 @@ import numpy as np
 import pytest
 
 from teleop_core.base.errors import ParameterError
-from teleop_core.robots import load_robot
-from teleop_core.robots.dexterity import (
-    COLUMNS,
-    manipulability,
-    sample_workspace,
-    singular_values,
-    write_workspace_csv,
-)
+from teleop_core.robots import dexterity, load_robot
 
 
 def test_manipulability_of_the_puma_is_the_closed_form_determinant() -> None:
@@ -25,30 +18,32 @@ def test_manipulability_of_the_puma_is_the_closed_form_determinant() -> None:
         u = a2 * math.cos(q[1]) + a3 * math.cos(q[1] + q[2]) - d4 * math.sin(q[1] + q[2])
         bend = d4 * math.cos(q[2]) + a3 * math.sin(q[2])
         expected = abs(a2 * u * bend * math.sin(q[4]))
-        assert manipulability(arm, q) == pytest.approx(expected, abs=1e-14)
+        assert dexterity.manipulability(arm, q) == pytest.approx(expected, abs=1e-14)
 
 
 def test_scara_is_measured_in_the_four_directions_it_controls() -> None:
     arm = load_robot("scara")
     q = np.array([0.3, 1.1, 0.1, 0.0])
-    assert singular_values(arm, q).shape == (4,)
-    assert manipulability(arm, q) == pytest.approx(0.4 * 0.3 * math.sin(1.1), abs=1e-15)
+    assert dexterity.singular_values(arm, q).shape == (4,)
+    assert dexterity.manipulability(arm, q) == pytest.approx(0.4 * 0.3 * math.sin(1.1), abs=1e-15)
 
 
 def test_a_stretched_arm_has_no_manipulability() -> None:
     arm = load_robot("planar_3r")
-    assert manipulability(arm, [0.0, 0.0, 0.0]) < 1e-15
+    assert dexterity.manipulability(arm, [0.0, 0.0, 0.0]) < 1e-15
 
 
 def test_lengths_weigh_linear_against_angular_speed() -> None:
     arm = load_robot("rcrt1")
     q = arm.home + 0.1
-    assert manipulability(arm, q, 0.1) == pytest.approx(1e3 * manipulability(arm, q))
+    assert dexterity.manipulability(arm, q, 0.1) == pytest.approx(
+        1e3 * dexterity.manipulability(arm, q)
+    )
 
 
 def test_samples_lie_in_the_annulus_that_the_arm_can_reach() -> None:
     arm = load_robot("scara")
-    points, values = sample_workspace(arm, 2000, np.random.default_rng(3))
+    points, values = dexterity.sample_workspace(arm, 2000, np.random.default_rng(3))
     radius = np.hypot(points[:, 0], points[:, 1])
     assert points.shape == (2000, 3)
     assert values.shape == (2000,)
@@ -62,16 +57,16 @@ def test_samples_lie_in_the_annulus_that_the_arm_can_reach() -> None:
 
 def test_the_same_seed_draws_the_same_workspace() -> None:
     arm = load_robot("five_axis")
-    one, other = (sample_workspace(arm, 50, np.random.default_rng(5)) for _ in range(2))
+    one, other = (dexterity.sample_workspace(arm, 50, np.random.default_rng(5)) for _ in range(2))
     assert np.array_equal(one[0], other[0])
     assert np.array_equal(one[1], other[1])
 
 
 def test_the_csv_holds_every_sample_with_all_digits(tmp_path: Path) -> None:
-    points, values = sample_workspace(load_robot("puma560"), 20, np.random.default_rng(7))
-    write_workspace_csv(tmp_path / "puma.csv", points, values)
+    points, values = dexterity.sample_workspace(load_robot("puma560"), 20, np.random.default_rng(7))
+    dexterity.write_workspace_csv(tmp_path / "puma.csv", points, values)
     header, *rows = (tmp_path / "puma.csv").read_text().splitlines()
-    assert header == ",".join(COLUMNS)
+    assert header == ",".join(dexterity.COLUMNS)
     assert np.array_equal(np.array([row.split(",") for row in rows], float)[:, :3], points)
     assert np.array_equal(np.array([row.split(",") for row in rows], float)[:, 3], values)
 
@@ -79,12 +74,12 @@ def test_the_csv_holds_every_sample_with_all_digits(tmp_path: Path) -> None:
 @pytest.mark.parametrize("count", [0, -3])
 def test_fewer_than_one_sample_is_refused(count: int) -> None:
     with pytest.raises(ParameterError) as caught:
-        sample_workspace(load_robot("scara"), count, np.random.default_rng(0))
+        dexterity.sample_workspace(load_robot("scara"), count, np.random.default_rng(0))
     assert caught.value.name == "count"
 
 
 @pytest.mark.parametrize("length", [0.0, -1.0, math.nan, math.inf])
 def test_a_length_that_cannot_weigh_is_refused(length: float) -> None:
     with pytest.raises(ParameterError) as caught:
-        singular_values(load_robot("scara"), [0.0, 1.0, 0.1, 0.0], length)
+        dexterity.singular_values(load_robot("scara"), [0.0, 1.0, 0.1, 0.0], length)
     assert caught.value.name == "length"

@@ -3,39 +3,22 @@
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 import roboticstoolbox as rtb
 import sympy
 
-from teleop_core.base.errors import (
-    ParameterError,
-    RecordingError,
-    ShapeError,
-    TeleopError,
-    UnknownNameError,
-)
+from random_arms import table
+from teleop_core.base import errors
 from teleop_core.kernels.geometry import Array, rotation, transform
 from teleop_core.robots import IkStatus, load_robot
-from teleop_core.robots.dh import CONVENTIONS, DhTable, elementary, load_table, parse_table
+from teleop_core.robots.dh import CONVENTIONS, elementary, load_table, parse_table
+from ways import stepped
 
 ROUNDING = 1e-14
-TABLES = (
-    "puma560", "rcrt1", "scara", "planar_3r", "five_axis_standard", "five_axis_sheth_uicker"
-)  # fmt: skip
+TABLES = ("puma560", "rcrt1", "scara", "planar_3r", "five_axis_standard", "five_axis_sheth_uicker")
 REACHED = 1e-9
-
-
-def table(
-    rows: Any,
-    convention: str = "modified",
-    **entries: object,
-) -> DhTable:
-    return parse_table(
-        {"name": "chain", "convention": convention, "angles": "degrees", "rows": rows, **entries}
-    )
 
 
 def modified_link(alpha: float, a: float, d: float, theta: float) -> Array:
@@ -71,13 +54,7 @@ def test_d1_equation_10_is_the_product_of_its_four_motions_symbolically() -> Non
 
 def test_d1_a_modified_row_is_equation_10() -> None:
     for alpha, a, d, theta in np.random.default_rng(1).uniform(-2.0, 2.0, (100, 4)):
-        chain = parse_table(
-            {
-                "name": "row",
-                "convention": "modified",
-                "rows": [{"alpha": alpha, "a": a, "d": d, "theta": "q"}],
-            }
-        )
+        chain = table([{"alpha": alpha, "a": a, "d": d, "theta": "q"}], angles="radians")
         assert np.abs(
             chain.link_transforms([theta])[0] - modified_link(alpha, a, d, theta)
         ).max() < (ROUNDING)
@@ -89,13 +66,8 @@ def test_d1_a_modified_row_is_equation_10() -> None:
 def test_roboticstoolbox_builds_the_same_chain(convention: str, link: str) -> None:
     rng = np.random.default_rng(2)
     numbers = rng.uniform(-1.5, 1.5, (6, 3))
-    ours = parse_table(
-        {
-            "name": "chain",
-            "convention": convention,
-            "rows": [{"alpha": k, "a": a, "d": d, "theta": "q"} for k, a, d in numbers],
-        }
-    ).robot()
+    rows = [{"alpha": k, "a": a, "d": d, "theta": "q"} for k, a, d in numbers]
+    ours = table(rows, convention, angles="radians").robot()
     theirs = rtb.DHRobot([getattr(rtb, link)(alpha=k, a=a, d=d) for k, a, d in numbers])
     for q in rng.uniform(-3.0, 3.0, (50, 6)):
         assert np.abs(ours.fk(q) - theirs.fkine(q).A).max() < 1e-12
@@ -214,15 +186,9 @@ def test_paths_of_a_chain_keep_their_steps_and_pass_the_straight_wrist() -> None
     poses = np.array(
         [transform(straight[:3, :3] @ rotation("y", a), straight[:3, 3]) for a in swing]
     )
-    last, limits = robot.ik(poses[0]).q, np.stack((robot.lower, robot.upper, np.full(6, 0.01)))
-    residual = np.empty(2)
-    for pose in poses:
-        now = np.empty(6)
-        status = robot.kernels.ik(pose, last, limits, robot.geometry_row, now, residual)
-        assert status in {IkStatus.FOLLOWED, IkStatus.NEAR_SINGULAR}
-        assert np.abs(now - last).max() <= 0.01 + 1e-15
-        last = now
-    assert residual.max() < REACHED
+    found, statuses = stepped(robot, poses, robot.ik(poses[0]).q, 0.01)
+    assert set(statuses) <= {IkStatus.FOLLOWED, IkStatus.NEAR_SINGULAR}
+    assert np.abs(robot.fk(found[-1]) - poses[-1]).max() < REACHED
 
 
 def test_unreachable_poses_come_back_as_a_status_with_finite_joints() -> None:
@@ -275,7 +241,7 @@ def test_signs_offsets_limits_and_homes_are_read_in_the_table_unit() -> None:
 def test_malformed_rows_are_refused_by_name(
     rows: str | Sequence[int | dict[str, str | float | bool | list[int]]], named: str
 ) -> None:
-    with pytest.raises(ParameterError) as caught:
+    with pytest.raises(errors.ParameterError) as caught:
         table(rows)
     assert caught.value.name == named
 
@@ -297,12 +263,12 @@ def test_malformed_rows_are_refused_by_name(
 def test_malformed_tables_are_refused(
     content: list[object] | Mapping[str, str | int | list[str | dict[str, str]]] | None,
 ) -> None:
-    with pytest.raises(TeleopError):
+    with pytest.raises(errors.TeleopError):
         parse_table(content)
 
 
 def test_unknown_conventions_list_the_known_ones() -> None:
-    with pytest.raises(UnknownNameError) as caught:
+    with pytest.raises(errors.UnknownNameError) as caught:
         table([{"theta": "q"}], convention="distant")
     assert set(caught.value.alternatives) == set(CONVENTIONS)
 
@@ -311,14 +277,14 @@ def test_files_that_are_not_yaml_or_not_there_are_refused(tmp_path: Path) -> Non
     broken = tmp_path / "broken.yaml"
     broken.write_text("rows: [", encoding="utf-8")
     for path in (broken, tmp_path / "missing.yaml"):
-        with pytest.raises(RecordingError) as caught:
+        with pytest.raises(errors.RecordingError) as caught:
             load_table(path)
         assert caught.value.path == path
 
 
 def test_joint_vectors_of_another_length_are_refused() -> None:
     chain = table([{"theta": "q"}])
-    with pytest.raises(ShapeError):
+    with pytest.raises(errors.ShapeError):
         chain.link_transforms([0.0, 1.0])
-    with pytest.raises(ParameterError):
+    with pytest.raises(errors.ParameterError):
         chain.link_transforms([math.nan])

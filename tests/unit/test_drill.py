@@ -24,16 +24,7 @@ from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot
 from teleop_core.session import api
 from teleop_core.slave.operation import Fault, State
-from teleop_drill.drill import (
-    EXERCISES,
-    SHORT,
-    Cure,
-    Motion,
-    Outcome,
-    chosen,
-    hand,
-    measure,
-)
+from teleop_drill import drill
 from teleop_drill.drill.drill_table import drill_table, markdown, rows, summary
 from teleop_drill.drill.exercise import Exercise
 from teleop_drill.drill.hand import Sample
@@ -50,7 +41,7 @@ def trace(values: ArrayLike, numbers: Any = None) -> Any:
     values = np.asarray(values, dtype=float)
     numbers = np.arange(len(values)) if numbers is None else np.asarray(numbers)
     times = 1_000 * MS + present(numbers).astype(np.int64) * MS
-    return measure.Trace(times, present(numbers).astype(np.int64), values, times)
+    return drill.measure.Trace(times, present(numbers).astype(np.int64), values, times)
 
 
 @pytest.mark.parametrize(("steps", "ratio"), [([1e-3, 2e-3], 2.0), ([5e-4, -5e-4], 0.5)])
@@ -59,18 +50,18 @@ def test_the_ratio_is_that_of_the_largest_step_of_any_joint(
 ) -> None:
     still = np.zeros((len(steps) + 1, 1))
     moving = np.concatenate(([0.0], np.cumsum(steps)))[:, np.newaxis]
-    found = measure.step_ratio(trace(np.hstack((still, moving))), np.array([9.0, 1.0]), DT)
+    found = drill.measure.step_ratio(trace(np.hstack((still, moving))), np.array([9.0, 1.0]), DT)
     assert found == pytest.approx(ratio)
 
 
 def test_messages_that_were_lost_count_as_ticks_in_which_a_joint_could_move() -> None:
-    assert measure.step_ratio(trace([[0.0], [3e-3]], [0, 3]), np.array([1.0]), DT) == (
+    assert drill.measure.step_ratio(trace([[0.0], [3e-3]], [0, 3]), np.array([1.0]), DT) == (
         pytest.approx(1.0)
     )
 
 
 def test_another_publisher_is_no_step() -> None:
-    assert measure.step_ratio(trace([[0.0], [9.0]], [500, 1]), np.array([1.0]), DT) == 0.0
+    assert drill.measure.step_ratio(trace([[0.0], [9.0]], [500, 1]), np.array([1.0]), DT) == 0.0
 
 
 @pytest.mark.parametrize("moving_for", [0, 1, 7])
@@ -78,17 +69,17 @@ def test_a_stop_is_over_with_the_first_setpoint_that_stands_still(moving_for: in
     way = np.cumsum(np.ones(100 + moving_for))
     places = np.concatenate((way, np.full(50, way[-1])))[:, np.newaxis]
     since_ns = 1_000 * MS + 99 * MS  # that of the hundredth message
-    assert measure.stop_delay(trace(places), since_ns) == pytest.approx((moving_for + 1) * DT)
+    assert drill.measure.stop_delay(trace(places), since_ns) == pytest.approx((moving_for + 1) * DT)
 
 
 def test_who_never_stands_still_has_no_time_of_stopping() -> None:
-    assert math.isnan(measure.stop_delay(trace(np.arange(100.0)[:, None]), 1_050 * MS))
+    assert math.isnan(drill.measure.stop_delay(trace(np.arange(100.0)[:, None]), 1_050 * MS))
 
 
 def test_travel_is_counted_from_the_last_place_before_the_fault_and_until_the_end() -> None:
     places = np.zeros((100, 3))
     places[:, 0] = 1e-3 * np.arange(100)
-    found = measure.travel(trace(places), 1_050 * MS, 1_060 * MS)
+    found = drill.measure.travel(trace(places), 1_050 * MS, 1_060 * MS)
     assert found == pytest.approx(10e-3)
 
 
@@ -97,7 +88,7 @@ def test_braking_takes_the_square_of_the_speed_over_twice_the_deceleration() -> 
     turning = trace(speed * DT * np.arange(100)[:, None])
     jacobian = np.zeros((6, 1))
     jacobian[1, 0] = 0.3
-    found = measure.braking_way(turning, 1_099 * MS, jacobian, np.array([braking]))
+    found = drill.measure.braking_way(turning, 1_099 * MS, jacobian, np.array([braking]))
     assert found == pytest.approx(0.3 * speed**2 / (2.0 * braking))
 
 
@@ -108,7 +99,7 @@ def test_the_bound_of_braking_holds_for_a_real_arm_that_brakes_all_joints() -> N
     for _ in range(20):
         q, speeds = robot.home.copy(), rng.uniform(-0.5, 0.5, robot.n)
         moving = trace(q + DT * np.arange(-50, 1)[:, None] * speeds)
-        bound = measure.braking_way(moving, 1_050 * MS + 1, robot.jacobian(q), braking)
+        bound = drill.measure.braking_way(moving, 1_050 * MS + 1, robot.jacobian(q), braking)
         time = np.abs(speeds) / braking
         rest = q + 0.5 * speeds * time
         way = np.linalg.norm((robot.fk(rest) - robot.fk(q))[:3, 3])
@@ -116,60 +107,64 @@ def test_the_bound_of_braking_holds_for_a_real_arm_that_brakes_all_joints() -> N
 
 
 def test_the_hand_goes_round_at_constant_speed_once_it_has_set_in() -> None:
-    times = np.arange(2.0, 6.0, hand.PERIOD)
-    places = np.array([hand.circle(time)[:3] for time in times])
-    speeds = np.linalg.norm(np.diff(places, axis=0), axis=1) / hand.PERIOD
-    assert speeds == pytest.approx(2.0 * math.pi * hand.RADIUS / hand.ROUND, rel=1e-4)
-    assert np.linalg.norm(hand.circle(hand.PERIOD)[:3] - hand.circle(0.0)[:3]) < 1e-6
+    times = np.arange(2.0, 6.0, drill.hand.PERIOD)
+    places = np.array([drill.hand.circle(time)[:3] for time in times])
+    speeds = np.linalg.norm(np.diff(places, axis=0), axis=1) / drill.hand.PERIOD
+    assert speeds == pytest.approx(2.0 * math.pi * drill.hand.RADIUS / drill.hand.ROUND, rel=1e-4)
+    assert (
+        np.linalg.norm(drill.hand.circle(drill.hand.PERIOD)[:3] - drill.hand.circle(0.0)[:3]) < 1e-6
+    )
 
 
 def sent(distortion: Callable[..., Any], count: int = 100) -> list[Sample]:
     """Samples that leave, of one every two milliseconds."""
     out = []
     for number in range(count):
-        out += distortion(Sample(number * 2 * MS, hand.circle(2.0 + number * hand.PERIOD)))
+        out += distortion(
+            Sample(number * 2 * MS, drill.hand.circle(2.0 + number * drill.hand.PERIOD))
+        )
     return out
 
 
 def test_what_is_lost_is_a_share_and_the_rest_is_untouched() -> None:
-    left = sent(hand.lossy(0.3), 2000)
+    left = sent(drill.hand.lossy(0.3), 2000)
     assert 0.65 < len(left) / 2000 < 0.75
     assert [s.stamp_ns for s in left] == sorted({s.stamp_ns for s in left})
 
 
 def test_what_is_late_comes_in_order_and_so_many_samples_later() -> None:
-    held = hand.delayed(10)
-    assert [len(held(Sample(n, hand.circle(0.0)))) for n in range(12)] == [0] * 10 + [1, 1]
+    held = drill.hand.delayed(10)
+    assert [len(held(Sample(n, drill.hand.circle(0.0)))) for n in range(12)] == [0] * 10 + [1, 1]
 
 
 def test_what_is_out_of_order_is_all_there() -> None:
-    stamps = [s.stamp_ns for s in sent(hand.reordered(5))]
+    stamps = [s.stamp_ns for s in sent(drill.hand.reordered(5))]
     assert stamps[:5] == sorted(stamps[:5], reverse=True)
     assert sorted(stamps) == [n * 2 * MS for n in range(100)]
 
 
 def test_stamps_are_changed_alone() -> None:
-    frozen, zero = sent(hand.frozen_stamps()), sent(hand.stamped(lambda _: 0))
+    frozen, zero = sent(drill.hand.frozen_stamps()), sent(drill.hand.stamped(lambda _: 0))
     assert {s.stamp_ns for s in frozen} == {0}
     assert {s.stamp_ns for s in zero} == {0}
-    assert np.array_equal([s.pose for s in frozen], [s.pose for s in sent(hand.faithful)])
+    assert np.array_equal([s.pose for s in frozen], [s.pose for s in sent(drill.hand.faithful)])
 
 
 @pytest.mark.parametrize("number", [math.nan, 1e308])
 def test_what_a_hand_cannot_send_is_sent(number: float) -> None:
-    for sample in sent(hand.filled(number), 3):
+    for sample in sent(drill.hand.filled(number), 3):
         assert np.array_equal(sample.pose[:3], [number] * 3, equal_nan=True)
 
 
-def outcome(**changed: object) -> Outcome:
+def outcome(**changed: object) -> drill.Outcome:
     """One that is as expected, of an arm that was stopped."""
     good: dict[str, Any] = {
-        "exercise": next(one for one in EXERCISES if one.name == "stop_topic"),
+        "exercise": next(one for one in drill.EXERCISES if one.name == "stop_topic"),
         "state": State.FAULT, "fault": Fault.STOP,
         "measures": {"travel_m": Measured("travel_m", "{0:.1f} mm, at most {1:.1f}", 1e-3, 2e-3)},
-        "recording": "intact", "recovered": 0.2, "cure": Cure.RESET, "detected": 1e-3,
+        "recording": "intact", "recovered": 0.2, "cure": drill.Cure.RESET, "detected": 1e-3,
     }  # fmt: skip
-    return Outcome(**(good | changed))
+    return drill.Outcome(**(good | changed))
 
 
 def test_an_outcome_as_expected_has_no_failures() -> None:
@@ -184,7 +179,7 @@ def test_an_outcome_as_expected_has_no_failures() -> None:
         ({"fault": Fault.SILENCE}, "silence"),
         ({"recording": "lost", "is_recorded": False}, "lost"),
         ({"recovered": math.nan}, "did not recover"),
-        ({"cure": Cure.NOTHING}, "by itself"),
+        ({"cure": drill.Cure.NOTHING}, "by itself"),
     ],
 )
 def test_whatever_is_not_as_expected_fails_and_says_what(
@@ -218,7 +213,7 @@ def test_what_is_not_recorded_fails_unless_the_fault_may_cost_it() -> None:
 
 
 def by_name(name: str) -> Exercise:
-    return next(one for one in EXERCISES if one.name == name)
+    return next(one for one in drill.EXERCISES if one.name == name)
 
 
 NUMBERS = Numbers.of(api.configuration("free_motion"))
@@ -227,11 +222,7 @@ BEGIN: Any = 1_500 * MS
 
 
 def seen(
-    joints: Array,
-    lies: float = 1.0,
-    told: Any = None,
-    warned: Any = None,
-    late: float = 0.0,
+    joints: Array, lies: float = 1.0, told: Any = None, warned: Any = None, late: float = 0.0
 ) -> Seen:
     """What a tap hears of an arm whose setpoint and measured joints are these, each millisecond."""
     joints = np.asarray(joints)
@@ -289,10 +280,10 @@ def test_an_arm_follows_where_its_joints_go_and_not_where_its_setpoints_alone_do
     rng = np.random.default_rng(3)
     still = wanted[:1] + 1e-6 * limit * rng.standard_normal(wanted.shape)
     late = wanted - 40 * (wanted[1] - wanted[0])
-    assert measure.follows(wanted, late, limit)
-    assert not measure.follows(wanted, still, limit)
-    assert not measure.follows(still[:1].repeat(60, axis=0), wanted, limit)
-    assert not measure.follows(wanted, wanted[:20], limit)
+    assert drill.measure.follows(wanted, late, limit)
+    assert not drill.measure.follows(wanted, still, limit)
+    assert not drill.measure.follows(still[:1].repeat(60, axis=0), wanted, limit)
+    assert not drill.measure.follows(wanted, wanted[:20], limit)
 
 
 def test_measured_joints_that_are_not_where_the_tip_is_are_found() -> None:
@@ -361,14 +352,14 @@ def test_a_fault_that_nobody_warns_of_is_found() -> None:
 
 @pytest.mark.parametrize("share", [1.0, 0.1])
 def test_the_deceleration_is_read_off_the_last_steps(share: float) -> None:
-    found = measure.ramp(trace(stopping(0.1, share)), NUMBERS.braking, DT)
+    found = drill.measure.ramp(trace(stopping(0.1, share)), NUMBERS.braking, DT)
     assert found == pytest.approx(share, rel=1e-6)
 
 
 def test_a_joint_that_creeps_after_its_reference_and_stops_at_once_is_no_ramp() -> None:
     creeping = np.cumsum(1e-4 * 0.99 ** np.arange(500))
     places = np.concatenate((creeping, np.full(100, creeping[-1])))[:, None]
-    assert math.isnan(measure.ramp(trace(places), np.array([50.0]), DT))
+    assert math.isnan(drill.measure.ramp(trace(places), np.array([50.0]), DT))
 
 
 @pytest.mark.parametrize("recorded", [[], [5, 6, 9], [5, 5, 6, 9, 9, 9]])
@@ -395,13 +386,13 @@ def test_messages_that_are_not_recorded_are_counted_one_by_one(
 
 def test_every_exercise_says_what_is_expected_and_has_a_name_of_its_own_in_each_way() -> None:
     for is_composed in (False, True):
-        names = [one.name for one in chosen((), is_composed=is_composed)]
+        names = [one.name for one in drill.chosen((), is_composed=is_composed)]
         assert len(names) == len(set(names))
         assert len(names) > 30
-    for one in EXERCISES:
+    for one in drill.EXERCISES:
         assert one.states
         assert one.cures
-        assert one.motion is Motion.RESTS or one.watch >= 0.0
+        assert one.motion is drill.Motion.RESTS or one.watch >= 0.0
 
 
 @pytest.mark.parametrize("mutant", MUTANTS, ids=lambda one: one.name)
@@ -409,7 +400,7 @@ def test_every_mutant_fits_the_source_and_names_rows_that_there_are(mutant: Muta
     assert changed(mutant)
     for is_composed in (False, True):
         rows = mutant.rows_of(is_composed=is_composed)
-        assert {one.name for one in chosen(rows, is_composed=is_composed)} >= set(rows)
+        assert {one.name for one in drill.chosen(rows, is_composed=is_composed)} >= set(rows)
 
 
 @pytest.mark.parametrize("mutant", CODE_MUTANTS, ids=lambda one: one.name)
@@ -420,12 +411,12 @@ def test_every_code_mutant_fits_the_source_and_names_files_of_tests(mutant: Muta
 
 
 def test_the_short_form_is_there_in_five_processes() -> None:
-    assert {one.name for one in chosen(SHORT, is_composed=False)} == set(SHORT)
+    assert {one.name for one in drill.chosen(drill.SHORT, is_composed=False)} == set(drill.SHORT)
 
 
 def test_a_fault_that_there_is_not_is_refused_with_those_that_there_are() -> None:
     with pytest.raises(UnknownNameError) as caught:
-        chosen(("kill_slave_simm",), is_composed=False)
+        drill.chosen(("kill_slave_simm",), is_composed=False)
     assert "kill_slave_sim" in str(caught.value)
 
 

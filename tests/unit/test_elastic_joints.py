@@ -94,12 +94,7 @@ def test_a_gear_that_swings_too_fast_for_the_ticks_is_refused() -> None:
 
 
 @kernel
-def drive_on(
-    p: SimulationNumbers,
-    s: SimulationState,
-    arm: Any,
-    efforts: Array,
-) -> None:
+def drive_on(p: SimulationNumbers, s: SimulationState, arm: Any, efforts: Array) -> None:
     """What drives give for rows of efforts (N, 6); written in their place."""
     for k in range(efforts.shape[0]):
         for i in range(6):

@@ -40,10 +40,7 @@ SIZES = {"sphere": (30, 30, 30), "box": (30, 10, 20)}
 
 
 def fixture_on(
-    described: dict[str, str] | None,
-    gain: float = 1.0,
-    size: Any = (0.03, 0.03, 0.03),
-    at: int = 0,
+    described: dict[str, str] | None, gain: float = 1.0, size: Any = (0.03, 0.03, 0.03), at: int = 0
 ) -> tuple[Topic, int, bytes]:
     """Report that a fixture is on around the slave at rest."""
     stamp_ns = START_NS + at * TICK_NS

@@ -410,10 +410,7 @@ def test_documentation_of_the_keys_is_a_table_with_all_of_them() -> None:
     assert {line.count("|") for line in lines} == {4}
 
 
-def leaves(
-    tree: Any,
-    before: str = "",
-) -> Iterator[str]:
+def leaves(tree: Any, before: str = "") -> Iterator[str]:
     for name, value in tree.items():
         if isinstance(value, dict):
             yield from leaves(value, f"{before}{name}.")

@@ -258,6 +258,10 @@ def test_roll_and_yaw_are_left_out_where_pitch_makes_them_meaningless() -> None:
     turned = Rotation.from_euler("ZYX", [[60, 89.6, 70], [11, 88.0, 20]], degrees=True)
     errors = pose_errors(poses(np.zeros((2, 3)), near), poses(np.zeros((2, 3)), turned))
     assert errors.is_degenerate.tolist() == [True, False]
+    off = Rotation.from_euler("ZYX", [[60, 88.0, 70], [11, 88.0, 20]], degrees=True)
+    for pair in ((near, off), (off, near)):  # one of the two is enough
+        mixed = pose_errors(*(poses(np.zeros((2, 3)), one) for one in pair))
+        assert mixed.is_degenerate.tolist() == [True, False]
     assert np.isnan(errors.roll_pitch_yaw_deg[0, ::2]).all()
     assert np.isclose(errors.roll_pitch_yaw_deg[0, 1], 0.0, atol=1e-6)
     assert errors.angle_deg[0] < 1.0  # the two turns nearly cancel

@@ -1,8 +1,11 @@
 """Outcomes of experiments: what counts as agreement, exact JSON, tables that say what they are."""
 
+import ast
+import inspect
 import json
 import math
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -11,6 +14,7 @@ from hypothesis import strategies as st
 
 from teleop_core.base.errors import ParameterError, UnknownNameError
 from teleop_core.evaluation.figure import Figure
+from teleop_lab import experiments
 from teleop_lab.experiments import (
     EXACT,
     Experiment,
@@ -107,6 +111,40 @@ def test_json_brings_back_the_same_bits(published: float, predicted: float) -> N
     assert back["predicted"] == predicted
     assert back["difference"] == predicted - published
     assert back["agrees"] == row.agrees
+
+
+def test_only_what_was_printed_counts_as_a_published_figure() -> None:
+    whole: dict[str, Any] = {"published": 1.0, "predicted": 1.0, "within": EXACT}
+    rows = [Row(quantity="q", basis=basis, **whole) for basis in ("printed", "law", "law", "goal")]
+    found = outcome(*rows, Row(quantity="q", basis="goal", **whole | {"predicted": 2.0}))
+    assert (found.agreeing, found.judged, found.count("goal")) == (1, 1, (1, 2))
+    told = "1 of 1 published figures agree; 2 of 2 laws hold; 1 of 2 goals are kept"
+    assert summary([found]) == f"{told}; 0 rows are not judged"
+    with pytest.raises(ParameterError, match="basis"):
+        Row(quantity="q", basis="guess", **whole)
+
+
+class Typed(ast.NodeVisitor):
+    """Lines of ``predicted=`` that hold typed numbers alone: literals, constants, conversions."""
+
+    def __init__(self, source: str) -> None:
+        self.lines: list[int] = []
+        self.visit(ast.parse(source))
+
+    def visit_keyword(self, node: ast.keyword) -> None:
+        names = {n.id for n in ast.walk(node.value) if isinstance(n, ast.Name)}
+        computed = {n for n in names if not n.lstrip("_").isupper() and n not in {"float", "len"}}
+        is_none = isinstance(node.value, ast.Constant) and node.value.value is None
+        if node.arg == "predicted" and not computed and not is_none:
+            self.lines.append(node.value.lineno)
+        self.generic_visit(node)
+
+
+def test_no_experiment_compares_two_typed_numbers() -> None:
+    for typed in ("36.0 - 6.0", "1e3 * MASSES['L2']", "float(_TIME_S)"):
+        assert Typed(f"Row(published=30.0, predicted={typed})").lines == [1]
+    for file in Path(inspect.getfile(experiments)).parent.glob("*.py"):
+        assert not Typed(file.read_text()).lines, file
 
 
 def test_outcome_counts_what_is_judged_and_what_agrees() -> None:

@@ -35,11 +35,7 @@ def saved(session: tc.Recording, tmp_path_factory: pytest.TempPathFactory) -> tc
     return session.save(tmp_path_factory.mktemp("bags") / "session")
 
 
-READERS = {
-    "a.csv": pd.read_csv,
-    "a.csv.gz": pd.read_csv,
-    "a.parquet": pd.read_parquet,
-}
+READERS = {"a.csv": pd.read_csv, "a.csv.gz": pd.read_csv, "a.parquet": pd.read_parquet}
 
 
 @pytest.mark.parametrize("name", READERS)
@@ -206,8 +202,9 @@ def test_a_data_set_has_the_newest_values_fifty_times_a_second(
     state = vectors(one["observation.state"])
     at = np.rint(np.array(one["timestamp"]) * 1000).astype(int)
     for topic, column, name in (
-        ("slave/measured_js", "theta1.position", "theta1"), ("slave/measured_cp", "z", "tip.z"),
-    ):  # fmt: skip
+        ("slave/measured_js", "theta1.position", "theta1"),
+        ("slave/measured_cp", "z", "tip.z"),
+    ):
         expected = saved[topic][column][at].astype(np.float32)
         assert np.array_equal(state[:, names.index(name)], expected)
     joints = info["features"]["action"]["names"]
@@ -296,8 +293,9 @@ def test_the_loader_of_lerobot_reads_the_same_numbers(
 ) -> None:
     """LEROBOT_PYTHON names a Python that has the lerobot package; else that of the tests."""
     python = os.environ.get("LEROBOT_PYTHON", sys.executable)
-    tried = subprocess.run([python, "-c", "import lerobot.datasets.lerobot_dataset"],
-                           capture_output=True, check=False)  # fmt: skip
+    tried = subprocess.run(
+        [python, "-c", "import lerobot.datasets.lerobot_dataset"], capture_output=True, check=False
+    )
     if tried.returncode:
         pytest.skip("the lerobot package is not installed")
     out = str(Path(data_set[0]))

@@ -20,11 +20,7 @@ ROUNDING = 1e-15
 
 
 def filtered(
-    values: Any,
-    start: float = 0.0,
-    gain: float = GAIN,
-    zero: float = ZERO,
-    pole: float = POLE,
+    values: Any, start: float = 0.0, gain: float = GAIN, zero: float = ZERO, pole: float = POLE
 ) -> Array:
     """Output of the filter that rests at ``start`` before the values come."""
     last_input, output, out = start, start, []
@@ -96,8 +92,7 @@ def test_output_never_leaves_the_range_of_its_inputs(values: list[float]) -> Non
 
 
 @pytest.mark.parametrize(
-    "values",
-    [{"gain": 0.2}, {"gain": 0.0}, {"pole": 20.0}, {"zero": 50.0}, {"zero": 0.0}],
+    "values", [{"gain": 0.2}, {"gain": 0.0}, {"pole": 20.0}, {"zero": 50.0}, {"zero": 0.0}]
 )
 def test_filter_that_would_not_come_to_rest_at_its_input_is_refused(
     values: dict[str, float],

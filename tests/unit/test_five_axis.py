@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from present import present
+from random_arms import table
 from teleop_core.kernels.geometry import Array, rotation, transform
 from teleop_core.robots import IkStatus, load_robot
-from teleop_core.robots.dh import DhTable, load_table, parse_table
+from teleop_core.robots.dh import DhTable, load_table
 from teleop_core.robots.five_axis import pitch_and_roll
+from ways import followed
 
 ARM = load_robot("five_axis")
 D1, A2, A3, D5 = ARM.geometry_row
@@ -20,21 +21,15 @@ DT = 1e-3
 
 def proximal_table(home_of_4: int) -> DhTable:
     """Table 3.4 of the thesis; its theta4 counted from a home position."""
-    return parse_table(
-        {
-            "name": "proximal",
-            "convention": "modified",
-            "angles": "degrees",
-            "rows": [
-                {"d": D1, "theta": "q"},
-                {"alpha": -90, "theta": "q"},
-                {"a": A2, "theta": "q"},
-                {"a": A3, "theta": f"q {home_of_4:+d}"},
-                {"alpha": -90, "theta": "q"},
-                {"d": D5},
-            ],
-        }
-    )
+    rows = [
+        {"d": D1, "theta": "q"},
+        {"alpha": -90, "theta": "q"},
+        {"a": A2, "theta": "q"},
+        {"a": A3, "theta": f"q {home_of_4:+d}"},
+        {"alpha": -90, "theta": "q"},
+        {"d": D5},
+    ]
+    return table(rows)
 
 
 def random_joints(count: int = 100, seed: int = 1) -> Array:
@@ -123,10 +118,7 @@ def test_lines_over_the_base_axis_keep_speeds_and_go_on(y: float) -> None:
     down = ARM.fk(ARM.home)[:3, :3]
     poses = np.array([transform(down, np.array([value, y, 0.3])) for value in x])
     seed = ARM.ik(poses[0]).q
-    result = ARM.follow(poses, seed, DT)
-    steps = np.abs(np.diff(np.vstack((seed, result.q)), axis=0))
-    assert (steps <= present(ARM.drives).speed_limit * DT * (1.0 + 1e-9)).all()
-    assert np.isfinite(result.residual).all()
+    followed(ARM, poses, seed)
 
 
 @pytest.mark.parametrize("reach", [1.001, 1.2])
@@ -138,7 +130,5 @@ def test_stretching_beyond_reach_and_back_ends_on_the_path(reach: float) -> None
     way = np.linspace(pose[:3, 3], far, 3000)
     points = np.concatenate((way, way[::-1], way[:1].repeat(1000, axis=0)))
     poses = np.array([transform(pose[:3, :3], p) for p in points])
-    result = ARM.follow(poses, q, DT)
-    steps = np.abs(np.diff(np.vstack((q, result.q)), axis=0))
-    assert (steps <= present(ARM.drives).speed_limit * DT * (1.0 + 1e-9)).all()
+    result = followed(ARM, poses, q)
     assert result.residual[-1].max() < 1e-9

@@ -129,11 +129,7 @@ def test_a_hand_in_a_mesh_of_a_box_is_held_and_scored_as_in_the_box_though_the_f
     ],
 )  # fmt: skip
 def test_what_cannot_hold_a_hand_is_refused_by_its_name(
-    kind: str,
-    values: Any,
-    name: str,
-    text: str,
-    folder: Path,
+    kind: str, values: Any, name: str, text: str, folder: Path
 ) -> None:
     if values.get("file") == "ball":
         values = values | {"file": str(folder / "ball.stl")}

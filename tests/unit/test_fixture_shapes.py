@@ -16,25 +16,14 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from any_fixture import (
-    BALL,
-    BEYOND,
-    KINDS,
-    THIN,
-    beyond_line,
-    beyond_path,
-    found,
-    pieces,
-    places,
-)
+from any_fixture import BALL, BEYOND, KINDS, THIN, beyond_line, beyond_path, found, pieces, places
 from teleop_core.base.errors import ParameterError
 from teleop_core.base.parameters import build
 from teleop_core.chain.fixtures import FIXTURES
 from teleop_core.chain.fixtures.cone import ConeParameters
 from teleop_core.chain.fixtures.cylinder import CylinderParameters
 from teleop_core.chain.fixtures.half_space import HalfSpaceParameters
-from teleop_core.chain.fixtures.keep_out_box import KeepOutBoxParameters
-from teleop_core.chain.fixtures.keep_out_sphere import KeepOutSphereParameters
+from teleop_core.chain.fixtures.keep_out import KeepOutBoxParameters, KeepOutSphereParameters
 from teleop_core.chain.fixtures.line import LineParameters
 from teleop_core.chain.fixtures.path import PathParameters, path_depth
 from teleop_core.chain.mapping.parameters import FixtureParameters

@@ -29,8 +29,9 @@ middles = st.tuples(*[st.floats(-0.02, 0.02)] * 3)
 
 def text_of(kind: str, parameters: object, at: list[float]) -> str:
     values = {**values_of(parameters), "at": at}
-    return " ".join([kind, *(f"{name}={list(v) if isinstance(v, tuple) else v}"
-                             for name, v in values.items())])  # fmt: skip
+    return " ".join(
+        [kind, *(f"{name}={list(v) if isinstance(v, tuple) else v}" for name, v in values.items())]
+    )
 
 
 @st.composite
@@ -180,7 +181,7 @@ def test_between_two_walls_where_nothing_is_allowed_the_deepest_pushes() -> None
         (("sphere", "box at=['a', 0, 0]"), TeleopError, r"parts\[1\] at"),
         (("sphere", "keep_out_sphere place=[0, 0, 0]"), ParameterError, "keep_out_sphere.place"),
     ],
-)  # fmt: skip
+)
 def test_a_part_that_is_wrong_is_refused_by_its_number(
     name: str, parts: tuple[str, ...], error: type[TeleopError], said: str
 ) -> None:

@@ -219,8 +219,9 @@ def test_legal_poses_are_found_and_all_branches_are_solutions(tmp_path: Path) ->
 def test_a_path_is_followed_by_an_arm_with_followers_in_a_session(tmp_path: Path) -> None:
     path, options = str(tmp_path / "arm.urdf"), ["tip=tip", "task=x y z"]
     Path(path).write_text(re.sub("<dynamics[^>]*/>", "", ARM))  # friction alone would be 1 mm
-    recording = tc.run("coarse_box", duration=3.0, robot=path, geometry=options,
-                       starts_at_home=False)  # fmt: skip
+    recording = tc.run(
+        "coarse_box", duration=3.0, robot=path, geometry=options, starts_at_home=False
+    )
     assert present(recording.score().value("position_error_mm.rms")) < 1.0
 
 

@@ -91,8 +91,9 @@ def test_a_constant_push_on_the_tip_is_estimated_within_four_per_cent(
 def test_a_push_is_told_through_a_low_pass_of_the_bandwidth_behind_that_of_the_speeds(
     hertz: float,
 ) -> None:
-    true, estimated = pressed("rcrt1", (0.3, 0.5, -0.8), "plant=fine_encoders",
-                              f"estimate_bandwidth={hertz}", seconds=0.1)  # fmt: skip
+    true, estimated = pressed(
+        "rcrt1", (0.3, 0.5, -0.8), "plant=fine_encoders", f"estimate_bandwidth={hertz}", seconds=0.1
+    )
     wanted, lagged = np.zeros_like(true), np.zeros(3)
     for k in range(1, len(true)):
         lagged = lagged + (true[k - 1] - lagged) * 1e-3 / (1e-3 + LAG)
@@ -100,9 +101,7 @@ def test_a_push_is_told_through_a_low_pass_of_the_bandwidth_behind_that_of_the_s
     assert np.abs(estimated - wanted).max() < 0.05 * np.abs(true - wanted).max()
 
 
-@given(
-    size=st.floats(0.05, 0.15), turns=st.lists(st.floats(0.3, 1.2), min_size=6, max_size=6)
-)  # fmt: skip
+@given(size=st.floats(0.05, 0.15), turns=st.lists(st.floats(0.3, 1.2), min_size=6, max_size=6))
 @settings(max_examples=6, deadline=None)
 def test_swinging_fast_in_free_air_is_no_push(size: float, turns: list[float]) -> None:
     stage = made("rcrt1", "plant=fine_encoders")
@@ -143,9 +142,7 @@ def test_brakes_that_stop_the_arm_are_no_push_and_nothing_of_before_is_left_afte
 ENTRIES = st.floats(-1.0, 1.0).map(lambda value: round(value, 3))
 
 
-@given(
-    n=st.integers(1, 9), data=st.data(), force=st.lists(ENTRIES, min_size=3, max_size=3)
-)  # fmt: skip
+@given(n=st.integers(1, 9), data=st.data(), force=st.lists(ENTRIES, min_size=3, max_size=3))
 @settings(max_examples=100, deadline=None)
 def test_the_force_is_the_damped_least_squares_of_the_efforts(
     n: int, data: st.DataObject, force: list[float]

@@ -146,8 +146,9 @@ def test_a_sensor_that_is_retuned_tells_the_new_numbers_from_the_next_tick_on() 
     assert measured[:, 0].std() == pytest.approx(0.01, rel=0.3)
 
 
-@pytest.mark.parametrize("text", ["force_noise=-0.1", "force_bias=[1.0]", "force_bandwidth=501.0",
-                                  "tool_mass=nan"])  # fmt: skip
+@pytest.mark.parametrize(
+    "text", ["force_noise=-0.1", "force_bias=[1.0]", "force_bandwidth=501.0", "tool_mass=nan"]
+)
 def test_a_sensor_that_cannot_be_is_refused_by_name(text: str) -> None:
     with pytest.raises(ParameterError) as caught:
         arm(text)

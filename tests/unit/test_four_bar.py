@@ -13,6 +13,7 @@ from teleop_core.kernels.geometry import Array, rotation, transform
 from teleop_core.robots import IkStatus, list_robots, load_robot
 from teleop_core.robots.four_bar import Assembly, FourBar
 from teleop_core.robots.four_bar_loop import Closure
+from ways import stepped
 
 # Cosines and sines of a few terms of length below 10: rounding stays far under this.
 CLOSED = 1e-12
@@ -170,28 +171,6 @@ def test_matrix_loop_closes_with_the_tool_block_as_the_pose_of_r_in_the_tool() -
             assert np.abs(inverted - along(LOOP.l0)).max() > 0.3
 
 
-@pytest.mark.parametrize("mode", [1.0, -1.0])
-def test_robot_draws_the_coupler_where_the_closure_says(mode: float) -> None:
-    robot = load_robot("four_bar", l0=4.0, l1=1.0, l2=3.5, l3=2.5, a=3.5, mode=mode)
-    for theta1 in np.linspace(-3.0, 3.0, 11):
-        phi1 = LOOP.close(theta1).phi1[0 if mode > 0 else 1]
-        tip = robot.fk([theta1])[:3, 3]
-        wanted = [4.0 + 2.5 * math.cos(phi1), 2.5 * math.sin(phi1), 0.0]
-        assert np.allclose(tip, wanted, atol=CLOSED)
-
-
-@pytest.mark.parametrize("name", ["four_bar", "parallelogram"])
-def test_jacobian_is_the_finite_difference(name: str) -> None:
-    robot, step = load_robot(name), 1e-6
-    for theta1 in np.linspace(-3.0, 3.0, 20):
-        ahead, behind = robot.fk([theta1 + step]), robot.fk([theta1 - step])
-        J = robot.jacobian([theta1])[:, 0]
-        # Central differences: error of third order in the step plus rounding over the step.
-        assert np.allclose(J[:3], (ahead - behind)[:3, 3] / (2 * step), atol=1e-8)
-        turn = (ahead[:3, :3] - behind[:3, :3]) @ robot.fk([theta1])[:3, :3].T / (2 * step)
-        assert math.isclose(J[5], turn[1, 0], abs_tol=1e-8)
-
-
 @pytest.mark.parametrize("geometry", [{}, {"mode": -1.0}, {"l0": 4, "l1": 3, "l2": 3, "l3": 2}])
 def test_inverse_finds_the_crank_of_every_reachable_point(geometry: dict[str, float]) -> None:
     robot = load_robot("four_bar", **geometry)
@@ -222,16 +201,8 @@ def test_a_point_off_the_curve_gets_the_nearest_one_and_is_unreachable() -> None
 def test_along_a_path_the_crank_turns_on_without_a_jump() -> None:
     robot = load_robot("four_bar")
     cranks = np.linspace(0.0, 2.0 * math.pi, 2000)
-    path = robot.fk(cranks[:, None])
-    limits = robot.limits()
-    limits[2] = 0.01
-    q = np.array([0.0])
-    for T, wanted in zip(path, cranks, strict=True):
-        found, residual = np.empty(1), np.empty(2)
-        robot.kernels.ik(T, q, limits, robot.geometry_row, found, residual)
-        assert abs(found[0] - q[0]) <= 0.01
-        assert abs(found[0] - wanted) < 1e-6
-        q = found
+    found, _ = stepped(robot, robot.fk(cranks[:, None]), np.array([0.0]), 0.01)
+    assert np.abs(found[:, 0] - cranks).max() < 1e-6
 
 
 def test_parallelogram_passes_its_change_points_without_turning_the_coupler() -> None:

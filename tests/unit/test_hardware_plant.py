@@ -7,13 +7,7 @@ import numpy as np
 import pytest
 
 from present import present
-from teleop_core.base.errors import (
-    ParameterError,
-    PartError,
-    ShapeError,
-    TeleopError,
-    UnknownNameError,
-)
+from teleop_core.base import errors
 from teleop_core.base.parameters import MARKS, NoParameters, build, parameter, specs
 from teleop_core.graph.signals import TICK_NS
 from teleop_core.robots import load_robot
@@ -32,9 +26,7 @@ TARGET = ARM.home + np.array([0.5, -0.4, -0.04, 0.6, 0.5, 0.4])
 
 
 def slave(
-    plant: str = "hardware",
-    controller: str = "source_pid",
-    **settings: Any,
+    plant: str = "hardware", controller: str = "source_pid", **settings: Any
 ) -> ArmParameters:
     given = {"plant.kind": plant, "controller.kind": controller}
     return build(ArmParameters, given | settings)
@@ -134,9 +126,10 @@ def test_every_fault_can_be_left_out_alone(fault: str) -> None:
     with_it = HARDWARE.physics(slave().plant.kind.parameters, ARM)
     without = HARDWARE.physics(kind.parameters, ARM)
     differ = {
-        name for name in vars(with_it)
+        name
+        for name in vars(with_it)
         if not np.array_equal(getattr(with_it, name), getattr(without, name))
-    }  # fmt: skip
+    }
     expected = {
         "friction": {"coulomb"}, "sticking": {"bristle"}, "wandering": {"wander"},
         "bias": {"bias"}, "weights": {"dynamics"}, "drive_steps": {"effort_step"},
@@ -185,7 +178,7 @@ def test_a_plant_of_ones_own_moves_the_slave() -> None:
     ],
 )
 def test_what_is_no_plant_is_refused_with_the_reason(plant: str | Plant, needed: str) -> None:
-    with pytest.raises(PartError, match=needed):
+    with pytest.raises(errors.PartError, match=needed):
         PLANTS.add("bad", plant)
     assert "bad" not in PLANTS.names()
 
@@ -202,26 +195,23 @@ def test_what_is_no_plant_is_refused_with_the_reason(plant: str | Plant, needed:
     ],
 )
 def test_wrong_numbers_of_a_plant_name_what_is_possible(setting: str, needed: str) -> None:
-    with pytest.raises((ParameterError, UnknownNameError), match=needed):
+    with pytest.raises((errors.ParameterError, errors.UnknownNameError), match=needed):
         SlaveSim(configure(None, settings=["plant=hardware", setting]).group("slave_sim"))
 
 
 @pytest.mark.parametrize(
     ("changed", "kind"),
     [
-        ({"coulomb": [-1.0, 0.0]}, ParameterError),
-        ({"play": [0.0]}, ShapeError),
-        ({"coupling": np.zeros((3, 3))}, ShapeError),
-        ({"coupling": np.ones((2, 2))}, ParameterError),
-        ({"links": LinkErrors.none(3)}, ShapeError),
-        ({"sources": {"mass": "published: x"}}, UnknownNameError),
-        ({"sources": {"play": "somewhere"}}, ParameterError),
+        ({"coulomb": [-1.0, 0.0]}, errors.ParameterError),
+        ({"play": [0.0]}, errors.ShapeError),
+        ({"coupling": np.zeros((3, 3))}, errors.ShapeError),
+        ({"coupling": np.ones((2, 2))}, errors.ParameterError),
+        ({"links": LinkErrors.none(3)}, errors.ShapeError),
+        ({"sources": {"mass": "published: x"}}, errors.UnknownNameError),
+        ({"sources": {"play": "somewhere"}}, errors.ParameterError),
     ],
 )
-def test_impossible_hardware_is_refused(
-    changed: Any,
-    kind: type[TeleopError],
-) -> None:
+def test_impossible_hardware_is_refused(changed: Any, kind: type[errors.TeleopError]) -> None:
     zero = np.zeros(2)
     given = {"coulomb": zero, "bias": zero, "wander": zero, "play": zero,
              "coupling": np.zeros((2, 2))}  # fmt: skip
@@ -230,5 +220,5 @@ def test_impossible_hardware_is_refused(
 
 
 def test_a_source_without_a_mark_is_refused() -> None:
-    with pytest.raises(ParameterError, match="published"):
+    with pytest.raises(errors.ParameterError, match="published"):
         parameter(1.0, doc="", source="my own measurement")

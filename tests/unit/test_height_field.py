@@ -82,8 +82,7 @@ def near_surface(
 
 
 @pytest.mark.parametrize(
-    ("name", "distance", "angle"),
-    [("flat", 6e-6, 0.1), ("tilted", 6e-6, 0.2), ("ball", 6e-6, 0.1)],
+    ("name", "distance", "angle"), [("flat", 6e-6, 0.1), ("tilted", 6e-6, 0.2), ("ball", 6e-6, 0.1)]
 )
 def test_a_field_has_distance_and_normal_of_its_plane_or_sphere_within_the_bounds(
     name: str, distance: float, angle: float, folder: Path

@@ -60,8 +60,9 @@ def test_a_library_of_others_finds_the_same_distance_and_the_same_way_out(name: 
     ball, still = coal.Sphere(1e-9), coal.Transform3s()
     R = to_axis(parameters.axis)
     sides = set()
-    for place in np.random.default_rng(2).uniform((-0.03, -0.03, -0.03), (0.03, 0.03, 0.01),
-                                                  (300, 3)):  # fmt: skip
+    for place in np.random.default_rng(2).uniform(
+        (-0.03, -0.03, -0.03), (0.03, 0.03, 0.01), (300, 3)
+    ):
         found = HOLE.distance(R @ place, numbers, normal)
         there, result = coal.Transform3s(np.eye(3), place), coal.DistanceResult()
         coal.distance(surface, still, ball, there, coal.DistanceRequest(True, True), result)

@@ -189,9 +189,10 @@ def test_a_session_whose_slave_does_not_yield_sends_no_force_there() -> None:
     assert feeds["slave/servo_cp"].topic.name == "network/servo_cp"
     assert feeds["slave/measured_cf"].topic.name == "slave/measured_cf"  # its own, not late
     (into,) = (
-        link for link in with_it.links
+        link
+        for link in with_it.links
         if link.reader.name == "passivity" and link.port.name == "slave/servo_cp"
-    )  # fmt: skip
+    )
     assert into.topic.name == "impedance/servo_cp"  # passivity counts how it yields
 
 

@@ -227,6 +227,16 @@ def test_slave_that_stands_still_is_where_solutions_start_again() -> None:
     assert (np.abs(joints - held) <= STEP + STEP_ROUNDING).all()
 
 
+def test_commands_slower_than_the_timeout_go_on_from_each_other_for_twice_their_period() -> None:
+    stage, goal = Stage(), ARM.fk(START + np.array([0.6, 0, 0, 0, 0, 0]))
+    stage.settle(ARM.fk(START))
+    slow: Any = {"gap_ns": 150_000_000, "does_follow": False}
+    answers = [stage.step(goal, **slow)[0] for _ in range(4)]
+    one, held = SPEED[0] * 0.15, START[0]
+    # The fourth is asked for when the setpoint is three periods older than the command before.
+    assert answers == pytest.approx([held + one, held + 0.6, held + 0.6, held + one])
+
+
 def test_restart_beside_the_flipped_branch_stays_on_it() -> None:
     flipped = START + np.array([0, 0, 0, 0, -0.5, 0])
     stage = Stage()

@@ -13,13 +13,8 @@ import teleop_core as tc
 from present import present
 from teleop_core.base.errors import ParameterError
 from teleop_core.chain.mapping.jaw_command import JAW_COMMAND, JawCommandParameters
+from teleop_core.graph import topics
 from teleop_core.graph.signals import TICK_NS
-from teleop_core.graph.topics import (
-    NO_COMMAND_NS,
-    OPERATION,
-    SLAVE_JAW_BOARD,
-    SLAVE_JAW_GRIP,
-)
 from teleop_core.kernels.geometry import Array
 from teleop_core.slave.jaw.grip import WEIGHT
 from teleop_core.slave.jaw.jaw import Jaw, JawParameters
@@ -31,21 +26,17 @@ from teleop_core.slave.jaw.jaw_sim import (
 )
 from teleop_core.slave.operation import State
 
-ENABLED, STATE = float(State.ENABLED), OPERATION.index("state")
+ENABLED, STATE = float(State.ENABLED), topics.OPERATION.index("state")
 PLACE = np.array([0.2, -0.1, 0.05])
 OPEN, CLOSED = 0.8, 0.0
-FORCE, IS_GRIPPED, SLID, GRIPS, SLIPS, DROPS = range(len(SLAVE_JAW_GRIP.columns))
+FORCE, IS_GRIPPED, SLID, GRIPS, SLIPS, DROPS = range(len(topics.SLAVE_JAW_GRIP.columns))
 
 
 class Bench:
     """An open jaw, its drive, and a hand that leads it; the tip is led by hand too."""
 
     def __init__(
-        self,
-        *,
-        jaw: Mapping[str, Any] | None = None,
-        places: Array = PLACE,
-        **thing: float,
+        self, *, jaw: Mapping[str, Any] | None = None, places: Array = PLACE, **thing: float
     ) -> None:
         self.given = JawSimParameters(
             **(jaw or {}), object=GripObjectParameters(place=tuple(np.ravel(places)), **thing)
@@ -92,7 +83,7 @@ class Bench:
 
     @property
     def board(self) -> dict[str, float]:
-        return dict(zip(SLAVE_JAW_BOARD.columns, self.told["slave_jaw_board"], strict=True))
+        return dict(zip(topics.SLAVE_JAW_BOARD.columns, self.told["slave_jaw_board"], strict=True))
 
     @property
     def middles(self) -> Array:
@@ -299,7 +290,7 @@ def test_a_jaw_that_is_closed_at_first_stays_so_until_the_hand_has_closed(angle:
         found.append((row["slave_jaw_setpoint_js"][0], int(row["slave_jaw_setpoint_js_ns"])))
     before, (opened, _) = found[198], found[-1]
     assert before[0] == min(angle, OPEN)
-    assert (before[1] == NO_COMMAND_NS) is (angle < OPEN)
+    assert (before[1] == topics.NO_COMMAND_NS) is (angle < OPEN)
     assert opened == OPEN
 
 
@@ -383,8 +374,9 @@ def test_an_object_that_slides_out_above_the_table_has_dropped_and_lies_there() 
     bench = Bench()
     bench.run(CLOSED, 600)
     bench.carry(CLOSED, lift(0.05))
-    bench.carry(CLOSED, bench.tip[:3] + 400.0 * 0.5 * (1e-3 * np.arange(20)[:, None]) ** 2
-                * [1.0, 0.0, 0.0])  # fmt: skip
+    bench.carry(
+        CLOSED, bench.tip[:3] + 400.0 * 0.5 * (1e-3 * np.arange(20)[:, None]) ** 2 * [1.0, 0.0, 0.0]
+    )
     bench.run(CLOSED, 500)
     assert (bench.grip[[IS_GRIPPED, GRIPS, SLIPS, DROPS]] == (0, 1, 1, 1)).all()
     assert bench.object[2] == PLACE[2]

@@ -83,7 +83,7 @@ def test_plain_shapes_are_drawn_too_and_a_length_in_millimetres_is_read_as_such(
     unit = '<unit name="millimeter" meter="0.001"/>'
     meshes = path.parents[1] / "meshes"
     (meshes / "part.dae").write_text(part.replace("<up_axis>", f"{unit}<up_axis>"))
-    (vertices, _), = looks_of(load_robot(str(path), tip="tool0")).values()  # fmt: skip
+    ((vertices, _),) = looks_of(load_robot(str(path), tip="tool0")).values()
     np.testing.assert_allclose(vertices.max(axis=0), [0.13, 0.12, 0.11], atol=1e-6)
     np.testing.assert_allclose(vertices.min(axis=0), [-0.04] * 3, atol=1e-6)
 

@@ -11,14 +11,7 @@ from hypothesis import strategies as st
 
 import teleop_core as tc
 from teleop_core.bags import ros_types
-from teleop_core.bags.messages import (
-    Refusal,
-    check,
-    layout,
-    read_any,
-    read_numbers,
-    report,
-)
+from teleop_core.bags.messages import Refusal, check, layout, read_any, read_numbers, report
 from teleop_core.bags.reader import Bag
 from teleop_core.bags.writer import BagWriter
 from teleop_core.base.errors import RecordingError

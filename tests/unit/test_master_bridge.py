@@ -15,12 +15,8 @@ from present import present
 from teleop_core.base.errors import ParameterError
 from teleop_core.base.parameters import build
 from teleop_core.chain.mapping.parameters import AXES
+from teleop_core.chain.master import master_bridge
 from teleop_core.chain.master.device_axes import UNITS, axis_of, device_axes
-from teleop_core.chain.master.master_bridge import (
-    POSE_MESSAGES,
-    MasterBridge,
-    MasterBridgeParameters,
-)
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot
 
@@ -49,8 +45,8 @@ def rows(axes: tuple[str, str, str]) -> Any:
 FRAMES = list(frames())
 
 
-def bridge(**values: Any) -> MasterBridge:
-    return MasterBridge(MasterBridgeParameters(**values))
+def bridge(**values: Any) -> master_bridge.MasterBridge:
+    return master_bridge.MasterBridge(master_bridge.MasterBridgeParameters(**values))
 
 
 def pose(place: Any = (0.0, 0.0, 0.0), turn: Rotation | None = None) -> Array:
@@ -58,7 +54,7 @@ def pose(place: Any = (0.0, 0.0, 0.0), turn: Rotation | None = None) -> Array:
     return np.array([*place, *turn.as_quat(scalar_first=True)])
 
 
-def said(stage: MasterBridge) -> tuple[Array, Rotation]:
+def said(stage: master_bridge.MasterBridge) -> tuple[Array, Rotation]:
     found = np.array(stage.signals["master_measured_cp"])
     return found[:3], Rotation.from_quat(found[3:], scalar_first=True)
 
@@ -151,7 +147,7 @@ def test_buttons_are_taken_from_where_they_are_and_missing_ones_are_released() -
 def test_a_jointed_device_is_where_the_forward_kinematics_of_its_robot_says() -> None:
     robot = load_robot("scara")
     stage = bridge(
-        pose_message=POSE_MESSAGES[-1], handle="scara", device_axes=TURNED,
+        pose_message=master_bridge.POSE_MESSAGES[-1], handle="scara", device_axes=TURNED,
         handle_joints=[f"{robot.joint_names[0]}=turn"], handle_signs=[-1.0] + [1.0] * 3,
     )  # fmt: skip
     names = ["turn", *robot.joint_names[1:], "gripper"]
@@ -171,13 +167,13 @@ def test_a_jointed_device_is_where_the_forward_kinematics_of_its_robot_says() ->
     [
         ({"device_axes": ("+x", "+y", "-z")}, "device_axes"),
         ({"stylus_axes": ("+x", "+x", "+z")}, "stylus_axes"),
-        ({"pose_message": POSE_MESSAGES[-1]}, "handle"),
+        ({"pose_message": master_bridge.POSE_MESSAGES[-1]}, "handle"),
         ({"handle": "scara"}, "handle"),
     ],
 )
 def test_what_no_device_can_be_is_refused_by_its_name(values: Mapping[str, Any], name: str) -> None:
     with pytest.raises(ParameterError) as caught:
-        MasterBridgeParameters(**values)
+        master_bridge.MasterBridgeParameters(**values)
     assert caught.value.name == f"master_bridge.{name}"
 
 
@@ -185,9 +181,7 @@ def test_what_no_device_can_be_is_refused_by_its_name(values: Mapping[str, Any],
 
 
 @pytest.mark.parametrize("axes", FRAMES, ids="".join)
-def test_axes_and_unit_come_out_of_three_motions_that_are_not_quite_straight(
-    axes: Any,
-) -> None:
+def test_axes_and_unit_come_out_of_three_motions_that_are_not_quite_straight(axes: Any) -> None:
     rng = np.random.default_rng(len(axes))
     for unit in UNITS:
         ways = (
@@ -214,7 +208,7 @@ def test_two_motions_along_one_axis_and_left_handed_frames_are_refused() -> None
 @pytest.mark.parametrize("file", MASTERS, ids=lambda path: path.stem)
 def test_the_configuration_of_each_device_has_parameters_that_exist(file: Path) -> None:
     groups = {k: v["ros__parameters"] for k, v in yaml.safe_load(file.read_text()).items()}
-    made = build(MasterBridgeParameters, groups["master_bridge"])
+    made = build(master_bridge.MasterBridgeParameters, groups["master_bridge"])
     assert made.pose_topic
 
 
@@ -234,7 +228,7 @@ def test_rates_of_a_joy_move_the_stylus_in_the_axes_of_the_master(
 ) -> None:
     (file,) = (path for path in MASTERS if path.stem == name)
     given = yaml.safe_load(file.read_text())["master_bridge"]["ros__parameters"]
-    stage = MasterBridge(build(MasterBridgeParameters, given))
+    stage = master_bridge.MasterBridge(build(master_bridge.MasterBridgeParameters, given))
     axes, held = [*axes, *[0.0] * (8 - len(axes))], [0, 0, 0, 0, 1]
 
     def after(seconds: float, buttons: list[int], start_ns: int) -> int:

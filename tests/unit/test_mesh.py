@@ -41,11 +41,7 @@ class Bounds(NamedTuple):
     normal: float  # [degrees]
 
 
-BOUNDS = {
-    "sphere": Bounds(25e-6, 0.3),
-    "box": Bounds(3e-6, 0.1),
-    "capsule": Bounds(30e-6, 1.0),
-}
+BOUNDS = {"sphere": Bounds(25e-6, 0.3), "box": Bounds(3e-6, 0.1), "capsule": Bounds(30e-6, 1.0)}
 AWAY = 6e-3  # from the edges of the box, and from its ridges within [m]
 
 
@@ -222,11 +218,7 @@ def turned() -> Trimesh:
 @pytest.mark.parametrize(
     ("make", "name", "requirement"),
     [
-        (
-            lambda: without(solid("box"), 0),
-            "world.mesh.file",
-            "it has a hole at the edge",
-        ),
+        (lambda: without(solid("box"), 0), "world.mesh.file", "it has a hole at the edge"),
         (turned, "world.mesh.file", "two triangles look to opposite sides"),
         (flat, "world.mesh.file", "encloses a volume"),
     ],

@@ -7,18 +7,7 @@ import numpy as np
 import pytest
 
 from teleop_core.base.errors import ParameterError
-from teleop_core.robots.mma_balance import (
-    ARM_AT_45_DEGREES,
-    ARM_LEVEL,
-    MASSES,
-    ShoulderSpring,
-    cam_profile,
-    cam_pulley_radius,
-    coil,
-    gravity_torque,
-    matching_rate,
-    shoulder_load,
-)
+from teleop_core.robots import mma_balance
 
 # Half of the last digit that the source prints.
 TENTH_OF_MILLINEWTON_METRE, TENTH_OF_MICROMETRE = 0.5e-4, 0.5e-7
@@ -26,7 +15,7 @@ AT_45_DEGREES, LEVEL = math.radians(135.0), math.radians(90.0)
 
 
 def total() -> float:
-    return sum(MASSES.values())
+    return sum(mma_balance.MASSES.values())
 
 
 def test_masses_add_up_to_less_than_the_printed_total() -> None:  # H14
@@ -36,13 +25,16 @@ def test_masses_add_up_to_less_than_the_printed_total() -> None:  # H14
 
 def test_gravity_torques_of_both_poses_are_the_published_ones() -> None:  # H15
     # 1.03497 is printed cut, 1.0349.
-    first, second = gravity_torque(total(), ARM_AT_45_DEGREES), gravity_torque(total(), ARM_LEVEL)
+    first, second = (
+        mma_balance.gravity_torque(total(), mma_balance.ARM_AT_45_DEGREES),
+        mma_balance.gravity_torque(total(), mma_balance.ARM_LEVEL),
+    )
     assert math.isclose(first, 1.03497, abs_tol=1e-5)
     assert math.isclose(second, 1.1926, abs_tol=TENTH_OF_MILLINEWTON_METRE)
 
 
 def test_spring_triangle_is_the_published_one() -> None:  # H16
-    spring = ShoulderSpring()
+    spring = mma_balance.ShoulderSpring()
     for value, printed in (
         (spring.length(AT_45_DEGREES), 51.7373e-3),
         (spring.lever(AT_45_DEGREES), 10.7151e-3),
@@ -55,23 +47,27 @@ def test_spring_triangle_is_the_published_one() -> None:  # H16
 
 
 def test_rate_from_the_printed_rounded_inputs_is_the_printed_one() -> None:  # H17
-    rate = matching_rate(0.1577, 12.1392e-3, 19.7989e-3)
+    rate = mma_balance.matching_rate(0.1577, 12.1392e-3, 19.7989e-3)
     # Seven digits printed from inputs of four to six; 0.01 N/m covers their rounding.
     assert math.isclose(rate, 656.146, abs_tol=0.01)
     assert math.isclose(1.15 * rate, 754.57, abs_tol=0.01)
 
 
 def test_rate_from_unrounded_inputs() -> None:  # H17
-    spring = ShoulderSpring()
-    difference = gravity_torque(total(), ARM_LEVEL) - gravity_torque(total(), ARM_AT_45_DEGREES)
+    spring = mma_balance.ShoulderSpring()
+    difference = mma_balance.gravity_torque(
+        total(), mma_balance.ARM_LEVEL
+    ) - mma_balance.gravity_torque(total(), mma_balance.ARM_AT_45_DEGREES)
     deflection = spring.length(AT_45_DEGREES) - spring.length(LEVEL)
-    rate = matching_rate(float(difference), float(deflection), float(spring.lever(LEVEL)))
+    rate = mma_balance.matching_rate(
+        float(difference), float(deflection), float(spring.lever(LEVEL))
+    )
     assert math.isclose(rate, 655.95, abs_tol=0.005)
     assert math.isclose(1.15 * rate, 754.34, abs_tol=0.005)
 
 
 def test_coil_has_the_published_dimensions() -> None:  # H18
-    wound = coil()
+    wound = mma_balance.coil()
     assert wound.turns == 13
     # The source cuts 3.695 to 3.69.
     assert math.isclose(wound.slenderness, 3.69, abs_tol=0.0051)
@@ -83,12 +79,12 @@ def test_coil_has_the_published_dimensions() -> None:  # H18
 @pytest.mark.parametrize(("modulus", "turns"), [(40.9e9, 13), (44.2e9, 13), (79.3e9, 24)])
 def test_thirteen_turns_ask_for_a_soft_wire(modulus: float, turns: int) -> None:
     # 40.9 and 44.2 GPa are the rounded edges of 12.5 and 13.5 turns.
-    assert abs(coil(shear_modulus=modulus).turns - turns) <= (0 if turns == 24 else 1)
-    assert coil(shear_modulus=42.5e9).turns == 13
+    assert abs(mma_balance.coil(shear_modulus=modulus).turns - turns) <= (0 if turns == 24 else 1)
+    assert mma_balance.coil(shear_modulus=42.5e9).turns == 13
 
 
 def test_published_spring_leaves_most_of_the_load_in_both_poses() -> None:
-    load = shoulder_load(np.radians([-45.0, 0.0]))
+    load = mma_balance.shoulder_load(np.radians([-45.0, 0.0]))
     assert np.allclose(load.gravity, [1.03497, 1.1926], rtol=0, atol=TENTH_OF_MILLINEWTON_METRE)
     # 0.181 and 1.011 N·m in the notes to the source; its free length is cut to 51.73 mm.
     assert np.allclose(load.spring, [0.0, 0.181], rtol=0, atol=5e-4)
@@ -96,55 +92,28 @@ def test_published_spring_leaves_most_of_the_load_in_both_poses() -> None:
 
 
 def test_spring_that_balances_the_worst_pose_is_far_stiffer() -> None:
-    rate = matching_rate(1.1926, 12.1392e-3, 19.7989e-3)
+    rate = mma_balance.matching_rate(1.1926, 12.1392e-3, 19.7989e-3)
     assert math.isclose(rate, 4962.0, abs_tol=0.5)
-    spring = ShoulderSpring(rate=rate, free_length=51.7373e-3)
-    assert abs(shoulder_load(0.0, spring).residual) < 1e-4
+    spring = mma_balance.ShoulderSpring(rate=rate, free_length=51.7373e-3)
+    assert abs(mma_balance.shoulder_load(0.0, spring).residual) < 1e-4
 
 
 def test_spring_never_pulls() -> None:
     openings = np.linspace(0.0, math.pi, 50)
-    torques = ShoulderSpring().torque(openings)
+    torques = mma_balance.ShoulderSpring().torque(openings)
     assert (torques >= 0.0).all()
     # Beyond 135° the anchors are further apart than the spring is long.
     assert (torques[openings > AT_45_DEGREES + 1e-3] == 0.0).all()
 
 
-@pytest.mark.parametrize(("moment", "rate"), [(0.3, 100.0), (1.2, 656.0), (5.0, 20.0)])
-def test_cam_pulley_balances_the_link_everywhere(moment: float, rate: float) -> None:  # H19
-    theta = np.linspace(0.05, math.pi - 0.05, 50)
-    radius = cam_pulley_radius(theta, moment, rate)
-    slope = 0.5 * math.sqrt(moment / rate) * np.cos(0.5 * theta)
-    gap = rate * radius**3 - moment * np.sin(theta) * slope + moment * radius * np.cos(theta)
-    # Relative to the largest term.
-    assert np.abs(gap).max() < 1e-14 * moment * radius.max() * 10.0
-    tension = 2.0 * math.sqrt(rate * moment) * np.cos(0.5 * theta)
-    assert np.allclose(tension * radius, moment * np.sin(theta), rtol=1e-12)
-
-
-def test_cam_profile_is_the_envelope_of_the_cable() -> None:  # H19
-    theta = np.linspace(0.05, math.pi - 0.05, 50)
-    distance, angle = cam_profile(theta, 1.2, 656.0)
-    radius, step = cam_pulley_radius(theta, 1.2, 656.0), 1e-6
-    ahead, behind = (cam_pulley_radius(theta + h, 1.2, 656.0) for h in (step, -step))
-    slope = (ahead - behind) / (2.0 * step)
-    assert np.allclose(distance, np.hypot(radius, slope), rtol=1e-8)
-    assert np.allclose(np.tan(angle), slope / radius, rtol=1e-6)
-    closed = np.sqrt(1.2 / 656.0 * (0.25 * np.cos(theta / 2) ** 2 + np.sin(theta / 2) ** 2))
-    assert np.allclose(distance, closed, rtol=1e-12)
-    assert np.allclose(angle, np.arctan(0.5 / np.tan(theta / 2)), rtol=1e-12)
-
-
 @pytest.mark.parametrize(
     ("call", "name"),
     [
-        (lambda: ShoulderSpring(rate=0.0), "rate"),
-        (lambda: ShoulderSpring(anchor=math.nan), "anchor"),
-        (lambda: matching_rate(0.1, 0.0, 0.02), "deflection"),
-        (lambda: coil(wire=-1.0), "wire"),
-        (lambda: coil(rate=1e6), "rate"),
-        (lambda: cam_pulley_radius(1.0, -1.0, 10.0), "weight_moment"),
-        (lambda: cam_profile(1.0, 1.0, 0.0), "rate"),
+        (lambda: mma_balance.ShoulderSpring(rate=0.0), "rate"),
+        (lambda: mma_balance.ShoulderSpring(anchor=math.nan), "anchor"),
+        (lambda: mma_balance.matching_rate(0.1, 0.0, 0.02), "deflection"),
+        (lambda: mma_balance.coil(wire=-1.0), "wire"),
+        (lambda: mma_balance.coil(rate=1e6), "rate"),
     ],
 )
 def test_impossible_springs_are_refused(call: Callable[..., object], name: str) -> None:

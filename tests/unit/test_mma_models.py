@@ -12,16 +12,8 @@ from pinocchio import Model
 
 from teleop_core.base.errors import ParameterError, ShapeError, UnknownNameError
 from teleop_core.kernels.geometry import Array, rotation
-from teleop_core.robots import load_robot
+from teleop_core.robots import load_robot, mma_models
 from teleop_core.robots.dh import DhRow
-from teleop_core.robots.mma_models import (
-    frames,
-    joints_of_model,
-    loop_closure,
-    model_table,
-    passive_angles,
-    readings_of_serial,
-)
 from teleop_core.robots.robot import Robot
 
 MM = 1e-3
@@ -49,7 +41,7 @@ def mma() -> Robot:
 
 
 def serial_frames(mma: Robot, serial: Sequence[float] | Array) -> dict[str, Array]:
-    return frames(model_table("B", mma.geometry), serial)
+    return mma_models.frames(mma_models.model_table("B", mma.geometry), serial)
 
 
 def random_readings(count: int, seed: int = 0) -> Array:
@@ -57,8 +49,8 @@ def random_readings(count: int, seed: int = 0) -> Array:
 
 
 def tool_of_model(mma: Robot, q: Array, model: str) -> Array:
-    table = model_table(model, mma.geometry)
-    return list(frames(table, joints_of_model(q, model)).values())[-1]
+    table = mma_models.model_table(model, mma.geometry)
+    return list(mma_models.frames(table, mma_models.joints_of_model(q, model)).values())[-1]
 
 
 @pytest.mark.parametrize("name", TABLE_4_7)
@@ -80,7 +72,7 @@ def test_dummy_frames_at_home_agree_with_the_printed_table(mma: Robot, name: str
 
 def test_conventional_table_at_home_gives_its_published_pose(mma: Robot) -> None:  # H3
     home = np.radians([0.0, -90.0, 90.0, 0.0, 0.0, -90.0, 90.0])
-    chain = frames(model_table("A", mma.geometry), home)
+    chain = mma_models.frames(mma_models.model_table("A", mma.geometry), home)
     assert np.abs(chain["8"][:3, 3] - np.array([122.36, -35.07, 456.84]) * MM).max() < PLACE
     assert np.abs(chain["8"][:3, :3] - [[0, 1, 0], [-1, 0, 0], [0, 0, 1]]).max() < TURN
     assert np.abs(chain["4"][:3, 3] - np.array([160.76, 0.0, 325.23]) * MM).max() < PLACE
@@ -105,7 +97,7 @@ def test_hybrid_at_home_gives_the_published_pose_and_passive_angles(mma: Robot) 
     pose = mma.fk(mma.home)
     assert np.abs(pose[:3, 3] - np.array([3.63, -71.27, 482.08]) * MM).max() < PLACE
     assert np.abs(pose[:3, :3] - np.diag([-1.0, -1.0, 1.0])).max() < TURN
-    assert np.allclose(np.degrees(passive_angles(mma.home)), [90.0, 90.0], atol=1e-9)
+    assert np.allclose(np.degrees(mma_models.passive_angles(mma.home)), [90.0, 90.0], atol=1e-9)
 
 
 def test_prototype_was_measured_within_three_millimetres_per_axis(mma: Robot) -> None:  # H6
@@ -117,8 +109,8 @@ def test_prototype_was_measured_within_three_millimetres_per_axis(mma: Robot) ->
 
 def test_both_ways_round_the_parallelogram_meet(mma: Robot) -> None:  # H7
     q = np.radians([20.0, -80.0, -15.0, 75.0, 0.0, 0.0, 0.0])
-    assert np.allclose(np.degrees(passive_angles(q)), [90.0, 90.0], atol=1e-9)
-    loop = loop_closure(q, mma.geometry)
+    assert np.allclose(np.degrees(mma_models.passive_angles(q)), [90.0, 90.0], atol=1e-9)
+    loop = mma_models.loop_closure(q, mma.geometry)
     # Printed to 0.1 µm.
     meeting = np.array([181.0791, 65.9074, 336.3932]) * MM
     assert np.abs(loop.along_link_3 - meeting).max() < 1e-7
@@ -129,9 +121,11 @@ def test_both_ways_round_the_parallelogram_meet(mma: Robot) -> None:  # H7
 
 def test_loop_closes_for_every_reading_and_any_split_of_the_short_side(mma: Robot) -> None:
     for q, side in zip(random_readings(100), np.linspace(0.005, 0.06, 100), strict=True):
-        loop = loop_closure(q, mma.geometry, side)
+        loop = mma_models.loop_closure(q, mma.geometry, side)
         assert np.abs(loop.along_link_3 - loop.along_link_3a).max() < EXACT
-        table = frames(model_table("C", mma.geometry, side), joints_of_model(q, "C"))
+        table = mma_models.frames(
+            mma_models.model_table("C", mma.geometry, side), mma_models.joints_of_model(q, "C")
+        )
         assert np.abs(table["4'"][:3, 3] - loop.frame_4).max() < EXACT
         assert np.abs(table["12"] - mma.fk(q)).max() < EXACT
 
@@ -143,19 +137,13 @@ def test_closed_form_is_the_product_of_both_tables_for_random_readings(mma: Robo
         assert np.abs(pose - tool_of_model(mma, q, "B")).max() < EXACT
 
 
-def test_readings_and_serial_joints_are_inverse_maps() -> None:
-    for q in random_readings(20):
-        assert np.allclose(readings_of_serial(joints_of_model(q, "B")), q, rtol=0, atol=1e-14)
-
-
 @pytest.mark.parametrize(
     ("serial", "shared", "place", "quaternion"),
     [
-        ((30, -90, 90, 0, 90, 0, 0), (0, 90), (38.7787, -59.9066, 482.08),
-         (0, 0, 0.9659, -0.2588)),
+        ((30, -90, 90, 0, 90, 0, 0), (0, 90), (38.7787, -59.9066, 482.08), (0, 0, 0.9659, -0.2588)),
         ((0, -60, 70, -10, 90, 0, 0), (-30, 70), (94.9177, -71.27, 429.0494), (0, 0, 1, 0)),
     ],
-)  # fmt: skip
+)
 def test_further_points_of_the_specification(
     mma: Robot,
     serial: tuple[int, ...],
@@ -173,9 +161,11 @@ def test_further_points_of_the_specification(
 
 
 def test_printed_last_row_of_the_dummy_table_is_not_reproduced(mma: Robot) -> None:  # H20
-    table = model_table("B", mma.geometry)
+    table = mma_models.model_table("B", mma.geometry)
     last = DhRow(constants={**table.rows[-1].constants, "alpha": 0.5 * math.pi})
-    wrong = frames(replace(table, rows=(*table.rows[:-1], last)), SERIAL_HOME)["12"][:3, 3]
+    wrong = mma_models.frames(replace(table, rows=(*table.rows[:-1], last)), SERIAL_HOME)["12"][
+        :3, 3
+    ]
     assert np.abs(wrong - np.array([3.63, -34.77, 445.58]) * MM).max() < PLACE
     assert np.linalg.norm(wrong - mma.fk(mma.home)[:3, 3]) > 50.0 * MM
 
@@ -197,7 +187,7 @@ def test_signed_offsets_would_move_the_tool(mma: Robot) -> None:  # H21
 
 
 def test_tool_in_roboticstoolbox_is_the_same(mma: Robot) -> None:
-    rows = model_table("B", mma.geometry).rows
+    rows = mma_models.model_table("B", mma.geometry).rows
     links = []
     for row in rows:
         a, alpha, d, theta = (row.constants[symbol] for symbol in ("a", "alpha", "d", "theta"))
@@ -205,14 +195,14 @@ def test_tool_in_roboticstoolbox_is_the_same(mma: Robot) -> None:
     moving = [row.joint is not None for row in rows]
     for q in random_readings(20):
         joints = np.zeros(len(moving))
-        joints[moving] = joints_of_model(q, "B")
+        joints[moving] = mma_models.joints_of_model(q, "B")
         assert np.abs(rtb.DHRobot(links).fkine(joints).A - mma.fk(q)).max() < EXACT
 
 
 def pinocchio_model(mma: Robot) -> Model:
     """Serial model B from joint placements alone, without any D-H routine of ours."""
     model, parent, fixed = pinocchio.Model(), 0, pinocchio.SE3.Identity()
-    for row in model_table("B", mma.geometry).rows:
+    for row in mma_models.model_table("B", mma.geometry).rows:
         a, alpha, d, theta = (row.constants[symbol] for symbol in ("a", "alpha", "d", "theta"))
         fixed = fixed * pinocchio.SE3(rotation("x", alpha), np.array([a, 0.0, 0.0]))
         along = pinocchio.SE3(np.eye(3), np.array([0.0, 0.0, d]))
@@ -230,7 +220,7 @@ def test_pose_and_jacobian_in_pinocchio_are_the_same(mma: Robot) -> None:
     model = pinocchio_model(mma)
     data, frame = model.createData(), model.getFrameId("tool")
     for q in random_readings(50):
-        serial = joints_of_model(q, "B")
+        serial = mma_models.joints_of_model(q, "B")
         pinocchio.framesForwardKinematics(model, data, serial)
         assert np.abs(data.oMf[frame].homogeneous - mma.fk(q)).max() < EXACT
         columns = pinocchio.computeFrameJacobian(
@@ -243,8 +233,8 @@ def test_pose_and_jacobian_in_pinocchio_are_the_same(mma: Robot) -> None:
 
 def test_vectors_and_models_that_do_not_exist_are_refused(mma: Robot) -> None:
     with pytest.raises(ShapeError):
-        joints_of_model(np.zeros((2, 7)), "B")
+        mma_models.joints_of_model(np.zeros((2, 7)), "B")
     with pytest.raises(UnknownNameError):
-        joints_of_model(np.zeros(7), "D")
+        mma_models.joints_of_model(np.zeros(7), "D")
     with pytest.raises(UnknownNameError):
-        model_table("D", mma.geometry)
+        mma_models.model_table("D", mma.geometry)

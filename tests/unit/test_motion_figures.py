@@ -8,20 +8,8 @@ from scipy import signal
 from scipy.spatial.transform import Rotation
 
 from present import present
+from teleop_core.evaluation import motion_measures
 from teleop_core.evaluation.motion_figures import NAMES, Kinematics, MotionFigures
-from teleop_core.evaluation.motion_measures import (
-    RATE,
-    log_dimensionless_jerk,
-    reversals,
-    share_between,
-    sparc,
-    stretches,
-    submovements,
-    tremor_power,
-    turn_rates,
-    turning_points,
-    velocity_spectrum,
-)
 from teleop_core.evaluation.motion_samples import MotionSamples
 from teleop_core.kernels.geometry import Array
 
@@ -50,35 +38,37 @@ def hand(times: Array, seed: int = 1) -> Array:
 
 
 def test_spectral_arc_length_is_that_of_its_authors() -> None:
-    assert sparc(BELL, 100.0) == pytest.approx(BELL_SPARC, abs=DECIMALS)
+    assert motion_measures.sparc(BELL, 100.0) == pytest.approx(BELL_SPARC, abs=DECIMALS)
 
 
 def test_log_dimensionless_jerk_is_that_of_its_authors() -> None:
-    assert log_dimensionless_jerk(BELL[:, None], 100.0) == pytest.approx(BELL_LDLJ, abs=DECIMALS)
+    assert motion_measures.log_dimensionless_jerk(BELL[:, None], 100.0) == pytest.approx(
+        BELL_LDLJ, abs=DECIMALS
+    )
 
 
 @pytest.mark.parametrize("factor", [0.01, 300.0])
 def test_smoothness_does_not_depend_on_the_size_of_a_motion(factor: float) -> None:
-    assert sparc(factor * BELL, 100.0) == pytest.approx(BELL_SPARC, abs=DECIMALS)
-    scaled = log_dimensionless_jerk(factor * BELL[:, None], 100.0)
+    assert motion_measures.sparc(factor * BELL, 100.0) == pytest.approx(BELL_SPARC, abs=DECIMALS)
+    scaled = motion_measures.log_dimensionless_jerk(factor * BELL[:, None], 100.0)
     assert scaled == pytest.approx(BELL_LDLJ, abs=DECIMALS)
 
 
 def test_two_strokes_are_less_smooth_than_one() -> None:
     twice = np.concatenate((BELL, np.zeros(50), BELL))
-    assert present(sparc(twice, 100.0)) < BELL_SPARC - 0.5
+    assert present(motion_measures.sparc(twice, 100.0)) < BELL_SPARC - 0.5
 
 
 def test_motion_at_rest_has_no_smoothness() -> None:
-    assert sparc(np.zeros(100), RATE) is None
-    assert log_dimensionless_jerk(np.zeros((100, 3)), RATE) is None
+    assert motion_measures.sparc(np.zeros(100), motion_measures.RATE) is None
+    assert motion_measures.log_dimensionless_jerk(np.zeros((100, 3)), motion_measures.RATE) is None
 
 
 @pytest.mark.parametrize("count", [300, 1800])
 def test_spectrum_is_that_of_scipy(count: int) -> None:
     velocity = np.random.default_rng(3).standard_normal((count, 3))
-    frequency, density = velocity_spectrum([velocity])
-    expected_frequency, expected = signal.welch(velocity, RATE, nperseg=256, axis=0)
+    frequency, density = motion_measures.velocity_spectrum([velocity])
+    expected_frequency, expected = signal.welch(velocity, motion_measures.RATE, nperseg=256, axis=0)
     np.testing.assert_allclose(frequency, expected_frequency)
     np.testing.assert_allclose(density, expected.sum(axis=1), rtol=1e-9)
 
@@ -89,26 +79,29 @@ def test_peaks_are_those_whose_prominence_scipy_finds_as_large(seed: int) -> Non
     values = rng.standard_normal(int(rng.integers(3, 90)))
     values = np.cumsum(values) if seed % 2 else values
     swing = float(rng.uniform(0.1, 2.0))
-    peaks, valleys = turning_points(values, swing)
+    peaks, valleys = motion_measures.turning_points(values, swing)
     assert peaks == signal.find_peaks(values, prominence=swing)[0].tolist()
     assert valleys == signal.find_peaks(-values, prominence=swing)[0].tolist()
 
 
 def test_plateau_is_one_peak() -> None:
-    assert turning_points(np.array([0.0, 2.0, 2.0, 2.0, 0.0, 2.0, 0.0]), 1.0) == ([1, 5], [4])
+    assert motion_measures.turning_points(np.array([0.0, 2.0, 2.0, 2.0, 0.0, 2.0, 0.0]), 1.0) == (
+        [1, 5],
+        [4],
+    )
 
 
 def test_each_bell_of_speed_is_a_submovement() -> None:
     speed = 0.05 * np.tile(BELL[::7], 4)
-    assert len(submovements(speed)) == 4
-    assert not submovements(0.1 * speed)
+    assert len(motion_measures.submovements(speed)) == 4
+    assert not motion_measures.submovements(0.1 * speed)
 
 
 def test_reversals_are_the_turns_of_every_axis() -> None:
-    times = np.arange(0.0, 10.0, 1.0 / RATE)
+    times = np.arange(0.0, 10.0, 1.0 / motion_measures.RATE)
     wave = np.sin(2.0 * math.pi * 0.5 * times)
     place = np.column_stack((5e-3 * wave, 0.5e-3 * wave, 0.0 * wave))
-    assert reversals(place) == 10
+    assert motion_measures.reversals(place) == 10
 
 
 @pytest.mark.parametrize("axis", [[1.0, 0.0, 0.0], [0.6, 0.0, 0.8]])
@@ -116,7 +109,9 @@ def test_turn_rate_is_that_of_a_steady_turn_whatever_the_signs(axis: list[float]
     angles = np.arange(0.0, 7.0, 0.02)
     turns = Rotation.from_rotvec(angles[:, None] * axis).as_quat(scalar_first=True)
     turns[::3] *= -1.0
-    np.testing.assert_allclose(turn_rates(turns), 0.02 * RATE, rtol=1e-6)
+    np.testing.assert_allclose(
+        motion_measures.turn_rates(turns), 0.02 * motion_measures.RATE, rtol=1e-6
+    )
 
 
 @pytest.mark.parametrize("rate", [100.0, 609.0, 1000.0])
@@ -135,7 +130,7 @@ def test_tremor_is_the_root_mean_square_of_a_wave_in_its_band(
 def test_waves_beside_the_band_are_no_tremor(frequency: float) -> None:
     times = np.arange(0.0, 5.0, 1e-3)
     wave = np.sin(2.0 * math.pi * frequency * times)
-    assert tremor_power(1e-3 * wave[:, None], 1000.0) < (1e-6) ** 2
+    assert motion_measures.tremor_power(1e-3 * wave[:, None], 1000.0) < (1e-6) ** 2
 
 
 def test_seconds_of_rest_have_a_tremor_of_their_own() -> None:
@@ -162,7 +157,7 @@ def test_circle_has_the_speed_of_its_angle_and_radius() -> None:
     assert found.speed_median_mm_s == pytest.approx(speed, rel=0.01)
     assert found.path_mm == pytest.approx(20.0 * speed, rel=0.01)
     assert found.idle_share == 0.0
-    assert found.frequency_50_hz == pytest.approx(0.5, abs=RATE / 256)
+    assert found.frequency_50_hz == pytest.approx(0.5, abs=motion_measures.RATE / 256)
     assert found.acceleration_p95_m_s2 == pytest.approx(1e-3 * speed * math.pi, rel=0.02)
 
 
@@ -214,8 +209,8 @@ def test_samples_that_are_no_numbers_or_not_later_are_left_out() -> None:
 
 def test_stretches_end_where_time_is_missing() -> None:
     times = np.array([0.0, 0.1, 0.2, 3.0, 3.1])
-    assert stretches(times) == [slice(0, 3), slice(3, 5)]
-    assert stretches(np.empty(0)) == []
+    assert motion_measures.stretches(times) == [slice(0, 3), slice(3, 5)]
+    assert motion_measures.stretches(np.empty(0)) == []
 
 
 def test_nothing_has_no_figures() -> None:
@@ -226,9 +221,11 @@ def test_nothing_has_no_figures() -> None:
 
 
 def test_share_of_power_is_that_of_the_waves_in_it() -> None:
-    times = np.arange(0.0, 60.0, 1.0 / RATE)
+    times = np.arange(0.0, 60.0, 1.0 / motion_measures.RATE)
     velocity = np.column_stack(
         (np.sin(2.0 * math.pi * 0.5 * times), np.sin(2.0 * math.pi * 2.0 * times))
     )
-    frequency, density = velocity_spectrum([velocity])
-    assert share_between(1.0, 3.0, frequency, density) == pytest.approx(0.5, abs=0.01)
+    frequency, density = motion_measures.velocity_spectrum([velocity])
+    assert motion_measures.share_between(1.0, 3.0, frequency, density) == pytest.approx(
+        0.5, abs=0.01
+    )

@@ -9,11 +9,7 @@ import pytest
 from scaling_desk import ANY_HAND, HOME, MM, Desk
 from teleop_core.base.errors import ParameterError
 from teleop_core.base.parameters import build
-from teleop_core.chain.mapping.motion_scaling import (
-    MotionScaling,
-    mapped_orientation,
-    to_slave_axes,
-)
+from teleop_core.chain.mapping import motion_scaling
 from teleop_core.chain.mapping.parameters import FixtureParameters, MotionScalingParameters
 from teleop_core.chain.operators.rest import REST_POSITION, REST_TILT
 from teleop_core.graph.signals import TICK_NS
@@ -57,17 +53,17 @@ def test_the_wall_stands_around_the_stylus_and_the_slave_goes_by_what_is_left_of
 
 
 def mapped(stylus: Array, tool_roll: float) -> Array:
-    scaling = MotionScaling(MotionScalingParameters(tool_roll=tool_roll))
+    scaling = motion_scaling.MotionScaling(MotionScalingParameters(tool_roll=tool_roll))
     quaternion, tool, out = np.empty(4), np.empty(4), np.empty((3, 3))
     quaternion_from_rotation(np.ascontiguousarray(stylus), quaternion)
-    mapped_orientation(scaling.parameters, quaternion, tool)
+    motion_scaling.mapped_orientation(scaling.parameters, quaternion, tool)
     rotation_from_quaternion(tool, out)
     return out
 
 
 def slave_axes(master: tuple[float, float, float], **values: Any) -> Array:
-    scaling, out = MotionScaling(MotionScalingParameters(**values)), np.empty(3)
-    to_slave_axes(scaling.parameters, np.array(master), out)
+    scaling, out = motion_scaling.MotionScaling(MotionScalingParameters(**values)), np.empty(3)
+    motion_scaling.to_slave_axes(scaling.parameters, np.array(master), out)
     return out
 
 

@@ -144,7 +144,7 @@ def drawn(
 ) -> Array:
     """What a kind says of packets sent in a row (packets,)."""
     part = NETWORKS.find(name)
-    numbers, memory = part.numbers_of(build(part.parameters, values)), np.zeros(4)
+    numbers, memory = part.numbers(build(part.parameters, values)), np.zeros(4)
     chances = np.random.default_rng(seed).random((packets, 3))
     return np.array([part.draw(numbers, memory, c, i * period) for i, c in enumerate(chances)])
 
@@ -228,9 +228,7 @@ def test_a_delay_that_holds_has_the_same_spread_but_changes_seldom() -> None:
 
 
 @pytest.mark.parametrize("in_packets", [False, True])
-def test_outages_last_for_any_time_up_to_the_longest_and_pause_after_each(
-    in_packets: bool,
-) -> None:
+def test_outages_last_for_any_time_up_to_the_longest_and_pause_after_each(in_packets: bool) -> None:
     times = {"pause": 2.0, "longest": 1.0}
     if in_packets:  # 400 a second here
         times = {name: 400.0 * value for name, value in times.items()}
@@ -271,8 +269,9 @@ def test_a_trace_is_played_row_by_row_and_begins_anew_at_its_end(tmp_path: Path)
     differing = np.flatnonzero(found != np.concatenate((one, one, one))[:700])
     assert len(differing) <= 2  # where a sum of milliseconds is a bit beside a border
     seldom = drawn("trace", {"file": str(file)}, 50, period=0.77)
-    np.testing.assert_array_equal(seldom, np.array([0.05, LOST, 0.07])[
-        (np.arange(50) * 0.77 % 0.3 / 0.1).astype(int)])  # fmt: skip
+    np.testing.assert_array_equal(
+        seldom, np.array([0.05, LOST, 0.07])[(np.arange(50) * 0.77 % 0.3 / 0.1).astype(int)]
+    )
     network = link(there__kind="trace", there__trace__file=str(file))
     _, stamps = through(network, walk(700))
     age = np.arange(2, 702) - stamps / MS

@@ -153,8 +153,9 @@ def test_a_session_in_virtual_time_misses_no_message_of_what_is_sent_where_it_ch
 def test_a_replayed_hand_feels_another_fixture(recorded: tc.Recording) -> None:
     loose = tc.replay(recorded, begin="hand", device__friction=0.0)
     assert np.array_equal(loose["hand/servo_cp"].values, recorded["hand/servo_cp"].values)
-    assert not np.array_equal(loose["master/measured_cp"].values,
-                              recorded["master/measured_cp"].values)  # fmt: skip
+    assert not np.array_equal(
+        loose["master/measured_cp"].values, recorded["master/measured_cp"].values
+    )
 
 
 def test_a_replay_that_cannot_begin_there_says_so(recorded: tc.Recording) -> None:

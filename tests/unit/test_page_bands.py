@@ -82,8 +82,9 @@ def test_stretches_hold_just_the_times_at_which_it_is_so(seed: int) -> None:
     rng = np.random.default_rng(seed)
     at = np.sort(rng.choice(np.arange(-50, COUNT + 50), 200, replace=False))
     is_so = rng.random(200) < 0.5
-    stretches = stretches_of(history([(a, None) for a in at]), is_so, START_NS,
-                             START_NS + COUNT * TICK_NS)  # fmt: skip
+    stretches = stretches_of(
+        history([(a, None) for a in at]), is_so, START_NS, START_NS + COUNT * TICK_NS
+    )
     times = (np.arange(COUNT) + 0.5) * 1e-3
     row = np.searchsorted(at * 1e-3, times, side="right") - 1
     expected = np.where(row >= 0, is_so[row], False)

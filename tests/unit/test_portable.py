@@ -10,15 +10,7 @@ import pytest
 from scipy.linalg import expm
 
 import teleop_core
-from teleop_core.kernels.portable import (
-    arctangent,
-    dot,
-    exponential,
-    inverse_motion,
-    length,
-    matrix_exponential,
-    product,
-)
+from teleop_core.kernels import portable
 
 PACKAGE = Path(teleop_core.__file__).parent
 ROOMS = ("chain", "kernels", "robots", "session", "slave", "graph/signals.py")
@@ -125,24 +117,26 @@ def test_the_rule_lets_pass_what_rounds_alike(text: str) -> None:
 def test_products_are_those_of_numpy(a: tuple[int, ...], b: tuple[int, ...]) -> None:
     rng = np.random.default_rng(1)
     left, right = rng.normal(size=a), rng.normal(size=b)
-    np.testing.assert_allclose(product(left, right), left @ right, rtol=0.0, atol=1e-14)
+    np.testing.assert_allclose(portable.product(left, right), left @ right, rtol=0.0, atol=1e-14)
 
 
 def test_lengths_dots_and_functions_are_those_of_numpy() -> None:
     rng = np.random.default_rng(2)
     x, y = rng.normal(size=(2, 5, 4))
-    np.testing.assert_allclose(length(x), np.linalg.norm(x, axis=1), rtol=1e-15)
-    np.testing.assert_allclose(dot(x, y), (x * y).sum(axis=1), rtol=1e-12)
-    np.testing.assert_allclose(exponential(x), np.exp(x), rtol=1e-15)
-    np.testing.assert_allclose(arctangent(x, y), np.arctan2(x, y), rtol=1e-15)
-    assert arctangent(1.0, np.zeros(2)).tolist() == [0.5 * math.pi] * 2
+    np.testing.assert_allclose(portable.length(x), np.linalg.norm(x, axis=1), rtol=1e-15)
+    np.testing.assert_allclose(portable.dot(x, y), (x * y).sum(axis=1), rtol=1e-12)
+    np.testing.assert_allclose(portable.exponential(x), np.exp(x), rtol=1e-15)
+    np.testing.assert_allclose(portable.arctangent(x, y), np.arctan2(x, y), rtol=1e-15)
+    assert portable.arctangent(1.0, np.zeros(2)).tolist() == [0.5 * math.pi] * 2
 
 
 def test_an_inverse_motion_leads_back() -> None:
     from teleop_core.kernels.geometry import rotation, transform
 
     there = transform(rotation("x", 0.7), np.array([0.1, -0.2, 0.3]))
-    np.testing.assert_allclose(product(inverse_motion(there), there), np.eye(4), atol=1e-15)
+    np.testing.assert_allclose(
+        portable.product(portable.inverse_motion(there), there), np.eye(4), atol=1e-15
+    )
 
 
 @pytest.mark.parametrize("size", [0.0, 1e-3, 1.0, 30.0])
@@ -151,5 +145,5 @@ def test_the_exponential_of_a_matrix_is_scipys(size: float) -> None:
     for n in (1, 3, 8):
         matrix = size * rng.normal(size=(n, n))
         expected = expm(matrix)
-        error = np.abs(matrix_exponential(matrix) - expected).max()
+        error = np.abs(portable.matrix_exponential(matrix) - expected).max()
         assert error < 1e-12 * np.abs(expected).max()

@@ -1,15 +1,13 @@
 """RCRT-1 kinematics: published poses, misprints, four branches, singularities, limits."""
 
 import math
-from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from teleop_core.base.errors import ParameterError, ShapeError, UnknownNameError
+from teleop_core.base.errors import ParameterError
 from teleop_core.kernels.geometry import Array, roll_pitch_yaw, rotation, transform
 from teleop_core.robots import IkStatus, load_robot
 from teleop_core.robots.rcrt1_hardware import tendon_joint_angles, tendon_motor_angles
@@ -131,6 +129,14 @@ def test_table_read_as_modified_convention_points_home_straight_up() -> None:  #
     assert np.linalg.norm(wrong[:3, 3] - ARM.fk(ARM.home)[:3, 3]) > 0.4
 
 
+def test_ranges_of_the_joints_are_those_of_table_6_2() -> None:
+    for end, wanted in (
+        (ARM.lower, joints(-80, 50, 0, -170, -80, -170)),
+        (ARM.upper, joints(80, 160, 421, 170, 80, 170)),
+    ):
+        assert np.allclose(end, wanted, rtol=0, atol=ROUNDING)
+
+
 def test_home_is_where_the_joint_table_puts_it() -> None:  # case 2
     pose = ARM.fk(ARM.home)
     # Half of the last digit given.
@@ -200,43 +206,10 @@ def test_printed_element_formulas_are_off_by_centimetres() -> None:  # misprint 
     assert worst_axis > 1.0
 
 
-def test_poses_of_a_batch_equal_the_single_ones() -> None:
-    batch = inside_limits(20)
-    assert np.array_equal(ARM.fk(batch), [ARM.fk(q) for q in batch])
-
-
-def test_jacobian_is_the_slope_of_the_pose() -> None:
-    h = 1e-6
-    for q in inside_limits(50):
-        pose, numeric = ARM.fk(q), np.empty((6, 6))
-        for j in range(6):
-            step = np.zeros(6)
-            step[j] = h
-            slope = (ARM.fk(q + step) - ARM.fk(q - step)) / (2.0 * h)
-            turning = slope[:3, :3] @ pose[:3, :3].T
-            numeric[:3, j] = slope[:3, 3]
-            numeric[3:, j] = turning[2, 1], turning[0, 2], turning[1, 0]
-        # Rounding 1e-16 / h and truncation h² are both under 1e-9.
-        assert np.allclose(ARM.jacobian(q), numeric, rtol=0, atol=1e-9)
-
-
 def test_determinant_of_the_jacobian_is_the_published_product() -> None:  # case 12
     for q in inside_limits(200):
         product = q[2] ** 2 * math.sin(q[1]) * math.sin(q[4])
         assert math.isclose(np.linalg.det(ARM.jacobian(q)), product, rel_tol=1e-9, abs_tol=1e-15)
-
-
-def test_all_four_branches_reach_the_pose_and_one_is_the_joints() -> None:  # case 9
-    worst_pose, worst_joint = 0.0, 0.0
-    for q in inside_limits(2_000, seed=9):
-        pose = ARM.fk(q)
-        branches = ARM.ik_all(pose)
-        assert branches.shape == (4, 6)
-        worst_pose = max(worst_pose, np.abs(ARM.fk(branches) - pose).max())
-        worst_joint = max(worst_joint, np.abs(branches - q).max(axis=1).min())
-    assert worst_pose < 2e-13
-    # Joint 4 is known to the rounding of the pose over sin(theta5), here down to 1e-3.
-    assert worst_joint < 1e-11
 
 
 def test_ik_next_to_the_joints_gives_them_back_for_20_000_poses() -> None:  # case 9
@@ -279,33 +252,6 @@ def test_roll_that_joint_6_cannot_do_alone_at_the_wrist_singularity_is_shared_wi
         answer = ARM.ik(pose, np.array([0.2, 1.8, 0.4, seed4, 0.0, 0.0]))
         assert answer.status is IkStatus.NEAR_SINGULAR
         assert answer.residual.max() < 1e-9
-
-
-@given(legal_joints(), legal_joints())
-def test_answer_is_inside_the_limits_and_says_how_far_off_it_is(q: Array, seed: Array) -> None:
-    pose = ARM.fk(q)
-    answer = ARM.ik(pose, seed)
-    assert ((answer.q >= ARM.lower) & (answer.q <= ARM.upper)).all()
-    off = ARM.fk(answer.q)
-    assert math.isclose(np.linalg.norm(off[:3, 3] - pose[:3, 3]), answer.residual[0], abs_tol=1e-12)
-    # Some branch inside the limits reaches it, so the answer does.
-    assert answer.status in {IkStatus.FOLLOWED, IkStatus.NEAR_SINGULAR}
-    assert answer.residual.max() < 1e-9
-
-
-@given(
-    st.lists(st.floats(-1e6, 1e6), min_size=3, max_size=3),
-    st.lists(st.floats(-3.0, 3.0), min_size=3, max_size=3),
-    legal_joints(),
-)
-def test_no_finite_pose_makes_a_nan_or_leaves_the_limits(
-    place: list[float], turn: list[float], seed: Array
-) -> None:
-    matrix = rotation("x", turn[0]) @ rotation("y", turn[1]) @ rotation("z", turn[2])
-    answer = ARM.ik(transform(matrix, np.array(place)), seed)
-    assert np.isfinite(answer.q).all()
-    assert np.isfinite(answer.residual).all()
-    assert ((answer.q >= ARM.lower) & (answer.q <= ARM.upper)).all()
 
 
 @pytest.mark.parametrize("size", [0.0, 5e-324, 1e-200, 1e200, 1.7e308])
@@ -363,25 +309,6 @@ def test_without_a_seed_the_answer_is_the_one_next_to_home() -> None:
     assert np.array_equal(ARM.ik(pose).q, ARM.ik(pose, ARM.home).q)
 
 
-def test_batch_with_one_seed_or_one_for_each_equals_single_answers() -> None:
-    batch, seeds = inside_limits(50, seed=2), inside_limits(50, seed=3)
-    poses = ARM.fk(batch)
-    for seed_of, given_seeds in ((lambda i: seeds[i], seeds), (lambda i: seeds[0], seeds[0])):
-        together: Any = ARM.ik(poses, given_seeds)
-        for i, pose in enumerate(poses):
-            alone = ARM.ik(pose, seed_of(i))
-            assert np.array_equal(together.q[i], alone.q)
-            assert together.status[i] == alone.status
-            assert np.array_equal(together.residual[i], alone.residual)
-
-
-def test_empty_batch_has_empty_answers() -> None:
-    answer: Any = ARM.ik(np.empty((0, 4, 4)))
-    assert answer.q.shape == (0, 6)
-    assert answer.status.shape == (0,)
-    assert ARM.fk(np.empty((0, 6))).shape == (0, 4, 4)
-
-
 @given(st.floats(0.0, 0.05), legal_joints())
 def test_shoulder_offset_keeps_the_inverse_an_inverse(offset: float, q: Array) -> None:
     # With an offset the wrist centre stays off the axis of joint 1.
@@ -389,68 +316,6 @@ def test_shoulder_offset_keeps_the_inverse_an_inverse(offset: float, q: Array) -
     pose = arm.fk(q)
     branches = arm.ik_all(pose)
     assert np.allclose(arm.fk(branches), pose, rtol=0, atol=1e-12)
-
-
-@pytest.mark.parametrize("method", ["ik", "ik_all"])
-def test_pose_that_is_not_rigid_is_refused(method: str) -> None:
-    for bad in (np.zeros((4, 4)), 2.0 * np.eye(4), np.diag([1.0, 1.0, -1.0, 1.0])):
-        with pytest.raises(ParameterError):
-            getattr(ARM, method)(bad)
-
-
-@pytest.mark.parametrize("method", ["ik", "ik_all"])
-def test_pose_with_nan_is_refused(method: str) -> None:
-    bad = ARM.fk(ARM.home)
-    bad[0, 3] = math.nan
-    with pytest.raises(ParameterError):
-        getattr(ARM, method)(bad)
-
-
-def test_bad_pose_in_a_batch_is_named_by_its_index() -> None:
-    poses = ARM.fk(inside_limits(3))
-    poses[2, 0, 0] += 0.1
-    with pytest.raises(ParameterError) as error:
-        ARM.ik(poses)
-    assert error.value.name == "T[2]"
-
-
-def test_seed_with_nan_is_refused() -> None:
-    with pytest.raises(ParameterError):
-        ARM.ik(ARM.fk(ARM.home), np.full(6, math.nan))
-
-
-@pytest.mark.parametrize(
-    "call",
-    [
-        lambda: ARM.fk(np.zeros(5)),
-        lambda: ARM.jacobian(np.zeros((2, 6))),
-        lambda: ARM.ik(np.eye(3)),
-        lambda: ARM.ik(np.eye(4), np.zeros(5)),
-        lambda: ARM.ik(np.stack([np.eye(4)] * 3), np.zeros((2, 6))),
-    ],
-)
-def test_array_of_another_shape_is_refused(call: Callable[..., object]) -> None:
-    with pytest.raises(ShapeError):
-        call()
-
-
-def test_limits_and_home_cannot_be_changed_through_the_robot() -> None:
-    for array in (ARM.lower, ARM.upper, ARM.home):
-        with pytest.raises(ValueError, match="read-only"):
-            array[0] = 1.0
-
-
-@pytest.mark.parametrize("length", [-0.01, 1.5, math.nan, math.inf])
-def test_impossible_length_is_refused_by_its_symbol(length: float) -> None:
-    with pytest.raises(ParameterError) as error:
-        load_robot("rcrt1", L6=length)
-    assert error.value.name == "L6"
-
-
-def test_unknown_symbol_is_refused_with_the_symbols() -> None:
-    with pytest.raises(UnknownNameError) as error:
-        load_robot("rcrt1", L7=0.1)
-    assert error.value.alternatives == ("L6", "d2")
 
 
 def test_published_numbers_have_no_tendon_coupling() -> None:

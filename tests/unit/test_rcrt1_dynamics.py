@@ -32,9 +32,8 @@ Q_PRISMATIC[2, 3] = 1.0
 Q = (Q_REVOLUTE, Q_REVOLUTE, Q_PRISMATIC)
 
 states = st.tuples(
-    st.floats(-1.4, 1.4), st.floats(0.9, 2.8), st.floats(0.1, 0.42),
-    *[st.floats(-3.0, 3.0)] * 3,
-)  # fmt: skip
+    st.floats(-1.4, 1.4), st.floats(0.9, 2.8), st.floats(0.1, 0.42), *[st.floats(-3.0, 3.0)] * 3
+)
 
 
 def pseudo_inertia(
@@ -216,14 +215,7 @@ def test_static_moment_of_the_four_bar_adds_to_axis_2() -> None:
 
 
 def spatial_inertia(
-    mass: float,
-    center: Any,
-    ixx: float,
-    iyy: float,
-    izz: float,
-    ixy: float,
-    ixz: float,
-    iyz: float,
+    mass: float, center: Any, ixx: float, iyy: float, izz: float, ixy: float, ixz: float, iyz: float
 ) -> Inertia:
     """pinocchio's inertia, about the centre of mass, from moments about the frame's origin."""
     center = np.array(center)
@@ -236,9 +228,7 @@ def pinocchio_model() -> Model:
     """The same arm as a chain Rz, Ry, Pz; frame 2 and 3 as in the source, motors as armature."""
     model = pinocchio.Model()
     model.gravity.linear = np.array([0.0, 0.0, -LINKS["g"]])
-    joints = (
-        pinocchio.JointModelRZ(), pinocchio.JointModelRY(), pinocchio.JointModelPZ(),
-    )  # fmt: skip
+    joints = (pinocchio.JointModelRZ(), pinocchio.JointModelRY(), pinocchio.JointModelPZ())
     bodies = (
         # Frame 1 of the source has its y axis along -z0.
         spatial_inertia(1e-12, (0, 0, 0), 1.0, 1.0, LINKS["I1yy"], 0.0, 0.0, 0.0),

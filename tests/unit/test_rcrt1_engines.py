@@ -71,9 +71,7 @@ def numbers(values: Sequence[float] | Array) -> str:
     return " ".join(repr(float(value)) for value in values)
 
 
-def mujoco_xml(
-    table: Any,
-) -> str:
+def mujoco_xml(table: Any) -> str:
     """The arm as nested bodies; body 1 keeps axes along the base's, so its row is turned."""
     # Frame 1 to base axes at rest: x1 = x0, y1 = -z0, z1 = y0.
     turn = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])

@@ -22,23 +22,16 @@ from teleop_core.evaluation.score import Score
 from teleop_core.evaluation.score_table import MET, NOT_MET, score_tables
 from teleop_core.evaluation.scoring import evaluate
 from teleop_core.evaluation.windows import windows
+from teleop_core.graph import topics
 from teleop_core.graph.signals import STATE_FIELDS, TICK_NS
-from teleop_core.graph.topics import (
-    MASTER_MEASURED_CP,
-    SLAVE_MEASURED_CP,
-    SLAVE_REACH,
-    SLAVE_SERVO_CP,
-    TELEOP_STATE,
-    Limit,
-)
 from teleop_core.kernels.geometry import Array
 from teleop_core.session.api import configuration
 
 COUNT = 15_000  # ticks: some windows
 SECOND_NS = 1_000_000_000
-COLUMN = {name: index for index, name in enumerate(SLAVE_REACH.columns)}
+COLUMN = {name: index for index, name in enumerate(topics.SLAVE_REACH.columns)}
 SHARES = ("followed", "joint", "workspace", "singularity", "speed", "aligning")
-ALIGNING = len(Limit)
+ALIGNING = len(topics.Limit)
 # The published map of the master's axes to the slave's.
 AXES = np.array([[0, 0, -1], [-1, 0, 0], [0, 1, 0]], float)
 # Sums of up to 1e4 spans of time, and of positions in doubles in millimetres.
@@ -65,12 +58,12 @@ class Session(Recipe):
         values[:, COLUMN["joint"]] = -1.0
         values[:, COLUMN["position_residual"]] = 1e-3 * millimetres
         values[:, COLUMN["rotation_residual"]] = np.radians(degrees)
-        self.rows[SLAVE_REACH] = (stamp_ns, values, stamp_ns)
+        self.rows[topics.SLAVE_REACH] = (stamp_ns, values, stamp_ns)
 
     def tell(self, seconds: float, **values: Any) -> None:
         """Say in teleop/state what holds from some time on."""
         stamp_ns = START_NS + round(seconds * 1e9)
-        self.singles.append((TELEOP_STATE, stamp_ns, state(stamp_ns, **values)))
+        self.singles.append((topics.TELEOP_STATE, stamp_ns, state(stamp_ns, **values)))
 
     def write(self, path: Path) -> Any:
         whole, blocks = self.rows, []
@@ -139,22 +132,22 @@ def test_shares_of_time_are_those_of_a_count_of_every_millisecond(path: Path, se
     assert len(np.unique(every)) == len(SHARES)
 
     bag = session.write(path)
-    assert len(list(windows(bag, [SLAVE_REACH]))) >= 3
+    assert len(list(windows(bag, [topics.SLAVE_REACH]))) >= 3
     score = evaluate(bag)
     expected = np.bincount(every, minlength=len(SHARES)) / len(every)
     assert np.allclose(shares(score), expected, rtol=0, atol=ROUNDING)
-    longest = max(len(list(run)) for is_off, run in groupby(every != Limit.NONE) if is_off)
+    longest = max(len(list(run)) for is_off, run in groupby(every != topics.Limit.NONE) if is_off)
     assert score.reach.longest_s == pytest.approx(longest * 1e-3, abs=ROUNDING)
 
 
 def test_a_stretch_goes_on_across_windows_whatever_its_cause(path: Path) -> None:
     session = Session()
     limits = np.zeros(COUNT)
-    limits[500:900] = Limit.SPEED
-    limits[3200:6000], limits[6000:9700] = Limit.JOINT, Limit.WORKSPACE
+    limits[500:900] = topics.Limit.SPEED
+    limits[3200:6000], limits[6000:9700] = topics.Limit.JOINT, topics.Limit.WORKSPACE
     session.reach(session.stamps, limits)
     bag = session.write(path)
-    assert len(list(windows(bag, [SLAVE_REACH]))) >= 3
+    assert len(list(windows(bag, [topics.SLAVE_REACH]))) >= 3
     score = evaluate(bag)
     assert score.reach.longest_s == pytest.approx(6.5, abs=ROUNDING)
     total = COUNT - 1  # milliseconds from the first command to the last
@@ -227,8 +220,8 @@ def test_interpolation_is_late_by_a_period_of_slow_commands(
 ) -> None:
     session = Session()
     session.metadata["configuration"] = configured(interpolation)
-    a, b, c = session.rows[SLAVE_SERVO_CP]
-    session.rows[SLAVE_SERVO_CP] = (a[::period_ms], b[::period_ms], c[::period_ms])
+    a, b, c = session.rows[topics.SLAVE_SERVO_CP]
+    session.rows[topics.SLAVE_SERVO_CP] = (a[::period_ms], b[::period_ms], c[::period_ms])
     score = evaluate(session.write(path))
     assert score.reach.master_hz == pytest.approx(1000.0 / period_ms)
     assert score.reach.interpolation == interpolation
@@ -249,14 +242,14 @@ def hand_and_command(
     """Write a hand that wanders, and the command that follows it but for what is cut off."""
     rng = np.random.default_rng(4)
     hand = np.cumsum(1e-5 * rng.normal(size=(COUNT, 3)), axis=0)
-    poses = session.values(SLAVE_SERVO_CP).copy()
+    poses = session.values(topics.SLAVE_SERVO_CP).copy()
     poses[:, :3] = hand
-    session.rows[MASTER_MEASURED_CP] = (session.stamps, poses, session.stamps)
-    command = session.values(SLAVE_SERVO_CP)
+    session.rows[topics.MASTER_MEASURED_CP] = (session.stamps, poses, session.stamps)
+    command = session.values(topics.SLAVE_SERVO_CP)
     for i in range(1, COUNT):
         moved = 0.0 if is_held[i] or is_held[i - 1] else gain[i] * AXES @ (hand[i] - hand[i - 1])
         command[i, :3] = command[i - 1, :3] + moved + cuts[i]
-    session.values(SLAVE_MEASURED_CP)[:] = command
+    session.values(topics.SLAVE_MEASURED_CP)[:] = command
     return hand, command
 
 
@@ -284,7 +277,7 @@ def test_asked_error_is_what_was_cut_off_since_the_last_clutch_stroke(path: Path
         missing[i] = 1e3 * np.linalg.norm(since)
     kept = missing[~is_held]
     bag = session.write(path)
-    assert len(list(windows(bag, [SLAVE_SERVO_CP]))) >= 3
+    assert len(list(windows(bag, [topics.SLAVE_SERVO_CP]))) >= 3
     error: Any = (
         evaluate(bag).value("asked_error_mm.rms"),
         evaluate(bag).value("asked_error_mm.max"),
@@ -298,7 +291,7 @@ def test_no_sample_of_the_slave_is_left_out_of_the_asked_error(path: Path, at: i
     session = Session()
     still = np.zeros(COUNT, bool)
     hand_and_command(session, np.ones(COUNT), still, np.zeros((COUNT, 3)))
-    session.values(SLAVE_MEASURED_CP)[at : at + 100, 1] += 5e-3
+    session.values(topics.SLAVE_MEASURED_CP)[at : at + 100, 1] += 5e-3
     error = evaluate(session.write(path))
     assert error.value("asked_error_mm.max") == pytest.approx(5.0, abs=EXACT_MM)
     expected = 5.0 * np.sqrt(100 / COUNT)
@@ -322,7 +315,7 @@ def turned_session(cut_from: int = COUNT, **parameters: Any) -> Any:
     row = scaling.signals
     turns = Rotation.from_rotvec(2e-3 * rng.normal(size=(COUNT, 3)))
     attitude, hands, commands = Rotation.identity(), np.zeros((COUNT, 7)), np.zeros((COUNT, 7))
-    row["slave_setpoint_cp"] = session.values(SLAVE_SERVO_CP)[0]
+    row["slave_setpoint_cp"] = session.values(topics.SLAVE_SERVO_CP)[0]
     for i, stamp_ns in enumerate(session.stamps):
         attitude = turns[i] * attitude
         row["master_measured_cp"][3:] = attitude.as_quat(scalar_first=True)
@@ -332,8 +325,8 @@ def turned_session(cut_from: int = COUNT, **parameters: Any) -> Any:
         hands[i], commands[i] = row["master_measured_cp"], row["slave_servo_cp"]
         row["slave_setpoint_cp"] = row["slave_servo_cp"]
     commands[cut_from:] = commands[cut_from - 1]
-    session.rows[MASTER_MEASURED_CP] = (session.stamps, hands, session.stamps)
-    for topic in (SLAVE_SERVO_CP, SLAVE_MEASURED_CP):
+    session.rows[topics.MASTER_MEASURED_CP] = (session.stamps, hands, session.stamps)
+    for topic in (topics.SLAVE_SERVO_CP, topics.SLAVE_MEASURED_CP):
         session.values(topic)[:] = commands
     texts = configuration(settings={f"motion_scaling.{n}": v for n, v in parameters.items()}).text()
     session.metadata["configuration"] = texts
@@ -343,7 +336,7 @@ def turned_session(cut_from: int = COUNT, **parameters: Any) -> Any:
 @pytest.mark.parametrize(
     "parameters",
     [{}, {"tool_roll": 0.4}, {"axes": ("+x", "+y", "+z"), "tool_axes": ("-x", "+y", "-z")}],
-)  # fmt: skip
+)
 def test_a_tool_that_turns_as_the_hand_is_where_it_was_asked_to_be(
     path: Path, parameters: Any
 ) -> None:
@@ -377,7 +370,7 @@ def test_marks_of_published_figures_need_99_percent_and_the_table_says_so(
     path: Path, lost_ms: int, told: str | None
 ) -> None:
     session, limits = Session(), np.zeros(COUNT)
-    limits[5000 : 5000 + lost_ms] = Limit.WORKSPACE
+    limits[5000 : 5000 + lost_ms] = topics.Limit.WORKSPACE
     session.reach(session.stamps, limits)
     text = table_of(evaluate(session.write(path)))
     assert "(0.338)" in text
@@ -390,11 +383,13 @@ def test_marks_of_published_figures_need_99_percent_and_the_table_says_so(
 
 def test_recordings_of_before_have_no_rows_of_reach_and_no_marks(path: Path) -> None:
     session = Session()
-    del session.rows[SLAVE_REACH]
-    session.topics.remove(SLAVE_REACH)
+    del session.rows[topics.SLAVE_REACH]
+    session.topics.remove(topics.SLAVE_REACH)
     known = set(STATE_FIELDS) - {"limit", "limited_joint"}
     texts = {name: str(float(name in {"gain", "is_following"})) for name in known}
-    session.singles = [(TELEOP_STATE, START_NS, report(START_NS, "teleop", 0, "FOLLOWING", texts))]
+    session.singles = [
+        (topics.TELEOP_STATE, START_NS, report(START_NS, "teleop", 0, "FOLLOWING", texts))
+    ]
     score: Any = evaluate(session.write(path))
     assert shares(score) == [None] * len(SHARES)
     assert score.reach.residual_mm.rms is score.reach.interpolation is None

@@ -68,10 +68,7 @@ def operator(
     return OPERATORS.find(kind), parameters.kind.parameters, setting
 
 
-def motion(
-    path: Path,
-    **options: Any,
-) -> Callable[..., Any]:
+def motion(path: Path, **options: Any) -> Callable[..., Any]:
     found, parameters, setting = operator(path, **options)
     return found.make(parameters, setting)
 
@@ -157,8 +154,7 @@ def test_a_recording_lasts_as_long_as_it_and_its_approach(tmp_path: Path) -> Non
 
 
 @pytest.mark.parametrize(
-    ("given", "seconds"),
-    [({}, 5.0), ({"duration": 1.5}, 1.5), ({"scenario": "coarse_box"}, 5.0)],
+    ("given", "seconds"), [({}, 5.0), ({"duration": 1.5}, 1.5), ({"scenario": "coarse_box"}, 5.0)]
 )
 def test_a_session_lasts_as_long_as_what_it_follows_unless_told(
     given: Any, seconds: float, tmp_path: Path

@@ -119,10 +119,11 @@ def test_another_shaft_passes_through_the_centre_as_well() -> None:
 @pytest.mark.parametrize(
     ("given", "name"),
     [
-        ({"place": (0.0, 1.0)}, "place"), ({"shaft": (0.0, 0.0, 0.0)}, "shaft"),
+        ({"place": (0.0, 1.0)}, "place"),
+        ({"shaft": (0.0, 0.0, 0.0)}, "shaft"),
         ({"depth": 0.01, "least_depth": 0.02}, "least_depth"),
     ],
-)  # fmt: skip
+)
 def test_what_is_no_centre_is_refused_by_its_name(given: Mapping[str, Any], name: str) -> None:
     with pytest.raises(ParameterError, match=name):
         RemoteCentreParameters(**given)

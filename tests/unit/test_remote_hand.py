@@ -113,9 +113,7 @@ def test_no_jump_of_what_is_wanted_ever_passes(
     np.testing.assert_allclose(run.way[-1], second, atol=1e-3)
 
 
-@given(
-    place, st.floats(0.01, 0.2), st.floats(0.05, 2.5), st.floats(2.0, 500.0),
-)  # fmt: skip
+@given(place, st.floats(0.01, 0.2), st.floats(0.05, 2.5), st.floats(2.0, 500.0))
 def test_the_stylus_never_goes_beyond_a_place_that_it_is_sent_to(
     way: tuple[float, float, float], delay: float, speed: float, acceleration: float
 ) -> None:
@@ -246,9 +244,7 @@ def test_every_tap_is_seen_as_one_press(taps: int, is_held: bool) -> None:
     assert rows[-1, 8] == float(is_held)
 
 
-@given(
-    st.lists(st.tuples(st.floats(1e-3, 1.0), st.booleans()), min_size=1, max_size=30),
-)
+@given(st.lists(st.tuples(st.floats(1e-3, 1.0), st.booleans()), min_size=1, max_size=30))
 def test_every_press_is_seen_also_where_the_time_between_two_was_slept_through(
     turns: list[tuple[float, bool]],
 ) -> None:

@@ -8,19 +8,12 @@ from hypothesis import strategies as st
 from present import present
 from teleop_core.kernels import pointer
 from teleop_core.kernels.geometry import Array
-from teleop_core.robots import load_robot
+from teleop_core.robots import load_robot, rcrt1_dynamics
 from teleop_core.robots.drives import ACCELERATION
-from teleop_core.robots.rcrt1_dynamics import (
-    DYNAMICS,
-    gravity_effort,
-    inertia_matrix,
-    link_row,
-    velocity_effort,
-)
 from teleop_core.robots.rigid_body import invert_positive, write_model
 
-ROW = link_row()
-FORWARD = pointer(DYNAMICS.acceleration, ACCELERATION)
+ROW = rcrt1_dynamics.link_row()
+FORWARD = pointer(rcrt1_dynamics.DYNAMICS.acceleration, ACCELERATION)
 # Two solves of matrices whose entries differ by 2e5.
 ROUNDING = 1e-9
 
@@ -39,9 +32,9 @@ def test_model_of_the_arm_is_its_closed_form(q: Array, dq: Array) -> None:
     q[2] = 0.35 + 0.01 * q[2]
     bias, inertia = model(q, dq)
     D, h, c = np.empty((3, 3)), np.empty(3), np.empty(6)
-    inertia_matrix(q, ROW, D)
-    velocity_effort(q, dq, ROW, h)
-    gravity_effort(q, ROW, c)
+    rcrt1_dynamics.inertia_matrix(q, ROW, D)
+    rcrt1_dynamics.velocity_effort(q, dq, ROW, h)
+    rcrt1_dynamics.gravity_effort(q, ROW, c)
     assert np.allclose(inertia[:3, :3], D, rtol=ROUNDING, atol=ROUNDING)
     assert np.allclose(bias[:3], h + c[:3], rtol=ROUNDING, atol=ROUNDING)
 
@@ -51,7 +44,7 @@ def test_model_and_forward_dynamics_undo_each_other(q: Array, dq: Array, wanted:
     q[2] = 0.35 + 0.01 * q[2]
     bias, inertia = model(q, dq)
     found = np.empty(6)
-    DYNAMICS.acceleration(q, dq, inertia @ wanted + bias, ROW, found)
+    rcrt1_dynamics.DYNAMICS.acceleration(q, dq, inertia @ wanted + bias, ROW, found)
     assert np.allclose(found, wanted, rtol=1e-7, atol=1e-7)
 
 

@@ -11,13 +11,7 @@ import pytest
 import yaml
 
 from present import present
-from teleop_core.base.errors import (
-    ParameterError,
-    PartError,
-    RecordingError,
-    ShapeError,
-    UnknownNameError,
-)
+from teleop_core.base import errors
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots import (
     ROBOTS,
@@ -152,16 +146,16 @@ def test_a_registered_function_gets_the_geometry(registered: Callable[..., objec
 
     assert load_robot("long_arm").fk(np.zeros(3))[0, 3] == pytest.approx(0.7)
     assert load_robot_set("long_arm", ["reach=1.0"]).fk(np.zeros(3))[0, 3] == pytest.approx(1.3)
-    with pytest.raises(UnknownNameError) as caught:
+    with pytest.raises(errors.UnknownNameError) as caught:
         load_robot("long_arm", width=1.0)
     assert caught.value.alternatives == ("reach",)
 
 
 def test_a_name_is_used_once_unless_a_cell_is_run_again(registered: Callable[..., object]) -> None:
     registered(robot_from_table(TABLE))
-    with pytest.raises(PartError, match="my_arm"):
+    with pytest.raises(errors.PartError, match="my_arm"):
         registered(robot_from_table(TABLE))
-    with pytest.raises(PartError, match="scara"):
+    with pytest.raises(errors.PartError, match="scara"):
         registered(robot_from_table(TABLE), "scara", replace=True)
     second = registered(robot_from_table(TABLE), replace=True)
     assert load_robot("my_arm") is second
@@ -175,7 +169,7 @@ def needs_a_length(length: Any) -> Robot:
 def test_what_is_no_robot_is_refused_by_name(
     registered: Callable[..., object], part: str | int | Callable[..., object] | type[Robot]
 ) -> None:
-    with pytest.raises(PartError) as caught:
+    with pytest.raises(errors.PartError) as caught:
         registered(part, "mine")
     assert (caught.value.kind, "mine" not in list_robots()) == ("robot", True)
 
@@ -244,13 +238,13 @@ def test_a_robot_with_a_wrong_kernel_is_refused_before_anything_runs(
     def ik(T: Array, seed: Array, q: Any) -> int:
         return 0
 
-    with pytest.raises(PartError, match="crank"):
+    with pytest.raises(errors.PartError, match="crank"):
         registered(crank(ik=ik))
 
 
 def test_ready_robots_take_no_geometry(registered: Callable[..., object]) -> None:
     registered(robot_from_table(TABLE))
-    with pytest.raises(ParameterError) as caught:
+    with pytest.raises(errors.ParameterError) as caught:
         load_robot("my_arm", a2=1.0)
     assert caught.value.name == "geometry"
 
@@ -261,12 +255,12 @@ def test_the_path_of_a_table_is_a_robot(tmp_path: Path) -> None:
     robot = load_robot_set(str(path), ())
     assert robot.name == "my_arm"
     assert robot.n == 3
-    with pytest.raises(RecordingError, match=r"other.yml: cannot be read: No such file"):
+    with pytest.raises(errors.RecordingError, match=r"other.yml: cannot be read: No such file"):
         load_robot(str(tmp_path / "other.yml"))
 
 
 def test_unknown_names_list_the_alternatives() -> None:
-    with pytest.raises(UnknownNameError) as caught:
+    with pytest.raises(errors.UnknownNameError) as caught:
         load_robot("r2d2")
     files = ("FILE.urdf", "FILE.xacro", "FILE.yaml")
     assert caught.value.alternatives == (*list_robots(), *files)
@@ -300,11 +294,11 @@ def test_a_robot_says_which_of_its_drives_are_assumed(name: str) -> None:
 @pytest.mark.parametrize(
     ("change", "error"),
     [
-        ({"home": [3.0]}, ParameterError),
-        ({"lower": [3.0]}, ParameterError),
-        ({"upper": [np.nan]}, ParameterError),
-        ({"home": [0.0, 0.0]}, ShapeError),
-        ({"drives": electric_cylinders(2)}, ShapeError),
+        ({"home": [3.0]}, errors.ParameterError),
+        ({"lower": [3.0]}, errors.ParameterError),
+        ({"upper": [np.nan]}, errors.ParameterError),
+        ({"home": [0.0, 0.0]}, errors.ShapeError),
+        ({"drives": electric_cylinders(2)}, errors.ShapeError),
     ],
 )
 def test_a_robot_whose_vectors_do_not_fit_is_refused(change: Mapping[str, Any], error: Any) -> None:
@@ -316,11 +310,11 @@ def test_a_robot_whose_vectors_do_not_fit_is_refused(change: Mapping[str, Any], 
 @pytest.mark.parametrize(
     ("change", "error"),
     [
-        ({"speed_limit": [0.0]}, ParameterError),
-        ({"viscous": [-1.0]}, ParameterError),
-        ({"inertia": [np.inf]}, ParameterError),
-        ({"bandwidth": [1.0, 1.0]}, ShapeError),
-        ({"assumed": ("mass",)}, UnknownNameError),
+        ({"speed_limit": [0.0]}, errors.ParameterError),
+        ({"viscous": [-1.0]}, errors.ParameterError),
+        ({"inertia": [np.inf]}, errors.ParameterError),
+        ({"bandwidth": [1.0, 1.0]}, errors.ShapeError),
+        ({"assumed": ("mass",)}, errors.UnknownNameError),
     ],
 )
 def test_impossible_drives_are_refused_by_entry(change: Any, error: Any) -> None:

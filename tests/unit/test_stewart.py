@@ -11,6 +11,7 @@ from teleop_core.base.errors import ClosureError, ParameterError, ShapeError, Un
 from teleop_core.kernels.geometry import Array, rotation, transform
 from teleop_core.robots import FkStatus, IkStatus, list_robots, load_robot
 from teleop_core.robots.stewart import PAIRED, DirectStatus, Layout
+from ways import stepped
 
 SIXTHS = np.radians([0.0, 60.0, 120.0, 180.0, 240.0, 300.0])
 # Lengths of the hybrid's source in centimetres, as the specification prints them.
@@ -49,21 +50,6 @@ def test_published_hexagons_give_the_published_legs() -> None:
     # Printed to four decimals.
     printed = [22.3607, 26.7095, 26.7095, 22.3607, 19.1569, 19.1569]
     assert np.allclose(HEXAGONS.legs(EXAMPLE), printed, atol=5e-5)
-
-
-def test_leg_jacobian_is_the_finite_difference_of_the_legs() -> None:
-    rng, step = np.random.default_rng(2), 1e-6
-    for T in poses(rng, 10):
-        for axis in range(6):
-            ahead, behind = T.copy(), T.copy()
-            if axis < 3:
-                ahead[axis, 3] += step
-                behind[axis, 3] -= step
-            else:
-                ahead[:3, :3] = rotation("xyz"[axis - 3], step) @ T[:3, :3]
-                behind[:3, :3] = rotation("xyz"[axis - 3], -step) @ T[:3, :3]
-            slope = (PAIRED.legs(ahead) - PAIRED.legs(behind)) / (2.0 * step)
-            assert np.allclose(PAIRED.leg_jacobian(T)[:, axis], slope, atol=1e-9)
 
 
 def test_published_hexagons_have_rank_five_in_every_pose() -> None:
@@ -139,21 +125,6 @@ def test_robot_legs_and_poses_are_inverse_to_each_other() -> None:
     assert np.allclose(robot.ik_all(wanted[0]), result.q[:1], atol=1e-15)
 
 
-def test_robot_jacobian_is_the_finite_difference() -> None:
-    robot, rng, step = load_robot("stewart"), np.random.default_rng(6), 1e-6
-    for T in poses(rng, 5):
-        q = robot.ik(T).q
-        J = robot.jacobian(q)
-        for leg in range(6):
-            change = step * np.eye(6)[leg]
-            ahead, behind = robot.fk(q + change), robot.fk(q - change)
-            slope = (ahead - behind) / (2.0 * step)
-            spin = slope[:3, :3] @ T[:3, :3].T
-            # Rounding of the pose over the step, third derivative times its square.
-            assert np.allclose(J[:3, leg], slope[:3, 3], atol=1e-6)
-            assert np.allclose(J[3:, leg], [spin[2, 1], spin[0, 2], spin[1, 0]], atol=1e-5)
-
-
 def test_strokes_stop_the_legs_and_the_rest_is_residual() -> None:
     robot = load_robot("stewart")
     T = transform(np.eye(3), np.array([0.0, 0.0, 0.5]))
@@ -164,19 +135,11 @@ def test_strokes_stop_the_legs_and_the_rest_is_residual() -> None:
 
 
 def test_along_a_path_through_the_singularity_the_legs_keep_their_step_and_go_on() -> None:
-    robot, step = load_robot("stewart"), 5e-4
-    limits = robot.limits()
-    limits[2] = step
+    robot, up = load_robot("stewart"), np.array([0.0, 0.0, 0.2])
     angles = np.linspace(0.0, math.radians(110.0), 400)
-    q, worst = robot.home.copy(), 0.0
-    for angle in angles:
-        T = transform(rotation("z", angle), np.array([0.0, 0.0, 0.2]))
-        found, residual = np.empty(6), np.empty(2)
-        robot.kernels.ik(T, q, limits, robot.geometry_row, found, residual)
-        assert np.isfinite(residual).all()
-        worst, q = max(worst, np.abs(found - q).max()), found
-    assert worst <= step + 1e-15
-    assert np.allclose(q, robot.ik_all(T)[0], atol=1e-12)
+    path = [transform(rotation("z", angle), up) for angle in angles]
+    found, _ = stepped(robot, path, robot.home, 5e-4)
+    assert np.allclose(found[-1], robot.ik_all(path[-1])[0], atol=1e-12)
 
 
 def test_any_layout_loads_as_a_robot_and_the_singular_one_refuses() -> None:

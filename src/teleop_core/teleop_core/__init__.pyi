@@ -27,10 +27,7 @@ from .session.exchange import (
     export_recording as export_recording,
     import_recording as import_recording,
 )
-from .chain.passivity import (
-    Passivity as Passivity,
-    register_passivity as register_passivity,
-)
+from .chain.passivity import Passivity as Passivity, register_passivity as register_passivity
 from .chain.architectures import (
     Architecture as Architecture,
     register_architecture as register_architecture,
@@ -54,15 +51,8 @@ from .chain.operators import (
 from .chain.operators.remote import RemoteHand as RemoteHand, remote_operator as remote_operator
 from .base.parameters import NoParameters as NoParameters, parameter as parameter
 from .console.controls import Control as Control, register_control as register_control
-from .slave.bridges import (
-    Bridge as Bridge,
-    Command as Command,
-    register_bridge as register_bridge,
-)
-from .slave.world import (
-    WorldObject as WorldObject,
-    register_world_object as register_world_object,
-)
+from .slave.bridges import Bridge as Bridge, Command as Command, register_bridge as register_bridge
+from .slave.world import WorldObject as WorldObject, register_world_object as register_world_object
 from .slave.plants import Physics as Physics, Plant as Plant, register_plant as register_plant
 from .session.recording import (
     Recording as Recording,

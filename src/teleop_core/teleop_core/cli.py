@@ -86,7 +86,6 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def _note(message: Warning | str, *_: object) -> None:
-    """Show a warning as one line."""
     print(f"note: {one_line(str(message))}", file=sys.stderr)
 
 

@@ -138,7 +138,6 @@ class _ArmBag(Bag):
         return name.removeprefix(self._prefix) if is_own else None
 
     def _recorded(self, topic: Topic | str) -> str:
-        """Name of a topic in the whole recording."""
         name = topic.name if isinstance(topic, Topic) else topic.removeprefix("/")
         return name if name == DIAGNOSTICS.name else self._prefix + name
 

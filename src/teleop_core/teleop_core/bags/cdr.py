@@ -62,7 +62,6 @@ class Template:
 
 
 def _stamped(frame_id: str) -> Template:
-    """Message with a header."""
     cdr = Template()
     cdr.gap("i", slice(-2, -1))
     cdr.gap("I", slice(-2, -1))

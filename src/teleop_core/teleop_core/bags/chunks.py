@@ -196,7 +196,6 @@ def _cuts(stretches: Sequence[Stretch], total: int, size: int) -> list[int]:
 
 
 def _chunk(data: Bytes, begin: int, index: Mapping[int, Entries]) -> Chunk:
-    """Chunk of bytes that stood at ``begin``, and their part of the index."""
     base = np.array((0, begin), np.uint64)
     start_ns = min(int(rows[0, 0]) for rows in index.values())
     end_ns = max(int(rows[-1, 0]) for rows in index.values())

@@ -252,7 +252,6 @@ def _note_cold(found: Contents, data: Bytes, rows: walk.Rows) -> None:
 
 
 def _note_chunk(found: Contents, data: Bytes, offset: int) -> None:
-    """Note what is inside of a chunk."""
     rows, _ = walk.walk(data, 0, len(data))
     _note_cold(found, data, rows)
     messages = rows[rows[:, walk.OPCODE] == Opcode.MESSAGE]

@@ -100,7 +100,6 @@ class MemoryBag(Bag):
 
 
 def _ordered(series: Series, joint_names: tuple[str, ...] | None) -> Series:
-    """The series with its joints in a wanted order."""
     if not joint_names or joint_names == series.names or not series.names:
         return series
     parts = series.values.shape[1] // len(series.names)

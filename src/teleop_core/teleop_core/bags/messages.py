@@ -13,15 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from teleop_core.bags.layouts import (
-    SECOND_NS,
-    Layout,
-    Stamps,
-    Values,
-    discover,
-    layout,
-    layout_of,
-)
+from teleop_core.bags.layouts import SECOND_NS, Layout, Stamps, Values, discover, layout, layout_of
 from teleop_core.bags.reports import Report, read_reports, report
 from teleop_core.bags.ros_types import deserialise
 from teleop_core.graph.topics import Kind
@@ -76,10 +68,7 @@ def check(kind: Kind, stamp_ns: int, values: Values, last_stamp_ns: int | None) 
 
 
 def read_values(
-    kind: Kind,
-    message: Any,
-    joint_names: tuple[str, ...] = (),
-    buttons: tuple[int, ...] = BUTTONS,
+    kind: Kind, message: Any, joint_names: tuple[str, ...] = (), buttons: tuple[int, ...] = BUTTONS
 ) -> tuple[int, Values] | Refusal:
     """Stamp [ns] and values of any message of a kind, read by attribute.
 
@@ -103,10 +92,7 @@ def read_values(
 
 
 def read_any(
-    kind: Kind,
-    data: bytes,
-    joint_names: tuple[str, ...] = (),
-    buttons: tuple[int, ...] = BUTTONS,
+    kind: Kind, data: bytes, joint_names: tuple[str, ...] = (), buttons: tuple[int, ...] = BUTTONS
 ) -> tuple[int, Values] | Refusal:
     """Stamp [ns] and values of the bytes of any message of a kind; or why it cannot be used.
 

@@ -112,7 +112,7 @@ class Column:
             f"{self.frame_id!r}"
             for frame, count in self._frames.items()
             if frame != self.frame_id and not self.kind.has_names
-        ]  # fmt: skip
+        ]
 
     def _begin(self, data: Bytes, begins: Stamps, sizes: Stamps) -> None:
         """Learn from the first message that can be read, of those of the commonest size first."""
@@ -140,7 +140,6 @@ class Column:
             raise ValueError(f"lacks joints {', '.join(missing)}; it has {', '.join(names)}")
 
     def _fast(self, data: Bytes, begins: Stamps, sizes: Stamps) -> tuple[Stamps, Values] | None:
-        """Stamps and values if all messages are alike."""
         form = self._layout
         if form is None or not len(sizes) or sizes.min() != sizes.max() or sizes[0] < form.size:
             return None

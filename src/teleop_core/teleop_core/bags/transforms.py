@@ -67,7 +67,6 @@ class TransformMessages:
 
 
 def _places(begins: list[int], size: int) -> NDArray[np.int64]:
-    """Places of all bytes of pieces of one size."""
     return np.asarray(np.add.outer(begins, np.arange(size)).ravel())
 
 

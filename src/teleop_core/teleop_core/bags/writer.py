@@ -88,11 +88,12 @@ class BagWriter:
         numbers = {topic.name: i for i, topic in enumerate(self._topics, start=1)}
         self._channels = {
             topic.name: _Channel(
-                numbers.get(topic.name, 0), every[topic.name],
+                numbers.get(topic.name, 0),
+                every[topic.name],
                 None if topic.kind is Kind.REPORT else layout(topic, named.get(topic.arm, ())),
             )
             for topic in declared
-        }  # fmt: skip
+        }
         self._singles: list[Single] = []
         self._bytes, self._first_ns = 0, 0
         self._failure: BaseException | None = None

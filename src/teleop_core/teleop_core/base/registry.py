@@ -105,6 +105,10 @@ class Registry(Generic[Part]):
         self._parts[name] = checked
         return checked
 
+    def register(self, part: Part, *, replace: bool = False) -> Part:
+        """Add a part under its own name for the rest of the program; see :meth:`add`."""
+        return self.add(getattr(part, "name", type(part).__name__), part, replace=replace)
+
     def remove(self, name: str) -> None:
         """Take away a part that the program added; its name is free again.
 
@@ -146,6 +150,11 @@ class Registry(Generic[Part]):
             reason = f"{type(error).__name__}: {' '.join(str(error).split())}"
             expected = f"loadable from {entry.value} ({reason})"
             raise PartError(self.kind, name, expected) from error
+
+
+def places(package: str, names: str) -> dict[str, str]:
+    """Places of parts called like their files: ``NOTCH`` of ``notch.py`` for the name "notch"."""
+    return {name: f"{package}.{name}:{name.upper()}" for name in names.split()}
 
 
 @cache

@@ -10,12 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from teleop_core.base.errors import ParameterError, TeleopError
 from teleop_core.base.texts import printable
-from teleop_core.commands.arguments import (
-    command,
-    ros_module,
-    setting_arguments,
-    without_argument,
-)
+from teleop_core.commands.arguments import command, ros_module, setting_arguments, without_argument
 
 if TYPE_CHECKING:
     from teleop_core.console.server import ConsoleServer

@@ -17,8 +17,9 @@ def _run(_: argparse.Namespace) -> int:
     from teleop_core.base.errors import SessionError
 
     searches: tuple[tuple[str, Callable[[], Iterator[str]]], ...] = (
-        ("gamepad", _gamepads), ("spacemouse", _space_mice),
-    )  # fmt: skip
+        ("gamepad", _gamepads),
+        ("spacemouse", _space_mice),
+    )
     for operator, search in searches:
         try:
             names = list(search())

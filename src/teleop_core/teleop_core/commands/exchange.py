@@ -58,7 +58,6 @@ def _add_import(commands: Any) -> None:
 
 
 def _options(parser: argparse.ArgumentParser) -> None:
-    """What can be said of one hand."""
     # `--axes +y -x +z`: -x is a value; argparse lets only what looks like a number be one.
     parser._negative_number_matcher = re.compile(r"-([xyz]|\d+|\d*\.\d+)$")
     _time(parser.add_argument_group("time"))
@@ -96,9 +95,10 @@ def _place(group: Any) -> None:
     )
     group.add_argument("--quaternion", nargs="+", metavar="COL", help="four columns")
     group.add_argument(
-        "--quaternion-order", choices=("auto", "wxyz", "xyzw"),
+        "--quaternion-order",
+        choices=("auto", "wxyz", "xyzw"),
         help="order of these columns (default: as their names say, else wxyz)",
-    )  # fmt: skip
+    )
     group.add_argument("--matrix", nargs="+", metavar="COL", help="nine columns of a rotation")
     group.add_argument(
         "--matrix-order", choices=("row", "column"), help="row by row (default) or column by column"
@@ -140,14 +140,16 @@ def _changes(group: Any) -> None:
         help="the master's x, y, z as axes of the file, such as +y -x +z",
     )  # fmt: skip
     group.add_argument(
-        "--handedness", choices=("right", "left"),
+        "--handedness",
+        choices=("right", "left"),
         help="left: axes as in game engines; --axes must mirror then (default: right)",
-    )  # fmt: skip
+    )
     group.add_argument("--scale", type=float, metavar="X", help="multiplies positions (default: 1)")
     group.add_argument(
-        "--center", choices=("keep", "mean", "middle", "start"),
+        "--center",
+        choices=("keep", "mean", "middle", "start"),
         help="point that becomes the origin: mean, middle of the range, or start (default: keep)",
-    )  # fmt: skip
+    )
 
 
 def _damage(group: Any) -> None:
@@ -165,9 +167,10 @@ def _damage(group: Any) -> None:
         help="longest gap to interpolate [s] (default: 0.1)",
     )
     group.add_argument(
-        "--backwards", choices=("auto", "refuse", "drop", "sort"),
+        "--backwards",
+        choices=("auto", "refuse", "drop", "sort"),
         help="rows whose time goes back (default: drop up to 1 %%, refuse more)",
-    )  # fmt: skip
+    )
     group.add_argument(
         "--gap", type=float, metavar="N", help="report gaps longer than N periods (default: 5)"
     )
@@ -233,9 +236,8 @@ def _import(arguments: argparse.Namespace) -> int:
 
     arms = {name: _given(_of_arm(name, text)) for name, text in arguments.arm}
     report = import_recording(
-        arguments.file, arguments.out, preset=arguments.preset or "", arms=arms,
-        **_given(arguments),
-    )  # fmt: skip
+        arguments.file, arguments.out, preset=arguments.preset or "", arms=arms, **_given(arguments)
+    )
     print(printable(str(report)))
     print(f"{arguments.out}: {report.duration:.1f} s imported; next: "
           f"teleop replay {arguments.out} --out {arguments.out}_replayed")  # fmt: skip
@@ -260,7 +262,6 @@ def _of_arm(name: str, text: str) -> argparse.Namespace:
 
 
 def _given(arguments: argparse.Namespace) -> dict[str, Any]:
-    """Options that were given, by name."""
     given = vars(arguments)
     names = ImportOptions.__dataclass_fields__
     return {name: given[name] for name in names if given.get(name) is not None}

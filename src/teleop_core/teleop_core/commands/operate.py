@@ -85,7 +85,6 @@ def _stop(arguments: argparse.Namespace) -> int:
 
 
 def _stopped(arm: "ArmState") -> str:
-    """How an arm stopped, with its times."""
     values = arm.values
     return (
         f"stopped, confirmed after {1e3 * arm.stopped_after:.0f} ms; at rest "

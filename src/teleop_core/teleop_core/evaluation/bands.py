@@ -100,7 +100,6 @@ def merged(stretches: Array, count: int = _STRETCHES) -> Array:
 
 
 def _named(cause: str, history: StateHistory, is_so: NDArray[np.bool_]) -> str:
-    """The cause, with the joints that are at their limits."""
     if cause != _COLORS[Limit.JOINT][0]:
         return cause
     joints = np.unique(history.rows[is_so, STATE["limited_joint"]])

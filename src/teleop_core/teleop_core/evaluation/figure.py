@@ -74,7 +74,7 @@ def along(
         during: Begin and end of the stretches [s] in which it is drawn at all; None for always.
         colored: Whether its colour tells the time; in space only.
         whole: Whether all of it stays, as what surrounds the visible part.
-    """  # fmt: skip
+    """
     stretches = None if during is None else [list(stretch) for stretch in during]
     meta = {"path": True, "during": stretches, "colored": colored, "whole": whole}
     return {**trace, "customdata": times, "meta": meta}

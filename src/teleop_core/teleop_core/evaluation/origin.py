@@ -193,7 +193,6 @@ def _slave(layer: Layer, arm: str) -> tuple[str | None, str | None]:
 
 
 def _geometry(layer: Layer, arm: str) -> tuple[str, ...]:
-    """Settings of the robot."""
     said = _said(layer, SLAVE_SIM.name, arm).get("geometry")
     return tuple(map(str, said)) if isinstance(said, list | tuple) else ()
 
@@ -222,10 +221,8 @@ def _tool(layer: Layer, arm: str) -> tuple[Array, Array] | None:
 
 
 def _axes(layer: Layer, arm: str) -> Array:
-    """Map of the axes."""
     return axis_map("axes", _mapping(layer, arm, ("axes",)).axes)
 
 
 def _operator(layer: Layer, arm: str) -> Mapping[str, object]:
-    """What is said of the operator."""
     return _said(layer, OPERATOR.name, arm)

@@ -116,7 +116,6 @@ class Arrays:
 
 
 def _recording(study: Study) -> dict[str, Any]:
-    """What all plots of a recording share."""
     bands = [
         {
             "cause": band.cause,

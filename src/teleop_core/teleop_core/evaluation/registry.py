@@ -89,8 +89,9 @@ METRICS: Registry[type[Metric]] = Registry(
         "orientation_error_deg": f"{_FOLDER}.orientation_error:OrientationErrorMetric",
         "true_error_mm": f"{_FOLDER}.position_error:TrueErrorMetric",
         "command_error_mm": f"{_FOLDER}.position_error:CommandErrorMetric",
-        "command_orientation_error_deg":
-            f"{_FOLDER}.orientation_error:CommandOrientationErrorMetric",
+        "command_orientation_error_deg": (
+            f"{_FOLDER}.orientation_error:CommandOrientationErrorMetric"
+        ),
         "fixture": f"{_FOLDER}.fixture:FixtureMetric",
         "force_n": f"{_FOLDER}.force:ForceMetric",
         "contact": f"{_FOLDER}.contact:ContactMetric",
@@ -110,7 +111,7 @@ METRICS: Registry[type[Metric]] = Registry(
         "topics": f"{_FOLDER}.counts:TopicsMetric",
     },
     check_metric,
-)  # fmt: skip
+)
 """All metrics, in the order of the score."""
 
 

@@ -62,10 +62,7 @@ class Study(NamedTuple):
 
 
 def evaluate(
-    bag: Bag,
-    arm: str = "",
-    further: Sequence[type[Metric]] = (),
-    span: Seconds | None = None,
+    bag: Bag, arm: str = "", further: Sequence[type[Metric]] = (), span: Seconds | None = None
 ) -> Score:
     """Score of one arm of a recording.
 
@@ -94,10 +91,7 @@ def scores(
 
 
 def study(
-    bag: Bag,
-    arm: str = "",
-    further: Sequence[type[Metric]] = (),
-    span: Seconds | None = None,
+    bag: Bag, arm: str = "", further: Sequence[type[Metric]] = (), span: Seconds | None = None
 ) -> Study:
     """Score of one arm with its metrics; raises as :func:`evaluate`."""
     makers = all_metrics(further)

@@ -80,8 +80,9 @@ class StampTallies:
         sources, played = origin.sources, origin.played
         self.of = {
             t.name: StampTally(t, sources.get(t.name), is_played=t.name in played)
-            for t in streams if t.name in recorded
-        }  # fmt: skip
+            for t in streams
+            if t.name in recorded
+        }
 
     def add(self, window: Window) -> None:
         """Take one window."""

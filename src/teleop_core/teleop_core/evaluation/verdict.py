@@ -28,7 +28,8 @@ _ADVICE = {
     "the controller other gains",
     "topics": "stages or the recorder were too late to take them: the machine or the network was "
     "busy",
-    "ticks.made_up": _BUSY, "ticks.dropped": _BUSY,
+    "ticks.made_up": _BUSY,
+    "ticks.dropped": _BUSY,
     "latency_ms.total.p99": "commands came late: the table of latencies names the stage",
     "passivity.slave.out_mj": "delayed forces gave energy, which makes touches bounce: choose "
     "reflection.passivity",
@@ -36,7 +37,7 @@ _ADVICE = {
     "or the delay, or choose reflection.passivity",
     "fixture.penetration_max_mm": "the hand pushed through the fixture: raise its stiffness, or "
     "push less",
-}  # fmt: skip
+}
 Values = Mapping[str, Leaf]
 """Numbers of a score by their keys."""
 

@@ -39,8 +39,9 @@ def write_workspace_page(robot: Robot, points: Array, values: Array, file: Path)
         plots.Scatter3d(
             x=x, y=y, z=z, mode="markers", marker={**marker, "colorbar": bar, "showscale": True}
         ),
-        row=1, col=1,
-    )  # fmt: skip
+        row=1,
+        col=1,
+    )
     for row, second in ((1, y), (2, z)):
         trace = plots.Scattergl(x=x, y=second, mode="markers", marker=marker)
         figure.add_trace(trace, row=row, col=2)

@@ -46,9 +46,10 @@ class SessionParameters:
         10.0, unit="s", lower=0.001, upper=86400.0, doc="simulated or live time"
     )
     arms: tuple[str, ...] = parameter(
-        (), fixed=True,
+        (),
+        fixed=True,
         doc="names of the arms, the first of which keeps the plain topics; empty: one without name",
-    )  # fmt: skip
+    )
     stages: tuple[str, ...] = parameter(
         (), fixed=True, doc="further stages of every arm, beside the built-in ones"
     )

@@ -398,7 +398,5 @@ STAGES: Registry[Stage] = Registry(
 )
 """All stages by name, in the order in which data goes through the built-in ones."""
 
-
-def register_stage(stage: Stage, *, replace: bool = False) -> Stage:
-    """Add a stage under its own name for the rest of the program; see :meth:`Registry.add`."""
-    return STAGES.add(stage.name, stage, replace=replace)
+register_stage = STAGES.register
+"""Adds one of yours under its own name; see :meth:`Registry.register`."""

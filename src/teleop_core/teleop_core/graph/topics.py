@@ -7,9 +7,7 @@ arm called ``left`` has ``left/slave/servo_cp`` and so on.
 from dataclasses import dataclass, replace
 from enum import Enum, IntEnum
 
-STATE_COMMANDS = (
-    "enable", "disable", "pause", "resume", "home", "unhome", "reset", "stop"
-)  # fmt: skip
+STATE_COMMANDS = ("enable", "disable", "pause", "resume", "home", "unhome", "reset", "stop")
 """What an arm in operation is told, by name; see :mod:`teleop_core.slave.operation`."""
 OPERATION = (
     "state", "is_homed", "is_busy", "is_stopped", "fault", "fault_joint", "fault_value",
@@ -120,9 +118,7 @@ class Kind(Enum):
         """Number of columns for a robot with this many joints, or a topic with so many names."""
         fixed = {Kind.POSE: 7, Kind.TWIST: 6, Kind.WRENCH: 6, Kind.BUTTONS: 3, Kind.REPORT: 0,
                  Kind.JAW: 3}  # fmt: skip
-        return {
-            Kind.NUMBERS: joints, Kind.JOINTS: joints, Kind.STATE: 3 * joints, **fixed
-        }[self]  # fmt: skip
+        return {Kind.NUMBERS: joints, Kind.JOINTS: joints, Kind.STATE: 3 * joints, **fixed}[self]
 
 
 JAW = ("jaw",)
@@ -297,13 +293,9 @@ SLAVE_MEASURED_JS = Topic("slave/measured_js", Kind.STATE, SAMPLED, "slave_base"
 SLAVE_MEASURED_CP = Topic(
     "slave/measured_cp", Kind.POSE, passed_on("slave/measured_js"), "slave_base"
 )
-SLAVE_MEASURED_CF = Topic(
-    "slave/measured_cf", Kind.WRENCH, SAMPLED, "slave_base", is_seldom=True
-)  # fmt: skip
+SLAVE_MEASURED_CF = Topic("slave/measured_cf", Kind.WRENCH, SAMPLED, "slave_base", is_seldom=True)
 """What the sensor tells of the force on the tip, along slave_base, and of the torque about it."""
-SLAVE_ESTIMATED_CF = Topic(
-    "slave/estimated_cf", Kind.WRENCH, SAMPLED, "slave_base", is_seldom=True
-)  # fmt: skip
+SLAVE_ESTIMATED_CF = Topic("slave/estimated_cf", Kind.WRENCH, SAMPLED, "slave_base", is_seldom=True)
 """What drive efforts and joint motion tell of the force on the tip, along slave_base, without a
 sensor; zero where ``slave_sim.force_sensor.estimate`` is off, and while brakes hold the arm."""
 SLAVE_TRUE_CP = Topic("slave/true_cp", Kind.POSE, SAMPLED, "slave_base")
@@ -311,8 +303,9 @@ SLAVE_TRUE_CP = Topic("slave/true_cp", Kind.POSE, SAMPLED, "slave_base")
 SLAVE_TRUE_CF = Topic("slave/true_cf", Kind.WRENCH, SAMPLED, "slave_base", is_seldom=True)
 """The world's force on the tip, along slave_base, and no torque about the tip: what an ideal sensor
 would tell. Only a simulator knows."""
-SLAVE_OPERATION = Topic("slave/operation", Kind.REPORT, SAMPLED, quality=Quality.LATCHED,
-                        columns=OPERATION)  # fmt: skip
+SLAVE_OPERATION = Topic(
+    "slave/operation", Kind.REPORT, SAMPLED, quality=Quality.LATCHED, columns=OPERATION
+)
 """Whether the slave may move, what stopped it, and what it takes to go on; sent where it changes.
 See :mod:`teleop_core.slave.operation`."""
 TELEOP_STATE = Topic(
@@ -427,7 +420,7 @@ HAND_BUTTONS = Topic("hand/buttons", Kind.BUTTONS, SAMPLED, "master_base", is_se
 """Which buttons of the stylus the operator presses."""
 HAND_TREMOR = Topic(
     "hand/tremor", Kind.NUMBERS, SAMPLED, "master_base", columns=("x", "y", "z"), is_seldom=True
-)  # fmt: skip
+)
 """By how much the tip is off [m], whatever the device's friction swallows of the hand's motion."""
 HAND_JAW = Topic(
     "hand/jaw", Kind.NUMBERS, SAMPLED, "master_base", columns=("closing",), is_seldom=True
@@ -439,7 +432,7 @@ there. Silence lets go. As ``operator/buttons`` it comes from outside: no stage 
 not recorded."""
 OPERATOR_BUTTONS = Topic(
     "operator/buttons", Kind.BUTTONS, SAMPLED, "master_base", quality=Quality.REPORT
-)  # fmt: skip
+)
 """Buttons that this person presses and releases: each message counts, so it is sent reliably."""
 DIAGNOSTICS = Topic("diagnostics", Kind.REPORT, Stamp("time of the report"), quality=Quality.REPORT)
 

@@ -31,6 +31,4 @@ def lag_step(
     Source:
         Vongbunyong 2008, eqs. 6.2.8-6.2.9; printed there with the pole outside the unit circle.
     """
-    return (
-        (1.0 - pole * dt) * last_output + gain * (zero * dt - 1.0) * last_input + gain * value
-    )  # fmt: skip
+    return (1.0 - pole * dt) * last_output + gain * (zero * dt - 1.0) * last_input + gain * value

@@ -338,9 +338,7 @@ class _Hand:
         self._lock, self._pressing = threading.Lock(), threading.Lock()
         self._publishers = [
             owner.ros.create_publisher(
-                message_type(topic.kind.ros_type),
-                f"/{topic.of_arm(arm).name}",
-                Qos(depth=10),
+                message_type(topic.kind.ros_type), f"/{topic.of_arm(arm).name}", Qos(depth=10)
             )
             for topic in (OPERATOR_SERVO_CP, OPERATOR_BUTTONS)
         ]

@@ -35,15 +35,7 @@ from teleop_core.robots.kinematics import (
     IkStatus,
     Kernels,
 )
-from teleop_core.robots.parts import (
-    ARGUMENT,
-    ROBOTS,
-    Part,
-    RobotPart,
-    built,
-    from_file,
-    part_name,
-)
+from teleop_core.robots.parts import ARGUMENT, ROBOTS, Part, RobotPart, built, from_file, part_name
 from teleop_core.robots.robot import Robot
 
 if TYPE_CHECKING:

@@ -19,12 +19,7 @@ import numpy as np
 
 from teleop_core.kernels import inner, kernel
 from teleop_core.kernels.geometry import Array
-from teleop_core.robots.branches import (
-    cost_of,
-    is_allowed,
-    turn,
-    wrapped,
-)
+from teleop_core.robots.branches import cost_of, is_allowed, turn, wrapped
 from teleop_core.robots.damped import ZERO, assign
 from teleop_core.robots.dh_kernels import descend, descend_long, fk, pose_of_chain
 from teleop_core.robots.kinematics import IkStatus, pose_residual

@@ -46,10 +46,7 @@ class Solution:
 SEARCH = Solution(
     text="search: damped least squares from the seed, then from 24 starts or more",
     kernels=Kernels(
-        fk=dh_kernels.fk,
-        jacobian=dh_kernels.jacobian,
-        ik=dh_kernels.ik,
-        ik_all=dh_kernels.ik_all,
+        fk=dh_kernels.fk, jacobian=dh_kernels.jacobian, ik=dh_kernels.ik, ik_all=dh_kernels.ik_all
     ),
 )
 
@@ -157,7 +154,6 @@ class _Chain:
 
 
 def _degrees(sine: float) -> float:
-    """Angle in degrees."""
     return math.degrees(math.asin(min(sine, 1.0)))
 
 

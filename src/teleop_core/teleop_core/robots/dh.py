@@ -46,13 +46,7 @@ from teleop_core.base import plain_yaml
 from teleop_core.base.damage import damage_told
 from teleop_core.base.errors import ParameterError, UnknownNameError
 from teleop_core.base.ranges import check
-from teleop_core.robots.dh_chain import (
-    CONVENTIONS,
-    DhJoint,
-    DhRow,
-    DhTable,
-    elementary,
-)
+from teleop_core.robots.dh_chain import CONVENTIONS, DhJoint, DhRow, DhTable, elementary
 from teleop_core.robots.dh_drives import parse_drives
 from teleop_core.robots.kinematics import DIRECTIONS
 from teleop_core.robots.robot import Robot

@@ -22,13 +22,7 @@ from teleop_core.kernels.geometry import Array
 from teleop_core.robots.branches import OUTSIDE, hold, is_allowed, move_cost, turn, turned, wrapped
 from teleop_core.robots.drives import ENTRIES, Drives
 from teleop_core.robots.kinematics import REACHED, IkStatus, Kernels, is_askable, pose_residual
-from teleop_core.robots.planar_3r import (
-    NEAR,
-    elbow_angle,
-    first_angle,
-    pointing,
-    second_angle,
-)
+from teleop_core.robots.planar_3r import NEAR, elbow_angle, first_angle, pointing, second_angle
 from teleop_core.robots.robot import Robot, geometry_of
 
 JOINTS = tuple(f"theta{i}" for i in range(1, 6))

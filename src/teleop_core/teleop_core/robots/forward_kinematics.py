@@ -8,14 +8,7 @@ from teleop_core.base.errors import ClosureError, ParameterError, ShapeError
 from teleop_core.kernels import raise_pending
 from teleop_core.kernels.geometry import Array, checked_array, is_rigid
 from teleop_core.robots import kinematics
-from teleop_core.robots.kinematics import (
-    MAX_ASSEMBLIES,
-    SEARCH,
-    FkBatch,
-    FkOne,
-    FkResult,
-    FkStatus,
-)
+from teleop_core.robots.kinematics import MAX_ASSEMBLIES, SEARCH, FkBatch, FkOne, FkResult, FkStatus
 
 if TYPE_CHECKING:
     from teleop_core.robots.robot import Robot

@@ -19,17 +19,10 @@ import numpy as np
 from teleop_core.base.errors import ParameterError
 from teleop_core.kernels import inner, kernel
 from teleop_core.kernels.geometry import Array
+from teleop_core.robots import kinematics
 from teleop_core.robots.branches import bounded, turned, wrapped
 from teleop_core.robots.drives import geared_motors
 from teleop_core.robots.four_bar_loop import Assembly, Closure, FourBar
-from teleop_core.robots.kinematics import (
-    REACHED,
-    FkStatus,
-    IkStatus,
-    Kernels,
-    is_askable,
-    pose_residual,
-)
 from teleop_core.robots.robot import Robot, geometry_of
 
 __all__ = ["GEOMETRY", "Assembly", "Closure", "FourBar", "make"]
@@ -42,10 +35,13 @@ _SAMPLES = 90  # of the coupler curve, in the search for its nearest point
 _NEAR = 0.02
 _ROUNDING = 1e-12
 _CLOSE = 1e-15  # m, where going further down makes no difference
-_FOLLOWED, _LIMITED = int(IkStatus.FOLLOWED), int(IkStatus.LIMITED)
-_CLOSED, _NOT_CLOSED = int(FkStatus.CLOSED), int(FkStatus.NOT_CLOSED)
-_NEAR_SINGULAR_FK = int(FkStatus.NEAR_SINGULAR)
-_NEAR_SINGULAR, _UNREACHABLE = int(IkStatus.NEAR_SINGULAR), int(IkStatus.UNREACHABLE)
+_FOLLOWED, _LIMITED = int(kinematics.IkStatus.FOLLOWED), int(kinematics.IkStatus.LIMITED)
+_CLOSED, _NOT_CLOSED = int(kinematics.FkStatus.CLOSED), int(kinematics.FkStatus.NOT_CLOSED)
+_NEAR_SINGULAR_FK = int(kinematics.FkStatus.NEAR_SINGULAR)
+_NEAR_SINGULAR, _UNREACHABLE = (
+    int(kinematics.IkStatus.NEAR_SINGULAR),
+    int(kinematics.IkStatus.UNREACHABLE),
+)
 
 
 class Directions(NamedTuple):
@@ -112,7 +108,7 @@ def assemble(q: Array, geometry: Array, ask: Array, T: Array, out: Array) -> int
     y = g[3] * links.rocker_y - g[1] * links.crank_y
     out[0] = abs(math.sqrt(x * x + y * y) - g[2])
     out[1] = g[5] * geometry[5]
-    if out[0] > REACHED:
+    if out[0] > kinematics.REACHED:
         return _NOT_CLOSED
     sine = links.rocker_y * links.coupler_x - links.rocker_x * links.coupler_y
     return _NEAR_SINGULAR_FK if abs(sine) < _NEAR else _CLOSED
@@ -126,7 +122,7 @@ def assemblies(q: Array, geometry: Array, found: Array) -> int:
         return 0
     g[5] = -g[5]
     fk(q, g, found[1])
-    return 2 if np.abs(found[0] - found[1]).max() > REACHED else 1
+    return 2 if np.abs(found[0] - found[1]).max() > kinematics.REACHED else 1
 
 
 @inner
@@ -207,7 +203,7 @@ def _nearest(T: Array, seed: float, limits: Array, g: Array) -> float:
     for side in (1.0, -1.0):
         angle = turned(middle + side * half, seed, lower, upper, False)
         is_nearer = abs(angle - seed) < cost and lower - _ROUNDING <= angle <= upper + _ROUNDING
-        if is_nearer and _distance(angle, T, g) <= REACHED:
+        if is_nearer and _distance(angle, T, g) <= kinematics.REACHED:
             best, cost = angle, abs(angle - seed)
     if cost < math.inf:
         return best
@@ -227,7 +223,7 @@ def ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual
     In a path the crank goes down the distance from where it is, so it stays on its part of the
     curve; otherwise the whole curve is searched.
     """
-    if not is_askable(T, seed):
+    if not kinematics.is_askable(T, seed):
         return -1
     lower, upper = limits[0, 0], limits[1, 0]
     start = bounded(seed[0], seed[0], lower, upper, math.inf)
@@ -239,8 +235,8 @@ def ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual
     q[0] = min(max(_refined(start, lower, upper, T, geometry), limits[0, 0]), limits[1, 0])
     reached = np.empty((4, 4))
     fk(q, geometry, reached)
-    pose_residual(reached, T, residual)
-    if _distance(q[0], T, geometry) > REACHED:
+    kinematics.pose_residual(reached, T, residual)
+    if _distance(q[0], T, geometry) > kinematics.REACHED:
         return _LIMITED if q[0] <= lower or q[0] >= upper else _UNREACHABLE
     links = _links(q[0], geometry)
     sine = links.rocker_y * links.coupler_x - links.rocker_x * links.coupler_y
@@ -254,8 +250,8 @@ def ik_all(T: Array, geometry: Array, solutions: Array) -> int:
     middle, half = _candidates(T, geometry)
     for side in (1.0, -1.0):
         angle = wrapped(middle + side * half)
-        is_exact = _distance(angle, T, geometry) <= REACHED
-        if is_exact and (count == 0 or abs(wrapped(angle - solutions[0, 0])) > REACHED):
+        is_exact = _distance(angle, T, geometry) <= kinematics.REACHED
+        if is_exact and (count == 0 or abs(wrapped(angle - solutions[0, 0])) > kinematics.REACHED):
             solutions[count, 0] = angle
             count += 1
     return count
@@ -282,7 +278,7 @@ def make(**geometry: float | str) -> Robot:
         upper=np.array([upper]),
         home=np.array([0.5 * (lower + upper)]),
         geometry=row,
-        kernels=Kernels(
+        kernels=kinematics.Kernels(
             fk=fk, jacobian=jacobian, ik=ik, ik_all=ik_all, assemble=assemble, assemblies=assemblies
         ),
         drives=drives,

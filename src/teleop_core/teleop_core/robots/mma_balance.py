@@ -160,36 +160,6 @@ def shoulder_load(theta2: float | Array, spring: ShoulderSpring | None = None) -
     return ShoulderLoad(gravity, lifting, gravity - lifting)
 
 
-def cam_pulley_radius(theta: float | Array, weight_moment: float, rate: float) -> Array:
-    """Radius r(θ) [m] of the cable on a cam that balances one link exactly.
-
-    A spring of ``rate`` [N/m] pulls the cable; ``weight_moment`` is m g l [N·m] and θ [rad] the
-    angle from the upright. r solves k r³ - mgl sin(θ) r' + mgl r cos(θ) = 0.
-
-    Raises:
-        ParameterError: A value is not positive.
-
-    Source:
-        Ulrich and Kumar, in Singh 2014, eqs. 5.1-5.8.
-    """
-    scale = math.sqrt(_positive("weight_moment", weight_moment) / _positive("rate", rate))
-    return scale * np.sin(0.5 * np.asarray(theta))
-
-
-def cam_profile(theta: float | Array, weight_moment: float, rate: float) -> tuple[Array, Array]:
-    """Polar form of the cam: distance [m] of the point that the cable leaves, and its angle [rad].
-
-    Raises:
-        ParameterError: A value is not positive.
-
-    Source:
-        Ulrich and Kumar, in Singh 2014, eqs. 5.9-5.10.
-    """
-    radius = cam_pulley_radius(theta, weight_moment, rate)
-    slope = 0.5 * math.sqrt(weight_moment / rate) * np.cos(0.5 * np.asarray(theta))
-    return np.hypot(radius, slope), np.arctan2(slope, radius)
-
-
 def _positive(name: str, value: float) -> float:
     if not (math.isfinite(value) and value > 0.0):
         raise ParameterError(name, value, "finite and > 0")

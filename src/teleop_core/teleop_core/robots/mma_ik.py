@@ -15,16 +15,8 @@ import numpy as np
 
 from teleop_core.kernels import inner, kernel
 from teleop_core.kernels.geometry import Array
+from teleop_core.robots import damped
 from teleop_core.robots.branches import bounded
-from teleop_core.robots.damped import (
-    ZERO,
-    assign,
-    damped_move,
-    free_joints,
-    is_near_singular,
-    pose_error,
-    weigh,
-)
 from teleop_core.robots.kinematics import IkStatus, is_askable, pose_residual
 from teleop_core.robots.mma_branches import BRANCHES, branch, least_miss, nearest_branch, unwrapped
 from teleop_core.robots.mma_forward import fk, groups, jacobian_at
@@ -57,27 +49,27 @@ def _descend(T: Array, box: Array, geometry: Array, rounds: int, q: Array) -> fl
     """
     J, reached, is_free = np.empty((6, 7)), np.empty((4, 4)), np.empty(7)
     error, left, trial = np.empty(6), np.empty(6), np.empty(7)
-    assign(trial, q)
+    damped.assign(trial, q)
     square, damping = math.inf, _DAMPING
     for _ in range(rounds):
         fk(trial, geometry, reached)
-        trial_square = pose_error(reached, T, LENGTH, left)
+        trial_square = damped.pose_error(reached, T, LENGTH, left)
         if trial_square < square:
             is_stalled = trial_square > (1.0 - _STALLED) * square
             square, damping = trial_square, max(0.2 * damping, _LEAST_DAMPING)
-            assign(error, left)
-            assign(q, trial)
-            if square <= ZERO or is_stalled:
+            damped.assign(error, left)
+            damped.assign(q, trial)
+            if square <= damped.ZERO or is_stalled:
                 break
             jacobian_at(q, geometry, reached, J)
-            weigh(J, LENGTH)
-            if free_joints(J, error, q, box, is_free) <= 1e-9 * math.sqrt(square):
+            damped.weigh(J, LENGTH)
+            if damped.free_joints(J, error, q, box, is_free) <= 1e-9 * math.sqrt(square):
                 break
         else:
             damping *= 10.0
             if damping > _HOPELESS:
                 break
-        damped_move(J, error, damping * square, is_free, box, q, trial)
+        damped.damped_move(J, error, damping * square, is_free, box, q, trial)
     return float(square)
 
 
@@ -100,8 +92,8 @@ def _approach(T: Array, box: Array, geometry: Array, rounds: int, q: Array) -> f
         left = _descend(T, box, geometry, rounds, trial)
         if left < 0.99 * square:
             square = left
-            assign(q, trial)
-        if square <= ZERO:
+            damped.assign(q, trial)
+        if square <= damped.ZERO:
             break
     return float(square)
 
@@ -149,7 +141,7 @@ def _refine(T: Array, seed: Array, limits: Array, geometry: Array, found: Array,
             cost = _cost(T, place, choice, seed, limits, geometry, trial)
             if cost < best:
                 best, turn = cost, place
-                assign(q, trial)
+                damped.assign(q, trial)
         width *= 0.5
     return float(best)
 
@@ -198,15 +190,15 @@ def _search_branches(
         q: Result (7,) of the local search, then of this one.
     """
     found, trial, bound = np.empty(2), np.empty(7), math.inf
-    if left <= ZERO:
+    if left <= damped.ZERO:
         bound = unwrapped(q, seed, limits)
     if _scan(T, seed, limits, geometry, bound, found) < bound:
         _refine(T, seed, limits, geometry, found, q)
-    elif left > ZERO:
+    elif left > damped.ZERO:
         _nearest_miss(T, seed, geometry, trial)
         unwrapped(trial, seed, limits)
         if _approach(T, limits, geometry, _ROUNDS, trial) < left:
-            assign(q, trial)
+            damped.assign(q, trial)
 
 
 @kernel
@@ -223,7 +215,7 @@ def ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual
     for i in range(7):
         box[0, i] = bounded(-math.inf, seed[i], limits[0, i], limits[1, i], limits[2, i])
         box[1, i] = bounded(math.inf, seed[i], limits[0, i], limits[1, i], limits[2, i])
-    assign(q, seed)
+    damped.assign(q, seed)
     left = _approach(T, box, geometry, _PATH_ROUNDS if is_path else _ROUNDS, q)
     if not is_path:
         _search_branches(T, seed, limits, geometry, left, q)
@@ -231,7 +223,7 @@ def ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual
     if not pose_residual(reached, T, residual):
         return _LIMITED if _can_reach(T, q, geometry) else _UNREACHABLE
     jacobian_at(q, geometry, reached, J)
-    return _NEAR_SINGULAR if is_near_singular(J, LENGTH, _NEAR) else _FOLLOWED
+    return _NEAR_SINGULAR if damped.is_near_singular(J, LENGTH, _NEAR) else _FOLLOWED
 
 
 @kernel

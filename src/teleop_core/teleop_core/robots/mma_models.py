@@ -181,12 +181,6 @@ def joints_of_model(q: object, model: str) -> Array:
     return np.concatenate((joints[:2], elbow, joints[4:] + np.array(turns)))
 
 
-def readings_of_serial(serial: object) -> Array:
-    """Joint readings (7,) of the MMA from the joint vector (7,) of model B [rad]."""
-    joints = vector("serial", serial, 7)
-    return np.concatenate((joints[:2], (joints[2] + joints[3] - _QUARTER, joints[2]), joints[4:]))
-
-
 def loop_closure(q: object, g: Mapping[str, float], short_side: float = SHORT_SIDE) -> Loop:
     """Both ways round the parallelogram for joint readings q (7,) [rad].
 

@@ -1,9 +1,5 @@
 """Mobility: how many freedoms and independent loops a mechanism of links and joints has."""
 
-from collections.abc import Iterable, Sequence
-
-import numpy as np
-
 from teleop_core.base.errors import ParameterError
 
 SPATIAL, PLANAR = 6, 3
@@ -63,34 +59,6 @@ def passive_joints(joints: int, freedoms: int) -> int:
     if not 0 <= freedoms <= joints:
         raise ParameterError("freedoms", freedoms, f"0 to {joints}, the number of joints")
     return joints - freedoms
-
-
-def loop_rank(edges: Sequence[tuple[int, int]], loops: Iterable[Sequence[int]]) -> int:
-    """How many of the given loops are independent.
-
-    Args:
-        edges: The two links that each joint connects.
-        loops: Links in the order in which a loop visits them, the first not repeated.
-
-    Returns:
-        Rank of the loops in the space of all loops, at most :func:`independent_loops`.
-
-    Raises:
-        ParameterError: A loop passes from one link to another that no joint connects.
-    """
-    index = {}
-    for number, (first, second) in enumerate(edges):
-        index[first, second], index[second, first] = (number, 1.0), (number, -1.0)
-    rows = []
-    for loop in loops:
-        row = np.zeros(len(edges))
-        for step in zip(loop, [*loop[1:], *loop[:1]], strict=True):
-            if step not in index:
-                raise ParameterError("loops", step, "two links that a joint connects")
-            number, direction = index[step]
-            row[number] += direction
-        rows.append(row)
-    return int(np.linalg.matrix_rank(np.array(rows))) if rows else 0
 
 
 def _check_counts(links: int, joints: int) -> None:

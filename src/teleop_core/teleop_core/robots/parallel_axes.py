@@ -17,19 +17,8 @@ import numpy as np
 
 from teleop_core.kernels import inner, kernel
 from teleop_core.kernels.geometry import Array
+from teleop_core.robots import closed_form
 from teleop_core.robots.branches import BESIDE
-from teleop_core.robots.closed_form import (
-    angle_of,
-    choose,
-    constants_at,
-    is_beside,
-    kept,
-    set_angle,
-    settled,
-    undo_between,
-    undo_turn,
-    wanted_motion,
-)
 from teleop_core.robots.kinematics import is_askable
 from teleop_core.robots.subproblems import one_angle, pair_of_angles, turn_between
 
@@ -112,32 +101,32 @@ def _branches(T: Array, geometry: Array, seed: Array, found: Array) -> tuple[int
     Returns:
         How many, and the least sine between axis 6 and the parallel ones.
     """
-    K, work = geometry[constants_at(6) :], np.empty((30, 7))
+    K, work = geometry[closed_form.constants_at(6) :], np.empty((30, 7))
     G, M, N, A, B = work[7:11], work[11:15], work[15:19], work[19:21], work[21:23]
     h, pairs, angles = work[23], work[24:28], work[28:30]
-    wanted_motion(T, K, 6, M, G)
+    closed_form.wanted_motion(T, K, 6, M, G)
     _equations(G, K, A, B, h)
-    h[2], h[3] = angle_of(K, 6, 0, seed), angle_of(K, 6, 4, seed)
+    h[2], h[3] = closed_form.angle_of(K, 6, 0, seed), closed_form.angle_of(K, 6, 4, seed)
     count, least = pair_of_angles(A, B, h, K[RULE : RULE + 4], h[2:4], work[:7], pairs), math.inf
     for k in range(count):
         first, fifth = pairs[k, 0], pairs[k, 1]
         for i in range(3):
             for j in range(4):
                 M[i, j] = G[i, j]
-        undo_turn(first, M, 4)
-        undo_between(K, _F1, M, N, 4)
+        closed_form.undo_turn(first, M, 4)
+        closed_form.undo_between(K, _F1, M, N, 4)
         least = min(least, math.hypot(N[2, 0], N[2, 1]))
-        sixth = _sixth(N, K, fifth, angle_of(K, 6, 5, seed))
+        sixth = _sixth(N, K, fifth, closed_form.angle_of(K, 6, 5, seed))
         _hand(K, fifth, sixth, M)
-        is_near = _plane(N, M, K, angle_of(K, 6, 1, seed), angles)
+        is_near = _plane(N, M, K, closed_form.angle_of(K, 6, 1, seed), angles)
         for j in range(2):
             q = found[2 * k + j]
             q[6] = pairs[k, 2] * is_near
-            set_angle(K, 6, 0, first, q)
-            set_angle(K, 6, 4, fifth, q)
-            set_angle(K, 6, 5, sixth, q)
+            closed_form.set_angle(K, 6, 0, first, q)
+            closed_form.set_angle(K, 6, 4, fifth, q)
+            closed_form.set_angle(K, 6, 5, sixth, q)
             for i in range(3):
-                set_angle(K, 6, 1 + i, angles[j, i], q)
+                closed_form.set_angle(K, 6, 1 + i, angles[j, i], q)
     return 2 * count, least
 
 
@@ -147,12 +136,12 @@ def ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual
     if not is_askable(T, seed):
         return -1
     found = np.empty((12, 7))
-    if is_beside(T, seed, limits, geometry, q):
-        return int(settled(T, seed, limits, geometry, 2, found, 0, q, residual))
+    if closed_form.is_beside(T, seed, limits, geometry, q):
+        return int(closed_form.settled(T, seed, limits, geometry, 2, found, 0, q, residual))
     count, least = _branches(T, geometry, seed, found)
-    K = geometry[constants_at(6) :]
-    reach, _ = choose(found, count, seed, limits, K, least < BESIDE, q)
-    return int(settled(T, seed, limits, geometry, reach, found, count, q, residual))
+    K = geometry[closed_form.constants_at(6) :]
+    reach, _ = closed_form.choose(found, count, seed, limits, K, least < BESIDE, q)
+    return int(closed_form.settled(T, seed, limits, geometry, reach, found, count, q, residual))
 
 
 @kernel
@@ -163,4 +152,4 @@ def ik_all(T: Array, geometry: Array, solutions: Array) -> int:
     """
     found = np.empty((8, 7))
     count = _branches(T, geometry, np.zeros(6), found)[0]
-    return int(kept(T, found, count, geometry, solutions))
+    return int(closed_form.kept(T, found, count, geometry, solutions))

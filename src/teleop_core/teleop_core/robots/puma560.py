@@ -17,15 +17,7 @@ import numpy as np
 from teleop_core.base.errors import ParameterError
 from teleop_core.kernels import inner, kernel
 from teleop_core.kernels.geometry import Array
-from teleop_core.robots.branches import (
-    BESIDE,
-    bounded,
-    cost_of,
-    is_allowed,
-    turn,
-    turned,
-    wrapped,
-)
+from teleop_core.robots.branches import BESIDE, bounded, cost_of, is_allowed, turn, turned, wrapped
 from teleop_core.robots.drives import ENTRIES, Drives
 from teleop_core.robots.kinematics import IkStatus, Kernels, is_askable, pose_residual
 from teleop_core.robots.robot import Robot, geometry_of

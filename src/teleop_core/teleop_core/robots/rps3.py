@@ -26,16 +26,9 @@ import numpy as np
 from teleop_core.base.errors import ParameterError
 from teleop_core.kernels import inner, kernel
 from teleop_core.kernels.geometry import Array
+from teleop_core.robots import kinematics
 from teleop_core.robots.branches import slowed
 from teleop_core.robots.drives import electric_cylinders
-from teleop_core.robots.kinematics import (
-    REACHED,
-    SEARCH,
-    IkStatus,
-    Kernels,
-    is_askable,
-    pose_residual,
-)
 from teleop_core.robots.robot import Robot, geometry_of
 from teleop_core.robots.rps3_loop import COSINES, SINES, constraints, frame, points, settle
 from teleop_core.robots.rps3_modes import (
@@ -45,13 +38,7 @@ from teleop_core.robots.rps3_modes import (
     joint_points,
     leg_coordinates,
 )
-from teleop_core.robots.rps3_search import (
-    angles_of,
-    assemble,
-    assemblies,
-    is_near_singular,
-    lean,
-)
+from teleop_core.robots.rps3_search import angles_of, assemble, assemblies, is_near_singular, lean
 from teleop_core.robots.stewart_legs import invert
 
 __all__ = [
@@ -66,8 +53,11 @@ __all__ = [
 
 # No lengths are published: hinges, ball joints, legs at home [m].
 GEOMETRY = {"b": 1.0, "a": 0.5, "l_home": 1.2}
-_FOLLOWED, _LIMITED = int(IkStatus.FOLLOWED), int(IkStatus.LIMITED)
-_NEAR_SINGULAR, _UNREACHABLE = int(IkStatus.NEAR_SINGULAR), int(IkStatus.UNREACHABLE)
+_FOLLOWED, _LIMITED = int(kinematics.IkStatus.FOLLOWED), int(kinematics.IkStatus.LIMITED)
+_NEAR_SINGULAR, _UNREACHABLE = (
+    int(kinematics.IkStatus.NEAR_SINGULAR),
+    int(kinematics.IkStatus.UNREACHABLE),
+)
 
 
 @inner
@@ -100,7 +90,7 @@ def jacobian(q: Array, geometry: Array, J: Array) -> None:
     theta, S, T = np.empty(3), np.empty((3, 3)), np.empty((4, 4))
     gap, G, H, inverse = np.empty(3), np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
     b, a = geometry[0], geometry[1]
-    assemble(q, geometry, np.array((float(SEARCH), 0.0)), T, np.empty(2))
+    assemble(q, geometry, np.array((float(kinematics.SEARCH), 0.0)), T, np.empty(2))
     angles_of(T, b, a, gap, theta)
     constraints(q, theta, b, a, gap, G, H)
     invert(G, inverse)
@@ -147,7 +137,7 @@ def _legs(T: Array, geometry: Array, q: Array) -> None:
 @kernel
 def ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual: Array) -> int:
     """Write leg lengths (3,) [m]; see :class:`teleop_core.robots.robot.Kernels`."""
-    if not is_askable(T, seed):
+    if not kinematics.is_askable(T, seed):
         return -1
     _legs(T, geometry, q)
     is_there = slowed(q, seed, limits, q)
@@ -155,10 +145,10 @@ def ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual
     _close(q, geometry, theta)
     points(q, theta, geometry[0], S)
     frame(S, reached)
-    pose_residual(reached, T, residual)
+    kinematics.pose_residual(reached, T, residual)
     tilt = math.sqrt((reached[0, 2] - T[0, 2]) ** 2 + (reached[1, 2] - T[1, 2]) ** 2)
     is_up = reached[2, 2] * T[2, 2] >= 0.0
-    if abs(reached[2, 3] - T[2, 3]) > REACHED or tilt > REACHED or not is_up:
+    if abs(reached[2, 3] - T[2, 3]) > kinematics.REACHED or tilt > kinematics.REACHED or not is_up:
         return _UNREACHABLE if is_there else _LIMITED
     is_near = is_near_singular(q, theta, geometry[0], geometry[1])
     return _NEAR_SINGULAR if is_near else _FOLLOWED
@@ -188,7 +178,7 @@ def make(**geometry: float | str) -> Robot:
         upper=home * 1.5,
         home=home,
         geometry=row,
-        kernels=Kernels(
+        kernels=kinematics.Kernels(
             fk=fk, jacobian=jacobian, ik=ik, ik_all=ik_all, assemble=assemble, assemblies=assemblies
         ),
         drives=drives,

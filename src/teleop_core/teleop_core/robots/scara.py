@@ -17,13 +17,7 @@ from teleop_core.kernels.geometry import Array
 from teleop_core.robots.branches import hold, is_allowed, move_cost, turn, wrapped
 from teleop_core.robots.drives import ENTRIES, Drives
 from teleop_core.robots.kinematics import REACHED, IkStatus, Kernels, is_askable, pose_residual
-from teleop_core.robots.planar_3r import (
-    NEAR,
-    elbow_angle,
-    first_angle,
-    heading,
-    second_angle,
-)
+from teleop_core.robots.planar_3r import NEAR, elbow_angle, first_angle, heading, second_angle
 from teleop_core.robots.robot import Robot, geometry_of
 
 JOINTS = ("theta1", "theta2", "d3", "theta4")

@@ -22,29 +22,9 @@ import numpy as np
 from teleop_core.base.errors import ParameterError, UnknownNameError
 from teleop_core.kernels import inner, kernel
 from teleop_core.kernels.geometry import Array
-from teleop_core.robots import scara_stewart_drives
+from teleop_core.robots import kinematics, scara_stewart_drives, scara_stewart_legs
 from teleop_core.robots.branches import bounded, hold, is_allowed, move_cost, slowed, turned
-from teleop_core.robots.kinematics import (
-    SEARCH_ALL,
-    FkStatus,
-    IkStatus,
-    Kernels,
-    is_askable,
-    pose_residual,
-)
 from teleop_core.robots.robot import Robot, geometry_of
-from teleop_core.robots.scara_stewart_legs import (
-    TILT,
-    close_platform,
-    is_blind,
-    is_similar,
-    layout,
-    leg_lengths,
-    leg_slopes,
-    platform_pose,
-    turned_and_tilted,
-    wanted_platform,
-)
 from teleop_core.robots.stewart_legs import invert
 from teleop_core.robots.stewart_search import closing_poses
 
@@ -67,9 +47,12 @@ _NEAR = 0.02  # sine of the elbow under which small moves need large joint moves
 _SWING = 1.25 * math.pi  # rad, of a joint that a path sends round the other way
 # Sine of the elbow of a straight arm: shortens it by less than rounding, and has a sign.
 _STRAIGHT = 1e-8
-_NOT_CLOSED = int(FkStatus.NOT_CLOSED)
-_FOLLOWED, _LIMITED = int(IkStatus.FOLLOWED), int(IkStatus.LIMITED)
-_NEAR_SINGULAR, _UNREACHABLE = int(IkStatus.NEAR_SINGULAR), int(IkStatus.UNREACHABLE)
+_NOT_CLOSED = int(kinematics.FkStatus.NOT_CLOSED)
+_FOLLOWED, _LIMITED = int(kinematics.IkStatus.FOLLOWED), int(kinematics.IkStatus.LIMITED)
+_NEAR_SINGULAR, _UNREACHABLE = (
+    int(kinematics.IkStatus.NEAR_SINGULAR),
+    int(kinematics.IkStatus.UNREACHABLE),
+)
 
 
 @kernel
@@ -96,7 +79,7 @@ def fk(q: Array, geometry: Array, T: Array) -> None:
     Source:
         Kucuk and Gungor 2016, eqs. 1-13, corrected.
     """
-    platform_pose(q[3:], geometry[_LEGS:_CARRIED], T)
+    scara_stewart_legs.platform_pose(q[3:], geometry[_LEGS:_CARRIED], T)
     _place(q, geometry, T, T)
 
 
@@ -110,7 +93,7 @@ def assemble(q: Array, geometry: Array, ask: Array, T: Array, out: Array) -> int
     g, platform = geometry[_LEGS:_CARRIED], np.empty((4, 4))
     if ask[1] > 0.0:
         _platform_of(q, geometry, T, platform)
-    status = close_platform(q[3:], g, ask, platform, out)
+    status = scara_stewart_legs.close_platform(q[3:], g, ask, platform, out)
     _place(q, geometry, platform, T)
     return status
 
@@ -122,10 +105,10 @@ def assemblies(q: Array, geometry: Array, found: Array) -> int:
     One at most with similar hexagons, whose centre is held.
     """
     g, joints, out = geometry[_LEGS:_CARRIED], np.empty((2, 6, 3)), np.empty(2)
-    if is_similar(g[3], g[4]):
+    if scara_stewart_legs.is_similar(g[3], g[4]):
         return 1 if assemble(q, geometry, np.zeros(2), found[0], out) < _NOT_CLOSED else 0
-    layout(g, joints)
-    count = closing_poses(q[3:], joints[0], joints[1], g[1], SEARCH_ALL, found)
+    scara_stewart_legs.layout(g, joints)
+    count = closing_poses(q[3:], joints[0], joints[1], g[1], kinematics.SEARCH_ALL, found)
     for k in range(count):
         _place(q, geometry, found[k].copy(), found[k])
     return count
@@ -154,8 +137,8 @@ def _twists(platform: Array, g: Array, twists: Array) -> None:
     Similar hexagons: least-squares turn about the held centre; hidden turns do not show.
     """
     J = np.empty((6, 6))
-    leg_slopes(platform, g, J)
-    if not is_similar(g[3], g[4]):
+    scara_stewart_legs.leg_slopes(platform, g, J)
+    if not scara_stewart_legs.is_similar(g[3], g[4]):
         invert(J, twists)
         return
     gram, inverse = np.empty((3, 3)), np.empty((3, 3))
@@ -177,7 +160,7 @@ def jacobian(q: Array, geometry: Array, J: Array) -> None:
     """Write the geometric Jacobian (6, 9): rows linear, then angular, in base axes."""
     platform, T, twists = np.empty((4, 4)), np.empty((4, 4)), np.empty((6, 6))
     g = geometry[_LEGS:_CARRIED]
-    platform_pose(q[3:], g, platform)
+    scara_stewart_legs.platform_pose(q[3:], g, platform)
     _place(q, geometry, platform, T)
     _twists(platform, g, twists)
     carried = geometry[_CARRIED]
@@ -234,8 +217,8 @@ def _cost(T: Array, seed: Array, limits: Array, g: Array, q: Array) -> float:
     if g[_CARRIED] == 0.0:
         return move_cost(q, seed, limits, 0, 3)
     platform = np.empty((4, 4))
-    wanted_platform(T, q[0] + q[1], g[_W], platform)
-    leg_lengths(platform, g[_LEGS:_CARRIED], q[3:])
+    scara_stewart_legs.wanted_platform(T, q[0] + q[1], g[_W], platform)
+    scara_stewart_legs.leg_lengths(platform, g[_LEGS:_CARRIED], q[3:])
     return move_cost(q, seed, limits, 0, 9)
 
 
@@ -305,20 +288,20 @@ def ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual
     Source:
         Kucuk and Gungor 2016, eqs. 14-25, corrected; carried mode derived from them.
     """
-    if not is_askable(T, seed):
+    if not kinematics.is_askable(T, seed):
         return -1
     g = geometry[_LEGS:_CARRIED]
     is_reachable = _held_arm(T, seed, limits, geometry, q)
     platform, reached = np.empty((4, 4)), np.empty((4, 4))
-    wanted_platform(T, geometry[_CARRIED] * (q[0] + q[1]), g[2], platform)
-    turning = leg_lengths(platform, g, q[3:])
+    scara_stewart_legs.wanted_platform(T, geometry[_CARRIED] * (q[0] + q[1]), g[2], platform)
+    turning = scara_stewart_legs.leg_lengths(platform, g, q[3:])
     is_held = not is_allowed(q, seed, limits)
     if is_held and not slowed(q[3:], seed[3:], limits[:, 3:], q[3:]):
-        platform_pose(q[3:], g, platform)
+        scara_stewart_legs.platform_pose(q[3:], g, platform)
     _place(q, geometry, platform, reached)
-    if not pose_residual(reached, T, residual):
+    if not kinematics.pose_residual(reached, T, residual):
         return _LIMITED if is_reachable else _UNREACHABLE
-    is_near = abs(math.sin(q[1])) < _NEAR or is_blind(platform, turning, g)
+    is_near = abs(math.sin(q[1])) < _NEAR or scara_stewart_legs.is_blind(platform, turning, g)
     return _NEAR_SINGULAR if is_near else _FOLLOWED
 
 
@@ -331,9 +314,9 @@ def ik_all(T: Array, geometry: Array, solutions: Array) -> int:
         if not _arm(T, geometry, elbow == 0, 0.0, q):
             return 0
         q[0] = turned(q[0], 0.0, -math.pi, math.pi, False)
-        wanted_platform(T, geometry[_CARRIED] * (q[0] + q[1]), g[2], platform)
-        leg_lengths(platform, g, q[3:])
-    return 2 if T[2, 2] > 0.0 and math.hypot(T[2, 0], T[2, 1]) <= TILT else 0
+        scara_stewart_legs.wanted_platform(T, geometry[_CARRIED] * (q[0] + q[1]), g[2], platform)
+        scara_stewart_legs.leg_lengths(platform, g, q[3:])
+    return 2 if T[2, 2] > 0.0 and math.hypot(T[2, 0], T[2, 1]) <= scara_stewart_legs.TILT else 0
 
 
 def make(*, heading: str = "fixed", **geometry: float | str) -> Robot:
@@ -351,11 +334,11 @@ def make(*, heading: str = "fixed", **geometry: float | str) -> Robot:
     g = np.array(list(row.values()))[_LEGS:_CARRIED]
     platform, legs = np.eye(4), np.empty(6)
     platform[2, 3] = row["w_z"]
-    leg_lengths(platform, g, legs)
+    scara_stewart_legs.leg_lengths(platform, g, legs)
     lower = np.concatenate(([-_TURN, -_TURN, 0.0], _STROKES[0] * legs))
     upper = np.concatenate(([_TURN, _TURN, 0.5], _STROKES[1] * legs))
-    turned_and_tilted(0.0, 0.0, math.sin(HOME_TILT), platform)
-    leg_lengths(platform, g, legs)
+    scara_stewart_legs.turned_and_tilted(0.0, 0.0, math.sin(HOME_TILT), platform)
+    scara_stewart_legs.leg_lengths(platform, g, legs)
     return Robot(
         name="scara_stewart",
         joint_names=JOINTS,
@@ -364,7 +347,7 @@ def make(*, heading: str = "fixed", **geometry: float | str) -> Robot:
         home=np.concatenate((HOME_JOINTS, legs)),
         start=START if is_published else None,
         geometry=row,
-        kernels=Kernels(
+        kernels=kinematics.Kernels(
             fk=fk, jacobian=jacobian, ik=ik, ik_all=ik_all, assemble=assemble, assemblies=assemblies
         ),
         drives=scara_stewart_drives.DRIVES,

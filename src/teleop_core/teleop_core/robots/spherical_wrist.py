@@ -18,21 +18,8 @@ import numpy as np
 
 from teleop_core.kernels import inner, kernel
 from teleop_core.kernels.geometry import Array
+from teleop_core.robots import closed_form
 from teleop_core.robots.branches import BESIDE, OUTSIDE
-from teleop_core.robots.closed_form import (
-    angle_of,
-    arm_cost,
-    branch_cost,
-    choose,
-    constants_at,
-    is_beside,
-    kept,
-    set_angle,
-    settled,
-    undo_between,
-    undo_turn,
-    wanted_motion,
-)
 from teleop_core.robots.kinematics import is_askable
 from teleop_core.robots.subproblems import one_angle, pair_of_angles, turn_between
 
@@ -130,18 +117,18 @@ def _wrist(G: Array, K: Array, arm: Array, M: Array, N: Array, seed: Array, q: A
     for i in range(3):
         for j in range(3):
             M[i, j] = G[i, j]
-    undo_turn(arm[3], M, 3)
-    undo_between(K, _F1, M, N, 3)
-    undo_turn(arm[4], N, 3)
-    undo_between(K, _F2, N, M, 3)
-    undo_turn(arm[5], M, 3)
-    undo_between(K, _F3, M, N, 3)
-    spread, is_wrist = wrist_angles(N, K, _F4, angle_of(K, 6, 3, seed), M)
+    closed_form.undo_turn(arm[3], M, 3)
+    closed_form.undo_between(K, _F1, M, N, 3)
+    closed_form.undo_turn(arm[4], N, 3)
+    closed_form.undo_between(K, _F2, N, M, 3)
+    closed_form.undo_turn(arm[5], M, 3)
+    closed_form.undo_between(K, _F3, M, N, 3)
+    spread, is_wrist = wrist_angles(N, K, _F4, closed_form.angle_of(K, 6, 3, seed), M)
     for j in range(2):
         q[j, 6] = arm[2] * is_wrist
         for i in range(3):
-            set_angle(K, 6, i, arm[3 + i], q[j])
-            set_angle(K, 6, 3 + i, M[j, i], q[j])
+            closed_form.set_angle(K, 6, i, arm[3 + i], q[j])
+            closed_form.set_angle(K, 6, 3 + i, M[j, i], q[j])
     return min(spread, math.pi - spread)
 
 
@@ -158,20 +145,20 @@ def _branches(
     Returns:
         How many, and the least half difference [rad] of a wrist's two angles y.
     """
-    K, work = geometry[constants_at(6) :], np.empty((29, 7))
+    K, work = geometry[closed_form.constants_at(6) :], np.empty((29, 7))
     G, M, N, A, B = work[7:11], work[11:15], work[15:19], work[19:21], work[21:23]
     h, arms, trial, is_path = work[23], work[24:28], found[8], math.isfinite(limits[2, 0])
-    wanted_motion(T, K, 6, M, G)
+    closed_form.wanted_motion(T, K, 6, M, G)
     _equations(G, K, A, B, h)
-    h[2], h[3] = angle_of(K, 6, 0, seed), angle_of(K, 6, 2, seed)
+    h[2], h[3] = closed_form.angle_of(K, 6, 0, seed), closed_form.angle_of(K, 6, 2, seed)
     count = pair_of_angles(A, B, h, K[RULE : RULE + 4], h[2:4], work[:7], arms)
     for k in range(count):  # whether it reaches, joints 1 to 3, cost
         arms[k, 3], arms[k, 5] = arms[k, 0], arms[k, 1]
-        arms[k, 4] = _joint2(G, K, arms[k, 3], arms[k, 5], angle_of(K, 6, 1, seed))
+        arms[k, 4] = _joint2(G, K, arms[k, 3], arms[k, 5], closed_form.angle_of(K, 6, 1, seed))
         for i in range(6):
-            set_angle(K, 6, i, arms[k, 3 + i % 3], trial)
+            closed_form.set_angle(K, 6, i, arms[k, 3 + i % 3], trial)
         trial[6] = arms[k, 2]
-        arms[k, 6] = 0.0 if do_all else arm_cost(trial, K, seed, limits)
+        arms[k, 6] = 0.0 if do_all else closed_form.arm_cost(trial, K, seed, limits)
     done, least, best = 0, math.inf, math.inf
     for _ in range(count):
         arm = arms[0]
@@ -184,7 +171,7 @@ def _branches(
             if is_path:
                 best = -1.0 if arm[2] > 0.5 else best
             else:
-                best = min(best, branch_cost(found[k], seed, limits))
+                best = min(best, closed_form.branch_cost(found[k], seed, limits))
         done += 2
         arm[6] = math.inf
     return done, least
@@ -196,12 +183,12 @@ def ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual
     if not is_askable(T, seed):
         return -1
     found = np.empty((13, 7))
-    if is_beside(T, seed, limits, geometry, q):
-        return int(settled(T, seed, limits, geometry, 2, found, 0, q, residual))
-    K = geometry[constants_at(6) :]
+    if closed_form.is_beside(T, seed, limits, geometry, q):
+        return int(closed_form.settled(T, seed, limits, geometry, 2, found, 0, q, residual))
+    K = geometry[closed_form.constants_at(6) :]
     count, least = _branches(T, geometry, seed, limits, False, found)
-    reach, _ = choose(found, count, seed, limits, K, least < BESIDE, q)
-    return int(settled(T, seed, limits, geometry, reach, found, count, q, residual))
+    reach, _ = closed_form.choose(found, count, seed, limits, K, least < BESIDE, q)
+    return int(closed_form.settled(T, seed, limits, geometry, reach, found, count, q, residual))
 
 
 @kernel
@@ -212,4 +199,4 @@ def ik_all(T: Array, geometry: Array, solutions: Array) -> int:
     """
     found = np.empty((9, 7))
     count = _branches(T, geometry, np.zeros(6), np.empty((3, 6)), True, found)[0]
-    return int(kept(T, found, count, geometry, solutions))
+    return int(closed_form.kept(T, found, count, geometry, solutions))

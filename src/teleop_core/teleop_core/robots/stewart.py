@@ -28,27 +28,21 @@ from teleop_core.base.errors import ParameterError, ShapeError
 from teleop_core.kernels import inner, kernel
 from teleop_core.kernels.geometry import Array, checked_array, is_rigid
 from teleop_core.kernels.portable import length
+from teleop_core.robots import kinematics
 from teleop_core.robots.branches import slowed
 from teleop_core.robots.damped import is_near_singular
 from teleop_core.robots.drives import electric_cylinders
-from teleop_core.robots.kinematics import (
-    REACHED,
-    SEARCH,
-    SEARCH_ALL,
-    FkStatus,
-    IkStatus,
-    Kernels,
-    is_askable,
-    pose_residual,
-)
 from teleop_core.robots.robot import Robot, geometry_of
 from teleop_core.robots.stewart_legs import CLOSED, direct, invert, leg_system, moved
 from teleop_core.robots.stewart_search import NEAR, close_legs, closing_poses
 
 # Smallest over largest singular value of the leg Jacobian that counts as zero in every pose.
 _RANK = 1e-10
-_FOLLOWED, _LIMITED = int(IkStatus.FOLLOWED), int(IkStatus.LIMITED)
-_NEAR_SINGULAR, _UNREACHABLE = int(IkStatus.NEAR_SINGULAR), int(IkStatus.UNREACHABLE)
+_FOLLOWED, _LIMITED = int(kinematics.IkStatus.FOLLOWED), int(kinematics.IkStatus.LIMITED)
+_NEAR_SINGULAR, _UNREACHABLE = (
+    int(kinematics.IkStatus.NEAR_SINGULAR),
+    int(kinematics.IkStatus.UNREACHABLE),
+)
 
 
 class DirectStatus(IntEnum):
@@ -192,7 +186,7 @@ PAIRED = Layout.circular(
 )
 GEOMETRY = {**PAIRED.symbols(), "z0": 0.2}
 _Z0, _SIZE, _SINGULAR, _SIDE = 36, 37, 38, 39
-_UNDETERMINED = int(FkStatus.UNDETERMINED)
+_UNDETERMINED = int(kinematics.FkStatus.UNDETERMINED)
 
 
 @inner
@@ -243,14 +237,14 @@ def assemblies(q: Array, geometry: Array, found: Array) -> int:
     if geometry[_SINGULAR] > 0.0:
         return 0
     base, platform = geometry[:18].reshape((6, 3)), geometry[18:36].reshape((6, 3))
-    return closing_poses(q, base, platform, geometry[_SIZE], SEARCH_ALL, found)
+    return closing_poses(q, base, platform, geometry[_SIZE], kinematics.SEARCH_ALL, found)
 
 
 @kernel
 def jacobian(q: Array, geometry: Array, J: Array) -> None:
     """Write the Jacobian (6, 6): that of the legs, inverted, at the pose of :func:`assemble`."""
     T, legs, lengths = np.empty((4, 4)), np.empty((6, 6)), np.empty(6)
-    assemble(q, geometry, np.array((float(SEARCH), 0.0)), T, np.empty(2))
+    assemble(q, geometry, np.array((float(kinematics.SEARCH), 0.0)), T, np.empty(2))
     base, platform = geometry[:18].reshape((6, 3)), geometry[18:36].reshape((6, 3))
     leg_system(T, base, platform, lengths, legs)
     invert(legs, J)
@@ -264,7 +258,7 @@ def ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual
 
     Each leg has one solution; speed limits slow all legs by one factor.
     """
-    if not is_askable(T, seed):
+    if not kinematics.is_askable(T, seed):
         return -1
     base, platform = geometry[:18].reshape((6, 3)), geometry[18:36].reshape((6, 3))
     size, legs, reached = geometry[_SIZE], np.empty((6, 6)), np.empty((4, 4))
@@ -274,10 +268,10 @@ def ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual
         # The legs of the pose, though they do not hold it; a pose next to it if they fell short.
         reached[:] = T
         direct(q, base, platform, size, False, reached)
-        pose_residual(reached, T, residual)
+        kinematics.pose_residual(reached, T, residual)
         return _NEAR_SINGULAR if is_there else _LIMITED
     fk(q, geometry, reached)
-    if not pose_residual(reached, T, residual):
+    if not kinematics.pose_residual(reached, T, residual):
         return _UNREACHABLE if is_there else _LIMITED
     is_near = is_near_singular(legs.T, 1.0 / size, NEAR * 2.0 * size)
     return _NEAR_SINGULAR if is_near else _FOLLOWED
@@ -299,7 +293,7 @@ def make(**geometry: float | str) -> Robot:
     home = np.eye(4)
     home[2, 3] = row["z0"]
     lengths = layout.legs(home)
-    if lengths.min() < REACHED:
+    if lengths.min() < kinematics.REACHED:
         raise ParameterError("z0", row["z0"], "a height at which no leg has length zero")
     row["size"] = layout.size
     row["is_singular"] = float(layout.is_architecturally_singular)
@@ -312,7 +306,7 @@ def make(**geometry: float | str) -> Robot:
         upper=1.5 * lengths,
         home=lengths,
         geometry=row,
-        kernels=Kernels(
+        kernels=kinematics.Kernels(
             fk=fk, jacobian=jacobian, ik=ik, ik_all=ik_all, assemble=assemble, assemblies=assemblies
         ),
         drives=drives,

@@ -22,6 +22,7 @@ import numpy as np
 
 from teleop_core.kernels import inner, kernel
 from teleop_core.kernels.geometry import Array
+from teleop_core.robots import swivel_families
 from teleop_core.robots.branches import BESIDE, cost_of, is_allowed, turn
 from teleop_core.robots.closed_form import (
     BESIDE_SEED,
@@ -41,15 +42,6 @@ from teleop_core.robots.dh_kernels import descend
 from teleop_core.robots.kinematics import is_askable
 from teleop_core.robots.spherical_wrist import wrist_angles
 from teleop_core.robots.swivel_arcs import ARCS, MARGIN, blend, cut_circle, swivel_of
-from teleop_core.robots.swivel_families import (
-    F1,
-    F2,
-    F5,
-    elbow_of,
-    families,
-    triple_product,
-    turned_about_z,
-)
 
 _SPEED = 0.3  # share of a joint's largest step by which psi goes back to its margin in a path
 _ROUNDS = 8  # of the search for the least move
@@ -73,12 +65,12 @@ def _write(
 ) -> float:
     """Write joints of shoulder and wrist of branch k at psi into q (8,); the least spread."""
     blend(S, psi, M)
-    spread, is_exact = wrist_angles(M, K, F1, angle_of(K, 7, 0, seed), angles)
+    spread, is_exact = wrist_angles(M, K, swivel_families.F1, angle_of(K, 7, 0, seed), angles)
     least = min(spread, math.pi - spread)
     for i in range(3):
         set_angle(K, 7, i, angles[k // 2, i], q)
     blend(W, psi, M)
-    spread, is_wrist = wrist_angles(M, K, F5, angle_of(K, 7, 4, seed), angles)
+    spread, is_wrist = wrist_angles(M, K, swivel_families.F5, angle_of(K, 7, 4, seed), angles)
     for i in range(3):
         set_angle(K, 7, 4 + i, angles[k % 2, i], q)
     q[7] *= is_exact * is_wrist
@@ -104,13 +96,13 @@ def _branches(
     for i in range(3):
         for j in range(3):
             N[i, j] = 1.0 if i == j else 0.0
-    turned_about_z(K, F1, angle_of(K, 7, 0, seed), N, M)
-    turned_about_z(K, F2, angle_of(K, 7, 1, seed), M, N)
+    swivel_families.turned_about_z(K, swivel_families.F1, angle_of(K, 7, 0, seed), N, M)
+    swivel_families.turned_about_z(K, swivel_families.F2, angle_of(K, 7, 1, seed), M, N)
     c, s = math.cos(angle_of(K, 7, 2, seed)), math.sin(angle_of(K, 7, 2, seed))
     for i in range(3):
         x, y = N[i, 0], N[i, 1]
         N[i, 0], N[i, 1] = c * x + s * y, c * y - s * x
-    base, spread, does_reach = elbow_of(G, K, angle_of(K, 7, 3, seed))
+    base, spread, does_reach = swivel_families.elbow_of(G, K, angle_of(K, 7, 3, seed))
     least, memory, best, other = math.inf, np.empty((11, 3)), math.inf, 0.0
     if is_free:
         near = _elbow_cost(base + spread, K, seed, limits, found[0])
@@ -122,7 +114,7 @@ def _branches(
             return 4, least
         S, W = work[16 + 20 * elbow : 25 + 20 * elbow], work[25 + 20 * elbow : 34 + 20 * elbow]
         fourth = base + spread if elbow == 0 else base - spread
-        families(G, K, fourth, N, memory, S, W)
+        swivel_families.families(G, K, fourth, N, memory, S, W)
         if is_free:
             cut_circle(S, W, K, limits, arcs)
         for k in range(4):
@@ -180,7 +172,11 @@ def _room(q: Array, limits: Array) -> float:
 @inner
 def _width(q: Array, K: Array, i: int) -> float:
     """Manipulability of the shoulder (i = 1) or wrist (5): the volume that their axes span."""
-    return abs(triple_product(K, F1 if i == 1 else F5, angle_of(K, 7, i, q)))
+    return abs(
+        swivel_families.triple_product(
+            K, swivel_families.F1 if i == 1 else swivel_families.F5, angle_of(K, 7, i, q)
+        )
+    )
 
 
 @inner

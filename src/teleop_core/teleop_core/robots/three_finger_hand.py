@@ -18,6 +18,7 @@ import numpy as np
 from teleop_core.base.errors import ParameterError
 from teleop_core.kernels import inner, kernel
 from teleop_core.kernels.geometry import Array
+from teleop_core.robots import kinematics
 from teleop_core.robots.drives import finger_motors
 from teleop_core.robots.hand_fingers import Triple, finger_branch, finger_joints
 from teleop_core.robots.hand_grasp import (
@@ -34,15 +35,6 @@ from teleop_core.robots.hand_grasp import (
     local_point,
     wanted_contact,
 )
-from teleop_core.robots.kinematics import (
-    AGREED,
-    REACHED,
-    FkStatus,
-    IkStatus,
-    Kernels,
-    is_askable,
-    pose_residual,
-)
 from teleop_core.robots.robot import Robot
 from teleop_core.robots.rps3_loop import frame
 
@@ -50,9 +42,12 @@ __all__ = ["GEOMETRY", "Grasp", "GraspResult", "Hand", "make"]
 
 _LIMITS = np.radians([80.0, 110.0, 150.0])  # assumed, either way
 _NEAR = 0.02  # sine of phi, and reach over full reach, that count as near singular
-_CLOSED, _NOT_CLOSED = int(FkStatus.CLOSED), int(FkStatus.NOT_CLOSED)
-_FOLLOWED, _LIMITED = int(IkStatus.FOLLOWED), int(IkStatus.LIMITED)
-_NEAR_SINGULAR, _UNREACHABLE = int(IkStatus.NEAR_SINGULAR), int(IkStatus.UNREACHABLE)
+_CLOSED, _NOT_CLOSED = int(kinematics.FkStatus.CLOSED), int(kinematics.FkStatus.NOT_CLOSED)
+_FOLLOWED, _LIMITED = int(kinematics.IkStatus.FOLLOWED), int(kinematics.IkStatus.LIMITED)
+_NEAR_SINGULAR, _UNREACHABLE = (
+    int(kinematics.IkStatus.NEAR_SINGULAR),
+    int(kinematics.IkStatus.UNREACHABLE),
+)
 
 
 @kernel
@@ -80,7 +75,7 @@ def assemble(q: Array, geometry: Array, ask: Array, T: Array, out: Array) -> int
         for r in range(3):
             square += (points[i, r] - points[j, r]) ** 2
         out[0] = max(out[0], abs(math.sqrt(square) - geometry[SIDE]))
-    return _CLOSED if out[0] <= AGREED else _NOT_CLOSED
+    return _CLOSED if out[0] <= kinematics.AGREED else _NOT_CLOSED
 
 
 @kernel
@@ -112,7 +107,7 @@ def _is_near_singular(p: Triple, phi: float, links: Triple) -> bool:
 @kernel
 def ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual: Array) -> int:
     """Write nine joints for ``T_base_object``; see :class:`teleop_core.robots.robot.Kernels`."""
-    if not is_askable(T, seed):
+    if not kinematics.is_askable(T, seed):
         return -1
     is_reachable, is_touching, is_near = True, True, False
     points, reached = np.empty((3, 3)), np.empty((4, 4))
@@ -125,9 +120,9 @@ def ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual
     for i in range(FINGERS):
         x, y, z = wanted_contact(i, T, geometry)
         off = max(abs(points[i, 0] - x), abs(points[i, 1] - y), abs(points[i, 2] - z))
-        is_touching = is_touching and off <= REACHED
+        is_touching = is_touching and off <= kinematics.REACHED
     frame(points, reached)
-    pose_residual(reached, T, residual)
+    kinematics.pose_residual(reached, T, residual)
     if not is_touching:
         return _LIMITED if is_reachable else _UNREACHABLE
     return _NEAR_SINGULAR if is_near else _FOLLOWED
@@ -185,6 +180,8 @@ def make(**geometry: float | str) -> Robot:
         upper=np.tile(_LIMITS, FINGERS),
         home=home,
         geometry=row,
-        kernels=Kernels(fk=fk, jacobian=jacobian, ik=ik, ik_all=ik_all, assemble=assemble),
+        kernels=kinematics.Kernels(
+            fk=fk, jacobian=jacobian, ik=ik, ik_all=ik_all, assemble=assemble
+        ),
         drives=drives,
     )

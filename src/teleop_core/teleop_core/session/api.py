@@ -36,20 +36,11 @@ from teleop_core.graph.topics import Topic
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots import ROBOTS, Robot
 from teleop_core.robots.dh import DhTable
+from teleop_core.session import runner
 from teleop_core.session.configuration import Configuration
 from teleop_core.session.length import as_long_as_followed
 from teleop_core.session.notes import notes_of
 from teleop_core.session.recording import Recording, open_recording
-from teleop_core.session.runner import (
-    NewSamples,
-    StateReports,
-    describe,
-    record_blocks,
-    recorded_configuration,
-    replayed_blocks,
-    run_blocks,
-    session_ticks,
-)
 from teleop_core.session.virtual import VirtualTime
 from teleop_core.slave.controllers import CONTROLLERS, Controller
 from teleop_core.slave.plants import PLANTS, Plant
@@ -69,10 +60,6 @@ columns are time [s] and what :data:`~teleop_core.chain.operators.Motion` says; 
 data frame with columns called as those of such a table."""
 Setting = float | str | bool | Sequence[float] | Sequence[str]
 """Value of a parameter."""
-
-
-def _silent(done: int, total: int) -> None:
-    """Show no progress."""
 
 
 def configuration(
@@ -117,9 +104,10 @@ def configuration(
     """
     named: dict[str, object] = {}
     for name, registry, part in (
-        ("fixture", FIXTURES, fixture), ("controller", CONTROLLERS, controller),
+        ("fixture", FIXTURES, fixture),
+        ("controller", CONTROLLERS, controller),
         ("plant", PLANTS, plant),
-    ):  # fmt: skip
+    ):
         if part is not None:
             named[f"{name}.kind"] = part if isinstance(part, str) else _known(registry, part)
     if robot is not None:
@@ -151,7 +139,7 @@ def run(
     duration: float | None = None,
     seed: int | None = None,
     out: Path | str | None = None,
-    progress: Progress = _silent,
+    progress: Progress = runner.silent,
     files: Iterable[Path | str] = (),
     settings: Mapping[str, Setting] | None = None,
     operator: OperatorLike | None = None,
@@ -208,8 +196,8 @@ def run(
     for note in notes_of(made):
         warnings.warn(note, stacklevel=2)
     session = VirtualTime(made)
-    ticks = session_ticks(made, session)
-    return _kept(session, made, run_blocks(session, ticks), ticks, out, progress)
+    ticks = runner.session_ticks(made, session)
+    return _kept(session, made, runner.run_blocks(session, ticks), ticks, out, progress)
 
 
 _BEGINS = {"device": DEVICE, "hand": HAND}
@@ -220,7 +208,7 @@ def replay(
     recording: Recording | Path | str,
     *,
     out: Path | str | None = None,
-    progress: Progress = _silent,
+    progress: Progress = runner.silent,
     files: Iterable[Path | str] = (),
     settings: Mapping[str, Setting] | None = None,
     texts: Iterable[str] = (),
@@ -249,7 +237,7 @@ def replay(
     from teleop_core.session.exchange import as_master_bag
 
     bag = as_master_bag(recording.bag if isinstance(recording, Recording) else recording)
-    layer, scenario = recorded_configuration(bag)
+    layer, scenario = runner.recorded_configuration(bag)
     named = {name.replace("__", "."): value for name, value in parameters.items()}
     changes = [setting(key, _plain(value)) for key, value in (named | dict(settings or {})).items()]
     layers = [layer, *(load_file(Path(file)) for file in files), *changes]
@@ -258,7 +246,7 @@ def replay(
     if begin not in _BEGINS:
         raise ParameterError("begin", begin, " or ".join(_BEGINS))
     session = VirtualTime(made, played=_BEGINS[begin])
-    blocks, ticks = replayed_blocks(session, bag)
+    blocks, ticks = runner.replayed_blocks(session, bag)
     return _kept(session, made, blocks, ticks, out, progress)
 
 
@@ -272,7 +260,7 @@ def _kept(
 ) -> Recording:
     """Recording of blocks, on disk or in memory."""
     if out is not None:
-        record_blocks(session, made, Path(out), blocks, ticks, progress)
+        runner.record_blocks(session, made, Path(out), blocks, ticks, progress)
         return open_recording(out)
     memory = _Memory(session)
     for block in blocks:
@@ -285,8 +273,8 @@ class _Memory:
     """Takes blocks as a writer does."""
 
     def __init__(self, session: VirtualTime) -> None:
-        self._session, self._reports = session, StateReports(session)
-        self._is_new = NewSamples()
+        self._session, self._reports = session, runner.StateReports(session)
+        self._is_new = runner.NewSamples()
         self._parts: dict[Topic, list[Sequence[NDArray[Any]]]] = {
             topic: [] for topic in session.graph.streams
         }
@@ -312,7 +300,7 @@ class _Memory:
             stamps, values, logs = (np.concatenate(column) for column in zip(*parts, strict=True))
             names = topic.names(self._session.joint_names[topic.arm])
             series[topic] = Series(stamps, logs, values, names, topic.frame_id)
-        about = describe(made) | self._session.about
+        about = runner.describe(made) | self._session.about
         return MemoryBag(about["scenario"] or "session", series, self._messages, about)
 
 

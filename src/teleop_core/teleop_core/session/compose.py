@@ -12,19 +12,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from teleop_core import kernels
 from teleop_core.base.errors import PartError, TeleopError
 from teleop_core.graph.graph import Graph, Link, Member
 from teleop_core.graph.signals import add, copy, topic_fields
 from teleop_core.graph.stage import Runner
-from teleop_core.kernels import (
-    apart,
-    bound,
-    is_kernel,
-    kernel_from_source,
-    raise_pending,
-    record_dtype,
-    records,
-)
 
 __all__ = ["Tick", "block_dtype", "compose"]
 
@@ -41,7 +33,7 @@ def block_dtype(graph: Graph, joints: Mapping[str, int]) -> Any:
         fields += topic_fields(member.writes, joints[member.arm])
         prefix = f"{member.arm}_" if member.arm else ""
         fields += [(prefix + note[0], *note[1:]) for note in member.stage.notes]
-    return record_dtype(fields)
+    return kernels.record_dtype(fields)
 
 
 Segment = list[str]
@@ -92,16 +84,19 @@ class Tick:
     def __init__(self, text: _Text, dtype: Any, dt: float, size: int) -> None:
         self._is_whole = len(text.parts) == 1
         self._size = size if self._is_whole else 1
-        self._clock = records(_CLOCK)[0]
-        self._samples, self._rows = records(dtype, self._size), records(dtype, self._size)
+        self._clock = kernels.records(_CLOCK)[0]
+        self._samples, self._rows = (
+            kernels.records(dtype, self._size),
+            kernels.records(dtype, self._size),
+        )
         given = tuple(text.objects.values())
         known = {"copy": copy, "add": add}
         sources = [_source(text.objects, part) for part in text.parts if isinstance(part, list)]
         self.source = "\n\n".join(sources)
         made = iter(sources)
         self._calls: list[Callable[[], object]] = [
-            bound(
-                kernel_from_source(next(made), "tick", known),
+            kernels.bound(
+                kernels.kernel_from_source(next(made), "tick", known),
                 given, self._clock, dt, self._samples, self._rows,
             )
             if isinstance(part, list) else part
@@ -135,7 +130,7 @@ class Tick:
         try:
             for call in self._calls:
                 call()
-            raise_pending()
+            kernels.raise_pending()
         except TeleopError:
             raise
         except Exception as error:
@@ -193,9 +188,11 @@ def compose(
             continue
         runner = runners[member.name]
         text.objects |= {f"r{number}": runner.signals, f"a{number}": runner.arguments}
-        is_compiled = is_kernel(runner.kernel)
+        is_compiled = kernels.is_kernel(runner.kernel)
         if is_compiled:
-            text.objects[f"k{number}"] = apart(runner.kernel, *runner.arguments, runner.signals, dt)
+            text.objects[f"k{number}"] = kernels.apart(
+                runner.kernel, *runner.arguments, runner.signals, dt
+            )
         for link in graph.links_of(member):
             _say_link(text, link, places, runners, played, dt, rings)
         text.say(f"r{number}.now_ns = now_ns")
@@ -259,7 +256,7 @@ def _ring(ticks: int, link: Link, runners: Mapping[str, Runner]) -> Any:
     writer = runners.get(link.writer.name)
     reader = runners[link.reader.name].signals[link.port.field]
     begin = writer.signals[_plain_field(link)] if writer is not None else reader
-    ring = records([("values", "f8", begin.shape), ("stamp_ns", "i8"), ("at", "i8")], ticks)
+    ring = kernels.records([("values", "f8", begin.shape), ("stamp_ns", "i8"), ("at", "i8")], ticks)
     ring["values"] = begin
     return ring
 

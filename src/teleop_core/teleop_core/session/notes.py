@@ -1,9 +1,6 @@
 """Notes: what runs but may not be meant, of a configuration before its session begins."""
 
-from teleop_core.chain.mapping.parameters import (
-    FixtureParameters,
-    MotionScalingParameters,
-)
+from teleop_core.chain.mapping.parameters import FixtureParameters, MotionScalingParameters
 from teleop_core.chain.mapping.walls import WALLS, passive_stiffness
 from teleop_core.chain.master.device import DeviceParameters
 from teleop_core.chain.master.haptic_master import HapticMasterParameters

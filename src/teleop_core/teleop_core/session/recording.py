@@ -223,9 +223,7 @@ class Recording:
         return evaluate(self._bag, arm, further, span)
 
     def scores(
-        self,
-        further: "Sequence[type[Metric]]" = (),
-        span: tuple[float, float] | None = None,
+        self, further: "Sequence[type[Metric]]" = (), span: tuple[float, float] | None = None
     ) -> "list[Score]":
         """Scores of all arms, the default one first; as :meth:`score`."""
         from teleop_core.evaluation import scores

@@ -7,14 +7,8 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from teleop_core.bags import kept_files
 from teleop_core.bags.arms import ARMS_KEY, PLAYED_KEY
-from teleop_core.bags.kept_files import (
-    FIXTURE,
-    TOUCHED,
-    KeptFiles,
-    recorded_files,
-    recorded_geometry,
-)
 from teleop_core.bags.reader import Bag, Series
 from teleop_core.bags.reports import report
 from teleop_core.bags.writer import BagWriter
@@ -34,11 +28,11 @@ from teleop_core.slave.operation import operation_level, operation_text
 Progress = Callable[[int, int], None]
 
 
-def _silent(done: int, total: int) -> None:
+def silent(*_: object) -> None:
     """Show no progress."""
 
 
-def simulate(configuration: Configuration, out: Path, progress: Progress = _silent) -> int:
+def simulate(configuration: Configuration, out: Path, progress: Progress = silent) -> int:
     """Run a session in virtual time and record it.
 
     Args:
@@ -71,7 +65,7 @@ def run_blocks(session: VirtualTime, ticks: int) -> Iterator[Any]:
 
 
 def replay(
-    bag: Bag, configuration: Configuration, out: Path, progress: Progress = _silent,
+    bag: Bag, configuration: Configuration, out: Path, progress: Progress = silent,
     begin: str = DEVICE,
 ) -> int:  # fmt: skip
     """Run recorded masters, or hands, through the graph again, in virtual time, and record it.
@@ -167,14 +161,14 @@ def recorded_configuration(bag: Bag) -> tuple[Layer, str]:
     if arms and not text:  # an import of several hands
         layer = {SESSION: {"arms": tuple(arms)}}
     owners = {name: name.rpartition("/")[0] for name in layer}
-    found = {arm: recorded_files(bag.metadata, arm) for arm in set(owners.values())}
+    found = {arm: kept_files.recorded_files(bag.metadata, arm) for arm in set(owners.values())}
     for name, values in layer.items():
         files = found[owners[name]]
         for key, value in values.items():
             if (key == "robot" or key.endswith(".file")) and str(value) in files:
                 values[key] = files[str(value)]
         if isinstance(geometry := values.get("geometry"), tuple | list):
-            values["geometry"] = recorded_geometry(map(str, geometry), files)
+            values["geometry"] = kept_files.recorded_geometry(map(str, geometry), files)
     _begin_at_home(layer)
     return layer, bag.metadata.get("scenario", "")
 
@@ -195,7 +189,7 @@ def record_blocks(
     out: Path,
     blocks: Iterable[Any],
     ticks: int,
-    progress: Progress = _silent,
+    progress: Progress = silent,
 ) -> int:
     """Record blocks of rows as they come.
 
@@ -245,13 +239,13 @@ def describe(configuration: Configuration) -> dict[str, str]:
     """Names and texts stored with a recording, so that it can be repeated."""
     from teleop_core import __version__
 
-    graph, files = configuration.graph, KeptFiles()
+    graph, files = configuration.graph, kept_files.KeptFiles()
     prefixes = {arm: f"{arm}/" if arm else "" for arm in graph.namespaces}
     about = {"version": __version__, "scenario": configuration.scenario}
     if graph.arms != ("",):
         about["arms"] = " ".join(graph.arms)
     for arm, prefix in prefixes.items():  # before what only is looked at
-        for name, kind in (("world", TOUCHED), ("fixture", FIXTURE)):
+        for name, kind in (("world", kept_files.TOUCHED), ("fixture", kept_files.FIXTURE)):
             part = configuration.value(name, arm)
             if file := part and getattr(part.kind.parameters, "file", ""):
                 files.add_mesh(file, prefix, kind)

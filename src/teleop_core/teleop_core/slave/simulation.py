@@ -41,7 +41,6 @@ class SimulationState(ElasticState, DriveState, SensorState, ObserverState):
 
 @inner
 def _measure(p: SimulationNumbers, s: SimulationState, q: Array, dt: float) -> None:
-    """Read the encoders."""
     for i in range(q.shape[0]):
         measured = round(q[i] / p.encoder_step[i]) * p.encoder_step[i]
         # Speed from encoder differences through a 5 ms low-pass: what a real drive reports.

@@ -11,18 +11,9 @@ import numpy as np
 
 from teleop_core.base.errors import ParameterError
 from teleop_core.base.parameters import parameter
+from teleop_core.graph import topics
 from teleop_core.graph.signals import DT, assign
 from teleop_core.graph.stage import RunningStage, Stage
-from teleop_core.graph.topics import (
-    NO_COMMAND_NS,
-    OPERATION,
-    SLAVE_MEASURED_CP,
-    SLAVE_MEASURED_JS,
-    SLAVE_OPERATION,
-    SLAVE_SERVO_JP,
-    SLAVE_SETPOINT_CP,
-    SLAVE_SETPOINT_JS,
-)
 from teleop_core.kernels import kernel, pointer, records
 from teleop_core.kernels.fields import record
 from teleop_core.kernels.geometry import Array, pose_from_transform
@@ -92,16 +83,18 @@ class SlaveParameters(RobotParameters):
         doc="joints to which the slave moves from home before it follows; empty: the robot's start",
     )  # fmt: skip
     starts_at_home: bool = parameter(
-        False, fixed=True,
+        False,
+        fixed=True,
         doc="whether it starts where it is, at home, if no start is given; a URDF states no home",
-    )  # fmt: skip
+    )
     start_speed: float = parameter(
         0.5, lower=0.01, upper=1.0, fixed=True, doc="share of the speed limits used on that move"
     )
     interpolation: str = parameter(
-        "linear", choices=INTERPOLATIONS,
+        "linear",
+        choices=INTERPOLATIONS,
         doc="way between commands that come slower than the ticks, which takes one period of them",
-    )  # fmt: skip
+    )
     reference_filter: ReferenceFilterParameters = field(default_factory=ReferenceFilterParameters)
     operation: OperationParameters = field(default_factory=OperationParameters)
 
@@ -210,7 +203,7 @@ class Slave(RunningStage):
     def _begin_operation(self) -> None:
         """Enabled and on the way to where it starts, or disabled and not homed."""
         s = self.state
-        s["command_stamp_ns"], s["fault_joint"] = NO_COMMAND_NS, -1
+        s["command_stamp_ns"], s["fault_joint"] = topics.NO_COMMAND_NS, -1
         s["move_to"], s["move_ticks"] = self.parameters["start"], self._start_ticks
         if self._starts_enabled:
             s["state"] = State.ENABLED
@@ -288,7 +281,7 @@ class Slave(RunningStage):
     @property
     def operation(self) -> dict[str, float]:
         """Numbers of ``slave/operation`` by name, of the last tick."""
-        return dict(zip(OPERATION, self.signals["slave_operation"].tolist(), strict=True))
+        return dict(zip(topics.OPERATION, self.signals["slave_operation"].tolist(), strict=True))
 
     def described(self) -> dict[str, str]:
         """Names of the joints, by which the report of the operation calls them."""
@@ -312,16 +305,20 @@ def _request(p: SlaveNumbers, s: SlaveState, event: int) -> int:
 
 @kernel
 def _fail(p: SlaveNumbers, s: SlaveState, fault: int, value: float, bound: float) -> None:
-    """Take note of a fault."""
     fail(p, s, fault, -1, value, bound)
 
 
 SLAVE = Stage(
     "slave",
     SlaveParameters,
-    reads=(SLAVE_SERVO_JP, SLAVE_MEASURED_JS),
-    writes=(SLAVE_SETPOINT_JS, SLAVE_SETPOINT_CP, SLAVE_MEASURED_CP, SLAVE_OPERATION),
-    late=(SLAVE_MEASURED_JS,),
+    reads=(topics.SLAVE_SERVO_JP, topics.SLAVE_MEASURED_JS),
+    writes=(
+        topics.SLAVE_SETPOINT_JS,
+        topics.SLAVE_SETPOINT_CP,
+        topics.SLAVE_MEASURED_CP,
+        topics.SLAVE_OPERATION,
+    ),
+    late=(topics.SLAVE_MEASURED_JS,),
     notes=(("command_status", "i8"),),
     make=Slave,
     node="teleop_core.nodes.slave:SlaveNode",

@@ -6,18 +6,9 @@ import numpy as np
 
 from teleop_core.base.errors import ClosureError, ParameterError
 from teleop_core.base.parameters import Choice, choice, parameter
+from teleop_core.graph import topics
 from teleop_core.graph.signals import DT, assign
 from teleop_core.graph.stage import RunningStage, Stage
-from teleop_core.graph.topics import (
-    NO_COMMAND_NS,
-    SLAVE_ESTIMATED_CF,
-    SLAVE_MEASURED_CF,
-    SLAVE_MEASURED_JS,
-    SLAVE_OPERATION,
-    SLAVE_SETPOINT_JS,
-    SLAVE_TRUE_CF,
-    SLAVE_TRUE_CP,
-)
 from teleop_core.kernels import pointer
 from teleop_core.kernels.fields import fields_of, record, record_array
 from teleop_core.kernels.geometry import Array
@@ -63,9 +54,10 @@ class SlaveSimParameters(RobotParameters):
     seed: int = parameter(1, lower=0, fixed=True, doc="seed of everything random in the session")
 
     gravity_compensation: str = parameter(
-        "published", choices=("published", "all", "none"),
+        "published",
+        choices=("published", "all", "none"),
         doc="axes whose gravity is fed forward: those of the source (axis 2), all, none",
-    )  # fmt: skip
+    )
     integration_steps: int = parameter(
         2, lower=1, upper=50, doc="Runge-Kutta steps in each control tick"
     )
@@ -80,10 +72,11 @@ class SlaveSimParameters(RobotParameters):
     force_sensor: ForceSensorParameters = field(default_factory=ForceSensorParameters)
     controller: ControllerParameters = field(default_factory=ControllerParameters)
     trials: str = parameter(
-        "all", choices=("all", "small"),
+        "all",
+        choices=("all", "small"),
         doc="errors that the loop must let die before it is used: small ones and those after a "
         "dash at full speed, or small ones alone, as for experiments with bad laws",
-    )  # fmt: skip
+    )
 
 
 class SlaveSim(RunningStage):
@@ -173,7 +166,7 @@ class SlaveSim(RunningStage):
         row["slave_setpoint_js"], row["slave_measured_js"] = home, 0.0
         row["slave_true_cf"] = row["slave_measured_cf"] = row["slave_estimated_cf"] = 0.0
         row["slave_measured_js"][: self.robot.n] = s["measured"]
-        row["slave_measured_js_ns"] = NO_COMMAND_NS  # where it stands before the first tick
+        row["slave_measured_js_ns"] = topics.NO_COMMAND_NS  # where it stands before the first tick
 
     @property
     def punctures(self) -> int:
@@ -241,9 +234,9 @@ class SlaveSim(RunningStage):
         self.arm.limit[:] = drives.effort_limit
         self._take_world(parameters.world)
         parameters.force_sensor.write(p, self.dt)
-        compensated = {
-            "published": robot.dynamics.compensated, "all": 1.0, "none": 0.0
-        }[parameters.gravity_compensation]  # fmt: skip
+        compensated = {"published": robot.dynamics.compensated, "all": 1.0, "none": 0.0}[
+            parameters.gravity_compensation
+        ]
         relieved = self._gravity(self.arm.model)
         self._law.shift(self.arm.memory, relieved * (p["compensated"] - compensated))
         p["compensated"] = compensated
@@ -337,13 +330,13 @@ class SlaveSim(RunningStage):
 SLAVE_SIM = Stage(
     "slave_sim",
     SlaveSimParameters,
-    reads=(SLAVE_SETPOINT_JS, SLAVE_OPERATION),
+    reads=(topics.SLAVE_SETPOINT_JS, topics.SLAVE_OPERATION),
     writes=(
-        SLAVE_MEASURED_JS,
-        SLAVE_MEASURED_CF,
-        SLAVE_ESTIMATED_CF,
-        SLAVE_TRUE_CP,
-        SLAVE_TRUE_CF,
+        topics.SLAVE_MEASURED_JS,
+        topics.SLAVE_MEASURED_CF,
+        topics.SLAVE_ESTIMATED_CF,
+        topics.SLAVE_TRUE_CP,
+        topics.SLAVE_TRUE_CF,
     ),
     make=SlaveSim,
     node="teleop_core.nodes.slave_sim:SlaveSimNode",

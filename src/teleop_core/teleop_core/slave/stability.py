@@ -223,9 +223,8 @@ def _left(robot: Robot, loop: Loop, joint: int) -> float:
         return found if np.isfinite(arm.q[joint]) else np.nan
 
     path = dash(
-        robot.lower[joint], robot.upper[joint], setpoint[joint],
-        loop.p.speed_limit[joint], loop.dt,
-    )  # fmt: skip
+        robot.lower[joint], robot.upper[joint], setpoint[joint], loop.p.speed_limit[joint], loop.dt
+    )
     most = largest(path)
     for rest in range(_LAST, _LONGEST + 1, _LAST):
         left = largest(np.full(_LAST, path[-1])) / most

@@ -22,19 +22,8 @@ from teleop_core.slave.commands import (
     take_command,
 )
 from teleop_core.slave.interpolation import advance_on_way
+from teleop_core.slave.operation import watch
 from teleop_core.slave.operation.states import Event, State, change
-from teleop_core.slave.operation.watch import (
-    begin_tick,
-    find_rest,
-    is_blind,
-    is_braked,
-    measure_rest,
-    tell,
-    watch_feedback,
-    watch_joints,
-    watch_limits,
-    watch_tip,
-)
 from teleop_core.slave.velocity import advance_velocity
 
 _ENABLED, _FAULT = int(State.ENABLED), int(State.FAULT)
@@ -52,7 +41,6 @@ def _moves(p: SlaveNumbers, s: SlaveState) -> bool:
 
 @inner
 def _is_still(s: SlaveState) -> bool:
-    """Whether the setpoint stands still."""
     moves = 0
     for i in range(s.step.shape[0]):
         moves += s.step[i] != 0.0
@@ -105,15 +93,15 @@ def _take_measured(p: SlaveNumbers, s: SlaveState, arm: ArmModel, row: SlaveRow)
         return
     if is_lost:  # it may have been moved, or have heard of no setpoint
         s.must_join = 1
-    if is_braked(p, s):
+    if watch.is_braked(p, s):
         for i in range(n):
             s.full_ns[i] = 0
     else:
         # What was in a longer gap nobody has seen.
-        watch_joints(p, s, arm.effort, min(stamp_ns - before_ns, p.timeout_ns))
-        watch_tip(p, s, row.slave_setpoint_cp, row.slave_measured_cp)
-    find_rest(s, _moves(p, s), stamp_ns)
-    measure_rest(s, row.slave_measured_cp, stamp_ns)
+        watch.watch_joints(p, s, arm.effort, min(stamp_ns - before_ns, p.timeout_ns))
+        watch.watch_tip(p, s, row.slave_setpoint_cp, row.slave_measured_cp)
+    watch.find_rest(s, _moves(p, s), stamp_ns)
+    watch.measure_rest(s, row.slave_measured_cp, stamp_ns)
 
 
 @inner
@@ -132,7 +120,7 @@ def _go_on(
     elif row.command_status != _BLIND and follows(p, s, row.now_ns):
         advance_on_way(p, s)
         advance_setpoint(p, s, before, dt)
-    elif is_braked(p, s) or s.must_join:
+    elif watch.is_braked(p, s) or s.must_join:
         come_to_rest(p, s, WITH_ARM, dt)
         s.must_join = s.must_join and not (_is_near(p, s) or _is_still(s))
     else:
@@ -154,14 +142,14 @@ def slave_step(p: SlaveNumbers, s: SlaveState, arm: ArmModel, row: SlaveRow, dt:
     """
     joints = arm.joints
     _take_measured(p, s, arm, row)
-    begin_tick(p, s, row.now_ns)
+    watch.begin_tick(p, s, row.now_ns)
     if s.asked_ns != 0:  # as a message of servo_jp would
         copy(s.asked, row.slave_servo_jp)
         row.slave_servo_jp_ns, s.asked_ns = s.asked_ns, 0
     row.command_status = take_command(p, s, row, dt)
     if s.state != _ENABLED:
         s.motion = 0
-    elif is_blind(p, s, row.now_ns):  # a move goes on from wherever the arm is then
+    elif watch.is_blind(p, s, row.now_ns):  # a move goes on from wherever the arm is then
         row.command_status, s.motion, s.must_plan = _BLIND, 0, s.is_busy
     if s.must_plan and row.command_status != _BLIND and _is_still(s):
         if s.is_homing:
@@ -176,6 +164,6 @@ def slave_step(p: SlaveNumbers, s: SlaveState, arm: ArmModel, row: SlaveRow, dt:
     pose_from_transform(arm.T, row.slave_setpoint_cp)
     copy(s.setpoint, row.slave_setpoint_js)
     row.slave_setpoint_js_ns = row.slave_setpoint_cp_ns = s.command_stamp_ns
-    watch_limits(p, s, row.now_ns)
-    watch_feedback(p, s, row.now_ns)
-    tell(p, s, row.slave_operation)
+    watch.watch_limits(p, s, row.now_ns)
+    watch.watch_feedback(p, s, row.now_ns)
+    watch.tell(p, s, row.slave_operation)

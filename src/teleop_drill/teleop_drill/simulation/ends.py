@@ -189,9 +189,6 @@ class Service:
     """
 
     def __init__(
-        self,
-        process: Process,
-        answer: Callable[[Any, Callable[[Any], None]], object],
-        born_ns: int,
+        self, process: Process, answer: Callable[[Any, Callable[[Any], None]], object], born_ns: int
     ) -> None:
         self.process, self.answer, self.born_ns, self.is_open = process, answer, born_ns, True

@@ -175,9 +175,8 @@ def simulate(
 
 
 def _tried(
-    found: Found, truth: LinkErrors, measured: Measured, finds_frame: bool,
-    rng: np.random.Generator,
-) -> Accuracy | None:  # fmt: skip
+    found: Found, truth: LinkErrors, measured: Measured, finds_frame: bool, rng: np.random.Generator
+) -> Accuracy | None:
     """Accuracy at fresh poses, without noise; of a tracker elsewhere at poses left out."""
     if finds_frame:
         return left_out(found, measured)

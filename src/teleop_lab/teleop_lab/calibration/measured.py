@@ -134,7 +134,6 @@ def _plain(name: str) -> str:
 
 
 def _slides(robot: Robot) -> tuple[str, ...]:
-    """Names of the sliding joints."""
     from teleop_lab.calibration.model import Model
 
     kinds = Model.of(robot).chain.kinds

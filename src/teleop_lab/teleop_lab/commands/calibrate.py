@@ -36,9 +36,10 @@ def add(commands: Any) -> None:
     parser.add_argument("--robot", default="rcrt1", help="a chain of links (default: rcrt1)")
     geometry_argument(parser)
     parser.add_argument(
-        "--data", metavar="FILE.csv",
+        "--data",
+        metavar="FILE.csv",
         help=f"measured poses in place of simulated ones, or {PUBLISHED!r}",
-    )  # fmt: skip
+    )
     _add_simulation(parser)
     parser.add_argument(
         "--fit", nargs="+", metavar="NAME",
@@ -63,18 +64,20 @@ def _add_simulation(parser: argparse.ArgumentParser) -> None:
     """Options of a simulated measurement; None where not given."""
     parser.add_argument("--poses", type=int, metavar="N", help="poses to measure (default: 40)")
     parser.add_argument(
-        "--noise", metavar="M|ruler",
+        "--noise",
+        metavar="M|ruler",
         help="standard deviation of a tracker [m], or a ruler of 0.5 mm (default: 0.1e-3)",
-    )  # fmt: skip
+    )
     parser.add_argument(
         "--errors", nargs="+", metavar="NAME=VALUE",
         help="how the arm was built: cnc (±20 µm), prototype (±100 µm), and errors [m, rad] such "
         "as d3=5.5e-3 (default: cnc, of the rcrt1 with d3=5.5e-3)",
     )  # fmt: skip
     parser.add_argument(
-        "--choose", metavar="optimal|random",
+        "--choose",
+        metavar="optimal|random",
         help="poses that tell most, or random ones (default: optimal)",
-    )  # fmt: skip
+    )
     parser.add_argument(
         "--seed", type=int, metavar="N", help="of poses, errors, noise (default: 1)"
     )
@@ -138,9 +141,8 @@ def _real(robot: "Robot", arguments: argparse.Namespace) -> "Calibration":
     )
     fit = _fit(arguments) or ("offsets" if is_published else "all")
     return calibrate(
-        robot, measured, fit, finds_frame=arguments.frame == "unknown",
-        keeps_all=arguments.keep_all,
-    )  # fmt: skip
+        robot, measured, fit, finds_frame=arguments.frame == "unknown", keeps_all=arguments.keep_all
+    )
 
 
 def _write(calibration: "Calibration", arguments: argparse.Namespace) -> None:

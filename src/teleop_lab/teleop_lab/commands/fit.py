@@ -28,10 +28,7 @@ def add(commands: Any) -> None:
     )
     parser.add_argument("--robot", default="rcrt1", help="robot of the table (default: rcrt1)")
     parser.add_argument(
-        "--free",
-        nargs="+",
-        metavar="NAME",
-        help="what to fit (default: what the table can tell)",
+        "--free", nargs="+", metavar="NAME", help="what to fit (default: what the table can tell)"
     )
     parser.add_argument(
         "--loss", default="cauchy", metavar="NAME",

@@ -62,7 +62,7 @@ AXES = {
     "x": Axis((-1.0, 0.0, 0.0), 0.0, READ["x"], 0.25, _ERROR["x"], 0.32, 0.29, 0.50),
     "y": Axis((0.0, 1.0, 0.0), ESCAPE_MM, READ["y"], 0.5, _ERROR["y"], 0.85, 0.56, 1.19),
     "z": Axis((0.0, 0.0, 1.0), 0.0, READ["z"], 0.25, _ERROR["z"], 0.99, 0.81, 2.00),
-}  # fmt: skip
+}
 
 
 def moved(reading_mm: Array, escape_mm: float) -> Array:

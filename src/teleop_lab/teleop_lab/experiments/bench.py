@@ -16,6 +16,7 @@ from teleop_core.evaluation import Score
 from teleop_core.graph.topics import NO_COMMAND_NS
 from teleop_core.kernels.geometry import Array
 from teleop_core.session.recording import Stream
+from teleop_core.session.runner import silent
 from teleop_core.slave.pair import ArmParameters
 
 Setting = float | str | bool | tuple[float, ...] | tuple[str, ...]
@@ -82,10 +83,6 @@ class Session:
         return self["slave/setpoint_cp"].stamp_ns > NO_COMMAND_NS
 
 
-def _silent(done: int, total: int) -> None:
-    """Show no progress."""
-
-
 class Bench:
     """Runs sessions in virtual time, and remembers them.
 
@@ -103,7 +100,7 @@ class Bench:
     def __init__(
         self,
         seed: int = 1,
-        progress: Progress = _silent,
+        progress: Progress = silent,
         settings: Settings | None = None,
         workers: int = 1,
     ) -> None:

@@ -190,8 +190,9 @@ def _trade_figure(scenario: str, found: Mapping[str, list[Tracking]]) -> Figure:
     layout = {
         "xaxis": axis("change of effort from tick to tick, RMS", "% of the limit", type="log"),
         "yaxis": axis("tracking error, RMS", "µm", type="log"),
-        "shapes": [shape], "annotations": [{**note, "y": float(np.log10(GOAL_UM))}],
-    }  # fmt: skip
+        "shapes": [shape],
+        "annotations": [{**note, "y": float(np.log10(GOAL_UM))}],
+    }
     sentence = "Error against noise of the effort, a point for each hand: better is lower and left."
     return Figure(f"Error and its price, {MODES[scenario].mode}", sentence, traces, layout, 420)
 

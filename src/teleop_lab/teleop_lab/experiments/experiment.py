@@ -79,7 +79,6 @@ EXPERIMENTS: Registry[Experiment] = Registry(
         "mma_balance": f"{_PLACE}.mma_spring:MMA_BALANCE",
         "hybrid": f"{_PLACE}.hybrid:HYBRID",
         "parallel_robots": f"{_PLACE}.parallel_robots:PARALLEL_ROBOTS",
-        "dh_robots": f"{_PLACE}.dh_robots:DH_ROBOTS",
     },
     _checked,
     package="teleop_lab",

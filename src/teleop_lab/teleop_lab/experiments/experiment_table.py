@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from itertools import groupby
 from typing import TYPE_CHECKING
 
+import numpy as np
 from rich.box import SIMPLE
 from rich.console import Console
 from rich.markup import escape
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
 
 MARKS = {True: "✓", False: "✗", None: ""}
 _COLORS = {True: "green", False: "red", None: "default"}
+_KEPT = {"printed": "published figures agree", "law": "laws hold", "goal": "goals are kept"}
 _WIDTH = 110
 _DIGITS = 6  # after the point, the most that any source prints
 
@@ -72,14 +74,17 @@ def spread(row: "Row") -> str:
 
 def within(row: "Row") -> str:
     """What counts as agreement."""
-    return row.within.text(row.unit) if row.within is not None else ""
+    if row.within is None:
+        return ""
+    return row.within.text(row.unit) + f", {row.basis}" * (row.basis != "printed")
 
 
 def summary(outcomes: "Sequence[Outcome]") -> str:
-    """One line: how many figures agree."""
-    judged, agreeing = (sum(getattr(o, n) for o in outcomes) for n in ("judged", "agreeing"))
-    rows = sum(len(outcome.rows) for outcome in outcomes)
-    return f"{agreeing} of {judged} published figures agree; {rows - judged} rows are not judged"
+    """One line: how many figures agree, how many laws and goals are kept."""
+    found = {basis: np.sum([o.count(basis) for o in outcomes], axis=0) for basis in _KEPT}
+    told = [f"{kept} of {of} {_KEPT[b]}" for b, (kept, of) in found.items() if of or b == "printed"]
+    rest = sum(len(o.rows) for o in outcomes) - sum(of for _, of in found.values())
+    return "; ".join((*told, f"{rest} rows are not judged"))
 
 
 def outcome_table(outcome: "Outcome") -> Table:

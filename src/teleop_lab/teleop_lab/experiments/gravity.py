@@ -54,8 +54,9 @@ def _effort_rows() -> list[Row]:
     group = "efforts that hold the arm (eqs. 4.6.6-4.6.8, computed, not printed)"
     rows = []
     for q, where, values in (
-        (robot.home, "at home", (-1.4084, -3.0740)), (level, "arm level", (-1.8141, 0.0))
-    ):  # fmt: skip
+        (robot.home, "at home", (-1.4084, -3.0740)),
+        (level, "arm level", (-1.8141, 0.0)),
+    ):
         robot.dynamics.gravity(q, robot.dynamics.parameters, held)
         for k, value, name, unit in ((1, values[0], "C2", "N·m"), (2, values[1], "C3", "N")):
             rows.append(

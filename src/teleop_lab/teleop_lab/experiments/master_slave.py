@@ -235,7 +235,7 @@ def _place_figure(mode: str, found: Drawn) -> Figure:
         for path, name, color, width in (
             (found.reference, "reference", REFERENCE, 4.0),
             (found.measured, "measured", MEASURED, 1.2),
-        ):  # fmt: skip
+        ):
             traces.append({**line(times, path[::_CURVE, row], name, color, width), **place})
     sentence = "Place of the slave against time."
     return Figure(f"x, y and z, {mode}", sentence, traces, layout, 480)
@@ -247,7 +247,7 @@ def _error_figure(name: str, found: Drawn) -> Figure:
     traces = [
         line(found.times[::_CURVE], off[::_CURVE, k], "xyz"[k], color, 1.0)
         for k, color in enumerate((FIRST, SECOND, THIRD))
-    ]  # fmt: skip
+    ]
     whole = np.linalg.norm(off, axis=1)
     traces.append(line(found.times[::_CURVE], whole[::_CURVE], "distance", MEASURED, 1.4))
     shapes, notes = zip(

@@ -5,16 +5,7 @@ import math
 import numpy as np
 
 from teleop_core.evaluation.figure import DARK, SECOND, THIRD, Figure
-from teleop_core.robots.mma_balance import (
-    ARM_AT_45_DEGREES,
-    ARM_LEVEL,
-    MASSES,
-    ShoulderSpring,
-    coil,
-    gravity_torque,
-    matching_rate,
-    shoulder_load,
-)
+from teleop_core.robots import mma_balance
 from teleop_lab.experiments.bench import Bench
 from teleop_lab.experiments.drawing import axis, line, published_points
 from teleop_lab.experiments.experiment import Experiment
@@ -22,26 +13,21 @@ from teleop_lab.experiments.outcome import EXACT, Findings, Row, absolute, perce
 
 _OPEN, _SQUARE = math.radians(135.0), math.radians(90.0)
 _SAFETY = 1.15
-# Table 5.1 [g]; packing is the last row.
-_MASSES_G = {"L2": 37.73, "L3": 25.87, "L3a": 7.46, "L3b": 25.87, "L4": 25.57, "L5": 16.93,
-             "L6": 12.09, "L7": 152.59, "packing": 3.25}  # fmt: skip
 _CLOSE = percent(0.1)
 
 
 def _measure(_: Bench) -> Findings:
-    total = sum(MASSES.values())
-    spring = ShoulderSpring()
+    total = sum(mma_balance.MASSES.values())
+    spring = mma_balance.ShoulderSpring()
     rows = [
-        Row(quantity=f"mass of {name}", unit="g", published=printed, predicted=1e3 * MASSES[name],
-            within=EXACT, group="masses, table 5.1")
-        for name, printed in _MASSES_G.items()
-    ]  # fmt: skip
-    rows.append(
         Row(quantity="total mass", unit="g", published=310.36, predicted=1e3 * total,
             within=EXACT, group="masses, table 5.1",
             note="not the sum of its rows, 307.36, with which it computes")
-    )  # fmt: skip
-    first, second = (float(gravity_torque(total, arm)) for arm in (ARM_AT_45_DEGREES, ARM_LEVEL))
+    ]  # fmt: skip
+    first, second = (
+        float(mma_balance.gravity_torque(total, arm))
+        for arm in (mma_balance.ARM_AT_45_DEGREES, mma_balance.ARM_LEVEL)
+    )
     group = "torque about the shoulder"
     rows += [
         Row(quantity=name, unit="N·m", published=printed, predicted=value, within=absolute(1e-4),
@@ -52,7 +38,7 @@ def _measure(_: Bench) -> Findings:
         )
     ]  # fmt: skip
     rows += [*_spring_rows(spring, second - first), *_coil_rows()]
-    load = shoulder_load(np.radians([-45.0, 0.0]), spring)
+    load = mma_balance.shoulder_load(np.radians([-45.0, 0.0]), spring)
     rows += [
         Row(quantity=f"left for the hand, link 2 {pose}", unit="N·m", predicted=float(left),
             group="what the spring does")
@@ -67,9 +53,9 @@ _NOTES = (
 )
 
 
-def _spring_rows(spring: ShoulderSpring, difference: float) -> list[Row]:
+def _spring_rows(spring: mma_balance.ShoulderSpring, difference: float) -> list[Row]:
     deflection = float(spring.length(_OPEN) - spring.length(_SQUARE))
-    rate = matching_rate(difference, deflection, float(spring.lever(_SQUARE)))
+    rate = mma_balance.matching_rate(difference, deflection, float(spring.lever(_SQUARE)))
     found = (
         ("length at 45°", "mm", 51.7372, 1e3 * float(spring.length(_OPEN))),
         ("lever at 45°", "mm", 10.7151, 1e3 * float(spring.lever(_OPEN))),
@@ -87,7 +73,7 @@ def _spring_rows(spring: ShoulderSpring, difference: float) -> list[Row]:
 
 
 def _coil_rows() -> list[Row]:
-    wound = coil()
+    wound = mma_balance.coil()
     found = (
         ("turns", "", 13.0, float(wound.turns)),
         ("slenderness", "", 3.69, wound.slenderness),
@@ -103,15 +89,15 @@ def _coil_rows() -> list[Row]:
     ]  # fmt: skip
 
 
-def _figure(spring: ShoulderSpring) -> Figure:
+def _figure(spring: mma_balance.ShoulderSpring) -> Figure:
     degrees = np.linspace(-90.0, 30.0, 121)
-    load = shoulder_load(np.radians(degrees), spring)
+    load = mma_balance.shoulder_load(np.radians(degrees), spring)
     traces = [
         line(degrees, load.gravity, "gravity", DARK, 2.0, "N·m"),
         line(degrees, load.spring, "spring", SECOND, 2.0, "N·m"),
         line(degrees, load.residual, "left for the hand", THIRD, 2.0, "N·m"),
         published_points(np.array([-45.0, 0.0]), np.array([1.0349, 1.1926]), "published", "N·m"),
-    ]  # fmt: skip
+    ]
     layout = {"xaxis": axis("link 2 (0 level, -90 upright)", "°"), "yaxis": axis("torque", "N·m")}
     sentence = "Torque about the shoulder: what gravity asks for and what the spring gives."
     return Figure("Balance of the shoulder", sentence, traces, layout, 340)

@@ -10,6 +10,8 @@ from teleop_core.evaluation.figure import Figure
 Plain = str | int | float | bool | None | list["Plain"] | dict[str, "Plain"]
 _KINDS = ("exact", "share", "absolute", "factor")
 _ROUNDING = 1e-9
+BASES = ("printed", "law", "goal")
+"""What a row is judged against."""
 
 
 @dataclass(frozen=True)
@@ -86,17 +88,19 @@ class Row:
     Attributes:
         quantity: What it is.
         unit: Its unit; empty for pure numbers.
-        published: What the source printed.
+        published: What the source printed, or another ``basis``.
         predicted: What our model of the source's machine says.
         ours: What another controller reaches on the same model.
         within: What counts as agreement of ``predicted`` with ``published``; None: not judged.
+        basis: What ``published`` is: "printed", a "law" of the source evaluated by us, or a "goal"
+            of our own. Only what is printed counts as a published figure.
         lowest: Smallest of several seeds, of which ``predicted`` is the mean.
         highest: Largest of them.
         group: Heading under which it stands.
         note: What must be known to read it, such as a misprint.
 
     Raises:
-        ParameterError: A number is not finite.
+        ParameterError: A number is not finite, or the basis is another.
     """
 
     quantity: str
@@ -105,12 +109,15 @@ class Row:
     predicted: float | None = None
     ours: float | None = None
     within: Tolerance | None = None
+    basis: str = "printed"
     lowest: float | None = None
     highest: float | None = None
     group: str = ""
     note: str = ""
 
     def __post_init__(self) -> None:
+        if self.basis not in BASES:
+            raise ParameterError("basis", self.basis, f"one of {', '.join(BASES)}")
         for name in ("published", "predicted", "ours", "lowest", "highest"):
             value = getattr(self, name)
             if value is None:
@@ -142,6 +149,7 @@ class Row:
             "group": self.group, "quantity": self.quantity, "unit": self.unit,
             "published": self.published, "predicted": self.predicted, "ours": self.ours,
             "difference": self.difference, "within": within, "agrees": self.agrees,
+            "basis": self.basis,
             "lowest": self.lowest, "highest": self.highest, "note": self.note,
         }  # fmt: skip
 
@@ -182,15 +190,20 @@ class Outcome:
     figures: tuple[Figure, ...] = ()
     notes: tuple[str, ...] = ()
 
+    def count(self, basis: str = "printed") -> tuple[int, int]:
+        """How many rows of a basis agree with it, and how many of them are judged."""
+        marks = [row.agrees for row in self.rows if row.basis == basis]
+        return marks.count(True), len(marks) - marks.count(None)
+
     @property
     def judged(self) -> int:
-        """How many rows are judged."""
-        return sum(row.agrees is not None for row in self.rows)
+        """How many published figures are judged."""
+        return self.count()[1]
 
     @property
     def agreeing(self) -> int:
         """How many of them agree with what was published."""
-        return sum(row.agrees is True for row in self.rows)
+        return self.count()[0]
 
     def row(self, quantity: str, group: str = "") -> Row:
         """The row of a quantity.

@@ -14,7 +14,7 @@ from teleop_core.evaluation.page import Arrays
 from teleop_core.evaluation.page_template import PAGE, POLICY, TIMES, script, style
 from teleop_core.evaluation.preview import preview
 from teleop_lab.experiments.experiment_table import MARKS, empty, numbers, spread, summary, within
-from teleop_lab.experiments.outcome import Outcome, Row
+from teleop_lab.experiments.outcome import BASES, Outcome, Row
 
 _CLASSES = {True: "met", False: "missed", None: "plain"}
 _STYLE = """
@@ -74,7 +74,7 @@ def _duration(outcome: Outcome) -> float:
 def _head(outcomes: Sequence[Outcome]) -> str:
     rows = "".join(
         f'<tr><td><a href="#{escape(o.name)}">{escape(o.name)}</a></td>'
-        f'<td class="value {_CLASSES[_verdict(o)]}">{o.agreeing} of {o.judged}</td>'
+        f'<td class="value {_CLASSES[_verdict(o)]}">{_counts(o)}</td>'
         f'<td class="unit title">{escape(o.title)}</td></tr>'
         for o in outcomes
     )
@@ -90,8 +90,19 @@ def _head(outcomes: Sequence[Outcome]) -> str:
     )
 
 
+def _counts(outcome: Outcome) -> str:
+    """Of published figures, laws and goals, those that there are."""
+    found = {basis: outcome.count(basis) for basis in BASES}
+    return "; ".join(
+        f"{kept} of {of}" + f" {basis}s" * (basis != "printed")
+        for basis, (kept, of) in found.items()
+        if of
+    )
+
+
 def _verdict(outcome: Outcome) -> bool | None:
-    return outcome.agreeing == outcome.judged if outcome.judged else None
+    marks = [row.agrees for row in outcome.rows if row.agrees is not None]
+    return all(marks) if marks else None
 
 
 def _section(number: int, outcome: Outcome, places: Sequence[str]) -> str:

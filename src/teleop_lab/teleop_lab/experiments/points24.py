@@ -21,7 +21,6 @@ SCENARIO = "points24"
 INNER_MM = 0.5
 """Radius of the inner circle of a point; not published, half of a pad of 1 mm assumed."""
 POINTS = 24
-_TIME_S = 45.0
 # Of a rest the second half counts: by then the low-pass has come near.
 _SETTLED = 0.5
 
@@ -122,9 +121,7 @@ def _measure(bench: Bench) -> Findings:
     rows: list[Row] = []
     blind = _visits(bench, PREDICTED, seeing=False)
     seen = _visits(bench, PREDICTED, seeing=True)
-    ours = {
-        "blind": _visits(bench, OURS, seeing=False), "seen": _visits(bench, OURS, seeing=True)
-    }  # fmt: skip
+    ours = {"blind": _visits(bench, OURS, seeing=False), "seen": _visits(bench, OURS, seeing=True)}
 
     def add(
         which: str, text: str, unit: str, value: Callable[[Visits], float],
@@ -150,10 +147,6 @@ def _measure(bench: Bench) -> Findings:
         "mm",
         lambda v: float(v.line_mm.max()),
     )
-    rows.append(
-        Row(quantity="time for points and line", unit="s", published=_TIME_S, predicted=_TIME_S,
-            note="about; the scenario is made to take it", group="task")
-    )  # fmt: skip
     figures = _figure(seen[0], seeing=True), _figure(blind[0], seeing=False)
     return Findings(tuple(rows), figures, _NOTES)
 

@@ -66,9 +66,9 @@ def _rests(rests: tuple[Array, ...], targets: Array) -> Rests:
     robot = load_robot("rcrt1")
     tips = [robot.fk(one)[:, :3, 3] for one in rests]
     aims = robot.fk(targets)[:, :3, 3]
-    errors = np.stack([
-        np.linalg.norm(tip - aim, axis=1) for tip, aim in zip(tips, aims, strict=True)
-    ])  # fmt: skip
+    errors = np.stack(
+        [np.linalg.norm(tip - aim, axis=1) for tip, aim in zip(tips, aims, strict=True)]
+    )
     off = np.stack([one - target for one, target in zip(rests, targets, strict=True)])
     return Rests(off, 1e3 * errors)
 

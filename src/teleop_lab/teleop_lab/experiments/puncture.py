@@ -102,8 +102,9 @@ def measure_puncture(bench: Bench, job: Job) -> Puncture:
         return Puncture(float(falls[begin]), drop, math.inf, math.inf)
     noticed = hears + int(fell[0])
     stop = 1e-3 * (noticed - led) + _REACTION
-    stopped = bench.signals("puncture", seconds + _REACTION + late, settings,
-                            partial(_motion, stop=stop))  # fmt: skip
+    stopped = bench.signals(
+        "puncture", seconds + _REACTION + late, settings, partial(_motion, stop=stop)
+    )
     height = stopped["slave_true_cp"][:, 2]
     deepest = float(height[begin] - height[begin:].min())
     return Puncture(float(falls[begin]), drop, 1e-3 * (noticed - begin), deepest)
@@ -129,7 +130,7 @@ def _rows(found: Mapping[Job, Puncture]) -> tuple[Row, ...]:
             continue
         rows += [
             Row(quantity=f"noticed after{told}", unit="ms", group=group, published=500.0 * late,
-                predicted=1e3 * each.notice, within=absolute(_TICKS_MS)),
+                basis="law", predicted=1e3 * each.notice, within=absolute(_TICKS_MS)),
             Row(quantity=f"overshoot{told}", unit="mm", group=group,
                 published=1e3 * least_overshoot(late), predicted=1e3 * each.overshoot),
         ]  # fmt: skip

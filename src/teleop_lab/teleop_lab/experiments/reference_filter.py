@@ -59,7 +59,7 @@ def _measure(bench: Bench) -> Findings:
     ]  # fmt: skip
     rows += [
         Row(quantity=f"unit step after {k} ticks", published=printed, predicted=value,
-            within=EXACT, group=rows[0].group, note="of the equation, not printed")
+            within=EXACT, basis="law", group=rows[0].group)
         for k, (printed, value) in enumerate(zip(_STEP, step_response(3), strict=True), start=1)
     ]  # fmt: skip
     rows += [
@@ -121,13 +121,15 @@ def _jitter_figure(session: Session) -> Figure:
     ]
     drawn = [
         level(sign * 1e3 * value, f"published ±{1e3 * value:g}" if sign > 0 else "")
-        for value in (_BEFORE, _AFTER) for sign in (1.0, -1.0)
-    ]  # fmt: skip
+        for value in (_BEFORE, _AFTER)
+        for sign in (1.0, -1.0)
+    ]
     layout = {
         "xaxis": {**time_axis(), "range": [0.0, 2.0]},
         "yaxis": axis("reference of joint 5", "mrad"),
-        "shapes": [shape for shape, _ in drawn], "annotations": [note for _, note in drawn],
-    }  # fmt: skip
+        "shapes": [shape for shape, _ in drawn],
+        "annotations": [note for _, note in drawn],
+    }
     sentence = "Reference of joint 5 around its mean with the stylus at rest, as figure 6.11."
     return Figure("What the filter leaves of the jitter", sentence, traces, layout, 340)
 

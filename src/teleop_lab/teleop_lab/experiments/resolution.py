@@ -22,7 +22,6 @@ _SPEEDS_RPM = {"theta1": 30.0, "theta2": 30.0, "theta4": 70.213, "theta5": 130.2
 _SCREW_UM, _SCREW_RPM, _LEAD_MM = 0.1316, 3719.677, 1.0
 # Reach of the prismatic link and the tip as the source rounds it [m], and its tip steps [µm].
 _REACH, _TIP_UM, _TIP_ALL_UM = 0.460, 8.029, 11.355
-_EXAMPLE = (1000, 87, 1.034e-3)
 
 
 def link_step(reach: float, step: float) -> float:
@@ -43,9 +42,6 @@ def _measure(_: Bench) -> Findings:
     rows += [
         Row(quantity="step of d3", unit="µm", published=_SCREW_UM, predicted=steps["d3"] / _UM,
             within=percent(0.1), group=rows[0].group, note="table 3.6 misprints 13.161"),
-        Row(quantity=f"step of {_EXAMPLE[0]} ppr behind {_EXAMPLE[1]}:1", unit="°",
-            published=_EXAMPLE[2], predicted=360.0 / (4 * _EXAMPLE[0] * _EXAMPLE[1]),
-            within=percent(0.1), group=rows[0].group),
     ]  # fmt: skip
     turning = [link_step(_REACH, steps[name]) / _UM for name in ("theta1", "theta2")]
     each = np.array([*turning, steps["d3"] / _UM])
@@ -84,9 +80,10 @@ def _figure(steps: dict[str, float]) -> Figure:
     traces = [
         joined(reach * 1e3, each["theta1"], "theta1 or theta2 alone", FIRST, "µm"),
         joined(reach * 1e3, total, "theta1, theta2 and d3", SECOND, "µm"),
-        points(np.array([460.0, 460.0]), np.array([_TIP_UM, _TIP_ALL_UM]), "published", "#111",
-               "µm", 0),
-    ]  # fmt: skip
+        points(
+            np.array([460.0, 460.0]), np.array([_TIP_UM, _TIP_ALL_UM]), "published", "#111", "µm", 0
+        ),
+    ]
     for trace in traces[:2]:
         trace["mode"] = "lines"
     layout = {"xaxis": axis("reach", "mm"),

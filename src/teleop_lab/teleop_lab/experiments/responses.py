@@ -172,9 +172,10 @@ def _place_figure(point: int, found: Response) -> Figure:
         for path, name, color, width in (
             (found.wanted_mm, "wanted", REFERENCE, 4.0),
             (found.reached_mm, "reached", MEASURED, 1.2),
-        ):  # fmt: skip
-            traces.append({**line(found.times[::_CURVE], path[::_CURVE, row], name, color, width),
-                           **place})  # fmt: skip
+        ):
+            traces.append(
+                {**line(found.times[::_CURVE], path[::_CURVE, row], name, color, width), **place}
+            )
     sentence = "Way of the tip from home."
     return Figure(
         f"Point {point}: displacement (of figures 7.3-7.15)", sentence, traces, layout, 400
@@ -191,7 +192,7 @@ def _joint_figure(point: int, found: Response) -> Figure:
         for joints, text, color, width in (
             (found.reference, "reference", REFERENCE, 4.0),
             (found.measured, "measured", MEASURED, 1.2),
-        ):  # fmt: skip
+        ):
             values = _SCALES[row] * joints[::_CURVE, row]
             traces.append(
                 {**line(found.times[::_CURVE], values, text, color, width, unit), **place}

@@ -25,9 +25,10 @@ LAWS: Mapping[str, Settings] = {
     "adaptive": {"controller": "adaptive"},
     "disturbance_observer": {"controller": "disturbance_observer"},
     "disturbance_observer, ratio 2": {
-        "controller": "disturbance_observer", "controller.disturbance_observer.observer_ratio": 2.0
+        "controller": "disturbance_observer",
+        "controller.disturbance_observer.observer_ratio": 2.0,
     },
-}  # fmt: skip
+}
 """Laws that are compared, each with its own settings."""
 _COLORS = (COMMAND, DARK, FIRST, SECOND, THIRD, MEASURED, FIXTURE)
 _FAULTS = faults_of(load_robot("rcrt1"))

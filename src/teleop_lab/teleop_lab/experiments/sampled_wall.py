@@ -10,13 +10,7 @@ from teleop_core.chain.master.haptic_master import HapticMaster
 from teleop_core.graph.signals import DT
 from teleop_core.graph.topics import MASTER_CONTACT
 from teleop_core.kernels.geometry import Array
-from teleop_lab.experiments.one_axis import (
-    Grip,
-    boundary_from_below,
-    growth_rate,
-    ideal_device,
-    sampled_boundary,
-)
+from teleop_lab.experiments import one_axis
 
 AXIS = 1  # of the master's base, along which the hand is pushed
 _BLOCK = 500  # ticks for which noise is drawn at once
@@ -56,8 +50,8 @@ class Loop:
         own: Parameters of the device.
     """
 
-    def __init__(self, grip: Grip, wall: Wall, **own: float) -> None:
-        self.master = HapticMaster(ideal_device(grip, **own))
+    def __init__(self, grip: one_axis.Grip, wall: Wall, **own: float) -> None:
+        self.master = HapticMaster(one_axis.ideal_device(grip, **own))
         self._wall, self._tick = wall, self.master.load()
         self._most = float(self.master.parameters["peak_force"])
         self._depth, self._push, self._left = np.zeros(3), np.zeros(3), 0
@@ -113,7 +107,7 @@ class Loop:
         return force
 
 
-def wall_growth(grip: Grip, wall: Wall) -> float:
+def wall_growth(grip: one_axis.Grip, wall: Wall) -> float:
     """Rate [1/s] at which our hand and device swing up before a wall; negative: down."""
     loop = Loop(grip, wall)
     loop.move(_KICK)
@@ -124,10 +118,10 @@ def wall_growth(grip: Grip, wall: Wall) -> float:
     speed: Array = np.diff(place)[round(_SETTLE / DT) + _SETTLED * wall.late :] / DT
     rest = speed[len(speed) // 2 :]
     # What is dead does not grow; its rounding may.
-    return -1.0 / DT if np.sqrt(np.mean(rest * rest)) < _DEAD else growth_rate(speed)
+    return -1.0 / DT if np.sqrt(np.mean(rest * rest)) < _DEAD else one_axis.growth_rate(speed)
 
 
-def wall_boundary(grip: Grip, damping: float, late: int) -> float:
+def wall_boundary(grip: one_axis.Grip, damping: float, late: int) -> float:
     """Stiffness [N/m] of a wall at which our hand and device neither swing up nor down.
 
     Args:
@@ -135,8 +129,8 @@ def wall_boundary(grip: Grip, damping: float, late: int) -> float:
         damping: Of the wall [N·s/m].
         late: Periods by which its force comes late.
     """
-    start = 0.3 * sampled_boundary(grip, late, damping)
-    return boundary_from_below(
+    start = 0.3 * one_axis.sampled_boundary(grip, late, damping)
+    return one_axis.boundary_from_below(
         lambda stiffness: wall_growth(grip, Wall(stiffness, damping, late)), start
     )
 
@@ -154,7 +148,7 @@ def press_energy(damping: float, wall: Wall, length: int, speed: float) -> float
         length: Periods in, and as many out.
         speed: Of the hand [m/s].
     """
-    loop = Loop(Grip(5.0, 1.0, 0.1), wall)
+    loop = Loop(one_axis.Grip(5.0, 1.0, 0.1), wall)
     loop.origin -= 0.25 * speed * DT  # no sample is on the plane: force 0 would end the contact
     before, lost = 0.0, 0.0
     for i in range(4 * length):
@@ -189,7 +183,7 @@ def is_restless(wall: Wall, friction: float, resolution: float, push: float) -> 
         resolution: Step of its reading [m].
         push: Of the hand [steps of the wall's force].
     """
-    grip = Grip(0.045, 1.0, 0.1)
+    grip = one_axis.Grip(0.045, 1.0, 0.1)
     loop = Loop(grip, wall, friction=friction, position_resolution=resolution)
     force = push * wall.stiffness * resolution
     loop.aim(loop.origin + force / grip.stiffness)

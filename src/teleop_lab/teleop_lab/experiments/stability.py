@@ -102,7 +102,7 @@ def _measure(bench: Bench) -> Findings:
             told = f"force {1e3 * delay:.0f} ms later"
             exact = exact_boundary(grip, delay + DT)
             rows.append(
-                Row(quantity=told, unit="N/m", published=exact,
+                Row(quantity=told, unit="N/m", published=exact, basis="law",
                     predicted=found_boundary(grip, delay), within=percent(2.0),
                     group=f"one axis before a spring, {name} grip")
             )  # fmt: skip

@@ -29,9 +29,9 @@ def _measure(_: Bench) -> Findings:
     group = "turns of a motor for one turn of a joint, eqs. 3.5-3.7 and 4.5.7"
     rows = (
         Row(quantity="motor 5 for joint 5, r5/r5*", published=0.7143, predicted=turn5[0],
-            within=percent(0.1), group=group, note="value of the printed radii"),
+            within=percent(0.1), basis="law", group=group, note="of the printed radii"),
         Row(quantity="motor 6 for joint 6, r6/r6*", published=1.3889, predicted=turn6[1],
-            within=percent(0.1), group=group, note="value of the printed radii"),
+            within=percent(0.1), basis="law", group=group, note="of the printed radii"),
         Row(quantity="motor 6 for joint 5", published=_JOINT5 / _JOINT6, predicted=turn5[1],
             within=percent(0.1), group=group,
             note="eq. 3.7 lacks the ratio r6/r6*, without which joint 6 does not stand still"),

@@ -12,13 +12,7 @@ from teleop_lab.experiments.bench import Bench
 from teleop_lab.experiments.drawing import PUBLISHED, Trace, axis, level, line, points
 from teleop_lab.experiments.experiment import Experiment
 from teleop_lab.experiments.outcome import Findings, Row, absolute, percent
-from teleop_lab.experiments.transmission import (
-    AIR,
-    Cell,
-    Way,
-    measure_cells,
-    predicted_hybrid,
-)
+from teleop_lab.experiments.transmission import AIR, Cell, Way, measure_cells, predicted_hybrid
 from teleop_lab.experiments.two_port import (
     LINES,
     Complex,
@@ -110,7 +104,8 @@ def _rows(found: list[Number], group: str, told: str, *, is_judged: bool) -> lis
         within = _NEAR if not each.law or "Llewellyn" in each.quantity else _WITHIN
         rows.append(
             Row(quantity=each.quantity + told, unit=each.unit, published=law,
-                predicted=each.measured, within=None if law is None else within, group=group)
+                basis="law", predicted=each.measured, within=None if law is None else within,
+                group=group)
         )  # fmt: skip
     return rows
 
@@ -143,8 +138,8 @@ def _lag_rows(cell: Cell) -> list[Row]:
         off = np.abs(cell.hybrid[:, i, k] - exact[:, i, k]) / size
         rows.append(
             Row(quantity=f"h{i + 1}{k + 1}, farthest from the exact one", unit="%",
-                published=0.0, predicted=100.0 * float(off.max()), within=absolute(5.0),
-                group=group)
+                published=0.0, basis="law", predicted=100.0 * float(off.max()),
+                within=absolute(5.0), group=group)
         )  # fmt: skip
     return rows + _rows(numbers(cell, exact), group, "", is_judged=True)
 
@@ -211,8 +206,9 @@ def _felt_figure(cells: Cells, world: str) -> Figure:
               "yaxis": axis("force over speed", "N·s/m", type="log")}  # fmt: skip
     sentence = (
         "Impedance that the hand feels; dotted the world's own."
-        if world != AIR else "Impedance that the hand feels where the tip touches nothing: drag."
-    )  # fmt: skip
+        if world != AIR
+        else "Impedance that the hand feels where the tip touches nothing: drag."
+    )
     return Figure(f"What the hand feels: {world}", sentence, traces, layout, 460)
 
 
@@ -245,8 +241,7 @@ def _known_figure(known: Cell) -> Figure:
         traces.append(_curve(np.abs(exact[:, i, k]), f"{name}, exact", color, "dot", unit))
         measured = np.abs(known.hybrid[:, i, k])
         traces.append(points(LINES, measured, name, color, unit))
-    layout = {"xaxis": axis("frequency", "Hz", type="log"),
-              "yaxis": axis("size", type="log")}  # fmt: skip
+    layout = {"xaxis": axis("frequency", "Hz", type="log"), "yaxis": axis("size", type="log")}
     sentence = "Marks are measured through our hand and mapping; they lie on the exact lines."
     return Figure("A two-port that is known", sentence, traces, layout, 420)
 

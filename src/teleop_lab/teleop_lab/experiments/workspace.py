@@ -1,6 +1,4 @@
-"""Workspace: joint ranges and reach, and where the tip can be (figure 4.1)."""
-
-import math
+"""Workspace: reach, and where the tip can be (figure 4.1)."""
 
 import numpy as np
 
@@ -10,36 +8,23 @@ from teleop_core.robots import Robot, load_robot
 from teleop_lab.experiments.bench import Bench
 from teleop_lab.experiments.drawing import axis, in_space, line, scene
 from teleop_lab.experiments.experiment import Experiment
-from teleop_lab.experiments.outcome import EXACT, Findings, Row, percent
+from teleop_lab.experiments.outcome import Findings, Row, percent
 
-# Table 6.2 [°, mm].
-_RANGES = {"theta1": (-80.0, 80.0), "theta2": (50.0, 160.0), "d3": (0.0, 421.0),
-           "theta4": (-170.0, 170.0), "theta5": (-80.0, 80.0),
-           "theta6": (-170.0, 170.0)}  # fmt: skip
 _REACH_MM = 460.0
 _SAMPLES, _SLICE_MM = 40_000, 6.0
 
 
 def _measure(bench: Bench) -> Findings:
     robot = load_robot("rcrt1")
-    group, rows = "joint ranges, table 6.2", []
-    for k, name in enumerate(robot.joint_names):
-        unit, scale = ("mm", 1e3) if name == "d3" else ("°", 180.0 / math.pi)
-        ends = (robot.lower[k], robot.upper[k])
-        for text, printed, found in zip(("from", "to"), _RANGES[name], ends, strict=True):
-            rows.append(
-                Row(quantity=f"{name}, {text}", unit=unit, published=printed,
-                    predicted=scale * found, within=EXACT, group=group)
-            )  # fmt: skip
     places = _samples(robot, bench.seed)
     low, high = places.min(axis=0), places.max(axis=0)
     reach = float(np.linalg.norm(places, axis=1).max())
     longest = 1e3 * float(robot.upper[2] + robot.geometry["L6"])
-    rows.append(
+    rows = [
         Row(quantity="reach, d3 and tool in line", unit="mm", published=_REACH_MM,
-            predicted=longest, within=percent(1.0), group="tip", note="rounded in its estimate")
-    )  # fmt: skip
-    rows.append(Row(quantity="reach of the samples", unit="mm", predicted=reach, group="tip"))
+            predicted=longest, within=percent(1.0), group="tip", note="rounded in its estimate"),
+        Row(quantity="reach of the samples", unit="mm", predicted=reach, group="tip"),
+    ]  # fmt: skip
     for name, begin, end in zip("xyz", low, high, strict=True):
         rows.append(Row(quantity=f"{name}, from", unit="mm", predicted=begin, group="tip"))
         rows.append(Row(quantity=f"{name}, to", unit="mm", predicted=end, group="tip"))
@@ -91,7 +76,7 @@ def _sections(places: Array, robot: Robot) -> Figure:
 
 WORKSPACE = Experiment(
     "workspace",
-    "ranges of the joints, reach, and where the tip can be",
+    "reach, and where the tip can be",
     "Vongbunyong 2008, section 4.2, table 6.2, figure 4.1",
     _measure,
 )

@@ -14,11 +14,7 @@ from teleop_lab.experiments.drawing import Trace, axis, level, line, points
 from teleop_lab.experiments.experiment import Experiment
 from teleop_lab.experiments.one_axis import Grip, sampled_boundary
 from teleop_lab.experiments.outcome import Findings, Row, absolute, percent
-from teleop_lab.experiments.sampled_wall import (
-    passive_boundary,
-    restless_boundary,
-    wall_boundary,
-)
+from teleop_lab.experiments.sampled_wall import passive_boundary, restless_boundary, wall_boundary
 from teleop_lab.experiments.stability import GRIPS
 
 BARE = Grip(0.045, 1.0, 2.0)
@@ -107,7 +103,8 @@ def _stability(found: Boundaries) -> list[Row]:
         where = f"B = {wall_damping:g} N·s/m"
         row = Row(
             quantity=f"force {late} ms later", unit="N/m", published=round(law, 1),
-            predicted=predicted, within=_WITHIN, group=f"stable, linear law of Gil 2009, {where}",
+            basis="law", predicted=predicted, within=_WITHIN,
+            group=f"stable, linear law of Gil 2009, {where}",
             note=f"exact {axis_:.0f}",
         )  # fmt: skip
         laws.append(row)
@@ -124,10 +121,11 @@ def _energy(found: Bounds) -> list[Row]:
         law, text = passive_law(damping, wall_damping), f"b = {damping:g}, B = {wall_damping:g}"
         rows += [
             Row(quantity=f"{text} N·s/m, worst press", unit="N/m", published=law, predicted=worst,
-                within=_WITHIN if law else _NONE, group="passive, Colgate and Schenkel 1997"),
+                basis="law", within=_WITHIN if law else _NONE,
+                group="passive, Colgate and Schenkel 1997"),
             Row(quantity=f"{text} N·s/m, press of {longest} ms", unit="N/m",
                 published=press_law(damping, wall_damping, longest), predicted=bounds[longest],
-                within=_WITHIN, group="gives no energy in a long press"),
+                basis="law", within=_WITHIN, group="gives no energy in a long press"),
         ]  # fmt: skip
     return sorted(rows, key=lambda row: row.group, reverse=True)
 
@@ -136,7 +134,7 @@ def _divergence() -> Row:
     grip = GRIPS["loose"]  # b of 5 N·s/m and 0.25 kg
     return Row(
         quantity="b = B = 5 N·s/m, 0.25 kg", unit="N/m",
-        published=round(sampled_boundary(grip, 0, grip.damping), 1),
+        published=round(sampled_boundary(grip, 0, grip.damping), 1), basis="law",
         predicted=wall_boundary(grip, grip.damping, 0), within=_EXACT,
         group="diverges, exact sampled axis", note="passive: 0",
     )  # fmt: skip
@@ -145,7 +143,7 @@ def _divergence() -> Row:
 def _quiet(friction: float, resolution: float) -> Row:
     return Row(
         quantity=f"friction {friction:g} N, steps of {1e3 * resolution:g} mm", unit="N/m",
-        published=round(quiet_law(friction, resolution), 1),
+        published=round(quiet_law(friction, resolution), 1), basis="law",
         predicted=restless_boundary(friction, resolution), within=_WITHIN,
         group="rests under a loose hand, Abbott and Okamura 2005",
     )  # fmt: skip

@@ -10,6 +10,7 @@
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
+from teleop_core.session.runner import silent
 from teleop_lab.fitting.fit import LOSSES, FitError, FitResult, Fitted, default_free, fit
 from teleop_lab.fitting.rest_table import PUBLISHED, RestTable, read_rests
 
@@ -27,10 +28,6 @@ __all__ = [
 ]
 
 
-def _silent(share: float) -> None:
-    """Show no progress."""
-
-
 def fit_plant(
     table: Path | str | None = None,
     *,
@@ -39,7 +36,7 @@ def fit_plant(
     files: Iterable[Path | str] = (),
     texts: Iterable[str] = (),
     loss: str = "cauchy",
-    progress: Callable[[float], None] = _silent,
+    progress: Callable[[float], None] = silent,
 ) -> FitResult:
     """Fit the plant ``hardware`` of a robot to where its joints came to rest.
 

@@ -222,9 +222,10 @@ def default_free(robot: Robot, table: RestTable) -> tuple[str, ...]:
         if is_free and not is_single
     ]
     return (
-        *(f"coulomb.{name}" for name in stuck), *(f"bias.{name}" for name in both),
+        *(f"coulomb.{name}" for name in stuck),
+        *(f"bias.{name}" for name in both),
         *(f"weight.{name}" for name in model.unknown),
-    )  # fmt: skip
+    )
 
 
 def fit(

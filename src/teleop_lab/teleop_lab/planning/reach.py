@@ -21,7 +21,7 @@ from teleop_core.session.api import run
 from teleop_core.session.configuration import Configuration
 from teleop_core.session.exchange import as_master_bag
 from teleop_core.session.recording import Recording
-from teleop_core.session.runner import recorded_configuration
+from teleop_core.session.runner import recorded_configuration, silent
 from teleop_lab.planning.aim import Aim
 from teleop_lab.planning.asked import AskedPath, asked_path
 from teleop_lab.planning.placement import Placement
@@ -112,10 +112,6 @@ class Reach:
         return f"Reach({self.path.name}, {self.robot.name}: {shares})"
 
 
-def _silent(done: int, total: int) -> None:
-    """Show no progress."""
-
-
 def reach(
     source: Recording | Path | str,
     *,
@@ -124,7 +120,7 @@ def reach(
     share: float = GOAL,
     arm: str = "",
     keeps_axes: bool = False,
-    progress: Progress = _silent,
+    progress: Progress = silent,
     files: Iterable[Path | str] = (),
     settings: Mapping[str, Setting] | None = None,
     texts: Iterable[str] = (),

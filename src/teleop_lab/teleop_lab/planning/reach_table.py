@@ -61,7 +61,6 @@ def _start(placement: Placement) -> str:
 
 
 def _advice(reach: "Reach") -> list[str]:
-    """What to do next."""
     if reach.is_given:
         return [f"The parameters as given reach {_percent(reach.goal)}: nothing to change."]
     lines = []

@@ -104,7 +104,6 @@ class Search:
         return tried
 
     def _other_starts(self, placement: Placement) -> list[Placement]:
-        """The placement from everywhere else."""
         return [replace(placement, start=start) for start in self._starts]
 
     def _other_turns(self, placement: Placement) -> list[Placement]:

@@ -14,7 +14,7 @@ import numpy as np
 from numba import types
 
 from teleop_core.base.errors import PartError
-from teleop_core.base.registry import Registry, part_check, tried
+from teleop_core.base.registry import Registry, part_check, places, tried
 from teleop_core.kernels import pointer
 from teleop_core.kernels.geometry import Array
 from teleop_core.kernels.parts import fenced, is_whole, numbers_of
@@ -52,8 +52,8 @@ class Architecture:
             where the tip was measured [m], both along the slave's base, as late as they come, and
             zero where nothing comes; ``period`` is the time since the sample before [s]. Writes the
             push (3,) along the slave's base [N].
-        numbers: ``numbers(parameters)`` gives what ``push`` takes; None for the numbers of the
-            parameters in their order.
+        numbers: ``numbers(parameters)`` gives what ``push`` takes, if that is
+            something else than the numbers of the parameters in their order.
         force_scale: ``force_scale(parameters)`` gives the force at the hand over the one on the
             tip that it answers, above 0, by which energies of hand and slave are compared.
         lead_gain: ``lead_gain(parameters)`` gives the force that leads the slave's tip over what
@@ -64,19 +64,13 @@ class Architecture:
     name: str
     parameters: type
     push: Callable[[Array, Array, Array, Array, float, Array], None]
-    numbers: Callable[[Any], Array] | None = None
+    numbers: Callable[[Any], Array] = numbers_of
     force_scale: Callable[[Any], float] = unscaled
     lead_gain: Callable[[Any], float] = unled
     needs_impedance: bool = False
 
-    @cached_property
-    def push_pointer(self) -> Any:
-        """The push as an argument for kernels."""
-        return pointer(self.push, PUSH)
-
-    def numbers_of(self, parameters: object) -> Array:
-        """Numbers of a parameter group, as the push takes them."""
-        return numbers_of(parameters) if self.numbers is None else self.numbers(parameters)
+    push_pointer = cached_property(lambda self: pointer(self.push, PUSH))
+    """The push as an argument for kernels."""
 
 
 def _try(part: Architecture) -> None:
@@ -86,7 +80,7 @@ def _try(part: Architecture) -> None:
         "defaults"
     )
     with tried("architecture", part.name, needs):
-        numbers = part.numbers_of(part.parameters())
+        numbers = part.numbers(part.parameters())
         memory, fence = fenced(np.zeros(MEMORY))
         out, behind = fenced(np.zeros(3))
         for size in (0.0, 1.0, -3.0):
@@ -99,19 +93,14 @@ def _try(part: Architecture) -> None:
 ARCHITECTURES: Registry[Architecture] = Registry(
     "architecture",
     "architectures",
-    {
-        "unilateral": "teleop_core.chain.architectures.unilateral:UNILATERAL",
-        "position_force": "teleop_core.chain.architectures.position_force:POSITION_FORCE",
-        "position_position": "teleop_core.chain.architectures.position_position:POSITION_POSITION",
-        "three_channel": "teleop_core.chain.architectures.three_channel:THREE_CHANNEL",
-        "four_channel": "teleop_core.chain.architectures.four_channel:FOUR_CHANNEL",
-    },
+    places(
+        "teleop_core.chain.architectures",
+        "unilateral position_force position_position three_channel four_channel",
+    ),
     part_check("architecture", Architecture, "push"),
     _try,
 )
 """All kinds by name."""
 
-
-def register_architecture(part: Architecture, *, replace: bool = False) -> Architecture:
-    """Add a kind under its own name for the rest of the program; see :meth:`Registry.add`."""
-    return ARCHITECTURES.add(part.name, part, replace=replace)
+register_architecture = ARCHITECTURES.register
+"""Adds one of yours under its own name; see :meth:`Registry.register`."""

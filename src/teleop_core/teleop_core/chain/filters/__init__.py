@@ -14,7 +14,7 @@ import numpy as np
 from numba import types
 
 from teleop_core.base.errors import PartError
-from teleop_core.base.registry import Registry, part_check, tried
+from teleop_core.base.registry import Registry, part_check, places, tried
 from teleop_core.kernels import pointer
 from teleop_core.kernels.geometry import Array
 from teleop_core.kernels.parts import fenced, is_whole, numbers_of
@@ -43,23 +43,17 @@ class TremorFilter:
             the filter begins; ``value`` is the way from the place where it began [m]; ``period`` is
             the time since the sample before [s], 10 ms at most. Returns the filtered value [m]; as
             long as all values are 0 it returns 0.
-        numbers: ``numbers(parameters)`` gives what ``filter`` takes; None for the numbers of the
-            parameters in their order.
+        numbers: ``numbers(parameters)`` gives what ``filter`` takes, if that is
+            something else than the numbers of the parameters in their order.
     """
 
     name: str
     parameters: type
     filter: Callable[[Array, Array, float, float], float]
-    numbers: Callable[[Any], Array] | None = None
+    numbers: Callable[[Any], Array] = numbers_of
 
-    @cached_property
-    def filter_pointer(self) -> Any:
-        """The filter as an argument for kernels."""
-        return pointer(self.filter, FILTER)
-
-    def numbers_of(self, parameters: object) -> Array:
-        """Numbers of a parameter group, as the filter takes them."""
-        return numbers_of(parameters) if self.numbers is None else self.numbers(parameters)
+    filter_pointer = cached_property(lambda self: pointer(self.filter, FILTER))
+    """The filter as an argument for kernels."""
 
 
 def _try(part: TremorFilter) -> None:
@@ -69,7 +63,7 @@ def _try(part: TremorFilter) -> None:
         "defaults"
     )
     with tried("tremor filter", part.name, needs):
-        numbers = part.numbers_of(part.parameters())
+        numbers = part.numbers(part.parameters())
         memory, fence = fenced(np.zeros(MEMORY))
         rest = float(part.filter(numbers, memory, 0.0, 1e-3))
         for i in range(64):
@@ -85,18 +79,11 @@ def _try(part: TremorFilter) -> None:
 TREMOR_FILTERS: Registry[TremorFilter] = Registry(
     "tremor filter",
     "tremor_filters",
-    {
-        "notch": "teleop_core.chain.filters.notch:NOTCH",
-        "band_stop": "teleop_core.chain.filters.band_stop:BAND_STOP",
-        "kalman": "teleop_core.chain.filters.kalman:KALMAN",
-        "wflc": "teleop_core.chain.filters.wflc:WFLC",
-    },
+    places("teleop_core.chain.filters", "notch band_stop kalman wflc"),
     part_check("tremor filter", TremorFilter, "filter"),
     _try,
 )
 """All kinds by name."""
 
-
-def register_tremor_filter(part: TremorFilter, *, replace: bool = False) -> TremorFilter:
-    """Add a kind under its own name for the rest of the program; see :meth:`Registry.add`."""
-    return TREMOR_FILTERS.add(part.name, part, replace=replace)
+register_tremor_filter = TREMOR_FILTERS.register
+"""Adds one of yours under its own name; see :meth:`Registry.register`."""

@@ -13,13 +13,7 @@ import numpy as np
 
 from teleop_core.base.parameters import Choice, choice, parameter
 from teleop_core.chain.filters import LONGEST_NS, MEMORY, TREMOR_FILTERS
-from teleop_core.chain.mapping.plausibility import (
-    HandLimits,
-    PlausibilityNumbers,
-    PlausibilityState,
-    is_plausible,
-    take_hand,
-)
+from teleop_core.chain.mapping import plausibility
 from teleop_core.graph.row import Row
 from teleop_core.graph.signals import DT, assign
 from teleop_core.graph.stage import RunningStage, Stage
@@ -41,10 +35,10 @@ class TremorFilterParameters:
         0.3, unit="s", lower=0.002, upper=5.0,
         doc="after a longer pause of the master the filter begins anew at the reading",
     )  # fmt: skip
-    plausible: HandLimits = field(default_factory=HandLimits)
+    plausible: plausibility.HandLimits = field(default_factory=plausibility.HandLimits)
 
 
-class FilterState(PlausibilityState):
+class FilterState(plausibility.PlausibilityState):
     """State record of the tremor filter."""
 
     origin: Vector3  # reading at which it began [m]
@@ -120,7 +114,7 @@ def _follow(s: FilterState, part: Part, pose: Array, elapsed_ns: int, filtered: 
 
 @kernel
 def tremor_filter_step(
-    p: PlausibilityNumbers, s: FilterState, part: Part, row: Row, dt: float
+    p: plausibility.PlausibilityNumbers, s: FilterState, part: Part, row: Row, dt: float
 ) -> None:
     """One master sample: write master_filtered_cp and master_filtered_out.
 
@@ -142,7 +136,7 @@ def tremor_filter_step(
     if not _is_finite(pose) or (elapsed_ns == 0 and s.begun > 0):
         return
     goes_on = s.begun > 0 and 0 < elapsed_ns <= p.pause_ns
-    goes_on = is_plausible(p, s, pose, row.master_measured_cp_ns) and goes_on
+    goes_on = plausibility.is_plausible(p, s, pose, row.master_measured_cp_ns) and goes_on
     for i in range(3, 7):
         filtered[i] = pose[i]
     if goes_on:
@@ -159,7 +153,7 @@ class RunningTremorFilter(RunningStage):
 
     def __init__(self, parameters: TremorFilterParameters, dt: float = DT) -> None:
         super().__init__(TREMOR_FILTER, 0, dt)
-        self.parameters, self.state = record(PlausibilityNumbers), record(FilterState)
+        self.parameters, self.state = record(plausibility.PlausibilityNumbers), record(FilterState)
         self.kernel = tremor_filter_step
         self._part = Part(None, np.empty(0), np.zeros((3, MEMORY)))
         self._begin = self.signals.copy()
@@ -175,10 +169,10 @@ class RunningTremorFilter(RunningStage):
 
     def retune(self, parameters: TremorFilterParameters) -> None:
         """Take new parameters from the next sample on; what differs fades, and nothing jumps."""
-        take_hand(self.parameters, parameters.plausible)
+        plausibility.take_hand(self.parameters, parameters.plausible)
         self.parameters["pause_ns"] = math.floor(parameters.longest_pause * 1e9 + 0.5)
         kind = TREMOR_FILTERS.find(parameters.kind.kind)
-        numbers, step = kind.numbers_of(parameters.kind.parameters), kind.filter_pointer
+        numbers, step = kind.numbers(parameters.kind.parameters), kind.filter_pointer
         if step is self._part.filter and len(numbers) == len(self._part.numbers):
             self.state["is_retuned"] |= not np.array_equal(numbers, self._part.numbers)
             self._part.numbers[:] = numbers  # the tick that is composed already goes on

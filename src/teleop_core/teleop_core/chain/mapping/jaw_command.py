@@ -7,14 +7,9 @@ from dataclasses import dataclass
 
 from teleop_core.base.errors import ParameterError
 from teleop_core.base.parameters import parameter
+from teleop_core.graph import topics
 from teleop_core.graph.row import Row
 from teleop_core.graph.stage import Stage
-from teleop_core.graph.topics import (
-    HAND_JAW,
-    MASTER_BUTTONS,
-    MASTER_MEASURED_CP,
-    SLAVE_JAW_SERVO_JP,
-)
 from teleop_core.kernels import kernel
 from teleop_core.kernels.fields import Fields
 
@@ -29,9 +24,10 @@ class JawCommandParameters:
     """What closes the jaw, and how far."""
 
     source: str = parameter(
-        "hand", choices=SOURCES,
+        "hand",
+        choices=SOURCES,
         doc="what closes it: hand/jaw, by its share, or a button, which keeps its own meaning too",
-    )  # fmt: skip
+    )
     toggles: bool = parameter(
         False, doc="whether each press closes or opens it, not the button as long as it is held"
     )
@@ -90,9 +86,9 @@ def jaw_command_step(p: JawCommandNumbers, s: JawCommandState, row: Row, dt: flo
 JAW_COMMAND = Stage(
     "jaw_command",
     JawCommandParameters,
-    reads=(MASTER_MEASURED_CP, MASTER_BUTTONS, HAND_JAW),
-    writes=(SLAVE_JAW_SERVO_JP,),
+    reads=(topics.MASTER_MEASURED_CP, topics.MASTER_BUTTONS, topics.HAND_JAW),
+    writes=(topics.SLAVE_JAW_SERVO_JP,),
     step=jaw_command_step,
     state=JawCommandState,
-    trigger=MASTER_MEASURED_CP,
+    trigger=topics.MASTER_MEASURED_CP,
 )

@@ -10,17 +10,8 @@ from collections.abc import Sequence
 
 from teleop_core.graph.row import Row
 from teleop_core.graph.topics import SLAVE_REACH, Limit
-from teleop_core.kernels import inner
+from teleop_core.kernels import geometry, inner
 from teleop_core.kernels.fields import Fields, PoseRow, Quaternion, Vector3
-from teleop_core.kernels.geometry import (
-    Array,
-    invert_quaternion,
-    multiply_quaternions,
-    rotate_by_vector,
-    turn_between,
-    turn_by,
-    turn_within,
-)
 from teleop_core.kernels.room import room
 
 SENT = 8192
@@ -136,7 +127,7 @@ def draw_back(s: LimitState, sent: Sequence[Sent], gain: float, row: Row) -> Non
 
 
 @inner
-def _move_back(s: LimitState, entry: Sent, gain: float, reach: Array) -> None:
+def _move_back(s: LimitState, entry: Sent, gain: float, reach: geometry.Array) -> None:
     cut, square = room(3), 0.0
     for i in range(3):
         cut[i] = entry.moved[i] + reach[_CUT + i] - s.moved[i]
@@ -155,12 +146,12 @@ def _move_back(s: LimitState, entry: Sent, gain: float, reach: Array) -> None:
 
 
 @inner
-def _turn_back(s: LimitState, entry: Sent, reach: Array) -> None:
+def _turn_back(s: LimitState, entry: Sent, reach: geometry.Array) -> None:
     wanted, cut = room(4), room(3)
     for i in range(4):
         wanted[i] = entry.turned[i]
-    turn_by(reach[_CUT + 3 : _CUT + 6], wanted)
-    turn_between(s.turned, wanted, cut)
+    geometry.turn_by(reach[_CUT + 3 : _CUT + 6], wanted)
+    geometry.turn_between(s.turned, wanted, cut)
     length = math.sqrt(cut[0] * cut[0] + cut[1] * cut[1] + cut[2] * cut[2])
     if length <= _ROUNDING:
         return
@@ -170,9 +161,9 @@ def _turn_back(s: LimitState, entry: Sent, reach: Array) -> None:
     before = room(4)
     for i in range(4):
         before[i], s.turned[i] = s.command[3 + i], wanted[i]
-    turn_by(cut, s.command[3:7])
+    geometry.turn_by(cut, s.command[3:7])
     align(s)
-    turn_within(before, s.command[3:7], cut)
+    geometry.turn_within(before, s.command[3:7], cut)
     for i in range(3):
         s.turn_out[i] = -cut[i] / length
     _anchor_turn(s)
@@ -182,8 +173,8 @@ def _turn_back(s: LimitState, entry: Sent, reach: Array) -> None:
 def align(s: LimitState) -> None:
     """Let the hand's present orientation mean that of the command."""
     inverse = room(4)
-    invert_quaternion(s.tool, inverse)
-    multiply_quaternions(s.command[3:7], inverse, s.alignment)
+    geometry.invert_quaternion(s.tool, inverse)
+    geometry.multiply_quaternions(s.command[3:7], inverse, s.alignment)
 
 
 @inner
@@ -191,7 +182,7 @@ def _anchor_turn(s: LimitState) -> None:
     """Put the anchor where the hand's orientation is, less the depth."""
     x, y, z = s.turn_out[0], s.turn_out[1], s.turn_out[2]
     back = -s.turn_depth
-    rotate_by_vector(s.tool, back * x, back * y, back * z, s.turn_anchor)
+    geometry.rotate_by_vector(s.tool, back * x, back * y, back * z, s.turn_anchor)
 
 
 @inner
@@ -215,7 +206,7 @@ def measure_depth(s: LimitState, most: float, now_ns: int) -> None:
                 s.anchor[i] = s.hand[i] - most * s.out[i]
     if s.turn_depth > 0.0:
         turn = room(3)
-        turn_within(s.turn_anchor, s.tool, turn)
+        geometry.turn_within(s.turn_anchor, s.tool, turn)
         s.turn_depth = turn[0] * s.turn_out[0] + turn[1] * s.turn_out[1] + turn[2] * s.turn_out[2]
         if s.turn_depth > s.turn_met + _TURN_PAST:
             s.turn_depth = 0.0

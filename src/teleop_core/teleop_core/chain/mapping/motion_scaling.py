@@ -9,23 +9,7 @@ import numpy as np
 from teleop_core.base.parameters import values_of
 from teleop_core.chain.architectures import ARCHITECTURES
 from teleop_core.chain.fixtures import FIXTURES
-from teleop_core.chain.mapping.following import (
-    FollowingNumbers,
-    FollowingState,
-    follows,
-    hear,
-    is_in_doubt,
-)
-from teleop_core.chain.mapping.limits import (
-    SENT,
-    LimitState,
-    Sent,
-    align,
-    draw_back,
-    forget_limits,
-    measure_depth,
-    remember,
-)
+from teleop_core.chain.mapping import following, limits, plausibility, walls
 from teleop_core.chain.mapping.parameters import (
     MODES,
     FixtureParameters,
@@ -35,13 +19,6 @@ from teleop_core.chain.mapping.parameters import (
     axis_map,
     tool_maps,
 )
-from teleop_core.chain.mapping.plausibility import (
-    PlausibilityNumbers,
-    PlausibilityState,
-    has_lost_buttons,
-    is_plausible,
-    take_hand,
-)
 from teleop_core.chain.mapping.reflection import (
     Law,
     ReflectionNumbers,
@@ -50,21 +27,7 @@ from teleop_core.chain.mapping.reflection import (
     make_law,
     reflect,
 )
-from teleop_core.chain.mapping.side import (
-    Shape,
-    SideNumbers,
-    SideState,
-    hold_slave,
-    let_go,
-)
-from teleop_core.chain.mapping.walls import (
-    WALLS,
-    WallNumbers,
-    WallState,
-    damped_wall,
-    forget_wall,
-    wall_force,
-)
+from teleop_core.chain.mapping.side import Shape, SideNumbers, SideState, hold_slave, let_go
 from teleop_core.chain.passivity import PASSIVITIES
 from teleop_core.graph.row import Row
 from teleop_core.graph.signals import DT, STATE, assign, copy
@@ -86,17 +49,16 @@ from teleop_core.graph.topics import (
 )
 from teleop_core.kernels import inner, kernel
 from teleop_core.kernels.fields import Integers, Quaternion, Vector3, record, record_array
-from teleop_core.kernels.geometry import (
-    Array,
-    multiply_quaternions,
-    rotate_by_vector,
-    turn_within,
-)
+from teleop_core.kernels.geometry import Array, multiply_quaternions, rotate_by_vector, turn_within
 from teleop_core.kernels.room import room
 
 
 class ScalingNumbers(
-    WallNumbers, SideNumbers, ReflectionNumbers, PlausibilityNumbers, FollowingNumbers
+    walls.WallNumbers,
+    SideNumbers,
+    ReflectionNumbers,
+    plausibility.PlausibilityNumbers,
+    following.FollowingNumbers,
 ):
     """Parameter record of the motion scaling."""
 
@@ -112,7 +74,12 @@ class ScalingNumbers(
 
 
 class ScalingState(
-    LimitState, WallState, SideState, PlausibilityState, ReflectionState, FollowingState
+    limits.LimitState,
+    walls.WallState,
+    SideState,
+    plausibility.PlausibilityState,
+    ReflectionState,
+    following.FollowingState,
 ):
     """State record of the motion scaling."""
 
@@ -189,8 +156,8 @@ def _latch(s: ScalingState, stylus: Array) -> None:
     if s.is_engaged:
         for i in range(3):
             s.center[i] += stylus[i] - s.stylus[i]
-    align(s)
-    forget_limits(s)
+    limits.align(s)
+    limits.forget_limits(s)
 
 
 @inner
@@ -213,7 +180,7 @@ def _move(
     else:
         x, y, z = turn[0] * p.rotation_gain, turn[1] * p.rotation_gain, turn[2] * p.rotation_gain
         rotate_by_vector(s.command[3:7], x, y, z, s.command[3:7])
-        align(s)
+        limits.align(s)
     # One Newton step keeps the product of many unit quaternions a unit quaternion.
     square = 0.0
     for i in range(3, 7):
@@ -233,12 +200,12 @@ def _wall(
             fixture.offset[i] = stylus[i] - s.center[i]
         length = fixture.depth(fixture.offset, fixture.numbers, fixture.out)
     if p.is_damped == 0:
-        wall_force(fixture.out, length, p.stiffness, p.max_force, force)
+        walls.wall_force(fixture.out, length, p.stiffness, p.max_force, force)
         return
     if period <= 0.0 or period > 1e-9 * p.pause_ns:
-        forget_wall(s, stylus)
+        walls.forget_wall(s, stylus)
         period = _LONG
-    damped_wall(p, s, stylus, fixture.out, length, period, force)
+    walls.damped_wall(p, s, stylus, fixture.out, length, period, force)
 
 
 @inner
@@ -275,7 +242,7 @@ def _report(p: ScalingNumbers, s: ScalingState, gain: float, is_following: bool,
 def _refuse(
     p: ScalingNumbers,
     s: ScalingState,
-    sent: Sequence[Sent],
+    sent: Sequence[limits.Sent],
     is_following: bool,
     is_doubtful: bool,
     stylus: Array,
@@ -283,8 +250,8 @@ def _refuse(
 ) -> None:
     """Answer a sample that no hand can have made: hold, push with nothing, begin anew after it."""
     s.must_latch = 1
-    remember(s, sent, row.master_measured_cp_ns)
-    forget_wall(s, stylus)
+    limits.remember(s, sent, row.master_measured_cp_ns)
+    walls.forget_wall(s, stylus)
     for i in range(6):
         row.master_servo_cf[i] = 0.0
     for i in range(3):
@@ -301,7 +268,7 @@ def _refuse(
 def motion_scaling_step(
     p: ScalingNumbers,
     s: ScalingState,
-    sent: Sequence[Sent],
+    sent: Sequence[limits.Sent],
     fixture: Shape,
     law: Law,
     row: Row,
@@ -333,14 +300,14 @@ def motion_scaling_step(
     for i in range(3):
         stylus[i] = pose[i] + row.master_filtered_out[i]
     period = 1e-9 * (row.master_measured_cp_ns - s.last_ns)
-    hear(s, row)
-    is_following = follows(p, s, row)
-    is_doubtful = is_in_doubt(p, s, is_following, row)
-    draw_back(s, sent, p.gain[s.is_fine], row)
-    if not is_plausible(p, s, pose, row.master_measured_cp_ns):
+    following.hear(s, row)
+    is_following = following.follows(p, s, row)
+    is_doubtful = following.is_in_doubt(p, s, is_following, row)
+    limits.draw_back(s, sent, p.gain[s.is_fine], row)
+    if not plausibility.is_plausible(p, s, pose, row.master_measured_cp_ns):
         _refuse(p, s, sent, is_following, is_doubtful, stylus, row)
         return
-    clutch = 1.0 if has_lost_buttons(p, s, row) else buttons[0]
+    clutch = 1.0 if plausibility.has_lost_buttons(p, s, row) else buttons[0]
     _toggle_mode(s, buttons)
     gain = p.gain[s.is_fine]
     turn = room(3)
@@ -357,14 +324,14 @@ def motion_scaling_step(
         _latch(s, stylus)
     else:
         _move(p, s, fixture, gain, pose, turn)
-        measure_depth(s, p.reach_depth, row.master_measured_cp_ns)
+        limits.measure_depth(s, p.reach_depth, row.master_measured_cp_ns)
     _toggle_fixture(s, buttons, stylus)
     s.is_engaged, s.must_latch = 1, 0
     for i in range(3):
         s.master[i], s.stylus[i], s.buttons[i] = pose[i], stylus[i], buttons[i]
     s.buttons[0] = clutch
     s.last_ns = row.master_measured_cp_ns
-    remember(s, sent, s.last_ns)
+    limits.remember(s, sent, s.last_ns)
     _wall(p, s, fixture, period, stylus, row.master_servo_cf)
     _push_back(p, s, row.master_servo_cf)
     reflect(p, s, law, is_following, period, stylus, row)
@@ -381,7 +348,7 @@ class MotionScaling(RunningStage):
         super().__init__(MOTION_SCALING, 0, dt)
         self.changes_itself = True  # its mode, by a button
         self.parameters, self.state = record(ScalingNumbers), record(ScalingState)
-        self._sent = record_array(Sent, SENT)
+        self._sent = record_array(limits.Sent, limits.SENT)
         self._values = parameters
         self.kernel = motion_scaling_step
         self._shape = Shape(None, np.empty(0), np.zeros(3), np.zeros(3))
@@ -408,14 +375,14 @@ class MotionScaling(RunningStage):
         p["slave_master"], p["stylus_tool"] = tool_maps(parameters)
         p["axis"], p["sign"] = np.abs(axes).argmax(axis=1), axes.sum(axis=1)
         self._take_fixture(fixture)
-        wall = WALLS[fixture.wall]
+        wall = walls.WALLS[fixture.wall]
         p["stiffness"] = wall.spring(fixture.stiffness, fixture.max_force)
         p["max_force"], p["damping"] = fixture.max_force, fixture.damping
         p["is_damped"] = wall.is_damped
         p["timeout_ns"] = round(parameters.feedback_timeout * 1e9)
         p["pause_ns"] = round(parameters.longest_pause * 1e9)
         p["rotation_gain"] = parameters.rotation_gain
-        take_hand(p, parameters.plausible)
+        plausibility.take_hand(p, parameters.plausible)
         p["silence_ns"] = round(parameters.plausible.button_silence * 1e9)
         self._take_reach_force(parameters.reach_force)
         self._take_reflection(parameters.reflection)
@@ -464,12 +431,13 @@ class MotionScaling(RunningStage):
         p["law"] = PASSIVITIES.names().index(passivity.name)
         p["force_scale"] = part.force_scale(chosen.parameters)
         p["lead_gain"] = part.lead_gain(chosen.parameters)
-        numbers = part.numbers_of(chosen.parameters)
+        numbers = part.numbers(chosen.parameters)
         kept = passivity.numbers_of(reflection.passivity.parameters)
         law = self._law
         if (part.push_pointer, passivity.hand_pointer) == (law.push, law.hand) and (
-            len(numbers), len(kept)
-        ) == (len(law.numbers), len(law.kept)):  # fmt: skip
+            len(numbers),
+            len(kept),
+        ) == (len(law.numbers), len(law.kept)):
             law.numbers[:], law.kept[:] = numbers, kept  # the tick that is composed already goes on
             return
         if part.push_pointer is not law.push:

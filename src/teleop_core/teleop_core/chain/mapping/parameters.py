@@ -26,16 +26,18 @@ class FixtureParameters:
 
     kind: Choice = choice(FIXTURES, "box", doc="shape of the fixture")
     side: str = parameter(
-        "hand", choices=SIDES,
+        "hand",
+        choices=SIDES,
         doc="whom it holds: hand: it pushes the hand, and the slave goes where that goes; slave: "
         "the slave's command stays inside, and the hand feels nothing of it; both: both",
-    )  # fmt: skip
+    )
     wall: str = parameter(
-        "damped", choices=tuple(WALLS),
+        "damped",
+        choices=tuple(WALLS),
         doc="damped: spring and damper up to max_force, passive if soft enough (up to 1000 N/m); "
         "hard: the same, as steep as sampling allows; source: the published spring, full after "
         "1 mm; soft: a spring; step: max_force at once, which buzzes",
-    )  # fmt: skip
+    )
     stiffness: float = parameter(
         1000.0, unit="N/m", lower=1.0, upper=5000.0, doc="spring of the damped and the soft wall",
         source="assumed: below the least stiffness of the device, 1020 N/m; none is published",
@@ -84,12 +86,13 @@ class ReflectionParameters:
         source="published: Vongbunyong 2008, section 6.3, the peak force of the device",
     )  # fmt: skip
     passivity: Choice = choice(
-        PASSIVITIES, "none",
+        PASSIVITIES,
+        "none",
         doc="tank: the push gives the hand no more energy than it took from it in this touch, "
         "however late it comes; tdpa: no more than the slave got back, and with a stage passivity "
         "the slave gives no more than the hand did; wave: waves of force and speed, if there is "
         "that stage; none: what the slave feels, which may throw the hand",
-    )  # fmt: skip
+    )
 
 
 @dataclass(frozen=True, kw_only=True)

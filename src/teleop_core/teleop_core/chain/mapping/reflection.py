@@ -190,12 +190,7 @@ def _bound(push: Array, most: float, rounding: float) -> None:
 
 @inner
 def _count(
-    p: ReflectionNumbers,
-    s: ReflectionState,
-    law: Law,
-    is_following: bool,
-    stylus: Array,
-    row: Row,
+    p: ReflectionNumbers, s: ReflectionState, law: Law, is_following: bool, stylus: Array, row: Row
 ) -> None:
     """Count what the last push did on the way of the hand; what begins anew has no energy.
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from teleop_core.base.parameters import parameter
+from teleop_core.chain.master import hand_mechanics
 from teleop_core.chain.master.contact import ContactState, account, distance
 from teleop_core.chain.master.device import (
     DeviceParameters,
@@ -16,13 +17,6 @@ from teleop_core.chain.master.device import (
     measure_twist,
     read_handle,
     read_phantom,
-)
-from teleop_core.chain.master.hand_mechanics import (
-    HandNumbers,
-    HandParameters,
-    HandState,
-    join,
-    move_hand,
 )
 from teleop_core.chain.master.rendering import RenderingNumbers, RenderingState, render
 from teleop_core.chain.operators.rest import REST_POSITION, REST_TILT, rest_pose
@@ -46,11 +40,7 @@ from teleop_core.graph.topics import (
 )
 from teleop_core.kernels import inner, kernel
 from teleop_core.kernels.fields import PoseRow, record
-from teleop_core.kernels.geometry import (
-    Array,
-    rotation,
-    transform,
-)
+from teleop_core.kernels.geometry import Array, rotation, transform
 from teleop_core.kernels.room import room
 from teleop_core.slave.operation.states import State
 
@@ -83,17 +73,17 @@ class HapticMasterParameters:
         source="assumed: as of buttons, longer than a busy machine keeps a process waiting",
     )  # fmt: skip
     device: DeviceParameters = field(default_factory=DeviceParameters)
-    hand: HandParameters = field(default_factory=HandParameters)
+    hand: hand_mechanics.HandParameters = field(default_factory=hand_mechanics.HandParameters)
 
 
-class MasterNumbers(HandNumbers, ReadingNumbers, RenderingNumbers):
+class MasterNumbers(hand_mechanics.HandNumbers, ReadingNumbers, RenderingNumbers):
     """Parameter record of the haptic master."""
 
     force_range: float  # beyond which a force is not given [N]
     silence_ns: int
 
 
-class MasterState(HandState, ReadingState, RenderingState, ContactState):
+class MasterState(hand_mechanics.HandState, ReadingState, RenderingState, ContactState):
     """State record of the haptic master."""
 
     next_noise: int
@@ -171,7 +161,7 @@ def haptic_master_step(
     row.master_contact[_MOST] = render(p, s, row.master_servo_cf, force)
     for i in range(3):
         before[i] = s.position[i]
-    move_hand(p, s, s.aim[0:3], force, dt)
+    hand_mechanics.move_hand(p, s, s.aim[0:3], force, dt)
     for i in range(3):
         place[i] = s.position[i] + row.hand_tremor[i]
     account(s, force, p.friction, distance(before, s.position), place, row.master_contact)
@@ -237,7 +227,7 @@ class HapticMaster(RunningStage):
         p["friction"], p["peak_force"] = device.friction, device.peak_force
         p["continuous"] = device.continuous_force
         p["warming"] = -math.expm1(-self.dt / device.thermal_time)
-        join(p, hand, device, self.dt)
+        hand_mechanics.join(p, hand, device, self.dt)
         p["force_range"] = parameters.force_range
         p["silence_ns"] = round(parameters.hand_timeout * 1e9)
         p["center"] = np.subtract(REST_POSITION, device.start)

@@ -18,12 +18,7 @@ from teleop_core.chain.master.joy_rates import JoyParameters, JoyRates
 from teleop_core.graph.signals import DT
 from teleop_core.graph.stage import RunningStage, Stage
 from teleop_core.graph.topics import MASTER_BUTTONS, MASTER_MEASURED_CP, MASTER_SERVO_CF
-from teleop_core.kernels.geometry import (
-    Array,
-    multiply_quaternions,
-    pose_from_transform,
-    quaternion_from_rotation,
-)
+from teleop_core.kernels import geometry
 from teleop_core.kernels.portable import dot
 from teleop_core.robots import load_robot_set
 from teleop_core.slave.bridges.hearing import wrong_stamp
@@ -66,9 +61,10 @@ class MasterBridgeParameters:
         doc="length in which the device counts: 0.001 for millimetres",
     )  # fmt: skip
     handle: str = parameter(
-        "", fixed=True,
+        "",
+        fixed=True,
         doc="robot whose tip is the stylus, by name or file, where the device says its joints",
-    )  # fmt: skip
+    )
     handle_geometry: tuple[str, ...] = parameter(
         (), fixed=True, doc="symbol=value in place of its lengths and options [m, rad]"
     )
@@ -99,9 +95,10 @@ class MasterBridgeParameters:
         doc="poses whose stamps differ by more from our clock are refused",
     )  # fmt: skip
     force_topic: str = parameter(
-        "", fixed=True,
+        "",
+        fixed=True,
         doc="where the device takes forces, as geometry_msgs/WrenchStamped; empty: it has none",
-    )  # fmt: skip
+    )
     force_gain: float = parameter(
         1.0, lower=0.0, upper=10.0, doc="force of the device over the one that is asked for"
     )
@@ -148,9 +145,9 @@ class MasterBridge(RunningStage):
         self.kernel, self.parameters, p = _nothing, parameters, parameters
         self._rows = axis_map("device_axes", p.device_axes)
         self._base, self._stylus = np.empty(4), np.empty(4)
-        quaternion_from_rotation(self._rows, self._base)
+        geometry.quaternion_from_rotation(self._rows, self._base)
         columns = np.ascontiguousarray(axis_map("stylus_axes", p.stylus_axes).T)
-        quaternion_from_rotation(columns, self._stylus)
+        geometry.quaternion_from_rotation(columns, self._stylus)
         self.refused: Counter[str] = Counter()
         self.wrong, self.heard_ns, self._stamp_ns = "", 0, 0
         self._rates = JoyRates(p.joy)
@@ -165,7 +162,7 @@ class MasterBridge(RunningStage):
         """Take another gain, bound or timeout of the force."""
         self.parameters = parameters
 
-    def hear(self, pose: Array, stamp_ns: int, now_ns: int) -> bool:
+    def hear(self, pose: geometry.Array, stamp_ns: int, now_ns: int) -> bool:
         """Take a pose of the stylus; whether ``master/measured_cp`` is new.
 
         Args:
@@ -180,8 +177,8 @@ class MasterBridge(RunningStage):
         out = self.signals["master_measured_cp"]
         out[:3] = self.parameters.unit * dot(self._rows, pose[:3])
         turned = pose[3:7] / math.sqrt(float((pose[3:7] ** 2).sum()))
-        multiply_quaternions(self._base, turned, turned)
-        multiply_quaternions(turned, self._stylus, turned)
+        geometry.multiply_quaternions(self._base, turned, turned)
+        geometry.multiply_quaternions(turned, self._stylus, turned)
         out[3:7] = turned
         self._stamp_ns, self.heard_ns = stamp_ns, now_ns
         return True
@@ -198,7 +195,7 @@ class MasterBridge(RunningStage):
         theirs = np.array([position[place] for place in places], np.float64)
         pose = np.full(7, np.nan)
         if np.isfinite(theirs).all():
-            pose_from_transform(self._robot.fk(self._joints.position(theirs)), pose)
+            geometry.pose_from_transform(self._robot.fk(self._joints.position(theirs)), pose)
         return self.hear(pose, stamp_ns, now_ns)
 
     def hear_joy(
@@ -226,7 +223,7 @@ class MasterBridge(RunningStage):
         silence = 1e-9 * (now_ns - self.heard_ns)
         return self.heard_ns > 0 and silence <= self.parameters.force_timeout
 
-    def force(self, age: float, now_ns: int) -> Array:
+    def force(self, age: float, now_ns: int) -> geometry.Array:
         """Force (3,) that the device shall give, along its own axes [N].
 
         Zero where nobody has asked for one lately, or the device has not said where it is.
@@ -252,7 +249,7 @@ class MasterBridge(RunningStage):
             return [f"waits for the device on {self.parameters.pose_topic}"]
         return []
 
-    def _doubt(self, pose: Array, stamp_ns: int, now_ns: int) -> tuple[str, str]:
+    def _doubt(self, pose: geometry.Array, stamp_ns: int, now_ns: int) -> tuple[str, str]:
         """Reason not to believe a pose, in a word and in a line; empty if there is none."""
         size = float((pose[3:7] ** 2).sum()) if np.isfinite(pose).all() else math.nan
         if not abs(size - 1.0) <= _OFF_UNIT:

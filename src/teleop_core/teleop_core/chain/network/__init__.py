@@ -14,7 +14,7 @@ import numpy as np
 from numba import types
 
 from teleop_core.base.errors import PartError
-from teleop_core.base.registry import Registry, part_check, tried
+from teleop_core.base.registry import Registry, part_check, places, tried
 from teleop_core.kernels import pointer
 from teleop_core.kernels.geometry import Array
 from teleop_core.kernels.parts import fenced, is_whole, numbers_of
@@ -42,23 +42,17 @@ class Network:
             packet to packet, and zero at the start; ``chances`` (3,) are random numbers, even from
             0 to 1; ``now`` is the time since the start [s]. Returns the time on the way beside the
             least one [s], or :data:`LOST`.
-        numbers: ``numbers(parameters)`` gives what ``draw`` takes; None for the numbers of the
-            parameters in their order.
+        numbers: ``numbers(parameters)`` gives what ``draw`` takes, if that is
+            something else than the numbers of the parameters in their order.
     """
 
     name: str
     parameters: type
     draw: Callable[[Array, Array, Array, float], float]
-    numbers: Callable[[Any], Array] | None = None
+    numbers: Callable[[Any], Array] = numbers_of
 
-    @cached_property
-    def draw_pointer(self) -> Any:
-        """The draw as an argument for kernels."""
-        return pointer(self.draw, DRAW)
-
-    def numbers_of(self, parameters: object) -> Array:
-        """Numbers of a parameter group, as the draw takes them."""
-        return numbers_of(parameters) if self.numbers is None else self.numbers(parameters)
+    draw_pointer = cached_property(lambda self: pointer(self.draw, DRAW))
+    """The draw as an argument for kernels."""
 
 
 def _try(part: Network) -> None:
@@ -68,7 +62,7 @@ def _try(part: Network) -> None:
         "defaults"
     )
     with tried("network", part.name, needs):
-        numbers = part.numbers_of(part.parameters())
+        numbers = part.numbers(part.parameters())
         memory, fence = fenced(np.zeros(MEMORY))
         for i, chance in enumerate(np.linspace(0.0, 0.999, 32)):
             drawn = float(part.draw(numbers, memory, np.full(CHANCES, chance), 1e-3 * i))
@@ -80,19 +74,11 @@ def _try(part: Network) -> None:
 NETWORKS: Registry[Network] = Registry(
     "network",
     "networks",
-    {
-        "constant": "teleop_core.chain.network.constant:CONSTANT",
-        "jitter": "teleop_core.chain.network.jitter:JITTER",
-        "gilbert_elliott": "teleop_core.chain.network.gilbert_elliott:GILBERT_ELLIOTT",
-        "outages": "teleop_core.chain.network.outages:OUTAGES",
-        "trace": "teleop_core.chain.network.trace:TRACE",
-    },
+    places("teleop_core.chain.network", "constant jitter gilbert_elliott outages trace"),
     part_check("network", Network, "draw"),
     _try,
 )
 """All kinds by name."""
 
-
-def register_network(network: Network, *, replace: bool = False) -> Network:
-    """Add a kind under its own name for the rest of the program; see :meth:`Registry.add`."""
-    return NETWORKS.add(network.name, network, replace=replace)
+register_network = NETWORKS.register
+"""Adds one of yours under its own name; see :meth:`Registry.register`."""

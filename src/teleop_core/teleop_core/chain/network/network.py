@@ -8,24 +8,7 @@ import math
 
 import numpy as np
 
-from teleop_core.chain.network import CHANCES, NETWORKS
-from teleop_core.chain.network.deadband import (
-    DeadbandNumbers,
-    DeadbandState,
-    is_worth_telling,
-    remember_told,
-    take_deadband,
-)
-from teleop_core.chain.network.link import (
-    BLOCK,
-    LinkNumbers,
-    Way,
-    make_way,
-    may_send,
-    send_packet,
-    serve_line,
-    take_packet,
-)
+from teleop_core.chain.network import CHANCES, NETWORKS, deadband, link
 from teleop_core.chain.network.packet_size import message_sizes
 from teleop_core.chain.network.parameters import NetworkParameters, WayParameters
 from teleop_core.graph.row import Row
@@ -78,7 +61,7 @@ _CARRIED = (
 """Topics of a packet to the slave, and of one from it, in the order of their stamps."""
 
 
-class NetworkNumbers(LinkNumbers, DeadbandNumbers):
+class NetworkNumbers(link.LinkNumbers, deadband.DeadbandNumbers):
     """Parameter record of the network."""
 
     is_incremental: int
@@ -86,7 +69,7 @@ class NetworkNumbers(LinkNumbers, DeadbandNumbers):
     clock_drift: float
 
 
-class NetworkState(DeadbandState):
+class NetworkState(deadband.DeadbandState):
     """State record of the network."""
 
     sent_ns: int
@@ -122,19 +105,19 @@ def _as_stamped_there(p: NetworkNumbers, s: NetworkState, stamp_ns: int) -> int:
 
 
 @inner
-def _send_there(p: NetworkNumbers, s: NetworkState, there: Way, row: Row, dt: float) -> None:
+def _send_there(p: NetworkNumbers, s: NetworkState, there: link.Way, row: Row, dt: float) -> None:
     """Send the command if it is a new one, and its sender has heard where the slave is."""
     is_new = row.slave_servo_cp_ns not in (0, s.sent_ns)
-    if not (is_new and s.newest[BACK] > 0 and may_send(p, s, THERE)):
+    if not (is_new and s.newest[BACK] > 0 and link.may_send(p, s, THERE)):
         return
     force = row.slave_servo_cf[:3]
     moves_jaw = row.slave_jaw_servo_jp[0] != there.packet[_JAW_THERE]
-    if not (moves_jaw or is_worth_telling(p, s, THERE, row.slave_servo_cp, force)):
+    if not (moves_jaw or deadband.is_worth_telling(p, s, THERE, row.slave_servo_cp, force)):
         return
     for i in range(3):
         if s.sent_ns != 0:
             there.moved[0, i] = row.slave_servo_cp[i] - s.told_pose[THERE, i]
-    remember_told(s, THERE, row.slave_servo_cp, force)
+    deadband.remember_told(s, THERE, row.slave_servo_cp, force)
     s.sent_ns = row.slave_servo_cp_ns
     _pack(row.slave_servo_cp, there.packet, 0)
     _pack(row.master_energy, there.packet, _ENERGY_THERE)
@@ -142,18 +125,18 @@ def _send_there(p: NetworkNumbers, s: NetworkState, there: Way, row: Row, dt: fl
     _pack(row.slave_servo_cf, there.packet, _FORCE_THERE)
     there.packet_ns[0], there.packet_ns[1] = row.slave_servo_cp_ns, row.master_energy_ns
     there.packet_ns[2], there.packet_ns[3] = row.slave_jaw_servo_jp_ns, row.slave_servo_cf_ns
-    send_packet(p, s, there, THERE, dt)
+    link.send_packet(p, s, there, THERE, dt)
 
 
 @inner
-def _send_back(p: NetworkNumbers, s: NetworkState, back: Way, row: Row, dt: float) -> None:
+def _send_back(p: NetworkNumbers, s: NetworkState, back: link.Way, row: Row, dt: float) -> None:
     """Send what the slave says of itself, once it has said anything."""
-    if row.slave_setpoint_cp_ns == 0 or not may_send(p, s, BACK):
+    if row.slave_setpoint_cp_ns == 0 or not link.may_send(p, s, BACK):
         return
     force = row.slave_measured_cf[:3]
-    if not is_worth_telling(p, s, BACK, row.slave_measured_cp, force):
+    if not deadband.is_worth_telling(p, s, BACK, row.slave_measured_cp, force):
         return
-    remember_told(s, BACK, row.slave_measured_cp, force)
+    deadband.remember_told(s, BACK, row.slave_measured_cp, force)
     _pack(row.slave_setpoint_cp, back.packet, _SETPOINT)
     _pack(row.slave_measured_cp, back.packet, _POSE)
     _pack(row.slave_measured_cf, back.packet, _FORCE)
@@ -164,13 +147,13 @@ def _send_back(p: NetworkNumbers, s: NetworkState, back: Way, row: Row, dt: floa
     back.packet_ns[1] = _as_stamped_there(p, s, row.slave_measured_cp_ns)
     back.packet_ns[2] = _as_stamped_there(p, s, row.slave_measured_cf_ns)
     back.packet_ns[4] = _as_stamped_there(p, s, row.slave_energy_ns)
-    send_packet(p, s, back, BACK, dt)
+    link.send_packet(p, s, back, BACK, dt)
 
 
 @inner
-def _take_there(p: NetworkNumbers, s: NetworkState, there: Way, row: Row) -> None:
+def _take_there(p: NetworkNumbers, s: NetworkState, there: link.Way, row: Row) -> None:
     """Take the command that arrived; increments count from where the slave is led, or was last."""
-    take_packet(s, there, THERE)
+    link.take_packet(s, there, THERE)
     if s.arrived[THERE]:
         _unpack(there.came, 0, row.network_servo_cp)
         _unpack(there.came, _ENERGY_THERE, row.network_master_energy)
@@ -190,9 +173,8 @@ def _take_there(p: NetworkNumbers, s: NetworkState, there: Way, row: Row) -> Non
 
 
 @inner
-def _take_back(s: NetworkState, back: Way, row: Row) -> None:
-    """Take what arrived from the slave."""
-    take_packet(s, back, BACK)
+def _take_back(s: NetworkState, back: link.Way, row: Row) -> None:
+    link.take_packet(s, back, BACK)
     if s.arrived[BACK] == 0:
         return
     _unpack(back.came, _SETPOINT, row.network_setpoint_cp)
@@ -207,7 +189,7 @@ def _take_back(s: NetworkState, back: Way, row: Row) -> None:
 
 @kernel
 def network_step(
-    p: NetworkNumbers, s: NetworkState, there: Way, back: Way, row: Row, dt: float
+    p: NetworkNumbers, s: NetworkState, there: link.Way, back: link.Way, row: Row, dt: float
 ) -> None:
     """One tick: send what is new on either side, and write what arrives at the other.
 
@@ -222,8 +204,8 @@ def network_step(
     s.tick += 1
     if s.first_ns == 0:
         s.first_ns = row.now_ns
-    serve_line(p, s, there, THERE, dt)
-    serve_line(p, s, back, BACK, dt)
+    link.serve_line(p, s, there, THERE, dt)
+    link.serve_line(p, s, back, BACK, dt)
     _send_there(p, s, there, row, dt)
     _send_back(p, s, back, row, dt)
     _take_there(p, s, there, row)
@@ -247,7 +229,7 @@ class NetworkLink(RunningStage):
     def __init__(self, parameters: NetworkParameters, dt: float = DT) -> None:
         super().__init__(NETWORK, 0, dt)
         self.parameters, self.state = record(NetworkNumbers), record(NetworkState)
-        self.kernel, self._seed, self.ahead = network_step, parameters.seed, BLOCK
+        self.kernel, self._seed, self.ahead = network_step, parameters.seed, link.BLOCK
         self._ways = [
             self._made(width, topics, given)
             for width, topics, given in zip(_WIDTHS, _CARRIED, parameters.ways, strict=True)
@@ -258,10 +240,10 @@ class NetworkLink(RunningStage):
         self.reset()
 
     @staticmethod
-    def _made(width: int, topics: tuple[Topic, ...], given: WayParameters) -> Way:
+    def _made(width: int, topics: tuple[Topic, ...], given: WayParameters) -> link.Way:
         kind = NETWORKS.find(given.kind.kind)
-        numbers = kind.numbers_of(given.kind.parameters)
-        return make_way(width, message_sizes(topics), kind.draw_pointer, numbers)
+        numbers = kind.numbers(given.kind.parameters)
+        return link.make_way(width, message_sizes(topics), kind.draw_pointer, numbers)
 
     def reset(self) -> None:
         """Nothing is on the way, and the random numbers of the seed begin anew."""
@@ -270,7 +252,7 @@ class NetworkLink(RunningStage):
         for way in self._ways:
             way.clear()
         self._rng = np.random.default_rng((self._seed, *b"network"))
-        self.state["next"] = BLOCK
+        self.state["next"] = link.BLOCK
 
     def retune(self, parameters: NetworkParameters) -> None:
         """Take another network from the next packet on; what is on its way arrives as it would."""
@@ -278,7 +260,7 @@ class NetworkLink(RunningStage):
         p["is_incremental"] = parameters.commands == "incremental"
         p["clock_offset_ns"] = round(1e9 * parameters.clock_offset)
         p["clock_drift"] = 1e-6 * parameters.clock_drift
-        take_deadband(p, parameters.deadband, self.dt)
+        deadband.take_deadband(p, parameters.deadband, self.dt)
         for k, given in enumerate(parameters.ways):
             p["least_delay"][k], p["loss"][k] = given.least_delay, given.loss
             p["keeps_order"][k] = given.packet_order == "kept"
@@ -289,7 +271,7 @@ class NetworkLink(RunningStage):
 
     def _take_kind(self, k: int, given: WayParameters) -> None:
         way, kind = self._ways[k], NETWORKS.find(given.kind.kind)
-        numbers = kind.numbers_of(given.kind.parameters)
+        numbers = kind.numbers(given.kind.parameters)
         if kind.draw_pointer is way.draw and len(numbers) == len(way.numbers):
             way.numbers[:] = numbers  # the tick that is composed already goes on
             return
@@ -301,11 +283,11 @@ class NetworkLink(RunningStage):
     def prepare(self, ticks: int) -> None:
         """Draw the random numbers of the next ticks."""
         used = int(self.state["next"])
-        if used + ticks <= BLOCK:
+        if used + ticks <= link.BLOCK:
             return
         for way in self._ways:
-            way.chances[: BLOCK - used] = way.chances[used:]
-            way.chances[BLOCK - used :] = self._rng.random((used, CHANCES + 1))
+            way.chances[: link.BLOCK - used] = way.chances[used:]
+            way.chances[link.BLOCK - used :] = self._rng.random((used, CHANCES + 1))
         self.state["next"] = 0
 
     def concerns(self) -> list[str]:

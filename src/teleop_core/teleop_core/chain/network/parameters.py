@@ -14,10 +14,7 @@ _QOS = "UVA-DSA telesurgery QoS analysis 2026"
 
 
 def _bursts(good: tuple[float, float], bad: tuple[float, float]) -> dict[str, Any]:
-    lost = {
-        "kind": "gilbert_elliott",
-        "gilbert_elliott.good": good, "gilbert_elliott.bad": bad,
-    }  # fmt: skip
+    lost = {"kind": "gilbert_elliott", "gilbert_elliott.good": good, "gilbert_elliott.bad": bad}
     return {"there": lost, "back": {}}
 
 
@@ -38,9 +35,7 @@ def _outages(pause: float, longest: float, packet_rate: float = 0.0) -> dict[str
 
 
 def _far(least: float, mean: float) -> dict[str, Any]:
-    far = {
-        "kind": "jitter", "least_delay": least, "jitter.mean": mean, "jitter.hold": 1.0,
-    }  # fmt: skip
+    far = {"kind": "jitter", "least_delay": least, "jitter.mean": mean, "jitter.hold": 1.0}
     return {"there": far, "back": far}
 
 
@@ -78,10 +73,11 @@ class WayParameters:
         0.0, lower=0.0, upper=1.0, doc="share of packets that are lost, each by itself"
     )
     packet_order: str = parameter(
-        "newest", choices=("newest", "kept"),
+        "newest",
+        choices=("newest", "kept"),
         doc="newest: a packet that was overtaken is thrown away; kept: the packets behind a late "
         "one wait for it",
-    )  # fmt: skip
+    )
     packet_rate: float = parameter(
         1000.0, unit="Hz", lower=1.0, upper=1e6, doc="packets sent in a second, at most"
     )
@@ -103,15 +99,17 @@ class NetworkParameters:
 
     seed: int = parameter(1, lower=0, fixed=True, doc="seed of everything random in the session")
     preset: str = parameter(
-        "own", choices=("own", *PRESETS),
+        "own",
+        choices=("own", *PRESETS),
         doc="a network that was measured, in place of both directions below; own: these",
         source=f"published: {_QOS} for all but iss and ets7, which are assumed",
-    )  # fmt: skip
+    )
     commands: str = parameter(
-        "absolute", choices=("absolute", "incremental"),
+        "absolute",
+        choices=("absolute", "incremental"),
         doc="what a packet to the slave says: where the tip shall be, or by how much it moves, so "
         "that a lost packet is lost motion",
-    )  # fmt: skip
+    )
     clock_offset: float = parameter(
         0.0, unit="s", lower=-3600.0, upper=3600.0,
         doc="by how much the slave's clock is ahead of the master's at the start",

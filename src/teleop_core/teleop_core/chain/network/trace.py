@@ -58,7 +58,6 @@ def read_trace(path: str) -> Array:
 
 
 def _row(path: str, number: int, line: list[str], before: float) -> tuple[float, float]:
-    """Time and delay of one line."""
     try:
         time = float(line[0])
         delay = float(line[1]) if len(line) > 1 and line[1].strip() else LOST

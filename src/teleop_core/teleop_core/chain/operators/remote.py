@@ -17,12 +17,7 @@ from teleop_core.base.parameters import parameter
 from teleop_core.chain.operators import Motion, Operator, Setting
 from teleop_core.chain.operators.follower import MOST, Follower
 from teleop_core.chain.operators.rest import rest_pose
-from teleop_core.kernels.geometry import (
-    Array,
-    invert_quaternion,
-    multiply_quaternions,
-    turn_within,
-)
+from teleop_core.kernels import geometry
 
 __all__ = ["REMOTE", "Person", "RemoteHand", "RemoteParameters", "remote_operator"]
 
@@ -78,7 +73,7 @@ class _Wanted(NamedTuple):
     let go of before.
     """
 
-    pose: Array
+    pose: geometry.Array
     time: float
     grip: int
 
@@ -105,8 +100,8 @@ class RemoteHand:
     def __init__(
         self,
         parameters: RemoteParameters | None = None,
-        start: Array | None = None,
-        room: tuple[Array, Array] | None = None,
+        start: geometry.Array | None = None,
+        room: tuple[geometry.Array, geometry.Array] | None = None,
     ) -> None:
         p = self._parameters = parameters or RemoteParameters()
         begin = rest_pose() if start is None else _row("start", start)
@@ -126,7 +121,7 @@ class RemoteHand:
 
     # -- what the person wants, in any thread ----------------------------------------------------
 
-    def want(self, pose: Array, time: float | None = None) -> bool:
+    def want(self, pose: geometry.Array, time: float | None = None) -> bool:
         """Want the stylus at a pose; the first one after silence is where it is then.
 
         Args:
@@ -192,7 +187,7 @@ class RemoteHand:
         return self._is_held
 
     @property
-    def pose(self) -> Array:
+    def pose(self) -> geometry.Array:
         """Where the stylus is wanted by the hand now (7,), in the master's base."""
         return self._follower.pose
 
@@ -201,7 +196,7 @@ class RemoteHand:
         """Time that the motion has come to [s]."""
         return self._follower.time
 
-    def motion(self, times: Array) -> Array:
+    def motion(self, times: geometry.Array) -> geometry.Array:
         """Where the stylus goes: the :data:`~teleop_core.chain.operators.Motion` of an operator.
 
         Args:
@@ -218,7 +213,7 @@ class RemoteHand:
             part[:, :3] = drawn["wanted"] - self._start[:3]
             part[:, 6:9], part[:, 12] = drawn["buttons"], drawn["jaw"]
             for row, wanted in zip(part, drawn, strict=True):
-                turn_within(self._start[3:], wanted["attitude"], row[3:6])
+                geometry.turn_within(self._start[3:], wanted["attitude"], row[3:6])
         return rows
 
     __call__ = motion
@@ -253,7 +248,6 @@ class RemoteHand:
         return rows
 
     def _listen(self, now: float) -> None:
-        """Take what is wanted now."""
         wanted, before = self._wanted, self._seen
         self._seen = wanted
         came = now if math.isnan(wanted.time) else min(wanted.time, now)
@@ -265,15 +259,15 @@ class RemoteHand:
         if not self._is_held:
             self._is_held = True
             self._first, self._held = wanted.pose, self._follower.pose
-            invert_quaternion(self._first[3:], self._turn)
+            geometry.invert_quaternion(self._first[3:], self._turn)
         self._follower.aim(self._moved(wanted.pose))
 
-    def _moved(self, pose: Array) -> Array:
+    def _moved(self, pose: geometry.Array) -> geometry.Array:
         """Where the stylus was gripped, moved by as much as the wanted pose was since then."""
         target = np.empty(7)
         target[:3] = self._held[:3] + (pose[:3] - self._first[:3])
-        multiply_quaternions(pose[3:], self._turn, target[3:])
-        multiply_quaternions(target[3:], self._held[3:], target[3:])
+        geometry.multiply_quaternions(pose[3:], self._turn, target[3:])
+        geometry.multiply_quaternions(target[3:], self._held[3:], target[3:])
         return target
 
     def _release(self) -> None:
@@ -314,7 +308,7 @@ class _Button:
         return self._is_pressed
 
 
-def _row(name: str, pose: object) -> Array:
+def _row(name: str, pose: object) -> geometry.Array:
     """Copy of a pose (7,).
 
     Raises:
@@ -357,7 +351,7 @@ def remote_operator(name: str, person: Person) -> Operator:
     def make(_: object, setting: Setting) -> Motion:
         hand = hand_of(setting)
 
-        def motion(times: Array) -> Array:
+        def motion(times: geometry.Array) -> geometry.Array:
             person(hand, float(times[0]))
             return hand.motion(times)
 

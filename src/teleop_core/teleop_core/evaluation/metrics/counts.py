@@ -21,9 +21,7 @@ class NodesMetric(Metric):
     """Counts that each node reported last; none in virtual time, where no node reports."""
 
     name = "nodes"
-    keys = (
-        Key("nodes.<node>.<name>", "1", "counts that the nodes reported last on diagnostics"),
-    )  # fmt: skip
+    keys = (Key("nodes.<node>.<name>", "1", "counts that the nodes reported last on diagnostics"),)
 
     def __init__(self, context: Context) -> None:
         self._counts = _read_counts(context.bag)

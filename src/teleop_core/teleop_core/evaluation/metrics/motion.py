@@ -209,10 +209,11 @@ class MotionMetric(Metric):
         layout = {
             "xaxis": {"title": {"text": "frequency [Hz]"}, "type": "log"},
             "yaxis": {
-                "title": {"text": "power of velocity [mm²/s²/Hz]"}, "type": "log",
+                "title": {"text": "power of velocity [mm²/s²/Hz]"},
+                "type": "log",
                 "exponentformat": "power",
             },
-        }  # fmt: skip
+        }
         return Figure("Spectrum of motion", sentence, traces, layout, 340)
 
 
@@ -249,8 +250,9 @@ def _segments(hand: Kinematics, mask: Mask) -> dict[str, dict[str, float | None]
         only[begin:end] = True
         figures = hand.figures(only)
         values: dict[str, float | None] = {
-            "begin_s": float(hand.times[begin]), "end_s": float(hand.times[end - 1]),
-        }  # fmt: skip
+            "begin_s": float(hand.times[begin]),
+            "end_s": float(hand.times[end - 1]),
+        }
         values |= {name: getattr(figures, name) for name in _SEGMENT_NAMES}
         found[str(len(found) + 1)] = values
     return found

@@ -95,10 +95,7 @@ class NetworkMetric(Metric):
     """Ages and losses of the network between both sides."""
 
     name = "network"
-    keys = (
-        *keys_of("network.there", WayScore),
-        *keys_of("network.back", WayScore),
-    )
+    keys = (*keys_of("network.there", WayScore), *keys_of("network.back", WayScore))
     topics = (NETWORK_SERVO_CP, NETWORK_MEASURED_CP, NETWORK_STATE)
 
     def __init__(self, context: Context) -> None:

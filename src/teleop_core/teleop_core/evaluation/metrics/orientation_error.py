@@ -2,17 +2,9 @@
 
 from dataclasses import dataclass
 
+from teleop_core.evaluation import figure
 from teleop_core.evaluation.accumulators import Moments, Spread
 from teleop_core.evaluation.context import Context
-from teleop_core.evaluation.figure import (
-    FIRST,
-    SECOND,
-    THIRD,
-    Figure,
-    axis_suffix,
-    line,
-    stacked_axes,
-)
 from teleop_core.evaluation.metric import SPREAD_MEANING, Key, Metric
 from teleop_core.evaluation.metrics.position_error import COMMAND_GROUP, GROUP
 from teleop_core.evaluation.published import ANGLE_FACTOR, Gains, agrees_by_factor
@@ -106,18 +98,21 @@ class OrientationErrorMetric(Metric):
             rows += spread_rows(group, turn, "deg", spread, figures, met)
         return rows + spread_rows(group, "rotation", "deg", error.angle)
 
-    def figures(self) -> list[Figure]:
+    def figures(self) -> list[figure.Figure]:
         """Roll, pitch and yaw of the tip against the reference, against time."""
         times, values = self._trace.envelope.line()
         traces = [
             {
-                **line(times, values[:, 2 + row], name, color, 1.2, "deg"),
-                "yaxis": f"y{axis_suffix(row)}", "showlegend": False,
+                **figure.line(times, values[:, 2 + row], name, color, 1.2, "deg"),
+                "yaxis": f"y{figure.axis_suffix(row)}",
+                "showlegend": False,
             }
-            for row, (name, color) in enumerate(zip(TURNS, (FIRST, SECOND, THIRD), strict=True))
-        ]  # fmt: skip
-        layout = stacked_axes(TURNS, "deg") | {"hovermode": "x unified"}
-        return [Figure("Orientation error", _sentence(self.values()), traces, layout, 480)]
+            for row, (name, color) in enumerate(
+                zip(TURNS, (figure.FIRST, figure.SECOND, figure.THIRD), strict=True)
+            )
+        ]
+        layout = figure.stacked_axes(TURNS, "deg") | {"hovermode": "x unified"}
+        return [figure.Figure("Orientation error", _sentence(self.values()), traces, layout, 480)]
 
 
 def _sentence(error: OrientationError) -> str:

@@ -4,16 +4,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from teleop_core.chain.passivity.port import (
-    DRIFT,
-    HEARD,
-    IN,
-    LAW,
-    MARGIN,
-    OUT,
-    ROUND,
-    WITHHELD,
-)
+from teleop_core.chain.passivity.port import DRIFT, HEARD, IN, LAW, MARGIN, OUT, ROUND, WITHHELD
 from teleop_core.evaluation.accumulators import Integers
 from teleop_core.evaluation.context import Context
 from teleop_core.evaluation.figure import FIRST, FIXTURE, SECOND, THIRD, Figure, line, time_axis

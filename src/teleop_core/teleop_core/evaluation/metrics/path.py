@@ -4,24 +4,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from teleop_core.evaluation import figure
 from teleop_core.evaluation.context import Context
-from teleop_core.evaluation.figure import (
-    COMMAND,
-    DRAWN_FIXTURES,
-    FIXTURE,
-    MEASURED,
-    REFERENCE,
-    SURROUNDING,
-    Figure,
-    Numbers,
-    along,
-    axis_suffix,
-    is_long,
-    line,
-    span,
-    stacked_axes,
-    time_spent,
-)
 from teleop_core.evaluation.metric import Metric
 from teleop_core.evaluation.metrics.fixture import FixtureMetric
 from teleop_core.evaluation.metrics.position_error import PositionErrorMetric
@@ -44,13 +28,13 @@ _CAMERA = {"eye": {"x": 1.4, "y": -1.7, "z": 0.85}, "center": {"x": 0, "y": 0, "
 class _Path(NamedTuple):
     """Where reference and tip were: times (N,) [s], points (N, 3) [mm], and when they are drawn."""
 
-    times: Numbers
-    reference: Numbers
-    measured: Numbers
+    times: figure.Numbers
+    reference: figure.Numbers
+    measured: figure.Numbers
     during: list[tuple[float, float]] | None
 
     @property
-    def shown(self) -> Numbers:
+    def shown(self) -> figure.Numbers:
         """Measured points of the time that is drawn, NaN elsewhere, shape (N, 3)."""
         if self.during is None:
             return self.measured
@@ -83,7 +67,7 @@ class PathMetric(Metric):
         """Nothing: it only draws."""
         return {}
 
-    def figures(self) -> list[Figure]:
+    def figures(self) -> list[figure.Figure]:
         """Paths in space and per plane, and positions against time."""
         outlines = outlines_of(self._context)
         path = self._path(outlines)
@@ -93,7 +77,7 @@ class PathMetric(Metric):
             self._against_time(outlines),
         ]
 
-    def measured(self) -> tuple[Numbers, Numbers]:
+    def measured(self) -> tuple[figure.Numbers, figure.Numbers]:
         """Times (N,) [s] and places (N, 3) [mm] of the tip."""
         times, values = self._position.line()
         return times, values[:, 6:]
@@ -119,20 +103,20 @@ class PathMetric(Metric):
             text += f". Drawn as a box and not scored: {score.unscored}."
         return f"{text} Only the time with the {kinds} on is drawn."
 
-    def _against_time(self, outlines: list[Outline]) -> Figure:
+    def _against_time(self, outlines: list[Outline]) -> figure.Figure:
         times, values = self._position.line()
-        layout, shapes, traces = stacked_axes("xyz", "mm"), [], []
+        layout, shapes, traces = figure.stacked_axes("xyz", "mm"), [], []
         for row in range(3):
-            suffix = axis_suffix(row)
+            suffix = figure.axis_suffix(row)
             traces += [
                 {**trace, "yaxis": f"y{suffix}", "showlegend": row == 0}
                 for trace in (
-                    line(times, values[:, row], "command", COMMAND, 1),
-                    line(times, values[:, row + 3], "reference", REFERENCE, 5),
-                    line(times, values[:, row + 6], "measured", MEASURED, 1.6),
+                    figure.line(times, values[:, row], "command", figure.COMMAND, 1),
+                    figure.line(times, values[:, row + 3], "reference", figure.REFERENCE, 5),
+                    figure.line(times, values[:, row + 6], "measured", figure.MEASURED, 1.6),
                 )
             ]
-            for outline in outlines[:DRAWN_FIXTURES]:
+            for outline in outlines[: figure.DRAWN_FIXTURES]:
                 shapes += outline.wall_lines(row, suffix)
         layout |= {"shapes": shapes, "hovermode": "x unified"}
         layout["xaxis"]["range"] = self._interesting(outlines)
@@ -145,7 +129,7 @@ class PathMetric(Metric):
                 f" Dashed: where the {kinds_of(outlines)} ends, from its middle along each axis."
             )
         sentence += " Drag to zoom, all plots follow; double-click to see the whole recording."
-        return Figure("Position against time", sentence, traces, layout, 640)
+        return figure.Figure("Position against time", sentence, traces, layout, 640)
 
     def _interesting(self, outlines: list[Outline]) -> list[float]:
         """Time [s] that is shown first: with a fixture on, or else from when the slave follows."""
@@ -172,35 +156,40 @@ def _size(outline: Outline) -> str:
     return " × ".join(f"{side:.3g}" for side in outline.size)
 
 
-def _in_space(path: _Path, outlines: list[Outline], sentence: str) -> Figure:
+def _in_space(path: _Path, outlines: list[Outline], sentence: str) -> figure.Figure:
     """Paths of reference and tip in 3-D, with the fixture."""
-    whole = _line3(path.measured, "whole path", SURROUNDING, 1)
+    whole = _line3(path.measured, "whole path", figure.SURROUNDING, 1)
     reference, measured = (
         _line3(points, name, color, 4)
         for points, name, color in (
-            (path.reference, "reference", REFERENCE), (path.measured, "measured", MEASURED)
+            (path.reference, "reference", figure.REFERENCE),
+            (path.measured, "measured", figure.MEASURED),
         )
-    )  # fmt: skip
+    )
     measured |= {"showlegend": False}  # its colours are told by the bar
     measured["line"] |= {"colorscale": "Viridis", "showscale": True, "colorbar": _TIME_BAR}
     traces = [
-        {**along(whole, path.times, path.during, whole=True), "opacity": 0.5, "hoverinfo": "skip"},
+        {
+            **figure.along(whole, path.times, path.during, whole=True),
+            "opacity": 0.5,
+            "hoverinfo": "skip",
+        },
         # Both lines at once would hide each other in turns.
-        {**along(reference, path.times, path.during), "visible": "legendonly"},
-        along(measured, path.times, path.during, colored=True),
+        {**figure.along(reference, path.times, path.during), "visible": "legendonly"},
+        figure.along(measured, path.times, path.during, colored=True),
     ]
     named: set[str] = set()
     for outline in largest(outlines):
         is_known = outline.kind in named
-        traces.append(_line3(outline.points, outline.kind, FIXTURE, 3, hidden=is_known))
+        traces.append(_line3(outline.points, outline.kind, figure.FIXTURE, 3, hidden=is_known))
         named.add(outline.kind)
     axes = {f"{axis}axis": {"title": {"text": f"{axis} [mm]"}} for axis in "xyz"}
     scene = {**axes, "domain": {"y": [0.12, 1.0]}, "aspectmode": "data", "camera": _CAMERA}
-    return Figure("Path in space", sentence, traces, {"scene": scene}, 560)
+    return figure.Figure("Path in space", sentence, traces, {"scene": scene}, 560)
 
 
 def _line3(
-    points: Numbers, name: str, color: str, width: int, *, hidden: bool = False
+    points: figure.Numbers, name: str, color: str, width: int, *, hidden: bool = False
 ) -> dict[str, Any]:
     x, y, z = points.T
     return {
@@ -211,22 +200,25 @@ def _line3(
     }  # fmt: skip
 
 
-def _in_planes(path: _Path, outlines: list[Outline]) -> Figure:
+def _in_planes(path: _Path, outlines: list[Outline]) -> figure.Figure:
     """The same along each axis; behind it all of the path, or where it spent its time."""
     shown = path.shown
     fixtures = largest(outlines)
-    every = np.concatenate([shown, path.reference[np.isfinite(shown[:, 0])],
-                            *(outline.points for outline in fixtures)])  # fmt: skip
-    ranges = [span(every[:, axis]) or [0.0, 1.0] for axis in range(3)]
+    every = np.concatenate(
+        [shown, path.reference[np.isfinite(shown[:, 0])], *(outline.points for outline in fixtures)]
+    )
+    ranges = [figure.span(every[:, axis]) or [0.0, 1.0] for axis in range(3)]
     traces: list[dict[str, Any]] = []
     layout: dict[str, Any] = {"grid": {"rows": 1, "columns": 3, "pattern": "independent"}}
-    is_dense = is_long(shown)
+    is_dense = figure.is_long(shown)
     for plot, (across, up) in enumerate(_PLANES):
-        place = {"xaxis": f"x{axis_suffix(plot)}", "yaxis": f"y{axis_suffix(plot)}"}
+        place = {"xaxis": f"x{figure.axis_suffix(plot)}", "yaxis": f"y{figure.axis_suffix(plot)}"}
         drawn = [_surroundings(path, shown, across, up, (ranges[across], ranges[up]), is_dense)]
         drawn += _plane_lines(path, across, up)
         drawn += [
-            line(outline.points[:, across], outline.points[:, up], outline.kind, FIXTURE, 2.0)
+            figure.line(
+                outline.points[:, across], outline.points[:, up], outline.kind, figure.FIXTURE, 2.0
+            )
             for outline in fixtures
         ]
         named: set[str] = set()
@@ -240,23 +232,28 @@ def _in_planes(path: _Path, outlines: list[Outline]) -> Figure:
         f"The same path seen along each axis{f', in the {kinds_of(outlines)}' * bool(fixtures)}."
         f"{' Dark: where it spent more time.' * is_dense}"
     )
-    return Figure("Path per plane", sentence, traces, layout, 420)
+    return figure.Figure("Path per plane", sentence, traces, layout, 420)
 
 
 def _plane_lines(path: _Path, across: int, up: int) -> list[dict[str, Any]]:
     """Reference and tip seen along an axis."""
     lines = (
-        (path.reference, "reference", REFERENCE, 6.0), (path.measured, "measured", MEASURED, 1.6)
-    )  # fmt: skip
+        (path.reference, "reference", figure.REFERENCE, 6.0),
+        (path.measured, "measured", figure.MEASURED, 1.6),
+    )
     return [
-        along(line(points[:, across], points[:, up], name, color, width), path.times, path.during)
+        figure.along(
+            figure.line(points[:, across], points[:, up], name, color, width),
+            path.times,
+            path.during,
+        )
         for points, name, color, width in lines
     ]
 
 
 def _surroundings(
     path: _Path,
-    shown: Numbers,
+    shown: figure.Numbers,
     across: int,
     up: int,
     ranges: tuple[list[float], list[float]],
@@ -266,17 +263,17 @@ def _surroundings(
     if is_dense:
         duration_s = float(path.times[-1] - path.times[0])
         sample_s = duration_s / max(1, len(path.times) - 1)
-        return time_spent(shown[:, across], shown[:, up], ranges, sample_s)
+        return figure.time_spent(shown[:, across], shown[:, up], ranges, sample_s)
     points = path.measured
-    whole = line(points[:, across], points[:, up], "whole path", SURROUNDING, 1.0)
-    return {**along(whole, path.times, path.during, whole=True), "hoverinfo": "skip"}  # fmt: skip
+    whole = figure.line(points[:, across], points[:, up], "whole path", figure.SURROUNDING, 1.0)
+    return {**figure.along(whole, path.times, path.during, whole=True), "hoverinfo": "skip"}
 
 
 def _plane_axes(
     plot: int, across: str, up: str, width: list[float] | None, height: list[float] | None
 ) -> dict[str, Any]:
     """Two axes of the same scale."""
-    suffix = axis_suffix(plot)
+    suffix = figure.axis_suffix(plot)
     return {
         f"xaxis{suffix}": {
             "title": {"text": f"{across} [mm]"}, "constrain": "domain", "range": width,

@@ -4,17 +4,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from teleop_core.evaluation import motion_measures
 from teleop_core.evaluation.accumulators import Integers
 from teleop_core.evaluation.context import Context
 from teleop_core.evaluation.metric import Metric, figure, keys_of
 from teleop_core.evaluation.metrics.motion import approach_end_ns
-from teleop_core.evaluation.motion_measures import (
-    RATE,
-    SHORTEST,
-    SPECTRUM_SAMPLES,
-    stretches,
-    velocities,
-)
 from teleop_core.evaluation.motion_samples import MotionSamples
 from teleop_core.evaluation.rows import Row, row
 from teleop_core.evaluation.windows import Window
@@ -44,9 +38,10 @@ class TremorFilterScore:
         "1", "how large motion below 2 Hz comes out: in phase with it, over all of it"
     )
     intention_before_um: float | None = figure(
-        "um", "RMS distance of the stylus from what the hand meant, against intention: its tremor; "
-        "null where no hand/tremor was recorded"
-    )  # fmt: skip
+        "um",
+        "RMS distance of the stylus from what the hand meant, against intention: its tremor; "
+        "null where no hand/tremor was recorded",
+    )
     intention_after_um: float | None = figure(
         "um", "the same of the filtered stylus, with what its delay and gain cost"
     )
@@ -67,11 +62,11 @@ def passage(before: Array, after: Array) -> tuple[float, float] | None:
     Returns:
         None where there is no motion, or less than a second.
     """
-    size = min(SPECTRUM_SAMPLES, len(before))
-    if size < max(SHORTEST, RATE):
+    size = min(motion_measures.SPECTRUM_SAMPLES, len(before))
+    if size < max(motion_measures.SHORTEST, motion_measures.RATE):
         return None
     window = 0.5 - 0.5 * np.cos(2.0 * np.pi * np.arange(size) / size)
-    frequency = np.fft.rfftfreq(size, 1.0 / RATE)
+    frequency = np.fft.rfftfreq(size, 1.0 / motion_measures.RATE)
     is_meant = (frequency > 0.0) & (frequency <= MEANT)
     cross, power = np.zeros(int(is_meant.sum()), np.complex128), 0.0
     for begin in range(0, len(before) - size + 1, size - size // 2):
@@ -153,11 +148,13 @@ class TremorFilterMetric(Metric):
         times, common, other = np.intersect1d(times, others, return_indices=True)
         counts = times >= self._begin_s
         times, before, after = times[counts], before[common][counts], after[other][counts]
-        parts = stretches(times, 1.5 / RATE)
+        parts = motion_measures.stretches(times, 1.5 / motion_measures.RATE)
         if not parts:
             return None
         longest = max(parts, key=lambda part: part.stop - part.start)
-        return passage(*(velocities(motion[longest, :3]) for motion in (before, after)))
+        return passage(
+            *(motion_measures.velocities(motion[longest, :3]) for motion in (before, after))
+        )
 
     def rows(self) -> list[Row]:
         """Tremor before and after, delay and gain; nothing without a filter."""

@@ -4,25 +4,19 @@ import math
 
 import numpy as np
 
-from teleop_core.kernels import kernel, portable
-from teleop_core.kernels.geometry import (
-    Array,
-    multiply_quaternions,
-    pose_from_transform,
-    rotations_from_quaternions,
-)
+from teleop_core.kernels import geometry, kernel, portable
 from teleop_core.robots.kinematics import FkStatus
 from teleop_core.robots.robot import Robot
 
 
 @kernel
-def poses_from_transforms(transforms: Array, poses: Array) -> None:
+def poses_from_transforms(transforms: geometry.Array, poses: geometry.Array) -> None:
     """Write poses (N, 7) of transforms (N, 4, 4)."""
     for i in range(transforms.shape[0]):
-        pose_from_transform(transforms[i], poses[i])
+        geometry.pose_from_transform(transforms[i], poses[i])
 
 
-def tips(robot: Robot, q: Array) -> tuple[Array, Array]:
+def tips(robot: Robot, q: geometry.Array) -> tuple[geometry.Array, geometry.Array]:
     """Tips of joint vectors (N, n): transforms (N, 4, 4) and poses (N, 7).
 
     Next to home's assembly; where that does not close, in the nearest that a search finds; where
@@ -40,23 +34,23 @@ def tips(robot: Robot, q: Array) -> tuple[Array, Array]:
     return transforms, poses
 
 
-def product(a: Array, b: Array) -> Array:
+def product(a: geometry.Array, b: geometry.Array) -> geometry.Array:
     """Pose (7,) of ``b``, given in the frame of ``a``."""
     out = np.empty(7)
-    out[:3] = a[:3] + portable.product(rotations_from_quaternions(a[3:]), b[:3])
-    multiply_quaternions(a[3:].copy(), b[3:].copy(), out[3:])
+    out[:3] = a[:3] + portable.product(geometry.rotations_from_quaternions(a[3:]), b[:3])
+    geometry.multiply_quaternions(a[3:].copy(), b[3:].copy(), out[3:])
     return out
 
 
-def inverse(pose: Array) -> Array:
+def inverse(pose: geometry.Array) -> geometry.Array:
     """Pose (7,) of the base in the frame of ``pose``."""
     out = np.empty(7)
     out[3:] = pose[3:] * (1.0, -1.0, -1.0, -1.0)
-    out[:3] = -portable.product(rotations_from_quaternions(out[3:]), pose[:3])
+    out[:3] = -portable.product(geometry.rotations_from_quaternions(out[3:]), pose[:3])
     return out
 
 
-def moved(pose: Array, kind: int, value: float) -> Array:
+def moved(pose: geometry.Array, kind: int, value: float) -> geometry.Array:
     """Pose (7,) turned about its z (kind 1, [rad]) or pushed along it (kind 2, [m])."""
     half = 0.5 * value
     step = np.array([0.0, 0.0, 0.0, math.cos(half), 0.0, 0.0, math.sin(half)])
@@ -65,21 +59,21 @@ def moved(pose: Array, kind: int, value: float) -> Array:
     return product(pose, step)
 
 
-def seen_from(pose: Array, point: Array) -> Array:
+def seen_from(pose: geometry.Array, point: geometry.Array) -> geometry.Array:
     """Point (3,) of the base in the frame of a pose (7,)."""
-    return portable.product(rotations_from_quaternions(pose[3:]).T, point - pose[:3])
+    return portable.product(geometry.rotations_from_quaternions(pose[3:]).T, point - pose[:3])
 
 
-def pose_of(transform: Array) -> Array:
+def pose_of(transform: geometry.Array) -> geometry.Array:
     """Pose (7,) of a transform (4, 4)."""
     out = np.empty(7)
-    pose_from_transform(np.ascontiguousarray(transform), out)
+    geometry.pose_from_transform(np.ascontiguousarray(transform), out)
     return out
 
 
 def pose(
     x: float = 0.0, y: float = 0.0, z: float = 0.0, axis: str = "z", angle: float = 0.0
-) -> Array:
+) -> geometry.Array:
     """Pose (7,) at a point [m], turned by an angle [rad] about one of its axes."""
     out = np.array([x, y, z, math.cos(0.5 * angle), 0.0, 0.0, 0.0])
     out[4 + "xyz".index(axis)] = math.sin(0.5 * angle)

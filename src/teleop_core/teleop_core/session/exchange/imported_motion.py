@@ -10,11 +10,7 @@ from numpy.typing import NDArray
 
 from teleop_core.base.damage import damage_told
 from teleop_core.base.errors import RecordingError
-from teleop_core.kernels.geometry import (
-    Array,
-    quaternion_from_rotation,
-    quaternion_products,
-)
+from teleop_core.kernels.geometry import Array, quaternion_from_rotation, quaternion_products
 from teleop_core.kernels.portable import product
 from teleop_core.session.exchange.gathering import bridge, gather
 from teleop_core.session.exchange.options import ImportOptions

@@ -75,7 +75,5 @@ BRIDGES: Registry[Bridge] = Registry(
 )
 """All kinds by name."""
 
-
-def register_bridge(bridge: Bridge, *, replace: bool = False) -> Bridge:
-    """Add a kind under its own name for the rest of the program; see :meth:`Registry.add`."""
-    return BRIDGES.add(bridge.name, bridge, replace=replace)
+register_bridge = BRIDGES.register
+"""Adds one of yours under its own name; see :meth:`Registry.register`."""

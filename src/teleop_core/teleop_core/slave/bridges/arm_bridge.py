@@ -10,14 +10,9 @@ import numpy as np
 
 from teleop_core.base.errors import ParameterError
 from teleop_core.base.parameters import Choice, choice, parameter
+from teleop_core.graph import topics
 from teleop_core.graph.signals import DT
 from teleop_core.graph.stage import RunningStage, Stage
-from teleop_core.graph.topics import (
-    OPERATION,
-    SLAVE_MEASURED_JS,
-    SLAVE_OPERATION,
-    SLAVE_SETPOINT_JS,
-)
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot_set
 from teleop_core.robots.parameters import RobotParameters
@@ -29,7 +24,7 @@ from teleop_core.slave.operation.states import State
 
 RATES = (100, 125, 200, 250, 500, 1000)
 """Commands a second that whole milliseconds allow."""
-_STATE, _BRAKED = OPERATION.index("state"), OPERATION.index("is_braked")
+_STATE, _BRAKED = topics.OPERATION.index("state"), topics.OPERATION.index("is_braked")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,9 +38,10 @@ class BridgeParameters:
         "", fixed=True, doc="where the controller takes commands; empty: where its kind does"
     )
     state_topic: str = parameter(
-        "", fixed=True,
+        "",
+        fixed=True,
         doc="where the arm's JointState comes from; empty: from where that of its kind does",
-    )  # fmt: skip
+    )
     rate: int = parameter(
         500, unit="1/s", lower=100, upper=1000, fixed=True, source="assumed",
         doc="commands a second, one of " + ", ".join(map(str, RATES)),
@@ -94,10 +90,11 @@ class ArmBridgeParameters(RobotParameters, BridgeParameters):
         (), unit="rad or m", fixed=True, doc="of each of our joints; empty: 0.0"
     )
     order: tuple[str, ...] = parameter(
-        (), fixed=True,
+        (),
+        fixed=True,
         doc="the arm's joints in the order of its commands, which a forward command does not name; "
         "empty: the robot's order",
-    )  # fmt: skip
+    )
     start_tolerance: float = parameter(
         0.02, unit="rad or m", lower=1e-4, upper=0.1, fixed=True, source="assumed",
         doc="the arm is commanded once each joint is as near to its setpoint",
@@ -245,8 +242,8 @@ def _nothing(row: object, dt: float) -> None:
 ARM_BRIDGE = Stage(
     "arm_bridge",
     ArmBridgeParameters,
-    reads=(SLAVE_SETPOINT_JS, SLAVE_OPERATION),
-    writes=(SLAVE_MEASURED_JS,),
+    reads=(topics.SLAVE_SETPOINT_JS, topics.SLAVE_OPERATION),
+    writes=(topics.SLAVE_MEASURED_JS,),
     make=ArmBridge,
     node="teleop_core.nodes.arm_bridge:ArmBridgeNode",
 )

@@ -23,10 +23,11 @@ class JointTrajectoryParameters:
         doc="time from start of the point: the arm follows so much later",
     )  # fmt: skip
     velocity: str = parameter(
-        "none", choices=("none", "zero", "setpoint"),
+        "none",
+        choices=("none", "zero", "setpoint"),
         doc="velocities of the point: left out, 0, or the setpoint's; a controller that commands "
         "velocities too needs them",
-    )  # fmt: skip
+    )
 
 
 def write_trajectory(

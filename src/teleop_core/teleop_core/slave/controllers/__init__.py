@@ -14,7 +14,7 @@ import numpy as np
 from numba import types
 
 from teleop_core.base.errors import ParameterError, PartError
-from teleop_core.base.registry import Registry, part_check, tried
+from teleop_core.base.registry import Registry, part_check, places, tried
 from teleop_core.graph.signals import DT
 from teleop_core.kernels import pointer
 from teleop_core.kernels.geometry import Array
@@ -24,7 +24,6 @@ from teleop_core.robots.robot import Robot
 
 __all__ = ["CONTROLLERS", "Controller", "drives_and_poles", "per_joint", "register_controller"]
 
-_PLACE = "teleop_core.slave.controllers"
 _ROW, _TABLE = types.float64[::1], types.float64[:, ::1]
 CONTROL = types.void(_TABLE, _TABLE, _ROW, _ROW, _ROW, _ROW, types.float64, _ROW)
 """Signature of a control kernel, so that one compiled slave serves every law."""
@@ -74,10 +73,8 @@ class Controller:
         """Length of the feedforward that it takes, for ``n`` joints."""
         return 2 * n + n * n if self.uses_model else n
 
-    @cached_property
-    def control_pointer(self) -> Any:
-        """The law as an argument for kernels."""
-        return pointer(self.control, CONTROL)
+    control_pointer = cached_property(lambda self: pointer(self.control, CONTROL))
+    """The law as an argument for kernels."""
 
 
 def per_joint(robot: Robot, name: str, values: tuple[float, ...], default: Array) -> Array:
@@ -162,21 +159,14 @@ def _tried_effort(part: Controller, gains: Array, home: Array) -> tuple[Array, b
 CONTROLLERS: Registry[Controller] = Registry(
     "controller",
     "controllers",
-    {
-        "pid": f"{_PLACE}.pid:PID",
-        "pd": f"{_PLACE}.pd:PD",
-        "source_pid": f"{_PLACE}.source_pid:SOURCE_PID",
-        "friction_compensation": f"{_PLACE}.friction_compensation:FRICTION_COMPENSATION",
-        "computed_torque": f"{_PLACE}.computed_torque:COMPUTED_TORQUE",
-        "adaptive": f"{_PLACE}.adaptive:ADAPTIVE",
-        "disturbance_observer": f"{_PLACE}.disturbance_observer:DISTURBANCE_OBSERVER",
-    },
+    places(
+        "teleop_core.slave.controllers",
+        "pid pd source_pid friction_compensation computed_torque adaptive disturbance_observer",
+    ),
     _checked,
     _try,
 )
 """All control laws by name."""
 
-
-def register_controller(controller: Controller, *, replace: bool = False) -> Controller:
-    """Add a law under its own name for the rest of the program; see :meth:`Registry.add`."""
-    return CONTROLLERS.add(controller.name, controller, replace=replace)
+register_controller = CONTROLLERS.register
+"""Adds one of yours under its own name; see :meth:`Registry.register`."""

@@ -16,25 +16,11 @@ import numpy as np
 from teleop_core.kernels import kernel
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots.robot import Robot
-from teleop_core.slave.controllers import Controller, drives_and_poles, fields
-from teleop_core.slave.controllers.motion_estimates import (
-    EXPECTED,
-    MEMORY,
-    SET_ACCELERATION,
-    SET_SPEED,
-    SPEED,
-    approach,
-    begin_motion,
-    beyond,
-    closeness,
-    fading_of,
-    follow_motion,
-    linear_range,
-)
+from teleop_core.slave.controllers import Controller, drives_and_poles, fields, motion_estimates
 
 # Columns of the table of gains.
 _POLE, _FADING, _VISCOUS, _DEAD_BAND, _RANGE = range(5)
-_INTEGRAL, _WANTED = MEMORY, MEMORY + 1  # columns of the memory
+_INTEGRAL, _WANTED = motion_estimates.MEMORY, motion_estimates.MEMORY + 1  # columns of the memory
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -65,24 +51,29 @@ def computed_torque_control(
     n = effort.shape[0]
     for i in range(n):
         row, pole = memory[i], gains[i, _POLE]
-        follow_motion(row, setpoint[i], measured[i], gains[i, _FADING], dt)
+        motion_estimates.follow_motion(row, setpoint[i], measured[i], gains[i, _FADING], dt)
         off = setpoint[i] - measured[i]
-        error, share = approach(off, gains[i, _RANGE]), closeness(off, gains[i, _RANGE])
-        rate = share * row[SET_SPEED] - row[SPEED]
-        wanted = 3.0 * pole * (rate + pole * error) + share * row[SET_ACCELERATION]
+        error, share = (
+            motion_estimates.approach(off, gains[i, _RANGE]),
+            motion_estimates.closeness(off, gains[i, _RANGE]),
+        )
+        rate = share * row[motion_estimates.SET_SPEED] - row[motion_estimates.SPEED]
+        wanted = 3.0 * pole * (rate + pole * error) + share * row[motion_estimates.SET_ACCELERATION]
         row[_WANTED] = wanted + row[_INTEGRAL]
-        row[EXPECTED] = wanted
+        row[motion_estimates.EXPECTED] = wanted
     for i in range(n):
         row, pole, error = memory[i], gains[i, _POLE], setpoint[i] - measured[i]
-        share = closeness(error, gains[i, _RANGE])
-        asked = feedforward[n + i] + gains[i, _VISCOUS] * share * row[SET_SPEED]
+        share = motion_estimates.closeness(error, gains[i, _RANGE])
+        asked = feedforward[n + i] + gains[i, _VISCOUS] * share * row[motion_estimates.SET_SPEED]
         for j in range(n):
             asked += feedforward[2 * n + n * i + j] * memory[j, _WANTED]
         effort[i] = min(max(asked, -limit[i]), limit[i])
         if share == 1.0 and (effort[i] == asked or asked * error < 0.0):
-            row[_INTEGRAL] += pole * pole * pole * beyond(error, gains[i, _DEAD_BAND]) * dt
+            row[_INTEGRAL] += (
+                pole * pole * pole * motion_estimates.beyond(error, gains[i, _DEAD_BAND]) * dt
+            )
         # A saturated joint accelerates by less than was wanted of it.
-        row[EXPECTED] += (effort[i] - asked) / feedforward[2 * n + n * i + i]
+        row[motion_estimates.EXPECTED] += (effort[i] - asked) / feedforward[2 * n + n * i + i]
 
 
 def computed_torque_gains(
@@ -95,15 +86,15 @@ def computed_torque_gains(
     """
     p = parameters
     drives, pole = drives_and_poles(robot, "computed_torque", p.bandwidth)
-    fading = fading_of(robot, pole, p.filter_ratio, stiffness=3.0, damping=3.0)
+    fading = motion_estimates.fading_of(robot, pole, p.filter_ratio, stiffness=3.0, damping=3.0)
     table = np.empty((robot.n, 5))
     table[:, _POLE], table[:, _FADING], table[:, _VISCOUS] = pole, fading, viscous
     table[:, _DEAD_BAND] = p.dead_band * drives.encoder_step
-    table[:, _RANGE] = linear_range(robot, pole, 3.0)
+    table[:, _RANGE] = motion_estimates.linear_range(robot, pole, 3.0)
     return table
 
 
 COMPUTED_TORQUE = Controller(
     "computed_torque", ComputedTorqueParameters, computed_torque_gains, computed_torque_control,
-    MEMORY + 2, begin_motion, uses_model=True,
+    motion_estimates.MEMORY + 2, motion_estimates.begin_motion, uses_model=True,
 )  # fmt: skip

@@ -17,28 +17,11 @@ import numpy as np
 from teleop_core.kernels import kernel
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots.robot import Robot
-from teleop_core.slave.controllers import Controller, drives_and_poles, fields
-from teleop_core.slave.controllers.motion_estimates import (
-    EXPECTED,
-    MEMORY,
-    SET_ACCELERATION,
-    SET_SPEED,
-    SPEED,
-    UNEXPLAINED,
-    approach,
-    beyond,
-    closeness,
-    fading_of,
-    follow_motion,
-    friction_of_setpoint,
-    holding,
-    known_friction,
-    linear_range,
-)
+from teleop_core.slave.controllers import Controller, drives_and_poles, fields, motion_estimates
 
 # Columns of the table of gains.
 _INERTIA, _POLE, _VISCOUS, _FADING, _FRICTION, _TRAVEL, _DEAD_BAND, _RANGE = range(8)
-_HELD = MEMORY  # what the arm weighs at the start, beyond what is compensated
+_HELD = motion_estimates.MEMORY  # what the arm weighs at the start, beyond what is compensated
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -71,20 +54,27 @@ def disturbance_observer_control(
     for i in range(effort.shape[0]):
         gain, row = gains[i], memory[i]
         inertia, pole, viscous = gain[_INERTIA], gain[_POLE], gain[_VISCOUS]
-        follow_motion(row, setpoint[i], measured[i], gain[_FADING], dt)
-        friction = friction_of_setpoint(row, setpoint[i], gain[_FRICTION], gain[_TRAVEL])
-        off = beyond(setpoint[i] - measured[i], gain[_DEAD_BAND])
-        error, share = approach(off, gain[_RANGE]), closeness(off, gain[_RANGE])
-        speed = share * row[SET_SPEED]
+        motion_estimates.follow_motion(row, setpoint[i], measured[i], gain[_FADING], dt)
+        friction = motion_estimates.friction_of_setpoint(
+            row, setpoint[i], gain[_FRICTION], gain[_TRAVEL]
+        )
+        off = motion_estimates.beyond(setpoint[i] - measured[i], gain[_DEAD_BAND])
+        error, share = (
+            motion_estimates.approach(off, gain[_RANGE]),
+            motion_estimates.closeness(off, gain[_RANGE]),
+        )
+        speed = share * row[motion_estimates.SET_SPEED]
         wanted = (
-            share * row[SET_ACCELERATION]
-            + 2.0 * pole * (speed - row[SPEED])
+            share * row[motion_estimates.SET_ACCELERATION]
+            + 2.0 * pole * (speed - row[motion_estimates.SPEED])
             + pole * pole * error
-            - row[UNEXPLAINED]
+            - row[motion_estimates.UNEXPLAINED]
         )
         known = feedforward[i] + friction + row[_HELD]
         effort[i] = min(max(inertia * wanted + viscous * speed + known, -limit[i]), limit[i])
-        row[EXPECTED] = (effort[i] - known - viscous * row[SPEED]) / inertia
+        row[motion_estimates.EXPECTED] = (
+            effort[i] - known - viscous * row[motion_estimates.SPEED]
+        ) / inertia
 
 
 def disturbance_observer_gains(
@@ -97,20 +87,20 @@ def disturbance_observer_gains(
     """
     p = parameters
     drives, pole = drives_and_poles(robot, "disturbance_observer", p.bandwidth)
-    fading = fading_of(
+    fading = motion_estimates.fading_of(
         robot, pole, p.observer_ratio, stiffness=1.0, damping=2.0, rejection=1.0
-    )  # fmt: skip
-    friction = p.friction_share * known_friction(robot)
+    )
+    friction = p.friction_share * motion_estimates.known_friction(robot)
     count = drives.encoder_step
     table = np.empty((robot.n, 8))
     table[:, _INERTIA], table[:, _POLE], table[:, _VISCOUS] = drives.inertia, pole, viscous
     table[:, _FADING], table[:, _FRICTION] = fading, friction
     table[:, _TRAVEL], table[:, _DEAD_BAND] = p.friction_counts * count, p.dead_band * count
-    table[:, _RANGE] = linear_range(robot, pole, 1.0)
+    table[:, _RANGE] = motion_estimates.linear_range(robot, pole, 1.0)
     return table
 
 
 DISTURBANCE_OBSERVER = Controller(
     "disturbance_observer", DisturbanceObserverParameters, disturbance_observer_gains,
-    disturbance_observer_control, MEMORY + 1, *holding(_HELD),
+    disturbance_observer_control, motion_estimates.MEMORY + 1, *motion_estimates.holding(_HELD),
 )  # fmt: skip

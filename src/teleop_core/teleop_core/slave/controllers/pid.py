@@ -111,12 +111,7 @@ def pid_step(
 
 @kernel
 def weighted_setpoint(
-    setpoint: float,
-    measured: float,
-    gains: Array,
-    memory: Array,
-    room: float,
-    dt: float,
+    setpoint: float, measured: float, gains: Array, memory: Array, room: float, dt: float
 ) -> float:
     """Setpoint that gives a PID on its error the setpoint weight b; at b = 1 that is itself.
 

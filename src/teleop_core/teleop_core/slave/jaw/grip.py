@@ -13,14 +13,8 @@ import numpy as np
 from teleop_core.graph.row import Row
 from teleop_core.graph.signals import copy
 from teleop_core.graph.topics import JAW_OBJECTS
-from teleop_core.kernels import inner, kernel
+from teleop_core.kernels import geometry, inner, kernel
 from teleop_core.kernels.fields import Integers, PoseRow, Vector3
-from teleop_core.kernels.geometry import (
-    Array,
-    invert_quaternion,
-    multiply_quaternions,
-    rotation_from_quaternion,
-)
 from teleop_core.slave.jaw.drive import DriveNumbers, DriveState, width
 
 WEIGHT = 9.81
@@ -42,7 +36,7 @@ class GripNumbers(DriveNumbers):
     objects: int  # how many there are
     place: Vector3  # of the first object at first, where it stands on the table [m]
     pegs: int  # how many there are
-    axes: Annotated[Array, 2 * PEGS]  # of the pegs, x and y of each [m]
+    axes: Annotated[geometry.Array, 2 * PEGS]  # of the pegs, x and y of each [m]
     peg_height: float  # [m]
     clearance: float  # of a peg in an object, on each side [m]
     mass: float  # [kg]
@@ -56,7 +50,9 @@ class GripState(DriveState):
     tip: PoseRow
     object: PoseRow  # the one that moves, or moved last
     number: int  # of that object
-    objects: Annotated[Array, 7 * JAW_OBJECTS]  # poses of all, of the moving one an old one
+    objects: Annotated[
+        geometry.Array, 7 * JAW_OBJECTS
+    ]  # poses of all, of the moving one an old one
     motion: Vector3  # of the object [m/s]
     peg: int  # the object is on it; _NONE without
     pull: float  # of the peg on the object, across [N]
@@ -74,11 +70,11 @@ class GripState(DriveState):
 class GripRoom(NamedTuple):
     """Room to work in."""
 
-    back: Array  # (4,)
-    turn: Array  # (4,)
-    turned: Array  # (4,)
-    R: Array  # (3, 3)
-    motion: Array  # (3,)
+    back: geometry.Array  # (4,)
+    turn: geometry.Array  # (4,)
+    turned: geometry.Array  # (4,)
+    R: geometry.Array  # (3, 3)
+    motion: geometry.Array  # (3,)
 
 
 def make_room() -> GripRoom:
@@ -87,11 +83,11 @@ def make_room() -> GripRoom:
 
 
 @inner
-def _tip_motion(s: GripState, room: GripRoom, tip: Array, dt: float) -> None:
+def _tip_motion(s: GripState, room: GripRoom, tip: geometry.Array, dt: float) -> None:
     """Write the tip's turn since its last sample, and its speed (3,) at the object's middle."""
-    invert_quaternion(s.tip[3:7], room.back)
-    multiply_quaternions(tip[3:7], room.back, room.turn)
-    rotation_from_quaternion(room.turn, room.R)
+    geometry.invert_quaternion(s.tip[3:7], room.back)
+    geometry.multiply_quaternions(tip[3:7], room.back, room.turn)
+    geometry.rotation_from_quaternion(room.turn, room.R)
     for i in range(3):
         place = tip[i]
         for k in range(3):
@@ -157,7 +153,7 @@ def _slide(s: GripState, way: float) -> None:
 
 
 @inner
-def _find(p: GripNumbers, s: GripState, tip: Array) -> bool:
+def _find(p: GripNumbers, s: GripState, tip: geometry.Array) -> bool:
     """Whether the object has just left the fingers; says whether it is between them.
 
     It comes between them where they are wider than it, and stays as long as its middle is no
@@ -247,7 +243,7 @@ def _thread(p: GripNumbers, s: GripState, before: float) -> None:
 
 
 @inner
-def _choose(p: GripNumbers, s: GripState, tip: Array) -> None:
+def _choose(p: GripNumbers, s: GripState, tip: geometry.Array) -> None:
     """Where the object rests and no finger is at it, take the one that the tip has come to."""
     if s.is_between or s.is_gripped or s.object[2] > p.place[2]:
         return
@@ -264,7 +260,7 @@ def _choose(p: GripNumbers, s: GripState, tip: Array) -> None:
 
 
 @inner
-def tell_board(p: GripNumbers, s: GripState, board: Array) -> None:
+def tell_board(p: GripNumbers, s: GripState, board: geometry.Array) -> None:
     """Write counts, the peg's pull and the objects' middles as slave/jaw/board has them."""
     board[0], board[1], board[2] = s.transferred, s.dropped, s.pull
     for i in range(p.objects):
@@ -273,7 +269,7 @@ def tell_board(p: GripNumbers, s: GripState, board: Array) -> None:
 
 
 @kernel
-def put_objects(p: GripNumbers, s: GripState, places: Array) -> None:
+def put_objects(p: GripNumbers, s: GripState, places: geometry.Array) -> None:
     """Put all objects where they stand at first, upright.
 
     Args:
@@ -317,7 +313,7 @@ def move_object(p: GripNumbers, s: GripState, room: GripRoom, row: Row) -> None:
         left = _rub(p, s, room, _meet_peg(p, s, room, dt), dt)
         _slide(s, left * dt)
         if left == 0.0:
-            multiply_quaternions(room.turn, s.object[3:7], room.turned)
+            geometry.multiply_quaternions(room.turn, s.object[3:7], room.turned)
             copy(room.turned, s.object[3:7])
     elif is_on_table:
         s.motion[0] = s.motion[1] = s.pull = 0.0

@@ -7,22 +7,15 @@ import math
 from dataclasses import dataclass
 
 from teleop_core.base.parameters import parameter
+from teleop_core.graph import topics
 from teleop_core.graph.row import Row
 from teleop_core.graph.signals import DT, assign
 from teleop_core.graph.stage import RunningStage, Stage
-from teleop_core.graph.topics import (
-    NO_COMMAND_NS,
-    OPERATION,
-    SLAVE_JAW_MEASURED_JS,
-    SLAVE_JAW_SERVO_JP,
-    SLAVE_JAW_SETPOINT_JS,
-    SLAVE_OPERATION,
-)
 from teleop_core.kernels import inner, kernel
 from teleop_core.kernels.fields import Fields, record
 from teleop_core.slave.operation.states import State
 
-_STATE, _ENABLED = OPERATION.index("state"), int(State.ENABLED)
+_STATE, _ENABLED = topics.OPERATION.index("state"), int(State.ENABLED)
 _NEAR = 1e-3  # so near to where the jaw stands a command has come to it [rad]
 _MOVED = 0.05  # a jaw that is so much farther from its setpoint was moved by others [rad]
 _CLOSING = 0.02  # a command that becomes less by so much closes: a hand that rests is not as rough
@@ -80,7 +73,7 @@ def _see(p: JawNumbers, s: JawState, row: Row) -> None:
         return
     was_silent = row.now_ns - s.seen_ns > p.timeout_ns
     is_elsewhere = was_silent and abs(angle - s.setpoint) > s.off + _MOVED
-    if row.slave_jaw_setpoint_js_ns == NO_COMMAND_NS or is_elsewhere:
+    if row.slave_jaw_setpoint_js_ns == topics.NO_COMMAND_NS or is_elsewhere:
         s.setpoint = min(max(angle, 0.0), p.upper)
     s.off = abs(angle - s.setpoint)
     s.sampled_ns, s.seen_ns = row.slave_jaw_measured_js_ns, row.now_ns
@@ -154,7 +147,7 @@ class Jaw(RunningStage):
         assign(row, self._begin)
         s["setpoint"] = row["slave_jaw_setpoint_js"] = self.parameters["upper"]
         s["lowest"], s["highest"] = math.inf, -math.inf
-        row["slave_jaw_setpoint_js_ns"] = NO_COMMAND_NS
+        row["slave_jaw_setpoint_js_ns"] = topics.NO_COMMAND_NS
 
     def retune(self, parameters: JawParameters) -> None:
         """Take new parameters from the next tick on; the setpoint stays."""
@@ -175,9 +168,9 @@ class Jaw(RunningStage):
 JAW_STAGE = Stage(
     "jaw",
     JawParameters,
-    reads=(SLAVE_JAW_SERVO_JP, SLAVE_OPERATION, SLAVE_JAW_MEASURED_JS),
-    writes=(SLAVE_JAW_SETPOINT_JS,),
-    late=(SLAVE_JAW_MEASURED_JS,),
-    optional=(SLAVE_JAW_SERVO_JP,),
+    reads=(topics.SLAVE_JAW_SERVO_JP, topics.SLAVE_OPERATION, topics.SLAVE_JAW_MEASURED_JS),
+    writes=(topics.SLAVE_JAW_SETPOINT_JS,),
+    late=(topics.SLAVE_JAW_MEASURED_JS,),
+    optional=(topics.SLAVE_JAW_SERVO_JP,),
     make=Jaw,
 )

@@ -7,19 +7,10 @@ import numpy as np
 
 from teleop_core.base.errors import ParameterError
 from teleop_core.base.parameters import parameter
+from teleop_core.graph import topics
 from teleop_core.graph.row import Row
 from teleop_core.graph.signals import DT, assign, copy
 from teleop_core.graph.stage import RunningStage, Stage
-from teleop_core.graph.topics import (
-    JAW_OBJECTS,
-    NO_COMMAND_NS,
-    SLAVE_JAW_BOARD,
-    SLAVE_JAW_GRIP,
-    SLAVE_JAW_MEASURED_JS,
-    SLAVE_JAW_OBJECT_CP,
-    SLAVE_JAW_SETPOINT_JS,
-    SLAVE_TRUE_CP,
-)
 from teleop_core.kernels import kernel
 from teleop_core.kernels.fields import record
 from teleop_core.slave.jaw.drive import drive
@@ -58,8 +49,8 @@ class GripObjectParameters:
 
     def __post_init__(self) -> None:
         n, rest = divmod(len(self.place), 3)
-        if rest or n > JAW_OBJECTS or len(set(self.place[2::3])) > 1:
-            needed = f"x, y, z of up to {JAW_OBJECTS} objects, with one z, or empty"
+        if rest or n > topics.JAW_OBJECTS or len(set(self.place[2::3])) > 1:
+            needed = f"x, y, z of up to {topics.JAW_OBJECTS} objects, with one z, or empty"
             raise ParameterError("jaw_sim.object.place", self.place, needed)
 
 
@@ -130,7 +121,7 @@ def jaw_sim_step(p: GripNumbers, s: GripState, room: GripRoom, row: Row, dt: flo
         dt: Tick [s].
     """
     before = s.setpoint
-    if row.slave_jaw_setpoint_js_ns > NO_COMMAND_NS:  # else the jaw stays where it begins
+    if row.slave_jaw_setpoint_js_ns > topics.NO_COMMAND_NS:  # else the jaw stays where it begins
         s.setpoint = row.slave_jaw_setpoint_js[0]
     row.slave_jaw_measured_js[0], row.slave_jaw_measured_js[1] = s.angle, s.velocity
     drive(p, s, (s.setpoint - before) / dt, dt)
@@ -184,8 +175,13 @@ class JawSim(RunningStage):
 JAW_SIM = Stage(
     "jaw_sim",
     JawSimParameters,
-    reads=(SLAVE_JAW_SETPOINT_JS, SLAVE_TRUE_CP),
-    writes=(SLAVE_JAW_MEASURED_JS, SLAVE_JAW_GRIP, SLAVE_JAW_OBJECT_CP, SLAVE_JAW_BOARD),
-    optional=(SLAVE_TRUE_CP,),
+    reads=(topics.SLAVE_JAW_SETPOINT_JS, topics.SLAVE_TRUE_CP),
+    writes=(
+        topics.SLAVE_JAW_MEASURED_JS,
+        topics.SLAVE_JAW_GRIP,
+        topics.SLAVE_JAW_OBJECT_CP,
+        topics.SLAVE_JAW_BOARD,
+    ),
+    optional=(topics.SLAVE_TRUE_CP,),
     make=JawSim,
 )

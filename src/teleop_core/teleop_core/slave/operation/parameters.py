@@ -16,13 +16,15 @@ class OperationParameters:
     """Limits, faults and states of an arm in operation."""
 
     starts_enabled: bool = parameter(
-        True, fixed=True,
+        True,
+        fixed=True,
         doc="whether it enables and homes itself; false: it waits for enable and home, as hardware",
-    )  # fmt: skip
+    )
     standstill: str = parameter(
-        "hold", choices=_STANDSTILLS,
+        "hold",
+        choices=_STANDSTILLS,
         doc="after a stop, or disabled: the drives hold the arm, or are off and brakes hold it",
-    )  # fmt: skip
+    )
     heartbeat: float = parameter(
         0.0, unit="s", lower=0.01, upper=10.0, off=0.0,
         doc="a stop button that says 'released' less often than this counts as pressed; 0: none is "
@@ -80,9 +82,10 @@ class OperationParameters:
         (), choices=NAMES, doc="faults that are told only and stop nothing"
     )
     events: tuple[str, ...] = parameter(
-        (), fixed=True,
+        (),
+        fixed=True,
         doc="commands at times since the start, command@seconds: stop@2.5, reset@4, enable@4.1",
-    )  # fmt: skip
+    )
 
     def __post_init__(self) -> None:
         if len(self.events) > MOST_EVENTS:

@@ -25,8 +25,9 @@ def operation_text(values: Mapping[str, float], joint_names: tuple[str, ...] = (
     release = "release the stop, " if values["is_pressed"] else ""
     home = ", then home" if not values["is_homed"] else ""
     cure = {
-        State.FAULT: f"; {release}reset, then enable{home}", State.PAUSED: "; resume to go on",
-    }.get(state, "")  # fmt: skip
+        State.FAULT: f"; {release}reset, then enable{home}",
+        State.PAUSED: "; resume to go on",
+    }.get(state, "")
     return f"{text}: {reason}{cure}"
 
 

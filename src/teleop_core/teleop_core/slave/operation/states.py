@@ -198,7 +198,8 @@ def answer_text(event: Event, answer: Answer, state: State) -> str:
         return f"{name} refused: {AT_REST_ONLY}"
     allowed = [other.name for other in State if TABLE[other, event] >= 0]
     hint = {
-        State.FAULT: "; reset first, then enable", State.DISABLED: "; enable first",
+        State.FAULT: "; reset first, then enable",
+        State.DISABLED: "; enable first",
         State.PAUSED: "; resume first",
-    }.get(state, "; home first" if event is Event.MOVE else "")  # fmt: skip
+    }.get(state, "; home first" if event is Event.MOVE else "")
     return f"{name} refused in {state.name}, allowed in {', '.join(allowed)}{hint}"

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from teleop_core.base.errors import ParameterError, PartError, ShapeError
-from teleop_core.base.registry import Registry, part_check, tried
+from teleop_core.base.registry import Registry, part_check, places, tried
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots.robot import Robot
 
@@ -111,16 +111,11 @@ def _try(part: Plant) -> None:
 PLANTS: Registry[Plant] = Registry(
     "plant",
     "plants",
-    {
-        "ideal": "teleop_core.slave.plants.ideal:IDEAL",
-        "hardware": "teleop_core.slave.plants.hardware:HARDWARE",
-    },
+    places("teleop_core.slave.plants", "ideal hardware"),
     part_check("plant", Plant, "physics"),
     _try,
 )
 """All plants by name."""
 
-
-def register_plant(plant: Plant, *, replace: bool = False) -> Plant:
-    """Add a plant under its own name for the rest of the program; see :meth:`Registry.add`."""
-    return PLANTS.add(plant.name, plant, replace=replace)
+register_plant = PLANTS.register
+"""Adds one of yours under its own name; see :meth:`Registry.register`."""

@@ -57,9 +57,10 @@ class HardwareParameters:
         doc="half width of the play behind each encoder; empty: the robot's",
     )  # fmt: skip
     weights: tuple[str, ...] = parameter(
-        (), fixed=True,
+        (),
+        fixed=True,
         doc="symbol=value of the dynamics that the source does not state; empty: the robot's",
-    )  # fmt: skip
+    )
     bristle_frequency: float = parameter(
         250.0, unit="rad/s", lower=10.0, upper=2000.0,
         doc="at which a joint swings on its friction before it slips",

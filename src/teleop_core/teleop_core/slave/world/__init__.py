@@ -15,7 +15,7 @@ import numpy as np
 from numba import types
 
 from teleop_core.base.errors import PartError
-from teleop_core.base.registry import Registry, part_check, tried
+from teleop_core.base.registry import Registry, part_check, places, tried
 from teleop_core.kernels import pointer
 from teleop_core.kernels.geometry import Array
 from teleop_core.kernels.parts import fenced, is_whole, numbers_of
@@ -51,15 +51,14 @@ class WorldObject:
     outline: Callable[[Any], Array]
     numbers: Callable[[Any], Array] = numbers_of
 
-    @cached_property
-    def distance_pointer(self) -> Any:
-        """The distance as an argument for kernels."""
-        return pointer(self.distance, DISTANCE)
+    distance_pointer = cached_property(lambda self: pointer(self.distance, DISTANCE))
+    """The distance as an argument for kernels."""
 
 
 _STEP = 1e-6  # along the normal, over which the distance must grow by as much [m]
-_TRIED = np.array([(0.31, 0.02, 0.05), (0.01, 0.43, -0.03), (-0.02, 0.04, 0.37),
-                   (-0.29, 0.23, -0.41)])  # fmt: skip
+_TRIED = np.array(
+    [(0.31, 0.02, 0.05), (0.01, 0.43, -0.03), (-0.02, 0.04, 0.37), (-0.29, 0.23, -0.41)]
+)
 """Offsets at which an object is tried [m]."""
 
 
@@ -104,24 +103,14 @@ def _try_at(part: WorldObject, numbers: Array, offset: Array) -> None:
 WORLD_OBJECTS: Registry[WorldObject] = Registry(
     "world object",
     "world_objects",
-    {
-        "empty": "teleop_core.slave.world.empty:EMPTY",
-        "plane": "teleop_core.slave.world.plane:PLANE",
-        "sphere": "teleop_core.slave.world.sphere:SPHERE",
-        "box": "teleop_core.slave.world.box:BOX",
-        "cylinder": "teleop_core.slave.world.cylinder:CYLINDER",
-        "capsule": "teleop_core.slave.world.capsule:CAPSULE",
-        "button": "teleop_core.slave.world.button:BUTTON",
-        "mesh": "teleop_core.slave.world.mesh:MESH",
-        "height_field": "teleop_core.slave.world.height_field:HEIGHT_FIELD",
-        "hole": "teleop_core.slave.world.hole:HOLE",
-    },
+    places(
+        "teleop_core.slave.world",
+        "empty plane sphere box cylinder capsule button mesh height_field hole",
+    ),
     part_check("world object", WorldObject, "distance", "outline"),
     _try,
 )
 """All objects by name."""
 
-
-def register_world_object(part: WorldObject, *, replace: bool = False) -> WorldObject:
-    """Add an object under its own name for the rest of the program; see :meth:`Registry.add`."""
-    return WORLD_OBJECTS.add(part.name, part, replace=replace)
+register_world_object = WORLD_OBJECTS.register
+"""Adds one of yours under its own name; see :meth:`Registry.register`."""

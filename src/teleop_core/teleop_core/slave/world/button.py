@@ -15,11 +15,7 @@ from teleop_core.kernels import inner
 from teleop_core.kernels.fields import Fields
 from teleop_core.kernels.geometry import Array
 from teleop_core.slave.world import WorldObject
-from teleop_core.slave.world.cylinder import (
-    CylinderParameters,
-    cylinder_distance,
-    cylinder_outline,
-)
+from teleop_core.slave.world.cylinder import CylinderParameters, cylinder_distance, cylinder_outline
 
 _STIFFER = 10.0  # spring of the friction, over the steepest that the snapping one can be
 _LARGEST = 100.0  # click force [N]

@@ -9,6 +9,7 @@ from teleop_core.base.parameters import parameter
 from teleop_core.kernels import kernel
 from teleop_core.kernels.geometry import Array
 from teleop_core.slave.world import WorldObject
+from teleop_core.slave.world.sphere import MIDDLE
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -28,7 +29,7 @@ def capsule_distance(offset: Array, shape: Array, normal: Array) -> float:
     distance = math.sqrt(x * x + y * y + z * z)
     normal[0] = normal[1] = 0.0
     normal[2] = 1.0
-    if distance > 0.0:
+    if distance > MIDDLE:
         normal[0], normal[1], normal[2] = x / distance, y / distance, z / distance
     return distance - shape[0]
 

@@ -19,12 +19,7 @@ from teleop_core.kernels.fields import PerJoint, Vector3
 from teleop_core.kernels.geometry import Array
 from teleop_core.kernels.room import room
 from teleop_core.slave.arm import Arm
-from teleop_core.slave.world.button import (
-    ButtonNumbers,
-    ButtonState,
-    follow_button,
-    push_of_button,
-)
+from teleop_core.slave.world.button import ButtonNumbers, ButtonState, follow_button, push_of_button
 from teleop_core.slave.world.puncture import (
     PunctureNumbers,
     PunctureState,

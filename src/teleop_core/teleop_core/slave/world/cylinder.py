@@ -9,6 +9,7 @@ from teleop_core.base.parameters import parameter
 from teleop_core.kernels import kernel
 from teleop_core.kernels.geometry import Array
 from teleop_core.slave.world import WorldObject
+from teleop_core.slave.world.sphere import MIDDLE
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -25,11 +26,11 @@ def cylinder_distance(offset: Array, shape: Array, normal: Array) -> float:
     x, y, z = offset[0], offset[1], offset[2]
     from_axis = math.sqrt(x * x + y * y)
     aside, above = from_axis - shape[0], abs(z) - 0.5 * shape[1]
-    along_x = x / from_axis if from_axis > 0.0 else 1.0
-    along_y = y / from_axis if from_axis > 0.0 else 0.0
+    along_x = x / from_axis if from_axis > MIDDLE else 1.0
+    along_y = y / from_axis if from_axis > MIDDLE else 0.0
     out, up = max(aside, 0.0), max(above, 0.0)
     distance = math.sqrt(out * out + up * up)
-    if distance > 0.0:
+    if distance > MIDDLE:
         out, up = out / distance, up / distance
     else:
         distance = max(aside, above)
@@ -43,9 +44,7 @@ def cylinder_outline(parameters: CylinderParameters) -> Array:
     angle = np.linspace(0.0, 2.0 * math.pi, 41)
     x, y = parameters.radius * np.cos(angle), parameters.radius * np.sin(angle)
     half = 0.5 * parameters.height
-    return np.concatenate(
-        [np.stack((x, y, np.full(41, z)), axis=1) for z in (-half, half)]
-    )  # fmt: skip
+    return np.concatenate([np.stack((x, y, np.full(41, z)), axis=1) for z in (-half, half)])
 
 
 CYLINDER = WorldObject("cylinder", CylinderParameters, cylinder_distance, cylinder_outline)

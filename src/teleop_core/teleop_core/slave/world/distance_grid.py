@@ -157,7 +157,6 @@ def _make(request: GridRequest) -> DistanceGrid:
 
 
 def _read(request: GridRequest, path: Path) -> Triangles:
-    """Read what is touched."""
     if request.kind != "mesh":
         return read_heights(path, path.read_bytes(), request.scale, request.step)
     x, y, z = request.angles

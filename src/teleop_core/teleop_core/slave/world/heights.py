@@ -80,8 +80,9 @@ def _block(heights: Array, width: float) -> Triangles:
     y = width * (np.arange(columns) - 0.5 * (columns - 1))
     top = np.stack((*np.meshgrid(x, y, indexing="ij"), heights), axis=2).reshape(-1, 3)
     index = np.arange(rows * columns).reshape(rows, columns)
-    a, b, c, d = (part.ravel() for part in (index[:-1, :-1], index[1:, :-1], index[1:, 1:],
-                                            index[:-1, 1:]))  # fmt: skip
+    a, b, c, d = (
+        part.ravel() for part in (index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:])
+    )
     rim: NDArray[np.int64] = np.concatenate(
         (index[:-1, 0], index[-1, :-1], index[:0:-1, -1], index[0, :0:-1])
     )  # counterclockwise seen from above

@@ -48,8 +48,9 @@ def _cell(offset: float, shape: Array, axis: int) -> tuple[int, float, float]:
 
 
 @inner
-def _gradient(shape: Array, at: tuple[int, int, int], share: tuple[float, float, float],
-              gradient: Array) -> float:  # fmt: skip
+def _gradient(
+    shape: Array, at: tuple[int, int, int], share: tuple[float, float, float], gradient: Array
+) -> float:
     """Write the gradient (3,) of the spline behind a node; returns its value [m]."""
     wx, wy, wz = weights(share[0]), weights(share[1]), weights(share[2])
     sx, sy, sz = slopes(share[0]), slopes(share[1]), slopes(share[2])

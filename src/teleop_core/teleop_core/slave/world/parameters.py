@@ -52,10 +52,11 @@ class WorldParameters:
         doc="between that tip and the object, if no place is given",
     )  # fmt: skip
     material: str = parameter(
-        "tissue", choices=(*MATERIALS, "own"),
+        "tissue",
+        choices=(*MATERIALS, "own"),
         doc="what it is made of; own: of the following three numbers",
         source="assumed: all five; what a tip meets depends on its own size as well",
-    )  # fmt: skip
+    )
     stiffness: float = parameter(
         1000.0, unit="N/m", lower=1.0, upper=1e5, doc="of the surface, if the material is own"
     )

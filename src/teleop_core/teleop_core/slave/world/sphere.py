@@ -10,6 +10,9 @@ from teleop_core.kernels import kernel
 from teleop_core.kernels.geometry import Array
 from teleop_core.slave.world import WorldObject
 
+MIDDLE = 1e-150
+"""Of ways shorter than this [m] squares underflow, so that they lead nowhere."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class SphereParameters:
@@ -25,7 +28,7 @@ def sphere_distance(offset: Array, shape: Array, normal: Array) -> float:
     distance = math.sqrt(x * x + y * y + z * z)
     normal[0] = normal[1] = 0.0
     normal[2] = 1.0
-    if distance > 0.0:
+    if distance > MIDDLE:
         normal[0], normal[1], normal[2] = x / distance, y / distance, z / distance
     return distance - shape[0]
 

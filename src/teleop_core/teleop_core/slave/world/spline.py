@@ -39,9 +39,7 @@ def weights(t: float) -> tuple[float, float, float, float]:
 def slopes(t: float) -> tuple[float, float, float, float]:
     """Derivatives of the weights over t."""
     u = 1.0 - t
-    return (
-        -0.5 * u * u, t * (1.5 * t - 2.0), u * (2.0 - 1.5 * u), 0.5 * t * t
-    )  # fmt: skip
+    return (-0.5 * u * u, t * (1.5 * t - 2.0), u * (2.0 - 1.5 * u), 0.5 * t * t)
 
 
 @kernel

@@ -247,8 +247,9 @@ def _signed(tree: Tree, x: float, y: float, z: float, most: float) -> float:
             continue
         if node < leaves:
             left, right = (
-                _to_box(tree.boxes[2 * node], x, y, z), _to_box(tree.boxes[2 * node + 1], x, y, z)
-            )  # fmt: skip
+                _to_box(tree.boxes[2 * node], x, y, z),
+                _to_box(tree.boxes[2 * node + 1], x, y, z),
+            )
             nearer = 2 * node if left <= right else 2 * node + 1
             stack[waiting], stack[waiting + 1] = 4 * node + 1 - nearer, nearer
             waiting += 2

@@ -1,4 +1,4 @@
-"""Serial arms of the D-H sources: the laws that every one of them obeys."""
+"""Laws of all robots, and of all serial arms with a closed form."""
 
 import math
 from typing import Any
@@ -9,20 +9,31 @@ import pytest
 from present import present
 from teleop_core.base.errors import ParameterError, ShapeError, UnknownNameError
 from teleop_core.kernels.geometry import Array, rotation, transform
-from teleop_core.robots import IkStatus, load_robot
+from teleop_core.robots import IkStatus, list_robots, load_robot
+from ways import followed
 
-BRANCHES = {"puma560": 8, "scara": 2, "planar_3r": 2, "five_axis": 4}
-ARMS = {name: load_robot(name) for name in BRANCHES}
+BRANCHES = {"rcrt1": 4, "puma560": 8, "scara": 2, "planar_3r": 2, "five_axis": 4}
+ARMS = {name: load_robot(name) for name in list_robots()}
 ROUNDING = 1e-13  # a few hundred products of numbers of size one
 REACHED = 1e-9  # the promise of the interface [m, rad]
 ROTARY = {name: np.array([j != "d3" for j in arm.joint_names]) for name, arm in ARMS.items()}
 
 arms = pytest.mark.parametrize("name", BRANCHES)
+robots = pytest.mark.parametrize("name", ARMS)
 
 
 def drawn(name: str, count: int, seed: int = 1) -> Array:
     arm, rng = ARMS[name], np.random.default_rng(seed)
     return rng.uniform(arm.lower, arm.upper, (count, arm.n))
+
+
+def near_home(name: str, count: int) -> Array:
+    """Joint vectors whose poses are next to home: their loops are closed."""
+    arm, rng = ARMS[name], np.random.default_rng(3)
+    turn = rotation("x", 0.04) @ rotation("y", -0.03) @ rotation("z", 0.02)
+    moves = [transform(turn, shift) for shift in rng.uniform(-2e-3, 2e-3, (count, 3))]
+    q: Array = arm.ik(arm.fk(arm.home) @ moves).q
+    return q
 
 
 def same_turns(name: str, a: Array, b: Array) -> Array:
@@ -75,32 +86,37 @@ def test_the_original_joints_come_back_when_they_are_the_seed(name: str) -> None
     assert np.abs(arm.ik(arm.fk(q), q).q - q).max() < 1e-8
 
 
-@arms
+# The legs of the hybrid contradict each other by a step; pinned loops are the test of its Jacobian.
+@pytest.mark.parametrize("name", [name for name in ARMS if name != "scara_stewart"])
 def test_the_jacobian_is_the_difference_quotient_of_forward_kinematics(name: str) -> None:
     arm, step = ARMS[name], 1e-6
-    for q in drawn(name, 50):
+    for q in drawn(name, 50) if name in BRANCHES or name == "mma" else near_home(name, 6):
         jacobian, pose = arm.jacobian(q), arm.fk(q)
         for j in range(arm.n):
             ahead, behind = (arm.fk(q + side * step * np.eye(arm.n)[j]) for side in (1, -1))
             rate = (ahead - behind) / (2.0 * step)
             spin = rate[:3, :3] @ pose[:3, :3].T
             numeric = [*rate[:3, 3], spin[2, 1], spin[0, 2], spin[1, 0]]
-            # Rounding over the step, 1e-16 / 1e-6, and its square.
-            assert np.abs(jacobian[:, j] - numeric).max() < 1e-8
+            # Rounding over the step, 1e-16 / 1e-6, and its square; loops are solved to rounding.
+            assert np.abs(jacobian[:, j] - numeric).max() < (1e-8 if name in BRANCHES else 1e-5)
 
 
-@arms
+@robots
 def test_single_and_batched_answers_are_bit_equal(name: str) -> None:
     arm = ARMS[name]
-    q, seeds = drawn(name, 50), drawn(name, 50, seed=2)
+    q, seeds = near_home(name, 20), near_home(name, 20)[::-1].copy()
     poses = arm.fk(q)
-    batch: Any = arm.ik(poses, seeds)
-    for i in range(50):
-        assert np.array_equal(arm.fk(q[i]), poses[i])
-        single = arm.ik(poses[i], seeds[i])
-        assert np.array_equal(single.q, batch.q[i])
-        assert single.status == batch.status[i]
-        assert np.array_equal(single.residual, batch.residual[i])
+    for given, seed_of in ((seeds, lambda i: seeds[i]), (seeds[0], lambda i: seeds[0])):
+        batch: Any = arm.ik(poses, given)
+        for i in range(20):
+            assert np.array_equal(arm.fk(q[i]), poses[i])
+            single = arm.ik(poses[i], seed_of(i))
+            assert np.array_equal(single.q, batch.q[i])
+            assert single.status == batch.status[i]
+            assert np.array_equal(single.residual, batch.residual[i])
+    empty: Any = arm.ik(np.empty((0, 4, 4)))
+    assert (empty.q.shape, empty.status.shape) == ((0, arm.n), (0,))
+    assert arm.fk(np.empty((0, arm.n))).shape == (0, 4, 4)
 
 
 @arms
@@ -139,12 +155,11 @@ def test_the_base_axis_itself_is_answered_with_finite_joints(name: str) -> None:
 
 @arms
 def test_a_path_keeps_every_joint_within_its_speed_and_its_branch(name: str) -> None:
-    arm, dt = ARMS[name], 1e-3
-    # Around home, where no singularity offers another branch.
-    way = arm.home + 0.05 * np.linspace(-1.0, 1.0, 400)[:, None]
-    result = arm.follow(arm.fk(way), way[0], dt)
-    steps = np.abs(np.diff(np.vstack((way[0], result.q)), axis=0))
-    assert (steps <= present(arm.drives).speed_limit * dt * (1.0 + 1e-9)).all()
+    arm = ARMS[name]
+    # Around home, where no singularity offers another branch but to the RCRT-1.
+    aside = np.array([0.0, 0.0, -0.1, 0.0, 0.5, 0.0]) if name == "rcrt1" else 0.0
+    way = arm.home + aside + 0.05 * np.linspace(-1.0, 1.0, 4000)[:, None]
+    result = followed(arm, arm.fk(way), way[0])
     assert (result.status == IkStatus.FOLLOWED).all()
     assert np.abs(result.q - way).max() < 1e-8
 
@@ -153,13 +168,8 @@ def test_a_path_keeps_every_joint_within_its_speed_and_its_branch(name: str) -> 
 def test_random_jumps_never_move_a_joint_faster_than_its_drive_or_out_of_its_limits(
     name: str,
 ) -> None:
-    arm, dt = ARMS[name], 1e-2
-    poses = arm.fk(drawn(name, 500, seed=6))
-    result = arm.follow(poses, arm.home, dt)
-    steps = np.abs(np.diff(np.vstack((arm.home, result.q)), axis=0))
-    assert (steps <= present(arm.drives).speed_limit * dt * (1.0 + 1e-9)).all()
-    assert (result.q >= arm.lower).all()
-    assert (result.q <= arm.upper).all()
+    arm = ARMS[name]
+    followed(arm, arm.fk(drawn(name, 500, seed=6)), arm.home, 1e-2)
 
 
 @arms
@@ -173,26 +183,41 @@ def test_a_path_that_stops_far_away_is_reached_in_the_end(name: str) -> None:
     assert np.abs(result.q[-1] - near).max() < 1e-8
 
 
-@arms
+@robots
 @pytest.mark.parametrize("bad", [math.nan, math.inf])
 def test_numbers_that_are_not_finite_are_refused(name: str, bad: float) -> None:
     arm = ARMS[name]
     pose, q = np.eye(4), arm.home.copy()
     pose[0, 3] = q[0] = bad
-    for call in (lambda: arm.fk(q), lambda: arm.ik(pose), lambda: arm.ik(np.eye(4), q)):
+    calls: Any = (arm.fk, q), (arm.ik, pose), (arm.ik_all, pose), (arm.ik, np.eye(4), q)
+    for call, *given in calls:
         with pytest.raises(ParameterError):
-            call()
+            call(*given)
 
 
-@arms
+@robots
 def test_matrices_that_are_not_rigid_and_wrong_shapes_are_refused(name: str) -> None:
     arm = ARMS[name]
-    with pytest.raises(ParameterError):
-        arm.ik(np.diag([1.0, 1.0, -1.0, 1.0]))
-    with pytest.raises(ParameterError):
-        arm.ik_all(2.0 * np.eye(4))
-    with pytest.raises(ShapeError):
-        arm.fk(np.zeros(arm.n + 1))
+    for bad in (np.zeros((4, 4)), 2.0 * np.eye(4), np.diag([1.0, 1.0, -1.0, 1.0])):
+        for call in (arm.ik, arm.ik_all):
+            with pytest.raises(ParameterError):
+                call(bad)
+    poses = np.repeat(arm.fk(arm.home)[None], 3, axis=0)
+    poses[2, 0, 0] += 0.1
+    with pytest.raises(ParameterError) as error:
+        arm.ik(poses)
+    assert error.value.name == "T[2]"
+    longer, pair = np.zeros(arm.n + 1), np.zeros((2, arm.n))
+    wrong: Any = (arm.fk, longer), (arm.jacobian, pair), (arm.ik, np.eye(3))
+    for method, *given in (*wrong, (arm.ik, np.eye(4), longer), (arm.ik, np.eye(4)[None], pair)):
+        with pytest.raises(ShapeError):
+            method(*given)
+
+
+@robots
+def test_unknown_symbols_are_refused(name: str) -> None:
+    with pytest.raises(UnknownNameError):
+        load_robot(name, wing=1.0)
 
 
 @arms
@@ -200,33 +225,32 @@ def test_unknown_symbols_list_the_known_ones_and_impossible_lengths_are_refused(
     with pytest.raises(UnknownNameError) as caught:
         load_robot(name, wing=1.0)
     assert set(caught.value.alternatives) == set(ARMS[name].geometry)
-    for value in (-1e3, math.nan, "long"):
+    for value in (-1e3, math.nan, math.inf, "long"):
         for symbol in ARMS[name].geometry:
             with pytest.raises(ParameterError) as refused:
                 load_robot(name, **{symbol: value})
             assert refused.value.name == symbol
 
 
-@arms
-def test_home_is_inside_the_limits_and_far_from_singular(name: str) -> None:
+@robots
+def test_home_is_inside_the_limits_and_the_answer_to_its_own_pose(name: str) -> None:
     arm = ARMS[name]
-    assert (arm.lower < arm.home).all()
-    assert (arm.home < arm.upper).all()
-    assert arm.ik(arm.fk(arm.home)).status is IkStatus.FOLLOWED
+    assert (arm.lower <= arm.home).all()
+    assert (arm.home <= arm.upper).all()
+    answer = arm.ik(arm.fk(arm.home))
+    assert answer.status is (IkStatus.NEAR_SINGULAR if name == "rcrt1" else IkStatus.FOLLOWED)
+    assert np.abs(answer.q - arm.home).max() < REACHED
 
 
-@arms
+@robots
 def test_the_drive_table_is_complete_and_the_model_runs(name: str) -> None:
     arm = ARMS[name]
     for entry in present(arm.drives).entries().values():
         assert entry.shape == (arm.n,)
         assert (entry > 0.0).all()
-    out = np.empty(arm.n)
-    present(arm.dynamics).acceleration(
-        arm.home.copy(),
-        np.zeros(arm.n),
-        np.ones(arm.n),
-        present(arm.dynamics).parameters.copy(),
-        out,
-    )
-    assert np.array_equal(out, 1.0 / present(arm.drives).inertia)
+    out, model = np.empty(arm.n), present(arm.dynamics)
+    rest, push = np.zeros(arm.n), np.ones(arm.n)
+    model.acceleration(arm.home.copy(), rest, push, model.parameters.copy(), out)
+    assert np.isfinite(out).all()
+    if name != "rcrt1":  # the only one whose joints feel each other and gravity
+        assert np.array_equal(out, 1.0 / present(arm.drives).inertia)
