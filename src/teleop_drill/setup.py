@@ -21,7 +21,7 @@ setup(
         "numpy",
         "pyyaml",
         "rich",
-    ],  # fmt: skip
+    ],
     extras_require={"ros": ["teleop_core[ros]"]},
     data_files=[
         ("share/ament_index/resource_index/packages", ["resource/teleop_drill"]),
