@@ -4,30 +4,14 @@ import shlex
 import subprocess
 import sys
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 from drill_runs import run_drill
-from mutants import ROOT
 from teleop_drill.drill import SHORT
 
 pytestmark = [pytest.mark.ros, pytest.mark.slow, pytest.mark.alone]
 LIMITS = 1.0 + 1e-9
-
-
-QUICK = ("stop_late", "not_recorded")
-SOAK = ("braking_weak", "second_publishers")
-
-
-@pytest.mark.parametrize(
-    "name", [*QUICK, *(pytest.param(name, marks=pytest.mark.soak) for name in SOAK)]
-)
-def test_a_broken_safety_is_found(name: Any) -> None:
-    """The others, and both forms of each: make drill-mutants."""
-    command = [sys.executable, str(ROOT / "tests/mutants.py"), name, "--composed"]
-    done = subprocess.run(command, check=False, capture_output=True, text=True, timeout=400)
-    assert done.returncode == 0, done.stdout + done.stderr
 
 
 @pytest.mark.soak
@@ -54,21 +38,6 @@ def test_a_composed_session_survives_a_hand_that_lies_and_is_stopped(tmp_path: P
         assert one["recovered_s"] is not None, text
         assert one["recording"] == "intact", text
     assert (code == 0) is all(one["is_passed"] for one in outcomes.values())
-
-
-def test_a_composed_session_stops_where_nobody_presses_and_pauses_where_it_stood_still(
-    tmp_path: Path,
-) -> None:
-    _, text, outcomes = run_drill(tmp_path, "--composed", "heartbeat", "freeze_session")
-    found = {name: (one["state"], one["told"]) for name, one in outcomes.items()}
-    assert found == {"heartbeat": ("FAULT", "heartbeat"), "freeze_session": ("PAUSED", "stall")}, (
-        text
-    )
-
-
-def test_joints_that_are_held_fast_are_told_in_a_process_of_their_own(tmp_path: Path) -> None:
-    _, text, outcomes = run_drill(tmp_path, "stuck_tip")
-    assert (outcomes["stuck_tip"]["state"], outcomes["stuck_tip"]["told"]) == ("FAULT", "tip"), text
 
 
 def test_drives_that_end_are_named_with_what_they_wrote_last() -> None:

@@ -142,7 +142,7 @@ def test_a_recorder_that_ends_costs_a_loop_nothing_and_the_next_one_is_found(
         feed.flush()
     assert not feed.is_open
     assert not feed.waiting
-    monkeypatch.setattr("teleop_core.nodes.feed._AGAIN", 0.0)
+    monkeypatch.setattr("teleop_core.nodes.feed._AGAIN_NS", -1)
     again = FeedReader(takers, feed.world)
     feed.flush()
     feed.channels["a"].give(b"y", 5)

@@ -1,0 +1,186 @@
+"""The simulated machine: what its middleware, processes and time do, as the real ones."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from std_msgs.msg import Bool
+
+from teleop_core.middleware.world import Qos
+from teleop_drill.simulation.bus import Bus, Line
+from teleop_drill.simulation.machine import Machine, Process
+from teleop_drill.simulation.scheduler import Deadlock, Scheduler
+from teleop_drill.simulation.world import SimulatedWorld
+
+FOUND = 2.0  # by then all have found each other [s]
+
+
+class Pair:
+    """Two processes that work, and whoever lets time pass."""
+
+    def __init__(self, seed: int = 0) -> None:
+        self.machine = Machine(Scheduler(seed))
+        self.bus = Bus(self.machine.scheduler)
+        self.outside = self.machine.outsider("test")
+        self.here, self.there = (self._process(name) for name in ("here", "there"))
+
+    def _process(self, name: str) -> SimulatedWorld:
+        def work(process: Process) -> int:
+            while True:
+                self.machine.scheduler.sleep(1e3)
+
+        process = self.machine.start(name, work)
+        self.bus.watch(process)
+        return SimulatedWorld(self.bus, process)
+
+    def process(self, name: str) -> Process:
+        return next(one for one in self.machine.processes if one.name == name)
+
+    def sleep(self, seconds: float) -> None:
+        self.machine.scheduler.sleep(seconds)
+
+
+def test_what_is_sent_before_both_have_found_each_other_is_not_heard_but_latched_messages_are() -> (
+    None
+):
+    for is_latched in (False, True):
+        pair, qos = Pair(), Qos(depth=3, is_latched=is_latched)
+        writer = pair.here.node("a").create_publisher(Bool, "/t", qos)
+        for k in range(5):
+            writer.publish(bytes([k]))
+        reader = pair.there.node("b").create_taker(Bool, "/t", qos)
+        pair.sleep(FOUND)
+        writer.publish(b"last")
+        pair.sleep(0.01)
+        heard = []
+        while (taken := reader.take()) is not None:
+            heard.append((taken.number, taken.data))
+        late = [(4, b"\x03"), (5, b"\x04"), (6, b"last")]  # a queue of three
+        assert heard == (late if is_latched else [(6, b"last")])
+
+
+def test_a_full_queue_loses_its_oldest_and_keep_all_loses_nothing() -> None:
+    pair = Pair()
+    writer = pair.here.node("a").create_publisher(Bool, "/t", Qos(depth=100))
+    node = pair.there.node("b")
+    short = node.create_taker(Bool, "/t", Qos(depth=2))
+    whole = node.create_taker(Bool, "/t", Qos(keeps_all=True))
+    pair.sleep(FOUND)
+    for k in range(50):
+        writer.publish(bytes([k]))
+    pair.sleep(0.1)
+    last = [taken.number for _ in range(9) if (taken := short.take()) is not None]
+    every = [taken.number for _ in range(99) if (taken := whole.take()) is not None]
+    assert last == [49, 50]
+    assert every == list(range(1, 51))
+
+
+def test_qualities_that_do_not_go_together_do_not_meet() -> None:
+    pair = Pair()
+    writer = pair.here.node("a").create_publisher(Bool, "/t", Qos(is_reliable=False))
+    node = pair.there.node("b")
+    strict, lenient = (
+        node.create_taker(Bool, "/t", Qos(is_reliable=reliable)) for reliable in (True, False)
+    )
+    pair.sleep(FOUND)
+    writer.publish(b"x")
+    pair.sleep(0.01)
+    assert writer.get_subscription_count() == 1
+    assert strict.take() is None
+    assert lenient.take() is not None
+
+
+def test_a_reliable_message_is_late_on_a_bad_line_and_another_one_is_lost_and_counted() -> None:
+    pair = Pair()
+    pair.bus.lines["here", "there"] = Line(loss=0.5)
+    writer = pair.here.node("a").create_publisher(Bool, "/t", Qos(depth=1000))
+    node = pair.there.node("b")
+    sure, fast = (
+        node.create_taker(Bool, "/t", Qos(depth=1000, is_reliable=reliable))
+        for reliable in (True, False)
+    )
+    pair.sleep(FOUND)
+    for _ in range(200):
+        writer.publish(b"x")
+        pair.sleep(0.001)
+    pair.sleep(1.0)
+    numbers = [taken.number for _ in range(999) if (taken := sure.take()) is not None]
+    got = [taken.number for _ in range(999) if (taken := fast.take()) is not None]
+    assert numbers == list(range(1, 201))
+    assert 50 < len(got) < 150
+    assert fast.lost == 200 - len(got)
+
+
+def test_a_process_that_stands_still_does_nothing_and_a_killed_one_never_again() -> None:
+    pair, turns = Pair(), [0]
+
+    def count(_: Process) -> int:
+        while True:
+            turns[0] += 1
+            pair.sleep(0.01)
+
+    process = pair.machine.start("counter", count)
+    pair.sleep(1.0)
+    process.stop()
+    pair.sleep(0.1)
+    still = turns[0]
+    pair.sleep(1.0)
+    assert turns[0] == still > 50
+    process.go_on()
+    pair.sleep(1.0)
+    assert turns[0] > still + 50
+    process.end(-9, is_orderly=False)
+    gone = turns[0]
+    pair.sleep(1.0)
+    assert turns[0] == gone
+    assert process.exit_code == -9
+
+
+def test_a_lock_is_held_by_one_thread_and_given_to_the_next() -> None:
+    pair, order = Pair(), list[str]()
+    lock = pair.here.lock()
+
+    def hold(name: str) -> None:
+        with lock:
+            order.append(f"{name} in")
+            pair.sleep(0.05)
+            order.append(f"{name} out")
+
+    for name in "abc":
+        pair.here.thread(name, lambda name=name: hold(name)).start()  # type: ignore[misc]
+    pair.sleep(1.0)
+    assert len(order) == 6
+    assert all(one[0] == other[0] for one, other in zip(order[::2], order[1::2], strict=True))
+    assert lock.acquire(True, 0.01)
+    assert not lock.acquire(True, 0.01)
+
+
+def test_whoever_waits_for_what_never_comes_is_told() -> None:
+    scheduler = Scheduler(0)
+    machine = Machine(scheduler)
+
+    def wait(_: Process) -> None:
+        scheduler.wait(None)
+
+    with pytest.raises(Deadlock):
+        machine.run(wait)
+
+
+def test_the_drill_gives_the_same_bits_in_processes_that_hash_otherwise(tmp_path: Path) -> None:
+    """The same folder each time, for its name stands in the recording."""
+    seen = []
+    for hashed in ("1", "2"):
+        place, file = tmp_path / "bags", tmp_path / "drill.json"
+        words = ["drill", "--simulated", "--seed", "5", "kill_slave", "stop_service"]
+        done = subprocess.run(
+            [sys.executable, "-m", "teleop_core.cli", *words, "--out", place, "--json", file],
+            env=os.environ | {"PYTHONHASHSEED": hashed}, capture_output=True, check=False,
+        )  # fmt: skip
+        assert done.returncode == 0, done.stdout
+        bags = {p.relative_to(place): p.read_bytes() for p in place.rglob("*") if p.is_file()}
+        seen.append((file.read_bytes(), bags))
+        place.rename(tmp_path / f"bags_{hashed}")
+    assert len(seen[0][1]) == 4
+    assert seen[0] == seen[1]

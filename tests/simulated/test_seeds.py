@@ -1,0 +1,100 @@
+"""Random schedules: laws that hold in all of them, and what is told where one does not."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from teleop_drill.simulation import laws
+from teleop_drill.simulation.schedules import KINDS, Fault, draw
+from teleop_drill.simulation.seeds import PROCESSES, run_seed, shrink
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_all_laws_hold_under_a_random_schedule(seed: Any) -> None:
+    found = run_seed(seed)
+    assert found.broken == ()
+    assert found.seconds > 9.0
+    assert {"speed", "motion", "told", "ends", "queues", "recovery"} <= set(found.looks)
+
+
+def test_schedules_are_drawn_from_their_seed_and_all_kinds_come() -> None:
+    drawn = [draw(seed, PROCESSES) for seed in range(300)]
+    assert drawn == [draw(seed, PROCESSES) for seed in range(300)]
+    assert {fault.kind for faults in drawn for fault in faults} == set(KINDS)
+    assert {len(faults) for faults in drawn} == {1, 2, 3, 4, 5}
+
+
+def test_a_schedule_that_breaks_a_law_is_cut_down_to_what_does_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(laws, "_OBEY", -10.0)  # nobody can be so fast
+    found = run_seed(
+        0, [
+            Fault(1.0, "clock drift", "", 1.0, 0.3),
+            Fault(1.5, "press", "", 0.5, 0.4),
+            Fault(2.0, "garbage", "", 0.5, 0.6),
+        ],
+    )  # fmt: skip
+    assert [one.law for one in found.broken] == ["stop"]
+    assert [fault.kind for fault in shrink(found, "stop").faults] == ["press"]
+
+
+def test_one_schedule_is_run_again_by_its_seed_and_faults(tmp_path: Path) -> None:
+    words = [
+        "drill",
+        "--seeds",
+        "1",
+        "--seed",
+        "3",
+        "--faults",
+        "0",
+        "--out",
+        str(tmp_path / "bags"),
+    ]
+    done = subprocess.run(
+        [sys.executable, "-m", "teleop_core.cli", *words], check=False, capture_output=True,
+        text=True,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert draw(3, PROCESSES)[0].text() in done.stdout
+    assert (tmp_path / "bags/recording_1/metadata.yaml").exists()
+
+
+def test_many_schedules_are_told_as_a_table_of_faults_and_states(tmp_path: Path) -> None:
+    file = tmp_path / "seeds.json"
+    words = ["drill", "--seeds", "2", "--seed", "10", "--json", str(file)]
+    done = subprocess.run(
+        [sys.executable, "-m", "teleop_core.cli", *words], check=False, capture_output=True,
+        text=True,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stdout + done.stderr
+    found = json.loads(file.read_text(encoding="utf-8"))
+    assert found["sessions"] == 2
+    assert found["broken"] == {}
+    drawn = [fault.kind for seed in (10, 11) for fault in draw(seed, PROCESSES)]
+    assert sum(sum(met.values()) for met in found["met"].values()) == len(drawn)
+
+
+@pytest.mark.parametrize(
+    ("words", "needed"),
+    [
+        (["--seeds", "2", "--faults", "0"], "1 with --faults"),
+        (["--seeds", "1", "--faults", "9"], "of 0, 1"),
+        (["--seeds", "2", "stop_topic"], "without names"),
+        (["--seed", "3", "stop_topic"], "with --simulated"),
+    ],
+)
+def test_arguments_that_do_not_go_together_are_refused_in_one_line(words: Any, needed: Any) -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "teleop_core.cli", "drill", *words], check=False,
+        capture_output=True, text=True,
+    )  # fmt: skip
+    assert done.returncode == 2
+    assert needed in done.stderr
+    assert len(done.stderr.strip().splitlines()) == 1
