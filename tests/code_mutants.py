@@ -41,6 +41,10 @@ _YIELD = "chain/architectures/impedance.py"
 _PID, _WAY = "slave/controllers/pid.py", "slave/interpolation.py"
 _HAND, _OBSERVER = "chain/master/hand_mechanics.py", "slave/force_observer.py"
 CODE_MUTANTS = (
+    _mutant("warm_reset", "a step for practice counts", "graph/warming.py",
+            "    runner.reset()\n", "", "warming"),
+    _mutant("warm_signals", "a step for practice leaves its outputs", "graph/warming.py",
+            "    assign(runner.signals, before)\n", "", "warming"),
     _mutant("buttons_paused", "a pause of the poses makes single presses of a stream of buttons",
             "chain/mapping/plausibility.py", "max(s.in_row - _STREAM, 0)", "0", "plausible_hand"),
     # kernels and robots

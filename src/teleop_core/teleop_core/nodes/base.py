@@ -16,6 +16,7 @@ from teleop_core.base.errors import SessionError, TeleopError
 from teleop_core.graph.signals import TICK_NS
 from teleop_core.graph.stage import Stage, joints_of
 from teleop_core.graph.topics import Kind, Topic
+from teleop_core.graph.warming import warm_up
 from teleop_core.nodes.diagnostics import Reporter, input_values, recent_values, tick_values
 from teleop_core.nodes.feed import Feed, address
 from teleop_core.nodes.loop import Loop
@@ -82,7 +83,7 @@ class CoreNode(TunedNode):
     def setup(self, parameters: Any) -> None:
         """Make the stage and open its topics."""
         self.stage = self.runner = self.description.run(parameters, TICK_NS / 1e9)
-        self.runner.load()
+        warm_up(self.runner)
         self.ports = Ports(
             self, self.arm, self.description, self.stage.signals, joints_of(parameters),
             self.options.feeds, self.open_publisher, self.options.joy_buttons,
