@@ -41,6 +41,8 @@ _YIELD = "chain/architectures/impedance.py"
 _PID, _WAY = "slave/controllers/pid.py", "slave/interpolation.py"
 _HAND, _OBSERVER = "chain/master/hand_mechanics.py", "slave/force_observer.py"
 CODE_MUTANTS = (
+    _mutant("reports_meet", "all nodes report at once", "nodes/rate.py",
+            "place = stages.index(stage) if stage in stages else len(stages)", "place = 0", "rate"),
     _mutant("warm_reset", "a step for practice counts", "graph/warming.py",
             "    runner.reset()\n", "", "warming"),
     _mutant("warm_signals", "a step for practice leaves its outputs", "graph/warming.py",

@@ -14,7 +14,7 @@ from rclpy.task import Future
 from teleop_core.bags.reports import read_reports
 from teleop_core.base.errors import SessionError, TeleopError
 from teleop_core.graph.signals import TICK_NS
-from teleop_core.graph.stage import Stage, joints_of
+from teleop_core.graph.stage import STAGES, Stage, joints_of
 from teleop_core.graph.topics import Kind, Topic
 from teleop_core.graph.warming import warm_up
 from teleop_core.nodes.diagnostics import Reporter, input_values, recent_values, tick_values
@@ -23,7 +23,13 @@ from teleop_core.nodes.loop import Loop
 from teleop_core.nodes.news import Commanders, introduction
 from teleop_core.nodes.ports import NO_PORTS, Ports
 from teleop_core.nodes.quality import profile
-from teleop_core.nodes.rate import Recent, Schedule, TickCounts
+from teleop_core.nodes.rate import (
+    REPORT_PERIOD,
+    Recent,
+    Schedule,
+    TickCounts,
+    report_phase,
+)
 from teleop_core.nodes.real_time import apply_options
 from teleop_core.nodes.streams import Input, message_type
 from teleop_core.nodes.taking import Unattended
@@ -72,7 +78,9 @@ class CoreNode(TunedNode):
         self._fresh_counts()
         self._word = "unconfigured"
         self._reporter, self._commanders = Reporter(self), Commanders(self, self.description)
-        self._report_timer = self.create_timer(1.0, self._report_in_time)
+        phase = report_phase(stage.name, tuple(STAGES), self.arm)
+        wait = (phase - time.monotonic()) % REPORT_PERIOD
+        self._report_timer = self.create_timer(wait, self._begin_reports)
         self.ending = threading.Lock()
         """Held while the end is told; shared by the nodes of a process, as ``ended`` is."""
         own = self._service_change_state
@@ -370,6 +378,12 @@ class CoreNode(TunedNode):
     def counts(self) -> TickCounts:
         """What became of the ticks since the node was configured."""
         return self.schedule.counts
+
+    def _begin_reports(self) -> None:
+        """Report, and from now on once a second."""
+        self.destroy_timer(self._report_timer)
+        self._report_timer = self.create_timer(REPORT_PERIOD, self._report_in_time)
+        self._report_in_time()
 
     def _report_in_time(self) -> None:
         """Report, once a second; what a part of others raises must not end the node."""
