@@ -43,6 +43,11 @@ _HAND, _OBSERVER = "chain/master/hand_mechanics.py", "slave/force_observer.py"
 CODE_MUTANTS = (
     _mutant("reports_meet", "all nodes report at once", "nodes/rate.py",
             "place = stages.index(stage) if stage in stages else len(stages)", "place = 0", "rate"),
+    _mutant("js_unanswered", "of two samples of the arm in a tick one is answered",
+            "nodes/slave.py", "in waiting[:-1]:", "in waiting[:0]:",
+            "tests/ros/test_bursts.py"),
+    _mutant("short_queue", "a queue forgets what a late sender makes up for", "nodes/streams.py",
+            "options.max_catch_up if", "20 if", "tests/ros/test_bursts.py"),
     _mutant("warm_reset", "a step for practice counts", "graph/warming.py",
             "    runner.reset()\n", "", "warming"),
     _mutant("warm_signals", "a step for practice leaves its outputs", "graph/warming.py",

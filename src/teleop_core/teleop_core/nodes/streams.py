@@ -40,7 +40,8 @@ from teleop_core.nodes.taking import Taker
 SILENCE_NS = 2_000_000_000
 """After this long without a sound message a sender may start anew with any stamp [ns]."""
 _WAITING = 20
-"""Messages that wait for a late reader: a stage that answers each of them loses none by 20 ms."""
+"""Messages that wait for a late reader at least; else what a late sender of its kind makes up for
+in one wake-up."""
 _PRESSES = 500
 """The same of buttons: who presses one while a reader stands still for half a second is heard."""
 
@@ -123,7 +124,9 @@ class Input:
         buttons: tuple[int, ...] = BUTTONS,
     ) -> None:
         self.topic, self._node, self._name = topic, node, name
-        self._waiting = _PRESSES if topic.kind is Kind.BUTTONS else _WAITING
+        options = getattr(node, "options", None)
+        burst = options.max_catch_up if options is not None else 0
+        self._waiting = max(_PRESSES if topic.kind is Kind.BUTTONS else _WAITING, burst)
         self.subscription: Subscription | None = Subscription(node, topic, name, self._waiting)
         self._is_new = False
         self._joint_names, self._target = topic.names(joint_names), target
@@ -135,7 +138,6 @@ class Input:
         self._delay_ns = round(delay * 1e9)
         self._held: deque[tuple[int, int, Values]] = deque()
         self.received, self.refused = 0, Counter[Refusal]()
-        options = getattr(node, "options", None)
         self.sender = options.sender() if options is not None else Sender()
         self._is_fault = options is not None and options.second_publisher == "fault"
         self.stamp_ns: int | None = None

@@ -1,0 +1,73 @@
+"""Bursts: what a late sender makes up for, and what a late reader finds."""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+from rclpy.parameter import Parameter
+
+from teleop_core.graph import topics
+from teleop_core.graph.stage import STAGES
+from teleop_core.kernels.geometry import Array, pose_from_transform
+from teleop_core.nodes.making import make_node
+from teleop_core.robots import load_robot
+
+if TYPE_CHECKING:
+    from ros.conftest import Peer
+
+pytestmark = pytest.mark.ros
+
+ARM = load_robot("rcrt1")
+MS = 1_000_000
+
+
+def test_slave_answers_every_sample_of_its_arm_also_several_that_come_within_a_tick(
+    peer: "Peer",
+) -> None:
+    answers = peer.listen(topics.SLAVE_MEASURED_CP)
+    peer.start("slave", has_arm=False)
+    where: dict[int, Array] = {}
+
+    def say(count: int) -> None:
+        for _ in range(count):
+            stamp = 1_000 * MS + len(where) * MS
+            where[stamp] = ARM.home + 1e-6 * len(where) * np.eye(6)[0]
+            state = [where[stamp], np.zeros(6), np.zeros(6)]
+            peer.send(topics.SLAVE_MEASURED_JS, stamp, np.concatenate(state))
+
+    def is_heard() -> int:
+        say(1)
+        return answers.take()
+
+    peer.wait(is_heard, "a first answer")
+    for burst in range(40):
+        answered = answers.take()
+        say(5)
+        peer.wait(lambda so_far=answered: answers.take() >= so_far + 5, f"answers to burst {burst}")
+    answers.insist_on_all()
+    assert answers.stamps == [stamp for stamp in where if stamp >= answers.stamps[0]]
+    for stamp, pose in zip(answers.stamps, answers.values, strict=True):
+        expected = np.empty(7)
+        pose_from_transform(np.ascontiguousarray(ARM.fk(where[stamp])), expected)
+        assert np.array_equal(pose, expected)
+
+
+@pytest.mark.parametrize("count", [200, 400])
+def test_what_comes_while_a_node_is_late_waits_for_it_up_to_its_catch_up(
+    peer: "Peer", count: int
+) -> None:
+    given = [Parameter("max_catch_up", value=300), Parameter("autostart", value=False)]
+    node = make_node(STAGES.find("slave"), context=peer.context, parameter_overrides=given)
+    try:
+        node.trigger_configure()
+        measured = node.input(topics.SLAVE_MEASURED_JS)
+        for tick in range(1, count + 1):
+            state = [ARM.home, np.zeros(6), np.zeros(6)]
+            peer.send(topics.SLAVE_MEASURED_JS, tick * MS, np.concatenate(state))
+        stamps = []
+        while measured.take():  # within a process what was sent has come
+            stamps.append(measured.stamp_ns)
+        assert stamps == [tick * MS for tick in range(1, count + 1)][-300:]
+    finally:
+        node.finish()
+        node.destroy_node()
