@@ -9,7 +9,6 @@ import subprocess
 import sys
 import tempfile
 import time
-import warnings
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager
@@ -50,10 +49,6 @@ from teleop_core.robots import load_robot
 from teleop_core.session.configuration import Configuration, configure
 from teleop_core.slave.slave import SlaveParameters
 from teleop_core.slave.slave_sim import SlaveSimParameters
-
-with warnings.catch_warnings():
-    warnings.simplefilter("ignore")  # its parser imports a deprecated module of Python
-    import rosidl_generator_py  # noqa: F401
 
 TIMEOUT = 90.0
 SESSION_TIMEOUT = 300.0

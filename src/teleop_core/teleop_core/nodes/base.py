@@ -34,7 +34,7 @@ from teleop_core.nodes.real_time import apply_options
 from teleop_core.nodes.streams import Input, message_type
 from teleop_core.nodes.taking import Unattended
 from teleop_core.nodes.tuned import TunedNode
-from teleop_core.session.runner import report_of
+from teleop_core.session.reports import report_of
 
 SUCCESS, FAILURE, ERROR = (
     TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILURE,

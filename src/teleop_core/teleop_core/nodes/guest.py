@@ -5,6 +5,10 @@ from typing import Any, Self
 from rclpy.context import Context
 from rclpy.node import Node
 
+from teleop_core.nodes.type_support import spare_generator
+
+spare_generator()  # before the first node
+
 
 class Guest:
     """Owner of a node with a middleware context of its own, to be used with ``with``.

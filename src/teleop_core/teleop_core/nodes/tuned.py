@@ -16,8 +16,10 @@ from teleop_core.graph.stage import Runner, Stage
 from teleop_core.nodes.declaration import declare, plain, typed
 from teleop_core.nodes.quality import PREFIX, QualityOverrides
 from teleop_core.nodes.sender import Sender
+from teleop_core.nodes.type_support import spare_generator
 
 _LOCK_PATIENCE = 1.0
+spare_generator()  # before the first node
 
 
 @dataclass(frozen=True, kw_only=True)
