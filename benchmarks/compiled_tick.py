@@ -100,7 +100,7 @@ def in_numba(node: Any, publishers: list[Any], late: Any, took: Any) -> None:
     data, infos = np.zeros((COUNT, ROOM), np.uint8), np.zeros((COUNT, 16), np.uint64)
     messages = np.zeros((COUNT, 8), np.uint64)  # buffer, length, capacity, allocator
     for row, room, taker in zip(messages, data, takers, strict=True):
-        row[:] = np.frombuffer(taker._bytes, np.uint64)
+        row[:] = np.frombuffer(bytes(taker._bytes), np.uint64)
         row[:3] = room.ctypes.data, 0, ROOM
     at = layout(IN[0], ()).encode_one(1, POSE).index(POSE[:3].tobytes())
     own = (readers, writers, messages, data, infos, at, np.zeros((2, 2), np.int64))

@@ -1,5 +1,6 @@
 """Bursts: what a late sender makes up for, and what a late reader finds."""
 
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,12 +14,16 @@ from teleop_core.nodes.making import make_node
 from teleop_core.robots import load_robot
 
 if TYPE_CHECKING:
-    from ros.conftest import Peer
+    from ros.conftest import Listener, Peer
 
 pytestmark = pytest.mark.ros
 
 ARM = load_robot("rcrt1")
 MS = 1_000_000
+
+
+def has(listener: "Listener", count: int) -> bool:
+    return listener.take() >= count
 
 
 def test_slave_answers_every_sample_of_its_arm_also_several_that_come_within_a_tick(
@@ -40,10 +45,10 @@ def test_slave_answers_every_sample_of_its_arm_also_several_that_come_within_a_t
         return answers.take()
 
     peer.wait(is_heard, "a first answer")
-    for burst in range(40):
-        answered = answers.take()
+    for _ in range(40):
+        wanted = answers.take() + 5
         say(5)
-        peer.wait(lambda so_far=answered: answers.take() >= so_far + 5, f"answers to burst {burst}")
+        peer.wait(partial(has, answers, wanted), "an answer to each of a burst")
     answers.insist_on_all()
     assert answers.stamps == [stamp for stamp in where if stamp >= answers.stamps[0]]
     for stamp, pose in zip(answers.stamps, answers.values, strict=True):
