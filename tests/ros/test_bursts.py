@@ -48,7 +48,7 @@ def test_slave_answers_every_sample_of_its_arm_also_several_that_come_within_a_t
     for _ in range(40):
         wanted = answers.take() + 5
         say(5)
-        peer.wait(partial(has, answers, wanted), "an answer to each of a burst")
+        peer.wait(partial(has, answers, wanted), "an answer to each of a burst", timeout=30.0)
     answers.insist_on_all()
     assert answers.stamps == [stamp for stamp in where if stamp >= answers.stamps[0]]
     for stamp, pose in zip(answers.stamps, answers.values, strict=True):
