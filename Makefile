@@ -4,6 +4,7 @@ BIN := $(VENV)/bin
 PYTHON ?= python3
 OUT ?= out
 SECONDS_LIVE ?= 60
+RUNS_LIVE ?= 1
 # Keep DDS traffic on this machine; export another value to talk to other hosts.
 export ROS_AUTOMATIC_DISCOVERY_RANGE ?= LOCALHOST
 export AMENT_PREFIX_PATH := $(CURDIR)/$(VENV):$(AMENT_PREFIX_PATH)
@@ -128,7 +129,7 @@ bench: bench-setup
 	$(BIN)/python benchmarks/session.py
 	$(BIN)/python benchmarks/kinematics.py
 	$(BIN)/python benchmarks/urdf_arms.py
-	$(BIN)/python benchmarks/live.py --seconds $(SECONDS_LIVE)
+	$(BIN)/python benchmarks/live.py --seconds $(SECONDS_LIVE) --runs $(RUNS_LIVE)
 
 # Starts and ends of live sessions under load, COUNT of each kind; about a quarter of an hour.
 COUNT ?= 100

@@ -13,6 +13,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -198,9 +199,16 @@ def lateness(seconds: float) -> dict[str, float]:
     return {"median": float(np.median(late)), "p99": float(np.percentile(late, 99))}
 
 
-def compare(seconds: float) -> None:
-    """Print everything side by side, as ratios to the raw relay chain too."""
-    print(f"\nlive, {seconds:g} s each, one after the other: master sample -> setpoint")
+def medians(run: Callable[[], dict[str, float]], runs: int) -> dict[str, float]:
+    """Median of each number of some runs."""
+    found = [run() for _ in range(runs)]
+    return {key: float(np.median([one[key] for one in found])) for key in found[0]}
+
+
+def compare(seconds: float, runs: int) -> None:
+    """Print everything side by side, medians of some runs, as ratios to the raw chain too."""
+    of = f", medians of {runs} runs" if runs > 1 else ""
+    print(f"\nlive, {seconds:g} s each{of}, one after the other: master sample -> setpoint")
     print(f"{'':44}{'median':>9}{'p99':>9}{'lost':>8}{'late':>8}{'CPU':>7}{'ratio':>14}")
     print(f"{'':44}{'ms':>9}{'ms':>9}{'%':>8}{'%':>8}{'%':>7}{'median, p99':>14}")
     raw: dict[str, float] = {}
@@ -218,7 +226,7 @@ def compare(seconds: float) -> None:
         ("one process, a busy process beside", lambda: live(seconds, "--composed")),
     ):
         beside = subprocess.Popen([sys.executable, "-c", spin]) if "busy" in name else None
-        found = run()
+        found = medians(run, runs)
         if beside is not None:
             beside.kill()
             beside.wait()
@@ -235,6 +243,7 @@ def compare(seconds: float) -> None:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seconds", type=float, default=60.0, help="length of each part")
+    parser.add_argument("--runs", type=int, default=1, help="runs of each part")
     parser.add_argument("--role", choices=("relay", "sink", "source"), help=argparse.SUPPRESS)
     parser.add_argument("--position", type=int, default=0, help=argparse.SUPPRESS)
     parser.add_argument("--style", choices=("raw", "typed"), help=argparse.SUPPRESS)
@@ -249,7 +258,7 @@ def main() -> None:
     elif arguments.role == "source":
         source(arguments.style)
     else:
-        compare(arguments.seconds)
+        compare(arguments.seconds, max(1, arguments.runs))
 
 
 if __name__ == "__main__":

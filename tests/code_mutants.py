@@ -39,6 +39,20 @@ _YIELD = "chain/architectures/impedance.py"
 _PID, _WAY = "slave/controllers/pid.py", "slave/interpolation.py"
 _HAND, _OBSERVER = "chain/master/hand_mechanics.py", "slave/force_observer.py"
 CODE_MUTANTS = (
+    _mutant("reports_meet", "all nodes report at once", "nodes/rate.py",
+            "place = stages.index(stage) if stage in stages else len(stages)", "place = 0", "rate"),
+    _mutant("js_unanswered", "of two samples of the arm in a tick one is answered",
+            "nodes/slave.py", "in waiting[:-1]:", "in waiting[:0]:",
+            "tests/simulated/test_bursts.py"),
+    _mutant("short_queue", "a queue forgets what a late sender makes up for", "nodes/streams.py",
+            "options.max_catch_up if", "20 if", "tests/simulated/test_bursts.py"),
+    _mutant("parsers_loaded", "each node loads parsers of message definitions",
+            "middleware/ros_type_support.py", "    if _GENERATOR in sys.modules:", "    if True:",
+            "tests/ros/test_light_nodes.py"),
+    _mutant("warm_reset", "a step for practice counts", "graph/warming.py",
+            "    runner.reset()\n", "", "warming"),
+    _mutant("warm_signals", "a step for practice leaves its outputs", "graph/warming.py",
+            "    assign(runner.signals, before)\n", "", "warming"),
     _mutant("buttons_paused", "a pause of the poses makes single presses of a stream of buttons",
             "chain/mapping/plausibility.py", "max(s.in_row - _STREAM, 0)", "0", "plausible_hand"),
     # kernels and robots

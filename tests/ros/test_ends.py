@@ -1,5 +1,6 @@
 """Ends: in order, whatever brings them about, and nothing is left behind."""
 
+import os
 import re
 import signal
 import subprocess
@@ -9,6 +10,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import psutil
 import pytest
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
@@ -17,6 +19,7 @@ from live_process import TIMEOUT, LiveProcess, WorkingTime, are_gone, wait_until
 from teleop_core.bags.reader import Bag
 from teleop_core.graph import topics
 from teleop_core.graph.graph import BUILT_IN, RECORDER_NAME
+from teleop_core.middleware.real_time import is_priority_granted
 from teleop_core.nodes.children import free_domain
 from teleop_core.nodes.observer import Observer
 
@@ -209,6 +212,38 @@ def test_a_process_that_stands_still_ends_the_session(start: Callable[..., Any])
     assert session.wait() == 2
     assert "hand_side stands still" in session.text
     assert session.recorded().topics["slave/measured_js"].count > 100
+
+
+@pytest.mark.parametrize("priority", [0, 31])
+def test_a_session_that_waits_for_a_recorder_that_stands_still_uses_no_processor(
+    start: Callable[..., Any], priority: int
+) -> None:
+    if priority and not is_priority_granted(priority):
+        pytest.skip("the system grants no SCHED_FIFO")
+    policy = os.SCHED_FIFO if priority else os.SCHED_OTHER
+    os.sched_setscheduler(0, policy, os.sched_param(priority))
+    try:
+        session = start()
+    finally:
+        os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
+    session.wait_running()
+    (recorder,) = session.nodes(RECORDER_NAME)
+    waiting = psutil.Process(session.process.pid)
+    recorder.suspend()
+    session.process.send_signal(signal.SIGINT)
+    wait_until(lambda: session.nodes() == [recorder], "the end of the other processes")
+    begin, before = time.monotonic(), used(waiting)
+    wait_until(lambda: time.monotonic() - begin > 3.0, "three seconds")
+    assert used(waiting) - before < 0.3 * (time.monotonic() - begin)
+    recorder.resume()
+    assert session.process.wait(TIMEOUT) == 0
+    assert Bag(session.bag).topics
+
+
+def used(process: psutil.Process) -> float:
+    """Processor time of a process and of what it started, as far as that runs [s]."""
+    every = (process, *process.children(recursive=True))
+    return sum(sum(one.cpu_times()[:2]) for one in every)
 
 
 def test_a_session_starts_with_no_kernel_compiled_on_a_busy_machine(

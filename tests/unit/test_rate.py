@@ -1,8 +1,11 @@
 """The schedule of a 1 kHz loop, on a clock that the tests move."""
 
+from itertools import pairwise
+
 import pytest
 
-from teleop_core.nodes.rate import Recent, Schedule
+from teleop_core.graph.stage import STAGES
+from teleop_core.nodes.rate import REPORT_PERIOD, Recent, Schedule, report_phase
 
 MS = 1_000_000
 
@@ -112,3 +115,16 @@ def test_a_schedule_with_a_phase_keeps_it_wherever_it_starts(begin_ns: int) -> N
     ticks = [loop.due() for _ in range(3)]
     assert all(tick % 1_000_000 == 700_000 for due in ticks for tick in due)
     assert begin_ns + 1_000_000 <= ticks[0][0] < begin_ns + 2_000_000
+
+
+@pytest.mark.parametrize("arms", [("",), ("", "left"), ("left", "right"), ("a", "b", "c")])
+def test_no_two_nodes_of_a_session_report_within_three_milliseconds(arms: tuple[str, ...]) -> None:
+    stages = tuple(STAGES)
+    phases = sorted(report_phase(stage, stages, arm) for arm in arms for stage in stages)
+    assert min(after - before for before, after in pairwise([*phases, phases[0] + 1.0])) > 3e-3
+    assert 0.0 <= phases[0] <= phases[-1] < REPORT_PERIOD
+
+
+def test_a_stage_that_is_not_registered_reports_at_a_time_of_its_own() -> None:
+    stages = tuple(STAGES)
+    assert report_phase("mine", stages) not in {report_phase(stage, stages) for stage in stages}

@@ -572,3 +572,17 @@ def test_refused_retuning_changes_nothing() -> None:
         bench.slave.retune(wrong)
     assert bench.slave.simulated.parameters == before
     assert np.array_equal(bench.slave.simulated.arm.gains, gains)
+
+
+def test_a_sample_is_answered_between_ticks_as_a_tick_answers_it_to_the_bit() -> None:
+    bench = Bench()
+    for _ in range(3):
+        bench.tick(MIDDLE)
+    server = bench.slave.server
+    row = server.signals
+    row["slave_measured_js"][:6], row["slave_measured_js_ns"] = MIDDLE, 10**10
+    server.step()
+    stepped = row["slave_measured_cp"].tobytes()
+    row["slave_measured_cp"] = 0.0
+    server.answer_measured()
+    assert row["slave_measured_cp"].tobytes() == stepped

@@ -1,5 +1,6 @@
 """Answering node: one step of its stage for every message of its trigger, under the same stamp."""
 
+from collections.abc import Callable
 from typing import Any
 
 from teleop_core.graph.signals import DT
@@ -26,7 +27,7 @@ class AnsweringNode(CoreNode):
     def start(self) -> None:
         """Start from where the slave is, whatever was before."""
         self.stage.reset()
-        self._was_silent = True
+        self._was_silent, self._told_ns = True, 0
         for port in self.description.reads:
             self.row[f"{port.field}_ns"] = 0
 
@@ -35,14 +36,23 @@ class AnsweringNode(CoreNode):
         assert self._question.subscription is not None
         # What is held back on a slow link comes without a message to wait for.
         self._question.subscription.wait(DT if self._question.delay else 0.1)
-        self.work()
+        self.work(self.send_report)
 
     def tick(self, tick_ns: int) -> None:
-        """Answer what has come within a session."""
+        """Answer what has come within a session, which has the state reported later."""
         self.work()
 
-    def work(self) -> None:
-        """Answer the messages that have come, one by one."""
+    def tell(self) -> None:
+        """Report the state that the last answer led to, if it has changed."""
+        if self._told_ns:
+            self.send_report(self._told_ns)
+
+    def work(self, report: Callable[[int], None] | None = None) -> None:
+        """Answer the messages that have come, one by one.
+
+        Args:
+            report: Told the stamp of each answer [ns] when it is sent.
+        """
         has_come = False
         while self._question.take():
             has_come = True
@@ -50,21 +60,26 @@ class AnsweringNode(CoreNode):
             stamp_ns = self._question.stamp_ns
             if stamp_ns is not None and all(n.stamp_ns is not None for n in self._needed):
                 self.answer(stamp_ns)
+                self._told_ns = stamp_ns
+                if report is not None:
+                    report(stamp_ns)
         if not has_come:
             self.read_ports(self._trigger)
-            self._tell_silence()
+            self._find_silence(report)
 
-    def _tell_silence(self) -> None:
+    def _find_silence(self, report: Callable[[int], None] | None) -> None:
         """Report once that nothing is answered any more, where a stage has something to say."""
         is_silent = self._question.age() > self._timeout
         if is_silent and not self._was_silent:
             with self.lock:
                 self.stage.fall_silent()
-            self.send_report(self.world.time_ns())
+            self._told_ns = self.world.time_ns()
+            if report is not None:
+                report(self._told_ns)
         self._was_silent = is_silent
 
     def answer(self, stamp_ns: int) -> None:
-        """Make one step of the stage, send what came of it, and report the state if it changed."""
+        """Make one step of the stage, and send what came of it."""
         for name in self._stamp_fields:
             self.row[name] = stamp_ns
         with self.lock:
@@ -72,7 +87,6 @@ class AnsweringNode(CoreNode):
         self.ports.send(stamp_ns)
         self.counts.ticks += 1
         self.delay.put(self.world.time_ns() - stamp_ns)
-        self.send_report(stamp_ns)
 
     def concerns(self) -> list[str]:
         """Topics that are missing or silent."""

@@ -8,8 +8,9 @@ from typing import Any
 from teleop_core.bags.reports import read_reports
 from teleop_core.base.errors import SessionError, TeleopError
 from teleop_core.graph.signals import TICK_NS
-from teleop_core.graph.stage import Stage, joints_of
+from teleop_core.graph.stage import STAGES, Stage, joints_of
 from teleop_core.graph.topics import Kind, Topic
+from teleop_core.graph.warming import warm_up
 from teleop_core.middleware.world import Outcome, Publisher
 from teleop_core.nodes.diagnostics import Reporter, input_values, recent_values, tick_values
 from teleop_core.nodes.feed import Feed
@@ -17,10 +18,10 @@ from teleop_core.nodes.loop import Loop
 from teleop_core.nodes.news import Commanders, introduction
 from teleop_core.nodes.ports import NO_PORTS, Ports
 from teleop_core.nodes.quality import profile
-from teleop_core.nodes.rate import Recent, Schedule, TickCounts
+from teleop_core.nodes.rate import REPORT_PERIOD, Recent, Schedule, TickCounts, report_phase
 from teleop_core.nodes.streams import Input, message_type
 from teleop_core.nodes.tuned import TunedNode
-from teleop_core.session.runner import report_of
+from teleop_core.session.reports import report_of
 
 _GATE_PATIENCE = 1.0  # a tick of a whole session takes a hundredth of it on a busy machine
 _NEWS = {"active": "at work", "finalized": "ended"}  # others: the state itself
@@ -60,7 +61,9 @@ class CoreNode(TunedNode):
         self._fresh_counts()
         self._word = "unconfigured"
         self._reporter, self._commanders = Reporter(self), Commanders(self, self.description)
-        self._report_timer = self.ros.create_timer(1.0, self._report_in_time)
+        phase = report_phase(stage.name, tuple(STAGES), self.arm)
+        wait = (phase - 1e-9 * self.world.monotonic_ns()) % REPORT_PERIOD
+        self._report_timer = self.ros.create_timer(wait, self._begin_reports)
         self.ending = self.world.lock()
         """Held while the end is told; shared by the nodes of a process, as ``ended`` is."""
 
@@ -69,7 +72,7 @@ class CoreNode(TunedNode):
     def setup(self, parameters: Any) -> None:
         """Make the stage and open its topics."""
         self.stage = self.runner = self.description.run(parameters, TICK_NS / 1e9)
-        self.runner.load()
+        warm_up(self.runner)
         self.ports = Ports(
             self, self.arm, self.description, self.stage.signals, joints_of(parameters),
             self.options.feeds, self.open_publisher, self.options.joy_buttons,
@@ -342,6 +345,12 @@ class CoreNode(TunedNode):
     def counts(self) -> TickCounts:
         """What became of the ticks since the node was configured."""
         return self.schedule.counts
+
+    def _begin_reports(self) -> None:
+        """Report, and from now on once a second."""
+        self.ros.destroy(self._report_timer)
+        self._report_timer = self.ros.create_timer(REPORT_PERIOD, self._report_in_time)
+        self._report_in_time()
 
     def _report_in_time(self) -> None:
         """Report, once a second; what a part of others raises must not end the node."""

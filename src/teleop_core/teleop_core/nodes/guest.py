@@ -3,7 +3,10 @@
 from typing import Any, Self
 
 from teleop_core.middleware.ros import ROS
+from teleop_core.middleware.ros_type_support import spare_generator
 from teleop_core.middleware.world import World
+
+spare_generator()  # before the first node
 
 
 class Guest:

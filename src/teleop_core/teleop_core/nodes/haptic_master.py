@@ -91,8 +91,6 @@ class HapticMasterNode(TickingNode):
     def setup(self, parameters: HapticMasterParameters) -> None:
         """Make the device and open its topics."""
         super().setup(parameters)
-        self.stage.step()  # loads the kernels, which takes longer than many ticks
-        self.stage.reset()
         self._stop, self._crtk = StopInput(self), CrtkMaster(self)
         self._force = self.stage.signals[MASTER_SERVO_CF.field]
         self._operation = self.stage.signals[SLAVE_OPERATION.field]

@@ -83,7 +83,7 @@ def live(
     # A file without a name: there is nothing to remove, however this ends.
     with (
         tempfile.TemporaryFile("w+") as parameters,
-        Starter("" if processes is Processes.ONE else configuration.text(), env) as starter,
+        Starter(configuration.text(), env) as starter,
         interrupt.caught(),
         announced(int(env["ROS_DOMAIN_ID"])),
         Observer(int(env["ROS_DOMAIN_ID"])) as observer,

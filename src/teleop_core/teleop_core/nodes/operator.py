@@ -94,8 +94,6 @@ class OperatorNode(TickingNode):
     def setup(self, parameters: OperatorParameters) -> None:
         """Make the operator and open its topics, and its device."""
         super().setup(parameters)
-        self.stage.step()  # loads the kernels, which takes longer than many ticks
-        self.stage.reset()
         self._force = self.stage.signals[MASTER_MEASURED_CF.field]
         self._hand, self._device = None, None
         self._sees = self.stage.ahead <= MOST

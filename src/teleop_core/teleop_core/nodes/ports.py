@@ -138,17 +138,20 @@ class Ports:
         for output, stamp_field in self._stamped:
             if output.name in silent:
                 continue
-            stamp_ns = row[stamp_field] if stamp_field else now_ns
-            if output in self._passed_on:
-                if self._passed_on[output] == stamp_ns:
-                    continue
-                self._passed_on[output] = stamp_ns
-            if output in self._seldom:
-                values, (before, last_ns) = output.bits(), self._seldom[output]
-                if values == before and stamp_ns - last_ns < SELDOM_NS:
-                    continue
-                self._seldom[output] = values, stamp_ns
-            output.send(stamp_ns)
+            self.send_one(output, row[stamp_field] if stamp_field else now_ns)
+
+    def send_one(self, output: Output, stamp_ns: int) -> None:
+        """Send the present values of one output under a stamp [ns], as :meth:`send` does."""
+        if output in self._passed_on:
+            if self._passed_on[output] == stamp_ns:
+                return
+            self._passed_on[output] = stamp_ns
+        if output in self._seldom:
+            values, (before, last_ns) = output.bits(), self._seldom[output]
+            if values == before and stamp_ns - last_ns < SELDOM_NS:
+                return
+            self._seldom[output] = values, stamp_ns
+        output.send(stamp_ns)
 
     def mute(self) -> None:
         """Send nothing: somebody else does."""

@@ -1,11 +1,30 @@
 """Rate: the schedule of a 1 kHz loop, with the clock and the sleep handed in."""
 
-from collections.abc import Callable
+import zlib
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from teleop_core.graph.signals import TICK_NS
+
+REPORT_PERIOD = 1.0
+"""From one report of a node to the next [s]."""
+
+
+def report_phase(stage: str, stages: Sequence[str], arm: str = "") -> float:
+    """Remainder of the times of a node's reports by their period [s].
+
+    A report takes milliseconds: no two of a session are due at once, in whatever processes.
+
+    Args:
+        stage: Name of the node's stage.
+        stages: Names of all stages.
+        arm: Name of the node's arm, which puts it between two others.
+    """
+    place = stages.index(stage) if stage in stages else len(stages)
+    between = zlib.crc32(arm.encode()) / 2**32 if arm else 0.0
+    return REPORT_PERIOD * (place + between) / (len(stages) + 1)
 
 
 @dataclass

@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable
 
 from teleop_core.bags.messages import Refusal
 from teleop_core.graph.signals import TICK_NS
-from teleop_core.graph.topics import SLAVE_MEASURED_JS, SLAVE_SERVO_JP
+from teleop_core.graph.topics import SLAVE_MEASURED_CP, SLAVE_MEASURED_JS, SLAVE_SERVO_JP, Topic
 from teleop_core.nodes.crtk_slave import CrtkSlave
 from teleop_core.nodes.operation import CommandServices, StopInput
 from teleop_core.nodes.sender import SECOND_NS
@@ -34,6 +34,7 @@ class SlaveNode(TickingNode):
         self._stop = StopInput(self)
         self._commands = CommandServices(self, self.stage, self._stop, self._holders)
         self._crtk = CrtkSlave(self, self.stage)
+        self._measured_cp = self.ports.output(SLAVE_MEASURED_CP)
         self._told_state = int(State.DISABLED)
 
     def teardown(self) -> None:
@@ -63,6 +64,28 @@ class SlaveNode(TickingNode):
         stamp_ns = self.row["slave_setpoint_js_ns"]
         if stamp_ns != before_ns:
             self.delay.put(self.world.time_ns() - stamp_ns)
+
+    def read_ports(self, trigger: Topic | None = None) -> None:
+        """Bring the signals up to date, and answer every sample of the arm.
+
+        The next step answers the newest one; of several that came meanwhile the others are
+        answered here.
+        """
+        measured, *others = self.ports.inputs[SLAVE_MEASURED_JS.name]
+        if others or not self._is_told:
+            super().read_ports(trigger)
+            return
+        super().read_ports(SLAVE_MEASURED_JS)
+        row, name, waiting = self.row, SLAVE_MEASURED_JS.field, []
+        while measured.take():
+            row[f"{name}_ns"] = measured.stamp_ns
+            waiting.append((row[name].copy(), row[f"{name}_ns"]))
+        for values, stamp_ns in waiting[:-1]:
+            row[name] = values
+            self.stage.answer_measured()
+            self.ports.send_one(self._measured_cp, stamp_ns)
+        if len(waiting) > 1:
+            row[name] = waiting[-1][0]
 
     def advance(self, now_ns: int) -> None:
         """Take the emergency stop, then make one step, also of many that are to be made up for."""

@@ -51,7 +51,7 @@ class Starter:
 
     Args:
         configuration: Text of the configuration whose stages and kernels are loaded; empty: of
-            none, for a single process, which loads its own as fast.
+            none.
         env: Environment in which it loads.
         patience: Time for which it may get no further before it is given up [s].
     """
@@ -315,6 +315,7 @@ def _load(configuration: str) -> None:
     from teleop_core.base.own_parts import load_own_parts
     from teleop_core.graph.layers import parse_text
     from teleop_core.graph.signals import DT
+    from teleop_core.middleware.ros_type_support import load_type_support
     from teleop_core.nodes import recorder, start, teleop_session  # noqa: F401
     from teleop_core.nodes.making import node_class
     from teleop_core.nodes.streams import message_type
@@ -329,8 +330,7 @@ def _load(configuration: str) -> None:
     loaded = Configuration.from_layers([parse_text(configuration, "the configuration")])
     for member in loaded.graph.members:
         node_class(member.stage)
-        for topic in member.stage.ports:
-            message_type(topic.ros_type)
+        load_type_support([message_type(topic.ros_type) for topic in member.stage.ports])
         try:
             member.stage.run(loaded.groups[member.name], DT).load()
         except Exception:  # of a part, ours or a user's: its node meets it again

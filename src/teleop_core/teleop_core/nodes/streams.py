@@ -35,7 +35,8 @@ from teleop_core.nodes.sender import Sender
 SILENCE_NS = 2_000_000_000
 """After this long without a sound message a sender may start anew with any stamp [ns]."""
 _WAITING = 20
-"""Messages that wait for a late reader: a stage that answers each of them loses none by 20 ms."""
+"""Messages that wait for a late reader at least; else what a late sender of its kind makes up for
+in one wake-up."""
 _PRESSES = 500
 """The same of buttons: who presses one while a reader stands still for half a second is heard."""
 
@@ -115,8 +116,9 @@ class Input:
         buttons: tuple[int, ...] = BUTTONS,
     ) -> None:
         self.topic, self._owner, self._name = topic, owner, name
-        self._world = owner.world
-        self._waiting = _PRESSES if topic.kind is Kind.BUTTONS else _WAITING
+        self._world, options = owner.world, getattr(owner, "options", None)
+        burst = options.max_catch_up if options is not None else 0
+        self._waiting = max(_PRESSES if topic.kind is Kind.BUTTONS else _WAITING, burst)
         self.subscription: Subscription | None = Subscription(owner, topic, name, self._waiting)
         self._is_new = False
         self._joint_names, self._target = topic.names(joint_names), target
@@ -128,7 +130,6 @@ class Input:
         self._delay_ns = round(delay * 1e9)
         self._held: deque[tuple[int, int, Values]] = deque()
         self.received, self.refused = 0, Counter[Refusal]()
-        options = getattr(owner, "options", None)
         self.sender = options.sender() if options is not None else Sender()
         self._is_fault = options is not None and options.second_publisher == "fault"
         self.stamp_ns: int | None = None

@@ -10,11 +10,13 @@ from teleop_core.base.parameters import Value, build, parameter, specs, values_o
 from teleop_core.graph.layers import RealTimeParameters
 from teleop_core.graph.stage import Runner, Stage
 from teleop_core.middleware.ros import ROS
+from teleop_core.middleware.ros_type_support import spare_generator
 from teleop_core.middleware.world import Hooks, LifecycleNode, World
 from teleop_core.nodes.quality import PREFIX, QualityOverrides
 from teleop_core.nodes.sender import Sender
 
 _LOCK_PATIENCE = 1.0
+spare_generator()  # before the first node
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,6 +1,6 @@
 """Runner: a session in virtual time, recorded block by block, and its replay."""
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -10,20 +10,19 @@ from numpy.typing import NDArray
 from teleop_core.bags import kept_files
 from teleop_core.bags.arms import ARMS_KEY, PLAYED_KEY
 from teleop_core.bags.reader import Bag, Series
-from teleop_core.bags.reports import report
 from teleop_core.bags.writer import BagWriter
 from teleop_core.base.errors import RecordingError
 from teleop_core.graph.graph import DEVICE, RECORDER_NAME, Member
 from teleop_core.graph.layers import SESSION, Layer, parse_text
-from teleop_core.graph.signals import STATE_FIELDS, TICK_NS
-from teleop_core.graph.topics import OPERATION, SELDOM_NS, TELEOP_STATE, Kind, Topic, limit_text
+from teleop_core.graph.signals import TICK_NS
+from teleop_core.graph.topics import SELDOM_NS, TELEOP_STATE, Kind, Topic
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot_set
 from teleop_core.session.configuration import Configuration
 from teleop_core.session.model import Model, ModelRecords
 from teleop_core.session.replayed_span import in_order, replayed_span, tick_times
+from teleop_core.session.reports import report_of
 from teleop_core.session.virtual import BLOCK, VirtualTime
-from teleop_core.slave.operation import operation_level, operation_text
 
 Progress = Callable[[int, int], None]
 
@@ -296,40 +295,6 @@ class NewSamples:
         self._periods[topic.name] = int(periods[-1])
         due: NDArray[np.bool_] = changes | (np.diff(periods, prepend=last) != 0)
         return due
-
-
-def report_of(
-    topic: Topic, stamp_ns: int, row: Array, described: Mapping[str, str] | None = None
-) -> bytes:
-    """Message of a report's topic, as CDR bytes.
-
-    Args:
-        topic: Such as :data:`~teleop_core.graph.topics.TELEOP_STATE`.
-        stamp_ns: Stamp [ns].
-        row: Its numbers (columns,).
-        described: Further names and texts, such as what the fixture is.
-    """
-    values = {name: repr(float(value)) for name, value in zip(topic.columns, row, strict=True)}
-    more, name, level, text = dict(described or {}), topic.name, 0, ""
-    if topic.columns == STATE_FIELDS:
-        name, text = "teleop", state_text(row, more.get("fixture", "box"))
-    elif topic.columns == OPERATION:
-        numbers = dict(zip(OPERATION, row.tolist(), strict=True))
-        names = tuple(more.pop("joints", "").split())
-        level, text = operation_level(numbers), operation_text(numbers, names)
-    return report(stamp_ns, name, level, text, values | more)
-
-
-def state_text(state: Array, fixture: str = "box") -> str:
-    """State in words: CLUTCHED or FOLLOWING or ALIGNING, mode, fixture, limit."""
-    named = dict(zip(STATE_FIELDS, state, strict=True))
-    doing = "CLUTCHED" if named["is_clutched"] else "FOLLOWING"
-    if not named["is_following"]:
-        doing = "ALIGNING"
-    mode = "fine" if named["is_fine"] else "coarse"
-    text = f"{doing} {mode}{f', {fixture} on' if named['is_fixture_on'] else ''}"
-    limit, joint = int(named["limit"]), int(named["limited_joint"])
-    return f"{text}, held back: {limit_text(limit, joint)}" if limit else text
 
 
 class ReportWriter(Protocol):

@@ -278,6 +278,13 @@ class Slave(RunningStage):
         """
         _fail(self.parameters, self.state, int(fault), value, bound)
 
+    def answer_measured(self) -> None:
+        """Write the measured pose of the joints in the signals, where no step takes them."""
+        row, transform = self.signals, np.empty((4, 4))
+        joints = row["slave_measured_js"][: self.robot.n].copy()
+        self.robot.kernels.fk(joints, self.arm.geometry, transform)
+        pose_from_transform(transform, row["slave_measured_cp"])
+
     @property
     def operation(self) -> dict[str, float]:
         """Numbers of ``slave/operation`` by name, of the last tick."""
