@@ -1,5 +1,6 @@
 """Robots from URDF: what pinocchio reads from the same file, and every mistake by its element."""
 
+import math
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -449,6 +450,27 @@ def test_soft_limits_of_a_controller_are_kept_and_told(tmp_path: Path) -> None:
 def test_limits_of_a_continuous_joint_are_told(tmp_path: Path) -> None:
     text = changed(ELBOW, '"elbow" type="continuous"')[0]
     assert told(text, tmp_path)[1] == "elbow: lower and upper left out: it is continuous"
+
+
+def test_limits_that_mean_none_are_told_and_assumed_as_of_continuous_joints(
+    tmp_path: Path,
+) -> None:
+    ends = f'<limit {LOW} upper="2.6"'
+    text = changed(ends, f'<limit {LOW} upper="999999"')[0]
+    robot, notes = told(text, tmp_path)
+    elbow = robot.joint_names.index("elbow")
+    assert robot.upper[elbow] == 2.0 * math.pi > -robot.lower[elbow] == 2.6
+    assert notes == "elbow: limits beyond 1000 rad mean none; 6.28 are assumed"
+    robot, _ = told(changed(ends, '<limit lower="-999999" upper="999999"')[0], tmp_path)
+    assert -robot.lower[elbow] == 2.0 * math.pi
+
+
+@pytest.mark.parametrize("place", ["0 0 1e6", "-1001 0 0"])
+def test_an_origin_farther_than_an_arm_reaches_is_refused(place: str, tmp_path: Path) -> None:
+    path = tmp_path / "arm.urdf"
+    path.write_text(changed('xyz="0 0 0.42"', f'xyz="{place}"')[0])
+    with pytest.raises(ParameterError, match=r"^origin of .*within 1000 m"):
+        load_robot(str(path), **TOOL)
 
 
 @pytest.mark.parametrize(

@@ -50,6 +50,7 @@ from teleop_core.robots.urdf_tree import (
     UrdfJoint,
     chain_to,
     elements_of,
+    is_endless,
     joint_of,
     joints_by_child,
     limits_of,
@@ -247,7 +248,7 @@ def _narrowed(train: list[_Geared]) -> DhJoint:
     leader = train[0].joint
     lower, upper = limits_of(leader)
     for geared in train[1:]:
-        if geared.joint.kind != "continuous":
+        if not is_endless(geared.joint):
             ends = sorted((x - geared.offset) / geared.factor for x in limits_of(geared.joint))
             lower, upper = max(lower, ends[0]), min(upper, ends[1])
     if not lower < upper:

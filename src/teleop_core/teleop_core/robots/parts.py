@@ -9,7 +9,7 @@ from typing import Protocol, TypeAlias, TypeVar, runtime_checkable
 import numpy as np
 
 from teleop_core.base.errors import ParameterError, PartError, TeleopError, UnknownNameError
-from teleop_core.base.ranges import check
+from teleop_core.base.ranges import MOST_OF_ARM, check
 from teleop_core.base.registry import Registry
 from teleop_core.robots.robot import Robot
 
@@ -51,7 +51,7 @@ def built(name: str, part: RobotPart, geometry: Mapping[str, float | str]) -> Ro
     """
     for symbol, value in geometry.items():
         if isinstance(value, float):
-            check(symbol, value, "rad or m")
+            check(symbol, value, "rad or m", MOST_OF_ARM)
     if isinstance(part, Robot | RobotSource):
         if geometry:
             raise ParameterError("geometry", dict(geometry), f"empty: {name!r} has no symbols")
