@@ -21,10 +21,12 @@ from .evaluation import (
     register_metric as register_metric,
 )
 from .session.exchange import (
+    EpisodesReport as EpisodesReport,
     ExportReport as ExportReport,
     ImportOptions as ImportOptions,
     ImportReport as ImportReport,
     export_recording as export_recording,
+    import_episodes as import_episodes,
     import_recording as import_recording,
 )
 from .chain.passivity import (
