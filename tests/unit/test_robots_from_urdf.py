@@ -13,9 +13,15 @@ from pinocchio import Data, Model
 
 from present import present
 from random_arms import random_urdf
-from teleop_core.base.errors import ParameterError, RecordingError, ShapeError, UnknownNameError
+from teleop_core.base.errors import (
+    ParameterError,
+    RecordingError,
+    ShapeError,
+    TeleopWarning,
+    UnknownNameError,
+)
 from teleop_core.kernels.geometry import Array
-from teleop_core.robots import load_robot
+from teleop_core.robots import load_robot, load_robot_set
 from teleop_core.robots.chain_dynamics import inertia_matrix, inverse_dynamics, tip_efforts
 from teleop_core.robots.kinematics import DIRECTIONS, IkStatus
 from teleop_core.robots.rank import directions_of
@@ -24,6 +30,7 @@ from teleop_core.robots.room import lever
 from teleop_core.session.api import configuration, run
 from teleop_core.session.notes import notes_of
 
+pytestmark = pytest.mark.filterwarnings("ignore::teleop_core.TeleopWarning")
 EXAMPLE = Path(__file__).parents[2] / "examples" / "any_arm.urdf"
 TEXT = EXAMPLE.read_text()
 REACHED = (IkStatus.FOLLOWED, IkStatus.NEAR_SINGULAR)
@@ -486,6 +493,20 @@ def test_numbers_that_look_like_another_unit_are_told(
     old: str, new: str, said: str, tmp_path: Path
 ) -> None:
     assert told(changed(old, new)[0], tmp_path)[1] == said
+
+
+@pytest.mark.filterwarnings("error")
+def test_an_arm_that_may_not_be_meant_so_is_loaded_with_a_warning(tmp_path: Path) -> None:
+    """As a session tells it; the silent way is for those who tell it themselves."""
+    path = tmp_path / "arm.urdf"
+    path.write_text(changed(LOW, 'lower="-170"')[0])
+    with pytest.warns(TeleopWarning, match=r"arm.urdf: limits of elbow 170 rad: .*degrees") as of:
+        load_robot(str(path), **TOOL)
+    assert [one.filename for one in of] == [__file__]
+    load_robot_set(str(path), ["tip=tool0"])
+    load_robot(str(EXAMPLE), **TOOL)
+    with pytest.warns(TeleopWarning, match="its tip moves in 5 of 6 directions at once"):
+        load_robot(str(EXAMPLE), tip="wrist_2")
 
 
 def test_a_session_tells_the_notes_of_its_arm(tmp_path: Path) -> None:

@@ -11,6 +11,7 @@ from .base.errors import (
     SessionError as SessionError,
     ShapeError as ShapeError,
     TeleopError as TeleopError,
+    TeleopWarning as TeleopWarning,
     UnknownNameError as UnknownNameError,
 )
 from .evaluation import (

@@ -147,7 +147,7 @@ def load_urdf(
         drives=table,
         followers=None if followers.is_plain else followers,
     )
-    controlled = _task(task) or directions_of(make(task=DIRECTIONS), reach / math.pi or 1.0).best
+    controlled = _task(task) or directions_of(make(task=DIRECTIONS), reach / math.pi).best
     solution = solution_of(kinds, fixed, reach, controlled) if followers.is_plain else SEARCH
     robot = make(task=controlled, solution=solution)
     coordinates = dict(zip((j.name for j in moving), followers.of(home).tolist(), strict=True))

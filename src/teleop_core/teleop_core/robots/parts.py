@@ -96,7 +96,8 @@ def file_of(name: str) -> tuple[Path, dict[str, str]] | None:
 
 def is_urdf(name: str) -> bool:
     """Whether a robot's name is a URDF, a xacro or a description."""
-    return name.lower().endswith(_URDF_ENDINGS) or name.endswith(DESCRIPTION)
+    is_description = name.endswith(DESCRIPTION) and name not in ROBOTS.names()
+    return name.lower().endswith(_URDF_ENDINGS) or is_description
 
 
 def arguments_of(geometry: Mapping[str, float | str]) -> dict[str, str]:
