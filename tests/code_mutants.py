@@ -46,6 +46,8 @@ CODE_MUTANTS = (
     # kernels and robots
     _mutant("margin_first", "a margin from a limit is worth any way", "robots/swivel.py",
             "> most + BESIDE_SEED:", "> most + 10.0:", "closed_forms"),
+    _mutant("search_short", "a search for the least move that a limit slows is given up",
+            "robots/swivel.py", "ZERO < square < _CLOSE and", "False and", "closed_forms"),
     _mutant("far_turn", "a turn beyond half a turn goes the long way", "kernels/geometry.py",
             "sign = -1.0 if turn[0] < 0.0 else 1.0", "sign = 1.0", "geometry"),
     _mutant("force_here", "a force's torque about the base is that about the tip",

@@ -52,7 +52,8 @@ from teleop_core.robots.swivel_families import (
 )
 
 _SPEED = 0.3  # share of a joint's largest step by which psi goes back to its margin in a path
-_ROUNDS = 8  # of the search for the least move
+_ROUNDS, _MORE_ROUNDS = 8, 40  # of the search for the least move, and if it comes close
+_CLOSE = 1e-4  # squared weighted error: a limit in the way slows a search that would get there
 _FLAT = 0.3  # volume of three unit axes under which manipulability counts
 _ASIDE = 1e-3  # psi [rad] to either side where it is compared
 _GAIN = 200.0  # of the relative difference, up to full speed
@@ -165,7 +166,10 @@ def _least_move(T: Array, seed: Array, limits: Array, geometry: Array, q: Array)
     box_around(seed, limits, box)
     for i in range(7):
         q[i] = min(max(seed[i], box[0, i]), box[1, i])
-    return descend(T, box, geometry, _ROUNDS, q) <= ZERO
+    square = descend(T, box, geometry, _ROUNDS, q)
+    if ZERO < square < _CLOSE and not math.isfinite(limits[2, 0]):
+        square = descend(T, box, geometry, _MORE_ROUNDS, q)
+    return square <= ZERO
 
 
 @inner
