@@ -95,7 +95,7 @@ def test_the_class_is_that_of_ssik_wherever_we_have_a_closed_form(
     assert load(name, tmp_path).solution.startswith(ours)
 
 
-def test_there_are_72_arms_of_ssik_and_twelve_that_the_issue_names() -> None:
+def test_there_are_72_arms_of_ssik_and_twelve_others() -> None:
     assert sum("class" in arm for arm in ARMS.values()) == 72
     assert set(TWELVE) <= set(ARMS)
     assert all(arm["source"] for arm in ARMS.values())
