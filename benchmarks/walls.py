@@ -1,9 +1,9 @@
 """Slow contacts with a damped wall: the most that they give back of what they took.
 
-Run with ``python benchmarks/walls.py``, which prints the table of docs/device_and_walls.md. The hand
-is that of ``tests/property/test_contact_laws.py``, with the tremor of the person simulated. *Press*:
-it goes 4 mm into one wall and out again at 0.13 Hz. *Slide*: along and into the walls of a box, on
-all axes. Contacts of less than a touch do not count.
+``python benchmarks/walls.py`` prints the table of docs/device_and_walls.md. The hand is that of
+``tests/property/test_contact_laws.py``, with the tremor of the person simulated. *Press*: it goes
+4 mm into one wall and out again at 0.13 Hz. *Slide*: along and into the walls of a box. Contacts
+of less than a touch do not count.
 """
 
 import sys
@@ -13,9 +13,8 @@ from pathlib import Path
 import numpy as np
 
 ROOT = Path(__file__).parents[1]
-sys.path[:0] = [str(ROOT / "tests"), str(ROOT / "tests" / "property")]
-from test_contact_laws import HALF, energies, session, slow  # noqa: E402
-
+sys.path.insert(0, str(ROOT / "tests"))
+from property.test_contact_laws import HALF, energies, session, slow  # noqa: E402
 from teleop_core.evaluation.metrics.contact import TOUCH_J  # noqa: E402
 from teleop_core.kernels.geometry import Array  # noqa: E402
 
