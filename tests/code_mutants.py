@@ -46,6 +46,8 @@ CODE_MUTANTS = (
     # kernels and robots
     _mutant("margin_first", "a margin from a limit is worth any way", "robots/swivel.py",
             "> most + BESIDE_SEED:", "> most + 10.0:", "closed_forms"),
+    _mutant("noise_stops", "noise of the hand keeps seven axes from leaving a singular posture",
+            "robots/swivel.py", "* left * left", "* max(4.0 * left - 3.0, 0.0)", "real_arms"),
     _mutant("search_short", "a search for the least move that a limit slows is given up",
             "robots/swivel.py", "ZERO < square < _CLOSE and", "False and", "closed_forms"),
     _mutant("far_turn", "a turn beyond half a turn goes the long way", "kernels/geometry.py",

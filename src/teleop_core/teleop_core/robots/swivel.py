@@ -192,13 +192,14 @@ def _urge(q: Array, seed: Array, limits: Array, K: Array) -> float:
     """How much manipulability counts, from 0 to 1, without a jump at either end.
 
     Nothing where axes are far from a plane or pass through it, within the margin of a limit, or
-    where a joint needs a quarter of its speed.
+    where a joint needs all of its speed. Of a part of it a hand whose readings are noisy asks
+    all the time.
     """
-    most, room = 0.0, _room(q, limits) / MARGIN - 1.0
+    left, room = 1.0, _room(q, limits) / MARGIN - 1.0
     for i in range(7):
-        most = max(most, abs(q[i] - seed[i]) / max(limits[2, i], 1e-300))
+        left = min(left, max(1.0 - abs(q[i] - seed[i]) / max(limits[2, i], 1e-300), 0.0))
     share = min(_width(q, K, 1), _width(q, K, 5)) / _FLAT
-    urge = 6.75 * share * share * max(1.0 - share, 0.0) * max(1.0 - 4.0 * most, 0.0)
+    urge = 6.75 * share * share * max(1.0 - share, 0.0) * left * left
     return urge * min(max(room, 0.0), 1.0)
 
 
