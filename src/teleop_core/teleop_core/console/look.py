@@ -1,9 +1,9 @@
 """Look: the colours and the type of the page, each colour named once by the one thing it means.
 
 Colour is for meaning, grey for what is there. Red is what is wrong and the stop, and nothing else;
-what is measured is orange, what is wanted or to be pressed next blue, what the person does and
-feels violet: everywhere, in the scene and in texts. Curves of a plot are told apart by colours that
-mean nothing but their number.
+what is measured is orange, what is wanted or to be pressed next blue, what the person does violet,
+forces are magenta: everywhere, in the scene and in texts. Curves of a plot are told apart by
+colours that mean nothing but their number.
 """
 
 from collections.abc import Mapping
@@ -30,12 +30,14 @@ MEANINGS: Mapping[str, Meaning] = MappingProxyType({
     "idle": Meaning((92, 102, 112), "#5c6670", "#9aa5b1"),  # there, and no more
     "measured": Meaning((217, 95, 2), "#b34d00", "#ff9f4d"),  # paths that were measured
     "wanted": Meaning((28, 109, 208), "#1c6dd0", "#74a9f2"),  # what shall be; what to press next
-    "hand": Meaning((112, 72, 190), "#7048be", "#b197fc"),  # path of the stylus, force on it
+    "hand": Meaning((112, 72, 190), "#7048be", "#b197fc"),  # path of the stylus
+    "force": Meaning((190, 24, 132), "#a61e74", "#f06ec0"),  # on stylus and tip
     "target": Meaning((12, 133, 153), "#0b7285", "#3bc9db"),  # points and objects of a task
 })  # fmt: skip
 """All colours that mean something, texts with at least 4.5 to 1 on their ground."""
-GOOD, WRONG, MEASURED, WANTED, HAND, TARGET = (
-    MEANINGS[name].scene for name in ("good", "wrong", "measured", "wanted", "hand", "target")
+GOOD, WRONG, MEASURED, WANTED, HAND, FORCE, TARGET = (
+    MEANINGS[name].scene
+    for name in ("good", "wrong", "measured", "wanted", "hand", "force", "target")
 )
 
 ROLES: Mapping[Role, Color] = MappingProxyType({
