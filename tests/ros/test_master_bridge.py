@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 
 pytestmark = [pytest.mark.ros, pytest.mark.slow]
 
+MASTERS = Path(__file__).parents[2] / "config" / "masters"
 AXES = ["+y", "+z", "+x"]
 ROWS = np.array([[0, 1, 0], [0, 0, 1], [1, 0, 0]])
 TYPES = {"PoseStamped": PoseStamped, "TransformStamped": TransformStamped, "Pose": Pose}
@@ -215,3 +216,62 @@ def test_a_topic_that_is_not_there_is_told_with_those_that_are(peer: "Peer") -> 
     assert asking.returncode == 2
     assert "/nowhere/pose is not there" in told
     assert "/touch/pose" in told
+
+
+# -- files of devices whose axes are speeds --------------------------------------------------------
+
+
+class Sticks:
+    """What ``joy_node`` or ``spacenav`` says of a device, 50 times a second."""
+
+    def __init__(self, peer: "Peer", topic: str) -> None:
+        self.axes, self.buttons, self._node = [0.0] * 6, [0] * 11, peer.node
+        self._joy = self._node.create_publisher(Joy, topic, 10)
+        self._node.create_timer(0.02, self._tick)
+
+    def _tick(self) -> None:
+        message = Joy(axes=self.axes, buttons=self.buttons)
+        message.header.stamp = self._node.get_clock().now().to_msg()
+        self._joy.publish(message)
+
+
+@pytest.mark.parametrize(
+    ("name", "axis", "held", "way"), [("joy", 1, 4, (0, 0, -1)), ("spacenav", 0, None, (0, 0, -1))]
+)
+def test_the_file_of_a_device_with_sticks_moves_the_stylus_as_it_is_held(
+    peer: "Peer", name: str, axis: int, held: int | None, way: tuple[int, int, int]
+) -> None:
+    file = MASTERS / f"{name}.yaml"
+    topic = yaml.safe_load(file.read_text())["master_bridge"]["ros__parameters"]["pose_topic"]
+    sticks, measured = Sticks(peer, topic), peer.listen(MASTER_MEASURED_CP)
+    words = ["master_bridge", "--ros-args", "--params-file", str(file)]
+    env = environment() | {"ROS_DOMAIN_ID": peer.domain}
+    with subprocess.Popen([sys.executable, "-m", "teleop_core.nodes", *words], env=env) as bridge:
+        try:
+
+            def newest() -> Any:
+                """The newest twenty places (20, 3)."""
+                measured.take()
+                return np.array(measured.values)[-20:, :3] if len(measured.values) > 20 else None
+
+            def rests() -> bool:
+                return (p := newest()) is not None and not np.ptp(p, axis=0).any()
+
+            sticks.axes[axis] = 1.0
+            if held is not None:  # the stick alone moves nothing
+                peer.wait(turning(peer, rests), "poses at rest")
+                assert not newest().any()
+                sticks.buttons[held] = 1
+
+            def is_far() -> bool:
+                return (p := newest()) is not None and p[-1] @ np.array(way) > 0.01
+
+            peer.wait(turning(peer, is_far), "a centimetre")
+            assert np.allclose(np.cross(newest()[-1], way), 0.0, atol=1e-9)
+            if held is None:
+                sticks.axes[axis] = 0.0
+            else:
+                sticks.buttons[held] = 0
+            peer.wait(turning(peer, rests), "rest")
+        finally:
+            bridge.terminate()

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 
 import teleop_core as tc
 from teleop_core.chain.operators.rest import rest_pose
+from teleop_core.console.status import RESTS
 from teleop_core.graph.topics import (
     HAND_BUTTONS,
     HAND_SERVO_CP,
@@ -98,7 +99,7 @@ def at_rest(listener: "Listener", count: int = 1000) -> Callable[[], object]:
 def test_the_slave_goes_with_a_person_holds_without_and_no_grip_makes_it_jump(
     peer: "Peer", session: object
 ) -> None:
-    peer.wait(lambda: "nobody holds" in peer.status("operator").message, "a hand that waits")
+    peer.wait(lambda: peer.status("operator").message.endswith(RESTS), "a hand that waits")
     peer.wait_value("operator", "has_begun", lambda n: n == 1)
     tips, person = peer.listen(SLAVE_MEASURED_CP), Person(peer)
     person.hold([0.0, 0.0, 0.0], is_held(peer), "a grip")
@@ -173,7 +174,7 @@ def test_a_recorded_hand_that_is_played_is_the_operator(
     slave = {"starts_at_home": True, "operation": {"longest_outage": 0.0}}
     compose(operator={"kind": "elsewhere"}, slave=slave)
     tips = peer.listen(SLAVE_MEASURED_CP)
-    peer.wait(lambda: "nobody holds" in peer.status("haptic_master").message, "a free stylus")
+    peer.wait(lambda: peer.status("haptic_master").message.endswith(RESTS), "a free stylus")
     peer.wait(at_rest(tips), "rest")
     tips.forget()
     command = [sys.executable, "-m", "teleop_core.cli", "play", str(bag), "--topics",

@@ -451,3 +451,12 @@ def test_seven_axes_stay_in_the_branch_of_the_seed_and_give_up_the_margin_first(
         # The least move is looked for in eight rounds, by its sum of squares.
         assert (longer > 0.3 + 1e-9).mean() <= (0.005 if beside else 0.0)
         assert longer.max() < 1.0
+
+
+def test_from_seeds_farther_beside_few_answers_leave_the_branch(load: Callable[..., Robot]) -> None:
+    """Where a limit is in the way the search for the least move goes on: 2 in 1000 left without."""
+    arm, rng = load(IIWA14, IIWA14_LIMITS), np.random.default_rng(8)
+    q = rng.uniform(arm.lower, arm.upper, (6000, 7))
+    seeds = np.clip(q + rng.uniform(-0.3, 0.3, q.shape), arm.lower, arm.upper)
+    moves = np.abs(arm.ik_batch(arm.fk(q), seeds).q - seeds).max(axis=1)
+    assert (moves > 1.0).sum() <= 6

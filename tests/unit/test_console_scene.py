@@ -13,12 +13,11 @@ from viser._scene_handles import BoxHandle, FrameHandle
 import teleop_core as tc
 from present import present
 from teleop_core.chain.fixtures import FIXTURES
-from teleop_core.console.body_nodes import ROLES
 from teleop_core.console.fixture_outlines import Look, scale_of, unit_outline
 from teleop_core.console.hooks import Server
 from teleop_core.console.jaw_nodes import finger_poses
 from teleop_core.console.link import Arm, ArmView, View
-from teleop_core.console.look import GOOD, WRONG
+from teleop_core.console.look import GOOD, ROLES, WRONG
 from teleop_core.console.recorded import RecordedLink
 from teleop_core.console.scene import Scene
 from teleop_core.console.server import ConsoleServer

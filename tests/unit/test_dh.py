@@ -232,6 +232,8 @@ def test_signs_offsets_limits_and_homes_are_read_in_the_table_unit() -> None:
         ([{"alpha": "q"}], "row 1 alpha"),
         ([{"theta": "q", "d": "q"}], "row 1 d"),
         ([{"d": "q"}], "row 1 lower"),
+        ([{"theta": "q", "a": 1e6}], "row 1 a"),
+        ([{"theta": "q", "upper": 999999}], "row 1 upper"),
         ([{"theta": "q", "lower": 10, "upper": -10}], "row 1 lower"),
         ([{"theta": "q", "lower": -10, "upper": 10, "home": 20}], "row 1 home"),
         ([{"theta": "q"}, {"a": 1.0, "lower": 0.0}], "row 2"),

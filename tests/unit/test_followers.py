@@ -18,6 +18,7 @@ from teleop_core.robots.chains import chain_of
 from teleop_core.robots.followers import follower_inertia
 from teleop_core.robots.kinematics import IkStatus
 
+pytestmark = pytest.mark.filterwarnings("ignore::teleop_core.TeleopWarning")
 REACHED = (IkStatus.FOLLOWED, IkStatus.NEAR_SINGULAR)
 SEEDS = range(24)
 

@@ -370,14 +370,75 @@ def test_poses_of_two_frames_on_one_topic_are_never_mixed(tmp_path: Path) -> Non
     assert_same(imported(path, tmp_path, frame="probe")[1], STAMPS[200:], POSES[200:])
 
 
-def test_a_frame_that_is_carried_by_another_is_told(tmp_path: Path) -> None:
-    carried = poses("TFMessage", "/tf", child="base")
-    for _, _, message in carried:
-        message.transforms[0].header.frame_id = "room"
-    path = write2(tmp_path / "bag", in_order(poses("TFMessage", "/tf"), carried))
-    report, _ = imported(path, tmp_path, frame="tool")
-    assert "poses of tool in base" in report.told
-    assert any("base is in room itself" in text for text in report.told)
+def carried(parent: str, child: str, rows: range | None = None) -> list[tuple[str, int, Any]]:
+    """Messages of ``/tf`` of a child in a parent, of some of the stamps."""
+    messages = poses("TFMessage", "/tf", child=child)
+    for _, _, message in messages:
+        message.transforms[0].header.frame_id = parent
+    return [messages[i] for i in rows or range(COUNT)]
+
+
+def matrices(rows: Array) -> Array:
+    T = np.tile(np.eye(4), (len(rows), 1, 1))
+    T[:, :3, :3] = Rotation.from_quat(rows[:, [4, 5, 6, 3]]).as_matrix()
+    T[:, :3, 3] = rows[:, :3]
+    return T
+
+
+def assert_composed(stream: tc.Stream, stamps: NDArray[np.int64], expected: Array) -> None:
+    np.testing.assert_array_equal(stream.stamp_ns, stamps)
+    np.testing.assert_allclose(matrices(stream.values), expected, atol=1e-12)
+
+
+@pytest.mark.parametrize("place", [0, 1, 2])
+def test_transforms_on_the_way_to_the_root_are_composed(place: int, tmp_path: Path) -> None:
+    """Times are those of the one with most poses; of the others the newest that is not later."""
+    names, steps = ("room", "base", "arm", "tool"), [7, 5, 3]
+    steps[place] = 1
+    edges = [carried(names[i], names[i + 1], range(4, COUNT, steps[i])) for i in range(3)]
+    still = carried("tool", "tip", range(50, 51))
+    static = [("/tf_static", LOGS[50], still[0][2])]
+    path = write2(tmp_path / "bag", in_order(*edges, static))
+    report, stream = imported(path, tmp_path, frame="tip")
+    expected = matrices(POSES[[50]])
+    for step in steps[::-1]:
+        newest = np.arange(COUNT - 4) // step * step + 4
+        expected = matrices(POSES[newest]) @ expected
+    assert_composed(stream, STAMPS[4:], expected)
+    assert any(
+        text.startswith("poses of tip in room, composed of tip in tool (constant), tool in arm (")
+        for text in report.told
+    )
+
+
+def test_a_parent_on_the_way_ends_the_chain(tmp_path: Path) -> None:
+    edges = [carried("room", "base"), carried("base", "arm"), carried("arm", "tool")]
+    path = write2(tmp_path / "bag", in_order(*edges))
+    _, stream = imported(path, tmp_path, frame="tool", parent="base")
+    assert_composed(stream, STAMPS, matrices(POSES) @ matrices(POSES))
+    report, stream = imported(path, tmp_path / "direct", frame="tool", parent="arm")
+    assert_same(stream)
+    assert "poses of tool in arm" in report.told
+
+
+def test_poses_before_the_first_of_a_carrier_are_left_out_and_told(tmp_path: Path) -> None:
+    edges = [carried("base", "arm", range(30, COUNT, 2)), carried("arm", "tool")]
+    path = write2(tmp_path / "bag", in_order(*edges))
+    report, stream = imported(path, tmp_path, frame="tool")
+    np.testing.assert_array_equal(stream.stamp_ns, STAMPS[30:])
+    assert "30 poses before the first of all of these are left out" in report.told
+
+
+def test_frames_with_two_parents_or_in_a_circle_are_not_composed(tmp_path: Path) -> None:
+    two = [carried("arm", "tool"), carried("base", "arm"), carried("room", "arm")]
+    path = write2(tmp_path / "two", in_order(*two))
+    with pytest.raises(tc.UnknownNameError, match=r"--parent.*poses of arm.*base, room"):
+        tc.import_recording(path, tmp_path / "out", frame="tool")
+    _, stream = imported(path, tmp_path, frame="tool", parent="room")
+    assert_composed(stream, STAMPS, matrices(POSES) @ matrices(POSES))
+    path = write2(tmp_path / "circle", in_order(carried("arm", "tool"), carried("tool", "arm")))
+    with pytest.raises(tc.ParameterError, match="carries itself"):
+        tc.import_recording(path, tmp_path / "other", frame="tool")
 
 
 def test_options_of_columns_do_not_fit_a_bag(tmp_path: Path) -> None:

@@ -33,6 +33,7 @@ from teleop_core.graph.topics import ENERGY, MASTER_CONTACT, OPERATION
 from teleop_core.kernels.geometry import Array
 from teleop_core.session.configuration import configure
 from teleop_core.session.virtual import VirtualTime
+from teleop_core.slave.operation import Fault
 from teleop_core.slave.world.parameters import MATERIALS
 
 pytestmark = pytest.mark.usefixtures("own_parts")
@@ -546,6 +547,31 @@ def test_many_more_sessions_take_no_more_out_than_that(kind: str, seed: int) -> 
         texts = worked(rng, kind, ("position_force", "three_channel", "four_channel")[number % 3])
         scale = float(next(t for t in texts if "force_gain" in t).partition("=")[2])
         assert created(pressing(*texts), scale) < LENT, texts
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [1003, 1078, 1118])
+def test_an_arm_whose_tip_is_not_where_its_encoders_say_lends_little_more(seed: int) -> None:
+    """The worst of 120 sessions: commands 120 ms apart, ahead of the tip before a hard object."""
+    architecture = ("position_force", "three_channel", "four_channel")[seed % 3]
+    texts = worked(np.random.default_rng(seed), "tdpa", architecture)
+    scale = float(next(t for t in texts if "force_gain" in t).partition("=")[2])
+    rows = pressing(*texts, "plant.kind=hardware")
+    assert presses(rows) >= 2
+    assert created(rows, scale) < 1.2 * LENT
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("kind", "is_stopped"), [("tdpa", True), ("tank", False)])
+def test_a_hand_that_hears_nothing_leads_the_drives_to_their_limit_on_steel_but_with_a_tank(
+    kind: str, is_stopped: bool
+) -> None:
+    """Energy is bounded by both, force by the tank alone."""
+    texts = worked(np.random.default_rng(32), kind, "four_channel")
+    rows = pressing(*texts)
+    fault = rows["slave_operation"][:, OPERATION.index("fault")].max()
+    assert fault == (Fault.EFFORT if is_stopped else Fault.NONE)
+    assert (np.linalg.norm(rows["slave_true_cf"][:, :3], axis=1).max() > 10.0) == is_stopped
 
 
 @pytest.mark.parametrize("kind", ["tank", "tdpa"])

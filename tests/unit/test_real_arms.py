@@ -14,6 +14,7 @@ from real_arms import ARMS, urdf_of
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot
 from teleop_core.robots.chain_dynamics import inertia_matrix, inverse_dynamics
+from teleop_core.session.api import run
 
 sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))
 from sold_arms import lines, load, solved, wrists
@@ -95,7 +96,7 @@ def test_the_class_is_that_of_ssik_wherever_we_have_a_closed_form(
     assert load(name, tmp_path).solution.startswith(ours)
 
 
-def test_there_are_72_arms_of_ssik_and_twelve_that_the_issue_names() -> None:
+def test_there_are_72_arms_of_ssik_and_twelve_others() -> None:
     assert sum("class" in arm for arm in ARMS.values()) == 72
     assert set(TWELVE) <= set(ARMS)
     assert all(arm["source"] for arm in ARMS.values())
@@ -136,3 +137,17 @@ def test_poses_beside_singular_postures_and_limits_are_reached_by_longer_searche
     robot, rng = load(name, tmp_path), np.random.default_rng(1)
     q = rng.uniform(robot.lower, robot.upper, (5000, robot.n))[place]
     assert robot.ik(robot.fk(q)).residual.max() < 1e-9
+
+
+def test_a_hand_of_noisy_readings_leads_seven_axes_past_a_shoulder_in_line(tmp_path: Path) -> None:
+    """The arm keeps away from that posture, in which it fell 60 mm behind."""
+    path = tmp_path / "iiwa14.urdf"
+    path.write_text(urdf_of("iiwa14"))
+    session = run("coarse_box", duration=10.0, seed=2, robot=str(path), geometry=["tip=tip"])
+    told, asked = session["slave/servo_jp"], session["slave/servo_cp"]
+    stamps, joints, poses = np.intersect1d(told.stamp_ns, asked.stamp_ns, return_indices=True)
+    late = stamps > stamps[0] + 4_000_000_000  # it follows from there on
+    tips = load_robot(str(path), tip="tip").fk(told.values[joints[late], :7])[:, :3, 3]
+    lag = np.linalg.norm(tips - asked.values[poses[late], :3], axis=1)
+    assert len(lag) > 5000
+    assert lag.max() < 3e-3

@@ -1,5 +1,6 @@
 """Robots from URDF: what pinocchio reads from the same file, and every mistake by its element."""
 
+import math
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -12,9 +13,15 @@ from pinocchio import Data, Model
 
 from present import present
 from random_arms import random_urdf
-from teleop_core.base.errors import ParameterError, RecordingError, ShapeError, UnknownNameError
+from teleop_core.base.errors import (
+    ParameterError,
+    RecordingError,
+    ShapeError,
+    TeleopWarning,
+    UnknownNameError,
+)
 from teleop_core.kernels.geometry import Array
-from teleop_core.robots import load_robot
+from teleop_core.robots import load_robot, load_robot_set
 from teleop_core.robots.chain_dynamics import inertia_matrix, inverse_dynamics, tip_efforts
 from teleop_core.robots.kinematics import DIRECTIONS, IkStatus
 from teleop_core.robots.rank import directions_of
@@ -23,6 +30,7 @@ from teleop_core.robots.room import lever
 from teleop_core.session.api import configuration, run
 from teleop_core.session.notes import notes_of
 
+pytestmark = pytest.mark.filterwarnings("ignore::teleop_core.TeleopWarning")
 EXAMPLE = Path(__file__).parents[2] / "examples" / "any_arm.urdf"
 TEXT = EXAMPLE.read_text()
 REACHED = (IkStatus.FOLLOWED, IkStatus.NEAR_SINGULAR)
@@ -451,6 +459,25 @@ def test_limits_of_a_continuous_joint_are_told(tmp_path: Path) -> None:
     assert told(text, tmp_path)[1] == "elbow: lower and upper left out: it is continuous"
 
 
+def test_limits_that_mean_none_are_told_and_assumed_as_of_continuous_joints(tmp_path: Path) -> None:
+    ends = f'<limit {LOW} upper="2.6"'
+    text = changed(ends, f'<limit {LOW} upper="999999"')[0]
+    robot, notes = told(text, tmp_path)
+    elbow = robot.joint_names.index("elbow")
+    assert robot.upper[elbow] == 2.0 * math.pi > -robot.lower[elbow] == 2.6
+    assert notes == "elbow: limits beyond 1000 rad mean none; 6.28 are assumed"
+    robot, _ = told(changed(ends, '<limit lower="-999999" upper="999999"')[0], tmp_path)
+    assert -robot.lower[elbow] == 2.0 * math.pi
+
+
+@pytest.mark.parametrize("place", ["0 0 1e6", "-1001 0 0"])
+def test_an_origin_farther_than_an_arm_reaches_is_refused(place: str, tmp_path: Path) -> None:
+    path = tmp_path / "arm.urdf"
+    path.write_text(changed('xyz="0 0 0.42"', f'xyz="{place}"')[0])
+    with pytest.raises(ParameterError, match=r"^origin of .*within 1000 m"):
+        load_robot(str(path), **TOOL)
+
+
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
@@ -464,6 +491,20 @@ def test_numbers_that_look_like_another_unit_are_told(
     old: str, new: str, said: str, tmp_path: Path
 ) -> None:
     assert told(changed(old, new)[0], tmp_path)[1] == said
+
+
+@pytest.mark.filterwarnings("error")
+def test_an_arm_that_may_not_be_meant_so_is_loaded_with_a_warning(tmp_path: Path) -> None:
+    """As a session tells it; the silent way is for those who tell it themselves."""
+    path = tmp_path / "arm.urdf"
+    path.write_text(changed(LOW, 'lower="-170"')[0])
+    with pytest.warns(TeleopWarning, match=r"arm.urdf: limits of elbow 170 rad: .*degrees") as of:
+        load_robot(str(path), **TOOL)
+    assert [one.filename for one in of] == [__file__]
+    load_robot_set(str(path), ["tip=tool0"])
+    load_robot(str(EXAMPLE), **TOOL)
+    with pytest.warns(TeleopWarning, match="its tip moves in 5 of 6 directions at once"):
+        load_robot(str(EXAMPLE), tip="wrist_2")
 
 
 def test_a_session_tells_the_notes_of_its_arm(tmp_path: Path) -> None:

@@ -16,6 +16,7 @@ from teleop_core.robots import rcrt1_dynamics
 from teleop_core.robots.bodies import Solid, bodies_of, urdf_of
 from teleop_core.robots.chain_dynamics import inertia_matrix
 
+pytestmark = pytest.mark.filterwarnings("ignore::teleop_core.TeleopWarning")
 ROUNDING = 1e-9
 SERIAL = ("rcrt1", "puma560", "scara", "planar_3r", "five_axis", "parallelogram")
 EXAMPLE = str(Path(__file__).parents[2] / "examples" / "any_arm.urdf")

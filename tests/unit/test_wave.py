@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from teleop_core.base.errors import ParameterError
 from teleop_core.chain.passivity.port import (
     DRIFT,
+    IMPEDANCE,
     IN,
     LAW,
     MARGIN,
@@ -237,6 +238,27 @@ def pressing(*texts: str, ticks: int = 12_000, scenario: str = "palpation") -> N
     settings = (stages, "feedback_timeout=1.0", "reach_force.is_on=false", "gimbal_noise=0.0",
                 "reflection.passivity=wave")  # fmt: skip
     return VirtualTime(configure(scenario, settings=[*settings, *texts])).run(ticks)
+
+
+@pytest.mark.parametrize("direction", [(0.0, 0.0, 1.0), (0.6, 0.0, 0.8)])
+def test_an_arm_that_is_overdrawn_goes_back_before_force_whatever_wave_comes(
+    direction: tuple[float, float, float],
+) -> None:
+    """At the speed at which drift is made up for, with 5 N at the tip: nothing is lent then."""
+    away, force = np.array(direction), np.zeros(6)
+    force[:3] = 5.0 * away
+    port, heard, memory = np.zeros(len(ENERGY)), np.zeros(len(ENERGY)), np.zeros(12)
+    begin_round(port, 3.0, 1.0)
+    begin_round(heard, 3.0, 1.0)
+    tip = np.array([0.1, 0.2, 0.3, 1.0, 0.0, 0.0, 0.0])
+    last, speed = tip.copy(), SLAVE[1]
+    for tick in range(1, 20):
+        heard[IMPEDANCE], heard[TOLD] = B, 3e-3 * tick
+        heard[WAVE : WAVE + 3] = -2e-3 * tick * away  # into what is pressed
+        flow, command = np.array([hear_energy(port, heard), 0.0, 5e-3]), tip.copy()
+        wave_slave(SLAVE, memory, flow, force, tip, last, heard, port, command, DT)
+        np.testing.assert_allclose(command[:3] - last[:3], speed * DT * away, atol=1e-12)
+        last = command
 
 
 def late(delay: float) -> Any:

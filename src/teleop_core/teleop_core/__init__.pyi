@@ -11,6 +11,7 @@ from .base.errors import (
     SessionError as SessionError,
     ShapeError as ShapeError,
     TeleopError as TeleopError,
+    TeleopWarning as TeleopWarning,
     UnknownNameError as UnknownNameError,
 )
 from .evaluation import (
@@ -21,10 +22,12 @@ from .evaluation import (
     register_metric as register_metric,
 )
 from .session.exchange import (
+    EpisodesReport as EpisodesReport,
     ExportReport as ExportReport,
     ImportOptions as ImportOptions,
     ImportReport as ImportReport,
     export_recording as export_recording,
+    import_episodes as import_episodes,
     import_recording as import_recording,
 )
 from .chain.passivity import Passivity as Passivity, register_passivity as register_passivity

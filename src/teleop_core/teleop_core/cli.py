@@ -11,7 +11,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any, NoReturn
 
-from teleop_core.base.errors import SessionError, TeleopError
+from teleop_core.base.errors import SessionError, TeleopError, TeleopWarning
 from teleop_core.base.texts import one_line
 from teleop_core.commands import (
     compiling,
@@ -247,7 +247,7 @@ def _sim(arguments: argparse.Namespace) -> int:
 
     configuration = configured(arguments)
     for note in notes_of(configuration):
-        warnings.warn(note, stacklevel=2)
+        warnings.warn(note, TeleopWarning, stacklevel=2)
     with shown_progress("simulating") as progress:
         simulate(configuration, arguments.out, progress)
     print(done(arguments.out, f"{progress.seconds:g} s recorded"))

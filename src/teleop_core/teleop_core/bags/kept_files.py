@@ -18,6 +18,7 @@ from collections.abc import Iterable, Mapping
 from functools import cache
 from pathlib import Path
 
+from teleop_core.base.errors import TeleopWarning
 from teleop_core.base.texts import printable
 from teleop_core.robots import geometry_of
 from teleop_core.robots.parts import DESCRIPTION, arguments_of, file_of
@@ -81,7 +82,9 @@ class KeptFiles:
         if self._left_out:
             names = ", ".join(path.name for path in self._left_out.values())
             limit = f"keeps {_MOST / 2**20:g} MiB of files"
-            warnings.warn(f"the recording {limit}, and only digests of {names}", stacklevel=3)
+            warnings.warn(
+                f"the recording {limit}, and only digests of {names}", TeleopWarning, stacklevel=3
+            )
         return dict(self._texts)
 
     def _name(self, key: str, name: str) -> None:
@@ -181,7 +184,11 @@ def _robot_now(
 
 def _tell(name: str, path: Path | None) -> None:
     change = "another by now" if _digest_now(path) else "gone"
-    warnings.warn(f"{name}: this file is {change}; the recording has no copy of it", stacklevel=4)
+    warnings.warn(
+        f"{name}: this file is {change}; the recording has no copy of it",
+        TeleopWarning,
+        stacklevel=4,
+    )
 
 
 def _text(path: Path) -> str | None:

@@ -19,7 +19,7 @@ from teleop_core.bags.messages import Refusal, Report, read_reports
 from teleop_core.bags.recovery import recover
 from teleop_core.bags.series import Column, Series, join, kind_of
 from teleop_core.bags.writer import METADATA_NAME
-from teleop_core.base.errors import RecordingError
+from teleop_core.base.errors import RecordingError, TeleopWarning
 from teleop_core.base.texts import printable
 from teleop_core.graph.topics import Kind, Topic
 
@@ -232,7 +232,7 @@ class Bag:
             if column.total and column.left_out.total() == column.total:
                 raise RecordingError(self.path, f"has nothing to read: {column.notes()[0]}")
             for note in column.notes():
-                warnings.warn(f"{self.path.name}: {note}", stacklevel=4)
+                warnings.warn(f"{self.path.name}: {note}", TeleopWarning, stacklevel=4)
 
     def _records(self, names: Iterable[str]) -> Iterator[tuple[McapSource, Records]]:
         for source, channels in self._numbers.items():
@@ -265,7 +265,7 @@ class Bag:
             note = f"{_name(topic)}: {left_out} messages, each {Refusal.MALFORMED.value}"
             if not out:
                 raise RecordingError(self.path, f"has nothing to read: {note}")
-            warnings.warn(f"{self.path.name}: left out of {note}", stacklevel=2)
+            warnings.warn(f"{self.path.name}: left out of {note}", TeleopWarning, stacklevel=2)
         return out
 
     def stored(self, topic: str) -> Iterator[tuple[int, bytes]]:

@@ -30,6 +30,10 @@ class TeleopError(Exception):
         return _same, (type(self), str(self), self.__dict__)
 
 
+class TeleopWarning(UserWarning):
+    """What runs but may not be meant: the kind of all warnings of this package."""
+
+
 def _same(kind: type[TeleopError], text: str, attributes: dict[str, object]) -> TeleopError:
     error = kind.__new__(kind, text)
     error.__dict__.update(attributes)

@@ -35,8 +35,10 @@ RANGES = {
     "N·m·s/rad": Range(1e9),
     "s": Range(1e6),
 }
-"""By unit. Four rounds are more than arms turn to either side, 50 rad/s more than they do; files
-write limits of 999999 rad or m where they mean none."""
+"""By unit. Four rounds are more than arms turn to either side, 50 rad/s more than they do."""
+MOST_OF_ARM = 1e3
+"""Length in an arm [m] or limit of its joints [rad, m]; the longest arms span 500 m. Files write
+limits of 999999 where they mean none, and origins far away where they mean a place on a map."""
 LONGEST_DELAY = 10.0
 """Of a packet on its way [s]: to the Moon and back takes 2.6 s, ETS-VII took 7 s."""
 LATEST_S = 4e9
@@ -49,13 +51,13 @@ def range_of(unit: str) -> Range:
     return max(parts, key=lambda part: part.most)
 
 
-def check(name: str, value: float, unit: str) -> float:
-    """The number, if it is finite and within its range.
+def check(name: str, value: float, unit: str, most: float = math.inf) -> float:
+    """The number, if it is finite and within its range, and no larger than ``most``.
 
     Raises:
         ParameterError: It is not; says which numbers are.
     """
-    most = range_of(unit).most
+    most = min(most, range_of(unit).most)
     if not (math.isfinite(value) and abs(value) <= most):
         end = f" {unit}" if unit else ""
         needed = f"between {-most:g} and {most:g}{end}" if math.isfinite(most) else "finite"

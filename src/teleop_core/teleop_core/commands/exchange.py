@@ -23,6 +23,7 @@ examples:
   teleop import hand.csv --out bags/hand --time t --time-unit ms --position px py pz --unit mm
   teleop import mocap.txt --out bags/mocap --rate 100 --position 1-3 --matrix 4-12
   teleop import tool.csv --out bags/tool --euler ZYX yaw pitch roll --angles deg --axes +y -x +z
+  teleop import dataset --out bags/dataset --episode all --position 4-6
   teleop import user.bag --out bags/user --topic /MTMR/measured_cp --buttons clutch=0,mode=2
 files of known systems:
 %s
@@ -155,8 +156,10 @@ def _changes(group: Any) -> None:
 def _damage(group: Any) -> None:
     group.add_argument("--skip", type=int, metavar="N", help="lines to leave out at the beginning")
     group.add_argument(
-        "--episode", type=int, metavar="N", help="which recording of a table that holds several"
-    )
+        "--episode", type=_episode, metavar="N|all",
+        help="which recording of a table that holds several; all: each, into a folder of them, of "
+        "the folder of a LeRobot data set too",
+    )  # fmt: skip
     group.add_argument(
         "--missing", choices=("drop", "interpolate"), help="rows with NaN (default: drop)"
     )
@@ -231,10 +234,24 @@ def _export(arguments: argparse.Namespace) -> int:
     return 0
 
 
+def _episode(text: str) -> int | str:
+    if text != "all" and not text.isdigit():
+        raise argparse.ArgumentTypeError(f"{text!r} must be a number, or all")
+    return text if text == "all" else int(text)
+
+
 def _import(arguments: argparse.Namespace) -> int:
-    from teleop_core.session.exchange import import_recording
+    from teleop_core.session.exchange import import_episodes, import_recording
 
     arms = {name: _given(_of_arm(name, text)) for name, text in arguments.arm}
+    if arguments.episode == "all":
+        arguments.episode = None
+        episodes = import_episodes(
+            arguments.file, arguments.out, preset=arguments.preset or "", arms=arms,
+            say=lambda line: print(printable(line), flush=True), **_given(arguments),
+        )  # fmt: skip
+        print(printable(str(episodes)))
+        return 2 if episodes.refused else 0
     report = import_recording(
         arguments.file, arguments.out, preset=arguments.preset or "", arms=arms, **_given(arguments)
     )

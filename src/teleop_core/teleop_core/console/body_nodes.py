@@ -1,22 +1,15 @@
 """Body nodes: the bodies of an arm on the page, of which only the frames move."""
 
 from collections.abc import Mapping
-from types import MappingProxyType
 
 import numpy as np
 import viser
 
-from teleop_core.console.look import WANTED, WRONG, Color
+from teleop_core.console.look import ROLES, WANTED, WRONG
 from teleop_core.console.poses import moved, set_pose
 from teleop_core.kernels.geometry import Array, rotations_from_quaternions
 from teleop_core.robots.bodies import Bodies, Role, Solid
 from teleop_core.robots.bodies.meshes import Mesh, merged, mesh_of
-
-ROLES: Mapping[Role, Color] = MappingProxyType({
-    "base": (96, 108, 122), "link": (196, 204, 212), "joint": (52, 112, 176),
-    "leg": (150, 162, 176), "platform": (120, 140, 160), "tool": (214, 130, 40),
-})  # fmt: skip
-"""Colours of solids, readable on light and on dark ground."""
 
 
 class BodyNodes:

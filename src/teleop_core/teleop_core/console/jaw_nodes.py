@@ -5,9 +5,8 @@ from collections.abc import Mapping
 import numpy as np
 import viser
 
-from teleop_core.console.body_nodes import ROLES
 from teleop_core.console.link import ArmView, Setting
-from teleop_core.console.look import TARGET
+from teleop_core.console.look import ROLES, TARGET
 from teleop_core.console.poses import move
 from teleop_core.graph.topics import SLAVE_JAW_BOARD, SLAVE_JAW_MEASURED_JS, SLAVE_JAW_OBJECT_CP
 from teleop_core.kernels.geometry import Array, quaternion_products, rotations_from_quaternions

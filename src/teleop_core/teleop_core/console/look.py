@@ -1,55 +1,68 @@
-"""Look: the colours and the type of the page, each named once by what it means.
+"""Look: the colours and the type of the page, each colour named once by the one thing it means.
 
-Colour is for meaning: grey for what is there, blue for what is to be pressed next, and three
-signals. What is measured is warm, what is wanted is cool, what the person does is violet:
-everywhere, in the scene and in plots.
+Colour is for meaning, grey for what is there. Red is what is wrong and the stop, and nothing else;
+what is measured is orange, what is wanted or to be pressed next blue, what the person does violet,
+forces are magenta: everywhere, in the scene and in texts. Curves of a plot are told apart by
+colours that mean nothing but their number.
 """
+
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import NamedTuple
+
+from teleop_core.robots.bodies import Role
 
 Color = tuple[int, int, int]
 
-# -- meanings
 
-GOOD: Color = (43, 138, 62)
-"""Goes, is free."""
-HELD: Color = (181, 101, 0)
-"""Holds, waits, warns."""
-WRONG: Color = (214, 32, 46)
-"""Is stopped, touches, is at a limit; the stop itself."""
-ACTION: Color = (28, 109, 208)
-"""What is to be pressed next."""
-MEASURED: Color = (208, 73, 12)
-"""What is: paths and curves that were measured."""
-WANTED: Color = (28, 109, 208)
-"""What shall be: references, and the posture that the setpoints give."""
-HAND: Color = (112, 72, 190)
-"""What the person does: the path of the stylus, and the force on it is a :data:`WRONG` arrow."""
-TARGET: Color = (230, 150, 30)
-"""Points of a task."""
+class Meaning(NamedTuple):
+    """Colour of one meaning: in the scene, and of a text on light and on dark ground."""
 
-# -- ground
+    scene: Color
+    light: str
+    dark: str
 
+
+MEANINGS: Mapping[str, Meaning] = MappingProxyType({
+    "good": Meaning((43, 138, 62), "#247a36", "#51cf66"),  # goes, is free
+    "held": Meaning((154, 87, 0), "#9a5700", "#ffb84d"),  # holds, waits, warns
+    "wrong": Meaning((214, 0, 28), "#d6001c", "#ff7b83"),  # stopped, touches, at a limit; the stop
+    "idle": Meaning((92, 102, 112), "#5c6670", "#9aa5b1"),  # there, and no more
+    "measured": Meaning((217, 95, 2), "#b34d00", "#ff9f4d"),  # paths that were measured
+    "wanted": Meaning((28, 109, 208), "#1c6dd0", "#74a9f2"),  # what shall be; what to press next
+    "hand": Meaning((112, 72, 190), "#7048be", "#b197fc"),  # path of the stylus
+    "force": Meaning((190, 24, 132), "#a61e74", "#f06ec0"),  # on stylus and tip
+    "target": Meaning((12, 133, 153), "#0b7285", "#3bc9db"),  # points and objects of a task
+})  # fmt: skip
+"""All colours that mean something, texts with at least 4.5 to 1 on their ground."""
+GOOD, WRONG, MEASURED, WANTED, HAND, FORCE, TARGET = (
+    MEANINGS[name].scene
+    for name in ("good", "wrong", "measured", "wanted", "hand", "force", "target")
+)
+
+ROLES: Mapping[Role, Color] = MappingProxyType({
+    "base": (96, 108, 122), "link": (196, 204, 212), "joint": (104, 126, 150),
+    "leg": (150, 162, 176), "platform": (120, 140, 160), "tool": (72, 82, 94),
+})  # fmt: skip
+"""Greys of solids, readable on light and on dark ground."""
 LIGHT: Color = (255, 255, 255)
 DARK: Color = (20, 20, 20)
 """Ground behind the scene: viser's."""
 GRID: Color = (196, 202, 208)
 GRID_DARK: Color = (52, 58, 64)
-"""Lines of the floor: there, and no more."""
+"""Lines of the floor."""
+AXIS = "#888888"
+AXIS_GRID = "rgba(128,128,128,0.2)"
+"""Of plots."""
+CURVES = ("#0072b2", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#8c6d46")
+"""Of plots, in the order of their series; told apart without seeing red or green (Okabe and Ito
+2008)."""
 
-CURVES = ("#d0490c", "#1c6dd0", "#2b8a3e", "#7048be", "#9c6b1e", "#5c6670")
-"""Of plots, in the order of their series."""
-
-_LIGHT = {
-    "ground": "#ffffff", "text": "#1c2126", "muted": "#5c6670", "line": "#d9dee3",
-    "good": "#2b8a3e", "held": "#9a5700", "wrong": "#c5162a", "idle": "#5c6670",
-}  # fmt: skip
-_DARK = {
-    "ground": "#1f2328", "text": "#e6e9ec", "muted": "#9aa5b1", "line": "#343b42",
-    "good": "#51cf66", "held": "#ffb84d", "wrong": "#ff7b83", "idle": "#9aa5b1",
-}  # fmt: skip
-"""Of texts: at least 4.5 to 1 on their ground."""
+_LIGHT = {"ground": "#ffffff", "text": "#1c2126", "muted": "#5c6670", "line": "#d9dee3"}
+_DARK = {"ground": "#1f2328", "text": "#e6e9ec", "muted": "#9aa5b1", "line": "#343b42"}
 
 _STYLE = """\
-:root { VARIABLES; --t-stop: #d6001c; --t-small: 12px; --t-text: 13px; --t-head: 16px; }
+:root { VARIABLES; --t-stop: STOP; --t-small: 12px; --t-text: 13px; --t-head: 16px; }
 :root[data-mantine-color-scheme="dark"] { DARK_VARIABLES; }
 body { font: var(--t-text)/1.45 system-ui, -apple-system, "Segoe UI", Roboto, sans-serif; }
 .t-status { padding: 4px 14px; color: var(--t-color-text); font-size: var(--t-small);
@@ -90,6 +103,15 @@ body { font: var(--t-text)/1.45 system-ui, -apple-system, "Segoe UI", Roboto, sa
 
 def style() -> str:
     """Style sheet that is added to the page."""
-    light, dark = ("; ".join(f"--t-color-{name}: {value}" for name, value in kind.items())
-                   for kind in (_LIGHT, _DARK))  # fmt: skip
-    return _STYLE.replace("DARK_VARIABLES", dark).replace("VARIABLES", light)
+    light = _LIGHT | {name: one.light for name, one in MEANINGS.items()}
+    dark = _DARK | {name: one.dark for name, one in MEANINGS.items()}
+    stop = MEANINGS["wrong"].light  # on any ground, under white letters
+    return (
+        _STYLE.replace("STOP", stop)
+        .replace("DARK_VARIABLES", _variables(dark))
+        .replace("VARIABLES", _variables(light))
+    )
+
+
+def _variables(colors: Mapping[str, str]) -> str:
+    return "; ".join(f"--t-color-{name}: {value}" for name, value in colors.items())

@@ -5,7 +5,7 @@ import viser
 
 from teleop_core.console.body_nodes import add_solids
 from teleop_core.console.fixture_outlines import OutlineNode
-from teleop_core.console.look import HAND, WRONG
+from teleop_core.console.look import FORCE, HAND
 from teleop_core.console.poses import move
 from teleop_core.console.stand import DEVICE, REST, STYLUS, Stand
 from teleop_core.console.tails import Tail
@@ -29,7 +29,7 @@ class ForceArrow:
     def __init__(self, server: viser.ViserServer, name: str) -> None:
         self._frame = server.scene.add_frame(name, show_axes=False, visible=False)
         self._arrow = server.scene.add_arrows(
-            f"{name}/arrow", np.zeros((1, 2, 3), np.float32), WRONG, shaft_radius=0.0025,
+            f"{name}/arrow", np.zeros((1, 2, 3), np.float32), FORCE, shaft_radius=0.0025,
             head_radius=0.006, head_length=0.014,
         )  # fmt: skip
         self._label = server.scene.add_label(

@@ -8,7 +8,7 @@ import viser
 from viser import uplot
 
 from teleop_core.console.history import SPAN, History
-from teleop_core.console.look import CURVES
+from teleop_core.console.look import AXIS, AXIS_GRID, CURVES
 from teleop_core.kernels.geometry import Array
 
 _PERIOD = 0.25  # between two drawings [s]
@@ -68,9 +68,8 @@ class Plots:
                 )
                 for i, label in enumerate(labels[:count])
             ]  # fmt: skip
-        grey = "#888888"
-        grid = uplot.Axis_Grid(stroke="rgba(128,128,128,0.2)")
-        axes = uplot.Axis(stroke=grey, grid=grid), uplot.Axis(stroke=grey, grid=grid, size=_NUMBERS)
+        grid = uplot.Axis_Grid(stroke=AXIS_GRID)
+        axes = uplot.Axis(stroke=AXIS, grid=grid), uplot.Axis(stroke=AXIS, grid=grid, size=_NUMBERS)
         return gui.add_uplot(
             tuple(np.zeros(1) for _ in series), tuple(series), title=title, height=170,
             padding=(10, 8, 0, 0),  # the uppermost number has room under the title

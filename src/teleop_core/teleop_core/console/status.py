@@ -15,6 +15,8 @@ _PRESSED = (
 )
 _RELEASED = "Released; the arms stay in FAULT. Next: press Initialize, which resets and homes them."
 _NEWS = 4  # lines
+RESTS = "nobody holds the stylus"
+"""How nodes of a hand end the line that says that it rests."""
 
 
 def situation(view: View) -> Situation:
@@ -70,9 +72,15 @@ def status_html(view: View, title: str, doing: str) -> str:
     lines.append(f'<span class="t-muted">{html.escape(title)} · {html.escape(doing)}</span>')
     said = [arm.operation_text for arm in view.arms.values() if arm.operation_text]
     news = [text for text in view.news if not any(known in text for known in said)]
-    lines += [f'<span class="t-held">⚠ {html.escape(text)}</span>' for text in news[:_NEWS]]
+    lines += [_news_line(text) for text in news[:_NEWS]]
     # Of one height, so that what is below stays where it is when there is more to say.
     return f'<div class="t-status">{"".join(f"<p>{line}</p>" for line in lines)}</div>'
+
+
+def _news_line(text: str) -> str:
+    """A warning; a hand that rests is no more than information."""
+    signal, mark = ("muted", "ⓘ") if text.endswith(RESTS) else ("held", "⚠")
+    return f'<span class="t-{signal}">{mark} {html.escape(text)}</span>'
 
 
 def _arm_lines(view: View, name: str, arm: ArmView) -> list[str]:

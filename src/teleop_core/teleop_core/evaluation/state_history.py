@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from teleop_core.bags.kept_files import recorded_files
 from teleop_core.bags.messages import Report
 from teleop_core.bags.reader import Bag
-from teleop_core.base.errors import EvaluationError
+from teleop_core.base.errors import EvaluationError, TeleopWarning
 from teleop_core.chain.fixtures.reported_fixture import ReportedFixture, reported_fixture
 from teleop_core.evaluation.accumulators import Integers
 from teleop_core.evaluation.pairing import NONE, latest
@@ -124,7 +124,7 @@ def read_history(bag: Bag) -> StateHistory:
     if wrong and not rows:
         raise wrong[0]
     if wrong:
-        warnings.warn(f"{wrong[0]}; reports left out: {len(wrong)}", stacklevel=2)
+        warnings.warn(f"{wrong[0]}; reports left out: {len(wrong)}", TeleopWarning, stacklevel=2)
     columns = np.array(rows).reshape(len(rows), len(STATE_FIELDS))
     times, told = np.array(stamps, np.int64), np.array(which, np.int64)
     order = np.argsort(times, kind="stable")

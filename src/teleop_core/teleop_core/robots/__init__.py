@@ -19,11 +19,12 @@ entry-point group ``teleop_core.robots`` of an installed package, gives a robot 
     register_robot(arm)
 """
 
-from collections.abc import Iterable
+import warnings
+from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from typing import TYPE_CHECKING
 
-from teleop_core.base.errors import ParameterError
+from teleop_core.base.errors import ParameterError, TeleopWarning
 from teleop_core.robots.kinematics import (
     FkBatch,
     FkOne,
@@ -35,7 +36,16 @@ from teleop_core.robots.kinematics import (
     IkStatus,
     Kernels,
 )
-from teleop_core.robots.parts import ARGUMENT, ROBOTS, Part, RobotPart, built, from_file, part_name
+from teleop_core.robots.parts import (
+    ARGUMENT,
+    ROBOTS,
+    Part,
+    RobotPart,
+    built,
+    from_file,
+    is_urdf,
+    part_name,
+)
 from teleop_core.robots.robot import Robot
 
 if TYPE_CHECKING:
@@ -124,12 +134,25 @@ def load_robot(name: str, **geometry: float | str) -> Robot:
         ParameterError: A length is not possible, or a table has an impossible entry.
         PartError: A robot of another package cannot be loaded.
         OSError: A table cannot be read.
+
+    Warns:
+        TeleopWarning: A URDF may mean another unit, or its tip cannot move in all directions.
     """
+    robot = _loaded(name, geometry)
+    if is_urdf(name):
+        from teleop_core.robots.robot_notes import notes_on_robot
+
+        for note in notes_on_robot(robot, name, "task" in geometry):
+            warnings.warn(note, TeleopWarning, stacklevel=2)
+    return robot
+
+
+def _loaded(name: str, geometry: Mapping[str, float | str]) -> Robot:
     return from_file(name, geometry) or built(name, ROBOTS.find(name), geometry)
 
 
 def load_robot_set(name: str, settings: Iterable[str]) -> Robot:
-    """Robot by name, with its geometry as texts ``symbol=value``: how parameters give it.
+    """Robot by name, with its geometry as texts ``symbol=value``, without a warning.
 
     Args:
         name: As for :func:`load_robot`.
@@ -142,7 +165,7 @@ def load_robot_set(name: str, settings: Iterable[str]) -> Robot:
     Raises:
         ParameterError: A text without "="; and all errors of :func:`load_robot`.
     """
-    return load_robot(name, **geometry_of(settings))
+    return _loaded(name, geometry_of(settings))
 
 
 def geometry_of(settings: Iterable[str]) -> dict[str, float | str]:

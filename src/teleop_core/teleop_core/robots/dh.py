@@ -45,7 +45,7 @@ from typing import Any
 from teleop_core.base import plain_yaml
 from teleop_core.base.damage import damage_told
 from teleop_core.base.errors import ParameterError, UnknownNameError
-from teleop_core.base.ranges import check
+from teleop_core.base.ranges import MOST_OF_ARM, check
 from teleop_core.robots.dh_chain import CONVENTIONS, DhJoint, DhRow, DhTable, elementary
 from teleop_core.robots.dh_drives import parse_drives
 from teleop_core.robots.kinematics import DIRECTIONS
@@ -165,7 +165,7 @@ def _number(name: str, value: Any, kind: str) -> float:
     """Length [m] or angle, whose range in radians holds for degrees as well."""
     if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
         raise ParameterError(name, value, "a finite number")
-    return check(name, float(value), "rad" if kind == "turn" else "m")
+    return check(name, float(value), "rad" if kind == "turn" else "m", MOST_OF_ARM)
 
 
 def _choice(name: str, value: Any, choices: Any) -> str:

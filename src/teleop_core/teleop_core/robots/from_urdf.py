@@ -50,6 +50,7 @@ from teleop_core.robots.urdf_tree import (
     UrdfJoint,
     chain_to,
     elements_of,
+    is_endless,
     joint_of,
     joints_by_child,
     limits_of,
@@ -146,7 +147,7 @@ def load_urdf(
         drives=table,
         followers=None if followers.is_plain else followers,
     )
-    controlled = _task(task) or directions_of(make(task=DIRECTIONS), reach / math.pi or 1.0).best
+    controlled = _task(task) or directions_of(make(task=DIRECTIONS), reach / math.pi).best
     solution = solution_of(kinds, fixed, reach, controlled) if followers.is_plain else SEARCH
     robot = make(task=controlled, solution=solution)
     coordinates = dict(zip((j.name for j in moving), followers.of(home).tolist(), strict=True))
@@ -247,7 +248,7 @@ def _narrowed(train: list[_Geared]) -> DhJoint:
     leader = train[0].joint
     lower, upper = limits_of(leader)
     for geared in train[1:]:
-        if geared.joint.kind != "continuous":
+        if not is_endless(geared.joint):
             ends = sorted((x - geared.offset) / geared.factor for x in limits_of(geared.joint))
             lower, upper = max(lower, ends[0]), min(upper, ends[1])
     if not lower < upper:

@@ -9,7 +9,7 @@ from typing import Protocol, TypeAlias, TypeVar, runtime_checkable
 import numpy as np
 
 from teleop_core.base.errors import ParameterError, PartError, TeleopError, UnknownNameError
-from teleop_core.base.ranges import check
+from teleop_core.base.ranges import MOST_OF_ARM, check
 from teleop_core.base.registry import Registry
 from teleop_core.robots.robot import Robot
 
@@ -51,7 +51,7 @@ def built(name: str, part: RobotPart, geometry: Mapping[str, float | str]) -> Ro
     """
     for symbol, value in geometry.items():
         if isinstance(value, float):
-            check(symbol, value, "rad or m")
+            check(symbol, value, "rad or m", MOST_OF_ARM)
     if isinstance(part, Robot | RobotSource):
         if geometry:
             raise ParameterError("geometry", dict(geometry), f"empty: {name!r} has no symbols")
@@ -96,7 +96,8 @@ def file_of(name: str) -> tuple[Path, dict[str, str]] | None:
 
 def is_urdf(name: str) -> bool:
     """Whether a robot's name is a URDF, a xacro or a description."""
-    return name.lower().endswith(_URDF_ENDINGS) or name.endswith(DESCRIPTION)
+    is_description = name.endswith(DESCRIPTION) and name not in ROBOTS.names()
+    return name.lower().endswith(_URDF_ENDINGS) or is_description
 
 
 def arguments_of(geometry: Mapping[str, float | str]) -> dict[str, str]:

@@ -44,7 +44,8 @@ from teleop_core.robots.spherical_wrist import wrist_angles
 from teleop_core.robots.swivel_arcs import ARCS, MARGIN, blend, cut_circle, swivel_of
 
 _SPEED = 0.3  # share of a joint's largest step by which psi goes back to its margin in a path
-_ROUNDS = 8  # of the search for the least move
+_ROUNDS, _MORE_ROUNDS = 8, 40  # of the search for the least move, and if it comes close
+_CLOSE = 1e-4  # squared weighted error: a limit in the way slows a search that would get there
 _FLAT = 0.3  # volume of three unit axes under which manipulability counts
 _ASIDE = 1e-3  # psi [rad] to either side where it is compared
 _GAIN = 200.0  # of the relative difference, up to full speed
@@ -157,7 +158,10 @@ def _least_move(T: Array, seed: Array, limits: Array, geometry: Array, q: Array)
     box_around(seed, limits, box)
     for i in range(7):
         q[i] = min(max(seed[i], box[0, i]), box[1, i])
-    return descend(T, box, geometry, _ROUNDS, q) <= ZERO
+    square = descend(T, box, geometry, _ROUNDS, q)
+    if ZERO < square < _CLOSE and not math.isfinite(limits[2, 0]):
+        square = descend(T, box, geometry, _MORE_ROUNDS, q)
+    return square <= ZERO
 
 
 @inner
@@ -184,13 +188,14 @@ def _urge(q: Array, seed: Array, limits: Array, K: Array) -> float:
     """How much manipulability counts, from 0 to 1, without a jump at either end.
 
     Nothing where axes are far from a plane or pass through it, within the margin of a limit, or
-    where a joint needs a quarter of its speed.
+    where a joint needs all of its speed. Of a part of it a hand whose readings are noisy asks
+    all the time.
     """
-    most, room = 0.0, _room(q, limits) / MARGIN - 1.0
+    left, room = 1.0, _room(q, limits) / MARGIN - 1.0
     for i in range(7):
-        most = max(most, abs(q[i] - seed[i]) / max(limits[2, i], 1e-300))
+        left = min(left, max(1.0 - abs(q[i] - seed[i]) / max(limits[2, i], 1e-300), 0.0))
     share = min(_width(q, K, 1), _width(q, K, 5)) / _FLAT
-    urge = 6.75 * share * share * max(1.0 - share, 0.0) * max(1.0 - 4.0 * most, 0.0)
+    urge = 6.75 * share * share * max(1.0 - share, 0.0) * left * left
     return urge * min(max(room, 0.0), 1.0)
 
 

@@ -2,9 +2,10 @@
 
 from collections.abc import Callable, Iterator, Sequence
 
-from teleop_core.base.ranges import unusual
+from teleop_core.base.ranges import MOST_OF_ARM, unusual
 from teleop_core.kernels.portable import length
 from teleop_core.robots.urdf_tree import (
+    ASSUMED,
     KINDS,
     UNITS,
     Links,
@@ -31,8 +32,10 @@ def notes_on(chain: Sequence[UrdfJoint], links: Links) -> Iterator[str]:
     yield from _listed("lower and upper left out: it is continuous", endless, _has_limits)
     for kind, unit in UNITS.items():
         own = [joint for joint in bounded if KINDS[joint.kind] == kind]
-        ends = [max(map(abs, ends_of(joint, "limit", "lower", "upper"))) for joint in own]
-        yield from _told("limits", own, ends, unit)
+        what = f"limits beyond {MOST_OF_ARM:g} {unit} mean none; {ASSUMED[kind]:.3g} are assumed"
+        yield from _listed(what, own, lambda joint: _widest(joint) > MOST_OF_ARM)
+        near = [joint for joint in own if _widest(joint) <= MOST_OF_ARM]
+        yield from _told("limits", near, list(map(_widest, near)), unit)
         speeds = [_speed(joint, unit) for joint in own]
         yield from _told("speeds", own, speeds, f"{unit}/s")
     yield from _told("origins", chain, [float(length(j.origin[:3, 3])) for j in chain], "m")
@@ -53,6 +56,10 @@ def _listed(
 def _is_narrowed(joint: UrdfJoint) -> bool:
     soft, (lower, upper) = soft_limits_of(joint), ends_of(joint, "limit", "lower", "upper")
     return soft is not None and (soft[0] > lower or soft[1] < upper)
+
+
+def _widest(joint: UrdfJoint) -> float:
+    return max(map(abs, ends_of(joint, "limit", "lower", "upper")))
 
 
 def _has_limits(joint: UrdfJoint) -> bool:

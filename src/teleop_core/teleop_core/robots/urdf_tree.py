@@ -14,7 +14,7 @@ import numpy as np
 
 from teleop_core.base.damage import damage_told
 from teleop_core.base.errors import ParameterError, UnknownNameError
-from teleop_core.base.ranges import check
+from teleop_core.base.ranges import MOST_OF_ARM, RANGES, check
 from teleop_core.kernels.geometry import Array, rotation, transform
 from teleop_core.kernels.portable import length, product
 
@@ -25,8 +25,8 @@ UNITS = {"turn": "rad", "slide": "m"}
 _READ = ("link", "joint", "inertial")  # elements in which a macro would be missed
 _XACRO = "{http://www.ros.org/wiki/xacro}"
 Links = Mapping[str, Xml.Element]
-_ROUNDS = 2.0 * math.pi
-"""Limit [rad] of a continuous joint to either side, assumed."""
+ASSUMED = {"turn": 2.0 * math.pi, "slide": RANGES["m"].usual}
+"""Limit [rad, m] to either side of a joint that has none."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -188,19 +188,28 @@ def limits_of(joint: UrdfJoint) -> tuple[float, float]:
     Raises:
         ParameterError: It has none and is not continuous, or they cross or are not physical.
     """
-    if joint.kind == "continuous":
-        lower, upper = -_ROUNDS, _ROUNDS
+    most = ASSUMED[KINDS[joint.kind]]
+    if is_endless(joint):
+        lower, upper = -most, most
     else:
         lower, upper = ends_of(joint, "limit", "lower", "upper")
         if joint.element.find("limit") is None or lower == upper == 0.0:
             name = f"<limit> of joint {joint.name}"
             needed = "given: a lower < upper; a joint without limits is continuous"
             raise ParameterError(name, "missing", needed)
+        lower = -most if lower < -MOST_OF_ARM else lower
+        upper = most if upper > MOST_OF_ARM else upper
     if soft := soft_limits_of(joint):
         lower, upper = max(lower, soft[0]), min(upper, soft[1])
     if not lower < upper:
         raise ParameterError(f"limits of joint {joint.name}", (lower, upper), "lower < upper")
     return lower, upper
+
+
+def is_endless(joint: UrdfJoint) -> bool:
+    """Whether a joint is continuous, or has limits that mean none to both sides."""
+    lower, upper = ends_of(joint, "limit", "lower", "upper")
+    return joint.kind == "continuous" or min(-lower, upper) > MOST_OF_ARM
 
 
 def soft_limits_of(joint: UrdfJoint) -> tuple[float, float] | None:
@@ -241,7 +250,11 @@ def origin_of(where: str, element: Xml.Element) -> Array:
     found = element.find("origin")
     roll, pitch, yaw = numbers_of(where, found, "rpy", (0.0, 0.0, 0.0), "rad").tolist()
     turn = product(product(rotation("z", yaw), rotation("y", pitch)), rotation("x", roll))
-    return transform(turn, numbers_of(where, found, "xyz", (0.0, 0.0, 0.0), "m"))
+    place = numbers_of(where, found, "xyz", (0.0, 0.0, 0.0), "m")
+    if max(map(abs, place.tolist())) > MOST_OF_ARM:
+        needed = f"within {MOST_OF_ARM:g} m in each direction; place the arm near its root"
+        raise ParameterError(f"origin of {where}", place.tolist(), needed)
+    return transform(turn, place)
 
 
 def numbers_of(

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from teleop_core.bags.memory import MemoryBag, Message
 from teleop_core.bags.series import Series
-from teleop_core.base.errors import ParameterError, TeleopError
+from teleop_core.base.errors import ParameterError, TeleopError, TeleopWarning
 from teleop_core.chain.fixtures import FIXTURES, Fixture
 from teleop_core.chain.operators import OPERATORS, Motion, Operator, following
 from teleop_core.graph.graph import DEVICE, HAND
@@ -194,7 +194,7 @@ def run(
             delays=delays, **parameters,
         )  # fmt: skip
     for note in notes_of(made):
-        warnings.warn(note, stacklevel=2)
+        warnings.warn(note, TeleopWarning, stacklevel=2)
     session = VirtualTime(made)
     ticks = runner.session_ticks(made, session)
     return _kept(session, made, runner.run_blocks(session, ticks), ticks, out, progress)

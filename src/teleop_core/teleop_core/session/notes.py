@@ -8,11 +8,8 @@ from teleop_core.graph.graph import BUILT_IN
 from teleop_core.graph.signals import DT
 from teleop_core.graph.topics import MASTER_MEASURED_CP, MASTER_SERVO_CF
 from teleop_core.robots import load_robot_set
-from teleop_core.robots.kinematics import DIRECTIONS
 from teleop_core.robots.parts import is_urdf
-from teleop_core.robots.rank import directions_of
-from teleop_core.robots.robot import Robot
-from teleop_core.robots.room import lever
+from teleop_core.robots.robot_notes import assumed_note, notes_on_robot
 from teleop_core.session.configuration import Configuration
 from teleop_core.slave.slave import SLAVE, SlaveParameters
 
@@ -43,8 +40,8 @@ def notes_of(configuration: Configuration, transport: float = 0.0) -> list[str]:
         if isinstance(slave, SlaveParameters) and is_urdf(slave.robot):
             robot = load_robot_set(slave.robot, slave.geometry)
             has_task = any(entry.startswith("task=") for entry in slave.geometry)
-            told = (rank_note(robot, slave.robot, has_task), assumed_note(robot, slave.robot))
-            own = [*(f"{slave.robot}: {note}" for note in robot.notes), *filter(None, told)]
+            own = notes_on_robot(robot, slave.robot, has_task)
+            own += filter(None, [assumed_note(robot, slave.robot)])
             found += [note for note in own if note not in found]
     return found
 
@@ -59,49 +56,6 @@ def _delay(configuration: Configuration, arm: str) -> float:
         if link.port.name in around
         and link.reader.arm == arm
         and link.reader.stage.name == ends[link.port.name]
-    )
-
-
-def rank_note(robot: Robot, file: str, has_task: bool) -> str:
-    """Which directions an arm does not hold that cannot move in all of them at once; else empty.
-
-    Args:
-        robot: As it was loaded from the file.
-        file: Its path, for the text.
-        has_task: Whether the directions that it controls were asked for; then only too many count.
-    """
-    rank, best = directions_of(robot, lever(robot))
-    pairs = list(zip(DIRECTIONS, robot.task_mask, strict=True))
-    held, free = ([name for name, is_held in pairs if is_held == kind] for kind in (True, False))
-    if rank == len(DIRECTIONS) or (has_task and len(held) <= rank):
-        return ""
-    does = f"it controls {' '.join(held)}, and not {' '.join(free)}"
-    if len(held) > rank:
-        does = f'it is asked for {" ".join(held)}; "task={" ".join(best)}" it can follow'
-    return (
-        f"{file}: its tip moves in {rank} of 6 directions at once, so it cannot reach every pose: "
-        f'{does}. geometry=[..., "task=x y z"] chooses what it controls, and teleop reach says '
-        "how far a hand can go with that"
-    )
-
-
-def assumed_note(robot: Robot, file: str) -> str:
-    """Which limits of drives a URDF leaves out, for one joint at least; empty where none is.
-
-    Args:
-        robot: As it was loaded from the file.
-        file: Its path, for the text.
-    """
-    words = {"effort_limit": "effort", "speed_limit": "velocity"}
-    drives = robot.drives
-    missing = [] if drives is None else [name for name in words if name in drives.assumed]
-    if drives is None or not missing:
-        return ""
-    entries = {words[name]: drives.entries()[name] for name in missing}
-    found = [f"{word} {', '.join(f'{v:g}' for v in row)}" for word, row in entries.items()]
-    return (
-        f"{file} does not give every joint its limits of {' and '.join(entries)}; the rest is "
-        f"assumed. All joints, in SI units: {'; '.join(found)}"
     )
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from teleop_core.bags.series import Series
-from teleop_core.base.errors import RecordingError
+from teleop_core.base.errors import RecordingError, TeleopWarning
 from teleop_core.graph.signals import TICK_NS
 
 LONGEST_GAP_NS = 60_000_000_000
@@ -46,6 +46,7 @@ def replayed_span(path: Path, name: str, stamp_ns: NDArray[np.int64]) -> tuple[i
         warnings.warn(
             f"{path.name}: replayed are {seconds:.3g} s of {name}; its {left_out} samples more than"
             f" {LONGEST_GAP_NS * 1e-9:g} s apart from them are left out",
+            TeleopWarning,
             stacklevel=2,
         )
     return int(longest[0]), int(longest[-1])

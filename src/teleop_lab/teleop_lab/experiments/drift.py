@@ -148,8 +148,8 @@ def _figure(found: Mapping[Job, Drift]) -> Figure:
 _COLORS, _WAVE = {"tissue": FIRST, "silicone": SECOND, "steel": THIRD}, FIXTURE
 _NOTES = (
     "Drift: from the command that arrives from the hand to the command that passivity gives the "
-    "arm. Without passivity and with a tank every command is given, so there is none; what that "
-    "costs is the energy that comes out, and that an arm may be stopped.",
+    "arm. Without passivity every command is given, so there is none; what that costs is the "
+    "energy that comes out, and that an arm may be stopped.",
     "0 is what a compensator of drift is for (Coelho et al. 2019); within: our goal, which is "
     "assumed. Nothing of this is a published figure.",
     f"The hand goes down and up by {1e3 * _WAY:.0f} mm in {_PERIOD:g} s, {CONTACTS} times, and "

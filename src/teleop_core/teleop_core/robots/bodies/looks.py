@@ -4,7 +4,7 @@ import warnings
 
 import numpy as np
 
-from teleop_core.base.errors import ParameterError, TeleopError
+from teleop_core.base.errors import ParameterError, TeleopError, TeleopWarning
 from teleop_core.kernels.geometry import rotations_from_quaternions
 from teleop_core.kernels.portable import product
 from teleop_core.robots.bodies.body import HERE
@@ -28,7 +28,9 @@ def looks_of(robot: Robot) -> dict[int, Mesh]:
         try:
             vertices, faces = _triangles(visual)
         except TeleopError as error:
-            warnings.warn(f"link {visual.link} is drawn without: {error}", stacklevel=2)
+            warnings.warn(
+                f"link {visual.link} is drawn without: {error}", TeleopWarning, stacklevel=2
+            )
             continue
         placed = product(vertices, visual.place[:3, :3].T) + visual.place[:3, 3]
         frame = frames[visual.joints]

@@ -1,6 +1,7 @@
 """Exchange: recordings of others come in, ours go out.
 
 - :func:`import_recording`: CSV, TSV, Parquet, rosbag2 and ROS 1 bags become a recording of ours;
+- :func:`import_episodes`: all recordings of a table or a LeRobot data set become one each;
 - :func:`export_recording`: recordings become CSV, Parquet or a LeRobot data set;
 - :func:`as_master_bag`: any recording as one whose master can be replayed.
 """

@@ -17,8 +17,10 @@ from teleop_core.session.exchange.bag_messages import (
     JOY,
     POSES,
     TRANSFORMS,
+    Frames,
     JoyReader,
     PoseReader,
+    Rows,
     frames,
     plain,
 )
@@ -26,6 +28,7 @@ from teleop_core.session.exchange.options import BUTTONS, ImportOptions, button_
 from teleop_core.session.exchange.orientation import Attitudes
 from teleop_core.session.exchange.ros_bags import OurBag, RosBag, is_plain_mcap, opened_by_rosbags
 from teleop_core.session.exchange.source import Block, Presses
+from teleop_core.session.exchange.transform_chain import chain_to, composed
 
 _LOOKED_AT = 1000
 """Messages of transforms whose frames are listed."""
@@ -59,8 +62,11 @@ class BagSource:
         self._bag = Bag(path) if is_plain_mcap(path) else None
         with self._opened() as bag:
             self._types = bag.types
+            transforms = [name for name, kind in self._types.items() if kind in TRANSFORMS]
+            self._static = [name for name in transforms if name.endswith("tf_static")]
             self._topic = self._pose_topic()
-            self._frame = self._child_frame(bag)
+            self._frame = plain(options.frame)
+            self._chain = self._way(bag)
             self._joy = self._joy_topic()
             self._numbers = self._button_numbers(bag)
 
@@ -85,6 +91,8 @@ class BagSource:
 
     def _pose_topic(self) -> str:
         found = [n for n, kind in self._types.items() if kind in POSES or kind in TRANSFORMS]
+        if not self._options.topic:  # those that never change belong to the others
+            found = [name for name in found if name not in self._static] or found
         if self._options.topic:
             wanted = _named(self._options.topic, self._types)
             if wanted is None:
@@ -107,23 +115,32 @@ class BagSource:
                 return few[0]
         raise UnknownNameError("--topic", "", sorted(found))
 
-    def _child_frame(self, bag: RosBag) -> str:
-        """Child frame that is taken; for topics of transforms it must be said or the only one."""
-        wanted = plain(self._options.frame)
+    def _way(self, bag: RosBag) -> list[tuple[str, Frames]]:
+        """Transforms from the frame up to the one in which it is taken, each with its topic.
+
+        A parent is named where a frame has several. Empty where the topic holds all that is needed.
+
+        Raises:
+            UnknownNameError: A frame or its parent is one of several and not said.
+        """
         if self._types[self._topic] not in TRANSFORMS:
-            return wanted
-        poses = self._pose_reader(bag)
-        known: dict[str, str] = {}
-        for _, data in islice(bag.raw(self._topic), _LOOKED_AT):
-            known |= {child: parent for parent, child in frames(poses.message(data))}
-        if not wanted and len(known) == 1:
-            (wanted,) = known
-        if wanted not in known:
-            raise UnknownNameError("--frame", wanted, sorted(known))
-        if (parent := known[wanted]) in known:
-            text = f"{parent} is in {known[parent]} itself, and may move there"
-            self.told.append(f"{text}: that motion is not in the poses of {wanted}")
-        return wanted
+            return []
+        known: dict[Frames, str] = {}
+        for topic in (*self._static, self._topic):
+            reader = self._pose_reader(bag, topic)
+            for _, data in islice(bag.raw(topic), _LOOKED_AT):
+                known |= dict.fromkeys(frames(reader.message(data)), topic)
+        parents: dict[str, set[str]] = {}
+        for parent, child in known:
+            parents.setdefault(child, set()).add(parent)
+        if not self._frame and len(parents) == 1:
+            (self._frame,) = parents
+        if self._frame not in parents:
+            raise UnknownNameError("--frame", self._frame, sorted(parents))
+        way = chain_to(plain(self._options.parent), self._frame, parents)
+        if len(way) == 1 and known.get(way[0]) in {None, self._topic}:
+            return []
+        return [(known[e], e if len(parents[e[1]]) > 1 else ("", e[1])) for e in way]
 
     def _joy_topic(self) -> str:
         found = [name for name, kind in self._types.items() if kind == JOY]
@@ -162,10 +179,28 @@ class BagSource:
 
     # -- messages --------------------------------------------------------------------------------
 
-    def _pose_reader(self, bag: RosBag) -> PoseReader:
-        frame, parent = getattr(self, "_frame", ""), plain(self._options.parent)
-        kind = self._types[self._topic]
+    def _pose_reader(
+        self, bag: RosBag, topic: str, frame: str = "", parent: str = ""
+    ) -> PoseReader:
+        kind = self._types[topic]
         return PoseReader(bag.typestore, kind, is_ros2=bag.is_ros2, frame=frame, parent=parent)
+
+    def _composed(self, bag: RosBag) -> Rows:
+        """Poses along the chain."""
+        edges, told = [], []
+        top = ""
+        for topic, (parent, child) in self._chain:
+            reader = self._pose_reader(bag, topic, child, parent)
+            parts = list(reader.blocks(bag.raw(topic)))
+            edges.append(Rows(*map(np.concatenate, zip(*parts, strict=True))))
+            top, count = (reader.taken or (parent, child))[0], len(edges[-1].poses)
+            told.append(f"{child} in {top} ({count if count > 1 else 'constant'})")
+        found = composed(edges, by_log=self._options.stamps == "log")
+        ends = f"poses of {self._frame} in {top or 'a frame without a name'}"
+        self.told.append(f"{ends}, composed of {', '.join(told)}")
+        if early := max(len(edge.poses) for edge in edges) - len(found.poses):
+            self.told.append(f"{early} poses before the first of all of these are left out")
+        return found
 
     def blocks(self) -> Iterator[Block]:
         """As of any source.
@@ -175,7 +210,11 @@ class BagSource:
             UnknownNameError: The frames of the poses are several, and none or another is chosen.
         """
         with self._opened() as bag:
-            poses = self._pose_reader(bag)
+            if self._chain:
+                yield self._block(*self._composed(bag))
+                return
+            parent = plain(self._options.parent)
+            poses = self._pose_reader(bag, self._topic, self._frame, parent)
             for rows in poses.blocks(bag.raw(self._topic)):
                 yield self._block(*rows)
         parent, child = poses.taken or ("", "")

@@ -9,6 +9,7 @@ from teleop_core.session.exchange import names
 from teleop_core.session.exchange.tables import Numbers, Table
 
 _LISTED = 8
+_NEEDED = "left out: no column is called episode_index or the like"
 
 
 class Episodes:
@@ -24,12 +25,9 @@ class Episodes:
 
     def __init__(self, table: Table, wanted: int | None) -> None:
         self._table, self._wanted, self._found = table, wanted, set[float]()
-        column = names.find_episode(table.names) if table.is_named else None
-        is_number = column is not None and np.isfinite(table.sample(column)).all()
-        self._column = column if is_number else None
+        self._column = _column(table)
         if wanted is not None and self._column is None:
-            needed = "left out: no column is called episode_index or the like"
-            raise ParameterError("--episode", wanted, needed)
+            raise ParameterError("--episode", wanted, _NEEDED)
 
     def blocks(self, columns: list[int]) -> Iterator[list[Numbers]]:
         """Some columns of the table, block by block.
@@ -56,9 +54,31 @@ class Episodes:
         if self._wanted is None and len(listed) > 1:
             few = ", ".join(listed) if len(listed) < _LISTED else f"{listed[0]} to {listed[-1]}"
             reason = f"holds {len(listed)} episodes (column {self._table.names[column]!r}: {few})"
-            hint = "take one by --episode N"
+            hint = "take one by --episode N, or each by --episode all"
             raise RecordingError(self._table.path, f"{reason}; {hint}")
 
     def told(self) -> list[str]:
         """What was taken, in words."""
         return [f"episode {self._wanted} of {len(self._found)}"] * (self._wanted is not None)
+
+
+def numbers_of(table: Table) -> list[int]:
+    """Numbers of the episodes of a table.
+
+    Raises:
+        ParameterError: No column says them.
+    """
+    column = _column(table)
+    if column is None:
+        raise ParameterError("--episode", "all", _NEEDED)
+    found: set[int] = set()
+    for (block,) in table.blocks([column]):
+        found |= set(np.unique(block[np.isfinite(block)]).astype(int).tolist())
+    return sorted(found)
+
+
+def _column(table: Table) -> int | None:
+    """Column of numbers that says which episode a row is of."""
+    column = names.find_episode(table.names) if table.is_named else None
+    is_number = column is not None and np.isfinite(table.sample(column)).all()
+    return column if is_number else None

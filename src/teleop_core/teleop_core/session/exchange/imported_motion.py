@@ -238,10 +238,15 @@ def open_source(path: Path, options: ImportOptions) -> Source:
         return BagSource(path, options)
     from teleop_core.session.exchange.table_source import TableSource
 
-    return TableSource(_table(path, options), options)
+    return TableSource(open_table(path, options), options)
 
 
-def _table(path: Path, options: ImportOptions) -> "Table":
+def open_table(path: Path, options: ImportOptions) -> "Table":
+    """Table of a file: Parquet, or text.
+
+    Raises:
+        RecordingError: It cannot be read.
+    """
     from teleop_core.session.exchange.tables import ParquetTable
     from teleop_core.session.exchange.text_table import TextTable
 

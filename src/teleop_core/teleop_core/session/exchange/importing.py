@@ -126,22 +126,27 @@ def _pressed(
     return stamps, presses[1][begin:end].astype(np.float64), stamps
 
 
+def command_of(path: Path, out: Path, options: Mapping[str, ImportOptions]) -> str:
+    """Command that makes a recording of a file, with the options of each arm."""
+    words = ["teleop", "import", path.name, "--out", out.name]
+    for arm, one in options.items():
+        own = one.as_arguments()
+        words += ["--arm", arm, shlex.join(own)] if arm else own
+    return shlex.join(words)
+
+
 def _about(
     path: Path, out: Path, options: Mapping[str, ImportOptions], report: ImportReport
 ) -> dict[str, str]:
     """Names and texts by which an import can be repeated."""
     from teleop_core import __version__
 
-    words = ["teleop", "import", path.name, "--out", out.name]
-    for arm, one in options.items():
-        own = one.as_arguments()
-        words += ["--arm", arm, shlex.join(own)] if arm else own
     named = {} if "" in options else {ARMS_KEY: " ".join(options)}
     return named | {
         "version": __version__,
         "imported_from": path.name,
         "imported_sha256": checksum(path),
-        "imported_by": shlex.join(words),
+        "imported_by": command_of(path, out, options),
         "imported_mapping": "; ".join(report.told),
         "imported_counts": json.dumps(asdict(report.counts)),
     }

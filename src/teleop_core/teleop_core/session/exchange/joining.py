@@ -9,7 +9,7 @@ import numpy as np
 from teleop_core.bags.memory import MemoryBag
 from teleop_core.bags.reader import Bag
 from teleop_core.bags.series import Series, in_order, kind_of
-from teleop_core.base.errors import UnknownNameError
+from teleop_core.base.errors import TeleopWarning, UnknownNameError
 from teleop_core.graph.topics import BY_NAME, Kind
 from teleop_core.kernels.geometry import Array
 from teleop_core.session.exchange.times import SECOND_NS, Stamps
@@ -179,6 +179,7 @@ def _numbers(since_ns: Stamps, step: float, first: int) -> Stamps:
         return np.arange(first, int(since_ns[-1] // step) + 1)
     warnings.warn(
         f"no rows where no message came for more than {LONGEST_GAP_NS / SECOND_NS:g} s",
+        TeleopWarning,
         stacklevel=4,
     )
     low = np.ceil(since_ns[np.append(0, ends + 1)] / step).astype(np.int64)

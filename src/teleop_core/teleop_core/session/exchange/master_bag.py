@@ -16,7 +16,7 @@ from teleop_core.bags.memory import MemoryBag
 from teleop_core.bags.messages import QUATERNION_TOLERANCE
 from teleop_core.bags.reader import Bag
 from teleop_core.bags.series import Series
-from teleop_core.base.errors import RecordingError, TeleopError
+from teleop_core.base.errors import RecordingError, TeleopError, TeleopWarning
 from teleop_core.graph.topics import MASTER_BUTTONS, MASTER_MEASURED_CP, Kind, Topic
 from teleop_core.kernels.portable import length
 from teleop_core.session.exchange.imported_motion import Motion
@@ -135,7 +135,7 @@ def _read(path: Path, arm: str, options: ImportOptions) -> dict[Topic, Series]:
         at, pressed = presses
         found[topic] = Series(at, at, pressed.astype(np.float64), (), topic.frame_id)
     if notes := [*motion.told, *motion.losses()]:
-        warnings.warn(f"{path.name}: {'; '.join(notes)}", stacklevel=4)
+        warnings.warn(f"{path.name}: {'; '.join(notes)}", TeleopWarning, stacklevel=4)
     return found
 
 

@@ -189,6 +189,8 @@ class ImportOptions:
             value = getattr(self, name)
             if value is not None and not 0.0 < value < float("inf"):
                 raise ParameterError(option(name), value, "finite and above 0")
+        if self.episode is not None and not isinstance(self.episode, int):
+            raise ParameterError("--episode", self.episode, "a number; import_episodes takes all")
         if self.skip < 0:
             raise ParameterError("--skip", self.skip, "0 or more")
         if not 0.0 <= self.missing_time < float("inf"):

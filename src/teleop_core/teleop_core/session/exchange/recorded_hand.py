@@ -16,7 +16,7 @@ import numpy as np
 
 from teleop_core.bags.reader import Bag
 from teleop_core.base.damage import damage_told
-from teleop_core.base.errors import ParameterError, RecordingError
+from teleop_core.base.errors import ParameterError, RecordingError, TeleopWarning
 from teleop_core.base.parameters import parameter
 from teleop_core.chain.operators import Motion, Operator, Setting
 from teleop_core.chain.operators.rest import REST_TILT
@@ -250,7 +250,7 @@ def _tell_stops(path: Path, samples: Samples, setting: Setting) -> None:
     share = 100.0 * is_beyond.mean()
     room = f"the device's workspace of {_millimetres(size)}"
     text = f"{share:.3g} % of the motion leaves {room}, by up to {1e3 * beyond.max():.3g} mm"
-    warnings.warn(f"{path.name}: {text}; {hint}", stacklevel=2)
+    warnings.warn(f"{path.name}: {text}; {hint}", TeleopWarning, stacklevel=2)
 
 
 def _metres(place: Array) -> str:

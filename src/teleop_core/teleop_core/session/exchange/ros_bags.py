@@ -18,7 +18,7 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from teleop_core.bags import ros_types
 from teleop_core.bags.finding import METADATA, compression_mode
 from teleop_core.bags.reader import Bag
-from teleop_core.base.errors import RecordingError
+from teleop_core.base.errors import RecordingError, TeleopWarning
 from teleop_core.session.exchange.bag_messages import Raw, plain
 
 _SHORT = re.compile(r"^(\w+)/(\w+)$")
@@ -76,7 +76,11 @@ class ForeignBag:
             count += 1
             yield log_ns, data
         if count != listed:
-            warnings.warn(f"{topic}: {count} messages of {listed} that are listed", stacklevel=2)
+            warnings.warn(
+                f"{topic}: {count} messages of {listed} that are listed",
+                TeleopWarning,
+                stacklevel=2,
+            )
 
 
 def is_plain_mcap(path: Path) -> bool:

@@ -1,0 +1,61 @@
+"""Notes on a robot of a URDF: what of it may not be meant, each in a line."""
+
+from teleop_core.robots.kinematics import DIRECTIONS
+from teleop_core.robots.rank import directions_of
+from teleop_core.robots.robot import Robot
+from teleop_core.robots.room import lever
+
+
+def notes_on_robot(robot: Robot, file: str, has_task: bool) -> list[str]:
+    """What the file may mean otherwise, and which directions the tip cannot move in.
+
+    Args:
+        robot: As it was loaded from the file.
+        file: Its path, for the text.
+        has_task: Whether the directions that it controls were asked for.
+    """
+    notes = [f"{file}: {note}" for note in robot.notes]
+    return [*notes, *filter(None, [rank_note(robot, file, has_task)])]
+
+
+def rank_note(robot: Robot, file: str, has_task: bool) -> str:
+    """Which directions an arm does not hold that cannot move in all of them at once; else empty.
+
+    Args:
+        robot: As it was loaded from the file.
+        file: Its path, for the text.
+        has_task: Whether the directions that it controls were asked for; then only too many count.
+    """
+    rank, best = directions_of(robot, lever(robot))
+    pairs = list(zip(DIRECTIONS, robot.task_mask, strict=True))
+    held, free = ([name for name, is_held in pairs if is_held == kind] for kind in (True, False))
+    if rank == len(DIRECTIONS) or (has_task and len(held) <= rank):
+        return ""
+    does = f"it controls {' '.join(held)}, and not {' '.join(free)}"
+    if len(held) > rank:
+        does = f'it is asked for {" ".join(held)}; "task={" ".join(best)}" it can follow'
+    return (
+        f"{file}: its tip moves in {rank} of 6 directions at once, so it cannot reach every pose: "
+        f'{does}. geometry=[..., "task=x y z"] chooses what it controls, and teleop reach says '
+        "how far a hand can go with that"
+    )
+
+
+def assumed_note(robot: Robot, file: str) -> str:
+    """Which limits of drives a URDF leaves out, for one joint at least; empty where none is.
+
+    Args:
+        robot: As it was loaded from the file.
+        file: Its path, for the text.
+    """
+    words = {"effort_limit": "effort", "speed_limit": "velocity"}
+    drives = robot.drives
+    missing = [] if drives is None else [name for name in words if name in drives.assumed]
+    if drives is None or not missing:
+        return ""
+    entries = {words[name]: drives.entries()[name] for name in missing}
+    found = [f"{word} {', '.join(f'{v:g}' for v in row)}" for word, row in entries.items()]
+    return (
+        f"{file} does not give every joint its limits of {' and '.join(entries)}; the rest is "
+        f"assumed. All joints, in SI units: {'; '.join(found)}"
+    )

@@ -1,0 +1,78 @@
+"""Colours of the page: one of each meaning, and of each meaning one."""
+
+import colorsys
+import re
+from collections.abc import Iterator
+from itertools import combinations
+from pathlib import Path
+
+import pytest
+
+from teleop_core import console
+from teleop_core.console.link import View
+from teleop_core.console.look import CURVES, MEANINGS, ROLES, Color, style
+from teleop_core.console.status import RESTS, status_html
+
+COLOR = re.compile(r"#[0-9a-fA-F]{6}\b|rgba?\(|\(\d{2,3}, \d{1,3}, \d{2,3}\)")
+GROUNDS = {"light": "#ffffff", "dark": "#1f2328"}
+
+
+def rgb(text: str) -> Color:
+    red, green, blue = bytes.fromhex(text.removeprefix("#"))
+    return red, green, blue
+
+
+def is_red(color: Color) -> bool:
+    """Whether a colour is a red to the eye: its hue within 20 degrees of it, and no grey."""
+    hue, _, saturation = colorsys.rgb_to_hls(*(part / 255 for part in color))
+    return min(hue, 1.0 - hue) * 360.0 < 20.0 and saturation > 0.2
+
+
+def all_colors() -> Iterator[tuple[str, Color]]:
+    for name, one in MEANINGS.items():
+        yield from ((name, color) for color in (one.scene, rgb(one.light), rgb(one.dark)))
+    yield from ROLES.items()
+    yield from ((f"curve {i}", rgb(text)) for i, text in enumerate(CURVES))
+
+
+def test_what_is_wrong_is_red_and_nothing_else_is() -> None:
+    assert {name for name, color in all_colors() if is_red(color)} == {"wrong"}
+    assert all(is_red(color) for name, color in all_colors() if name == "wrong")
+
+
+def test_no_two_things_have_one_color() -> None:
+    """Greys are one thing: what is there."""
+    names = {"idle": "there"} | dict.fromkeys(ROLES, "there")
+    named = [(names.get(name, name), color) for name, color in all_colors()]
+    for (one, color), (other, same) in combinations(named, 2):
+        distance = max(abs(a - b) for a, b in zip(color, same, strict=True))
+        assert one == other or distance > 10, (one, other)
+
+
+@pytest.mark.parametrize("ground", GROUNDS)
+@pytest.mark.parametrize("name", MEANINGS)
+def test_texts_stand_out_from_their_ground(name: str, ground: str) -> None:
+    def light(text: str) -> float:
+        parts = [part / 255 for part in rgb(text)]
+        linear = [c / 12.92 if c < 0.0404 else ((c + 0.055) / 1.055) ** 2.4 for c in parts]
+        return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2] + 0.05
+
+    low, high = sorted(light(text) for text in (getattr(MEANINGS[name], ground), GROUNDS[ground]))
+    assert high / low >= 4.5
+    assert f"--t-color-{name}: {getattr(MEANINGS[name], ground)}" in style()
+
+
+def test_colors_of_the_page_stand_in_one_table() -> None:
+    for file in Path(console.__path__[0]).glob("*.*"):
+        if file.suffix in {".py", ".js"} and file.name != "look.py":
+            found = re.findall(
+                r"#[0-9a-fA-F]{6}\b|rgba?\(|\(\d{2,3}, \d{1,3}, \d{2,3}\)", file.read_text()
+            )
+            assert not found, file.name
+
+
+def test_a_hand_that_rests_is_information_and_no_warning() -> None:
+    news = (f"operator: waits for operator/servo_cp: {RESTS}", "ik: 3 late ticks")
+    page = status_html(View(news=news, is_fresh=True), "coarse_box", "")
+    rests, late = re.findall(r'<span class="t-(\w+)">(.) (?:operator|ik)', page)
+    assert (rests, late) == (("muted", "ⓘ"), ("held", "⚠"))
