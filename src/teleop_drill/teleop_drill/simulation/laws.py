@@ -1,11 +1,13 @@
 """Laws: what must hold whatever goes wrong, judged by who sees all at once."""
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from teleop_core.bags.messages import layout
+from teleop_core.bags.reader import Bag
 from teleop_core.graph.signals import DT
 from teleop_core.graph.topics import SLAVE_SETPOINT_JS
 from teleop_core.kernels.geometry import Array
@@ -20,6 +22,8 @@ _TELL = 0.3
 """Time within which the operator is told a new state [s], of the time in which the arm works."""
 _OBEY = 0.1
 """Time within which a pressed stop is in force [s], of the time in which the arm works."""
+_FOUND_NS, _ON_THE_WAY_NS = 1_600_000_000, 300_000_000
+"""Time in which a recorder hears of all topics, and in which what was sent is recorded [ns]."""
 _QUEUES = 20_000
 """Messages that may wait anywhere."""
 
@@ -68,6 +72,8 @@ class Laws:
         self._moved_at = 0.0
         self._press: tuple[int, float] | None = None
         self._presses = 0
+        self._sent_ns: list[int] = []
+        """When setpoints were sent, by the system's clock [ns]."""
         stage.bus.seen[f"/{SLAVE_SETPOINT_JS.name}"] = self._judge_setpoint
         self._scheduler.at(0, self._look)
 
@@ -81,6 +87,7 @@ class Laws:
     # -- at every setpoint -----------------------------------------------------------------------
 
     def _judge_setpoint(self, data: bytes) -> None:
+        self._sent_ns.append(self._stage.world.time_ns())
         found = self._form.decode_one(data)
         slave = self._stage.session.node("slave")
         if found is None or slave is None:
@@ -177,6 +184,24 @@ class Laws:
                     self._break("queues", f"{len(reader.coming)} messages of {reader.topic} wait")
 
     # -- at the end ------------------------------------------------------------------------------
+
+    def judge_recording(self, path: Path) -> None:
+        """What was sent is recorded, or counted as lost.
+
+        Args:
+            path: A recording whose recorder ended in order, while no clock was stepped.
+        """
+        self._count("recorded")
+        kept_ns = Bag(path).read(SLAVE_SETPOINT_JS).log_ns
+        sent_ns = np.array(self._sent_ns)
+        begin_ns, end_ns = int(kept_ns[0]) + _FOUND_NS, int(sent_ns[-1]) - _ON_THE_WAY_NS
+        kept, sent = (
+            int(np.sum((begin_ns < times) & (times < end_ns))) for times in (kept_ns, sent_ns)
+        )
+        told = self._stage.session.observer.statuses["recorder"]
+        lost = int(told.number(f"lost.{SLAVE_SETPOINT_JS.name}"))
+        if sent - kept > lost + 1:
+            self._break("recorded", f"{sent} setpoints were sent, {kept} recorded, {lost} counted")
 
     def judge_recovery(self, seconds: float | None, bound: float) -> None:
         """After the cure the arm follows again, or says why not.

@@ -104,7 +104,10 @@ class _Run:
         self._found.seconds = 1e-9 * (self._scheduler.now_ns - begin_ns)
         for process in self._stage.session.running.values():
             self._stage.killed.add(process)  # from now on they are told to
+        first, was_killed = self._stage.session.recordings[0], self._was("kill", "recorder")
         self._stage.session.close()
+        if not (was_killed or self._was("clock step") or self._was("clock drift")):
+            self._laws.judge_recording(first)
         self._found.broken = tuple(self._laws.broken.values())
         self._found.looks.update(self._laws.looks)
         return self._found
@@ -120,6 +123,10 @@ class _Run:
         if end is not None:
             self._ends.append(end)
             self._scheduler.at(self._scheduler.now_ns + round(1e9 * fault.seconds), end)
+
+    def _was(self, kind: str, where: str = "") -> bool:
+        """Whether a fault of a kind was planned, for a process."""
+        return any(one.kind == kind and one.where in {where, ""} for one in self._found.faults)
 
     def _wait(self, seconds: float) -> None:
         self._scheduler.sleep(seconds)

@@ -53,7 +53,7 @@ class SimulatedSession:
         folder: Path, observer: Observer, master: Master,
     ) -> None:  # fmt: skip
         self._bus, self._machine, self._configuration = bus, owner.machine, configuration
-        self._folder, self._observer, self._master = folder, observer, master
+        self._folder, self.observer, self._master = folder, observer, master
         left_out = () if master is Master.DEVICE else _DRILLED
         self._processes = {
             name: tuple(node for node in nodes if node not in left_out)
@@ -83,7 +83,7 @@ class SimulatedSession:
     def _launch(self, name: str, nodes: tuple[str, ...]) -> None:
         if RECORDER_NAME in nodes:
             self.recordings.append(self._folder / f"recording_{len(self.recordings) + 1}")
-            self._begun_ns.append(self._observer.world.time_ns())
+            self._begun_ns.append(self.observer.world.time_ns())
         given = self._given()
 
         def work(process: Process) -> int:
@@ -122,11 +122,11 @@ class SimulatedSession:
 
     def _await(self, nodes: list[str]) -> None:
         for name in nodes:
-            self._observer.statuses.pop(name, None)
+            self.observer.statuses.pop(name, None)
         scheduler = self._machine.scheduler
         deadline_ns = scheduler.now_ns + round(1e9 * _STARTED)
-        while not all(self._observer.is_active(name) for name in nodes):
-            self._observer.listen(0.05)
+        while not all(self.observer.is_active(name) for name in nodes):
+            self.observer.listen(0.05)
             self.check()
             if scheduler.now_ns > deadline_ns:
                 raise SessionError(f"{', '.join(nodes)}: not at work after {_STARTED:g} s")
