@@ -184,3 +184,22 @@ def test_the_drill_gives_the_same_bits_in_processes_that_hash_otherwise(tmp_path
         place.rename(tmp_path / f"bags_{hashed}")
     assert len(seen[0][1]) == 4
     assert seen[0] == seen[1]
+
+
+def test_a_thread_that_ends_wakes_nobody_but_who_waits_for_its_end() -> None:
+    pair, order = Pair(), list[str]()
+
+    def child() -> None:
+        order.append("child ends")
+
+    def parent() -> None:
+        pair.here.thread("child", child).start()
+        pair.sleep(1.0)
+        order.append("parent goes on")
+
+    begin_ns = pair.machine.scheduler.now_ns
+    thread = pair.here.thread("parent", parent)
+    thread.start()
+    thread.join(5.0)
+    assert order == ["child ends", "parent goes on"]
+    assert pair.machine.scheduler.now_ns - begin_ns > 1_000_000_000

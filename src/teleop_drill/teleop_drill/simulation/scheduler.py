@@ -11,7 +11,7 @@ from itertools import count
 from random import Random
 from typing import Any
 
-from greenlet import greenlet
+from greenlet import GreenletExit, getcurrent, greenlet
 
 BEGIN_NS = 1_000_000_000_000
 """Where monotonic clocks begin [ns]."""
@@ -79,7 +79,8 @@ class Strand:
         self.token = 0  # a wake-up for an earlier wait is none
         self.has_priority = False
         self.error: BaseException | None = None
-        self.greenlet = greenlet(self._run)
+        # Whoever makes a greenlet goes on when it ends, unless another parent is named.
+        self.greenlet = greenlet(self._run, parent=scheduler.hub)
         self._has_begun = self._has_ended = False
         self._joined: list[Strand] = []
 
@@ -158,6 +159,7 @@ class Scheduler:
 
     Attributes:
         now_ns: Time, as monotonic clocks have it [ns].
+        hub: Greenlet in which the scheduler decides.
         current: Who runs: a strand, or whoever made the scheduler and stands outside.
         costs: How long things take.
     """
@@ -166,7 +168,7 @@ class Scheduler:
         self.seed, self.now_ns = seed, BEGIN_NS
         self.costs = Costs(self.random("costs"))
         self._queue: list[tuple[int, int, Any, int, bool]] = []
-        self._orders, self._hub = count(), greenlet.getcurrent()
+        self._orders, self.hub = count(), getcurrent()
         self._outside = Strand(self, Turns(), "outside", lambda: None)
         self.current = self._outside
         self._kept: list[Strand] = []  # a greenlet that is thrown away would run its `finally`
@@ -196,10 +198,12 @@ class Scheduler:
         return self._switch(None if seconds is None else self.now_ns + round(1e9 * seconds))
 
     def _switch(self, until_ns: int | None) -> bool:
-        strand = self.current
+        strand, here = self.current, getcurrent()
+        if here is not (self.hub if strand is self._outside else strand.greenlet):
+            raise GreenletExit  # of a simulation that is over, whose strands are thrown away
         if until_ns is not None:
             self._push(until_ns, strand, strand.token, False)
-        return self._pump() if strand is self._outside else bool(self._hub.switch())
+        return self._pump() if strand is self._outside else bool(self.hub.switch())
 
     # -- for whoever arranges --------------------------------------------------------------------
 
