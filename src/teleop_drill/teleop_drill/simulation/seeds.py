@@ -2,6 +2,7 @@
 
 import os
 import tempfile
+import traceback
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
@@ -17,7 +18,7 @@ from teleop_drill.drill.numbers import Numbers
 from teleop_drill.simulation.bus import Bus
 from teleop_drill.simulation.laws import Broken, Laws
 from teleop_drill.simulation.machine import Machine, Process
-from teleop_drill.simulation.scheduler import Scheduler
+from teleop_drill.simulation.scheduler import BEGIN_NS, Scheduler
 from teleop_drill.simulation.schedules import KINDS, Fault, draw
 from teleop_drill.simulation.stage import Stage
 
@@ -66,9 +67,14 @@ def run_seed(seed: int, faults: Sequence[Fault] | None = None, folder: Path | No
     with tempfile.TemporaryDirectory(prefix="drill_") as place:
         machine = Machine(Scheduler(seed))
         bus = Bus(machine.scheduler)
-        found: Found = machine.run(
-            lambda owner: _Run(bus, owner, seed, planned, folder or Path(place)).run()
-        )
+        try:
+            found: Found = machine.run(
+                lambda owner: _Run(bus, owner, seed, planned, folder or Path(place)).run()
+            )
+        except Exception as error:  # of one schedule, which must not end all others
+            at = 1e-9 * (machine.scheduler.now_ns - BEGIN_NS)
+            text = "".join(traceback.format_exception(error)[-2:])
+            found = Found(seed, planned, (Broken("runs", at, text),), seconds=at)
     return found
 
 

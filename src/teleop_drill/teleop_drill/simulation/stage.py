@@ -1,6 +1,7 @@
 """Stage: a session by side on a simulated machine, with all that a schedule does to it."""
 
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +10,7 @@ from std_msgs.msg import Bool
 from std_srvs.srv import Trigger
 
 from teleop_core.bags.messages import read_numbers
+from teleop_core.base.errors import SessionError
 from teleop_core.graph.graph import RECORDER_NAME
 from teleop_core.graph.topics import OPERATION, SLAVE_OPERATION, TELEOP_STATE, Topic
 from teleop_core.kernels.geometry import Array
@@ -144,9 +146,9 @@ class Stage:
 
     def help(self) -> None:
         """Do what the arm's state asks an operator for."""
-        dead = self.session.dead()
-        if dead:
-            self.session.start()
+        if self.session.dead():
+            with suppress(SessionError):  # killed again meanwhile: the next help starts it
+                self.session.start()
             return
         told = self.operation
         state = told.get("state")
