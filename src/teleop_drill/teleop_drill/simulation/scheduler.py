@@ -79,7 +79,7 @@ class Strand:
         self.token = 0  # a wake-up for an earlier wait is none
         self.has_priority = False
         self.error: BaseException | None = None
-        self.greenlet = greenlet(self._run)
+        self.greenlet = greenlet(self._run, scheduler.hub)  # whose turn it is once this one ends
         self._has_begun = self._has_ended = False
         self._joined: list[Strand] = []
 
@@ -160,13 +160,14 @@ class Scheduler:
         now_ns: Time, as monotonic clocks have it [ns].
         current: Who runs: a strand, or whoever made the scheduler and stands outside.
         costs: How long things take.
+        hub: Who gives the turns.
     """
 
     def __init__(self, seed: int) -> None:
         self.seed, self.now_ns = seed, BEGIN_NS
         self.costs = Costs(self.random("costs"))
         self._queue: list[tuple[int, int, Any, int, bool]] = []
-        self._orders, self._hub = count(), greenlet.getcurrent()
+        self._orders, self.hub = count(), greenlet.getcurrent()
         self._outside = Strand(self, Turns(), "outside", lambda: None)
         self.current = self._outside
         self._kept: list[Strand] = []  # a greenlet that is thrown away would run its `finally`
@@ -199,7 +200,7 @@ class Scheduler:
         strand = self.current
         if until_ns is not None:
             self._push(until_ns, strand, strand.token, False)
-        return self._pump() if strand is self._outside else bool(self._hub.switch())
+        return self._pump() if strand is self._outside else bool(self.hub.switch())
 
     # -- for whoever arranges --------------------------------------------------------------------
 
