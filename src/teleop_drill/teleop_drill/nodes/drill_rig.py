@@ -285,6 +285,10 @@ class LiveRig:
         self.session.send(node, signal.SIGKILL)
         self.session.await_end(node, 2.0)
 
+    def written(self) -> int:
+        """Bytes of the present recording that have reached the disk."""
+        return sum(file.stat().st_size for file in self.session.recordings[-1].glob("*.mcap"))
+
     def freeze(
         self, node: str, seconds: float, meanwhile: Callable[[], None] = lambda: None
     ) -> None:
