@@ -169,9 +169,6 @@ MUTANTS = (
            (("nodes/streams.py", "_WAITING = 20", "_WAITING = 20_000"),
             ("nodes/streams.py", "if has_buttons and self._target.tobytes() !=", "if b'x' !=")),
            (), seeds=(884,)),
-    _mutant("stop_leaves_moves", "a stop leaves a move active (as in dimos #3004)",
-            "slave/operation/states.py", "    if follower != _ENABLED:\n        s.is_busy",
-            "    if follower not in (_ENABLED, _FAULT):\n        s.is_busy", seeds=(2549,)),
     _mutant("engage_jumps", "who engages leads on from where the hand was (as in moveit2 #3378 and "
             "IsaacTeleop #730)", "chain/mapping/motion_scaling.py",
             "        s.must_latch = 1\n        if not is_doubtful:\n"
