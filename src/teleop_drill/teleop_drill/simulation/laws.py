@@ -9,6 +9,7 @@ from teleop_core.bags.messages import layout
 from teleop_core.graph.signals import DT
 from teleop_core.graph.topics import NO_COMMAND_NS, SLAVE_SETPOINT_JS
 from teleop_core.kernels.geometry import Array
+from teleop_core.slave.commands import CommandStatus
 from teleop_core.slave.operation import State
 from teleop_drill.drill.numbers import Numbers
 from teleop_drill.simulation.machine import Process
@@ -22,6 +23,8 @@ _OBEY = 0.1
 """Time within which a pressed stop is in force [s], of the time in which the arm works."""
 _OLD = 1.0
 """Age of the oldest command by which an enabled arm moves [s]."""
+_JOINING = 20
+"""Setpoints in which one that was enabled goes to where the arm is, by no command."""
 _AFTER_STEP_NS = 5_000_000_000
 """Time for which stamps of before a step of the clock may come [ns]."""
 _QUEUES = 20_000
@@ -69,7 +72,7 @@ class Laws:
         self._worked = 0.0
         """Time for which the slave has worked [s]: it does nothing while it stands still."""
         self._seen_state, self._since = -1, 0.0
-        self._offset_ns = self._stepped_ns = 0
+        self._offset_ns = self._stepped_ns = self._old = 0
         self._resting_since: float | None = None
         self._moved_at = 0.0
         self._press: tuple[int, float] | None = None
@@ -96,7 +99,7 @@ class Laws:
         process = self._stage.session.process_of("slave")
         if self._last is not None and self._last[1] is process:
             self._judge_speed(q - self._last[0])
-            if slave.stage.operation["state"] == State.ENABLED:  # else it may brake still
+            if slave.row["command_status"] == CommandStatus.FRESH:  # else it may brake still
                 self._judge_age(found[0], bool((q != self._last[0]).any()))
         self._last, self._stage.has_command = (q, process), found[0] != NO_COMMAND_NS
 
@@ -118,12 +121,14 @@ class Laws:
         if abs(offset_ns - self._offset_ns) > _LOOK_NS:
             self._offset_ns, self._stepped_ns = offset_ns, self._scheduler.now_ns
         if stamp_ns == NO_COMMAND_NS or not moves:
+            self._old = 0
             return
         if self._scheduler.now_ns - self._stepped_ns < _AFTER_STEP_NS:
             return
         self._count("age")
         age = 1e-9 * (self._scheduler.now_ns + offset_ns - stamp_ns)
-        if age > _OLD + self._late():
+        self._old = self._old + 1 if age > _OLD + self._late() else 0
+        if self._old > _JOINING:
             self._break("age", f"moves by a command that is {age:.2f} s old")
 
     # -- now and then ----------------------------------------------------------------------------
