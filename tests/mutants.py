@@ -38,6 +38,7 @@ class Mutant:
         changes: Files in the package, each with text that stands in it once, and what replaces it.
         rows: Exercises of the drill that must find it, at least one of them.
         composed: Those in one process, if they are others.
+        seeds: Schedules of ``teleop drill --seeds`` that must find it, in place of exercises.
     """
 
     name: str
@@ -45,6 +46,7 @@ class Mutant:
     changes: tuple[tuple[str, str, str], ...]
     rows: tuple[str, ...]
     composed: tuple[str, ...] | None = None
+    seeds: tuple[int, ...] = ()
 
     def rows_of(self, *, is_composed: bool) -> tuple[str, ...]:
         """Exercises in one form; empty where that form does not have what is broken."""
@@ -53,9 +55,9 @@ class Mutant:
 
 def _mutant(
     name: str, text: str, file: str, before: str, after: str, *rows: str,
-    composed: tuple[str, ...] | None = None,
+    composed: tuple[str, ...] | None = None, seeds: tuple[int, ...] = (),
 ) -> Mutant:  # fmt: skip
-    return Mutant(name, text, ((file, before, after),), rows, composed)
+    return Mutant(name, text, ((file, before, after),), rows, composed, seeds)
 
 
 _SLAVE, _COMMANDS, _WATCH = "nodes/slave.py", "slave/commands.py", "slave/operation/watch.py"
@@ -108,7 +110,7 @@ MUTANTS = (
     _mutant("no_pause", "silence never pauses", _COMMANDS,
             "0 < p.outage_ns < silence_ns", "0 < p.outage_ns < silence_ns - 10**18",
             "master_silent"),
-    _mutant("timeout_long", "commands are in force for 0.5 s longer", _STAGE,
+    _mutant("timeout_long", "commands are in force for 0.5 s longer (turtlebot3 #1154)", _STAGE,
             "round(parameters.command_timeout * 1e9)",
             "round(parameters.command_timeout * 1e9) + 500_000_000", "master_silent"),
     _mutant("braking_weak", "the arm brakes with a tenth of what it can", _STAGE,
@@ -144,8 +146,8 @@ MUTANTS = (
     _mutant("second_publishers", "messages of all publishers are taken", "nodes/sender.py",
             "if self._owner and now_ns", "if False and now_ns",
             "second_master", "second_commander", composed=("second_master",)),
-    _mutant("old_messages", "messages older than the last one are taken", "nodes/streams.py",
-            "check(self.topic.kind, stamp_ns, values, last_ns)",
+    _mutant("old_messages", "messages older than the last one are taken (axol #187)",
+            "nodes/streams.py", "check(self.topic.kind, stamp_ns, values, last_ns)",
             "check(self.topic.kind, stamp_ns, values, None)", "replayed", "stamps_frozen"),
     _mutant("plausibility_off", "a hand may be anywhere at once", "chain/mapping/plausibility.py",
             "    if not is_sound:\n", "    is_sound = True\n    if not is_sound:\n",
@@ -153,14 +155,42 @@ MUTANTS = (
     _mutant("buttons_forgotten", "silent buttons are released ones",
             "chain/mapping/plausibility.py",
             "return bool(s.is_lost)", "return False", "buttons_silent"),
-    _mutant("measured_lies", "the arm measures half of what it moves", "slave/simulation.py",
+    _mutant("measured_lies", "the arm measures what it was told", "slave/simulation.py",
             "row.slave_measured_js[i] = s.measured[i]",
-            "row.slave_measured_js[i] = 0.5 * s.measured[i]", "loss"),
+            "row.slave_measured_js[i] = arm.setpoint[i]", "stuck_tracking"),
     _mutant("recorder_late", "the recorder holds messages for 2 s", _RECORDER,
             "HOLD_NS = 100_000_000", "HOLD_NS = 2_000_000_000", "kill_recorder",
             composed=("kill_session",)),
     _mutant("not_recorded", "30 % of slave/measured* are not recorded", _RECORDER,
             "        came.sort(key=lambda message: message[0])\n", _SOME, "hiccup"),
+    # known of public stacks
+    Mutant("commands_queued", "commands that waited during an outage run after it (as in "
+           "stretch_web_teleop #3)",
+           (("nodes/streams.py", "_WAITING = 20", "_WAITING = 20_000"),
+            ("nodes/streams.py", "if has_buttons and self._target.tobytes() !=", "if b'x' !=")),
+           (), seeds=(884,)),
+    _mutant("engage_jumps", "who engages leads on from where the hand was (as in moveit2 #3378 and "
+            "IsaacTeleop #730)", "chain/mapping/motion_scaling.py",
+            "        s.must_latch = 1\n        if not is_doubtful:\n"
+            "            copy(row.slave_setpoint_cp, s.command)\n",
+            "        s.must_latch = 1 - s.is_engaged\n",
+            "master_silent", "stop_topic"),
+    Mutant("late_teleoperator", "who publishes later is never heard (as in lerobot #4166)",
+           (("nodes/sender.py", "now_ns - self._heard_ns <= self._silence_ns",
+             "now_ns - self._heard_ns <= 10**18"),
+            ("nodes/sender.py", 'gone."""\n        self._owner = b""', 'gone."""')),
+           ("kill_motion_scaling",), composed=()),
+    _mutant("drive_goes_on", "a joint goes on at its last speed when the link is lost (as in "
+            "turtlebot3 #1154)", "slave/velocity.py",
+            "is_stale = now_ns - s.driven_ns > p.timeout_ns",
+            "is_stale = now_ns - s.driven_ns > p.timeout_ns + 10**18", "press_limit"),
+    _mutant("stopped_says_ready", "a stopped arm says that it is ready", _WATCH,
+            "row[0], row[1], row[2], row[3] = s.state,",
+            "row[0], row[1], row[2], row[3] = max(1, s.state % 3),", "stop_topic"),
+    _mutant("late_reports", "a restarted slave reports late what it is", _SLAVE,
+            "        before = self._reported\n        super().send_report",
+            "        if self._turns < 2000:\n            return\n        before = self._reported\n"
+            "        super().send_report", seeds=(460,)),
     _mutant("not_closed", "the recording is left open at the end", _RECORDER,
             _CLOSED, _CLOSED.replace("self._writer.close()", "pass"), "hiccup"),
 )  # fmt: skip
@@ -223,15 +253,34 @@ def drilled(
     return {one["fault"]: one["failures"] for one in found}
 
 
+def scheduled(mutant: Mutant, seeds: Sequence[int]) -> dict[str, list[str]]:
+    """Laws that a mutant breaks in random schedules, by seed."""
+    env, found = os.environ | {"PYTHONPATH": str(tree(mutant))}, {}
+    for seed in seeds:
+        command = [sys.executable, "-m", "teleop_core.cli", "drill", "--seeds", "1"]
+        command += ["--seed", str(seed)]
+        done = subprocess.run(command, check=False, capture_output=True, text=True, env=env)
+        if not any(line[:1] in {"✓", "✗"} for line in done.stdout.splitlines()):
+            raise RuntimeError((done.stdout + done.stderr)[-2000:])
+        found[f"seed {seed}"] = [
+            one for one in done.stdout.splitlines() if "✗" in one and "✗ seed" not in one
+        ]
+    return found
+
+
 def hunt(mutants: Sequence[Mutant], *, is_composed: bool, is_live: bool) -> list[str]:
     """Drill mutants; returns the names of those that were not found."""
     missed = []
     for mutant in mutants:
-        if not (rows := mutant.rows_of(is_composed=is_composed)):
+        rows = mutant.rows_of(is_composed=is_composed)
+        seeds = () if is_composed or is_live else mutant.seeds
+        if not (rows or seeds):
             continue
         begin = time.monotonic()
         try:
-            found = drilled(mutant, rows, is_composed=is_composed, is_live=is_live)
+            found = scheduled(mutant, seeds)
+            if rows:
+                found |= drilled(mutant, rows, is_composed=is_composed, is_live=is_live)
         except Exception as error:  # a session that does not start is not found by its rows
             found = {}
             print(f"  {type(error).__name__}: {error}", flush=True)
@@ -251,7 +300,14 @@ def check_sound(mutants: Sequence[Mutant], *, is_composed: bool, is_live: bool) 
     wrong = [f"{row}: {text}" for row, texts in found.items() for text in texts]
     way = "composed" if is_composed else "processes"
     print(f"sound ({way}): {len(found)} rows, {'; '.join(wrong) or 'none fails'}", flush=True)
-    return wrong if len(found) == len(rows) else [*wrong, "not all rows were done"]
+    if len(found) < len(rows):
+        wrong.append("not all rows were done")
+    if not (is_composed or is_live):
+        seeds = sorted({seed for one in mutants for seed in one.seeds})
+        found = scheduled(SOUND, seeds)
+        wrong += [f"{name}: {text}" for name, texts in found.items() for text in texts]
+        print(f"sound: {len(seeds)} seeds, {sum(map(len, found.values()))} break a law", flush=True)
+    return wrong
 
 
 def main() -> int:
@@ -268,7 +324,8 @@ def main() -> int:
         parser.error(f"no mutant {', '.join(sorted(unknown))}; see --list")
     if asked.is_list:
         for one in MUTANTS:
-            print(f"{one.name:20} {one.text} ({', '.join(one.rows)})")
+            seeds = (f"seed {seed}" for seed in one.seeds)
+            print(f"{one.name:20} {one.text} ({', '.join((*one.rows, *seeds))})")
         return 0
     begin, wrong = time.monotonic(), []
     for is_composed in (False, True):

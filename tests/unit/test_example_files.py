@@ -19,7 +19,9 @@ PUBLIC = {
     "teleop_drill", "teleop_lab.experiments", "numpy",
     "numpy.typing", "pandas", "plotly.graph_objects",
 }  # fmt: skip
-ROS_EXAMPLES = {"crtk_client", "foreign_slave", "own_exercise", "ros_device"}
+ROS_EXAMPLES = {
+    "crtk_client", "foreign_slave", "own_exercise", "ros_device", "simulated_controller",
+}  # fmt: skip
 ROS = {
     "crtk_msgs.msg",
     "rclpy",
@@ -29,6 +31,11 @@ ROS = {
     "rclpy.signals",
     "geometry_msgs.msg",
     "sensor_msgs.msg",
+    "std_msgs.msg",
+    "teleop_core.middleware.world",
+    "teleop_drill.simulation.drill",
+    "teleop_drill.simulation.stand_ins",
+    "teleop_drill.simulation.world",
     "teleop_drill.nodes.drill",
 }
 

@@ -58,6 +58,10 @@ class Rig(Protocol):
     def kill(self, node: str) -> None:
         """Kill a node's process, as the kernel does when memory is short."""
 
+    def written(self) -> int:
+        """Bytes of the present recording that have reached the disk."""
+        ...
+
     def freeze(
         self, node: str, seconds: float, meanwhile: Callable[[], None] = lambda: None
     ) -> None:

@@ -18,18 +18,32 @@ from teleop_drill.drill.exercise import (
 )
 from teleop_drill.drill.inside import HANGS, RAISES, WORKS
 from teleop_drill.drill.numbers import Numbers
+from teleop_drill.drill.recordings import LONGEST_LOSS
 
 FREEZE = 3.0
 """For how long a process is stopped [s]."""
 _STAGES = ("haptic_master", "motion_scaling", "inverse_kinematics")
 _LOOK = 0.01
-"""Time from one look of the slave at its clocks to the next [s]."""
+"""Time from one look of the slave at its clocks, or of the drill at a file, to the next [s]."""
+_PATIENCE_NS = 2_000_000_000
+"""Time in which a recorder shows for how long it keeps what came [ns]."""
 _HOUR_NS = 3_600_000_000_000
 
 
 def _kill(node: str, rig: Rig) -> None:
     rig.mark()
     rig.kill(node)
+
+
+def _kill_writer(node: str, rig: Rig) -> None:
+    """Kill who records as soon as more waits for the disk than may be lost; else after a while."""
+    written, since_ns = rig.written(), rig.now_ns()
+    end_ns = since_ns + _PATIENCE_NS
+    while (now_ns := rig.now_ns()) < end_ns and now_ns - since_ns <= 1e9 * LONGEST_LOSS:
+        if rig.written() != written:
+            written, since_ns = rig.written(), now_ns
+        rig.wait(_LOOK)
+    _kill(node, rig)
 
 
 def _freeze(node: str, rig: Rig) -> None:
@@ -122,11 +136,11 @@ PROCESSES = (
         master=Master.DEVICE, watch=2.6, ways=(False,),
     ),
     Exercise(
-        name="kill_recorder", text="recorder killed", inject=partial(_kill, "recorder"),
+        name="kill_recorder", text="recorder killed", inject=partial(_kill_writer, "recorder"),
         motion=Motion.GOES_ON, master=Master.DEVICE, watch=1.0, ways=(False,), cuts_recording=True,
     ),
     Exercise(
-        name="kill_session", text="whole session killed", inject=partial(_kill, "slave"),
+        name="kill_session", text="whole session killed", inject=partial(_kill_writer, "slave"),
         states=(None,), cures=(Cure.RESTART,), master=Master.DEVICE, ways=(True,),
         cuts_recording=True,
     ),

@@ -249,7 +249,8 @@ class LiveRig:
     def is_following(self) -> bool:
         """Whether the slave is at work, enabled and homed, and its arm goes where the hand leads.
 
-        An arm that makes up slowly for what it lags behind moves too, while nothing leads it.
+        An arm that makes up slowly for what it lags behind, or that is driven, moves too, while
+        nothing leads it.
         """
         operation, told = self.operation(), self.tap.reports(TELEOP_STATE)
         if told and not told[-1][1]["is_following"]:
@@ -257,6 +258,8 @@ class LiveRig:
         if not operation or operation["state"] != State.ENABLED or operation["is_busy"]:
             return False
         if self.tap.age(SLAVE_SETPOINT_JS) > _FRESH or not self.session.is_running("slave"):
+            return False
+        if not self.tap.is_commanded():
             return False
         return measure.follows(*self._recent_joints(), self._speed_limit)
 
@@ -284,6 +287,10 @@ class LiveRig:
         self.mark()
         self.session.send(node, signal.SIGKILL)
         self.session.await_end(node, 2.0)
+
+    def written(self) -> int:
+        """Bytes of the present recording that have reached the disk."""
+        return sum(file.stat().st_size for file in self.session.recordings[-1].glob("*.mcap"))
 
     def freeze(
         self, node: str, seconds: float, meanwhile: Callable[[], None] = lambda: None

@@ -150,6 +150,12 @@ class Tap:
             heard = self._heard[topic.name]
             return 1e-9 * (self._world.time_ns() - heard[-1][0]) if heard else float("inf")
 
+    def is_commanded(self) -> bool:
+        """Whether the newest setpoint was made from a command: else the arm goes its own way."""
+        with self._lock:
+            _, stamps = self._counted[SLAVE_SETPOINT_JS.name]
+            return bool(stamps) and stamps[-1] != NO_COMMAND_NS
+
     def reports(self, topic: Topic) -> list[tuple[int, dict[str, float]]]:
         """Reports of a topic, each with the time at which it was sent [ns]."""
         with self._lock:

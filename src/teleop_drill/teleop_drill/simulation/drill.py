@@ -1,8 +1,9 @@
 """Drill: the exercises of a drill on a simulated machine, to the bit the same for the same seed."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from teleop_core.base.errors import ParameterError
 from teleop_core.graph.graph import RECORDER_NAME
 from teleop_core.middleware.world import World
 from teleop_core.nodes.crews import Processes, crews
@@ -17,7 +18,8 @@ from teleop_drill.simulation.bus import Bus
 from teleop_drill.simulation.inside import SimulatedSteering
 from teleop_drill.simulation.machine import Machine, Process
 from teleop_drill.simulation.scheduler import Scheduler
-from teleop_drill.simulation.session import SimulatedSession
+from teleop_drill.simulation.session import ARM, SimulatedSession
+from teleop_drill.simulation.stand_ins import Work
 from teleop_drill.simulation.world import SimulatedWorld
 
 
@@ -31,17 +33,19 @@ class SimulatedSite:
         folder: Where recordings go.
         master: Who moves the hand.
         processes: How the nodes are shared out.
+        foreign: Processes that are none of ours, by name.
     """
 
     domain = 0
 
     def __init__(
         self, bus: Bus, owner: Process, configuration: Configuration, folder: Path,
-        master: Master, processes: Processes,
+        master: Master, processes: Processes, foreign: Mapping[str, Work],
     ) -> None:  # fmt: skip
         self.is_composed = processes is Processes.ONE
         self.master, self._configuration, self._folder = master, configuration, folder
         self._bus, self._owner, self._processes = bus, owner, processes
+        self._foreign = foreign
         self.world: World = SimulatedWorld(bus, owner)
         self._steering = SimulatedSteering(owner.machine)
         self.control: Steering = self._steering
@@ -58,7 +62,7 @@ class SimulatedSite:
             shared = {SESSION: (RECORDER_NAME, *(member.name for member in graph.members))}
         made = SimulatedSession(
             self._bus, self._owner, self._configuration, shared, self._folder, observer,
-            self.master,
+            self.master, self._foreign,
         )  # fmt: skip
         self._steering.session = made
         return made
@@ -73,6 +77,8 @@ def simulated_drill(
     processes: Processes = Processes.NODES,
     files: Sequence[Path] = (),
     texts: Sequence[str] = (),
+    drives: Work | None = None,
+    arm: Work | None = None,
 ) -> list[Outcome]:
     """Do exercises on a simulated machine.
 
@@ -84,10 +90,23 @@ def simulated_drill(
         processes: How the nodes are shared out.
         files: Parameter files over the scenario ``free_motion``.
         texts: Parameters ``key=value`` over all files.
+        drives: Drives that the slave leads in place of the simulated ones, such as a bridge;
+            exercises that break the simulator are left out.
+        arm: What the drives lead, such as a model of a controller. It is started before them, and
+            nothing is done to it.
 
     Raises:
+        ParameterError: There are ``drives`` where all nodes share one process, or an ``arm``
+            without drives.
         TeleopError: A parameter is wrong, or a session cannot be started.
     """
+    if drives is not None and processes is not Processes.NODES:
+        raise ParameterError("processes", processes, f"{Processes.NODES} with drives")
+    if arm is not None and drives is None:
+        raise ParameterError("arm", arm, "with drives, which lead it")
+    both = {"slave_sim": drives, ARM: arm}
+    foreign = {name: work for name, work in both.items() if work is not None}
+    own = [one for one in exercises if not (drives and one.breaks_simulator)]
     machine = Machine(Scheduler(seed))
     bus = Bus(machine.scheduler)
 
@@ -95,11 +114,11 @@ def simulated_drill(
         bus.watch(owner)
 
         def site(master: Master, made: Configuration, place: Path) -> Site:
-            return SimulatedSite(bus, owner, made, place, master, processes)
+            return SimulatedSite(bus, owner, made, place, master, processes, foreign)
 
         given = ("real_time.priority=30", *texts)
         with SimulatedSteering.installed(machine):
-            return drill_at(site, exercises, folder, say, files, given)
+            return drill_at(site, own, folder, say, files, given)
 
     found: list[Outcome] = machine.run(work)
     return found

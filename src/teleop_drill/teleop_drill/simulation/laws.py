@@ -9,8 +9,9 @@ import numpy as np
 from teleop_core.bags.messages import layout
 from teleop_core.bags.reader import Bag
 from teleop_core.graph.signals import DT
-from teleop_core.graph.topics import SLAVE_SETPOINT_JS
+from teleop_core.graph.topics import NO_COMMAND_NS, SLAVE_SETPOINT_JS
 from teleop_core.kernels.geometry import Array
+from teleop_core.slave.commands import CommandStatus
 from teleop_core.slave.operation import State
 from teleop_drill.drill.numbers import Numbers
 from teleop_drill.simulation.machine import Process
@@ -24,6 +25,12 @@ _OBEY = 0.1
 """Time within which a pressed stop is in force [s], of the time in which the arm works."""
 _FOUND_NS, _ON_THE_WAY_NS = 1_600_000_000, 300_000_000
 """Time in which a recorder hears of all topics, and in which what was sent is recorded [ns]."""
+_OLD = 1.0
+"""Age of the oldest command by which an enabled arm moves [s]."""
+_JOINING = 20
+"""Setpoints in which one that was enabled goes to where the arm is, by no command."""
+_AFTER_STEP_NS = 5_000_000_000
+"""Time for which stamps of before a step of the clock may come [ns]."""
 _QUEUES = 20_000
 """Messages that may wait anywhere."""
 
@@ -65,9 +72,11 @@ class Laws:
         self._last: tuple[Array, Process | None] | None = None
         self._braking = float(np.max(numbers.speed_limit / numbers.braking))
         self._slave: Any = None
+        self._process: Process | None = None
         self._worked = 0.0
         """Time for which the slave has worked [s]: it does nothing while it stands still."""
         self._seen_state, self._since = -1, 0.0
+        self._offset_ns = self._stepped_ns = self._old = 0
         self._resting_since: float | None = None
         self._moved_at = 0.0
         self._press: tuple[int, float] | None = None
@@ -97,7 +106,9 @@ class Laws:
         process = self._stage.session.process_of("slave")
         if self._last is not None and self._last[1] is process:
             self._judge_speed(q - self._last[0])
-        self._last = q, process
+            if slave.row["command_status"] == CommandStatus.FRESH:  # else it may brake still
+                self._judge_age(found[0], bool((q != self._last[0]).any()))
+        self._last, self._stage.has_command = (q, process), found[0] != NO_COMMAND_NS
 
     def _judge_speed(self, step: Array) -> None:
         self._count("speed")
@@ -111,12 +122,30 @@ class Laws:
         if speed.max() > _SLACK:
             self._moved_at = self._worked
 
+    def _judge_age(self, stamp_ns: int, moves: bool) -> None:
+        """No command is followed long after it was given, such as one that waited in a queue."""
+        offset_ns = self._stage.machine.epoch_ns(self._stage.machine.clock)
+        if abs(offset_ns - self._offset_ns) > _LOOK_NS:
+            self._offset_ns, self._stepped_ns = offset_ns, self._scheduler.now_ns
+        if stamp_ns == NO_COMMAND_NS or not moves:
+            self._old = 0
+            return
+        if self._scheduler.now_ns - self._stepped_ns < _AFTER_STEP_NS:
+            return
+        self._count("age")
+        age = 1e-9 * (self._scheduler.now_ns + offset_ns - stamp_ns)
+        self._old = self._old + 1 if age > _OLD + self._late() else 0
+        if self._old > _JOINING:
+            self._break("age", f"moves by a command that is {age:.2f} s old")
+
     # -- now and then ----------------------------------------------------------------------------
 
     def _look(self) -> None:
         self._scheduler.at(self._scheduler.now_ns + _LOOK_NS, self._look)
         stage = self._stage
         slave, process = stage.session.node("slave"), stage.session.process_of("slave")
+        if process is not self._process:  # what the one before has told says nothing of this one
+            self._process, stage.operation = process, {}
         works = slave is not None and process is not None and not process.is_stopped
         if slave is not self._slave:
             self._slave, self._seen_state, self._press = slave, -1, None
@@ -138,6 +167,8 @@ class Laws:
         moves = self._worked - self._moved_at < 1e-9 * _LOOK_NS
         if moves and state != State.ENABLED and in_force > self._braking + 0.3:
             self._break("motion", f"moves {in_force:.2f} s after it became {State(state).name}")
+        if state != State.ENABLED and slave.stage.operation["is_busy"]:
+            self._break("motion", f"has a move to go on with while it is {State(state).name}")
         self._count("told")
         told = self._stage.operation.get("state")
         if in_force > _TELL and told != state:

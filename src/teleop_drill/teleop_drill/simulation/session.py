@@ -22,13 +22,15 @@ from teleop_core.session.configuration import Configuration
 from teleop_drill.drill.exercise import Master
 from teleop_drill.simulation.bus import Bus
 from teleop_drill.simulation.machine import Process
-from teleop_drill.simulation.stand_ins import SimulatedWatch, stand_by
+from teleop_drill.simulation.stand_ins import SimulatedWatch, Work, stand_by
 from teleop_drill.simulation.world import SimulatedWorld
 
 _START = 0.4  # of a process, until its node is made [s]
 _STARTED = 60.0  # patience with the start [s]
 _ENDED = 10.0  # patience with the end [s]
 _NEVER_NS = 2**62
+ARM = "arm"
+"""Process that drives lead; it is started first, and nothing is done to it."""
 _DRILLED = ("operator", "haptic_master")
 """Nodes in whose place the drill may be."""
 Processes = Mapping[str, tuple[str, ...]]
@@ -46,11 +48,13 @@ class SimulatedSession:
         folder: Where the recordings go.
         observer: Who hears what nodes say of themselves.
         master: Who moves the hand.
+        foreign: Processes that are none of ours, by name: drives in the place of the simulator, and
+            the arm that these lead.
     """
 
     def __init__(
         self, bus: Bus, owner: Process, configuration: Configuration, processes: Processes,
-        folder: Path, observer: Observer, master: Master,
+        folder: Path, observer: Observer, master: Master, foreign: Mapping[str, Work] | None = None,
     ) -> None:  # fmt: skip
         self._bus, self._machine, self._configuration = bus, owner.machine, configuration
         self._folder, self.observer, self._master = folder, observer, master
@@ -60,6 +64,9 @@ class SimulatedSession:
             for name, nodes in processes.items()
         }
         self._processes = {name: nodes for name, nodes in self._processes.items() if nodes}
+        self._foreign = dict(foreign or {})
+        if ARM in self._foreign:
+            self._processes[ARM] = (ARM,)
         self.running: dict[str, Process] = {}
         """Newest process of each name."""
         self.crews: dict[Process, Crew] = {}
@@ -72,13 +79,14 @@ class SimulatedSession:
 
     def start(self) -> None:
         """Start what does not run, the recorder first, and wait until all are at work."""
-        first = {n: k for n, k in self._processes.items() if RECORDER_NAME in k}
-        rest = {n: k for n, k in self._processes.items() if RECORDER_NAME not in k}
+        whole = self._processes.items()
+        first = {n: k for n, k in whole if RECORDER_NAME in k or n == ARM}
+        rest = {n: k for n, k in whole if n not in first}
         for crew in (first, rest):
             new = [name for name in crew if name not in self.running or self.running[name].is_dead]
             for name in new:
                 self._launch(name, crew[name])
-            self._await([node for name in new for node in crew[name]])
+            self._await([node for name in new if name not in self._foreign for node in crew[name]])
 
     def _launch(self, name: str, nodes: tuple[str, ...]) -> None:
         if RECORDER_NAME in nodes:
@@ -88,6 +96,8 @@ class SimulatedSession:
 
         def work(process: Process) -> int:
             world = SimulatedWorld(self._bus, process, given)
+            if name in self._foreign:
+                return self._foreign[name](world)
             crew = self._crew(nodes, world)
             self.crews[process] = crew
             watch = SimulatedWatch(world, crew, process)
@@ -151,8 +161,10 @@ class SimulatedSession:
         deadline_ns = scheduler.now_ns + round(1e9 * _ENDED)
         for process in processes:
             process.go_on()
-            if not process.is_dead and process in self.crews:
+            if process in self.crews:
                 self.crews[process].nodes[0].end(0)
+            elif process.name in self._foreign:
+                process.end(0, is_orderly=True)
         while not all(one.is_dead for one in processes) and scheduler.now_ns < deadline_ns:
             scheduler.sleep(0.01)
         for process in processes:

@@ -81,6 +81,8 @@ class Stage:
         """Newest report of the slave, by the names of its numbers."""
         self.is_following = False
         """Whether the mapping has said so."""
+        self.has_command = False
+        """Whether the newest setpoint was made from a command: else the arm goes its own way."""
         bus.seen[f"/{SLAVE_OPERATION.name}"] = self._note_operation
         bus.seen[f"/{TELEOP_STATE.name}"] = self._note_state
 
@@ -165,7 +167,8 @@ class Stage:
         """Whether the arm says that it goes where the hand leads."""
         told = self.operation
         return bool(
-            not self.session.dead() and self.is_following and told.get("state") == State.ENABLED
+            not self.session.dead() and self.is_following and self.has_command
+            and told.get("state") == State.ENABLED
             and told["is_homed"] and not told["is_busy"]
         )  # fmt: skip
 

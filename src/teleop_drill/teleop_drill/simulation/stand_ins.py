@@ -1,7 +1,13 @@
 """Stand-ins: a watch of processes without signals and accounts of the system; a stranger."""
 
+from collections.abc import Callable
+from typing import Any
+
+from teleop_core.graph.stage import STAGES
 from teleop_core.graph.topics import STREAMS
 from teleop_core.nodes.loop import Loop
+from teleop_core.nodes.making import make_node
+from teleop_core.nodes.process import serve
 from teleop_core.nodes.quality import profile
 from teleop_core.nodes.streams import message_type
 from teleop_core.nodes.watch import Crew
@@ -56,6 +62,25 @@ class SimulatedWatch:
         for node in self._crew.nodes:
             node.abandon()
         self._process.end(1, is_orderly=False)
+
+
+Work = Callable[[SimulatedWorld], int]
+"""What a simulated process does: told its world, it returns the exit code."""
+
+
+def run_node(world: SimulatedWorld, stage: str, **values: Any) -> int:
+    """Be a process that holds one node, until it is told to end; returns the exit code.
+
+    Args:
+        world: Of the process.
+        stage: Name of the node's stage.
+        values: Its parameters, as a parameter file has them.
+
+    Raises:
+        TeleopError: There is no such stage, or a parameter is wrong.
+    """
+    crew = make_node(STAGES.find(stage), values=values, world=world)
+    return serve(crew, SimulatedWatch(world, crew, world.process), world)
 
 
 def stand_by(world: SimulatedWorld) -> int:

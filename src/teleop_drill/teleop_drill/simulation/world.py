@@ -23,12 +23,15 @@ class SimulatedWorld:
         bus: The middleware.
         process: The process.
         given: Parameters of its file, by the full names of nodes without the slash before them.
+
+    Attributes:
+        process: As given.
     """
 
     def __init__(
         self, bus: Bus, process: Process, given: Mapping[str, Mapping[str, Any]] | None = None
     ) -> None:
-        self._bus, self._process, self._given = bus, process, given or {}
+        self._bus, self.process, self._given = bus, process, given or {}
         self._scheduler = process.machine.scheduler
         self.monotonic_ns: Callable[[], int] = self._scheduler.look_ns
         self.background: Background = Disk(process)
@@ -36,7 +39,7 @@ class SimulatedWorld:
 
     def time_ns(self) -> int:
         """Time of the system's clock [ns]."""
-        return self._scheduler.look_ns() + self._process.machine.epoch_ns(self._process.clock)
+        return self._scheduler.look_ns() + self.process.machine.epoch_ns(self.process.clock)
 
     def lock(self) -> Lock:
         """Lock between threads."""
@@ -44,7 +47,7 @@ class SimulatedWorld:
 
     def thread(self, name: str, work: Callable[[], None]) -> Strand:
         """Thread that does something, once it is started."""
-        return self._scheduler.spawn(self._process, name, work)
+        return self._scheduler.spawn(self.process, name, work)
 
     def thread_ident(self) -> int:
         """Number of the thread that calls."""
@@ -60,11 +63,11 @@ class SimulatedWorld:
 
     def connect(self, place: str) -> SocketEnd:
         """Line to who listens at a place."""
-        return self._process.machine.connect(self._process, place)
+        return self.process.machine.connect(self.process, place)
 
     def listen(self, place: str) -> Listener:
         """Listen at a place."""
-        return self._process.machine.listen(self._process, place)
+        return self.process.machine.listen(self.process, place)
 
     def feed_place(self) -> str:
         """Where the recorder of this machine listens."""
@@ -72,18 +75,18 @@ class SimulatedWorld:
 
     def node(self, name: str, **options: Any) -> SimulatedNode:
         """A node."""
-        return SimulatedNode(self._bus, self._process, name, **options)
+        return SimulatedNode(self._bus, self.process, name, **options)
 
     def lifecycle_node(self, name: str, hooks: Hooks, **options: Any) -> SimulatedLifecycleNode:
         """A node with parameters and a lifecycle."""
         full = f"{str(options.get('namespace', '')).strip('/')}/{name}".strip("/")
         return SimulatedLifecycleNode(
-            self._bus, self._process, name, hooks, self._given.get(full, {}), **options
+            self._bus, self.process, name, hooks, self._given.get(full, {}), **options
         )
 
     def executor(self) -> SimulatedExecutor:
         """Executor of the nodes of this process."""
-        return SimulatedExecutor(self._process.machine)
+        return SimulatedExecutor(self.process.machine)
 
     def guest(self, domain: int | None = None) -> "SimulatedWorld":
         """The same world: there is one domain."""
