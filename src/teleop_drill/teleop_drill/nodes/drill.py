@@ -19,8 +19,9 @@ from teleop_drill.drill.numbers import WARNED, Numbers, Scheduling
 from teleop_drill.drill.outcome import Outcome
 from teleop_drill.drill.recordings import Counted, Recorded, judge_recording
 from teleop_drill.nodes.drill_evidence import help_on, note_state, recover, seen_of
-from teleop_drill.nodes.drill_rig import LiveRig, Session, Site
+from teleop_drill.nodes.drill_rig import LiveRig
 from teleop_drill.nodes.drill_session import ARM, SIMULATOR, LiveSite
+from teleop_drill.nodes.drill_site import Session, Site
 
 _PRIORITY = 30
 _BEFORE = 0.2  # motion that is seen before a fault [s]

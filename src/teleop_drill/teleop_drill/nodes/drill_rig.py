@@ -3,8 +3,7 @@
 import re
 import signal
 from collections.abc import Callable
-from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from rcl_interfaces.srv import SetParameters
@@ -23,7 +22,7 @@ from teleop_core.graph.topics import (
 )
 from teleop_core.kernels.geometry import Array
 from teleop_core.middleware.ros_parameters import to_message
-from teleop_core.middleware.world import Qos, World
+from teleop_core.middleware.world import Qos
 from teleop_core.nodes.guest import Guest
 from teleop_core.nodes.observer import WARNING, Observer
 from teleop_core.nodes.operation import STOP_TOPIC
@@ -32,9 +31,10 @@ from teleop_core.robots.robot import Robot
 from teleop_core.session.configuration import Configuration
 from teleop_core.slave.operation import State
 from teleop_core.slave.operation.states import COMMANDS
-from teleop_drill.drill import inside, measure
+from teleop_drill.drill import measure
 from teleop_drill.drill.exercise import Master
 from teleop_drill.drill.hand import Distortion
+from teleop_drill.nodes.drill_site import Session, Site
 from teleop_drill.nodes.drill_tap import Tap
 
 _NUMBERS = re.compile(r"[-+]?[0-9][0-9.e]*")
@@ -45,86 +45,6 @@ _ANSWER = 3.0  # patience with a service [s]
 _FOUND = 3.0  # patience with discovery [s]
 _DRIVE_PERIOD = 0.01
 _FRESH = 0.3  # a setpoint that is older is none of a running slave [s]
-
-
-class Session(Protocol):
-    """Processes of a session, as a drill starts, breaks and ends them.
-
-    Attributes:
-        recordings: Recordings so far, the present one last.
-    """
-
-    recordings: list[Path]
-
-    def start(self) -> None:
-        """Start what does not run, and wait until all are at work; raises SessionError."""
-
-    def check(self) -> None:
-        """Make sure that all processes run; raises SessionError."""
-
-    def close(self) -> None:
-        """End all, in order."""
-
-    def until_ns(self, recording: Path) -> int:
-        """When the recording after one was begun [ns]; later than all without another."""
-
-    def is_running(self, node: str) -> bool:
-        """Whether the process of a node runs."""
-
-    def dead(self) -> list[str]:
-        """Processes that have ended."""
-
-    def send(self, node: str, number: int) -> None:
-        """Send a signal to a node's process."""
-
-    def await_end(self, node: str, timeout: float) -> None:
-        """Wait until a node's process has ended, or for so long [s]."""
-
-    def limit_files(self, node: str, room: int | None) -> None:
-        """Let files of a node's process grow by so many bytes only; None: as they like."""
-
-    def hog(self) -> None:
-        """Keep all processors busy."""
-
-    def relieve(self) -> None:
-        """Let them rest."""
-
-    def start_bystander(self) -> None:
-        """Start a process of others that listens to all streams."""
-
-    def kill_bystander(self) -> None:
-        """Kill it."""
-
-
-class Steering(Protocol):
-    """Who says to the processes what is to break inside of them."""
-
-    def write(self, word: int = inside.WORKS, offset_ns: int = 0) -> None:
-        """Say what the stage does and by how much the clock is off [ns]."""
-
-
-class Site(Protocol):
-    """Where a session is drilled: this machine, or a simulated one.
-
-    Attributes:
-        world: As the drill itself sees it.
-        domain: ROS domain.
-        is_composed: Whether all nodes share one process.
-        master: Who moves the hand.
-        control: What breaks inside of processes.
-    """
-
-    world: World
-    domain: int
-    is_composed: bool
-    master: Master
-    control: Steering
-
-    def session(self, observer: Observer) -> Session:
-        """Processes of a session, of which an observer hears."""
-
-    def load(self) -> float:
-        """Load of the machine, per processor."""
 
 
 class LiveRig:

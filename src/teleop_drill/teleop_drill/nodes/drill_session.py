@@ -27,7 +27,7 @@ from teleop_core.nodes.starter import START_TIMEOUT, Starter
 from teleop_core.session.configuration import Configuration
 from teleop_drill.drill import inside
 from teleop_drill.drill.exercise import Master
-from teleop_drill.nodes.drill_rig import Steering
+from teleop_drill.nodes.drill_site import Steering
 
 _NEVER_NS = 2**62
 _HAND, _MASTER = "operator", "haptic_master"

@@ -13,7 +13,7 @@ from teleop_core.session.configuration import Configuration
 from teleop_drill.drill.exercise import Exercise, Master
 from teleop_drill.drill.outcome import Outcome
 from teleop_drill.nodes.drill import Say, drill_at
-from teleop_drill.nodes.drill_rig import Site, Steering
+from teleop_drill.nodes.drill_site import Site, Steering
 from teleop_drill.simulation.bus import Bus
 from teleop_drill.simulation.inside import SimulatedSteering
 from teleop_drill.simulation.machine import Machine, Process

@@ -38,7 +38,7 @@ Processes = Mapping[str, tuple[str, ...]]
 
 
 class SimulatedSession:
-    """As of :class:`~teleop_drill.nodes.drill_rig.Session`.
+    """As of :class:`~teleop_drill.nodes.drill_site.Session`.
 
     Args:
         bus: The middleware.
