@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 import teleop_core as tc
-from teleop_core.cli import _parser
+from teleop_core.cli import _parser, main
 
 ROOT = Path(__file__).resolve().parents[1]
 HELP = "--help"
@@ -163,11 +163,22 @@ def _arm(path: Path) -> None:
     path.write_text((ROOT / "examples/ur5e.urdf").read_text(encoding="utf-8"), encoding="utf-8")
 
 
+def _data_set(path: Path) -> None:
+    """Two episodes, as `teleop export --format lerobot` writes them."""
+    bags = [path.with_name(f"of_{path.name}_{seed}") for seed in (1, 2)]
+    for seed, bag in enumerate(bags):
+        if not bag.exists():
+            tc.run("coarse_box", duration=2.0, seed=seed, out=bag)
+    if not path.exists():
+        words = ["export", *map(str, bags), "--out", str(path), "--format", "lerobot"]
+        assert main([*words, "--task", "follow the edge"]) == 0
+
+
 FILES: dict[str, Callable[[Path], None]] = {
     "hand.csv": _hand, "two.csv": _two, "mocap.txt": _mocap, "tool.csv": _tool,
     "skull.stl": _mesh, "part.stl": _mesh, "heights.csv": _heights,
     "my_arm.urdf": _arm, "arm.urdf": _arm, "poses.csv": _poses,
-    "drives.yaml": _drives, "tube.py": _tube,
+    "drives.yaml": _drives, "tube.py": _tube, "dataset": _data_set,
 }  # fmt: skip
 """Makers of the files that commands name and readers have."""
 

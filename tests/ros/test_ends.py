@@ -125,7 +125,7 @@ def test_a_composed_session_of_which_a_node_was_shut_down_ends_well(
         pytest.param(signal.SIGHUP, (), id="SIGHUP-sides", marks=pytest.mark.soak),
         pytest.param(signal.SIGQUIT, (), id="SIGQUIT-sides", marks=pytest.mark.soak),
         pytest.param(signal.SIGKILL, (), id="SIGKILL-sides"),
-        pytest.param(signal.SIGHUP, ("--composed",), id="SIGHUP-one"),
+        pytest.param(signal.SIGHUP, ("--composed",), id="SIGHUP-one", marks=pytest.mark.soak),
         pytest.param(signal.SIGQUIT, ("--composed",), id="SIGQUIT-one"),
         pytest.param(signal.SIGKILL, ("--composed",), id="SIGKILL-one"),
     ],
@@ -258,7 +258,7 @@ def test_a_session_starts_with_no_kernel_compiled_on_a_busy_machine(
     finally:
         busy.kill()
         busy.wait()
-    assert "teleop_session: compiling kernels" in session.text
+    assert "nodes: compiling kernels" in session.text
     counts = {name: topic.count for name, topic in session.recorded().topics.items()}
     assert counts[topics.SLAVE_MEASURED_JS.name] > 100
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from teleop_drill.simulation import laws
+from teleop_core.nodes.operation import StopInput
 from teleop_drill.simulation.schedules import KINDS, Fault, draw
 from teleop_drill.simulation.seeds import PROCESSES, run_seed, shrink
 
@@ -33,7 +33,7 @@ def test_schedules_are_drawn_from_their_seed_and_all_kinds_come() -> None:
 def test_a_schedule_that_breaks_a_law_is_cut_down_to_what_does_it(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(laws, "_OBEY", -10.0)  # nobody can be so fast
+    monkeypatch.setattr(StopInput, "take", lambda *_, **__: [])  # nobody hears a stop
     found = run_seed(
         0, [
             Fault(1.0, "clock drift", "", 1.0, 0.3),

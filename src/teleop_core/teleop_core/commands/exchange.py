@@ -23,7 +23,6 @@ examples:
   teleop import hand.csv --out bags/hand --time t --time-unit ms --position px py pz --unit mm
   teleop import mocap.txt --out bags/mocap --rate 100 --position 1-3 --matrix 4-12
   teleop import tool.csv --out bags/tool --euler ZYX yaw pitch roll --angles deg --axes +y -x +z
-  teleop import dataset --out bags/dataset --episode all --position 4-6
   teleop import user.bag --out bags/user --topic /MTMR/measured_cp --buttons clutch=0,mode=2
 files of known systems:
 %s

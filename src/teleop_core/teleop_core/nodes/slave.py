@@ -16,6 +16,8 @@ from teleop_core.slave.slave import SlaveParameters
 _SERVO = SLAVE_SERVO_JP.name
 _SELDOM = 10
 """Turns from one look at clocks and publishers to the next."""
+_ANSWERS = 50
+"""Samples of the arm that are answered in one turn, which takes less than a tick."""
 _CLOCK_STEP_NS = 100_000_000
 """A clock that moves by more against the monotonic one between two turns was stepped [ns]."""
 
@@ -69,7 +71,8 @@ class SlaveNode(TickingNode):
         """Bring the signals up to date, and answer every sample of the arm.
 
         The next step answers the newest one; of several that came meanwhile the others are
-        answered here.
+        answered here. After a standstill the stop comes first: of what came then, only the last
+        are answered.
         """
         measured, *others = self.ports.inputs[SLAVE_MEASURED_JS.name]
         if others or not self._is_told:
@@ -80,7 +83,7 @@ class SlaveNode(TickingNode):
         while measured.take():
             row[f"{name}_ns"] = measured.stamp_ns
             waiting.append((row[name].copy(), row[f"{name}_ns"]))
-        for values, stamp_ns in waiting[:-1]:
+        for values, stamp_ns in waiting[-_ANSWERS:-1]:
             row[name] = values
             self.stage.answer_measured()
             self.ports.send_one(self._measured_cp, stamp_ns)
