@@ -57,6 +57,13 @@ class Registry(Generic[Part]):
         self._own: set[str] = set()
         self._installed: dict[str, EntryPoint] | None = None
 
+        def register(part: Part, *, replace: bool = False) -> Part:
+            """Add a part under its own name for the rest of the program; see :meth:`add`."""
+            return self.add(getattr(part, "name", type(part).__name__), part, replace=replace)
+
+        self.register = register
+        """A function, which modules offer as their own."""
+
     def __iter__(self) -> Iterator[str]:
         return iter(self.names())
 
@@ -104,10 +111,6 @@ class Registry(Generic[Part]):
         self._own.add(name)
         self._parts[name] = checked
         return checked
-
-    def register(self, part: Part, *, replace: bool = False) -> Part:
-        """Add a part under its own name for the rest of the program; see :meth:`add`."""
-        return self.add(getattr(part, "name", type(part).__name__), part, replace=replace)
 
     def remove(self, name: str) -> None:
         """Take away a part that the program added; its name is free again.
