@@ -42,7 +42,7 @@ CODE_MUTANTS = (
     _mutant("reports_meet", "all nodes report at once", "nodes/rate.py",
             "place = stages.index(stage) if stage in stages else len(stages)", "place = 0", "rate"),
     _mutant("js_unanswered", "of two samples of the arm in a tick one is answered",
-            "nodes/slave.py", "in waiting[:-1]:", "in waiting[:0]:",
+            "nodes/slave.py", "in waiting[-_ANSWERS:-1]:", "in waiting[:0]:",
             "tests/simulated/test_bursts.py"),
     _mutant("short_queue", "a queue forgets what a late sender makes up for", "nodes/streams.py",
             "options.max_catch_up if", "20 if", "tests/simulated/test_bursts.py"),
