@@ -138,6 +138,8 @@ MUTANTS = (
     _mutant("stall_unnoticed", "a loop that stood still goes on", _SLAVE,
             "if 0.0 < longest < missed:", "if 0.0 < longest < missed - 1e9:", "freeze_slave",
             composed=("freeze_session",)),
+    _mutant("samples_first", "all samples of a standstill are answered before the stop", _SLAVE,
+            "in waiting[-_ANSWERS:-1]:", "in waiting[:-1]:", "freeze_slave", composed=()),
     _mutant("silent_arm", "an arm that says nothing is at rest", _WATCH,
             "if silence_ns > p.silence_ns:", "if silence_ns > 10**18:", "freeze_slave_sim",
             composed=()),
