@@ -247,14 +247,6 @@ def test_stages_of_a_user_run_between_ours_compiled_and_plain(recorded: Bag) -> 
     assert off[is_free(limits)].max() < 1e-3 + 1e-9
 
 
-def push(peer: "Peer", first: Any, second: Any) -> None:
-    """Send one sample of each source that is given."""
-    now = time.time_ns()
-    for topic, force in ((topics.MASTER_SERVO_CF, first), (HELPER, second)):
-        if force is not None:
-            peer.send(topic, now, [force, 0.0, 0.0, 0.0, 0.0, 0.0])
-
-
 def test_an_answer_that_is_no_number_is_counted_and_told_but_not_sent(
     package: None, peer: "Peer"
 ) -> None:

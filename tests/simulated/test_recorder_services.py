@@ -8,6 +8,7 @@ from std_srvs.srv import Trigger
 
 from teleop_core.bags.reader import Bag
 from teleop_core.bags.recording import MARKS
+from teleop_core.bags.reports import report
 from teleop_core.graph import topics
 
 if TYPE_CHECKING:
@@ -109,3 +110,15 @@ def test_a_recorder_that_waits_begins_at_the_start_service(peer: "Peer", tmp_pat
     session.send()
     assert session.node.end() == 0
     assert count(tmp_path / "bag") >= 100
+
+
+def test_a_new_recording_begins_with_the_last_state(peer: "Peer", tmp_path: Path) -> None:
+    session = Session(peer, out=str(tmp_path / "bag"))
+    state = report(7, "teleop", 0, "FOLLOWING", {"is_following": "1"})
+    peer.publisher(topics.TELEOP_STATE).publish(state)
+    peer.wait_value("recorder", f"received.{topics.TELEOP_STATE.name}", lambda n: n > 0)
+    assert session.ask("split")[0]
+    assert session.node.end() == 0
+    for name in ("bag", "bag_1"):
+        (found,) = Bag(tmp_path / name).reports(topics.TELEOP_STATE)
+        assert (found.stamp_ns, found.message) == (7, "FOLLOWING")

@@ -4,8 +4,7 @@ import ast
 import os
 import subprocess
 import sys
-from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import pytest
 
@@ -17,18 +16,6 @@ if TYPE_CHECKING:
     pass
 
 pytestmark = [pytest.mark.slow]
-
-
-SETTINGS = {
-    "operator": {"approach_time": 1.0, "patience": 0.0},
-    "motion_scaling": {"reach_force": {"is_on": False}},
-}
-
-
-@pytest.fixture
-def session(compose: Callable[..., object]) -> Any:
-    """Process of the composed session, all its nodes active."""
-    return compose(**SETTINGS)
 
 
 def test_real_time_options_are_taken_or_refused_in_one_line() -> None:

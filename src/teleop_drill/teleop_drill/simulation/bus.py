@@ -183,10 +183,12 @@ class Bus:
         )
         writer.links.append(link)
         if wanted.is_latched:
+            link.awaits_last = True
             self.scheduler.at(link.writer_knows_ns, lambda: self._send_last(writer, link))
 
     def _send_last(self, writer: Writer, link: Link) -> None:
         """Send a late reader what a latched topic has."""
+        link.awaits_last = False
         if writer.is_open and not writer.process.is_dead:
             for taken in tuple(writer.history):
                 self.carry(writer, link, taken)

@@ -26,6 +26,8 @@ class Link:
     reader_knows_ns: int
     is_reliable: bool
     last_ns: int = 0
+    awaits_last: bool = False
+    """Whether what a latched topic has, this message included, is still to be sent."""
 
 
 class Writer:
@@ -68,7 +70,7 @@ class Writer:
         if self.topic in bus.seen:
             bus.seen[self.topic](data)
         for link in self.links:
-            if link.writer_knows_ns <= now_ns:
+            if link.writer_knows_ns <= now_ns and not link.awaits_last:
                 bus.carry(self, link, taken)
 
     def get_subscription_count(self) -> int:
