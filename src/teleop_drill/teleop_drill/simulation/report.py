@@ -1,7 +1,6 @@
 """Report: what random schedules have found, and which faults met which states."""
 
 from collections import Counter
-from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 from teleop_core.slave.operation import State
@@ -66,11 +65,3 @@ def told(found: Found, shortest: Found, law: str) -> list[str]:
         *(f"    {fault.text()}" for fault in shortest.faults),
         f"    again: teleop drill --seeds 1 --seed {found.seed} --faults {kept or '-'} --out DIR",
     ]
-
-
-def merged(all_found: Iterable[Found]) -> Coverage:
-    """Coverage of some schedules."""
-    coverage = Coverage()
-    for found in all_found:
-        coverage.add(found)
-    return coverage
