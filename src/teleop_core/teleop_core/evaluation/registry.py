@@ -102,6 +102,8 @@ METRICS: Registry[type[Metric]] = Registry(
         "remote_centre": f"{_FOLDER}.remote_centre:RemoteCentreMetric",
         "jaw": f"{_FOLDER}.jaw:JawMetric",
         "transfer": f"{_FOLDER}.transfer:TransferMetric",
+        "task": f"{_FOLDER}.task:TaskMetric",
+        "display": f"{_FOLDER}.task:DisplayMetric",
         "force_sensing": f"{_FOLDER}.force_sensing:ForceSensingMetric",
         "tremor_filter": f"{_FOLDER}.tremor_filter:TremorFilterMetric",
         "motion": f"{_FOLDER}.motion:MotionMetric",

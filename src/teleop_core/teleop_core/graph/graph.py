@@ -229,14 +229,19 @@ class Graph:
             for topic in stage.writes:
                 if topic.name == port.name:
                     found = (stage, topic)
+        served = None
         for stage in self.stages:
             for old, new in zip(stage.replaced, stage.writes, strict=False):
-                if old.name == port.name and stage is reader:
+                if old.name != port.name:
+                    continue
+                if stage is reader and not stage.serves:
                     return found
                 own = {reader.name, f"{port.name}@{reader.name}"}
-                if old.name == port.name and own.isdisjoint(stage.spares):
+                if reader.name in stage.serves:
+                    served = (stage, new)
+                elif not stage.serves and own.isdisjoint(stage.spares):
                     found = (stage, new)
-        return found
+        return served or found
 
     def _delay(self, topic: Topic, reader: Stage) -> float:
         fitting = [d for d in self.delays if d.topic == topic.name]

@@ -109,3 +109,7 @@ class Row(Fields):
     slave_jaw_object_cp_ns: int
     slave_jaw_board: Array
     slave_jaw_board_ns: int
+    display_measured_cp: Array
+    display_measured_cp_ns: int
+    task_state: Array
+    task_state_ns: int

@@ -100,6 +100,8 @@ class Stage:
             filter between two stages; or several, for ``writes`` in their order.
         spares: Names of stages that read what is replaced all the same, such as an operator who
             holds the stylus itself; of one topic alone: ``slave/measured_cf@passivity``.
+        serves: Names of the only stages that read what is replaced, whatever others replace for
+            them, such as an operator who sees the slave on a display; empty for all.
         on_demand: Those of ``writes`` that are there only where another stage must read them, or
             where what they replace is written.
         notes: Further fields of its record, which nobody reads.
@@ -122,6 +124,7 @@ class Stage:
     trigger: Topic | None = None
     replaces: Topic | tuple[Topic, ...] | None = None
     spares: tuple[str, ...] = ()
+    serves: tuple[str, ...] = ()
     on_demand: tuple[Topic, ...] = ()
     notes: tuple[Field, ...] = ()
     node: str = ""
@@ -137,8 +140,10 @@ class Stage:
                 f"with {word} as a tuple of Topic, such as (topics.SLAVE_SERVO_CP,), not {found!r}"
             )
             self._insist(is_right, text)
-        is_right = isinstance(self.spares, tuple) and all(isinstance(n, str) for n in self.spares)
-        self._insist(is_right, f"with spares as a tuple of names, not {self.spares!r}")
+        for word in ("spares", "serves"):
+            found = getattr(self, word)
+            is_right = isinstance(found, tuple) and all(isinstance(name, str) for name in found)
+            self._insist(is_right, f"with {word} as a tuple of names, not {found!r}")
         known = {topic.name for topic in self.reads}
         for word in ("late", "optional", "needs"):
             for topic in getattr(self, word):
@@ -387,6 +392,8 @@ STAGES: Registry[Stage] = Registry(
         "inverse_kinematics": "teleop_core.chain.mapping.inverse_kinematics:INVERSE_KINEMATICS",
         "slave": "teleop_core.slave.slave:SLAVE",
         "slave_sim": "teleop_core.slave.slave_sim:SLAVE_SIM",
+        "display": "teleop_core.chain.master.display:DISPLAY",
+        "task": "teleop_core.chain.tasks.task:TASK",
         "arm_bridge": "teleop_core.slave.bridges.arm_bridge:ARM_BRIDGE",
         "jaw_command": "teleop_core.chain.mapping.jaw_command:JAW_COMMAND",
         "jaw": "teleop_core.slave.jaw.jaw:JAW_STAGE",

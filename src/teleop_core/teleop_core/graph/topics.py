@@ -426,6 +426,21 @@ HAND_JAW = Topic(
     "hand/jaw", Kind.NUMBERS, SAMPLED, "master_base", columns=("closing",), is_seldom=True
 )
 """How far the operator closes the jaw: 0 open, 1 closed."""
+DISPLAY_MEASURED_CP = Topic(
+    "display/measured_cp", Kind.POSE, arrived("slave/measured_cp"), "slave_base", is_seldom=True
+)
+"""Where the operator sees the slave, of a session with a display: the newest frame."""
+TASK_STATE = Topic(
+    "task/state", Kind.NUMBERS, SAMPLED, "slave_base", is_seldom=True,
+    columns=(
+        "number", "act", "goal_x", "goal_y", "goal_z", "width", "attempts", "successes", "errors",
+        "way", "off", "time",
+    ),
+)  # fmt: skip
+"""What a task asks for now, and what came of it: how many goals there were, what to do at this one
+(:class:`~teleop_core.chain.tasks.Act`), where it is and how wide [m]; attempts, successes and
+errors so far; of the last attempt: the way to its goal [m], how far the tip was beyond the goal
+along it [m], and the time it took [s]."""
 OPERATOR_SERVO_CP = Topic("operator/servo_cp", Kind.POSE, SAMPLED, "master_base")
 """Where a person who is elsewhere wants the stylus, at any rate: ``operator=remote`` leads the hand
 there. Silence lets go. As ``operator/buttons`` it comes from outside: no stage writes it, and it is
@@ -462,6 +477,8 @@ JAW_TOPICS = (
     SLAVE_JAW_MEASURED_JS, SLAVE_JAW_GRIP, SLAVE_JAW_OBJECT_CP, SLAVE_JAW_BOARD,
 )  # fmt: skip
 """Topics of a session with a jaw, the third with a network too."""
+TASK_TOPICS = (DISPLAY_MEASURED_CP, TASK_STATE)
+"""Topics of a session with a display, and of one with a task."""
 ALL = (
     *STREAMS, HAND_BUTTONS, HAND_TREMOR,
     SLAVE_MEASURED_CF, SLAVE_ESTIMATED_CF, SLAVE_TRUE_CF, *REPORTS, DIAGNOSTICS,
@@ -470,6 +487,6 @@ BY_NAME = {
     topic.name: topic
     for topic in (
         *ALL, *NETWORK_TOPICS, *PASSIVITY_TOPICS, *IMPEDANCE_TOPICS, MASTER_FILTERED_CP,
-        MASTER_FILTERED_OUT, REMOTE_CENTRE_SERVO_CP, REMOTE_CENTRE, *JAW_TOPICS,
+        MASTER_FILTERED_OUT, REMOTE_CENTRE_SERVO_CP, REMOTE_CENTRE, *JAW_TOPICS, *TASK_TOPICS,
     )
 }  # fmt: skip

@@ -11,6 +11,7 @@ from teleop_core.base.errors import ParameterError, PartError, UnknownNameError
 from teleop_core.base.parameters import Value, build, specs, values_of
 from teleop_core.chain.architectures import ARCHITECTURES
 from teleop_core.chain.architectures.impedance import IMPEDANCE
+from teleop_core.chain.operators import OPERATORS
 from teleop_core.chain.passivity import PASSIVITIES
 from teleop_core.chain.passivity.slave_side import PASSIVITY
 from teleop_core.graph.graph import DEVICE, HAND, RECORDER_NAME, Graph, Member, build_graph
@@ -71,6 +72,7 @@ class Configuration:
         for arm in graph.namespaces:
             _check_robots(graph, groups, arm)
             _check_sides(graph, groups, arm)
+            _check_operator(graph, groups, arm)
         return Configuration(groups, scenario, graph)
 
     def group(self, stage: str, arm: str = "") -> Any:
@@ -188,6 +190,19 @@ def _check_sides(graph: Graph, groups: Mapping[str, Any], arm: str) -> None:
             stages = f"teleop.stages=[{IMPEDANCE.name}]"
             needed = f"in a session with the stage {IMPEDANCE.name}, {stages}, or one of {others}"
             raise ParameterError("reflection.architecture", law, needed)
+
+
+def _check_operator(graph: Graph, groups: Mapping[str, Any], arm: str) -> None:
+    """Make sure that an operator has what it answers to.
+
+    Raises:
+        ParameterError: A stage is not there.
+    """
+    kind = groups[Member(STAGES.find(HAND), arm).name].kind.kind
+    names = [stage.name for stage in graph.stages]
+    if missing := [name for name in OPERATORS.find(kind).needs if name not in names]:
+        needed = f"in a session with a {missing[0]}: teleop.stages=[{', '.join(missing)}]"
+        raise ParameterError("operator.kind", kind, needed)
 
 
 def _check_order(stages: Iterable[str]) -> None:

@@ -25,6 +25,7 @@ from teleop_core.graph.topics import (
     MASTER_MEASURED_CF,
     MASTER_MEASURED_CP,
     SLAVE_MEASURED_CP,
+    TASK_STATE,
     TELEOP_STATE,
 )
 from teleop_core.kernels import inner, kernel
@@ -279,9 +280,10 @@ def _turn_all(rest: Array, turns: Array, attitudes: Array) -> None:
 OPERATOR = Stage(
     "operator",
     OperatorParameters,
-    reads=(SLAVE_MEASURED_CP, MASTER_MEASURED_CP, MASTER_MEASURED_CF, TELEOP_STATE),
+    reads=(SLAVE_MEASURED_CP, MASTER_MEASURED_CP, MASTER_MEASURED_CF, TELEOP_STATE, TASK_STATE),
     writes=(HAND_SERVO_CP, HAND_BUTTONS, HAND_TREMOR, HAND_JAW),
-    late=(SLAVE_MEASURED_CP, MASTER_MEASURED_CP, MASTER_MEASURED_CF, TELEOP_STATE),
+    late=(SLAVE_MEASURED_CP, MASTER_MEASURED_CP, MASTER_MEASURED_CF, TELEOP_STATE, TASK_STATE),
+    optional=(TASK_STATE,),
     on_demand=(HAND_JAW,),
     make=RunningOperator,
     node="teleop_core.nodes.operator:OperatorNode",

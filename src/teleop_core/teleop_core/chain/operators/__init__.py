@@ -44,12 +44,15 @@ class Seen(NamedTuple):
         force: Force and torque (6,) that the device gives the hand.
         state: Numbers of ``teleop/state``, as :data:`~teleop_core.graph.topics.TELEOP_STATE` names
             them.
+        task: Numbers of ``task/state``, as :data:`~teleop_core.graph.topics.TASK_STATE` names them;
+            zero without a task, and before it begins.
     """
 
     slave: Array
     stylus: Array
     force: Array
     state: Array
+    task: Array
 
 
 class Setting(NamedTuple):
@@ -83,6 +86,7 @@ class Operator:
             ``operator.approach_time``.
         length: ``length(parameters, setting)`` says how long its motion lasts [s], which a session
             then does too if its duration is not given; None for a motion without end.
+        needs: Names of stages without which it does nothing.
         is_here: False for one in whose place another node sends ``hand/servo_cp``.
         opens: ``opens(parameters)`` opens a device of this machine that moves the hand, which is
             a :class:`~teleop_core.chain.operators.remote.RemoteHand`; in live sessions alone.
@@ -96,6 +100,7 @@ class Operator:
     approaches: bool = False
     length: Callable[[Any, Setting], float] | None = None
     opens: "Callable[[Any], Device] | None" = None
+    needs: tuple[str, ...] = ()
     is_here: bool = True
 
 
@@ -165,6 +170,7 @@ OPERATORS: Registry[Operator] = Registry(
            for kind in ("random", "line", "circle", "points", "hold", "elsewhere")},
         "tour": "teleop_core.chain.operators.tour:TOUR",
         "human": "teleop_core.chain.operators.human:HUMAN",
+        "observer": "teleop_core.chain.operators.observer:OBSERVER",
         "remote": "teleop_core.chain.operators.remote:REMOTE",
         "gamepad": "teleop_core.chain.devices.gamepad:GAMEPAD",
         "spacemouse": "teleop_core.chain.devices.spacemouse:SPACEMOUSE",

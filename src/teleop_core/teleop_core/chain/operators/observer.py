@@ -1,0 +1,245 @@
+"""Observer: an operator who looks at the slave, plans from what it saw, moves, and looks again.
+
+Each look-move cycle is one submovement towards the goal of a task, with the noise of a fast hand.
+Its end is seen as late as display, network and eye make it, and only then the next one begins. So
+a delay slows it down by its share of the cycle, and nothing in here knows how long the delay is.
+Where the constants come from stands in ``docs/observer.md``.
+"""
+
+import math
+from collections import deque
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from teleop_core.base.parameters import parameter
+from teleop_core.chain.mapping.parameters import axis_map
+from teleop_core.chain.operators import Motion, Operator, Setting
+from teleop_core.chain.operators.shapes import minimum_jerk
+from teleop_core.chain.tasks import Act
+from teleop_core.graph.signals import STATE
+from teleop_core.graph.topics import TASK_STATE
+from teleop_core.kernels.geometry import Array
+from teleop_core.kernels.portable import length
+
+AHEAD = 4
+"""Ticks for which it is asked at once: what it does is up to so much later."""
+_GAIN, _CLUTCHED = STATE["gain"], STATE["is_clutched"]
+_NUMBER, _ACT, _GOAL, _WIDTH = (
+    TASK_STATE.columns.index(name) for name in ("number", "act", "goal_x", "width")
+)
+_PRESS_TIME = 0.06  # for which the hand stays closed [s]
+_STILL_TIME, _STILL = 0.02, 0.05  # at rest: in this time [s] it goes this share of its way
+_SHORTEST = 1e-5  # a way that is not worth a submovement [m]
+_MITT = "published: MacKenzie and Ware 1993, fitted to their four times of movement"
+
+
+@dataclass(frozen=True, kw_only=True)
+class ObserverParameters:
+    """How the operator sees, waits and moves."""
+
+    eye: float = parameter(
+        0.13, unit="s", lower=0.0, upper=1.0, fixed=True,
+        doc="from when something is on the screen to when a plan can use it",
+        source="published: 0.110 to 0.163 s in six studies of corrections by sight",
+    )  # fmt: skip
+    reaction: float = parameter(
+        0.25, unit="s", lower=0.0, upper=2.0, fixed=True,
+        doc="from a new goal to the first submovement", source="fitted: " + _MITT,
+    )  # fmt: skip
+    least_time: float = parameter(
+        0.06, unit="s", lower=0.02, upper=1.0, fixed=True,
+        doc="duration of a submovement of no difficulty", source="fitted: " + _MITT,
+    )  # fmt: skip
+    time_per_bit: float = parameter(
+        0.02, unit="s", lower=0.0, upper=1.0, fixed=True,
+        doc="what each bit of difficulty adds to it", source="fitted: " + _MITT,
+    )  # fmt: skip
+    noise: float = parameter(
+        0.04, unit="s", lower=0.0, upper=0.5, fixed=True,
+        doc="standard deviation of a submovement's end along its way, per mean speed",
+        source="fitted: " + _MITT + "; linear in speed: Meyer et al. 1988",
+    )  # fmt: skip
+    noise_across: float = parameter(
+        0.36, lower=0.0, upper=1.0, fixed=True, doc="the same across its way, per that along it",
+        source="assumed: as of the operator human",
+    )  # fmt: skip
+    error_cost: float = parameter(
+        0.0, unit="s", lower=0.0, upper=100.0, off=0.0, fixed=True,
+        doc="time that an error costs: it presses unseen where that is worth the wait; 0: never",
+    )  # fmt: skip
+    fastest: float = parameter(
+        0.04, unit="m/s", lower=0.005, upper=10.0, fixed=True,
+        doc="largest mean speed of a submovement of the hand; its peak is 1.9 times that",
+        source="fitted: 95 % at 65 mm/s while it moves, UVA-DSA telesurgery QoS analysis 2026",
+    )  # fmt: skip
+    longest_wait: float = parameter(
+        3.0, unit="s", lower=0.1, upper=60.0, fixed=True,
+        doc="after which it goes on, though its last motion did not show; less once it knows "
+        "how late a motion shows",
+        source="assumed: as the longest outage of the UVA-DSA telesurgery QoS analysis 2026",
+    )  # fmt: skip
+    axes: tuple[str, ...] = parameter(
+        ("-z", "-x", "+y"), length=3, fixed=True,
+        doc="axes of the hand along x, y, z of the slave, as motion_scaling's",
+    )  # fmt: skip
+
+
+class _Glance(NamedTuple):
+    """What is on the screen at a time [s]: tip and goal (3,) [m]."""
+
+    time: float
+    tip: Array
+    goal: Array
+
+
+class _Move(NamedTuple):
+    """A submovement: its begin and duration [s], and where the hand goes (3,) [m]."""
+
+    begin: float
+    duration: float
+    start: Array
+    step: Array
+    tip: Array  # where the tip was seen when it began
+    way: Array  # that the tip is meant to go
+
+
+class Observer:
+    """Motion of one session: it reads what is seen at the time that it is asked.
+
+    Args:
+        p: Its constants.
+        setting: What it is made with; ``seen`` must have a task.
+    """
+
+    def __init__(self, p: ObserverParameters, setting: Setting) -> None:
+        self._p, self._seen = p, setting.seen
+        self._hand_of_slave = axis_map("operator.observer.axes", p.axes).T
+        self._rng = np.random.default_rng((setting.seed, 3))
+        self._glances: deque[_Glance] = deque()
+        self._place = np.zeros(3)  # of the hand, where the last submovement ends
+        self._move: _Move | None = None
+        self._number = 0.0
+        self._next = 0.0  # when it may move again, whatever it sees [s]
+        self._half_seen = math.inf  # when half of the last way was seen [s]
+        self._close = -math.inf  # when the hand closes, and for a moment [s]
+        self._lag = -1.0  # how late the last motion was seen, beside the eye [s]; < 0: not known
+
+    def __call__(self, times: Array) -> Array:
+        """Rows (N, 13) of :data:`~teleop_core.chain.operators.Motion` for times (N,) [s]."""
+        now = float(times[0])
+        seen = self._seen
+        assert seen is not None
+        self._look(now)
+        rows = np.zeros((len(times), 13))
+        if seen.task[_NUMBER] > 0.0 and self._glances:
+            self._decide(now)
+        move = self._move
+        if move is not None:
+            share = minimum_jerk((times - move.begin) / move.duration)
+            rows[:, :3] = move.start + share[:, None] * move.step
+        rows[:, 12] = (times >= self._close) & (times < self._close + _PRESS_TIME)
+        return rows
+
+    def _look(self, now: float) -> None:
+        """Keep what is on the screen, and forget what is older than the eye's delay."""
+        seen = self._seen
+        assert seen is not None
+        if seen.slave[3:].any():  # else it has not been shown yet
+            goal = seen.task[_GOAL : _GOAL + 3].copy()
+            self._glances.append(_Glance(now, seen.slave[:3].copy(), goal))
+        while len(self._glances) > 1 and self._glances[1].time <= now - self._p.eye:
+            self._glances.popleft()
+
+    def _decide(self, now: float) -> None:
+        """Begin the next submovement, or press, if it is time for either."""
+        p, seen, glance = self._p, self._seen, self._glances[0]
+        assert seen is not None
+        width, act = float(seen.task[_WIDTH]), int(seen.task[_ACT])
+        if seen.task[_NUMBER] != self._number and act == Act.PRESS:
+            self._number = float(seen.task[_NUMBER])
+            self._next = now + p.reaction
+            return
+        if now < self._next or not self._has_seen(now, glance):
+            return
+        goal = glance.goal if act == Act.PASS else seen.task[_GOAL : _GOAL + 3]
+        way = goal - glance.tip
+        if act == Act.PASS:
+            way = way + self._speed_of_goal() * (p.eye + p.least_time)
+        distance = float(length(way))
+        if act == Act.PRESS and distance <= 0.5 * width:
+            self._press(now)
+        elif distance > _SHORTEST:
+            self._begin(now, glance.tip, way, distance, width, act)
+
+    def _has_seen(self, now: float, glance: _Glance) -> bool:
+        """Whether the end of the last submovement was seen.
+
+        It is seen as long after half of the way was, as the hand took from there to the end; a
+        slower arm is seen to move on.
+        """
+        move = self._move
+        if move is None:
+            return True
+        if math.isinf(self._half_seen):
+            gone = float((glance.tip - move.tip) @ move.way)
+            if gone >= 0.5 * float(move.way @ move.way):
+                self._half_seen = now
+                late = now - move.begin - 0.5 * move.duration - self._p.eye
+                self._lag = max(late, 0.0)
+            elif now >= move.begin + move.duration + self._patience():
+                return True
+        if now < self._half_seen + 0.5 * move.duration:
+            return False
+        later = next((g for g in self._glances if g.time >= glance.time + _STILL_TIME), glance)
+        still = max(_STILL * float(length(move.way)), _SHORTEST)
+        return later is glance or float(length(later.tip - glance.tip)) <= still
+
+    def _patience(self) -> float:
+        """How long after its end a motion that does not show is waited for [s]."""
+        p = self._p
+        if self._lag < 0.0:
+            return p.longest_wait
+        return min(p.longest_wait, p.eye + 1.5 * self._lag + p.reaction)
+
+    def _begin(
+        self, now: float, tip: Array, way: Array, distance: float, width: float, act: int
+    ) -> None:
+        """Begin a submovement along a way of the tip (3,) [m], as long as it is."""
+        p, seen = self._p, self._seen
+        assert seen is not None
+        gain = float(seen.state[_GAIN]) or 1.0
+        duration = p.least_time + p.time_per_bit * math.log2(distance / width + 1.0)
+        duration = max(duration, distance / gain / p.fastest)
+        spread = p.noise * distance / duration
+        along, noise = way / distance, self._rng.standard_normal(3)
+        ahead = along * float(along @ noise)
+        ended = way + spread * (ahead + p.noise_across * (noise - ahead))
+        step = self._hand_of_slave @ ended / gain
+        self._move = _Move(now, duration, self._place, step, tip, way)
+        self._place = self._place + step
+        self._next, self._half_seen = now + duration, math.inf
+        missed = math.erfc(0.5 * width / (math.sqrt(2.0) * max(spread, 1e-12)))
+        if (
+            act == Act.PRESS
+            and missed * p.error_cost < max(self._lag, 0.0) + p.eye
+            and p.error_cost > 0.0
+        ):
+            self._press(now + duration)
+
+    def _press(self, when: float) -> None:
+        """Close the hand at a time [s], and do nothing else until there is another goal."""
+        self._close, self._next = when, math.inf
+
+    def _speed_of_goal(self) -> Array:
+        """Velocity of the goal (3,) [m/s] as it is seen."""
+        first, last = self._glances[0], self._glances[-1]
+        return (last.goal - first.goal) / max(last.time - first.time, 1e-9)
+
+
+def _make(p: ObserverParameters, setting: Setting) -> Motion:
+    return Observer(p, setting)
+
+
+OBSERVER = Operator("observer", _make, ObserverParameters, ahead=AHEAD, needs=("task",))

@@ -1,0 +1,107 @@
+"""Stage ``task``: sets goals, sees whether they are reached, and tells both."""
+
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from teleop_core.base.parameters import Choice, choice
+from teleop_core.chain.tasks import MEMORY, SCENE, TASKS
+from teleop_core.graph.row import Row
+from teleop_core.graph.signals import DT, STATE, assign
+from teleop_core.graph.stage import RunningStage, Stage
+from teleop_core.graph.topics import (
+    HAND_JAW,
+    SLAVE_TRUE_CF,
+    SLAVE_TRUE_CP,
+    TASK_STATE,
+    TELEOP_STATE,
+)
+from teleop_core.kernels import kernel
+from teleop_core.kernels.fields import Fields, record
+from teleop_core.kernels.geometry import Array
+
+_IS_FOLLOWING = STATE["is_following"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class TaskParameters:
+    """Which task it is."""
+
+    kind: Choice = choice(TASKS, "point", fixed=True, doc="what the operator is to do")
+
+
+class TaskState(Fields):
+    """When the task began."""
+
+    begin_ns: int
+
+
+class Part(NamedTuple):
+    """The task's judge, its numbers, its memory (64,) and what it sees."""
+
+    judge: Any
+    numbers: Array
+    memory: Array
+    scene: Array
+
+
+@kernel
+def task_step(p: TaskState, s: TaskState, part: Part, row: Row, dt: float) -> None:
+    """One tick: show the task the scene and let it write task_state, once the slave follows.
+
+    Args:
+        p: Not used.
+        s: State record; written.
+        part: :class:`Part`; memory and scene are written.
+        row: Signals.
+        dt: Tick [s].
+    """
+    if s.begin_ns == 0:
+        if row.teleop_state[_IS_FOLLOWING] <= 0.0 or row.slave_true_cp_ns == 0:
+            return
+        s.begin_ns = row.now_ns
+    scene = part.scene
+    scene[0] = 1e-9 * (row.now_ns - s.begin_ns)
+    for i in range(7):
+        scene[1 + i] = row.slave_true_cp[i]
+    scene[8] = row.hand_jaw[0]
+    for i in range(3):
+        scene[9 + i] = row.slave_true_cf[i]
+    part.judge(part.numbers, part.memory, scene, row.task_state)
+
+
+class RunningTask(RunningStage):
+    """Stage of a task; it begins when the slave first follows the hand."""
+
+    def __init__(self, parameters: TaskParameters, dt: float = DT) -> None:
+        super().__init__(TASK, 0, dt)
+        self.state = record(TaskState)
+        self.kernel = task_step
+        kind = TASKS.find(parameters.kind.kind)
+        numbers = kind.numbers(parameters.kind.parameters)
+        self._part = Part(kind.judge_pointer, numbers, np.zeros(MEMORY), np.zeros(len(SCENE)))
+        self.arguments = (record(TaskState), self.state, self._part)
+        self._begin = self.signals.copy()
+        self.reset()
+
+    def reset(self) -> None:
+        """No goal is set yet."""
+        assign(self.state, 0)
+        assign(self.signals, self._begin)
+        self._part.memory[:] = 0.0
+
+    def retune(self, parameters: TaskParameters) -> None:
+        """Take new numbers of the task from the next tick on; goals that are set stay."""
+        self._part.numbers[:] = TASKS.find(parameters.kind.kind).numbers(parameters.kind.parameters)
+
+
+TASK = Stage(
+    "task",
+    TaskParameters,
+    reads=(SLAVE_TRUE_CP, HAND_JAW, TELEOP_STATE, SLAVE_TRUE_CF),
+    writes=(TASK_STATE,),
+    late=(HAND_JAW, TELEOP_STATE),
+    optional=(SLAVE_TRUE_CF,),
+    make=RunningTask,
+)

@@ -1,0 +1,148 @@
+"""Task: what an operator made of a task: attempts, errors, times, throughput."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from teleop_core.evaluation.context import Context
+from teleop_core.evaluation.metric import Metric, figure, keys_of
+from teleop_core.evaluation.rows import Row, row
+from teleop_core.evaluation.windows import Window
+from teleop_core.graph.topics import DISPLAY_MEASURED_CP, TASK_STATE
+
+GROUP = "task"
+_ATTEMPTS, _SUCCESSES, _WAY, _OFF, _TIME = (
+    TASK_STATE.columns.index(name) for name in ("attempts", "successes", "way", "off", "time")
+)
+EFFECTIVE = 4.133
+"""Effective width in standard deviations of the end points: 96 % of a normal distribution."""
+
+
+@dataclass(frozen=True)
+class TaskScore:
+    """What came of a task; None without one, or where too little was tried."""
+
+    attempts: int | None = figure("1", "attempts at a goal")
+    successes: int | None = figure("1", "attempts that ended within the goal's width")
+    error_share: float | None = figure("1", "share of the attempts that ended outside of it")
+    time_s: float | None = figure("s", "mean time of an attempt, from when the goal was set")
+    throughput: float | None = figure(
+        "bit/s",
+        "log2(mean way / effective width + 1) over the mean time, without the first attempt",
+    )
+    effective_width_mm: float | None = figure(
+        "mm", "4.133 standard deviations of the end points along their ways"
+    )
+
+
+class TaskMetric(Metric):
+    """Counts and times of the attempts that ``task/state`` tells.
+
+    Source:
+        ISO/TS 9241-411 2012, annex B, for throughput and effective width.
+    """
+
+    name = "task"
+    keys = keys_of("task", TaskScore)
+    topics = (TASK_STATE,)
+
+    def __init__(self, _: Context) -> None:
+        self._tried: list[np.ndarray] = []
+        self._count = np.nan  # of the attempts in the last sample
+        self._before = 0.0  # successes before the first sample
+
+    def add(self, window: Window) -> None:
+        """Take one window."""
+        told = window.samples(TASK_STATE).values
+        if len(told):
+            if np.isnan(self._count):
+                self._before = told[0, _SUCCESSES]
+            counts = np.append(self._count, told[:, _ATTEMPTS])
+            self._tried += list(told[np.diff(counts) > 0.0])
+            self._count = counts[-1]
+
+    def values(self) -> TaskScore:
+        """Score of everything so far."""
+        if np.isnan(self._count):
+            return TaskScore(None, None, None, None, None, None)
+        if not self._tried:
+            return TaskScore(0, 0, None, None, None, None)
+        tried = np.array(self._tried)
+        count, time = len(tried), float(tried[:, _TIME].mean())
+        successes = int(tried[-1, _SUCCESSES] - self._before)
+        errors = 1.0 - successes / count
+        if count < 4:
+            return TaskScore(count, successes, errors, time, None, None)
+        later = tried[1:]
+        width = EFFECTIVE * float(later[:, _OFF].std(ddof=1))
+        way, lasted = float(later[:, _WAY].mean()), float(later[:, _TIME].mean())
+        bits = float(np.log2(way / width + 1.0)) if width > 0.0 else None
+        rate = None if bits is None else bits / lasted
+        return TaskScore(count, successes, errors, time, rate, 1e3 * width)
+
+    def rows(self) -> list[Row]:
+        """All six; nothing without a task."""
+        score = self.values()
+        if score.attempts is None:
+            return []
+        return [
+            Row(GROUP, "attempts", "", str(score.attempts)),
+            Row(GROUP, "successes", "", str(score.successes)),
+            row(
+                GROUP, "errors", "%", None if score.error_share is None else 1e2 * score.error_share
+            ),
+            row(GROUP, "time of an attempt, mean", "s", score.time_s),
+            row(GROUP, "throughput", "bit/s", score.throughput),
+            row(GROUP, "effective width", "mm", score.effective_width_mm),
+        ]
+
+
+@dataclass(frozen=True)
+class DisplayScore:
+    """How late the operator saw the slave; None without a display."""
+
+    age_mean_ms: float | None = figure("ms", "mean age of the newest frame that was on the screen")
+    rate_hz: float | None = figure("Hz", "frames with another pose that were shown in a second")
+
+
+class DisplayMetric(Metric):
+    """Age of what the operator saw, from when the slave was there to the end of each frame."""
+
+    name = "display"
+    keys = keys_of("display", DisplayScore)
+    topics = (DISPLAY_MEASURED_CP,)
+
+    def __init__(self, _: Context) -> None:
+        self._logs: list[np.ndarray] = []
+        self._stamps: list[np.ndarray] = []
+
+    def add(self, window: Window) -> None:
+        """Take one window."""
+        shown = window.samples(DISPLAY_MEASURED_CP)
+        self._logs.append(shown.log_ns)
+        self._stamps.append(shown.stamp_ns)
+
+    def values(self) -> DisplayScore:
+        """Score of everything so far."""
+        logs, stamps = (
+            np.concatenate(part or [np.empty(0, np.int64)]) for part in (self._logs, self._stamps)
+        )
+        is_new = np.diff(stamps, prepend=-1) > 0
+        logs, stamps = logs[is_new], stamps[is_new]
+        if len(logs) < 2:
+            return DisplayScore(None, None)
+        until = np.diff(logs)
+        # An age grows from the frame's arrival to that of the next one.
+        ages = (logs[:-1] - stamps[:-1]) + 0.5 * until
+        span = float(until.sum())
+        return DisplayScore(1e-6 * float((ages * until).sum()) / span, 1e9 * (len(logs) - 1) / span)
+
+    def rows(self) -> list[Row]:
+        """Both; nothing without a display."""
+        score = self.values()
+        if score.rate_hz is None:
+            return []
+        return [
+            row("display", "age of what is seen, mean", "ms", score.age_mean_ms),
+            row("display", "frames", "Hz", score.rate_hz),
+        ]
