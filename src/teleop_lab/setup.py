@@ -11,7 +11,7 @@ setup(
     description="Experiments, calibration, fitting and planning for teleop_core",
     license="Apache-2.0",
     packages=find_packages(include=["teleop_lab", "teleop_lab.*"]),
-    package_data={"teleop_lab": ["py.typed", "*.pyi", "fitting/*.csv"]},
+    package_data={"teleop_lab": ["py.typed", "*.pyi", "fitting/*.csv", "experiments/*.csv"]},
     python_requires=">=3.11",
     install_requires=[
         f"teleop_core=={VERSION}",

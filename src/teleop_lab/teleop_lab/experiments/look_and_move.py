@@ -1,0 +1,57 @@
+"""Look and move: how many looks a person needs to a target, and how long they take.
+
+The same constants as those of the operator ``observer``, without an arm: what a law of delay says
+of any motion that the eye leads.
+"""
+
+import numpy as np
+
+from teleop_core.chain.operators.observer import ObserverParameters
+from teleop_core.kernels.geometry import Array
+
+_PEOPLE = 20_000
+_MOST = 60  # looks; nobody needs more
+CYCLE = 0.325
+"""Time of a look-move cycle of a person without any lag [s], identified from MacKenzie and Ware
+1993: their four lags give MT = 2.7 (0.325 s + lag) within 2 %."""
+
+
+def looks(way: float, width: float, passed: float = 1.0, seed: int = 1) -> tuple[float, float]:
+    """How many submovements a target takes on average, and how long they are together [s].
+
+    Args:
+        way: To the target [m].
+        width: Of the target, in which a motion ends [m].
+        passed: Share of each motion that arrives, as over a line that loses increments.
+        seed: Of the noise of the hand.
+    """
+    p, rng = ObserverParameters(), np.random.default_rng(seed)
+    off = np.full(_PEOPLE, way)
+    count, time, tries = np.zeros(_PEOPLE), np.zeros(_PEOPLE), np.ones(_PEOPLE, bool)
+    for _ in range(_MOST):
+        lasts = p.least_time + p.time_per_bit * np.log2(np.abs(off) / width + 1.0)
+        noise = rng.standard_normal(_PEOPLE) * p.noise * np.abs(off) / lasts
+        off = np.where(tries, off - passed * off + noise, off)
+        count += tries
+        time += np.where(tries, lasts, 0.0)
+        tries &= np.abs(off) > 0.5 * width
+    return float(count.mean()), float(time.mean())
+
+
+def movement_time(way: float, width: float, lag: float) -> tuple[float, float]:
+    """Time [s] to press in a target that is seen late, and how many looks it takes.
+
+    Args:
+        way: To the target [m].
+        width: Of the target [m].
+        lag: By which it is seen late, beside the eye [s].
+    """
+    p = ObserverParameters()
+    count, moving = looks(way, width)
+    return p.reaction + moving + count * (p.eye + lag), count
+
+
+def difficulty(way: float | Array, width: float) -> float | Array:
+    """Index of difficulty [bit]; MacKenzie 1992, in Shannon's form."""
+    found: float | Array = np.log2(way / width + 1.0)
+    return found

@@ -1,0 +1,101 @@
+"""UVA: times of a user study of fifteen people, predicted before its table was read.
+
+The prediction stands in ``uva_prediction.csv`` as it was written down; ``docs/predicted_study.md``
+says when and how.
+"""
+
+from typing import NamedTuple
+
+from teleop_lab.experiments.look_and_move import CYCLE, difficulty, looks
+
+LATENCY = 0.033 + 0.050
+"""Of the station by itself [s]: two frames at 60 Hz, and a video's encoder and decoder, which take
+50 ms (Nankaku et al. 2022)."""
+TOTAL = 22.1
+"""Mean time of a transfer without faults [s], printed: the one number of the study that scales the
+prediction."""
+
+
+class Primitive(NamedTuple):
+    """A motion primitive of a transfer: what it aims at."""
+
+    name: str
+    way: float  # [m]
+    width: float  # within which it is done [m]
+
+
+PRIMITIVES = (
+    Primitive("right reaches", 0.060, 0.006),
+    Primitive("right grasps", 0.006, 0.002),
+    Primitive("right lifts off", 0.017, 0.006),
+    Primitive("both meet", 0.045, 0.004),
+    Primitive("left grasps", 0.008, 0.002),
+    Primitive("right releases", 0.004, 0.004),
+    Primitive("right retreats", 0.025, 0.010),
+    Primitive("left reaches the goal", 0.055, 0.004),
+    Primitive("left releases", 0.015, 0.002),
+)
+"""Ways from the geometry of the board; widths assumed: fingers on a block 2 mm, a peg through its
+hole 2 to 4 mm, clear of a peg 6 mm, out of the way 10 mm."""
+
+
+class Level(NamedTuple):
+    """A level of the study: what the line does."""
+
+    name: str
+    delay: float = 0.0  # mean [s]
+    loss: float = 0.0  # share of the increments
+    outage: float = 0.0  # mean length [s]
+    pause: float = 0.0  # between two of them [s]
+
+
+LEVELS = (
+    Level("normal"),
+    Level("loss 10 %", loss=0.1), Level("loss 30 %", loss=0.3), Level("loss 50 %", loss=0.5),
+    Level("delay 100 ms", delay=0.1), Level("delay 300 ms", delay=0.3),
+    Level("delay 500 ms", delay=0.5),
+    Level("outages 1", outage=1.5, pause=8.5), Level("outages 2", outage=0.5, pause=1.0),
+    Level("outages 3", outage=1.0, pause=1.0),
+)  # fmt: skip
+
+
+def _plain(primitive: Primitive, level: Level) -> float:
+    """Time of a primitive at a level [s], before the one scale for all of them.
+
+    Each look costs a cycle, the station's latency and the delay. What is lost of a motion is to be
+    moved again. An outage costs its length and the cycle that it spoils.
+    """
+    count, _ = looks(primitive.way, primitive.width, 1.0 - level.loss)
+    time = count * (CYCLE + LATENCY + level.delay)
+    if level.pause > 0.0:
+        time *= 1.0 + (level.outage + CYCLE + LATENCY) / level.pause
+    return time
+
+
+def _mackenzie(primitive: Primitive, level: Level) -> float:
+    """The same by the law of MacKenzie and Ware 1993: MT = 230 + (169 + 1.03 lag) ID ms."""
+    bits = float(difficulty(primitive.way, primitive.width))
+    return 0.230 + (0.169 + 1.03 * (LATENCY + level.delay)) * bits
+
+
+def predict() -> dict[str, dict[str, dict[str, float]]]:
+    """Times [s] by model, level and primitive; each model takes :data:`TOTAL` without faults.
+
+    ``looks`` is the prediction; ``constant`` slows every primitive of every level by the same
+    factor, the mean of the printed totals; ``mackenzie`` is the law for pointing, which knows
+    delays alone.
+    """
+    slower = sum((22.1, 24.4, 26.6, 36.2, 27.1, 34.1, 47.9, 28.9, 47.4, 64.3)) / 10.0 / TOTAL
+    normal = LEVELS[0]
+    models = {
+        "looks": _plain,
+        "constant": lambda p, level: _plain(p, normal) * (1.0 if level is normal else slower),
+        "mackenzie": _mackenzie,
+    }
+    found = {}
+    for name, model in models.items():
+        scale = TOTAL / sum(model(p, normal) for p in PRIMITIVES)
+        found[name] = {
+            level.name: {p.name: scale * model(p, level) for p in PRIMITIVES} for level in LEVELS
+        }
+    return found
