@@ -75,6 +75,8 @@ EXPERIMENTS: Registry[Experiment] = Registry(
         "transparency": f"{_PLACE}.transparency:TRANSPARENCY",
         "drift": f"{_PLACE}.drift:DRIFT",
         "puncture": f"{_PLACE}.puncture:PUNCTURE",
+        "fitts": f"{_PLACE}.fitts:FITTS",
+        "uva": f"{_PLACE}.uva:UVA",
         "mma_frames": f"{_PLACE}.mma_frames:MMA_FRAMES",
         "mma_balance": f"{_PLACE}.mma_spring:MMA_BALANCE",
         "hybrid": f"{_PLACE}.hybrid:HYBRID",
