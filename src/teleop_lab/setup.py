@@ -2,7 +2,7 @@
 
 from setuptools import find_packages, setup
 
-COMMANDS = ("calibrate", "experiment", "fit", "reach")
+COMMANDS = ("calibrate", "experiment", "fit", "reach", "study")
 VERSION = "0.6.0"  # released together with teleop_core
 
 setup(
@@ -22,7 +22,9 @@ setup(
         "pyyaml",
         "rich",
         "scipy",
+        "xarray",
     ],
+    extras_require={"dask": ["distributed"]},
     data_files=[
         ("share/ament_index/resource_index/packages", ["resource/teleop_lab"]),
         ("share/teleop_lab", ["package.xml"]),

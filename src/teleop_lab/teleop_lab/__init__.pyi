@@ -9,5 +9,6 @@ from .experiments import (
 )
 from .fitting import FitError as FitError, FitResult as FitResult, fit_plant as fit_plant
 from .planning.reach import Reach as Reach, reach as reach
+from .studies import Study as Study, read_study as read_study, sweep as sweep
 
 __version__: str

@@ -1,0 +1,96 @@
+"""``teleop study``: sessions over named values of parameters, resumed where they were left."""
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from teleop_core.base.errors import SessionError
+from teleop_core.commands.arguments import command
+
+if TYPE_CHECKING:
+    from distributed import Client
+
+_EPILOG = """\
+a study is a YAML file:
+  scenario: point
+  seeds: 10                                       how many, from 1 on, or a list
+  set: {operator.tremor_amplitude: 0.0}           the same in all sessions
+  sweep:                                          a dimension each
+    display.latency: [0.033, 0.133, 0.333]
+    coarse_gain: [0.5, 1.0]
+  metrics: [task.time_s, task.error_share]        keys of scores, as `teleop evaluate --json`
+then:
+  teleop study FILE.yaml --explain                how many sessions, how long, how many bytes
+  teleop study FILE.yaml --store runs/delay       killed and called again, it goes on
+  teleop study FILE.yaml --store runs/delay --html delay.html --csv delay.csv
+"""
+
+
+def add(commands: Any) -> None:
+    """Add the command's parser."""
+    text = "run sessions over named values of parameters and seeds, and compare their scores"
+    parser = command(commands, "study", _run, text, _EPILOG)
+    parser.add_argument("file", type=Path, metavar="FILE.yaml", help="what is compared")
+    parser.add_argument(
+        "--store", type=Path, metavar="DIR", help="keep results there, and run only what is not"
+    )
+    parser.add_argument("--jobs", type=int, metavar="N", help="processes (default: processors)")
+    parser.add_argument(
+        "--scheduler", metavar="ADDRESS", help="run on the workers of this Dask scheduler"
+    )
+    parser.add_argument("--recordings", type=Path, metavar="DIR", help="record each session there")
+    parser.add_argument("--explain", action="store_true", help="say what it costs, and run nothing")
+    parser.add_argument("--html", type=Path, metavar="FILE", help="write a page with plots")
+    parser.add_argument("--csv", type=Path, metavar="FILE", help="write a line for each session")
+
+
+def _run(arguments: argparse.Namespace) -> int:
+    from teleop_core.base.errors import ParameterError
+    from teleop_core.commands.progress import shown_progress
+    from teleop_core.evaluation.command import check_places, write_whole
+    from teleop_lab.studies import read_study
+    from teleop_lab.studies.summary import study_table
+
+    study = read_study(arguments.file)
+    if arguments.jobs is not None and arguments.jobs < 1:
+        raise ParameterError("--jobs", arguments.jobs, "1 or more processes")
+    explained = study.explain(arguments.store, arguments.jobs)
+    print(explained)
+    if arguments.explain:
+        return 0
+    check_places(arguments.html, arguments.csv)
+    client = _client(arguments.scheduler) if arguments.scheduler else None
+    with shown_progress(arguments.file.stem) as progress:
+        found = study.run(
+            arguments.store, jobs=arguments.jobs, client=client, recordings=arguments.recordings,
+            progress=progress,
+        )  # fmt: skip
+    print(study_table(study, found))
+    failed = [str(error) for error in found["error"].values.ravel() if error]
+    if failed:
+        print(f"{len(failed)} of {explained.sessions} failed; first: {failed[0]}")
+    if arguments.csv is not None:
+        write_whole(arguments.csv, found.to_dataframe().to_csv())
+        print(f"numbers: {arguments.csv}")
+    if arguments.html is not None:
+        from teleop_lab.studies.page import study_page
+
+        write_whole(arguments.html, study_page(study, found, arguments.file.stem))
+        print(f"page: {arguments.html}")
+    return 1 if failed else 0
+
+
+def _client(address: str) -> "Client":
+    """Client of a Dask scheduler.
+
+    Raises:
+        SessionError: There is none, or Dask is not installed.
+    """
+    try:
+        from distributed import Client
+    except ImportError as error:
+        raise SessionError("--scheduler needs Dask: pip install teleop_lab[dask]") from error
+    try:
+        return Client(address, timeout="10s", set_as_default=False)
+    except (OSError, ValueError) as error:
+        raise SessionError(f"no Dask scheduler answers at {address}") from error

@@ -1,0 +1,12 @@
+"""Studies: sessions over named values of parameters and seeds, resumed where they were left.
+
+>>> from teleop_lab import sweep
+>>> found = sweep("point", metrics=["task.time_s"], seed=range(5),
+...               settings={"display.latency": [0.033, 0.133, 0.333]})
+>>> found["task.time_s"].mean("seed")
+"""
+
+from teleop_lab.studies.dataset import dataset_of
+from teleop_lab.studies.study import Explained, Study, read_study, sweep
+
+__all__ = ["Explained", "Study", "dataset_of", "read_study", "sweep"]

@@ -1,0 +1,119 @@
+"""Page: a study as one HTML file: lines with intervals, heat maps, and paired differences."""
+
+from html import escape
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from teleop_core.evaluation.figure import FIRST, FIXTURE, SECOND, THIRD
+from teleop_lab.experiments.drawing import axis
+from teleop_lab.studies.study import SEED, is_number
+from teleop_lab.studies.summary import conditions, differences, mean_of
+
+if TYPE_CHECKING:
+    import xarray
+
+    from teleop_lab.studies.study import Study
+
+_COLORS = (FIRST, SECOND, THIRD, FIXTURE, "#7f7f7f", "#17becf", "#bcbd22", "#8c564b")
+_STYLE = """body{font-family:system-ui,sans-serif;max-width:60rem;margin:2rem auto;padding:0 1rem}
+table{border-collapse:collapse;margin:1rem 0}td,th{padding:.25rem .75rem;text-align:left;
+border-bottom:1px solid #ddd}@media(prefers-color-scheme:dark){body{background:#16181c;color:#ddd}
+td,th{border-color:#444}}"""
+
+
+def study_page(study: "Study", found: "xarray.Dataset", title: str) -> str:
+    """HTML page of a study; it works offline, with plotly.js inside."""
+    import plotly.graph_objects as go
+    from plotly.offline import get_plotlyjs
+
+    parts = [_table(study, found)]
+    for metric in study.metrics:
+        for figure in (_lines(study, found, metric), _heat(study, found, metric)):
+            if figure is not None:
+                drawn = go.Figure(*figure)
+                parts.append(drawn.to_html(full_html=False, include_plotlyjs=False))
+        parts.append(_changes(study, found, metric))
+    errors = sorted({str(error) for error in found["error"].values.ravel() if error})
+    parts += [f"<p>failed: {escape(error)}</p>" for error in errors]
+    facts = ", ".join(f"{name} {value}" for name, value in found.attrs.items() if value)
+    return (
+        f'<!doctype html><html lang="en"><meta charset="utf-8"><title>{escape(title)}</title>'
+        f"<style>{_STYLE}</style><script>{get_plotlyjs()}</script><h1>{escape(title)}</h1>"
+        f"<p>{escape(facts)}. Means over the seeds, with 95 % intervals by the bootstrap.</p>"
+        + "".join(parts)
+        + "</html>"
+    )
+
+
+def _label(found: "xarray.Dataset", metric: str) -> dict[str, Any]:
+    unit = found[metric].attrs.get("units", "1")
+    return axis(metric, "" if unit == "1" else unit)
+
+
+def _lines(study: "Study", found: "xarray.Dataset", metric: str) -> tuple[Any, Any] | None:
+    """A line over the first parameter for each combination of the others."""
+    if not study.swept:
+        return None
+    name = next(iter(study.swept))
+    lines: dict[str, list[tuple[Any, Any]]] = {}
+    for values, part in conditions(study, found):
+        others = ", ".join(f"{key}={value}" for key, value in values.items() if key != name)
+        lines.setdefault(others, []).append((values[name], mean_of(part[metric].values)))
+    traces = []
+    for number, (others, points) in enumerate(lines.items()):
+        means = [mean for _, mean in points]
+        traces.append(
+            {
+                "type": "scatter", "mode": "lines+markers", "name": others or metric,
+                "x": [x if is_number(x) else str(x) for x, _ in points],
+                "y": [mean.value for mean in means],
+                "error_y": {
+                    "type": "data", "symmetric": False,
+                    "array": [mean.high - mean.value for mean in means],
+                    "arrayminus": [mean.value - mean.low for mean in means],
+                },
+                "line": {"color": _COLORS[number % len(_COLORS)]},
+            }
+        )  # fmt: skip
+    layout = {"xaxis": axis(name), "yaxis": _label(found, metric), "height": 420}
+    return traces, layout
+
+
+def _heat(study: "Study", found: "xarray.Dataset", metric: str) -> tuple[Any, Any] | None:
+    """Means over everything else, of the first two parameters; None with fewer."""
+    if len(study.swept) < 2:
+        return None
+    first, second = list(study.swept)[:2]
+    others = [name for name in (*study.swept, SEED) if name not in {first, second}]
+    means = found[metric].mean(others).transpose(second, first)
+    trace = {
+        "type": "heatmap", "z": np.asarray(means.values), "colorscale": "Viridis",
+        "x": [str(value) for value in study.swept[first]],
+        "y": [str(value) for value in study.swept[second]],
+        "colorbar": {"title": {"text": metric}},
+    }  # fmt: skip
+    layout = {"xaxis": axis(first), "yaxis": axis(second), "height": 380}
+    return [trace], layout
+
+
+def _table(study: "Study", found: "xarray.Dataset") -> str:
+    heads = "".join(f"<th>{escape(name)}</th>" for name in (*study.swept, *study.metrics))
+    rows = []
+    for values, part in conditions(study, found):
+        cells = [str(value) for value in values.values()]
+        cells += [str(mean_of(part[metric].values)) for metric in study.metrics]
+        rows.append("".join(f"<td>{escape(cell)}</td>" for cell in cells))
+    return f"<table><tr>{heads}</tr>{''.join(f'<tr>{row}</tr>' for row in rows)}</table>"
+
+
+def _changes(study: "Study", found: "xarray.Dataset", metric: str) -> str:
+    rows = [
+        f"<tr><td>{escape(name)}</td><td>{escape(str(value))}</td><td>{escape(str(mean))}</td></tr>"
+        for name, means in differences(study, found, metric).items()
+        for value, mean in zip(study.swept[name][1:], means, strict=True)
+    ]
+    if not rows:
+        return ""
+    head = f"<tr><th>{escape(metric)}</th><th>against the first value</th><th>difference</th></tr>"
+    return f"<table>{head}{''.join(rows)}</table>"

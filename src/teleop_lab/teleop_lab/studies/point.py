@@ -1,0 +1,126 @@
+"""Point: one session of a study, its key, and what comes of it."""
+
+import hashlib
+import json
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from functools import cache
+from importlib.resources import files
+from pathlib import Path
+
+import teleop_core
+from teleop_core.base.errors import TeleopError
+from teleop_core.session.api import Setting, run
+from teleop_core.session.configuration import Configuration
+
+
+@dataclass(frozen=True)
+class Key:
+    """What a result depends on: digests of its parameters and of the code that made it."""
+
+    recipe: str
+    code: str
+
+
+@dataclass(frozen=True)
+class Point:
+    """One session of a study.
+
+    Attributes:
+        place: Its value in every dimension.
+        scenario: As the study's.
+        settings: All parameters that are given.
+        seed: Its seed.
+        length: How long the hand moves [s].
+        key: What its result depends on.
+    """
+
+    place: Mapping[str, Setting]
+    scenario: str | None
+    settings: Mapping[str, Setting]
+    seed: int
+    length: float
+    key: Key
+
+    @property
+    def name(self) -> str:
+        """Name of its result, by its place alone."""
+        text = json.dumps({name: repr(value) for name, value in self.place.items()}, sort_keys=True)
+        return hashlib.sha256(text.encode()).hexdigest()[:20]
+
+
+@dataclass(frozen=True)
+class Result:
+    """What came of a point: scores, or the error in their place.
+
+    Attributes:
+        name: Of the point.
+        key: Its key.
+        scores: Numbers by key of a score; None where it does not apply.
+        error: What went wrong; empty where nothing did.
+        seconds: How long it took [s].
+    """
+
+    name: str
+    key: Key
+    scores: Mapping[str, float | None]
+    error: str
+    seconds: float
+
+    def to_json(self) -> str:
+        """The result as a text that :meth:`from_json` reads, to the bit."""
+        return json.dumps(asdict(self))
+
+    @staticmethod
+    def from_json(text: str) -> "Result":
+        """Result of a text.
+
+        Raises:
+            ValueError: It is another text.
+        """
+        found = json.loads(text)
+        try:
+            key = Key(**found.pop("key"))
+            return Result(key=key, **found)
+        except (AttributeError, KeyError, TypeError) as error:
+            raise ValueError(str(error)) from error
+
+
+def recipe_of(made: Configuration) -> str:
+    """Digest of a whole configuration, whatever its seed."""
+    lines = [line for line in made.text().splitlines() if line.strip().partition(":")[0] != "seed"]
+    return hashlib.sha256("\n".join(lines).encode()).hexdigest()[:20]
+
+
+def point_key(recipe: str, seed: int, metrics: Sequence[str], code: str) -> Key:
+    """Key of a point: any change of parameters, seed, scores or code makes another one."""
+    text = json.dumps([recipe, seed, sorted(metrics)])
+    return Key(hashlib.sha256(text.encode()).hexdigest()[:20], code)
+
+
+@cache
+def code_digest() -> str:
+    """Digest of the sources of ``teleop_core``: other code may give other numbers."""
+    found = hashlib.sha256()
+    root = Path(str(files("teleop_core")))
+    for path in sorted(root.rglob("*.py")):
+        found.update(path.relative_to(root).as_posix().encode() + b"\0" + path.read_bytes())
+    return f"{teleop_core.__version__}-{found.hexdigest()[:16]}"
+
+
+def compute(point: Point, metrics: Sequence[str], recordings: Path | None) -> Result:
+    """Run a point's session and score it; an error is a result too."""
+    begin = time.monotonic()
+    scores: dict[str, float | None] = {}
+    error = ""
+    try:
+        out = recordings / point.name if recordings is not None else None
+        session = run(point.scenario, seed=point.seed, settings=point.settings, out=out)
+        score = session.score()
+        scores = {metric: score.value(metric) for metric in metrics}
+    except TeleopError as raised:
+        error = " ".join(str(raised).split())
+    except Exception as raised:  # a part of a user's: the study goes on, the point says why
+        error = f"{type(raised).__name__}: {' '.join(str(raised).split())}"
+    return Result(point.name, point.key, scores, error, time.monotonic() - begin)

@@ -1,0 +1,112 @@
+"""Store: results of a study on disk, each written whole as it comes."""
+
+import json
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from teleop_core.base.errors import SessionError
+from teleop_lab.studies.point import Point, Result
+
+if TYPE_CHECKING:
+    from teleop_lab.studies.study import Study
+
+FORMAT = 1
+_ABOUT = "study.json"
+
+
+class Store:
+    """Results by the names of their points.
+
+    Args:
+        folder: Where they are kept; None: in memory.
+    """
+
+    def __init__(self, folder: Path | None) -> None:
+        self.folder = folder
+        self._results: dict[str, Result] = {}
+
+    @staticmethod
+    def open(folder: Path | str | None, study: "Study") -> "Store":
+        """Store of a study, made if it is missing.
+
+        Raises:
+            SessionError: It is of another study or of a newer version, or cannot be written.
+        """
+        store = Store(None if folder is None else Path(folder))
+        if store.folder is not None:
+            store._prepare(study)
+        return store
+
+    def _prepare(self, study: "Study") -> None:
+        assert self.folder is not None
+        about = {"format": FORMAT, "scenario": study.scenario, "dimensions": list(study.names)}
+        file = self.folder / _ABOUT
+        try:
+            self.folder.mkdir(parents=True, exist_ok=True)
+            if not file.exists():
+                if any(self.folder.iterdir()):
+                    raise SessionError(f"{self.folder} holds something else; choose another place")
+                write_whole(file, json.dumps(about))
+            found = json.loads(file.read_text("utf-8"))
+        except (OSError, ValueError) as error:
+            raise SessionError(f"{self.folder} cannot be used as a store: {error}") from error
+        if found.get("format", 0) > FORMAT:
+            raise SessionError(f"{self.folder} is a store of a newer version ({found['format']})")
+        for name, value in about.items():
+            if found.get(name) != value:
+                text = f"{self.folder} is a store of another study: its {name}"
+                raise SessionError(f"{text} is {found.get(name)!r}, not {value!r}")
+        for path in self.folder.glob("*/*.json"):
+            try:
+                result = Result.from_json(path.read_text("utf-8"))
+            except (OSError, ValueError):
+                continue  # not whole: as if it were missing
+            self._results[result.name] = result
+
+    def result(self, point: Point) -> Result | None:
+        """Result of a point; None if it is missing."""
+        return self._results.get(point.name)
+
+    def reason(self, point: Point) -> str:
+        """Why a point is to be run; empty if it is not."""
+        found = self.result(point)
+        if found is None:
+            return "missing"
+        if found.key.code != point.key.code:
+            return "changed code"
+        if found.key.recipe != point.key.recipe:
+            return "changed parameters"
+        return "failed" if found.error else ""
+
+    def take(self, result: Result) -> None:
+        """Keep a result.
+
+        Raises:
+            SessionError: The disk cannot take it; what is there stays.
+        """
+        self._results[result.name] = result
+        if self.folder is not None:
+            write_result(self.folder, result)
+
+
+def write_result(folder: Path, result: Result) -> None:
+    """Write a result whole or not at all; a second time changes nothing.
+
+    Raises:
+        SessionError: The disk cannot take it.
+    """
+    place = folder / result.name[:2]
+    try:
+        place.mkdir(exist_ok=True)
+        write_whole(place / f"{result.name}.json", result.to_json())
+    except OSError as error:
+        text = f"{folder} cannot take more: {error.strerror}; what is done is kept"
+        raise SessionError(f"{text}, and the same command goes on from there") from error
+
+
+def write_whole(path: Path, text: str) -> None:
+    """Write a file under another name, then rename it, so that it is never seen half written."""
+    half = path.with_name(f".{path.name}.{os.getpid()}")
+    half.write_text(text, "utf-8")
+    half.replace(path)

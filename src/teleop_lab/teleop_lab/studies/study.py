@@ -1,0 +1,299 @@
+"""Study: what is compared, its points, and how they are run."""
+
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import product
+from os import sched_getaffinity
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import yaml
+
+from teleop_core.base.errors import ParameterError, UnknownNameError
+from teleop_core.base.own_parts import load_own_parts
+from teleop_core.evaluation.score import keys
+from teleop_core.graph.layers import SESSION
+from teleop_core.session.api import Setting, configuration
+from teleop_core.session.runner import silent
+from teleop_lab.studies.point import Point, code_digest, point_key, recipe_of
+from teleop_lab.studies.store import Store
+
+if TYPE_CHECKING:
+    import xarray
+    from distributed import Client
+
+SEED = "seed"
+_KEYS = ("scenario", "seeds", "set", "sweep", "metrics", "parts", "duration")
+_SPEED = 25.0
+"""Simulated seconds that a process makes in a second, with scores; measured on a busy machine."""
+_RESULT = 600
+"""Bytes of a stored result."""
+_SECOND = 200_000
+"""Bytes of a recorded second, compressed."""
+
+
+@dataclass(frozen=True)
+class Explained:
+    """What a study costs, without running it.
+
+    Attributes:
+        sessions: How many there are in all.
+        to_run: Those that are missing, failed or changed.
+        why: How many of them for which reason: missing, failed, changed code, changed parameters.
+        simulated: Time that those last [s].
+        wall: About how long that takes on the processes given [s].
+        stored: Bytes of all results.
+        recorded: Bytes of their recordings, if they are kept.
+    """
+
+    sessions: int
+    to_run: int
+    why: Mapping[str, int]
+    simulated: float
+    wall: float
+    stored: int
+    recorded: int
+
+    def __str__(self) -> str:
+        reasons = ", ".join(f"{count} {reason}" for reason, count in self.why.items())
+        return (
+            f"{self.sessions} sessions, {self.to_run} to run ({reasons or 'all are there'}): "
+            f"{self.simulated:.0f} s simulated, about {self.wall:.0f} s; "
+            f"{self.stored / 1e6:.3g} MB of results, {self.recorded / 1e9:.3g} GB of recordings "
+            "if they are kept"
+        )
+
+
+@dataclass(frozen=True)
+class Study:
+    """Sessions over named values of parameters and seeds.
+
+    Attributes:
+        scenario: One of ``teleop scenarios``; None for the defaults.
+        swept: Values of each parameter, named as on the command line; a dimension each.
+        seeds: A dimension too.
+        metrics: Keys of scores, such as ``task.time_s``; a variable each.
+        settings: Parameters that are the same in all sessions.
+        parts: Files that register parts of your own.
+
+    Raises:
+        TeleopError: A parameter, value, key of a score or part is wrong; nothing was run.
+    """
+
+    scenario: str | None
+    swept: Mapping[str, Sequence[Setting]]
+    seeds: Sequence[int]
+    metrics: Sequence[str]
+    settings: Mapping[str, Setting] = field(default_factory=dict)
+    parts: Sequence[Path] = ()
+
+    def __post_init__(self) -> None:
+        load_own_parts(self.parts)
+        for name, values in self.swept.items():
+            if not len(values):
+                raise ParameterError(f"sweep of {name}", (), "at least one value")
+            if len({repr(value) for value in values}) < len(values):
+                raise ParameterError(f"sweep of {name}", tuple(values), "values that differ")
+        if not len(self.seeds) or len(set(self.seeds)) < len(self.seeds) or min(self.seeds) < 0:
+            raise ParameterError("seed", tuple(self.seeds), "whole numbers >= 0 that differ")
+        if not len(self.metrics):
+            raise ParameterError("metrics", (), "at least one key of a score, as task.time_s")
+        known = [name for key in keys() if key.unit != "" for name in key.names()]
+        for metric in self.metrics:
+            path = tuple(metric.split("."))
+            if not any(key.covers(path) for key in keys()):
+                raise UnknownNameError("key of a score", metric, known)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the dimensions, seed last."""
+        return (*self.swept, SEED)
+
+    def points(self) -> list[Point]:
+        """All points, in the order of the dimensions; each configuration is checked here.
+
+        Raises:
+            TeleopError: One of them cannot run; the text names the value.
+        """
+        found, code = [], code_digest()
+        for values in product(*self.swept.values()):
+            chosen = dict(zip(self.swept, values, strict=True))
+            given = {**self.settings, **chosen}
+            made = configuration(self.scenario, settings=given)
+            recipe, length = recipe_of(made), float(made.groups[SESSION].duration)
+            for seed in self.seeds:
+                place = {**chosen, SEED: int(seed)}
+                key = point_key(recipe, int(seed), self.metrics, code)
+                found.append(Point(place, self.scenario, given, int(seed), length, key))
+        return found
+
+    def explain(self, store: Path | str | None = None, jobs: int | None = None) -> Explained:
+        """How many sessions, how long and how many bytes, without running one.
+
+        Args:
+            store: Where results are already.
+            jobs: Processes; None: as many as processors.
+
+        Raises:
+            TeleopError: As :meth:`points`, or the store is another study's.
+        """
+        points = self.points()
+        kept = Store.open(store, self) if store is not None else None
+        why: dict[str, int] = {}
+        left = 0.0
+        for point in points:
+            reason = "missing" if kept is None else kept.reason(point)
+            if reason:
+                why[reason] = why.get(reason, 0) + 1
+                left += point.length
+        wall = left / _SPEED / (jobs or len(sched_getaffinity(0)))
+        total = sum(point.length for point in points)
+        return Explained(
+            len(points), sum(why.values()), why, left, wall, _RESULT * len(points),
+            round(_SECOND * total),
+        )  # fmt: skip
+
+    def run(
+        self,
+        store: Path | str | None = None,
+        *,
+        jobs: int | None = None,
+        client: "Client | None" = None,
+        recordings: Path | str | None = None,
+        progress: Callable[[int, int], None] = silent,
+    ) -> "xarray.Dataset":
+        """Run what is missing, failed or changed, and give all results.
+
+        A call that was killed goes on where it was with the same store: results are written one by
+        one, as they come. A session that fails is a point with its error.
+
+        Args:
+            store: Directory of the results, made if it is missing; None keeps them in memory.
+            jobs: Processes of this machine, a session at a time in each; None: as many as
+                processors.
+            client: A Dask client whose workers run the sessions in place of processes; nothing but
+                values travels.
+            recordings: Directory for a recording of each session; None: none are kept.
+            progress: Told how many points are done, and how many there are.
+
+        Raises:
+            TeleopError: As :meth:`explain`, before the first session.
+        """
+        from teleop_lab.studies.dataset import dataset_of
+        from teleop_lab.studies.workers import in_processes, on_dask
+
+        points = self.points()
+        kept = Store.open(store, self)
+        to_run = [point for point in points if kept.reason(point)]
+        done = len(points) - len(to_run)
+        progress(done, len(points))
+        if client is not None:
+            results = on_dask(client, self, to_run)
+        else:
+            results = in_processes(self, to_run, jobs, kept.folder, recordings)
+        for result in results:
+            kept.take(result)
+            done += 1
+            progress(done, len(points))
+        return dataset_of(self, points, kept)
+
+
+def sweep(
+    scenario: str | None = None,
+    *,
+    metrics: Sequence[str],
+    seed: Iterable[int] = range(1, 2),
+    settings: Mapping[str, Setting | Sequence[Setting]] | None = None,
+    parts: Sequence[Path | str] = (),
+    store: Path | str | None = None,
+    jobs: int | None = None,
+    client: "Client | None" = None,
+    progress: Callable[[int, int], None] = silent,
+    **parameters: Setting | Sequence[Setting],
+) -> "xarray.Dataset":
+    """Scores over named values of parameters: a dimension each, and one for the seed.
+
+    Args:
+        scenario: One of ``teleop scenarios``.
+        metrics: Keys of scores; a variable each.
+        seed: Seeds.
+        settings: Parameters by name; a list is swept, anything else holds for all.
+        parts: Files that register parts of your own.
+        store: As in :meth:`Study.run`, and so those that follow.
+        jobs: As there.
+        client: As there.
+        progress: As there.
+        **parameters: As ``settings``, with ``__`` for each dot: ``display__latency=[0.0, 0.3]``.
+
+    Raises:
+        TeleopError: A name or value is wrong; nothing was run.
+    """
+    named = {name.replace("__", "."): value for name, value in parameters.items()}
+    study = _study(scenario, list(seed), metrics, dict(settings or {}) | named, parts)
+    return study.run(store, jobs=jobs, client=client, progress=progress)
+
+
+def _study(
+    scenario: str | None,
+    seeds: Sequence[int],
+    metrics: Sequence[str],
+    given: Mapping[str, Any],
+    parts: Iterable[Path | str],
+) -> Study:
+    """Study in which lists are swept."""
+    swept = {name: tuple(v) for name, v in given.items() if isinstance(v, list | range)}
+    fixed = {name: value for name, value in given.items() if name not in swept}
+    return Study(
+        scenario, swept, tuple(seeds), tuple(metrics), fixed, tuple(Path(part) for part in parts)
+    )
+
+
+def read_study(path: Path | str) -> Study:
+    """Study of a YAML file: scenario, set, sweep, seeds, metrics, parts, duration.
+
+    ``seeds`` is how many there are, from 1 on, or a list. ``parts`` are files beside it.
+
+    Raises:
+        TeleopError: The file cannot be read, or says something else.
+    """
+    path = Path(path)
+    try:
+        content = yaml.safe_load(path.read_text("utf-8"))
+    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
+        reason = " ".join(str(error).split())
+        raise ParameterError(
+            "study", str(path), f"a YAML file that can be read ({reason})"
+        ) from error
+    if not isinstance(content, dict):
+        raise ParameterError("study", str(path), f"a YAML file with {', '.join(_KEYS)}")
+    for key in content:
+        if key not in _KEYS:
+            raise UnknownNameError(f"entry of {path.name}", str(key), _KEYS)
+    seeds = content.get("seeds", 1)
+    is_count = isinstance(seeds, int) and seeds > 0
+    if not is_count and not (isinstance(seeds, list) and all(isinstance(s, int) for s in seeds)):
+        raise ParameterError("seeds", seeds, "how many there are, or a list of whole numbers")
+    fixed, swept = content.get("set") or {}, content.get("sweep") or {}
+    for name, part in (("set", fixed), ("sweep", swept)):
+        if not isinstance(part, dict):
+            raise ParameterError(name, part, "parameters by name, each with its value")
+    for name, values in swept.items():
+        if not isinstance(values, list):
+            raise ParameterError(f"sweep of {name}", values, "a list of values")
+    metrics, parts = content.get("metrics") or [], content.get("parts") or []
+    if not isinstance(metrics, list) or not isinstance(parts, list):
+        raise ParameterError("metrics", metrics, "a list of keys of scores; parts a list of files")
+    if "duration" in content:
+        fixed = {f"{SESSION}.duration": content["duration"], **fixed}
+    numbers = tuple(range(1, seeds + 1)) if isinstance(seeds, int) else tuple(seeds)
+    return Study(
+        content.get("scenario"), {str(k): tuple(v) for k, v in swept.items()}, numbers,
+        tuple(map(str, metrics)), {str(k): v for k, v in fixed.items()},
+        tuple(path.parent / str(part) for part in parts),
+    )  # fmt: skip
+
+
+def is_number(value: object) -> bool:
+    """Whether a value of a parameter is a finite number, which an axis can show."""
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
