@@ -12,7 +12,7 @@ from teleop_core.evaluation.metric import Key, Metric
 from teleop_core.evaluation.registry import METRICS
 from teleop_core.evaluation.rows import Row, row, spread_rows
 from teleop_core.evaluation.score import Score, Session, frame_of, key_table, keys
-from teleop_core.evaluation.scoring import evaluate, scores
+from teleop_core.evaluation.scoring import evaluate, measure, scores
 from teleop_core.evaluation.traces import Envelope
 from teleop_core.evaluation.tracking import Tracked, tracked
 from teleop_core.evaluation.windows import Window
@@ -38,6 +38,7 @@ __all__ = [
     "key_table",
     "keys",
     "line",
+    "measure",
     "register_metric",
     "row",
     "scores",

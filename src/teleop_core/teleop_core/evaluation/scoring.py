@@ -10,7 +10,7 @@ import numpy as np
 
 from teleop_core.bags.arms import arm_names, of_arm
 from teleop_core.bags.reader import Bag
-from teleop_core.base.errors import EvaluationError, PartError, RecordingError
+from teleop_core.base.errors import EvaluationError, PartError, RecordingError, UnknownNameError
 from teleop_core.evaluation.bands import Band, bands_of
 from teleop_core.evaluation.context import Accumulator, Context
 from teleop_core.evaluation.figure import Figure
@@ -20,7 +20,7 @@ from teleop_core.evaluation.metrics.reach import GROUP as REACH_GROUP
 from teleop_core.evaluation.origin import read_origin
 from teleop_core.evaluation.plain import Plain, leaves, plain
 from teleop_core.evaluation.published import Gains
-from teleop_core.evaluation.registry import all_metrics
+from teleop_core.evaluation.registry import METRICS, all_metrics
 from teleop_core.evaluation.rows import Row
 from teleop_core.evaluation.score import Result, Score, Session
 from teleop_core.evaluation.state_history import StateHistory, read_history
@@ -88,6 +88,41 @@ def scores(
 ) -> list[Score]:
     """Scores of all arms of a recording, the default arm first; as :func:`evaluate`."""
     return [found.score for found in studies(bag, further, span)]
+
+
+def measure(bag: Bag, keys: Iterable[str], arm: str = "") -> dict[str, float | None]:
+    """Numbers under some keys of a score, by the metrics that have them alone: faster.
+
+    Args:
+        bag: The recording.
+        keys: Such as ``task.time_s``.
+        arm: As in :func:`evaluate`.
+
+    Returns:
+        Numbers by key; None where one does not apply.
+
+    Raises:
+        UnknownNameError: There is no such metric or key.
+        EvaluationError: A text stands there, or a metric fails.
+        RecordingError: The recording is damaged.
+        PartError: A metric does not keep to its keys.
+    """
+    wanted = list(keys)
+    makers = [METRICS.find(name) for name in dict.fromkeys(k.partition(".")[0] for k in wanted)]
+    context, metrics = _run(of_arm(bag, arm), arm or arm_names(bag)[0], makers, None)
+    known = {
+        ".".join((metric.name, *path)): value
+        for metric in metrics
+        for path, value in leaves(_result(context, metric).json or {}).items()
+    }
+    found: dict[str, float | None] = {}
+    for key in wanted:
+        if key not in known:
+            raise UnknownNameError("key of a score", key, known)
+        if isinstance(value := known[key], str):
+            raise EvaluationError(f"{key} of {bag.path} is {value!r}, must be a number")
+        found[key] = value
+    return found
 
 
 def study(

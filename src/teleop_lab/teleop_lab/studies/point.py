@@ -11,6 +11,7 @@ from pathlib import Path
 
 import teleop_core
 from teleop_core.base.errors import TeleopError
+from teleop_core.evaluation import measure
 from teleop_core.session.api import Setting, run
 from teleop_core.session.configuration import Configuration
 
@@ -117,8 +118,7 @@ def compute(point: Point, metrics: Sequence[str], recordings: Path | None) -> Re
     try:
         out = recordings / point.name if recordings is not None else None
         session = run(point.scenario, seed=point.seed, settings=point.settings, out=out)
-        score = session.score()
-        scores = {metric: score.value(metric) for metric in metrics}
+        scores = measure(session.bag, metrics)
     except TeleopError as raised:
         error = " ".join(str(raised).split())
     except Exception as raised:  # a part of a user's: the study goes on, the point says why

@@ -23,12 +23,12 @@ class Mean(NamedTuple):
     value: float
     low: float
     high: float
-    count: int
+    samples: int
 
     def __str__(self) -> str:
-        if not self.count:
+        if not self.samples:
             return "–"
-        if self.count == 1:
+        if self.samples == 1:
             return f"{self.value:.4g}"
         return f"{self.value:.4g} ({self.low:.4g} … {self.high:.4g})"
 

@@ -23,15 +23,15 @@ from teleop_core.graph.topics import TASK_STATE
 from teleop_core.kernels.geometry import Array
 from teleop_core.kernels.portable import length
 
-AHEAD = 4
-"""Ticks for which it is asked at once: what it does is up to so much later."""
+AHEAD = 16
+"""Ticks for which it is asked at once, about a frame: the eye needs longer, so nothing is late."""
 _GAIN, _CLUTCHED = STATE["gain"], STATE["is_clutched"]
 _NUMBER, _ACT, _GOAL, _WIDTH = (
     TASK_STATE.columns.index(name) for name in ("number", "act", "goal_x", "width")
 )
 _PRESS_TIME = 0.06  # for which the hand stays closed [s]
 _STILL_TIME, _STILL = 0.02, 0.05  # at rest: in this time [s] it goes this share of its way
-_SHORTEST = 1e-5  # a way that is not worth a submovement [m]
+_SHORTEST = 0.1  # of a width: a way that is not worth a submovement
 _MITT = "published: MacKenzie and Ware 1993, fitted to their four times of movement"
 
 
@@ -102,7 +102,7 @@ class _Move(NamedTuple):
     start: Array
     step: Array
     tip: Array  # where the tip was seen when it began
-    way: Array  # that the tip is meant to go
+    way: Array  # that the tip is to go by it, as the hand feels
 
 
 class Observer:
@@ -114,7 +114,9 @@ class Observer:
     """
 
     def __init__(self, p: ObserverParameters, setting: Setting) -> None:
-        self._p, self._seen = p, setting.seen
+        seen = setting.seen
+        assert seen is not None
+        self._p, self._seen = p, seen
         self._hand_of_slave = axis_map("operator.observer.axes", p.axes).T
         self._rng = np.random.default_rng((setting.seed, 3))
         self._glances: deque[_Glance] = deque()
@@ -123,78 +125,118 @@ class Observer:
         self._number = 0.0
         self._next = 0.0  # when it may move again, whatever it sees [s]
         self._half_seen = math.inf  # when half of the last way was seen [s]
+        self._is_still = False  # whether its end was seen
         self._close = -math.inf  # when the hand closes, and for a moment [s]
         self._lag = -1.0  # how late the last motion was seen, beside the eye [s]; < 0: not known
 
     def __call__(self, times: Array) -> Array:
         """Rows (N, 13) of :data:`~teleop_core.chain.operators.Motion` for times (N,) [s]."""
-        now = float(times[0])
-        seen = self._seen
-        assert seen is not None
+        now, until = float(times[0]), float(times[-1])
         self._look(now)
         rows = np.zeros((len(times), 13))
-        if seen.task[_NUMBER] > 0.0 and self._glances:
-            self._decide(now)
-        move = self._move
-        if move is not None:
-            share = minimum_jerk((times - move.begin) / move.duration)
-            rows[:, :3] = move.start + share[:, None] * move.step
+        self._draw(times, rows)
+        if self._seen.task[_NUMBER] > 0.0 and self._glances and self._decide(now, until):
+            self._draw(times, rows)
         rows[:, 12] = (times >= self._close) & (times < self._close + _PRESS_TIME)
         return rows
 
-    def _look(self, now: float) -> None:
-        """Keep what is on the screen, and forget what is older than the eye's delay."""
-        seen = self._seen
-        assert seen is not None
-        if seen.slave[3:].any():  # else it has not been shown yet
-            goal = seen.task[_GOAL : _GOAL + 3].copy()
-            self._glances.append(_Glance(now, seen.slave[:3].copy(), goal))
-        while len(self._glances) > 1 and self._glances[1].time <= now - self._p.eye:
-            self._glances.popleft()
+    def _draw(self, times: Array, rows: Array) -> None:
+        """Write the present submovement, from its begin on."""
+        if (move := self._move) is not None:
+            share = minimum_jerk((times - move.begin) / move.duration)
+            moved = move.start + share[:, None] * move.step
+            rows[:, :3] = np.where((times >= move.begin)[:, None], moved, rows[:, :3])
 
-    def _decide(self, now: float) -> None:
-        """Begin the next submovement, or press, if it is time for either."""
-        p, seen, glance = self._p, self._seen, self._glances[0]
-        assert seen is not None
-        width, act = float(seen.task[_WIDTH]), int(seen.task[_ACT])
-        if seen.task[_NUMBER] != self._number and act == Act.PRESS:
-            self._number = float(seen.task[_NUMBER])
+    def _look(self, now: float) -> None:
+        """Keep what is on the screen, and forget what the eye has long seen."""
+        seen, glances = self._seen, self._glances
+        if seen.slave[:3].any():  # else it has not been shown yet
+            goal = seen.task[_GOAL : _GOAL + 3].copy()
+            glances.append(_Glance(now, seen.slave[:3].copy(), goal))
+        while len(glances) > 2 and glances[1].time <= now - self._p.eye - _STILL_TIME:
+            glances.popleft()
+
+    def _glance(self, when: float) -> _Glance:
+        """What the eye can use at a time [s]: what was on the screen, between two looks."""
+        at, glances = when - self._p.eye, self._glances
+        later = next((i for i, glance in enumerate(glances) if glance.time > at), len(glances))
+        if later == 0 or later == len(glances):
+            return glances[min(later, len(glances) - 1)]
+        a, b = glances[later - 1], glances[later]
+        share = (at - a.time) / (b.time - a.time)
+        return _Glance(at, a.tip + share * (b.tip - a.tip), a.goal + share * (b.goal - a.goal))
+
+    def _decide(self, now: float, until: float) -> bool:
+        """Begin the next submovement, or press, if the time for either comes until then.
+
+        Returns:
+            Whether it begins a submovement.
+        """
+        p, task = self._p, self._seen.task
+        width, act = float(task[_WIDTH]), int(task[_ACT])
+        if task[_NUMBER] != self._number and act == Act.PRESS:
+            self._number = float(task[_NUMBER])
             self._next = now + p.reaction
-            return
-        if now < self._next or not self._has_seen(now, glance):
-            return
-        goal = glance.goal if act == Act.PASS else seen.task[_GOAL : _GOAL + 3]
+        when = max(self._next, self._seen_at(until), now)
+        if when > until:
+            return False
+        glance = self._glance(when)
+        goal = glance.goal if act == Act.PASS else task[_GOAL : _GOAL + 3]
         way = goal - glance.tip
         if act == Act.PASS:
             way = way + self._speed_of_goal() * (p.eye + p.least_time)
         distance = float(length(way))
         if act == Act.PRESS and distance <= 0.5 * width:
-            self._press(now)
-        elif distance > _SHORTEST:
-            self._begin(now, glance.tip, way, distance, width, act)
+            self._press(when)
+        elif distance > _SHORTEST * width:
+            self._begin(when, glance.tip, way, distance, width, act)
+            return True
+        return False
 
-    def _has_seen(self, now: float, glance: _Glance) -> bool:
-        """Whether the end of the last submovement was seen.
+    def _seen_at(self, until: float) -> float:
+        """When the end of the last submovement is seen [s]; infinite if not until then.
 
         It is seen as long after half of the way was, as the hand took from there to the end; a
         slower arm is seen to move on.
         """
         move = self._move
         if move is None:
-            return True
+            return -math.inf
         if math.isinf(self._half_seen):
-            gone = float((glance.tip - move.tip) @ move.way)
-            if gone >= 0.5 * float(move.way @ move.way):
-                self._half_seen = now
-                late = now - move.begin - 0.5 * move.duration - self._p.eye
+            self._half_seen = self._half_way(move, until)
+        if math.isinf(self._half_seen):
+            late = move.begin + move.duration + self._patience()
+            return late if late <= until else math.inf
+        when = self._half_seen + 0.5 * move.duration
+        if when > until or self._is_still:
+            return when
+        gone = float(length(self._glance(when + _STILL_TIME).tip - self._glance(when).tip))
+        self._is_still = gone <= _STILL * float(length(move.way))
+        if not self._is_still:  # it still moves: half of it is seen later
+            self._half_seen += until - when + 1e-3
+            return math.inf
+        return when
+
+    def _half_way(self, move: _Move, until: float) -> float:
+        """When the tip was seen half way [s]; infinite if it was not until then."""
+        whole = float(move.way @ move.way)
+        before: tuple[float, float] | None = None
+        for glance in self._glances:
+            if glance.time < move.begin:
+                continue
+            if glance.time > until - self._p.eye:
+                break
+            gone = float((glance.tip - move.tip) @ move.way) / whole
+            if gone >= 0.5:
+                at = glance.time
+                if before is not None and gone > before[1]:
+                    share = (0.5 - before[1]) / (gone - before[1])
+                    at = before[0] + share * (at - before[0])
+                late = at - move.begin - 0.5 * move.duration
                 self._lag = max(late, 0.0)
-            elif now >= move.begin + move.duration + self._patience():
-                return True
-        if now < self._half_seen + 0.5 * move.duration:
-            return False
-        later = next((g for g in self._glances if g.time >= glance.time + _STILL_TIME), glance)
-        still = max(_STILL * float(length(move.way)), _SHORTEST)
-        return later is glance or float(length(later.tip - glance.tip)) <= still
+                return at + self._p.eye
+            before = (glance.time, gone)
+        return math.inf
 
     def _patience(self) -> float:
         """How long after its end a motion that does not show is waited for [s]."""
@@ -207,9 +249,8 @@ class Observer:
         self, now: float, tip: Array, way: Array, distance: float, width: float, act: int
     ) -> None:
         """Begin a submovement along a way of the tip (3,) [m], as long as it is."""
-        p, seen = self._p, self._seen
-        assert seen is not None
-        gain = float(seen.state[_GAIN]) or 1.0
+        p = self._p
+        gain = float(self._seen.state[_GAIN]) or 1.0
         duration = p.least_time + p.time_per_bit * math.log2(distance / width + 1.0)
         duration = max(duration, distance / gain / p.fastest)
         spread = p.noise * distance / duration
@@ -217,9 +258,9 @@ class Observer:
         ahead = along * float(along @ noise)
         ended = way + spread * (ahead + p.noise_across * (noise - ahead))
         step = self._hand_of_slave @ ended / gain
-        self._move = _Move(now, duration, self._place, step, tip, way)
+        self._move = _Move(now, duration, self._place, step, tip, ended)
         self._place = self._place + step
-        self._next, self._half_seen = now + duration, math.inf
+        self._next, self._half_seen, self._is_still = now + duration, math.inf, False
         missed = math.erfc(0.5 * width / (math.sqrt(2.0) * max(spread, 1e-12)))
         if (
             act == Act.PRESS

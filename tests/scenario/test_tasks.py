@@ -1,0 +1,118 @@
+"""Tasks in sessions: what is recorded of them agrees with where the tip was, and with the hand."""
+
+import numpy as np
+import pytest
+
+import teleop_core as tc
+from teleop_core.graph.topics import SLAVE_MEASURED_CP, TASK_STATE
+
+COLUMN = {name: i for i, name in enumerate(TASK_STATE.columns)}
+
+
+@pytest.fixture(scope="module")
+def point() -> tc.Recording:
+    return tc.run("point", duration=12.0)
+
+
+def attempts(recording: tc.Recording) -> np.ndarray:
+    """Rows of ``task/state`` with another count of attempts."""
+    told = recording["task/state"].values
+    return told[1:][np.diff(told[:, COLUMN["attempts"]]) > 0.0]
+
+
+def test_presses_count_by_where_the_tip_really_was(point):
+    told, tip, jaw = point["task/state"], point["slave/true_cp"], point["hand/jaw"]
+    closing = np.flatnonzero((jaw.values[1:, 0] > 0.5) & (jaw.values[:-1, 0] < 0.5)) + 1
+    pressed = jaw.stamp_ns[closing]
+    successes = 0
+    for stamp in pressed:
+        goal = told.values[told.stamp_ns <= stamp][-1]
+        # The task sees the hand a tick later.
+        at = tip.values[tip.stamp_ns <= stamp + 1_000_000][-1, :3]
+        place = goal[[COLUMN["goal_x"], COLUMN["goal_y"], COLUMN["goal_z"]]]
+        successes += bool(np.linalg.norm(at - place) <= 0.5 * goal[COLUMN["width"]])
+    last = told.values[-1]
+    assert len(pressed) >= 5
+    assert last[COLUMN["attempts"]] == len(pressed)
+    assert last[COLUMN["successes"]] == successes
+    assert last[COLUMN["errors"]] == len(pressed) - successes
+
+
+def test_targets_lie_on_a_ring_across_from_each_other(point):
+    told = point["task/state"].values
+    told = told[told[:, COLUMN["number"]] > 0.0]
+    goals = {row[0]: row[2:5] for row in told}
+    places = np.array([goals[number] for number in sorted(goals)])
+    middle = point["slave/true_cp"].values[:, :3]
+    begin = point["task/state"].stamp_ns[point["task/state"].values[:, 0] > 0.0][0]
+    center = middle[point["slave/true_cp"].stamp_ns <= begin][-1]
+    assert np.linalg.norm(places - center, axis=1) == pytest.approx(0.015, abs=1e-9)
+    jumps = np.linalg.norm(np.diff(places, axis=0), axis=1)
+    assert jumps == pytest.approx(0.03 * np.cos(np.pi / 26), abs=1e-9)
+
+
+def test_throughput_is_effective_width_and_time_of_the_attempts(point):
+    rows = attempts(point)[1:]
+    width = 4.133 * rows[:, COLUMN["off"]].std(ddof=1)
+    bits = np.log2(rows[:, COLUMN["way"]].mean() / width + 1.0)
+    score = point.score()
+    assert score.value("task.throughput") == pytest.approx(bits / rows[:, COLUMN["time"]].mean())
+    assert score.value("task.attempts") == len(rows) + 1
+
+
+def test_the_operator_sees_the_slave_as_late_as_the_display_says():
+    for latency in (0.0, 0.1):
+        shown = tc.run("point", duration=3.0, display__latency=latency, display__rate=50.0)
+        stream = shown["display/measured_cp"]
+        is_new = np.diff(stream.stamp_ns, prepend=0) > 0
+        ages = (stream.frame()["stamp_ns"].index.to_numpy() * 1e9)[is_new]
+        age = ages - (stream.stamp_ns[is_new] - shown.bag.start_ns)
+        assert np.diff(stream.stamp_ns[is_new])[1:] == pytest.approx(20_000_000, abs=1_000_000)
+        assert np.median(age) == pytest.approx(1e9 * latency + 1e6, abs=1.1e6)
+
+
+def test_a_late_display_slows_the_operator_down():
+    times = [
+        tc.run("point", duration=20.0, display__latency=late).score().value("task.time_s")
+        for late in (0.033, 0.333)
+    ]
+    assert times[1] > times[0] + 0.2
+
+
+def test_only_the_operator_reads_the_display_wherever_it_stands():
+    for stages in (["display", "network"], ["network", "display"]):
+        graph = tc.build_graph(stages=stages)
+        found = {
+            link.reader.name: link.topic.name
+            for link in graph.links
+            if link.port == SLAVE_MEASURED_CP
+        }
+        assert found["operator"] == "display/measured_cp"
+        assert found["display"] == "network/measured_cp"
+        assert "display/measured_cp" not in {v for k, v in found.items() if k != "operator"}
+
+
+def test_a_session_with_a_task_repeats_itself_to_the_bit(point):
+    again = tc.run("point", duration=12.0)
+    session = tc.VirtualTime(tc.configuration("point"))
+    first = session.run(6000)
+    session.reset()
+    assert np.array_equal(session.run(6000), first)
+    for topic in ("task/state", "slave/true_cp", "hand/servo_cp"):
+        assert np.array_equal(again[topic].values, point[topic].values)
+
+
+def test_a_moving_goal_is_followed_by_looks_and_steps():
+    recording = tc.run("point", duration=15.0, task="trace", settings={"operator.seed": 1})
+    score = recording.score()
+    assert (score.value("task.attempts") or 0) > 20
+    assert (score.value("task.error_share") or 0.0) < 0.5
+
+
+def test_a_predictive_display_hides_the_network():
+    late = {"teleop.stages": ["network", "display", "task"], "network.back.least_delay": 0.3}
+    plain, predicted = (
+        tc.run("point", duration=20.0, settings={**late, "display.shows": shows}).score()
+        for shows in ("slave", "command")
+    )
+    assert (predicted.value("task.time_s") or 9.0) < (plain.value("task.time_s") or 0.0) - 0.2
