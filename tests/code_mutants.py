@@ -38,7 +38,18 @@ _GRIPPER = "slave/bridges/jaw_bridge.py"
 _YIELD = "chain/architectures/impedance.py"
 _PID, _WAY = "slave/controllers/pid.py", "slave/interpolation.py"
 _HAND, _OBSERVER = "chain/master/hand_mechanics.py", "slave/force_observer.py"
+_SEEING = "chain/operators/observer.py"
 CODE_MUTANTS = (
+    _mutant("blind", "an operator who sees does not wait for what it sees", _SEEING,
+            "        if move is None:\n            return -math.inf",
+            "        if True:\n            return -math.inf", "observer"),
+    _mutant("no_eye", "an operator sees without an eye's delay", _SEEING,
+            "        at, glances = when - self._p.eye, self._glances",
+            "        at, glances = when, self._glances", "observer"),
+    _mutant("early_display", "a display shows frames at once", "chain/master/display.py",
+            "int(1e9 * p.latency + 0.5)", "0", "tests/scenario/test_tasks.py"),
+    _mutant("wide_target", "a press beside the target counts", "chain/tasks/attempts.py",
+            "<= 0.5 * state[_WIDTH]", "<= state[_WIDTH]", "tests/scenario/test_tasks.py"),
     _mutant("reports_meet", "all nodes report at once", "nodes/rate.py",
             "place = stages.index(stage) if stage in stages else len(stages)", "place = 0", "rate"),
     _mutant("js_unanswered", "of two samples of the arm in a tick one is answered",

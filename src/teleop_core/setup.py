@@ -68,6 +68,7 @@ setup(
         "test": [
             "EAIK",
             "coverage",
+            "distributed",
             "pytest",
             "pytest-rerunfailures",
             "pytest-xdist",

@@ -35,7 +35,7 @@ def pointing(lag: float, way: float, width: float, trials: int, seed: int = 1) -
     task, begin, times, closed = seen.task, 0.0, [], 0.0
     task[COLUMN["number"]], task[COLUMN["width"]] = 1.0, width
     goal = task[COLUMN["goal_x"] : COLUMN["goal_x"] + 3]
-    goal[:] = begins + [way, 0.0, 0.0]
+    goal[:] = begins + np.array([way, 0.0, 0.0])
     tick = 0
     while len(times) < trials:
         assert tick < 10_000 * trials, "it does not press"

@@ -52,6 +52,7 @@ from .chain.operators import (
     register_operator as register_operator,
 )
 from .chain.operators.remote import RemoteHand as RemoteHand, remote_operator as remote_operator
+from .chain.tasks import Task as Task, register_task as register_task
 from .base.parameters import NoParameters as NoParameters, parameter as parameter
 from .console.controls import Control as Control, register_control as register_control
 from .slave.bridges import Bridge as Bridge, Command as Command, register_bridge as register_bridge

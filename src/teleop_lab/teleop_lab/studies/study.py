@@ -258,40 +258,48 @@ def read_study(path: Path | str) -> Study:
         TeleopError: The file cannot be read, or says something else.
     """
     path = Path(path)
+    content = _read(path)
+    seeds = content.get("seeds", 1)
+    is_count = isinstance(seeds, int) and seeds > 0
+    if not is_count and not (isinstance(seeds, list) and all(isinstance(s, int) for s in seeds)):
+        raise ParameterError("seeds", seeds, "how many there are, or a list of whole numbers")
+    fixed, swept = _named(content, "set"), _named(content, "sweep")
+    for name, values in swept.items():
+        if not isinstance(values, list):
+            raise ParameterError(f"sweep of {name}", values, "a list of values")
+    for name in ("metrics", "parts"):
+        if not isinstance(content.get(name, []), list):
+            raise ParameterError(name, content[name], "a list")
+    if "duration" in content:
+        fixed = {f"{SESSION}.duration": content["duration"], **fixed}
+    return Study(
+        content.get("scenario"), {name: tuple(values) for name, values in swept.items()},
+        tuple(range(1, seeds + 1)) if is_count else tuple(seeds),
+        tuple(map(str, content.get("metrics", []))), fixed,
+        tuple(path.parent / str(part) for part in content.get("parts", [])),
+    )  # fmt: skip
+
+
+def _read(path: Path) -> dict[str, Any]:
+    """Entries of a study's file."""
     try:
         content = yaml.safe_load(path.read_text("utf-8"))
     except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
-        reason = " ".join(str(error).split())
-        raise ParameterError(
-            "study", str(path), f"a YAML file that can be read ({reason})"
-        ) from error
+        needed = f"a YAML file that can be read ({' '.join(str(error).split())})"
+        raise ParameterError("study", str(path), needed) from error
     if not isinstance(content, dict):
         raise ParameterError("study", str(path), f"a YAML file with {', '.join(_KEYS)}")
     for key in content:
         if key not in _KEYS:
             raise UnknownNameError(f"entry of {path.name}", str(key), _KEYS)
-    seeds = content.get("seeds", 1)
-    is_count = isinstance(seeds, int) and seeds > 0
-    if not is_count and not (isinstance(seeds, list) and all(isinstance(s, int) for s in seeds)):
-        raise ParameterError("seeds", seeds, "how many there are, or a list of whole numbers")
-    fixed, swept = content.get("set") or {}, content.get("sweep") or {}
-    for name, part in (("set", fixed), ("sweep", swept)):
-        if not isinstance(part, dict):
-            raise ParameterError(name, part, "parameters by name, each with its value")
-    for name, values in swept.items():
-        if not isinstance(values, list):
-            raise ParameterError(f"sweep of {name}", values, "a list of values")
-    metrics, parts = content.get("metrics") or [], content.get("parts") or []
-    if not isinstance(metrics, list) or not isinstance(parts, list):
-        raise ParameterError("metrics", metrics, "a list of keys of scores; parts a list of files")
-    if "duration" in content:
-        fixed = {f"{SESSION}.duration": content["duration"], **fixed}
-    numbers = tuple(range(1, seeds + 1)) if isinstance(seeds, int) else tuple(seeds)
-    return Study(
-        content.get("scenario"), {str(k): tuple(v) for k, v in swept.items()}, numbers,
-        tuple(map(str, metrics)), {str(k): v for k, v in fixed.items()},
-        tuple(path.parent / str(part) for part in parts),
-    )  # fmt: skip
+    return content
+
+
+def _named(content: Mapping[str, Any], name: str) -> dict[str, Any]:
+    found = content.get(name) or {}
+    if not isinstance(found, dict):
+        raise ParameterError(name, found, "parameters by name, each with its value")
+    return {str(key): value for key, value in found.items()}
 
 
 def is_number(value: object) -> bool:

@@ -105,7 +105,7 @@ def on_dask(client: "Client", study: "Study", points: Sequence[Point]) -> Iterat
         for batch in batches
     }
     try:
-        for future in as_completed(list(futures)):
+        for future in as_completed(list(futures), loop=client.loop):
             batch = futures[future]
             if future.status == "finished":
                 yield from future.result()

@@ -1,0 +1,213 @@
+"""Studies: named values, keys, what is run again and why, and the same numbers wherever it runs."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import teleop_core as tc
+from teleop_lab import Study, read_study, sweep
+from teleop_lab.studies.point import Result
+from teleop_lab.studies.store import Store
+from teleop_lab.studies.summary import differences, mean_of, study_table
+
+SETTINGS = {"teleop.duration": 1.0, "display.latency": [0.0, 0.1]}
+METRICS = ["position_error_mm.rms", "task.attempts"]
+
+
+def study(**changes: object) -> Study:
+    whole = Study(
+        "point", {"display.latency": (0.0, 0.1)}, (1, 2), METRICS, {"teleop.duration": 1.0}
+    )
+    return replace(whole, **changes)
+
+
+@pytest.fixture(scope="module")
+def found(tmp_path_factory):
+    """A study of four sessions with its store."""
+    store = tmp_path_factory.mktemp("studies") / "one"
+    return store, study().run(store, jobs=1)
+
+
+def test_each_parameter_is_a_dimension_and_each_score_a_variable(found):
+    _, data = found
+    assert data.sizes == {"display.latency": 2, "seed": 2}
+    assert set(METRICS) < set(data.data_vars)
+    assert data["position_error_mm.rms"].attrs["units"] == "mm"
+    assert list(data["seed"].values) == [1, 2]
+
+
+def test_a_point_has_the_numbers_of_the_same_session_alone(found):
+    _, data = found
+    score = tc.run("point", duration=1.0, seed=2, display__latency=0.1).score()
+    here = data.sel({"display.latency": 0.1, "seed": 2})
+    assert float(here["position_error_mm.rms"]) == score.value("position_error_mm.rms")
+
+
+def test_nothing_is_run_twice(found):
+    store, data = found
+    explained = study().explain(store)
+    assert (explained.sessions, explained.to_run) == (4, 0)
+    again = study().run(store, jobs=1)
+    assert again["seconds"].values.tolist() == data["seconds"].values.tolist()
+
+
+def test_what_is_missing_failed_or_changed_is_run_and_named(found, tmp_path):
+    store, _ = found
+    kept = Store.open(store, study())
+    points = study().points()
+    one = kept.result(points[0])
+    assert one is not None
+    for change, reason in (
+        (replace(one, error="broken"), "failed"),
+        (replace(one, key=replace(one.key, code="older")), "changed code"),
+        (replace(one, key=replace(one.key, recipe="other")), "changed parameters"),
+    ):
+        kept._results[one.name] = change  # as a file from before would be
+        assert kept.reason(points[0]) == reason
+    assert Store.open(tmp_path / "new", study()).reason(points[0]) == "missing"
+    wider = study(seeds=(1, 2, 3)).explain(store)
+    assert (wider.to_run, wider.why) == (2, {"missing": 2})
+    longer = study(settings={"teleop.duration": 2.0}).explain(store)
+    assert longer.why == {"changed parameters": 4}
+
+
+def test_a_result_that_is_cut_off_counts_as_missing(found, tmp_path):
+    store, _ = found
+    file = next(store.glob("*/*.json"))
+    text = file.read_text()
+    file.write_text(text[: len(text) // 2])
+    try:
+        assert study().explain(store).why == {"missing": 1}
+    finally:
+        file.write_text(text)
+    assert Result.from_json(text).to_json() == text
+
+
+def test_a_session_that_fails_is_a_point_with_its_error(tmp_path):
+    parts = tmp_path / "bad.py"
+    parts.write_text(
+        "import teleop_core as tc\n"
+        "def motion(times):\n"
+        "    raise ValueError('tired')\n"
+        "tc.register_operator('tired', motion)\n"
+    )
+    data = sweep(
+        None, metrics=["position_error_mm.rms"], settings={"operator.kind": ["tired", "hold"]},
+        parts=[parts], jobs=1, teleop__duration=0.5,
+    )  # fmt: skip
+    errors = data["error"].values.ravel()
+    assert "tired" in errors[0]
+    assert not errors[1]
+    assert np.isnan(data["position_error_mm.rms"].values.ravel()[0])
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"swept": {"display.latenzy": (0.0,)}}, "display.latency"),
+        ({"swept": {"display.latency": (5.0,)}}, "display.latency"),
+        ({"swept": {"display.latency": ()}}, "at least one value"),
+        ({"swept": {"display.latency": (0.1, 0.1)}}, "differ"),
+        ({"metrics": ["task.tme_s"]}, "task.time_s"),
+        ({"metrics": []}, "key of a score"),
+        ({"seeds": (-1,)}, "whole numbers >= 0"),
+    ],
+)  # fmt: skip
+def test_a_wrong_study_is_refused_before_its_first_session(changes, said):
+    with pytest.raises(tc.TeleopError, match=said):
+        study(**changes).points()
+
+
+def test_a_store_of_another_study_is_refused(found, tmp_path):
+    store, _ = found
+    with pytest.raises(tc.TeleopError, match="another study"):
+        study(swept={"coarse_gain": (0.5,)}).explain(store)
+    (tmp_path / "thesis.txt").write_text("important")
+    with pytest.raises(tc.TeleopError, match="something else"):
+        study().explain(tmp_path)
+    about = json.loads((store / "study.json").read_text())
+    newer = tmp_path / "newer"
+    newer.mkdir()
+    (newer / "study.json").write_text(json.dumps(about | {"format": 99}))
+    with pytest.raises(tc.TeleopError, match="newer version"):
+        study().explain(newer)
+
+
+def test_a_file_says_the_same_as_a_call(tmp_path, found):
+    file = tmp_path / "delay.yaml"
+    file.write_text(
+        "scenario: point\nduration: 1.0\nseeds: 2\nsweep: {display.latency: [0.0, 0.1]}\n"
+        f"metrics: {json.dumps(METRICS)}\n"
+    )
+    assert read_study(file).explain(found[0]).to_run == 0
+    for text, said in (("seds: 1", "seeds"), ("sweep: {a: 1}", "a list of values"), ("[", "read")):
+        file.write_text(text)
+        with pytest.raises(tc.TeleopError, match=said):
+            read_study(file)
+
+
+def test_differences_are_by_pairs_and_intervals_hold_their_mean(found):
+    _, data = found
+    whole = study()
+    change = differences(whole, data, METRICS[0])["display.latency"][0]
+    late, early = (data[METRICS[0]].sel({"display.latency": v}).values for v in (0.1, 0.0))
+    assert change.value == pytest.approx((late - early).mean())
+    mean = mean_of(np.arange(20.0))
+    assert mean.low < mean.value == 9.5 < mean.high
+    assert METRICS[0] in study_table(whole, data)
+
+
+_KILLED = """
+import sys
+from pathlib import Path
+sys.path.insert(0, {folder!r})
+from test_studies import study
+if __name__ == "__main__":
+    study().run(Path(sys.argv[1]), jobs=2)
+"""
+
+
+@pytest.mark.slow
+def test_a_study_that_is_killed_goes_on_to_the_same_bits(found, tmp_path):
+    _, data = found
+    script, store = tmp_path / "killed.py", tmp_path / "store"
+    script.write_text(_KILLED.format(folder=str(Path(__file__).parent)))
+    for _ in range(6):
+        process = subprocess.Popen([sys.executable, script, store], start_new_session=True)
+        count = len(list(store.glob("*/*.json")))
+        while process.poll() is None and len(list(store.glob("*/*.json"))) == count:
+            try:
+                process.wait(0.05)
+            except subprocess.TimeoutExpired:
+                continue
+        if process.poll() is None:
+            os.killpg(process.pid, signal.SIGKILL)
+        process.wait()
+        if study().explain(store).to_run == 0:
+            break
+    again = study().run(store, jobs=1)
+    for metric in METRICS:
+        assert np.array_equal(again[metric].values, data[metric].values, equal_nan=True)
+
+
+@pytest.mark.slow
+def test_dask_workers_give_the_same_bits(found, tmp_path):
+    distributed = pytest.importorskip("distributed", reason="Dask is not installed")
+    _, data = found
+    with (
+        distributed.LocalCluster(
+            n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None,
+            local_directory=str(tmp_path),
+        ) as cluster,
+        distributed.Client(cluster, set_as_default=False) as client,
+    ):  # fmt: skip
+        again = study().run(client=client)
+    for metric in METRICS:
+        assert np.array_equal(again[metric].values, data[metric].values, equal_nan=True)
