@@ -1,5 +1,7 @@
 """Tasks in sessions: what is recorded of them agrees with where the tip was, and with the hand."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -20,7 +22,7 @@ def attempts(recording: tc.Recording) -> np.ndarray:
     return told[1:][np.diff(told[:, COLUMN["attempts"]]) > 0.0]
 
 
-def test_presses_count_by_where_the_tip_really_was(point):
+def test_presses_count_by_where_the_tip_really_was(point: tc.Recording) -> None:
     told, tip, jaw = point["task/state"], point["slave/true_cp"], point["hand/jaw"]
     closing = np.flatnonzero((jaw.values[1:, 0] > 0.5) & (jaw.values[:-1, 0] < 0.5)) + 1
     pressed = jaw.stamp_ns[closing]
@@ -38,7 +40,7 @@ def test_presses_count_by_where_the_tip_really_was(point):
     assert last[COLUMN["errors"]] == len(pressed) - successes
 
 
-def test_targets_lie_on_a_ring_across_from_each_other(point):
+def test_targets_lie_on_a_ring_across_from_each_other(point: tc.Recording) -> None:
     told = point["task/state"].values
     told = told[told[:, COLUMN["number"]] > 0.0]
     goals = {row[0]: row[2:5] for row in told}
@@ -51,7 +53,7 @@ def test_targets_lie_on_a_ring_across_from_each_other(point):
     assert jumps == pytest.approx(0.03 * np.cos(np.pi / 26), abs=1e-9)
 
 
-def test_throughput_is_effective_width_and_time_of_the_attempts(point):
+def test_throughput_is_effective_width_and_time_of_the_attempts(point: tc.Recording) -> None:
     rows = attempts(point)[1:]
     width = 4.133 * rows[:, COLUMN["off"]].std(ddof=1)
     bits = np.log2(rows[:, COLUMN["way"]].mean() / width + 1.0)
@@ -60,7 +62,7 @@ def test_throughput_is_effective_width_and_time_of_the_attempts(point):
     assert score.value("task.attempts") == len(rows) + 1
 
 
-def test_the_operator_sees_the_slave_as_late_as_the_display_says():
+def test_the_operator_sees_the_slave_as_late_as_the_display_says() -> None:
     for latency in (0.0, 0.1):
         shown = tc.run("point", duration=3.0, display__latency=latency, display__rate=50.0)
         stream = shown["display/measured_cp"]
@@ -71,15 +73,15 @@ def test_the_operator_sees_the_slave_as_late_as_the_display_says():
         assert np.median(age) == pytest.approx(1e9 * latency + 1e6, abs=1.1e6)
 
 
-def test_a_late_display_slows_the_operator_down():
+def test_a_late_display_slows_the_operator_down() -> None:
     times = [
-        tc.run("point", duration=20.0, display__latency=late).score().value("task.time_s")
+        tc.run("point", duration=20.0, display__latency=late).score().value("task.time_s") or 0.0
         for late in (0.033, 0.333)
     ]
     assert times[1] > times[0] + 0.2
 
 
-def test_only_the_operator_reads_the_display_wherever_it_stands():
+def test_only_the_operator_reads_the_display_wherever_it_stands() -> None:
     for stages in (["display", "network"], ["network", "display"]):
         graph = tc.build_graph(stages=stages)
         found = {
@@ -92,7 +94,7 @@ def test_only_the_operator_reads_the_display_wherever_it_stands():
         assert "display/measured_cp" not in {v for k, v in found.items() if k != "operator"}
 
 
-def test_a_session_with_a_task_repeats_itself_to_the_bit(point):
+def test_a_session_with_a_task_repeats_itself_to_the_bit(point: tc.Recording) -> None:
     again = tc.run("point", duration=12.0)
     session = tc.VirtualTime(tc.configuration("point"))
     first = session.run(6000)
@@ -102,15 +104,18 @@ def test_a_session_with_a_task_repeats_itself_to_the_bit(point):
         assert np.array_equal(again[topic].values, point[topic].values)
 
 
-def test_a_moving_goal_is_followed_by_looks_and_steps():
+def test_a_moving_goal_is_followed_by_looks_and_steps() -> None:
     recording = tc.run("point", duration=15.0, task="trace", settings={"operator.seed": 1})
     score = recording.score()
     assert (score.value("task.attempts") or 0) > 20
     assert (score.value("task.error_share") or 0.0) < 0.5
 
 
-def test_a_predictive_display_hides_the_network():
-    late = {"teleop.stages": ["network", "display", "task"], "network.back.least_delay": 0.3}
+def test_a_predictive_display_hides_the_network() -> None:
+    late: dict[str, Any] = {
+        "teleop.stages": ["network", "display", "task"],
+        "network.back.least_delay": 0.3,
+    }
     plain, predicted = (
         tc.run("point", duration=20.0, settings={**late, "display.shows": shows}).score()
         for shows in ("slave", "command")

@@ -32,14 +32,15 @@ def pointing(lag: float, way: float, width: float, trials: int, seed: int = 1) -
     begins = np.array([0.3, -0.2, 0.0])  # of the pointer: a tip at 0 is one that nobody told
     seen.slave[:3] = begins
     pointer = deque([begins] * (late + 1), maxlen=late + 1)
-    task, begin, times, closed = seen.task, 0.0, [], 0.0
+    task, begin, closed = seen.task, 0.0, 0.0
+    times: list[float] = []
     task[COLUMN["number"]], task[COLUMN["width"]] = 1.0, width
     goal = task[COLUMN["goal_x"] : COLUMN["goal_x"] + 3]
     goal[:] = begins + np.array([way, 0.0, 0.0])
     tick = 0
     while len(times) < trials:
         assert tick < 10_000 * trials, "it does not press"
-        block = (np.arange(AHEAD) + tick + 1) * TICK
+        block = np.arange(tick + 1, tick + 1 + AHEAD, dtype=np.float64) * TICK
         for time, row in zip(block, person(block), strict=True):
             pointer.append(begins + row[:3])
             if row[12] > closed:
@@ -54,7 +55,7 @@ def pointing(lag: float, way: float, width: float, trials: int, seed: int = 1) -
 
 
 @pytest.mark.parametrize("lag", PUBLISHED)
-def test_a_person_who_sees_late_takes_as_long_as_people_did(lag):
+def test_a_person_who_sees_late_takes_as_long_as_people_did(lag: float) -> None:
     means = [
         np.mean(pointing(lag, way, width, 24, seed))
         for seed, (way, width) in enumerate((w, v) for w in WAYS for v in WIDTHS)
@@ -62,7 +63,7 @@ def test_a_person_who_sees_late_takes_as_long_as_people_did(lag):
     assert np.mean(means) == pytest.approx(PUBLISHED[lag], rel=0.06)
 
 
-def test_a_smaller_target_takes_longer_and_so_does_a_farther_one():
+def test_a_smaller_target_takes_longer_and_so_does_a_farther_one() -> None:
     near, far, small = (
         np.mean(pointing(0.02, way, width, 30))
         for way, width in ((0.1, 0.02), (0.4, 0.02), (0.1, 0.005))
@@ -71,15 +72,17 @@ def test_a_smaller_target_takes_longer_and_so_does_a_farther_one():
     assert small > near
 
 
-def test_nobody_moves_without_a_goal():
+def test_nobody_moves_without_a_goal() -> None:
     seen = tc.Seen(*(np.zeros(n) for n in (7, 7, 6, len(STATE), len(COLUMN))))
     person = Observer(
         ObserverParameters(), tc.Setting(OperatorParameters(), np.zeros((6, 4)), 1, seen)
     )
-    rows = np.vstack([person((np.arange(16) + 16 * k) * TICK) for k in range(100)])
+    rows = np.vstack(
+        [person(np.arange(16 * k, 16 * k + 16, dtype=np.float64) * TICK) for k in range(100)]
+    )
     assert not rows.any()
 
 
-def test_an_operator_who_needs_a_task_is_refused_without_one():
+def test_an_operator_who_needs_a_task_is_refused_without_one() -> None:
     with pytest.raises(tc.ParameterError, match=r"observer.*teleop.stages=\[task\]"):
         tc.configuration(operator="observer")

@@ -7,6 +7,7 @@ import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
@@ -17,11 +18,14 @@ from teleop_lab.studies.point import Result
 from teleop_lab.studies.store import Store
 from teleop_lab.studies.summary import differences, mean_of, study_table
 
-SETTINGS = {"teleop.duration": 1.0, "display.latency": [0.0, 0.1]}
+if TYPE_CHECKING:
+    import xarray
+
+Found = tuple[Path, "xarray.Dataset"]
 METRICS = ["position_error_mm.rms", "task.attempts"]
 
 
-def study(**changes: object) -> Study:
+def study(**changes: Any) -> Study:
     whole = Study(
         "point", {"display.latency": (0.0, 0.1)}, (1, 2), METRICS, {"teleop.duration": 1.0}
     )
@@ -29,13 +33,13 @@ def study(**changes: object) -> Study:
 
 
 @pytest.fixture(scope="module")
-def found(tmp_path_factory):
+def found(tmp_path_factory: pytest.TempPathFactory) -> Found:
     """A study of four sessions with its store."""
     store = tmp_path_factory.mktemp("studies") / "one"
     return store, study().run(store, jobs=1)
 
 
-def test_each_parameter_is_a_dimension_and_each_score_a_variable(found):
+def test_each_parameter_is_a_dimension_and_each_score_a_variable(found: Found) -> None:
     _, data = found
     assert data.sizes == {"display.latency": 2, "seed": 2}
     assert set(METRICS) < set(data.data_vars)
@@ -43,14 +47,14 @@ def test_each_parameter_is_a_dimension_and_each_score_a_variable(found):
     assert list(data["seed"].values) == [1, 2]
 
 
-def test_a_point_has_the_numbers_of_the_same_session_alone(found):
+def test_a_point_has_the_numbers_of_the_same_session_alone(found: Found) -> None:
     _, data = found
     score = tc.run("point", duration=1.0, seed=2, display__latency=0.1).score()
     here = data.sel({"display.latency": 0.1, "seed": 2})
     assert float(here["position_error_mm.rms"]) == score.value("position_error_mm.rms")
 
 
-def test_nothing_is_run_twice(found):
+def test_nothing_is_run_twice(found: Found) -> None:
     store, data = found
     explained = study().explain(store)
     assert (explained.sessions, explained.to_run) == (4, 0)
@@ -58,7 +62,7 @@ def test_nothing_is_run_twice(found):
     assert again["seconds"].values.tolist() == data["seconds"].values.tolist()
 
 
-def test_what_is_missing_failed_or_changed_is_run_and_named(found, tmp_path):
+def test_what_is_missing_failed_or_changed_is_run_and_named(found: Found, tmp_path: Path) -> None:
     store, _ = found
     kept = Store.open(store, study())
     points = study().points()
@@ -78,7 +82,7 @@ def test_what_is_missing_failed_or_changed_is_run_and_named(found, tmp_path):
     assert longer.why == {"changed parameters": 4}
 
 
-def test_a_result_that_is_cut_off_counts_as_missing(found, tmp_path):
+def test_a_result_that_is_cut_off_counts_as_missing(found: Found, tmp_path: Path) -> None:
     store, _ = found
     file = next(store.glob("*/*.json"))
     text = file.read_text()
@@ -90,7 +94,7 @@ def test_a_result_that_is_cut_off_counts_as_missing(found, tmp_path):
     assert Result.from_json(text).to_json() == text
 
 
-def test_a_session_that_fails_is_a_point_with_its_error(tmp_path):
+def test_a_session_that_fails_is_a_point_with_its_error(tmp_path: Path) -> None:
     parts = tmp_path / "bad.py"
     parts.write_text(
         "import teleop_core as tc\n"
@@ -120,12 +124,14 @@ def test_a_session_that_fails_is_a_point_with_its_error(tmp_path):
         ({"seeds": (-1,)}, "whole numbers >= 0"),
     ],
 )  # fmt: skip
-def test_a_wrong_study_is_refused_before_its_first_session(changes, said):
+def test_a_wrong_study_is_refused_before_its_first_session(
+    changes: dict[str, Any], said: str
+) -> None:
     with pytest.raises(tc.TeleopError, match=said):
         study(**changes).points()
 
 
-def test_a_store_of_another_study_is_refused(found, tmp_path):
+def test_a_store_of_another_study_is_refused(found: Found, tmp_path: Path) -> None:
     store, _ = found
     with pytest.raises(tc.TeleopError, match="another study"):
         study(swept={"coarse_gain": (0.5,)}).explain(store)
@@ -140,7 +146,7 @@ def test_a_store_of_another_study_is_refused(found, tmp_path):
         study().explain(newer)
 
 
-def test_a_file_says_the_same_as_a_call(tmp_path, found):
+def test_a_file_says_the_same_as_a_call(tmp_path: Path, found: Found) -> None:
     file = tmp_path / "delay.yaml"
     file.write_text(
         "scenario: point\nduration: 1.0\nseeds: 2\nsweep: {display.latency: [0.0, 0.1]}\n"
@@ -153,7 +159,7 @@ def test_a_file_says_the_same_as_a_call(tmp_path, found):
             read_study(file)
 
 
-def test_differences_are_by_pairs_and_intervals_hold_their_mean(found):
+def test_differences_are_by_pairs_and_intervals_hold_their_mean(found: Found) -> None:
     _, data = found
     whole = study()
     change = differences(whole, data, METRICS[0])["display.latency"][0]
@@ -167,6 +173,7 @@ def test_differences_are_by_pairs_and_intervals_hold_their_mean(found):
 _KILLED = """
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 sys.path.insert(0, {folder!r})
 from test_studies import study
 if __name__ == "__main__":
@@ -175,7 +182,7 @@ if __name__ == "__main__":
 
 
 @pytest.mark.slow
-def test_a_study_that_is_killed_goes_on_to_the_same_bits(found, tmp_path):
+def test_a_study_that_is_killed_goes_on_to_the_same_bits(found: Found, tmp_path: Path) -> None:
     _, data = found
     script, store = tmp_path / "killed.py", tmp_path / "store"
     script.write_text(_KILLED.format(folder=str(Path(__file__).parent)))
@@ -198,7 +205,7 @@ def test_a_study_that_is_killed_goes_on_to_the_same_bits(found, tmp_path):
 
 
 @pytest.mark.slow
-def test_dask_workers_give_the_same_bits(found, tmp_path):
+def test_dask_workers_give_the_same_bits(found: Found, tmp_path: Path) -> None:
     distributed = pytest.importorskip("distributed", reason="Dask is not installed")
     _, data = found
     with (
