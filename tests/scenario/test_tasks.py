@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 import teleop_core as tc
+from teleop_core.chain.master.display import DisplayParameters
+from teleop_core.graph.stage import STAGES
 from teleop_core.graph.topics import SLAVE_MEASURED_CP, TASK_STATE
 
 COLUMN = {name: i for i, name in enumerate(TASK_STATE.columns)}
@@ -71,6 +73,16 @@ def test_the_operator_sees_the_slave_as_late_as_the_display_says() -> None:
         age = ages - (stream.stamp_ns[is_new] - shown.bag.start_ns)
         assert np.diff(stream.stamp_ns[is_new])[1:] == pytest.approx(20_000_000, abs=1_000_000)
         assert np.median(age) == pytest.approx(1e9 * latency + 1e6, abs=1.1e6)
+
+
+def test_a_display_is_dark_until_the_slave_says_where_it_is() -> None:
+    running = STAGES.find("display").run(DisplayParameters(latency=0.0))
+    row = running.signals
+    for tick in range(1, 100):
+        row["now_ns"] = tick * 1_000_000
+        row["slave_measured_cp_ns"] = 0 if tick < 50 else tick * 1_000_000
+        running.step()
+        assert (row["display_measured_cp_ns"] > 0) == (tick >= 50)
 
 
 def test_a_late_display_slows_the_operator_down() -> None:

@@ -72,13 +72,14 @@ def display_step(p: DisplayNumbers, s: DisplayState, row: Row, dt: float) -> Non
         row: Signals; ``display_measured_cp`` is written, with the stamp of what it shows.
         dt: Tick [s].
     """
-    if row.now_ns >= s.due_ns:
+    stamp_ns = row.slave_servo_cp_ns if p.shows == 1 else row.slave_measured_cp_ns
+    if row.now_ns >= s.due_ns and stamp_ns > 0:  # else there is nothing to see yet
         s.due_ns = max(s.due_ns, row.now_ns - 1_000_000_000) + int(1e9 / p.rate)
         at = s.taken % _FRAMES
         shown = row.slave_servo_cp if p.shows == 1 else row.slave_measured_cp
         for i in range(7):
             s.frames[7 * at + i] = shown[i]
-        s.stamps[at] = row.slave_servo_cp_ns if p.shows == 1 else row.slave_measured_cp_ns
+        s.stamps[at] = stamp_ns
         s.times[at] = row.now_ns
         s.taken += 1
     latest_ns = row.now_ns - int(1e9 * p.latency + 0.5)
