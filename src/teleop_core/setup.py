@@ -69,6 +69,7 @@ setup(
             "EAIK",
             "coverage",
             "distributed",
+            "gymnasium",
             "pytest",
             "pytest-rerunfailures",
             "pytest-xdist",

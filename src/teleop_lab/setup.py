@@ -24,7 +24,7 @@ setup(
         "scipy",
         "xarray",
     ],
-    extras_require={"dask": ["distributed"]},
+    extras_require={"dask": ["distributed"], "gym": ["gymnasium"]},
     data_files=[
         ("share/ament_index/resource_index/packages", ["resource/teleop_lab"]),
         ("share/teleop_lab", ["package.xml"]),

@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 _COLORS = (FIRST, SECOND, THIRD, FIXTURE, "#7f7f7f", "#17becf", "#bcbd22", "#8c564b")
 _STYLE = """body{font-family:system-ui,sans-serif;max-width:60rem;margin:2rem auto;padding:0 1rem}
 table{border-collapse:collapse;margin:1rem 0}td,th{padding:.25rem .75rem;text-align:left;
-border-bottom:1px solid #ddd}@media(prefers-color-scheme:dark){body{background:#16181c;color:#ddd}
-td,th{border-color:#444}}"""
+border-bottom:1px solid #ddd;white-space:nowrap}
+@media(prefers-color-scheme:dark){body{background:#16181c;color:#ddd}td,th{border-color:#444}}"""
 
 
 def study_page(study: "Study", found: "xarray.Dataset", title: str) -> str:
@@ -29,10 +29,13 @@ def study_page(study: "Study", found: "xarray.Dataset", title: str) -> str:
 
     parts = [_table(study, found)]
     for metric in study.metrics:
+        parts.append(f"<h2>{escape(metric)}</h2>")
         for figure in (_lines(study, found, metric), _heat(study, found, metric)):
             if figure is not None:
                 drawn = go.Figure(*figure)
-                parts.append(drawn.to_html(full_html=False, include_plotlyjs=False))
+                drawn.update_layout(margin={"t": 10, "b": 50, "l": 70, "r": 20})
+                bar = {"displayModeBar": False}
+                parts.append(drawn.to_html(bar, full_html=False, include_plotlyjs=False))
         parts.append(_changes(study, found, metric))
     errors = sorted({str(error) for error in found["error"].values.ravel() if error})
     parts += [f"<p>failed: {escape(error)}</p>" for error in errors]
@@ -76,7 +79,7 @@ def _lines(study: "Study", found: "xarray.Dataset", metric: str) -> tuple[Any, A
                 "line": {"color": _COLORS[number % len(_COLORS)]},
             }
         )  # fmt: skip
-    layout = {"xaxis": axis(name), "yaxis": _label(found, metric), "height": 420}
+    layout = {"xaxis": axis(name), "yaxis": _label(found, metric), "height": 340}
     return traces, layout
 
 
@@ -93,7 +96,7 @@ def _heat(study: "Study", found: "xarray.Dataset", metric: str) -> tuple[Any, An
         "y": [str(value) for value in study.swept[second]],
         "colorbar": {"title": {"text": metric}},
     }  # fmt: skip
-    layout = {"xaxis": axis(first), "yaxis": axis(second), "height": 380}
+    layout = {"xaxis": axis(first), "yaxis": axis(second), "height": 280}
     return [trace], layout
 
 

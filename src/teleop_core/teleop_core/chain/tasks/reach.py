@@ -1,0 +1,59 @@
+"""Reach: be at one place after another, anywhere in a box, as soon as it can be."""
+
+import math
+from dataclasses import dataclass
+
+from teleop_core.base.parameters import parameter
+from teleop_core.chain.tasks import Act, Task
+from teleop_core.chain.tasks.attempts import begin_goal, tell_attempt
+from teleop_core.kernels import kernel
+from teleop_core.kernels.geometry import Array
+
+_PASS = int(Act.PASS)
+# Powers of the inverse of the plastic number's relative in three dimensions, 1.2207440846…
+_STEPS = (0.8191725133961645, 0.6710436067037893, 0.5497004779019703)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReachTaskParameters:
+    """A box around the place where the tip is when the task begins."""
+
+    size: tuple[float, ...] = parameter(
+        (0.01, 0.04, 0.04), unit="m", lower=0.0, upper=0.5, length=3, doc="of the box"
+    )
+    width: float = parameter(
+        0.004, unit="m", lower=1e-4, upper=0.1, doc="diameter of a goal, a ball"
+    )
+    longest: float = parameter(
+        10.0, unit="s", lower=0.1, upper=600.0, doc="after which a goal counts as an error"
+    )
+    first: int = parameter(0, lower=0, upper=10**6, doc="which place comes first")
+
+
+@kernel
+def reach_judge(numbers: Array, memory: Array, scene: Array, state: Array) -> None:
+    """Set the next goal when the tip is at this one, or takes too long.
+
+    Goals fill the box evenly, as the additive recurrence of Roberts 2018 does.
+
+    ``memory`` holds the middle of the box (3,) and when the goal was set [s].
+    """
+    if state[0] == 0.0:
+        for i in range(3):
+            memory[i] = scene[1 + i]
+    else:
+        off = 0.0
+        for i in range(3):
+            off += (scene[1 + i] - state[2 + i]) * (scene[1 + i] - state[2 + i])
+        if math.sqrt(off) > 0.5 * state[5] and scene[0] - memory[3] < numbers[4]:
+            return
+        tell_attempt(memory, scene, state)
+    at = state[0] + numbers[5] + 1.0
+    goal_x = memory[0] + numbers[0] * ((0.5 + at * _STEPS[0]) % 1.0 - 0.5)
+    goal_y = memory[1] + numbers[1] * ((0.5 + at * _STEPS[1]) % 1.0 - 0.5)
+    goal_z = memory[2] + numbers[2] * ((0.5 + at * _STEPS[2]) % 1.0 - 0.5)
+    memory[3] = scene[0]
+    begin_goal(memory, scene, state, _PASS, goal_x, goal_y, goal_z, numbers[3])
+
+
+REACH = Task("reach", ReachTaskParameters, reach_judge)

@@ -1,0 +1,56 @@
+"""The session as a Gymnasium environment."""
+
+import warnings
+from typing import Any
+
+import numpy as np
+import pytest
+
+gymnasium = pytest.importorskip("gymnasium", reason="Gymnasium is not installed")
+NAME = "teleop_lab.environment:teleop_core/Reach-v0"
+
+
+def led(env: Any, seed: int) -> tuple[bool, int, list[float]]:
+    """Whether a hand that goes towards the goal gets there, in how many steps, and the rewards."""
+    seen, _ = env.reset(seed=seed)
+    rewards = []
+    for step in range(500):
+        seen, reward, is_over, is_late, _ = env.step(np.clip(2.0 * seen[:3], -1.0, 1.0))
+        rewards.append(reward)
+        if is_over or is_late:
+            return is_over, step, rewards
+    return False, 500, rewards
+
+
+def test_gymnasium_finds_no_fault_with_it() -> None:
+    from gymnasium.utils.env_checker import check_env
+
+    env = gymnasium.make(NAME)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        warnings.filterwarnings("ignore", message=".*infinity.*")
+        warnings.filterwarnings("ignore", message=".*render.*")
+        check_env(env.unwrapped, skip_render_check=True)
+
+
+def test_a_hand_that_goes_towards_the_goal_gets_there_and_a_resting_one_does_not() -> None:
+    env = gymnasium.make(NAME)
+    results = [led(env, seed) for seed in range(5)]
+    assert all(is_there for is_there, _, _ in results)
+    assert len({steps for _, steps, _ in results}) > 1, "the goals are the same"
+    env.reset(seed=1)
+    over = [env.step(np.zeros(3, np.float32))[2:4] for _ in range(500)]
+    assert not any(is_there for is_there, _ in over)
+    assert over[-1][1], "it is not truncated"
+
+
+def test_the_same_seed_gives_the_same_episode_beside_another_environment() -> None:
+    first, second = gymnasium.make(NAME), gymnasium.make(NAME)
+    assert led(first, 3)[2] == led(second, 3)[2] == led(first, 3)[2]
+    assert led(second, 4)[2] != led(first, 3)[2]
+
+
+def test_a_late_display_makes_it_slower() -> None:
+    late = gymnasium.make(NAME, settings={"display.latency": 0.3})
+    soon = gymnasium.make(NAME, settings={"display.latency": 0.0})
+    assert sum(led(late, s)[1] for s in range(3)) > sum(led(soon, s)[1] for s in range(3))
