@@ -2,7 +2,7 @@
 
 from setuptools import find_packages, setup
 
-COMMANDS = ("calibrate", "experiment", "fit", "reach", "study")
+COMMANDS = ("calibrate", "experiment", "fit", "grade", "reach", "study")
 VERSION = "0.6.0"  # released together with teleop_core
 
 setup(

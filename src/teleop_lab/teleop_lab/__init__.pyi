@@ -8,6 +8,7 @@ from .experiments import (
     register_experiment as register_experiment,
 )
 from .fitting import FitError as FitError, FitResult as FitResult, fit_plant as fit_plant
+from .grading import grade as grade
 from .planning.reach import Reach as Reach, reach as reach
 from .studies import Study as Study, read_study as read_study, sweep as sweep
 

@@ -1,0 +1,85 @@
+"""``teleop grade``: figures of every episode of a data set, the oddest first."""
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from teleop_core.commands.arguments import command
+
+_EPILOG = """\
+  teleop grade DATASET                                a LeRobot data set (v3), or a table
+  teleop grade DATASET --csv grades.csv --html grades.html
+  teleop grade DATASET --usual keep.txt --most 3.5    episodes that are no odder, one a line
+an episode is as odd as its oddest figure: by how many robust standard deviations it is off the
+median of all episodes. That says which to look at first, not which are wrong.
+"""
+
+
+def add(commands: Any) -> None:
+    """Add the command's parser."""
+    text = "figures of motion of every episode of a data set, the oddest first"
+    parser = command(commands, "grade", _run, text, _EPILOG)
+    parser.add_argument("data", type=Path, metavar="DATASET", help="folder or table")
+    parser.add_argument("--csv", type=Path, metavar="FILE", help="write all figures")
+    parser.add_argument("--html", type=Path, metavar="FILE", help="write a page")
+    parser.add_argument("--usual", type=Path, metavar="FILE", help="write which are not too odd")
+    parser.add_argument("--most", type=float, default=3.5, help="how odd those are (default: 3.5)")
+    parser.add_argument("--recordings", type=Path, metavar="DIR", help="keep a recording of each")
+
+
+def _run(arguments: argparse.Namespace) -> int:
+    from teleop_core.base.errors import ParameterError
+    from teleop_core.evaluation.command import check_places, write_whole
+    from teleop_lab.grading import REASON, grade, usual
+
+    if not arguments.most >= 0.0:
+        raise ParameterError("--most", arguments.most, "0 or more standard deviations")
+    check_places(arguments.csv, arguments.html, arguments.usual)
+    table = grade(arguments.data, recordings=arguments.recordings)
+    shown = table.drop(columns=REASON).head(20)
+    print(shown.to_string(float_format="{:.4g}".format, na_rep="–"))
+    if len(table) > len(shown):
+        print(f"and {len(table) - len(shown)} more")
+    kept = usual(table, arguments.most)
+    refused = table.index[table[REASON] != ""]
+    print(f"{len(kept)} of {len(table)} episodes are no odder than {arguments.most:g}")
+    for number in refused:
+        print(f"episode {number}: {table.loc[number, REASON]}")
+    for place, text in (
+        (arguments.csv, table.to_csv),
+        (arguments.usual, lambda: "".join(f"{number}\n" for number in kept)),
+        (arguments.html, lambda: _page(table, arguments.data.name)),
+    ):
+        if place is not None:
+            write_whole(place, text())
+            print(f"written: {place}")
+    return 0
+
+
+def _page(table: Any, name: str) -> str:
+    """Page with a sortable-by-oddness table whose odd cells stand out."""
+    from html import escape
+
+    from teleop_lab.grading import ODD, WORST
+
+    head = "".join(f"<th>{escape(str(column))}</th>" for column in ("episode", *table.columns))
+    rows = []
+    for number, row in table.iterrows():
+        cells = [f"<td>{number}</td>"]
+        for column, value in row.items():
+            is_odd = column == row[WORST] and row[ODD] > 3.5
+            text = f"{value:.4g}" if isinstance(value, float) else str(value)
+            cells.append(f"<td{' class=odd' if is_odd else ''}>{escape(text)}</td>")
+        rows.append(f"<tr>{''.join(cells)}</tr>")
+    style = (
+        "body{font-family:system-ui,sans-serif;margin:2rem}table{border-collapse:collapse}"
+        "td,th{padding:.25rem .6rem;border-bottom:1px solid #ddd;text-align:right}"
+        ".odd{background:#ffd9a8;color:#000}"
+        "@media(prefers-color-scheme:dark){body{background:#16181c;color:#ddd}}"
+    )
+    return (
+        f'<!doctype html><html lang="en"><meta charset="utf-8"><title>{escape(name)}</title>'
+        f"<style>{style}</style><h1>{escape(name)}</h1><p>Oddest first: by how many robust "
+        "standard deviations the oddest figure is off the median of all episodes.</p>"
+        f"<table><tr>{head}</tr>{''.join(rows)}</table></html>"
+    )

@@ -1,0 +1,92 @@
+"""Grading: every episode of a data set gets its figures of motion, the oddest first.
+
+No ROS, no arm: an episode is a hand's motion. What a data set does not say has no figure.
+"""
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from teleop_core.bags.reader import Bag
+from teleop_core.base.errors import ParameterError, RecordingError
+from teleop_core.evaluation import measure
+from teleop_core.session.exchange import ImportOptions, import_episodes
+
+if TYPE_CHECKING:
+    import pandas
+
+FIGURES = (
+    "time_s", "path_mm", "speed_median_mm_s", "speed_p95_mm_s", "acceleration_p95_m_s2",
+    "idle_share", "peaks_per_s", "reversals", "sparc",
+)  # fmt: skip
+"""Figures of :doc:`scores`, below ``motion.hand``, that an episode is graded by."""
+ODD, WORST, REASON = "odd", "most_odd", "reason"
+_NORMAL = 1.4826  # median absolute deviations of a normal distribution in a standard deviation
+
+
+def grade(
+    data: Path | str,
+    *,
+    figures: Sequence[str] = FIGURES,
+    options: ImportOptions | None = None,
+    recordings: Path | str | None = None,
+    say: Callable[[str], object] = lambda _: None,
+) -> "pandas.DataFrame":
+    """Figures of every episode, the oddest first.
+
+    An episode is as odd as its oddest figure: by how many robust standard deviations (1.4826 times
+    the median absolute deviation) it is off the median of all episodes. That says which to look at,
+    not which are wrong.
+
+    Args:
+        data: Folder of a LeRobot data set, or a table with a column of episodes.
+        figures: Keys below ``motion.hand`` of a score.
+        options: As of :func:`teleop_core.import_recording`: columns, units, frames.
+        recordings: Folder for a recording of each episode, kept; None: none are kept.
+        say: Told a line after each episode.
+
+    Returns:
+        A row for each episode by its number: its figures, ``odd``, ``most_odd``, the figure that
+        is so, and ``reason``, why there are none; NaN where the data set does not say.
+
+    Raises:
+        RecordingError: The data cannot be read, or no episode can.
+        ParameterError: No figures are asked for, or an option is wrong.
+        UnknownNameError: There is no such figure.
+    """
+    import pandas
+
+    if not figures:
+        raise ParameterError("figures", (), "at least one, as speed_median_mm_s")
+    keys = [f"motion.hand.{name}" for name in figures]
+    rows: dict[int, dict[str, float | str | None]] = {}
+    with TemporaryDirectory() as folder:
+        place = Path(folder) if recordings is None else Path(recordings)
+        report = import_episodes(data, place, options, say=say)
+        for number in sorted((*report.made, *report.kept)):
+            found = measure(Bag(place / f"episode_{number:06d}"), keys)
+            rows[number] = dict(zip(figures, found.values(), strict=True)) | {REASON: ""}
+    rows |= {number: {REASON: why} for number, why in report.refused.items()}
+    if not any(len(row) > 1 for row in rows.values()):
+        first = next(iter(report.refused.values()), "there are none")
+        raise RecordingError(Path(data), f"no episode can be graded: {first}")
+    table = pandas.DataFrame.from_dict(rows, orient="index").rename_axis("episode")
+    table = table.reindex(columns=[*figures, REASON])
+    table[REASON] = table[REASON].fillna("")
+    values = table[list(figures)].astype(float)
+    table[list(figures)] = values
+    off = (values - values.median()).abs()
+    spread = _NORMAL * off.median()
+    # Where all are alike nothing is odd.
+    shares = (off / spread.where(spread > 0.0, np.inf)).fillna(0.0)
+    table.insert(0, ODD, shares.max(axis=1).where(table[REASON] == "", np.inf))
+    table.insert(1, WORST, shares.idxmax(axis=1).where(shares.max(axis=1) > 0.0, ""))
+    return table.sort_values([ODD], ascending=False, kind="stable")
+
+
+def usual(table: "pandas.DataFrame", most: float = 3.5) -> list[int]:
+    """Numbers of the episodes that are no odder than this, in their order: a list for training."""
+    return sorted(int(number) for number in table.index[table[ODD] <= most])

@@ -1,0 +1,82 @@
+"""Grading of episodes: the odd one is found, and what is not known is said."""
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import teleop_core as tc
+from teleop_lab.grading import FIGURES, ODD, REASON, WORST, grade, usual
+
+RATE, ODD_ONE = 50.0, 4
+
+
+@pytest.fixture(scope="module")
+def table(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Eight episodes of nearly the same motion; one is three times as fast."""
+    rng, frames = np.random.default_rng(1), []
+    for episode in range(8):
+        fast = 3.0 if episode == ODD_ONE else 1.0
+        t = np.arange(200) / RATE
+        rate = 2.0 * np.pi * 0.4 * fast * (1.0 + 0.02 * rng.standard_normal())
+        place = 0.03 * np.sin(np.outer(t, [1.0, 0.7, 0.5]) * rate)
+        frame = pd.DataFrame(place, columns=["x", "y", "z"])
+        frame.insert(0, "timestamp", t)
+        frame.insert(0, "episode_index", episode)
+        frames.append(frame)
+    path = tmp_path_factory.mktemp("grading") / "set.csv"
+    pd.concat(frames).to_csv(path, index=False)
+    return path
+
+
+def test_the_odd_episode_comes_first_and_names_why(table: Path) -> None:
+    found = grade(table)
+    assert found.index[0] == ODD_ONE
+    assert "speed" in found.iloc[0][WORST] or "path" in found.iloc[0][WORST]
+    assert found[ODD].is_monotonic_decreasing
+    assert ODD_ONE not in usual(found)
+    assert len(usual(found, np.inf)) == 8
+
+
+def test_figures_are_those_of_each_episode_alone(table: Path, tmp_path: Path) -> None:
+    found = grade(table)
+    alone = pd.read_csv(table).query("episode_index == 2")
+    length = np.linalg.norm(np.diff(alone[["x", "y", "z"]], axis=0), axis=1).sum()
+    assert found.loc[2, "path_mm"] == pytest.approx(1e3 * length, rel=0.01)
+    assert found.loc[2, "time_s"] == pytest.approx(len(alone) / RATE, abs=0.05)
+
+
+def test_an_episode_that_cannot_be_read_says_why_and_is_not_among_the_usual(
+    table: Path, tmp_path: Path
+) -> None:
+    broken = pd.read_csv(table)
+    broken.loc[broken.episode_index == 6, ["x", "y", "z"]] = np.nan
+    file = tmp_path / "broken.csv"
+    broken.to_csv(file, index=False)
+    found = grade(file)
+    assert found.loc[6, REASON]
+    assert np.isnan(found.loc[6, "speed_median_mm_s"])
+    assert 6 not in usual(found)
+    assert set(found.index) == set(range(8))
+
+
+def test_all_alike_nothing_is_odd(table: Path, tmp_path: Path) -> None:
+    one = pd.read_csv(table).query("episode_index == 0")
+    copies = pd.concat([one.assign(episode_index=i) for i in range(4)])
+    copies.to_csv(tmp_path / "same.csv", index=False)
+    found = grade(tmp_path / "same.csv")
+    assert (found[ODD] == 0.0).all()
+
+
+@pytest.mark.parametrize(("figures", "said"), [((), "at least one"), (("speed",), "motion.hand")])
+def test_wrong_figures_are_refused(table: Path, figures: tuple[str, ...], said: str) -> None:
+    with pytest.raises(tc.TeleopError, match=said):
+        grade(table, figures=figures)
+
+
+def test_the_figures_are_keys_of_the_score() -> None:
+    from teleop_core.evaluation import keys
+
+    known = {name for key in keys() for name in key.names()}
+    assert {f"motion.hand.{name}" for name in FIGURES} <= known
