@@ -327,6 +327,7 @@ def _parts(_: argparse.Namespace) -> int:
     from teleop_core.chain.network import NETWORKS
     from teleop_core.chain.operators import OPERATORS
     from teleop_core.chain.passivity import PASSIVITIES
+    from teleop_core.chain.tasks import TASKS
     from teleop_core.console.controls import CONTROLS
     from teleop_core.evaluation import METRICS
     from teleop_core.graph.stage import STAGES
@@ -338,7 +339,7 @@ def _parts(_: argparse.Namespace) -> int:
 
     parts = (
         OPERATORS, FIXTURES, ROBOTS, CONTROLLERS, PLANTS, WORLD_OBJECTS, ARCHITECTURES, NETWORKS,
-        PASSIVITIES, TREMOR_FILTERS, BRIDGES, STAGES, METRICS, CONTROLS,
+        PASSIVITIES, TREMOR_FILTERS, TASKS, BRIDGES, STAGES, METRICS, CONTROLS,
     )  # fmt: skip
     for registry in parts:
         print(f"{registry.kinds:16}{', '.join(registry)}")

@@ -427,7 +427,7 @@ HAND_JAW = Topic(
 )
 """How far the operator closes the jaw: 0 open, 1 closed."""
 DISPLAY_MEASURED_CP = Topic(
-    "display/measured_cp", Kind.POSE, arrived("slave/measured_cp"), "slave_base", is_seldom=True
+    "display/measured_cp", Kind.POSE, arrived("slave/measured_cp"), "slave_base"
 )
 """Where the operator sees the slave, of a session with a display: the newest frame."""
 TASK_STATE = Topic(
