@@ -1,20 +1,30 @@
-"""Try several values of a parameter, and compare the scores side by side."""
+"""Ask what a delay and a gain cost: sessions over named values and seeds, as an xarray data set."""
 
-import pandas as pd
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
-import teleop_core as tc
-
-KEYS = ("position_error_mm.rms", "position_error_mm.max", "fixture.penetration_max_mm")
+from teleop_lab import Study
 
 
 def main() -> None:
-    """Print the errors for each stiffness of the wall."""
-    rows = {}
-    for stiffness in (250.0, 500.0, 1000.0, 2000.0):
-        score = tc.run("coarse_box", duration=15.0, fixture__stiffness=stiffness).score()
-        rows[f"{stiffness:.0f} N/m"] = {key: score.value(key) for key in KEYS}
-    table = pd.DataFrame.from_dict(rows, orient="index")
-    print(table.round(3).to_string())
+    """Print what it costs, run it, print the means; a second run would run nothing."""
+    study = Study(
+        "point",
+        {"display.latency": (0.033, 0.333), "coarse_gain": (0.5, 1.0)},
+        seeds=(1, 2),
+        metrics=("task.time_s", "task.error_share"),
+        settings={"teleop.duration": 8.0},
+    )
+    with TemporaryDirectory() as folder:
+        store = Path(folder) / "delay"
+        print(study.explain(store))
+        found = study.run(store)
+        print("again:", study.explain(store))
+    times = found["task.time_s"].mean("seed")
+    for latency in found["display.latency"].values:
+        row = times.sel({"display.latency": latency})
+        slow, fast = (float(row.sel(coarse_gain=gain)) for gain in (0.5, 1.0))
+        print(f"seen {1e3 * latency:.0f} ms late: {slow:.2f} s at gain 0.5, {fast:.2f} s at gain 1")
 
 
 if __name__ == "__main__":

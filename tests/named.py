@@ -30,10 +30,11 @@ NOT_RUN = {
     r"import user\.bag": "needs a bag of ROS 1: tests/unit/test_import_bags.py",
     r".*--format lerobot": "needs its library: tests/unit/test_lerobot.py",
     r".*--presets? jigsaws": "needs a data set: tests/unit/test_import_systems.py",
+    r"study .* --scheduler": "needs a Dask scheduler: tests/unit/test_studies.py",
     r"experiment": "each is run by a test of its own, below its name",
 }
 """Commands that are not run as they stand, by their beginnings, and why."""
-LONG = r"fit\b|.*\bsoft\.yaml"
+LONG = r"fit\b|.*\bsoft\.yaml|study config/studies/delay\.yaml --store"
 """Commands of more than half a minute, which only ``make soak`` runs."""
 
 
@@ -114,6 +115,11 @@ def _hand(path: Path) -> None:
     _table(path, "t x y z", circle())
 
 
+def _hands(path: Path) -> None:
+    numbers = np.repeat(np.arange(3.0), 400)
+    _table(path, "episode_index t x y z", np.column_stack((numbers, np.tile(circle(), (3, 1)))))
+
+
 def _hand_in_mm(path: Path) -> None:
     _table(path, "t px py pz", circle() * 1e3)
 
@@ -149,6 +155,12 @@ def _heights(path: Path) -> None:
     np.savetxt(path, np.zeros((5, 5)), delimiter=",")
 
 
+def _study(path: Path) -> None:
+    text = (ROOT / "config/studies/delay.yaml").read_text(encoding="utf-8")
+    short = text.replace("duration: 20.0", "duration: 1.0").replace("seeds: 5", "seeds: 1")
+    path.write_text(short, encoding="utf-8")
+
+
 def _drives(path: Path) -> None:
     path.write_text("elbow_joint: {inertia: 0.4, speed_limit: 2.0}\n", encoding="utf-8")
 
@@ -178,7 +190,7 @@ FILES: dict[str, Callable[[Path], None]] = {
     "hand.csv": _hand, "two.csv": _two, "mocap.txt": _mocap, "tool.csv": _tool,
     "skull.stl": _mesh, "part.stl": _mesh, "heights.csv": _heights,
     "my_arm.urdf": _arm, "arm.urdf": _arm, "poses.csv": _poses,
-    "drives.yaml": _drives, "tube.py": _tube, "dataset": _data_set,
+    "hands.csv": _hands, "drives.yaml": _drives, "delay.yaml": _study, "tube.py": _tube, "dataset": _data_set,
 }  # fmt: skip
 """Makers of the files that commands name and readers have."""
 

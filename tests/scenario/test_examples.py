@@ -198,10 +198,17 @@ def test_delay_of_twenty_milliseconds_makes_references_twenty_milliseconds_old(
     assert delayed > direct
 
 
-def test_sweep_tells_that_a_stiffer_wall_holds_better(tmp_path: Path) -> None:
-    depths = numbers(r"N/m .* ([\d.]+)\n", run("sweep", tmp_path))
-    assert len(depths) == 4
-    assert depths == sorted(depths, reverse=True)
+def test_sweep_tells_what_a_late_display_costs_and_runs_nothing_twice(tmp_path: Path) -> None:
+    text = run("sweep", tmp_path)
+    assert "8 sessions, 8 to run (8 missing)" in text
+    assert "again: 8 sessions, 0 to run" in text
+    _, soon, _, late = numbers(r"([\d.]+) s at gain", text)
+    assert late > soon + 0.1
+
+
+def test_own_task_takes_longer_the_later_the_slave_is_seen(tmp_path: Path) -> None:
+    soon, late = numbers(r"([\d.]+) s each", run("own_task", tmp_path))
+    assert late > soon + 0.1
 
 
 def test_walls_hold_the_hand_by_how_far_it_aims_and_damped_ones_do_not_feed_it(

@@ -7,9 +7,11 @@ from typing import Any
 from teleop_core.commands.arguments import command
 
 _EPILOG = """\
-  teleop grade DATASET                                a LeRobot data set (v3), or a table
-  teleop grade DATASET --csv grades.csv --html grades.html
-  teleop grade DATASET --usual keep.txt --most 3.5    episodes that are no odder, one a line
+  teleop grade hands.csv                              a table with a column of episodes
+  teleop grade hands.csv --csv grades.csv --html grades.html
+  teleop grade hands.csv --usual keep.txt --most 3.5  episodes that are no odder, one a line
+  teleop grade dataset --position observation.state.6 observation.state.7 observation.state.8
+a data set of LeRobot says which numbers are a place only by --position.
 an episode is as odd as its oddest figure: by how many robust standard deviations it is off the
 median of all episodes. That says which to look at first, not which are wrong.
 """
@@ -20,6 +22,10 @@ def add(commands: Any) -> None:
     text = "figures of motion of every episode of a data set, the oddest first"
     parser = command(commands, "grade", _run, text, _EPILOG)
     parser.add_argument("data", type=Path, metavar="DATASET", help="folder or table")
+    parser.add_argument(
+        "--position", nargs=3, metavar=("X", "Y", "Z"), help="columns of the place, if not x, y, z"
+    )
+    parser.add_argument("--unit", default="auto", help="of the place: m, cm, mm, in, or auto")
     parser.add_argument("--csv", type=Path, metavar="FILE", help="write all figures")
     parser.add_argument("--html", type=Path, metavar="FILE", help="write a page")
     parser.add_argument("--usual", type=Path, metavar="FILE", help="write which are not too odd")
@@ -30,12 +36,14 @@ def add(commands: Any) -> None:
 def _run(arguments: argparse.Namespace) -> int:
     from teleop_core.base.errors import ParameterError
     from teleop_core.evaluation.command import check_places, write_whole
+    from teleop_core.session.exchange import ImportOptions
     from teleop_lab.grading import REASON, grade, usual
 
     if not arguments.most >= 0.0:
         raise ParameterError("--most", arguments.most, "0 or more standard deviations")
     check_places(arguments.csv, arguments.html, arguments.usual)
-    table = grade(arguments.data, recordings=arguments.recordings)
+    options = ImportOptions(position=arguments.position, unit=arguments.unit)
+    table = grade(arguments.data, options=options, recordings=arguments.recordings)
     shown = table.drop(columns=REASON).head(20)
     print(shown.to_string(float_format="{:.4g}".format, na_rep="–"))
     if len(table) > len(shown):

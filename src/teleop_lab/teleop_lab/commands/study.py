@@ -20,9 +20,9 @@ a study is a YAML file:
     coarse_gain: [0.5, 1.0]
   metrics: [task.time_s, task.error_share]        keys of scores, as `teleop evaluate --json`
 then:
-  teleop study FILE.yaml --explain                how many sessions, how long, how many bytes
-  teleop study FILE.yaml --store runs/delay       killed and called again, it goes on
-  teleop study FILE.yaml --store runs/delay --html delay.html --csv delay.csv
+  teleop study delay.yaml --explain               how many sessions, how long, how many bytes
+  teleop study delay.yaml --store delay           killed and called again, it goes on
+  teleop study delay.yaml --store delay --html delay.html --csv delay.csv
 """
 
 
