@@ -186,7 +186,7 @@ def _wrist(
     other = other if is_path else max(other, arm[_COST])
     for k in range(2):
         j = start if k == 0 else 1 - start
-        if k == 1 and not do_both and lowest < other:
+        if k == 1 and not do_both and lowest < min(other, OUTSIDE):
             q[j, 6] = closed_form.UNKNOWN
             break
         y = base + spread if j == 0 else base - spread
