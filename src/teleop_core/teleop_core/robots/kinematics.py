@@ -1,19 +1,16 @@
 """Kinematics of a robot as compiled functions, what they answer, and batches of them."""
 
 import math
-import os
-import threading
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import IntEnum
-from itertools import pairwise
 from typing import Generic, NamedTuple, TypeAlias, TypeGuard, TypeVar
 
 import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
-from teleop_core.kernels import IS_COMPILED, inner, is_kernel, kernel, raise_pending
+from teleop_core.kernels import inner, kernel
 from teleop_core.kernels.geometry import Array, is_rigid, rotation_angle_between
 
 _FLOAT64 = np.dtype(np.float64)  # one object; another of its kind is copied
@@ -42,8 +39,6 @@ MAX_ASSEMBLIES = 64
 # search for all of them. Of the leg sets that have an assembly, a quarter of the starts and more
 # end in one.
 SEARCH, SEARCH_ALL = 64, 384
-# Poses of a batch that are worth a thread, which takes as long as some fifty of them to start.
-SHARE = 500
 
 
 class IkStatus(IntEnum):
@@ -227,42 +222,3 @@ def ik_batch(
         statuses[i] = ik(transforms[i], seed, limits, geometry, q[i], residuals[i])
         if statuses[i] < 0:
             return
-
-
-def solve_batch(
-    kernels: Kernels, ik: IkKernel, poses: Array, seeds: Array, limits: Array, geometry: Array
-) -> tuple[Array, Array, NDArray[np.int64]]:
-    """Joints (N, n), residuals (N, 2) and statuses (N,) of poses (N, 4, 4), each on its own.
-
-    The cores of the processor share a large batch; answers do not depend on how many there are.
-
-    Args:
-        kernels: Of the robot.
-        ik: Its ``ik`` as an argument for other kernels.
-        poses: Wanted poses (N, 4, 4).
-        seeds: Of each (N, n), or one for all (1, n).
-        limits: Rows lower, upper, largest step (3, n).
-        geometry: The robot's geometry row.
-    """
-    count, n = len(poses), seeds.shape[1]
-    q, residuals, statuses = np.empty((count, n)), np.empty((count, 2)), np.zeros(count, np.int64)
-
-    def solve(first: int, last: int) -> None:
-        own = slice(first, last)
-        starts = seeds[own] if len(seeds) > 1 else seeds
-        ik_batch(
-            ik, poses[own], starts, False, limits, geometry, q[own], residuals[own], statuses[own]
-        )
-
-    # Plain Python holds the interpreter's lock: shares of it would wait for each other.
-    is_shared = IS_COMPILED and is_kernel(kernels.ik)
-    cores = min(len(os.sched_getaffinity(0)), count // SHARE) if is_shared else 1
-    ends = [count * k // max(cores, 1) for k in range(max(cores, 1) + 1)]
-    others = [threading.Thread(target=solve, args=pair) for pair in pairwise(ends[1:])]
-    for thread in others:
-        thread.start()
-    solve(0, ends[1])
-    for thread in others:
-        thread.join()
-    raise_pending()
-    return q, residuals, statuses

@@ -419,19 +419,14 @@ class Robot:
         return self._solve(poses, np.atleast_2d(start), self.limits(dt), is_path=True)
 
     def _solve(self, poses: Array, seeds: Array, limits: Array, *, is_path: bool) -> IkBatch:
-        if is_path:
-            count = len(poses)
-            q, residual = np.empty((count, self.n)), np.empty((count, 2))
-            status = np.zeros(count, np.int64)
-            kinematics.ik_batch(
-                self.ik_pointer, poses, seeds, True, limits, self._row, q, residual, status
-            )
-            raise_pending()
-        else:
-            q, residual, status = kinematics.solve_batch(
-                self.kernels, self.ik_pointer, poses, seeds, limits, self._row
-            )
-        if len(poses) and status.min() < 0:
+        count = len(poses)
+        q, residual = np.empty((count, self.n)), np.empty((count, 2))
+        status = np.zeros(count, np.int64)
+        kinematics.ik_batch(
+            self.ik_pointer, poses, seeds, is_path, limits, self._row, q, residual, status
+        )
+        raise_pending()
+        if count and status.min() < 0:
             bad = int(status.argmin())
             raise ParameterError(f"T[{bad}]", poses[bad].tolist(), _ASKABLE)
         return IkResult(q, status, residual)

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from teleop_core.kernels import raise_pending
 from teleop_core.kernels.geometry import Array, rotations_from_quaternions
 from teleop_core.kernels.portable import length, product
 from teleop_core.robots import kinematics
@@ -206,7 +207,10 @@ def _moved(begin: Array, offsets: Array, is_turn: bool) -> Array:
 def _solve(
     robot: "Robot", poses: Array, seeds: Array, limits: Array
 ) -> tuple[Array, NDArray[np.int64]]:
-    q, _, status = kinematics.solve_batch(
-        robot.kernels, robot.ik_pointer, poses, seeds, limits, robot.geometry_row
+    q, residual = np.empty_like(seeds), np.empty((len(seeds), 2))
+    status = np.zeros(len(seeds), np.int64)
+    kinematics.ik_batch(
+        robot.ik_pointer, poses, seeds, False, limits, robot.geometry_row, q, residual, status
     )
+    raise_pending()
     return q, status
