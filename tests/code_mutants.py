@@ -73,6 +73,8 @@ CODE_MUTANTS = (
             "robots/parallel_axes.py", "(cost > best and", "(best < math.inf and", "closed_forms"),
     _mutant("lag_reach", "a large arm that lags gives up millimetres for a milliradian",
             "robots/closed_form.py", "_LEVER = 0.1", "_LEVER = 4.0", "real_arms"),
+    _mutant("no_tremor", "the Kalman filter takes all that it reads for meant",
+            "chain/filters/kalman.py", "value - at[0] - at[2]", "value - at[0]", "tremor_filters"),
     _mutant("steps_wide", "a drive's step throws a link of some grams",
             "slave/plants/hardware.py", "np.minimum(drives.effort_limit, quick)",
             "drives.effort_limit", "real_arms"),
