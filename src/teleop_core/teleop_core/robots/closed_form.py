@@ -3,9 +3,9 @@
 A closed form sees the arm as G = Rz(q1) F1 Rz(q2) F2 ... Rz(qn), with constant transforms between
 the joints and every joint about its own z axis; for arms that decompose from the tip it is the arm
 from tip to base. Its constants stand behind the chain's in the geometry row
-(:mod:`teleop_core.robots.dh_kernels`): 1 or -1 for the order, n signs, n groups, the constant
-transforms before and after G, those between the joints, of twelve numbers each, what a class of
-arms has beside, and last 1 for an arm that is of its class only nearly
+(:mod:`teleop_core.robots.dh_kernels`): 1 or -1 for the order, n signs, n groups, then transforms of
+twelve numbers each: before and after G, and those between the joints. Behind them stands what a
+class of arms has beside, and last 1 for an arm that is of its class only nearly
 (:mod:`teleop_core.robots.decomposition`).
 
 Branches are candidates: joint vectors in the arm's own order, with 1.0 behind those that reach the
@@ -291,8 +291,8 @@ def _best_of_step(
     """Replace ``q`` by the joints within limits and step that come nearest to the pose.
 
     A search from the branch. Where that reaches the pose, joints that a step does not bring there
-    go at full speed, and the others make the best of that, or go slower with them on the straight
-    way, whichever lags less.
+    go at full speed. The others make the best of that, or go slower with them on the straight way,
+    whichever lags less.
     """
     n, box, trial = q.shape[0], np.empty((2, q.shape[0])), np.empty(q.shape[0])
     box_around(seed, limits, box)

@@ -1,9 +1,9 @@
 """Kinematics of a Denavit-Hartenberg chain: kernels over constant transforms between its joints.
 
 Every convention comes down to T = F0 J1(q1) F1 J2(q2) F2 ... with Ji a turn about or a slide along
-the local z axis and Fi constant. The geometry row holds, for n joints: n kinds (+1 or -1 a turn,
-+2 or -2 a slide, negative against its axis), the reach [m], six weights of the controlled
-directions (1 or 0), and n + 1 transforms of twelve numbers, row by row.
+the local z axis and Fi constant. The geometry row holds, for n joints: n kinds (+1 or -1 a turn, +2
+or -2 a slide, negative against its axis); the reach [m]; six weights of the controlled directions
+(1 or 0); and n + 1 transforms of twelve numbers, row by row.
 
 In a chain of m motions of which some follow others (:mod:`teleop_core.robots.followers`) there
 stand, in place of the transforms: m + 1, which is no entry of a rotation, as the first one is; for

@@ -2,13 +2,13 @@
 
 The distance of the wrist centre from the shoulder's fixes joint 4. The arm can then swivel about
 the line between them: the shoulder's rotation is A(psi) = P cos psi + Q sin psi + N. A joint of
-shoulder or wrist is at a given angle where an equation linear in cos psi and sin psi says so, and
-so the limits of all joints cut the circle of psi into arcs, exactly: an arc is legal as a whole or
-not at all, however narrow it is. Of the legal psi the nearest to the seed's posture is taken that
-keeps a margin to the ends of its arc; psi = 0 is the seed's. In a path the arm makes the least move
-that follows, and the swivel goes back to its margin where a joint is near a limit. Where instead
-the axes of shoulder or wrist come to lie in a plane, the swivel goes slowly, with speed that the
-path leaves, to the side where the manipulability of both grows: the volumes that unit axes span.
+shoulder or wrist is at a given angle where an equation linear in cos psi and sin psi says so. So
+the limits of all joints cut the circle of psi into arcs, exactly: an arc is legal as a whole or not
+at all, however narrow it is. Of the legal psi the nearest to the seed's posture is taken that keeps
+a margin to the ends of its arc; psi = 0 is the seed's. In a path the arm makes the least move that
+follows, and the swivel goes back to its margin where a joint is near a limit. Where instead the
+axes of shoulder or wrist come to lie in a plane, the swivel goes slowly, with speed that the path
+leaves, to the side where the manipulability of both grows: the volumes that unit axes span.
 
 Source:
     Shimizu, Kakuya, Yoon, Kitagaki and Kosuge 2008, IEEE T-RO 24(5), sections on joint limits;
