@@ -113,27 +113,37 @@ def test_a_search_from_200_starts_finds_no_further_solution(case: Case, load: Lo
 TWO_ROUNDS = [WIDE, WIDE, (-1.0, 5.5), WIDE, (-6.0, 0.5), WIDE]
 
 
-@pytest.mark.parametrize("limits", [TWO_ROUNDS, [(-0.3, 4.5)] * 6], ids=["two rounds", "one side"])
+NEAREST = {
+    "two rounds": (lambda _: UR5E, TWO_ROUNDS),
+    "one side": (lambda _: UR5E, [(-0.3, 4.5)] * 6),
+    "wrist": (lambda rng: wrist_axes(rng, "2 and 3 parallel"), TWO_ROUNDS),
+    "skew": (lambda rng: wrist_axes(rng, "skew")[::-1], WIDE),
+}
+
+
+@pytest.mark.parametrize("kind", NEAREST)
 def test_the_nearest_branch_inside_the_limits_answers_whole_turns_included(
-    limits: list[tuple[float, float]], load: Load
+    kind: str, load: Load
 ) -> None:
-    arm = load(UR5E, limits)
     rng = np.random.default_rng(8)
-    q = rng.uniform(arm.lower, arm.upper, (2000, 6))
+    axes, limits = NEAREST[kind]
+    arm = load(axes(rng), limits)
+    q, seeds = rng.uniform(arm.lower, arm.upper, (2, 2000, 6))
     answer = arm.ik_batch(arm.fk(q), q)
     np.testing.assert_allclose(answer.q, q, atol=1e-6)
-    answer = arm.ik_batch(arm.fk(q))
+    seeds[: len(seeds) // 2] = arm.home
+    answer = arm.ik_batch(arm.fk(q), seeds)
     assert np.isin(answer.status, REACHED).all()
-    # No branch is nearer to home by the largest move, in any round that the limits allow.
+    # No branch is nearer by the largest move, in any round that the limits allow.
     rounds = 2.0 * math.pi * np.array([-1.0, 0.0, 1.0])
-    for joints, chosen in zip(q[:100], answer.q, strict=False):
+    for joints, seed, chosen in zip(q[900:1100], seeds[900:], answer.q[900:], strict=False):
         least = math.inf
         for branch in arm.ik_all(arm.fk(joints)):
             turns = branch[:, None] + rounds
             is_legal = (turns >= arm.lower[:, None]) & (turns <= arm.upper[:, None])
-            moves = np.where(is_legal, abs(turns - arm.home[:, None]), math.inf).min(axis=1)
+            moves = np.where(is_legal, abs(turns - seed[:, None]), math.inf).min(axis=1)
             least = min(least, moves.max())
-        assert abs(abs(chosen - arm.home).max() - least) < 1e-9
+        assert abs(abs(chosen - seed).max() - least) < 1e-9
 
 
 def smooth(arm: Robot, rng: np.random.Generator, count: int = 1500) -> Array:

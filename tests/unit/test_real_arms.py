@@ -151,3 +151,22 @@ def test_a_hand_of_noisy_readings_leads_seven_axes_past_a_shoulder_in_line(tmp_p
     lag = np.linalg.norm(tips - asked.values[poses[late], :3], axis=1)
     assert len(lag) > 5000
     assert lag.max() < 3e-3
+
+
+def followed(name: str, folder: Path) -> float:
+    """Share of ``coarse_box`` that an arm follows, 10 s of it."""
+    path = folder / "arm.urdf"
+    path.write_text(urdf_of(name))
+    score = run("coarse_box", duration=10.0, robot=str(path), geometry=["tip=tip"]).score()
+    return float(present(score.value("reach.followed_share")))
+
+
+@pytest.mark.filterwarnings("ignore::teleop_core.TeleopWarning")  # of its efforts
+def test_a_large_arm_whose_wrist_is_slower_than_the_noise_of_the_hand_keeps_its_place(
+    tmp_path: Path,
+) -> None:
+    assert followed("r2000ic210l", tmp_path) > 0.99
+
+
+def test_drives_of_links_that_weigh_some_grams_move_them(tmp_path: Path) -> None:
+    assert followed("piper", tmp_path) > 0.95

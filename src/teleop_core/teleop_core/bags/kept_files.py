@@ -2,8 +2,8 @@
 
 A recording holds the text of a robot's file (a URDF, a table of links) under ``robot_file`` beside
 ``robot``. All other files stand there by their digests: a mesh or field of heights that is touched
-under ``mesh_file`` beside ``mesh``, the mesh of a fixture under ``fixture_mesh_file``, drives of a
-URDF under ``drives_file``, the meshes that a robot's links look like under ``robot_meshes``, in a
+under ``mesh_file`` beside ``mesh``; the mesh of a fixture under ``fixture_mesh_file``; drives of a
+URDF under ``drives_file``; the meshes that a robot's links look like under ``robot_meshes``, in a
 line of digest and name each. Under each digest are the packed bytes, once for all arms, as long as
 there is room for them. Where a file is gone or says something else by now, what was recorded is
 written to a temporary folder and takes its place.

@@ -52,12 +52,12 @@ class Crowd:
 class Connection(ws.ServerConnection):
     """A connection that is filtered, and that ends when it floods or stands still.
 
-    It ends when the other side takes nothing for :data:`STUCK` seconds, sends more than its
-    :class:`~teleop_core.console.filter.Budget`, sends most of all pages when these send more than
-    the budget of the :class:`Crowd`, or has not become a page while :data:`OPENING` newer ones have
-    come. Of each of viser's two queues one message can wait here, and the newest of
-    each kind wait in the queues: so what a slow page costs is bounded, and what a dead one costs
-    ends.
+    It ends when the other side takes nothing for :data:`STUCK` seconds, or sends more than its
+    :class:`~teleop_core.console.filter.Budget`. It also ends when the other side sends most of all
+    pages while these send more than the budget of the :class:`Crowd`, or has not become a page
+    while :data:`OPENING` newer ones have come. Of each of viser's two queues one message can wait
+    here, and the newest of each kind wait in the queues: so what a slow page costs is bounded, and
+    what a dead one costs ends.
 
     Args:
         gate: Decides about its messages.

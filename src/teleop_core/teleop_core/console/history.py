@@ -26,8 +26,8 @@ _LEFT = ENERGY.index("margin")
 class History:
     """Last seconds of one arm: a row for each look.
 
-    Columns: joints wanted (n) and measured (n) [rad or m], place wanted and measured (3 each) [m],
-    force (3) [N], distance from the wanted place [m], delay [s], energy that the ports of hand and
+    Columns: joints wanted (n) and measured (n) [rad or m]; place wanted and measured (3 each) [m];
+    force (3) [N]; distance from the wanted place [m]; delay [s]; energy that the ports of hand and
     slave may still give (2) [J]; NaN where nothing was known.
 
     Args:

@@ -388,9 +388,9 @@ SLAVE_JAW_GRIP = Topic(
     "slave/jaw/grip", Kind.NUMBERS, SAMPLED, "slave_base", is_seldom=True,
     columns=("force", "is_gripped", "slid", "grips", "slips", "drops"),
 )  # fmt: skip
-"""What only a simulator knows: the push of each finger [N], whether the object is between them, how
-far it slid in the present grip or the last one [m], and how often it was gripped, slid by more than
-a millimetre, and was lost above the table."""
+"""What only a simulator knows: the push of each finger [N], whether the object is between them, and
+how far it slid in the present grip or the last one [m]. Then, how often it was gripped, slid by
+more than a millimetre, and was lost above the table."""
 SLAVE_JAW_OBJECT_CP = Topic("slave/jaw/object_cp", Kind.POSE, SAMPLED, "slave_base", is_seldom=True)
 """Where the object is that the jaw can grip, which only a simulator knows."""
 JAW_OBJECTS = 6
@@ -403,8 +403,8 @@ SLAVE_JAW_BOARD = Topic(
     ),
 )  # fmt: skip
 """What only a simulator knows: how many objects came onto another peg, how many came to rest on
-none, the pull of a peg on the gripped one, across [N], and the middle of each object [m], all zeros
-for one that is not there."""
+none, and the pull of a peg on the gripped one, across [N]. Then the middle of each object [m], all
+zeros for one that is not there."""
 NETWORK_JAW_SERVO_JP = Topic(
     "network/jaw_servo_jp", Kind.NUMBERS, arrived("slave/jaw/servo_jp"), "slave_base", columns=JAW
 )

@@ -1,7 +1,7 @@
 """What is taken from inside numba and may change in any version: here, ``borrowing`` and ``room``.
 
-The public part of numba has no way to stamp a cache, to compile without a wrapper for Python, to
-count literals as plain numbers, or to say in one line what is wrong with a function.
+The public part of numba cannot stamp a cache, compile without a wrapper for Python, count literals
+as plain numbers, or say in one line what is wrong with a function.
 """
 
 import gc

@@ -34,11 +34,11 @@ def is_installed() -> bool:
 
 
 SINGLE = Qos(depth=10)
-"""Quality of commands that are sent once: none is lost, of senders who care."""
+"""QoS of one-shot commands: reliable, so that none is lost if the sender is reliable too."""
 STREAMED = Qos(depth=1, is_reliable=False)
-"""Quality of commands that come in streams, from senders of every kind: the newest counts."""
+"""QoS of streamed commands: best effort, so that any sender is heard; the newest counts."""
 _LATCHED = Qos(depth=10, is_latched=True)
-"""Quality of a state: who comes late gets the last one, if he asks for it."""
+"""QoS of states: who subscribes late, with transient-local durability, gets the last value."""
 
 
 class OperatingState:

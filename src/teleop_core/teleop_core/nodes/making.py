@@ -8,7 +8,10 @@ from teleop_core.nodes.base import CoreNode
 
 
 def node_class(stage: Stage) -> Any:
-    """Class of the node of a stage: its own, or by what makes it work a general one."""
+    """Node class of a stage.
+
+    Stages without their own class get a generic one, chosen by whether they have a trigger.
+    """
     kind = "answering:AnsweringNode" if stage.trigger is not None else "ticking:TickingNode"
     module, _, name = (stage.node or f"teleop_core.nodes.{kind}").partition(":")
     return getattr(import_module(module), name)

@@ -5,8 +5,8 @@ import math
 from teleop_core.kernels import inner
 from teleop_core.kernels.geometry import Array
 
-# Rounding that a joint on its limit may show [rad or m].
-_SLACK = 1e-12
+SLACK = 1e-12
+"""Rounding that a joint on its limit may show [rad or m]."""
 # Up to this joint 5 of a spherical wrist its two branches are neighbours [rad]. There limits count
 # in a path too: a wrist that would run into one goes over to the other branch, which costs little.
 # Farther away the branch stays, whatever it costs.
@@ -74,9 +74,9 @@ def turned(angle: float, seed: float, lower: float, upper: float, is_path: bool)
     angle -= 2.0 * math.pi * math.floor((angle - near) / (2.0 * math.pi) + 0.5)
     if is_path:
         return angle
-    if angle > upper + _SLACK and angle - 2.0 * math.pi >= lower - _SLACK:
+    if angle > upper + SLACK and angle - 2.0 * math.pi >= lower - SLACK:
         return angle - 2.0 * math.pi
-    if angle < lower - _SLACK and angle + 2.0 * math.pi <= upper + _SLACK:
+    if angle < lower - SLACK and angle + 2.0 * math.pi <= upper + SLACK:
         return angle + 2.0 * math.pi
     return angle
 
@@ -100,7 +100,7 @@ def cost_of(
     worst, is_outside = 0.0, False
     for i in range(first, last):
         worst = max(worst, abs(q[i] - seed[i]))
-        is_outside |= (q[i] < limits[0, i] - _SLACK) | (q[i] > limits[1, i] + _SLACK)
+        is_outside |= (q[i] < limits[0, i] - SLACK) | (q[i] > limits[1, i] + SLACK)
     return OUTSIDE + worst if is_outside and do_limits_count else worst
 
 

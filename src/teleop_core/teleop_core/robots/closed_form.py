@@ -3,14 +3,15 @@
 A closed form sees the arm as G = Rz(q1) F1 Rz(q2) F2 ... Rz(qn), with constant transforms between
 the joints and every joint about its own z axis; for arms that decompose from the tip it is the arm
 from tip to base. Its constants stand behind the chain's in the geometry row
-(:mod:`teleop_core.robots.dh_kernels`): 1 or -1 for the order, n signs, n groups, the constant
-transforms before and after G, those between the joints, of twelve numbers each, what a class of
-arms has beside, and last 1 for an arm that is of its class only nearly
+(:mod:`teleop_core.robots.dh_kernels`): 1 or -1 for the order, n signs, n groups, then transforms of
+twelve numbers each: before and after G, and those between the joints. Behind them stands what a
+class of arms has beside, and last 1 for an arm that is of its class only nearly
 (:mod:`teleop_core.robots.decomposition`).
 
 Branches are candidates: joint vectors in the arm's own order, with 1.0 behind those that reach the
-pose. The best one is brought into limits and steps; where it then misses the pose, damped least
-squares on the whole chain make the best of the rest.
+pose, 0.0 behind those that come nearest, and :data:`UNKNOWN` behind those that cannot be the answer
+and were not computed. The best one is brought into limits and steps; where it then misses the pose,
+damped least squares on the whole chain make the best of the rest.
 """
 
 import math
@@ -19,17 +20,32 @@ import numpy as np
 
 from teleop_core.kernels import inner, kernel
 from teleop_core.kernels.geometry import Array
-from teleop_core.robots.branches import cost_of, is_allowed, turn, wrapped
-from teleop_core.robots.damped import ZERO, assign
+from teleop_core.kernels.room import room
+from teleop_core.robots.branches import (
+    OUTSIDE,
+    SLACK,
+    cost_of,
+    is_allowed,
+    slowed,
+    turn,
+    turned,
+    wrapped,
+)
+from teleop_core.robots.damped import ZERO, assign, pose_error
 from teleop_core.robots.dh_kernels import descend, descend_long, fk, pose_of_chain
 from teleop_core.robots.kinematics import IkStatus, pose_residual
 
 _ROUNDS, _PATH_ROUNDS = 60, 12  # of the search that makes the best of a branch out of limits
 _FEW_ROUNDS = 8  # of the search beside the seed
 _GROUPS = 3
+# Arm [m] at which a turn of the tip that lags moves what the tip holds: of a tool, whatever the
+# reach. Weighed by a reach of 4 m, 5 mm would count no more than 1 mrad.
+_LEVER = 0.1
+UNKNOWN = -1.0
+"""Last entry of a candidate that was not computed."""
 BESIDE_SEED = 0.3
 """Largest move [rad] below which the posture beside the seed is the answer."""
-_INEXACT = 1e4  # added to the cost of a branch that does not reach: after all others
+INEXACT = 1e4  # added to the cost of a branch that does not reach: after all others
 _FOLLOWED, _LIMITED = int(IkStatus.FOLLOWED), int(IkStatus.LIMITED)
 _NEAR_SINGULAR, _UNREACHABLE = int(IkStatus.NEAR_SINGULAR), int(IkStatus.UNREACHABLE)
 
@@ -78,9 +94,8 @@ def wanted_motion(T: Array, K: Array, n: int, work: Array, G: Array) -> None:
 
 
 @inner
-def undo_turn(q: float, M: Array, columns: int) -> None:
-    """Replace M by Rz(q)ᵀ M."""
-    c, s = math.cos(q), math.sin(q)
+def undo_turn(c: float, s: float, M: Array, columns: int) -> None:
+    """Replace M by Rz(q)ᵀ M, of the angle whose cosine and sine these are."""
     for j in range(columns):
         x, y = M[0, j], M[1, j]
         M[0, j], M[1, j] = c * x + s * y, c * y - s * x
@@ -128,15 +143,19 @@ def _group_cost(
 
 
 @inner
-def arm_cost(q: Array, K: Array, seed: Array, limits: Array) -> float:
-    """Least cost of all branches with the first group's joints of ``q``, those turned to the seed.
+def angle_cost(
+    K: Array, n: int, i: int, angle: float, seed: Array, limits: Array, do_limits_count: bool
+) -> float:
+    """:func:`cost_of` joint i of the closed form at an angle, by whole turns next to the seed.
 
-    The last entry of ``q`` says whether they can reach.
+    No branch with this angle costs less.
     """
-    is_path, n = math.isfinite(limits[2, 0]), seed.shape[0]
-    turn(q, seed, limits, 0, n)
-    cost = _group_cost(q, K, seed, limits, 1, not is_path)
-    return cost if is_path or q[n] > 0.5 else cost + _INEXACT
+    j = joint_of(K, n, i)
+    q = turned(K[1 + i] * angle, seed[j], limits[0, j], limits[1, j], math.isfinite(limits[2, 0]))
+    cost = abs(q - seed[j])
+    if do_limits_count and (q < limits[0, j] - SLACK or q > limits[1, j] + SLACK):
+        cost += OUTSIDE
+    return cost
 
 
 @inner
@@ -144,7 +163,7 @@ def branch_cost(q: Array, seed: Array, limits: Array) -> float:
     """Cost of a branch with free steps: largest move, inside limits before outside."""
     n = seed.shape[0]
     turn(q, seed, limits, 0, n)
-    return cost_of(q, seed, limits, 0, n, True) + (0.0 if q[n] > 0.5 else _INEXACT)
+    return cost_of(q, seed, limits, 0, n, True) + (0.0 if q[n] > 0.5 else INEXACT)
 
 
 @inner
@@ -177,6 +196,8 @@ def choose(
     n, is_path, best, least, is_exact = q.shape[0], math.isfinite(limits[2, 0]), -1, math.inf, False
     for k in range(count):
         trial = found[k]
+        if trial[n] == UNKNOWN:
+            continue
         is_exact = is_exact or trial[n] > 0.5
         if is_path:
             turn(trial, seed, limits, 0, n)
@@ -186,6 +207,9 @@ def choose(
         cost = branch_cost(trial, seed, limits)
         if cost < least:
             best, least = k, cost
+    if best < 0:  # numbers that overflow
+        assign(q, seed)
+        return 0, best
     for i in range(n):
         q[i] = found[best, i]
     return 2 if found[best, n] > 0.5 else (1 if is_exact else 0), best
@@ -200,15 +224,26 @@ def box_around(seed: Array, limits: Array, box: Array) -> None:
         box[1, i] = min(limits[1, i], near + limits[2, i])
 
 
-@kernel
+@inner
+def is_nearly(geometry: Array) -> bool:
+    """Whether an arm is of its class only nearly."""
+    return bool(geometry[geometry.shape[0] - 1] != 0.0)
+
+
+@inner
 def is_beside(T: Array, seed: Array, limits: Array, geometry: Array, q: Array) -> bool:
     """Whether an arm that is nearly of its class reaches the pose beside the seed; then by ``q``.
 
     Beside a stretched elbow, or a limit, the branch of the seed may be none of the class.
     """
-    n, box = q.shape[0], np.empty((2, q.shape[0]))
-    if geometry[geometry.shape[0] - 1] == 0.0 or math.isfinite(limits[2, 0]):
+    if not is_nearly(geometry) or math.isfinite(limits[2, 0]):
         return False
+    return _does_descend(T, seed, limits, geometry, q)
+
+
+@kernel
+def _does_descend(T: Array, seed: Array, limits: Array, geometry: Array, q: Array) -> bool:
+    n, box = q.shape[0], np.empty((2, q.shape[0]))
     box_around(seed, limits, box)
     for i in range(n):
         q[i] = min(max(seed[i], box[0, i]), box[1, i])
@@ -226,42 +261,60 @@ def move_of(q: Array, seed: Array) -> float:
 
 @kernel
 def _best_of_rest(
-    T: Array,
-    seed: Array,
-    limits: Array,
-    geometry: Array,
-    does_reach: bool,
-    found: Array,
-    count: int,
-    q: Array,
+    T: Array, seed: Array, limits: Array, geometry: Array, found: Array, count: int, q: Array
 ) -> None:
-    """Replace ``q`` by the joints within limits and step that come nearest to the pose.
+    """Replace ``q`` by the joints within limits that come nearest to the pose.
 
-    A search from the branch itself; where steps are free, also from the seed and from all other
-    branches, of which the least error counts. In a path to a branch that reaches the pose, joints
-    that a step does not bring there go at full speed, and the others make the best of that.
+    A search from the branch itself, from the seed and from all other branches, of which the least
+    error counts.
     """
     n, box, trial, least = q.shape[0], np.empty((2, q.shape[0])), np.empty(q.shape[0]), math.inf
-    is_path = math.isfinite(limits[2, 0])
     box_around(seed, limits, box)
-    for i in range(n):
-        does_reach = does_reach and limits[0, i] <= q[i] <= limits[1, i]
-    for i in range(n):
-        if is_path and does_reach and not box[0, i] <= q[i] <= box[1, i]:
-            box[0, i] = box[1, i] = box[0, i] if q[i] < box[0, i] else box[1, i]
-    for k in range(-2, -1 if is_path else count):
+    for k in range(-2, count):
+        if k >= 0 and found[k, n] == UNKNOWN:
+            continue
         for i in range(n):
             start = found[k, i] if k >= 0 else (seed[i] if k == -1 else q[i])
             trial[i] = min(max(start, box[0, i]), box[1, i])
-        if is_path:
-            error = descend(T, box, geometry, _PATH_ROUNDS, trial)
-        else:
-            error = descend_long(T, box, geometry, trial)
+        error = descend_long(T, box, geometry, trial)
         if error < least:
             least = error
             assign(q, trial)
         if error <= ZERO:
             break
+
+
+@kernel
+def _best_of_step(
+    T: Array, seed: Array, limits: Array, geometry: Array, does_reach: bool, q: Array
+) -> None:
+    """Replace ``q`` by the joints within limits and step that come nearest to the pose.
+
+    A search from the branch. Where that reaches the pose, joints that a step does not bring there
+    go at full speed. The others make the best of that, or go slower with them on the straight way,
+    whichever lags less.
+    """
+    n, box, trial = q.shape[0], np.empty((2, q.shape[0])), np.empty(q.shape[0])
+    box_around(seed, limits, box)
+    for i in range(n):
+        does_reach = does_reach and limits[0, i] <= q[i] <= limits[1, i]
+    for i in range(n):
+        trial[i] = min(max(q[i], box[0, i]), box[1, i])
+        if does_reach and trial[i] != q[i]:
+            box[0, i] = box[1, i] = trial[i]
+    if descend(T, box, geometry, _PATH_ROUNDS, trial) > ZERO and does_reach:
+        slowed(q, seed, limits, q)
+        if _lag(q, T, geometry) < _lag(trial, T, geometry):
+            return
+    assign(q, trial)
+
+
+@inner
+def _lag(q: Array, T: Array, geometry: Array) -> float:
+    """Squared error of a pose, of which a place counts as a turn at :data:`_LEVER`."""
+    reached, error = room(4, 4), room(6)
+    fk(q, geometry, reached)
+    return pose_error(reached, T, _LEVER, error)
 
 
 @kernel
@@ -280,18 +333,28 @@ def settled(
 
     What limits and steps leave off the pose, damped least squares bring as near as they allow.
     ``reach`` is what :func:`choose` returned.
-    The last four rows of ``found`` are memory.
     """
-    reached = found[found.shape[0] - 4 :]
+    reached, J = room(4, 4), room(6, 7)
     if is_allowed(q, seed, limits):
-        is_flat = pose_of_chain(q, geometry, reached)
+        is_flat = pose_of_chain(q, geometry, J, reached)
         if pose_residual(reached, T, residual):
             return _NEAR_SINGULAR if is_flat else _FOLLOWED
-    _best_of_rest(T, seed, limits, geometry, reach == 2, found, count, q)
-    is_flat = pose_of_chain(q, geometry, reached)
+    if math.isfinite(limits[2, 0]):
+        _best_of_step(T, seed, limits, geometry, reach == 2, q)
+    else:
+        _best_of_rest(T, seed, limits, geometry, found, count, q)
+    is_flat = pose_of_chain(q, geometry, J, reached)
     if not pose_residual(reached, T, residual):
         return _LIMITED if reach > 0 else _UNREACHABLE
     return _NEAR_SINGULAR if is_flat else _FOLLOWED
+
+
+@inner
+def forget(seed: Array, limits: Array) -> None:
+    """Write what :func:`kept` asks with: zero, and no limits and no branch that is turned to it."""
+    for i in range(seed.shape[0]):
+        seed[i] = limits[2, i] = 0.0
+        limits[0, i], limits[1, i] = -math.inf, math.inf
 
 
 @kernel

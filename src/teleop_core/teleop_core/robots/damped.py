@@ -11,10 +11,9 @@ Source:
 
 import math
 
-import numpy as np
-
 from teleop_core.kernels import inner, kernel
 from teleop_core.kernels.geometry import Array
+from teleop_core.kernels.room import room
 
 # Squared weighted error that counts as zero: 1e-12 m at a length of 0.1 m, 1e-11 rad.
 ZERO = 1e-22
@@ -86,17 +85,6 @@ def eliminate(A: Array, b: Array) -> None:
 
 
 @inner
-def factorise(A: Array) -> None:
-    """Replace the upper triangle of a positive definite A (6, 6) by its Cholesky factor."""
-    for k in range(6):
-        A[k, k] = math.sqrt(max(A[k, k], 1e-300))
-        for i in range(k + 1, 6):
-            A[k, i] /= A[k, k]
-            for j in range(k + 1, i + 1):
-                A[j, i] -= A[k, j] * A[k, i]
-
-
-@inner
 def gram(J: Array, is_free: Array, damping: float, A: Array) -> None:
     """Write the upper triangle of J Jᵀ + damping I, (6, 6).
 
@@ -133,7 +121,7 @@ def damped_move(
     J: Array, error: Array, damping: float, is_free: Array, box: Array, q: Array, moved: Array
 ) -> None:
     """Write ``moved`` (n,): q + Jᵀ (J Jᵀ + damping I)⁻¹ error over the free joints, in the box."""
-    A, y = np.empty((6, 6)), np.empty(6)
+    A, y = room(6, 6), room(6)
     assign(y, error)
     gram(J, is_free, damping, A)
     eliminate(A, y)
@@ -151,7 +139,7 @@ def is_near_singular(J: Array, length: float, bound: float) -> bool:
     The linear rows count after division by ``length``. It does where J Jᵀ - bound² I has a
     negative eigenvalue, and then elimination meets a negative pivot (Sylvester's law of inertia).
     """
-    A = np.empty((6, 6))
+    A = room(6, 6)
     for r in range(6):
         for s in range(r, 6):
             value = 0.0

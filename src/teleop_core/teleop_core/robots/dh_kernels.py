@@ -1,9 +1,9 @@
 """Kinematics of a Denavit-Hartenberg chain: kernels over constant transforms between its joints.
 
 Every convention comes down to T = F0 J1(q1) F1 J2(q2) F2 ... with Ji a turn about or a slide along
-the local z axis and Fi constant. The geometry row holds, for n joints: n kinds (+1 or -1 a turn,
-+2 or -2 a slide, negative against its axis), the reach [m], six weights of the controlled
-directions (1 or 0), and n + 1 transforms of twelve numbers, row by row.
+the local z axis and Fi constant. The geometry row holds, for n joints: n kinds (+1 or -1 a turn, +2
+or -2 a slide, negative against its axis); the reach [m]; six weights of the controlled directions
+(1 or 0); and n + 1 transforms of twelve numbers, row by row.
 
 In a chain of m motions of which some follow others (:mod:`teleop_core.robots.followers`) there
 stand, in place of the transforms: m + 1, which is no entry of a rotation, as the first one is; for
@@ -16,7 +16,8 @@ import numpy as np
 
 from teleop_core.kernels import inner, kernel
 from teleop_core.kernels.geometry import Array
-from teleop_core.robots.damped import ZERO, damped_move, factorise, free_joints, gram, pose_error
+from teleop_core.kernels.room import room
+from teleop_core.robots.damped import ZERO, damped_move, free_joints, pose_error
 from teleop_core.robots.kinematics import REACHED, IkStatus, is_askable, pose_residual
 
 _ROUNDS, _PATH_ROUNDS = 60, 12  # of one search
@@ -66,17 +67,27 @@ def spread(q: Array, followers: Array, motions: Array) -> None:
         motions[i] = followers[m + i] * q[int(followers[i])] + followers[2 * m + i]
 
 
+@inner
+def _motions(n: int, geometry: Array) -> int:
+    """Number of motions of a chain of which some follow others; 0 or less without followers."""
+    return int(geometry[n + 7]) - 1
+
+
 @kernel
 def fk(q: Array, geometry: Array, T: Array) -> None:
     """Write ``T_base_tip``, (4, 4), of joints (n,)."""
-    at = q.shape[0] + 7
-    m = int(geometry[at]) - 1
-    if m > 0:
-        motions = np.empty(m)
-        spread(q, geometry[at + 1 :], motions)
-        _chain_fk(motions, geometry[at + 1 + 3 * m :], T)
+    if _motions(q.shape[0], geometry) > 0:
+        _fk_with_followers(q, geometry, T)
     else:
         _chain_fk(q, geometry, T)
+
+
+@kernel
+def _fk_with_followers(q: Array, geometry: Array, T: Array) -> None:
+    at, m = q.shape[0] + 8, _motions(q.shape[0], geometry)
+    motions = np.empty(m)
+    spread(q, geometry[at:], motions)
+    _chain_fk(motions, geometry[at + 3 * m :], T)
 
 
 @inner
@@ -94,19 +105,23 @@ def _chain_fk(q: Array, geometry: Array, T: Array) -> None:
 @kernel
 def jacobian(q: Array, geometry: Array, J: Array) -> None:
     """Write the geometric Jacobian (6, n): rows linear, then angular, in base axes."""
-    at = q.shape[0] + 7
-    m = int(geometry[at]) - 1
-    if m > 0:
-        motions, whole = np.empty(m), np.empty((6, m))
-        spread(q, geometry[at + 1 :], motions)
-        _chain_jacobian(motions, geometry[at + 1 + 3 * m :], np.empty((4, 4)), whole)
-        for r in range(6):
-            for j in range(q.shape[0]):
-                J[r, j] = 0.0
-            for i in range(m):
-                J[r, int(geometry[at + 1 + i])] += geometry[at + 1 + m + i] * whole[r, i]
+    if _motions(q.shape[0], geometry) > 0:
+        _jacobian_with_followers(q, geometry, J)
     else:
-        _chain_jacobian(q, geometry, np.empty((4, 4)), J)
+        _chain_jacobian(q, geometry, room(4, 4), J)
+
+
+@kernel
+def _jacobian_with_followers(q: Array, geometry: Array, J: Array) -> None:
+    at, m = q.shape[0] + 8, _motions(q.shape[0], geometry)
+    motions, whole = np.empty(m), np.empty((6, m))
+    spread(q, geometry[at:], motions)
+    _chain_jacobian(motions, geometry[at + 3 * m :], room(4, 4), whole)
+    for r in range(6):
+        for j in range(q.shape[0]):
+            J[r, j] = 0.0
+        for i in range(m):
+            J[r, int(geometry[at + i])] += geometry[at + m + i] * whole[r, i]
 
 
 @inner
@@ -168,7 +183,7 @@ def descend(T: Array, box: Array, geometry: Array, rounds: int, q: Array) -> flo
         Squared weighted error that is left.
     """
     n = q.shape[0]
-    J, reached, error, left = np.empty((6, n)), np.empty((4, 4)), np.empty(6), np.empty(6)
+    J, reached, error, left = np.empty((6, n)), room(4, 4), room(6), room(6)
     is_free, trial = np.empty(n), np.empty(n)
     fk(q, geometry, reached)
     square, damping, is_new = _masked_error(reached, T, geometry, n, error), _DAMPING, True
@@ -258,12 +273,11 @@ def is_hardly_moving(q: Array, geometry: Array) -> bool:
 
 
 @inner
-def pose_of_chain(q: Array, geometry: Array, T: Array) -> bool:
+def pose_of_chain(q: Array, geometry: Array, J: Array, T: Array) -> bool:
     """Write the pose (4, 4) of a chain without followers, and say :func:`is_hardly_moving`.
 
-    It takes one walk along the chain in place of two.
+    It takes one walk along the chain in place of two. ``J`` is memory of six rows.
     """
-    J = np.empty((6, q.shape[0]))
     _chain_jacobian(q, geometry, T, J)
     _weigh(q.shape[0], geometry, J)
     return _is_flat(q.shape[0], geometry, J)
@@ -271,16 +285,27 @@ def pose_of_chain(q: Array, geometry: Array, T: Array) -> bool:
 
 @inner
 def _is_flat(n: int, geometry: Array, J: Array) -> bool:
-    """Whether some controlled direction of a weighted Jacobian (6, n) needs large joint moves."""
-    A = np.empty((6, 6))
-    gram(J, np.ones(n), 0.0, A)
+    """Whether some controlled direction of a weighted Jacobian (6, n) needs large joint moves.
+
+    The pivots are squares of those of Cholesky's factor of J Jᵀ.
+    """
+    A = room(6, 6)
     for r in range(6):
+        for s in range(r, 6):
+            value = 0.0
+            for i in range(n):
+                value += J[r, i] * J[s, i]
+            A[r, s] = value
         A[r, r] += 1.0 - geometry[n + 1 + r]
-    factorise(A)
-    pivot = A[0, 0]
-    for r in range(1, 6):
-        pivot = min(pivot, A[r, r])
-    return pivot < _NEAR
+    for k in range(6):
+        if A[k, k] < _NEAR * _NEAR:
+            return True
+        over = 1.0 / A[k, k]
+        for i in range(k + 1, 6):
+            share = over * A[k, i]
+            for j in range(i, 6):
+                A[i, j] -= share * A[k, j]
+    return False
 
 
 @inner

@@ -96,10 +96,10 @@ def jacobian(q: Array, geometry: Array, J: Array) -> None:
 def pitch_and_roll(T: Array, q1: float, psi: float, q5: float) -> tuple[float, float]:
     """Pitch and joint 5 [rad] whose rotation is next to that of T, in the plane of joint 1.
 
-    With N = Rz(-q1) R Rx(180°) the trace of Nᵀ Ry(psi) Rz(-q5) is greatest where psi leads the
-    tool to its direction in the plane, and psi + q5 or psi - q5, of which the one that is
-    defined best is taken, to the attitude as a whole. A tool normal to the plane leaves only
-    that one: the pitch moves from the given ``psi`` by as much as joint 5 from ``q5``.
+    With N = Rz(-q1) R Rx(180°) the trace of Nᵀ Ry(psi) Rz(-q5) is greatest where psi leads the tool
+    to its direction in the plane. psi + q5 or psi - q5, whichever is defined best, leads it to the
+    attitude as a whole. A tool normal to the plane leaves only that one: the pitch moves from the
+    given ``psi`` by as much as joint 5 from ``q5``.
 
     Source:
         Derived.

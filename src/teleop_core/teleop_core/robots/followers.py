@@ -5,8 +5,8 @@ row of A has one factor. Then the Jacobian of the joints is J A; by the principl
 their efforts are Aᵀ times those of the motions, and their inertia is Aᵀ M A. A is constant, so that
 accelerations bring no term of their own.
 
-The row of a dynamics here holds m, then leader, factor and offset of each motion (m,), the
-inertias (n,) of the motors at the joints, and the row of
+The row of a dynamics here holds m, then leader, factor and offset of each motion (m,), and the
+inertias (n,) of the motors at the joints. Behind them stands the row of
 :mod:`~teleop_core.robots.chain_dynamics` of the m motions, with motors of none.
 
 Source:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from teleop_core.kernels import inner, kernel
 from teleop_core.kernels.geometry import Array, is_rigid, rotation_angle_between
 
+_FLOAT64 = np.dtype(np.float64)  # one object; another of its kind is copied
 _ROW, _TABLE = types.float64[::1], types.float64[:, ::1]
 # Signatures that let one compiled graph run any robot: see Kernels for the arguments.
 FK = types.void(_ROW, _ROW, _TABLE)
@@ -164,7 +165,7 @@ def is_ready(value: object, shape: tuple[int, ...]) -> TypeGuard[Array]:
     return (
         type(value) is np.ndarray
         and value.shape == shape
-        and value.dtype == np.float64
+        and value.dtype is _FLOAT64
         and value.flags.carray
     )
 

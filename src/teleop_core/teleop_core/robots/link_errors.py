@@ -11,8 +11,8 @@ arm as built, on which :func:`teleop_core.robots.dh_kernels.fk` says where its t
 Arms described in other conventions are brought to this one: every pair of successive axes has a
 common normal, along which a is measured, pointing to the later axis. Where axes are parallel it is
 any of them; the small turn of the later axis out of the plane of both is then no error of the four
-numbers (Hayati and Mirmirani 1985), and a pair of nearly parallel axes can be built in a way that
-they do not describe.
+numbers (Hayati and Mirmirani 1985). A pair of nearly parallel axes can be built in a way that they
+do not describe.
 
 Source:
     Denavit and Hartenberg 1955; Mooring, Roth and Driels 1991, Fundamentals of manipulator

@@ -13,18 +13,21 @@ Source:
 
 import math
 
-import numpy as np
-
 from teleop_core.kernels import inner, kernel
 from teleop_core.kernels.geometry import Array
+from teleop_core.kernels.room import room
 from teleop_core.robots import closed_form
-from teleop_core.robots.branches import BESIDE
+from teleop_core.robots.branches import BESIDE, OUTSIDE
 from teleop_core.robots.kinematics import is_askable
-from teleop_core.robots.subproblems import one_angle, pair_of_angles, turn_between
+from teleop_core.robots.subproblems import close_pair, one_angle, open_pairs, turn_between
 
 _F1, _F2, _F3, _F4, _F5 = (37, 49, 61, 73, 85)
 RULE = 97
 """Place, among the constants, of the rule of the arm's pair of equations; then B and a length."""
+_LEVEL, _COST = 3, 4
+# A pair's row: joints 1 and 5, whether it reaches, 1.0 if both are known, the least cost of its
+# branches.
+_LATER = 1e9  # added to the cost of pairs that others go before, whatever else they are
 _ALIGNED = 1e-10  # sine under which axis 6 counts as parallel to 2, 3 and 4, and joint 6 is free
 
 
@@ -94,40 +97,119 @@ def _plane(H: Array, M: Array, K: Array, seed: float, angles: Array) -> float:
     return is_exact
 
 
+@inner
+def _behind_first(G: Array, K: Array, first: float, M: Array, N: Array) -> None:
+    """Write what joint 1 leaves to the others into N (3, 4); ``M`` is memory."""
+    for i in range(3):
+        for j in range(4):
+            M[i, j] = G[i, j]
+    closed_form.undo_turn(math.cos(first), math.sin(first), M, 4)
+    closed_form.undo_between(K, _F1, M, N, 4)
+
+
+@inner
+def _elbows(G: Array, K: Array, pair: Array, seed: Array, q: Array) -> None:
+    """Write both branches of a pair of joints 1 and 5 into q (2, 7)."""
+    M, N, angles = room(3, 4), room(3, 4), room(2, 3)
+    _behind_first(G, K, pair[0], M, N)
+    sixth = _sixth(N, K, pair[1], closed_form.angle_of(K, 6, 5, seed))
+    _hand(K, pair[1], sixth, M)
+    is_near = _plane(N, M, K, closed_form.angle_of(K, 6, 1, seed), angles)
+    for j in range(2):
+        q[j, 6] = pair[2] * is_near
+        closed_form.set_angle(K, 6, 0, pair[0], q[j])
+        closed_form.set_angle(K, 6, 4, pair[1], q[j])
+        closed_form.set_angle(K, 6, 5, sixth, q[j])
+        for i in range(3):
+            closed_form.set_angle(K, 6, 1 + i, angles[j, i], q[j])
+
+
+@inner
+def _least_sine(G: Array, K: Array, pairs: Array, count: int) -> float:
+    """Least sine between axis 6 and the parallel ones."""
+    M, N, least = room(3, 4), room(3, 4), math.inf
+    for k in range(count):
+        if k == 0 or pairs[k, 0] != pairs[k - 1, 0]:
+            _behind_first(G, K, pairs[k, 0], M, N)
+            least = min(least, math.hypot(N[2, 0], N[2, 1]))
+    return least
+
+
+@inner
+def _cost(pair: Array, K: Array, seed: Array, limits: Array, first: float, least: float) -> float:
+    """Least cost of all branches of a pair, by what is known of its joints 1 and 5.
+
+    In a path joint 1 comes first: of pairs with its least move ``first`` joint 5 counts, all others
+    come later.
+    """
+    is_path, is_closed = math.isfinite(limits[2, 0]), pair[_LEVEL] > 0.5
+    one = closed_form.angle_cost(K, 6, 0, pair[0], seed, limits, not is_path)
+    if is_path and one > first:
+        return _LATER + one
+    five = 0.0
+    if is_closed:
+        do_count = not is_path or least < BESIDE
+        five = closed_form.angle_cost(K, 6, 4, pair[1], seed, limits, do_count)
+    if is_path:
+        return five
+    return max(one, five) + (closed_form.INEXACT if pair[2] < 0.5 else 0.0)
+
+
+@inner
+def _known_cost(q: Array, K: Array, seed: Array, limits: Array, least: float) -> float:
+    """Cost of a branch (7,), above which others need not be computed: in a path of joints 5, 6."""
+    is_path, cost = math.isfinite(limits[2, 0]), 0.0
+    if q[6] < 0.5:
+        return math.inf
+    for i in range(4 if is_path else 0, 6):
+        angle, do_count = closed_form.angle_of(K, 6, i, q), not is_path or least < BESIDE
+        cost = max(cost, closed_form.angle_cost(K, 6, i, angle, seed, limits, do_count))
+    return cost
+
+
 @kernel
-def _branches(T: Array, geometry: Array, seed: Array, found: Array) -> tuple[int, float]:
-    """Write all branches into ``found`` (8, 7), and whether each reaches the pose.
+def _branches(
+    T: Array, geometry: Array, seed: Array, limits: Array, do_all: bool, found: Array
+) -> tuple[int, float]:
+    """Write branches into ``found`` (8, 7), and whether each reaches the pose.
+
+    Unless all are wanted, pairs of joints 1 and 5 of the least moves come first, and none that
+    cannot win.
 
     Returns:
-        How many, and the least sine between axis 6 and the parallel ones.
+        How many, and in a path the least sine between axis 6 and the parallel ones.
     """
-    K, work = geometry[closed_form.constants_at(6) :], np.empty((30, 7))
-    G, M, N, A, B = work[7:11], work[11:15], work[15:19], work[19:21], work[21:23]
-    h, pairs, angles = work[23], work[24:28], work[28:30]
+    K, is_path = geometry[closed_form.constants_at(6) :], math.isfinite(limits[2, 0])
+    G, M, A, B, h, seeds = room(4, 4), room(4, 4), room(2, 2), room(2, 2), room(2), room(2)
+    pairs, rule = room(4, 5), K[RULE:]
+    do_any = do_all or closed_form.is_nearly(geometry)
     closed_form.wanted_motion(T, K, 6, M, G)
     _equations(G, K, A, B, h)
-    h[2], h[3] = closed_form.angle_of(K, 6, 0, seed), closed_form.angle_of(K, 6, 4, seed)
-    count, least = pair_of_angles(A, B, h, K[RULE : RULE + 4], h[2:4], work[:7], pairs), math.inf
+    seeds[0], seeds[1] = closed_form.angle_of(K, 6, 0, seed), closed_form.angle_of(K, 6, 4, seed)
+    count, first, best = open_pairs(A, B, h, rule, seeds, pairs), math.inf, math.inf
+    least = _least_sine(G, K, pairs, count) if is_path else math.inf
     for k in range(count):
-        first, fifth = pairs[k, 0], pairs[k, 1]
-        for i in range(3):
-            for j in range(4):
-                M[i, j] = G[i, j]
-        closed_form.undo_turn(first, M, 4)
-        closed_form.undo_between(K, _F1, M, N, 4)
-        least = min(least, math.hypot(N[2, 0], N[2, 1]))
-        sixth = _sixth(N, K, fifth, closed_form.angle_of(K, 6, 5, seed))
-        _hand(K, fifth, sixth, M)
-        is_near = _plane(N, M, K, closed_form.angle_of(K, 6, 1, seed), angles)
-        for j in range(2):
-            q = found[2 * k + j]
-            q[6] = pairs[k, 2] * is_near
-            closed_form.set_angle(K, 6, 0, first, q)
-            closed_form.set_angle(K, 6, 4, fifth, q)
-            closed_form.set_angle(K, 6, 5, sixth, q)
-            for i in range(3):
-                closed_form.set_angle(K, 6, 1 + i, angles[j, i], q)
-    return 2 * count, least
+        found[2 * k, 6] = found[2 * k + 1, 6] = closed_form.UNKNOWN
+        first = min(first, closed_form.angle_cost(K, 6, 0, pairs[k, 0], seed, limits, False))
+    for k in range(count):
+        pairs[k, _COST] = 0.0 if do_all else _cost(pairs[k], K, seed, limits, first, least)
+    while True:
+        k = 0
+        for other in range(1, count):
+            k = other if pairs[other, _COST] < pairs[k, _COST] else k
+        cost = pairs[k, _COST]
+        if not cost < math.inf or (cost > best and (is_path or best < OUTSIDE)):
+            return 2 * count, least
+        if pairs[k, _LEVEL] < 0.5:
+            close_pair(A, B, h, rule, seeds, k, pairs)
+            for other in range(k, k + 2):
+                cost = _cost(pairs[other], K, seed, limits, first, least)
+                pairs[other, _COST] = 0.0 if do_all else cost
+            continue
+        pairs[k, _COST], q = math.inf, found[2 * k : 2 * k + 2]
+        _elbows(G, K, pairs[k], seed, q)
+        for j in range(0 if do_any else 2):
+            best = min(best, _known_cost(q[j], K, seed, limits, least))
 
 
 @kernel
@@ -135,10 +217,10 @@ def ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual
     """Write joints (6,) for ``T_base_tip``; see :class:`teleop_core.robots.robot.Kernels`."""
     if not is_askable(T, seed):
         return -1
-    found = np.empty((12, 7))
+    found = room(8, 7)
     if closed_form.is_beside(T, seed, limits, geometry, q):
         return int(closed_form.settled(T, seed, limits, geometry, 2, found, 0, q, residual))
-    count, least = _branches(T, geometry, seed, found)
+    count, least = _branches(T, geometry, seed, limits, False, found)
     K = geometry[closed_form.constants_at(6) :]
     reach, _ = closed_form.choose(found, count, seed, limits, K, least < BESIDE, q)
     return int(closed_form.settled(T, seed, limits, geometry, reach, found, count, q, residual))
@@ -150,6 +232,7 @@ def ik_all(T: Array, geometry: Array, solutions: Array) -> int:
 
     On a singularity, where a joint is free, it is zero and branches may coincide.
     """
-    found = np.empty((8, 7))
-    count = _branches(T, geometry, np.zeros(6), found)[0]
+    found, limits, seed = room(8, 7), room(3, 6), room(6)
+    closed_form.forget(seed, limits)
+    count = _branches(T, geometry, seed, limits, True, found)[0]
     return int(closed_form.kept(T, found, count, geometry, solutions))

@@ -1,8 +1,8 @@
 """Parallelogram: the four-bar with equal opposite sides, whose coupler never turns.
 
-q is the crank angle theta1; the tip is the coupler point at distance ``a`` from the crank. Taking
-the rocker parallel to the crank, instead of a sign of the general closure, keeps the loop in one
-mode where all links lie in one line (theta1 = 0 and 180°) and the general modes cross.
+q is the crank angle theta1; the tip is the coupler point at distance ``a`` from the crank. The
+rocker is taken parallel to the crank, in place of a sign of the general closure. That keeps the
+loop in one mode where all links lie in one line (theta1 = 0 and 180°) and the general modes cross.
 
 Source:
     Ghosal 2020, lecture 11, eq. 3 with l0 = l2, l1 = l3 and phi1 = theta1.

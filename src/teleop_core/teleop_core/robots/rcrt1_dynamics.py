@@ -5,11 +5,11 @@ Numbers that the source does not print (friction, motor inertia of the wrist) ar
 
 Table A.1 prints no convention of the products of inertia, and no single one is possible for all
 links: a body can have the numbers of link 1 only if they are -∫yz dm (the other sign needs a
-principal moment of -0.018 kg·m²), those of link 2 only if they are +∫xz dm (else -0.0004). Link 3
-is printed with its mass 264 mm ahead of the wrist centre, where only the tool is, so its axes were
-turned by 180° about x: its centre of mass lies at -264 mm, and with it Ixz changes its sign (else
--0.0035). Then +∫xz dm, -3.0e-3, is what a mass in its centre has, -3.06e-3. Of Ixy and Iyz of link
-2 every sign is possible; they are taken as its Ixz.
+principal moment of -0.018 kg·m²). It can have those of link 2 only if they are +∫xz dm (else
+-0.0004). Link 3 is printed with its mass 264 mm ahead of the wrist centre, where only the tool is,
+so its axes were turned by 180° about x: its centre of mass lies at -264 mm, and with it Ixz changes
+its sign (else -0.0035). Then +∫xz dm, -3.0e-3, is what a mass in its centre has, -3.06e-3. Of Ixy
+and Iyz of link 2 every sign is possible; they are taken as its Ixz.
 
 Source:
     Vongbunyong 2008, section 4.6, appendix A.3 and tables 3.6 and A.1; misprints corrected.

@@ -10,7 +10,7 @@ from typing import cast, overload
 import numpy as np
 
 from teleop_core.base.errors import ParameterError, ShapeError, UnknownNameError
-from teleop_core.kernels import pointer, raise_pending
+from teleop_core.kernels import direct, pointer, raise_pending
 from teleop_core.kernels.geometry import Array, checked_array, is_rigid
 from teleop_core.kernels.portable import product
 from teleop_core.robots import forward_kinematics, kinematics
@@ -150,7 +150,7 @@ class Robot:
 
         return html(self)
 
-    @property
+    @cached_property
     def n(self) -> int:
         """Number of joints."""
         return len(self.joint_names)
@@ -176,6 +176,10 @@ class Robot:
         if self.kernels.assemble is None:
             return None
         return cast("AssembleKernel", pointer(self.kernels.assemble, ASSEMBLE))
+
+    @cached_property
+    def _ik(self) -> IkKernel:
+        return direct(self.kernels.ik, IK)
 
     @cached_property
     def ik_pointer(self) -> IkKernel:
@@ -368,10 +372,11 @@ class Robot:
         else:
             start = seed if is_ready(seed, (self.n,)) else checked_array("seed", seed, (self.n,))
         q, residual = np.empty(self.n), np.empty(2)
-        status = self.kernels.ik(pose, start, self._free, self._row, q, residual)
+        status = self._ik(pose, start, self._free, self._row, q, residual)
         if status < 0:
             raise ParameterError("T or seed", (pose.tolist(), list(start)), _ASKABLE)
-        return IkResult(q, _STATUS[status], residual)
+        # What IkResult(...) does, without a call of Python.
+        return tuple.__new__(IkResult, (q, _STATUS[status], residual))
 
     def ik_batch(self, T: object, seed: object = None) -> IkBatch:
         """Joint vectors that reach many poses, each on its own.

@@ -14,18 +14,20 @@ Source:
 
 import math
 
-import numpy as np
-
 from teleop_core.kernels import inner, kernel
 from teleop_core.kernels.geometry import Array
+from teleop_core.kernels.room import room
 from teleop_core.robots import closed_form
 from teleop_core.robots.branches import BESIDE, OUTSIDE
 from teleop_core.robots.kinematics import is_askable
-from teleop_core.robots.subproblems import one_angle, pair_of_angles, turn_between
+from teleop_core.robots.subproblems import close_pair, one_angle, open_pairs, turn_between
 
 _F1, _F2, _F3, _F4, _F5 = (37, 49, 61, 73, 85)
 RULE = 97
 """Place, among the constants, of the rule of the arm's pair of equations; then B and a length."""
+_LEVEL, _SECOND, _COST, _TRIG = 3, 4, 5, 6
+# An arm's row: joints 1 and 3, whether it reaches, how many of its joints are known (0: one,
+# 1: both, 2: joint 2 too), joint 2, the least cost of its branches, cosine and sine of 1 and 3.
 _ALIGNED = 1e-10  # sine under which axes 4 and 6 count as one line, and joint 4 keeps its value
 _EVEN = 1e-9  # constant term of joint 5's equation that counts as none
 
@@ -47,14 +49,19 @@ def _equations(G: Array, K: Array, A: Array, B: Array, h: Array) -> None:
 
 
 @inner
-def _joint2(G: Array, K: Array, first: float, third: float, seed: float) -> float:
-    """Joint 2 that turns the wrist centre of joint 3 into that of joint 1; seed if on its axis."""
-    c, s = math.cos(first), math.sin(first)
+def _joint2(G: Array, K: Array, arm: Array, seed: float) -> float:
+    """Joint 2 that turns the wrist centre of joint 3 into that of joint 1; seed if on its axis.
+
+    Cosine and sine of joints 1 and 3 stay in the arm's row.
+    """
+    c, s = math.cos(arm[0]), math.sin(arm[0])
+    arm[_TRIG], arm[_TRIG + 1] = c, s
     x = c * G[0, 3] + s * G[1, 3] - K[_F1 + 3]
     y, z = c * G[1, 3] - s * G[0, 3] - K[_F1 + 7], G[2, 3] - K[_F1 + 11]
     wanted_x = K[_F1] * x + K[_F1 + 4] * y + K[_F1 + 8] * z
     wanted_y = K[_F1 + 1] * x + K[_F1 + 5] * y + K[_F1 + 9] * z
-    c, s = math.cos(third), math.sin(third)
+    c, s = math.cos(arm[1]), math.sin(arm[1])
+    arm[_TRIG + 2], arm[_TRIG + 3] = c, s
     x, y = c * K[_F3 + 3] - s * K[_F3 + 7], s * K[_F3 + 3] + c * K[_F3 + 7]
     z = K[_F3 + 11]
     has_x = K[_F2] * x + K[_F2 + 1] * y + K[_F2 + 2] * z + K[_F2 + 3]
@@ -63,13 +70,27 @@ def _joint2(G: Array, K: Array, first: float, third: float, seed: float) -> floa
 
 
 @inner
-def wrist_angles(M: Array, K: Array, at: int, seed: float, angles: Array) -> tuple[float, float]:
-    """Write both solutions of Rz(x) F Rz(y) F' Rz(z) = M into ``angles`` (2, 3).
+def _arm_cost(arm: Array, K: Array, seed: Array, limits: Array) -> float:
+    """Least cost of all branches of an arm, by those of its joints 1 to 3 that are known."""
+    do_count, level = not math.isfinite(limits[2, 0]), arm[_LEVEL]
+    cost = closed_form.INEXACT if do_count and arm[2] < 0.5 else 0.0
+    worst = 0.0
+    if level > 0.5 or K[RULE] < 0.5:
+        worst = closed_form.angle_cost(K, 6, 0, arm[0], seed, limits, do_count)
+    if level > 0.5 or K[RULE] > 0.5:
+        third = closed_form.angle_cost(K, 6, 2, arm[1], seed, limits, do_count)
+        worst = max(worst, third)
+    if level > 1.5:
+        second = closed_form.angle_cost(K, 6, 1, arm[_SECOND], seed, limits, do_count)
+        worst = max(worst, second)
+    return worst + cost
+
+
+@inner
+def middle_angle(M: Array, K: Array, at: int) -> tuple[float, float, float]:
+    """Base and spread [rad] of y in Rz(x) F Rz(y) F' Rz(z) = M, and 1.0 if that has a solution.
 
     F stands at a place among the constants, F' behind it; of both the rotations count.
-
-    Returns:
-        Half the difference [rad] of their angles y, and 1.0 if they solve it.
     """
     r0, r1, r2 = K[at + 8], K[at + 9], K[at + 10]
     a0, a1, a2 = K[at + 14], K[at + 18], K[at + 22]
@@ -77,17 +98,37 @@ def wrist_angles(M: Array, K: Array, at: int, seed: float, angles: Array) -> tup
     base, spread, is_exact = one_angle(a, b, d, 0.0)
     if abs(r2 * a2) < _EVEN:  # digits that 1 - cos² loses where axes x and z are nearly in line
         spread = math.atan2(math.sqrt(M[0, 2] * M[0, 2] + M[1, 2] * M[1, 2]), d)
-    for k in range(2):
-        y = base + spread if k == 0 else base - spread
-        c, s = math.cos(y), math.sin(y)
-        v0, v1 = c * a0 - s * a1, s * a0 + c * a1
-        u0 = K[at] * v0 + K[at + 1] * v1 + K[at + 2] * a2
-        u1 = K[at + 4] * v0 + K[at + 5] * v1 + K[at + 6] * a2
-        x = seed
-        if u0 * u0 + u1 * u1 > _ALIGNED * _ALIGNED:
-            x = turn_between(u0, u1, M[0, 2], M[1, 2], seed)
-        angles[k, 0], angles[k, 1] = x, y
-        angles[k, 2] = _last_angle(M, K, at, math.cos(x), math.sin(x), c, s)
+    return base, spread, is_exact
+
+
+@inner
+def wrist_at(M: Array, K: Array, at: int, y: float, seed: float, angles: Array) -> None:
+    """Write x, y and z, of which y is known, into ``angles`` (3,); x is the seed where y leaves it.
+
+    M, F and F' are those of :func:`middle_angle`.
+    """
+    a0, a1, a2 = K[at + 14], K[at + 18], K[at + 22]
+    c, s = math.cos(y), math.sin(y)
+    v0, v1 = c * a0 - s * a1, s * a0 + c * a1
+    u0 = K[at] * v0 + K[at + 1] * v1 + K[at + 2] * a2
+    u1 = K[at + 4] * v0 + K[at + 5] * v1 + K[at + 6] * a2
+    x = seed
+    if u0 * u0 + u1 * u1 > _ALIGNED * _ALIGNED:
+        x = turn_between(u0, u1, M[0, 2], M[1, 2], seed)
+    angles[0], angles[1] = x, y
+    angles[2] = _last_angle(M, K, at, math.cos(x), math.sin(x), c, s)
+
+
+@inner
+def wrist_angles(M: Array, K: Array, at: int, seed: float, angles: Array) -> tuple[float, float]:
+    """Write both solutions of :func:`middle_angle` into ``angles`` (2, 3).
+
+    Returns:
+        Half the difference [rad] of their angles y, and 1.0 if they solve it.
+    """
+    base, spread, is_exact = middle_angle(M, K, at)
+    wrist_at(M, K, at, base + spread, seed, angles[0])
+    wrist_at(M, K, at, base - spread, seed, angles[1])
     return spread, is_exact
 
 
@@ -109,72 +150,108 @@ def _last_angle(M: Array, K: Array, at: int, cx: float, sx: float, cy: float, sy
 
 
 @inner
-def _wrist(G: Array, K: Array, arm: Array, M: Array, N: Array, seed: Array, q: Array) -> float:
-    """Write both branches of an arm (7,), joints 1 to 3, into q (2, 7); the wrist's least spread.
-
-    ``M`` and ``N`` are memory; the wrist's angles stand in M at last.
-    """
+def _attitude(G: Array, K: Array, arm: Array, M: Array, N: Array) -> None:
+    """Write what an arm leaves to the wrist into N (3, 3); ``M`` is memory."""
     for i in range(3):
         for j in range(3):
             M[i, j] = G[i, j]
-    closed_form.undo_turn(arm[3], M, 3)
+    closed_form.undo_turn(arm[_TRIG], arm[_TRIG + 1], M, 3)
     closed_form.undo_between(K, _F1, M, N, 3)
-    closed_form.undo_turn(arm[4], N, 3)
+    closed_form.undo_turn(math.cos(arm[_SECOND]), math.sin(arm[_SECOND]), N, 3)
     closed_form.undo_between(K, _F2, N, M, 3)
-    closed_form.undo_turn(arm[5], M, 3)
+    closed_form.undo_turn(arm[_TRIG + 2], arm[_TRIG + 3], M, 3)
     closed_form.undo_between(K, _F3, M, N, 3)
-    spread, is_wrist = wrist_angles(N, K, _F4, closed_form.angle_of(K, 6, 3, seed), M)
-    for j in range(2):
+
+
+@inner
+def _wrist(
+    G: Array, K: Array, arm: Array, seed: Array, limits: Array, do_both: bool, q: Array
+) -> tuple[float, float]:
+    """Write both branches of an arm into q (2, 7).
+
+    Unless both are wanted, that whose joint 5 moves more is left out where it cannot win.
+
+    Returns:
+        The wrist's least spread, and with free steps the least cost of both.
+    """
+    M, N, angles = room(4, 7), room(4, 7), room(3)
+    is_path, lowest = math.isfinite(limits[2, 0]), math.inf
+    _attitude(G, K, arm, M, N)
+    base, spread, is_wrist = middle_angle(N, K, _F4)
+    least = min(spread, math.pi - spread)
+    do_both = do_both or (is_path and (least < BESIDE or arm[2] < 0.5))
+    first = closed_form.angle_cost(K, 6, 4, base + spread, seed, limits, not is_path)
+    second = closed_form.angle_cost(K, 6, 4, base - spread, seed, limits, not is_path)
+    other, start = max(first, second), 1 if second < first else 0
+    other = other if is_path else max(other, arm[_COST])
+    for k in range(2):
+        j = start if k == 0 else 1 - start
+        if k == 1 and not do_both and lowest < min(other, OUTSIDE):
+            q[j, 6] = closed_form.UNKNOWN
+            break
+        y = base + spread if j == 0 else base - spread
+        wrist_at(N, K, _F4, y, closed_form.angle_of(K, 6, 3, seed), angles)
         q[j, 6] = arm[2] * is_wrist
+        closed_form.set_angle(K, 6, 0, arm[0], q[j])
+        closed_form.set_angle(K, 6, 1, arm[_SECOND], q[j])
+        closed_form.set_angle(K, 6, 2, arm[1], q[j])
+        cost = 0.0
         for i in range(3):
-            closed_form.set_angle(K, 6, i, arm[3 + i], q[j])
-            closed_form.set_angle(K, 6, 3 + i, M[j, i], q[j])
-    return min(spread, math.pi - spread)
+            closed_form.set_angle(K, 6, 3 + i, angles[i], q[j])
+            if is_path:
+                move = closed_form.angle_cost(K, 6, 3 + i, angles[i], seed, limits, False)
+                cost = max(cost, move)
+        if not is_path:
+            cost = closed_form.branch_cost(q[j], seed, limits)
+        lowest = min(lowest, cost)
+    return least, lowest
 
 
 @kernel
 def _branches(
     T: Array, geometry: Array, seed: Array, limits: Array, do_all: bool, found: Array
 ) -> tuple[int, float]:
-    """Write branches into ``found`` (9, 7), and whether each reaches the pose.
+    """Write branches into ``found`` (8, 7), and whether each reaches the pose.
 
     Unless all are wanted, the arms of the least moves come first, and none that cannot win: with
     free steps those that move more than a whole branch inside the limits does, in a path all after
-    the first that reaches. Row 8 is memory.
+    the first that reaches. What is known of an arm so far says how much it moves at least.
 
     Returns:
         How many, and the least half difference [rad] of a wrist's two angles y.
     """
-    K, work = geometry[closed_form.constants_at(6) :], np.empty((29, 7))
-    G, M, N, A, B = work[7:11], work[11:15], work[15:19], work[19:21], work[21:23]
-    h, arms, trial, is_path = work[23], work[24:28], found[8], math.isfinite(limits[2, 0])
+    K, is_path = geometry[closed_form.constants_at(6) :], math.isfinite(limits[2, 0])
+    G, M, A, B, h, seeds = room(4, 4), room(4, 4), room(2, 2), room(2, 2), room(2), room(2)
+    arms, rule, do_both = room(4, 10), K[RULE:], do_all or closed_form.is_nearly(geometry)
     closed_form.wanted_motion(T, K, 6, M, G)
     _equations(G, K, A, B, h)
-    h[2], h[3] = closed_form.angle_of(K, 6, 0, seed), closed_form.angle_of(K, 6, 2, seed)
-    count = pair_of_angles(A, B, h, K[RULE : RULE + 4], h[2:4], work[:7], arms)
-    for k in range(count):  # whether it reaches, joints 1 to 3, cost
-        arms[k, 3], arms[k, 5] = arms[k, 0], arms[k, 1]
-        arms[k, 4] = _joint2(G, K, arms[k, 3], arms[k, 5], closed_form.angle_of(K, 6, 1, seed))
-        for i in range(6):
-            closed_form.set_angle(K, 6, i, arms[k, 3 + i % 3], trial)
-        trial[6] = arms[k, 2]
-        arms[k, 6] = 0.0 if do_all else closed_form.arm_cost(trial, K, seed, limits)
+    seeds[0], seeds[1] = closed_form.angle_of(K, 6, 0, seed), closed_form.angle_of(K, 6, 2, seed)
+    count = open_pairs(A, B, h, rule, seeds, arms)
+    for k in range(count):
+        arms[k, _COST] = 0.0 if do_all else _arm_cost(arms[k], K, seed, limits)
     done, least, best = 0, math.inf, math.inf
-    for _ in range(count):
-        arm = arms[0]
-        for k in range(1, count):
-            arm = arms[k] if arms[k, 6] < arm[6] else arm
-        if arm[6] >= best and best < OUTSIDE:
-            break
-        least = min(least, _wrist(G, K, arm, M, N, seed, found[done : done + 2]))
-        for k in range(done, done + 2 if not do_all else done):
+    while True:
+        k = 0
+        for other in range(1, count):
+            k = other if arms[other, _COST] < arms[k, _COST] else k
+        arm = arms[k]
+        if not arm[_COST] < math.inf or (arm[_COST] >= best and best < OUTSIDE):
+            return done, least
+        if arm[_LEVEL] < 0.5:
+            close_pair(A, B, h, rule, seeds, k, arms)
+        elif arm[_LEVEL] < 1.5:
+            arm[_SECOND] = _joint2(G, K, arm, closed_form.angle_of(K, 6, 1, seed))
+            arm[_LEVEL] = 2.0
+        else:
+            near, cost = _wrist(G, K, arm, seed, limits, do_both, found[done : done + 2])
+            least, done = min(least, near), done + 2
             if is_path:
-                best = -1.0 if arm[2] > 0.5 else best
-            else:
-                best = min(best, closed_form.branch_cost(found[k], seed, limits))
-        done += 2
-        arm[6] = math.inf
-    return done, least
+                cost = -1.0 if arm[2] > 0.5 else math.inf
+            best = best if do_all else min(best, cost)
+            arm[_COST] = math.inf
+            continue
+        for other in range(k, k + 1 if arm[_LEVEL] > 1.5 else k + 2):
+            arms[other, _COST] = 0.0 if do_all else _arm_cost(arms[other], K, seed, limits)
 
 
 @kernel
@@ -182,7 +259,7 @@ def ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual
     """Write joints (6,) for ``T_base_tip``; see :class:`teleop_core.robots.robot.Kernels`."""
     if not is_askable(T, seed):
         return -1
-    found = np.empty((13, 7))
+    found = room(8, 7)
     if closed_form.is_beside(T, seed, limits, geometry, q):
         return int(closed_form.settled(T, seed, limits, geometry, 2, found, 0, q, residual))
     K = geometry[closed_form.constants_at(6) :]
@@ -197,6 +274,7 @@ def ik_all(T: Array, geometry: Array, solutions: Array) -> int:
 
     On a singularity, where a joint is free, it is zero and branches may coincide.
     """
-    found = np.empty((9, 7))
-    count = _branches(T, geometry, np.zeros(6), np.empty((3, 6)), True, found)[0]
+    found, limits, seed = room(8, 7), room(3, 6), room(6)
+    closed_form.forget(seed, limits)
+    count = _branches(T, geometry, seed, limits, True, found)[0]
     return int(closed_form.kept(T, found, count, geometry, solutions))

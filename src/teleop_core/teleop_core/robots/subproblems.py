@@ -14,6 +14,7 @@ import math
 
 from teleop_core.kernels import inner, kernel
 from teleop_core.kernels.geometry import Array
+from teleop_core.kernels.room import room
 
 # Relative to its squared amplitude, so much may be missing for an equation to count as solved.
 _SLACK = 1e-9
@@ -149,31 +150,30 @@ def circle_roots(f: Array, work: Array, found: Array) -> int:
 
 
 @inner
-def _crossed(
-    A: Array, B: Array, h: Array, rule: Array, first: float, second: float, k: int, pairs: Array
-) -> int:
-    """Pairs (x, y) where a null vector of B takes y out of the equations: two times two."""
-    n0, n1, row = rule[1], rule[2], int(rule[3])
+def _alone(A: Array, h: Array, rule: Array, seed: float) -> tuple[float, float, float]:
+    """Base, spread and exactness of the angle that a null vector of the other's factors leaves."""
+    n0, n1 = rule[1], rule[2]
     a, b = n0 * A[0, 0] + n1 * A[1, 0], n0 * A[0, 1] + n1 * A[1, 1]
-    base, spread, is_x = one_angle(a, b, n0 * h[0] + n1 * h[1], first)
-    count = 0
-    for i in range(2):
-        x = base + spread if i == 0 else base - spread
-        d = h[row] - A[row, 0] * math.cos(x) - A[row, 1] * math.sin(x)
-        middle, width, is_y = one_angle(B[row, 0], B[row, 1], d, second)
-        for j in range(2):
-            pairs[count, k] = x
-            pairs[count, 1 - k] = middle + width if j == 0 else middle - width
-            pairs[count, 2] = is_x * is_y
-            count += 1
-    return count
+    return one_angle(a, b, n0 * h[0] + n1 * h[1], seed)
+
+
+@inner
+def _beside(
+    A: Array, B: Array, h: Array, rule: Array, x: float, seed: float
+) -> tuple[float, float, float]:
+    """Base, spread and exactness of the other angle, of factors B, where that of A is known."""
+    row = int(rule[3])
+    d = h[row] - A[row, 0] * math.cos(x) - A[row, 1] * math.sin(x)
+    return one_angle(B[row, 0], B[row, 1], d, seed)
 
 
 @kernel
-def pair_of_angles(
-    A: Array, B: Array, h: Array, rule: Array, seeds: Array, work: Array, pairs: Array
-) -> int:
-    """Write pairs with A (cos x, sin x) + B (cos y, sin y) = h into ``pairs`` (4, 3).
+def open_pairs(A: Array, B: Array, h: Array, rule: Array, seeds: Array, pairs: Array) -> int:
+    """Begin pairs with A (cos x, sin x) + B (cos y, sin y) = h: rows of ``pairs`` (4, 4 or more).
+
+    A row is x, y, whether the pair solves the equations (1.0), and 1.0 if both angles are there.
+    Else one is, the same in rows 0 and 1 as in rows 2 and 3, and :func:`close_pair` writes the
+    other: who needs one pair alone saves the others.
 
     Args:
         A: Factors of x, (2, 2).
@@ -182,16 +182,43 @@ def pair_of_angles(
         rule: How to go (4,): 0 if B has a null vector, 1 if A has, 2 if neither; the null vector,
             of two numbers; and the row that is left for the second angle.
         seeds: Values of x and y where the equations leave them free (2,).
-        work: Memory (7, 7).
-        pairs: x, y and whether they solve the equations (1.0), in each row.
+        pairs: Written.
 
     Returns:
         How many pairs; all of them nearest only, where none solves the equations.
     """
+    if rule[0] > 1.5:
+        return _skew(A, B, h, pairs)
     if rule[0] < 0.5:
-        return _crossed(A, B, h, rule, seeds[0], seeds[1], 0, pairs)
-    if rule[0] < 1.5:
-        return _crossed(B, A, h, rule, seeds[1], seeds[0], 1, pairs)
+        base, spread, is_exact = _alone(A, h, rule, seeds[0])
+    else:
+        base, spread, is_exact = _alone(B, h, rule, seeds[1])
+    for k in range(4):
+        pairs[k, int(rule[0])] = base + spread if k < 2 else base - spread
+        pairs[k, 2], pairs[k, 3] = is_exact, 0.0
+    return 4
+
+
+@inner
+def close_pair(
+    A: Array, B: Array, h: Array, rule: Array, seeds: Array, k: int, pairs: Array
+) -> None:
+    """Write the other angle of rows k and k + 1 of what :func:`open_pairs` began."""
+    if rule[0] < 0.5:
+        base, spread, is_exact = _beside(A, B, h, rule, pairs[k, 0], seeds[1])
+    else:
+        base, spread, is_exact = _beside(B, A, h, rule, pairs[k, 1], seeds[0])
+    other = 1 - int(rule[0])
+    for j in range(2):
+        pairs[k + j, other] = base + spread if j == 0 else base - spread
+        pairs[k + j, 2] *= is_exact
+        pairs[k + j, 3] = 1.0
+
+
+@kernel
+def _skew(A: Array, B: Array, h: Array, pairs: Array) -> int:
+    """All pairs where neither A nor B has a null vector: an equation of degree four."""
+    work, f, found = room(7, 7), room(5), room(4, 3)
     over = 1.0 / (B[0, 0] * B[1, 1] - B[0, 1] * B[1, 0])
     g0, g1 = over * (B[1, 1] * h[0] - B[0, 1] * h[1]), over * (B[0, 0] * h[1] - B[1, 0] * h[0])
     u0 = over * (B[0, 1] * A[1, 0] - B[1, 1] * A[0, 0])
@@ -199,12 +226,13 @@ def pair_of_angles(
     v0 = over * (B[0, 1] * A[1, 1] - B[1, 1] * A[0, 1])
     v1 = over * (B[1, 0] * A[0, 1] - B[0, 0] * A[1, 1])
     # The other angle's vector is g + u cos x + v sin x, of length 1.
-    uu, vv, f = u0 * u0 + u1 * u1, v0 * v0 + v1 * v1, work[4]
+    uu, vv = u0 * u0 + u1 * u1, v0 * v0 + v1 * v1
     f[0] = g0 * g0 + g1 * g1 + 0.5 * (uu + vv) - 1.0
     f[1], f[2] = 2.0 * (g0 * u0 + g1 * u1), 2.0 * (g0 * v0 + g1 * v1)
     f[3], f[4] = 0.5 * (uu - vv), u0 * v0 + u1 * v1
-    count = int(circle_roots(f, work, pairs))
+    count = int(circle_roots(f, work, found))
     for k in range(count):
-        c, s = math.cos(pairs[k, 0]), math.sin(pairs[k, 0])
+        c, s = math.cos(found[k, 0]), math.sin(found[k, 0])
+        pairs[k, 0], pairs[k, 2], pairs[k, 3] = found[k, 0], found[k, 2], 1.0
         pairs[k, 1] = math.atan2(g1 + u1 * c + v1 * s, g0 + u0 * c + v0 * s)
     return count

@@ -2,13 +2,13 @@
 
 The distance of the wrist centre from the shoulder's fixes joint 4. The arm can then swivel about
 the line between them: the shoulder's rotation is A(psi) = P cos psi + Q sin psi + N. A joint of
-shoulder or wrist is at a given angle where an equation linear in cos psi and sin psi says so, and
-so the limits of all joints cut the circle of psi into arcs, exactly: an arc is legal as a whole or
-not at all, however narrow it is. Of the legal psi the nearest to the seed's posture is taken that
-keeps a margin to the ends of its arc; psi = 0 is the seed's. In a path the arm makes the least move
-that follows, and the swivel goes back to its margin where a joint is near a limit. Where instead
-the axes of shoulder or wrist come to lie in a plane, the swivel goes slowly, with speed that the
-path leaves, to the side where the manipulability of both grows: the volumes that unit axes span.
+shoulder or wrist is at a given angle where an equation linear in cos psi and sin psi says so. So
+the limits of all joints cut the circle of psi into arcs, exactly: an arc is legal as a whole or not
+at all, however narrow it is. Of the legal psi the nearest to the seed's posture is taken that keeps
+a margin to the ends of its arc; psi = 0 is the seed's. In a path the arm makes the least move that
+follows, and the swivel goes back to its margin where a joint is near a limit. Where instead the
+axes of shoulder or wrist come to lie in a plane, the swivel goes slowly, with speed that the path
+leaves, to the side where the manipulability of both grows: the volumes that unit axes span.
 
 Source:
     Shimizu, Kakuya, Yoon, Kitagaki and Kosuge 2008, IEEE T-RO 24(5), sections on joint limits;
@@ -18,10 +18,9 @@ Source:
 
 import math
 
-import numpy as np
-
 from teleop_core.kernels import inner, kernel
 from teleop_core.kernels.geometry import Array
+from teleop_core.kernels.room import room
 from teleop_core.robots import swivel_families
 from teleop_core.robots.branches import BESIDE, cost_of, is_allowed, turn
 from teleop_core.robots.closed_form import (
@@ -31,17 +30,18 @@ from teleop_core.robots.closed_form import (
     branch_cost,
     choose,
     constants_at,
+    forget,
     kept,
     move_of,
     set_angle,
     settled,
     wanted_motion,
 )
-from teleop_core.robots.damped import ZERO
+from teleop_core.robots.damped import ZERO, assign
 from teleop_core.robots.dh_kernels import descend
 from teleop_core.robots.kinematics import is_askable
 from teleop_core.robots.spherical_wrist import wrist_angles
-from teleop_core.robots.swivel_arcs import ARCS, MARGIN, blend, cut_circle, swivel_of
+from teleop_core.robots.swivel_arcs import MARGIN, blend, cut_circle, swivel_of
 
 _SPEED = 0.3  # share of a joint's largest step by which psi goes back to its margin in a path
 _ROUNDS, _MORE_ROUNDS = 8, 40  # of the search for the least move, and if it comes close
@@ -92,7 +92,7 @@ def _branches(
         Number of branches, and the least spread of a shoulder or wrist [rad].
     """
     K = geometry[constants_at(7) :]
-    G, N, M, angles, arcs = work[:4], work[4:8], work[8:12], work[12:14], np.empty(ARCS)
+    G, N, M, angles, arcs = work[:4], work[4:8], work[8:12], work[12:14], room(8, 36)
     wanted_motion(T, K, 7, N, G)
     for i in range(3):
         for j in range(3):
@@ -104,7 +104,7 @@ def _branches(
         x, y = N[i, 0], N[i, 1]
         N[i, 0], N[i, 1] = c * x + s * y, c * y - s * x
     base, spread, does_reach = swivel_families.elbow_of(G, K, angle_of(K, 7, 3, seed))
-    least, memory, best, other = math.inf, np.empty((11, 3)), math.inf, 0.0
+    least, memory, best, other = math.inf, room(11, 3), math.inf, 0.0
     if is_free:
         near = _elbow_cost(base + spread, K, seed, limits, found[0])
         other = _elbow_cost(base - spread, K, seed, limits, found[0])
@@ -136,7 +136,7 @@ def _step_to_margin(
     """Let the swivel of a branch in a path go back to the margin of its arc, slowly."""
     elbow, k, trial = best // 4, best % 4, found[8]
     S, W = work[16 + 20 * elbow : 25 + 20 * elbow], work[25 + 20 * elbow : 34 + 20 * elbow]
-    M, angles, arcs, step = work[8:12], work[12:14], np.empty(ARCS), math.inf
+    M, angles, arcs, step = work[8:12], work[12:14], room(8, 36), math.inf
     cut_circle(S, W, K, limits, arcs)
     psi = swivel_of(k, S, W, K, seed, limits, arcs)
     if not math.isfinite(psi) or psi == 0.0:
@@ -154,7 +154,7 @@ def _step_to_margin(
 @inner
 def _least_move(T: Array, seed: Array, limits: Array, geometry: Array, q: Array) -> bool:
     """Write the pose's joints by the least move from the seed; whether a step allows them."""
-    box = np.empty((2, 7))
+    box = room(2, 7)
     box_around(seed, limits, box)
     for i in range(7):
         q[i] = min(max(seed[i], box[0, i]), box[1, i])
@@ -167,10 +167,10 @@ def _least_move(T: Array, seed: Array, limits: Array, geometry: Array, q: Array)
 @inner
 def _room(q: Array, limits: Array) -> float:
     """Least distance [rad] of a joint from its limits."""
-    room = math.inf
+    least = math.inf
     for i in range(7):
-        room = min(room, q[i] - limits[0, i], limits[1, i] - q[i])
-    return room
+        least = min(least, q[i] - limits[0, i], limits[1, i] - q[i])
+    return least
 
 
 @inner
@@ -191,12 +191,12 @@ def _urge(q: Array, seed: Array, limits: Array, K: Array) -> float:
     where a joint needs all of its speed. Of a part of it a hand whose readings are noisy asks
     all the time.
     """
-    left, room = 1.0, _room(q, limits) / MARGIN - 1.0
+    left, apart = 1.0, _room(q, limits) / MARGIN - 1.0
     for i in range(7):
         left = min(left, max(1.0 - abs(q[i] - seed[i]) / max(limits[2, i], 1e-300), 0.0))
     share = min(_width(q, K, 1), _width(q, K, 5)) / _FLAT
     urge = 6.75 * share * share * max(1.0 - share, 0.0) * left * left
-    return urge * min(max(room, 0.0), 1.0)
+    return urge * min(max(apart, 0.0), 1.0)
 
 
 @inner
@@ -207,7 +207,7 @@ def _step_to_width(
 
     No joint moves by more than a share of its step for that, nor out of its step from the seed.
     """
-    work, trial, near, K = np.empty((60, 4)), found[8], found[9, :7], geometry[constants_at(7) :]
+    work, trial, near, K = room(60, 4), found[8], found[9, :7], geometry[constants_at(7) :]
     _branches(T, geometry, q, limits, False, found, work)
     k = choose(found, 8, q, limits, K, False, near)[1]
     S, W = work[16 + 20 * (k // 4) : 25 + 20 * (k // 4)], work[25 + 20 * (k // 4) :]
@@ -224,8 +224,8 @@ def _step_to_width(
     turn(trial, q, limits, 0, 7)
     share = 1.0
     for i in range(7):
-        room = min(0.9 * (limits[2, i] - abs(q[i] - seed[i])), _SPEED * limits[2, i])
-        share = min(share, room / max(abs(trial[i] - q[i]), 1e-300))
+        free = min(0.9 * (limits[2, i] - abs(q[i] - seed[i])), _SPEED * limits[2, i])
+        share = min(share, free / max(abs(trial[i] - q[i]), 1e-300))
     _write(S, W, share * psi, K, q, M, angles, trial, k % 4)
     turn(trial, q, limits, 0, 7)
     if is_allowed(trial[:7], seed, limits):
@@ -238,10 +238,11 @@ def ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual
     """Write joints (7,) for ``T_base_tip``; see :class:`teleop_core.robots.robot.Kernels`."""
     if not is_askable(T, seed):
         return -1
-    found, work, K = np.empty((13, 8)), np.empty((60, 4)), geometry[constants_at(7) :]
-    is_free, posture, near, most = not math.isfinite(limits[2, 0]), seed, seed, math.inf
+    found, work, K = room(10, 8), room(60, 4), geometry[constants_at(7) :]
+    is_free, posture, most, near = not math.isfinite(limits[2, 0]), seed, math.inf, room(7)
     if _least_move(T, seed, limits, geometry, q):
-        near, most = q.copy(), move_of(q, seed)
+        assign(near, q)
+        most = move_of(q, seed)
         if _room(q, limits) > MARGIN and most < BESIDE_SEED:
             urge = 0.0 if is_free else _urge(q, seed, limits, K)
             if urge > 0.0:
@@ -266,6 +267,7 @@ def ik_all(T: Array, geometry: Array, solutions: Array) -> int:
     Limits do not count. There are endless many more, by turning the elbow about the line from
     shoulder to wrist.
     """
-    found, work, seed = np.empty((8, 8)), np.empty((60, 4)), np.zeros(7)
-    _branches(T, geometry, seed, np.empty((3, 7)), False, found, work)
+    found, work, seed, limits = room(8, 8), room(60, 4), room(7), room(3, 7)
+    forget(seed, limits)
+    _branches(T, geometry, seed, limits, False, found, work)
     return int(kept(T, found, 8, geometry, solutions))

@@ -10,10 +10,9 @@ Source:
 
 import math
 
-import numpy as np
-
 from teleop_core.kernels import inner
 from teleop_core.kernels.geometry import Array
+from teleop_core.kernels.room import room
 from teleop_core.robots.subproblems import one_angle
 
 F1, F2, F3, F4, F5 = (39, 51, 63, 75, 87)
@@ -46,7 +45,7 @@ def elbow_of(G: Array, K: Array, seed: float) -> tuple[float, float, float]:
 @inner
 def _least_turn(v: Array, p: Array, A: Array, out: Array) -> None:
     """Write the least rotation that turns the direction of A v into that of p, times A."""
-    a, size, other = np.empty(3), 0.0, 0.0
+    a, size, other = room(3), 0.0, 0.0
     for i in range(3):
         a[i] = A[i, 0] * v[0] + A[i, 1] * v[1] + A[i, 2] * v[2]
         size += a[i] * a[i]

@@ -1,6 +1,6 @@
 """Compose: the tick of a graph as one compiled kernel, from generated source.
 
-The source is a loop over ticks that copies values from record to record along the links, calls the
+The source is a loop over ticks. It copies values from record to record along the links, calls the
 kernel of each stage, stamps what it wrote and copies it to the row that is recorded. Stages that
 are plain Python cut it into segments, between which they are called. What was compiled once is
 loaded from disk by every later session of the same graph.

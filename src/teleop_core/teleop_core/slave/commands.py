@@ -183,8 +183,8 @@ def take_command(p: SlaveNumbers, s: SlaveState, row: SlaveRow, dt: float) -> in
     """Accept a new servo_jp unless it is a jump; returns the :class:`CommandStatus`.
 
     A jump is farther from the command in force than full speed reaches in the command timeout, or
-    in the time since the message before, half a second at most, which is what the first one has: no
-    stream can be that far.
+    in the time since the message before. That time is half a second at most, which is what the
+    first one has: no stream can be that far.
     """
     stamp, now_ns = row.slave_servo_jp_ns, row.now_ns
     if stamp > now_ns + _FUTURE_NS:  # taken, it would make every later command an old one
@@ -221,7 +221,10 @@ def _longest_gap(p: SlaveNumbers, s: SlaveState) -> int:
 
 @inner
 def follows(p: SlaveNumbers, s: SlaveState, now_ns: int) -> bool:
-    """Whether the setpoint goes to the command: it is fresh, or alone and no stream that broke."""
+    """Whether to follow the command.
+
+    It is fresh, or it is a single command rather than the last one of a broken stream.
+    """
     if s.state != _ENABLED or s.is_busy or not s.is_homed:
         return False
     return bool(now_ns - s.arrival_ns <= _longest_gap(p, s) or s.in_row == 0)

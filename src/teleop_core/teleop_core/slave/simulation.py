@@ -18,7 +18,7 @@ from teleop_core.slave.joints import integrate
 from teleop_core.slave.transmission import DriveNumbers, DriveState, drive, follow_encoders
 from teleop_core.slave.world.contact import touch
 
-# A joint that is farther from its setpoint [rad or m] is no joint of a simulation in its senses.
+# Beyond this distance from its setpoint [rad or m] the simulation of a joint has diverged.
 _ASTRAY = 10.0
 SPEED_LAG = 5e-3
 """Time constant of the low-pass of measured speeds [s]."""

@@ -15,7 +15,7 @@ from teleop_drill.drill import hand
 OVERSHOOT = 1.5
 """Speed of the tip over that of its setpoint, at most: three equal poles with a zero at a third of
 them answer a step by a quarter too much
-(:func:`~teleop_core.slave.controllers.pid.critically_damped_gains`), and a setpoint that turns
+(:func:`~teleop_core.slave.controllers.pid.critically_damped_gains`). A setpoint that turns
 round at full speed makes a step of twice its speed."""
 _COAST = 0.84
 """Way of such a loop beyond a setpoint that stops at once, in speeds over its pole: the maximum of

@@ -8,8 +8,8 @@ OURS: Settings = {"plant": "hardware", "controller": "disturbance_observer"}
 """The same machine under a controller of ours.
 
 Of the laws that track within 3 x 11.4 µm in both modes (experiment ``controllers``) it is the one
-without overshoot, with the least change of effort from tick to tick, and whose angles stay below
-half a degree near home too, though not below the published largest yaw of the coarse mode.
+without overshoot, with the least change of effort from tick to tick. Its angles stay below half a
+degree near home too, though not below the published largest yaw of the coarse mode.
 """
 RESTING: Settings = {"plant": "hardware", "controller": "pid"}
 """For tests whose gains the source tuned for no error at rest, tracking ignored (appendix E)."""

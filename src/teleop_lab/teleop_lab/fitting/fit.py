@@ -204,9 +204,9 @@ def one_sided(robot: Robot, table: RestTable) -> NDArray[np.bool_]:
 def default_free(robot: Robot, table: RestTable) -> tuple[str, ...]:
     """What a table can tell of a robot: names for :func:`fit`.
 
-    Dry friction of every axis that gravity does not leave to an integrator, the bias of those
-    among them that are approached from both sides and not loaded by gravity, and weights that no
-    source states.
+    Dry friction of every axis that gravity does not leave to an integrator; the bias of those among
+    them that are approached from both sides and not loaded by gravity; and weights that no source
+    states.
     """
     from teleop_core.slave.controllers.source_pid import loaded_axes
 

@@ -37,7 +37,8 @@ _WHOLE, _EXCERPT = 150_000, 6_000
 _EXCERPT_RATE = 20.0  # Hz
 # Walks that a search usually takes, for the progress.
 _USUAL_WALKS = 500
-# The excerpt is followed better than the whole path; so often the goal on it is raised.
+# The short excerpt is easier to follow than the whole path, so the search raises its goal up to
+# this many times.
 _ATTEMPTS = 3
 
 

@@ -48,8 +48,8 @@ class Architecture:
         push: ``push(numbers, memory, felt, away, period, out)``, a kernel or a plain function,
             called for every sample of the master. ``numbers`` are those of the parameters;
             ``memory`` (12,) is kept from sample to sample, and zero at the start; ``felt`` (3,) is
-            the force on the tip [N], ``away`` (3,) the way from where the hand leads the tip to
-            where the tip was measured [m], both along the slave's base, as late as they come, and
+            the force on the tip [N]; ``away`` (3,) the way from where the hand leads the tip to
+            where the tip was measured [m]; both along the slave's base, as late as they come, and
             zero where nothing comes; ``period`` is the time since the sample before [s]. Writes the
             push (3,) along the slave's base [N].
         numbers: ``numbers(parameters)`` gives what ``push`` takes, if that is

@@ -121,7 +121,7 @@ def tremor_filter_step(
     The position is filtered coordinate by coordinate, over the time between stamps; the orientation
     passes. A reading that is not finite, or of the same stamp as the last one, changes nothing:
     what was written stays. The filter begins anew at the first reading, after a pause, where stamps
-    go back, and at a reading that no hand can have made, which passes as it is, so that
+    go back, and at a reading that no hand can have made. That passes as it is, so that
     ``motion_scaling`` judges the same jump. Nothing rings after it.
 
     Args:

@@ -2,7 +2,7 @@
 
 The source's wall is a spring that ends in a constant force (:func:`wall_force`). Sampled, it gives
 back more energy than it took: its force is that of the place at the beginning of a period and is
-held for all of it, so it is too small on the way in and too large on the way out, by half a
+held for all of it. So it is too small on the way in and too large on the way out, by half a
 period's way. A damped wall (:func:`damped_wall`) makes up for it, as far as
 :func:`passive_stiffness`.
 
@@ -123,13 +123,13 @@ def damped_wall(
     period: float,
     force: Array,
 ) -> None:
-    """Write the push (3,) [N] of a wall that gives back less than it took, if it is soft enough.
+    """Write the force (3,) [N] of a damped wall: dissipative, if the wall is soft enough.
 
     How soft is :func:`passive_stiffness`.
 
     Spring and damper, together between a twentieth of the spring's force and the largest force. The
     damping is at least stiffness times period: twice what a force lacks that is held for a period.
-    What it has beyond takes the energy that steps of the reading and bending of the device give.
+    The extra damping absorbs the energy added by encoder steps and device compliance.
 
     Args:
         p: Parameters.

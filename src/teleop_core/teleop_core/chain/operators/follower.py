@@ -15,7 +15,7 @@ from teleop_core.kernels.fields import Fields, PoseRow, Quaternion, Vector3, rec
 from teleop_core.kernels.geometry import Array, turn_between, turn_by
 
 MOST = 4
-"""Ticks for which it can be asked at once: what is wanted is so much later at most."""
+"""Largest number of ticks per call. A new target takes effect at most this many ticks late."""
 
 
 class Wanted(Fields):

@@ -1,7 +1,7 @@
 """Human: a hand that reaches from target to target, sees what it missed, corrects, and rests.
 
 A reach is a first submovement that falls short of its target and is blurred by noise that grows
-with speed, and further ones that begin a reaction time after the eye could see the error. Each is a
+with speed. Further ones begin a reaction time after the eye could see the error. Each is a
 minimum-jerk movement; where two overlap they add up. Between reaches the hand dwells, or goes on at
 once. Tremor goes on all the time. Where the numbers come from stands in ``docs/human_operator.md``.
 """

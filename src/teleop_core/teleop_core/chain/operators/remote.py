@@ -22,7 +22,7 @@ from teleop_core.kernels import geometry
 __all__ = ["REMOTE", "Person", "RemoteHand", "RemoteParameters", "remote_operator"]
 
 AHEAD = MOST
-"""Ticks for which the hand is asked at once: what is wanted is so much later at most."""
+"""Largest number of ticks per call. A new target takes effect at most this many ticks late."""
 BUTTONS = ("clutch", "fixture", "mode")
 _PRESSED, _BETWEEN = 0.1, 0.05  # how long a button is pressed, and released at least [s]
 _UNIT = 1e-3  # how far a quaternion may be from unit length

@@ -56,8 +56,8 @@ class Passivity:
         parameters: Its parameter group.
         hand: ``hand(numbers, memory, last, moved, led, flow, heard, port, push, scale, period)``,
             called for every sample of the master. ``last`` (3,) is the push since the sample before
-            [N], ``moved`` (3,) how far the hand went under it, and ``led`` (3,) how far it led the
-            slave, over the gain of motion [m], all along the master's base;
+            [N]; ``moved`` (3,) how far the hand went under it; ``led`` (3,) how far it led the
+            slave, over the gain of motion [m]; all along the master's base;
             ``push`` (3,) the one that is asked for, to be made the one that is given; ``scale`` the
             hand's energy over that of the slave; ``period`` the time since the sample before [s].
         slave: ``slave(numbers, memory, flow, force, tip, last, heard, port, command, period)``,

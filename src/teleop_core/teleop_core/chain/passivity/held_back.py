@@ -84,10 +84,10 @@ def hold_lead(
 ) -> None:  # fmt: skip
     """Let the command (7,) be ahead of the tip only as far as what is left pays for on the way.
 
-    The arm goes on to its command whatever it meets, so the way from the tip to the command is
-    paid for before it is begun, as against a spring that has the present force already: friction
-    may be as large beside it. Turns against the torque are paid for too. Back from what was touched
-    last the command may go freely. With nothing left it goes nowhere else.
+    The arm goes on to its command whatever it meets. So the way from the tip to the command is paid
+    for before it is begun, as against a spring that has the present force already: friction may be
+    as large beside it. Turns against the torque are paid for too. Back from what was touched last
+    the command may go freely. With nothing left it goes nowhere else.
 
     Args:
         numbers: Those of :func:`teleop_core.chain.passivity.tdpa.tdpa_slave`.

@@ -143,8 +143,8 @@ def tdpa_slave(
     numbers of ``port`` are the drift, from what is given to what was commanded [m].
 
     Args:
-        numbers: Time constant [s] and largest speed [m/s] with which drift goes away, a force below
-            which nothing is touched [N], what the arm may lend [J], two that are not used, and the
+        numbers: Time constant [s] and largest speed [m/s] with which drift goes away; a force below
+            which nothing is touched [N]; what the arm may lend [J]; two that are not used; and the
             stiffness against which a lead is paid for [N/m].
         memory: Direction of the last force; written.
         flow: Heard, in, out [J].

@@ -174,9 +174,10 @@ def fading_of(
     """Fading (n,) of the filters of a law, as fast as its own noise allows.
 
     The rule: ``ratio`` times as fast as the loop, but so slow that one encoder count changes the
-    effort by no more than :data:`FRICTION_SHARE` of known dry friction, so that the noise of an
-    encoder shakes no joint loose, and no more than :data:`EFFORT_SHARE` of the drive's limit. It is
-    :data:`SLOWEST_RATIO` times as fast all the same, without which the loop would not be damped.
+    effort by no more than :data:`EFFORT_SHARE` of the drive's limit. It also changes it by no more
+    than :data:`FRICTION_SHARE` of known dry friction, so that the noise of an encoder shakes no
+    joint loose. It is :data:`SLOWEST_RATIO` times as fast all the same, without which the loop
+    would not be damped.
 
     Args:
         robot: Robot with drives.

@@ -40,11 +40,11 @@ def critically_damped_gains(
 
     The loop ``inertia q'' + viscous q' = Kp (b r - q) + Ki ∫(r - q) - Kd q'`` has the
     characteristic polynomial ``inertia (s + bandwidth)³``, critically damped: what disturbs it dies
-    away without swinging. Its answer to the setpoint r is ``bandwidth² (3 b s + bandwidth) /
-    (s + bandwidth)³``. With the whole setpoint in the proportional action, b = 1, the zero makes
-    a step overshoot by 25 % all the same, 20 % at 1 kHz, and less where the setpoint moves no
-    faster than the drive. With b = 1/3 it cancels a pole, ``bandwidth² / (s + bandwidth)²`` is
-    left, and no step overshoots.
+    away without swinging. Its answer to the setpoint r is ``bandwidth² (3 b s + bandwidth) / (s +
+    bandwidth)³``. With the whole setpoint in the proportional action, b = 1, the zero makes a step
+    overshoot by 25 % all the same. It is 20 % at 1 kHz, and less where the setpoint moves no faster
+    than the drive. With b = 1/3 it cancels a pole, ``bandwidth² / (s + bandwidth)²`` is left, and
+    no step overshoots.
 
     Args:
         inertia: Inertias (n,) [kg·m² or kg], > 0.
@@ -115,9 +115,9 @@ def weighted_setpoint(
 ) -> float:
     """Setpoint that gives a PID on its error the setpoint weight b; at b = 1 that is itself.
 
-    It is ``b r + (1 - b) x``, with x the setpoint r through a lag of Ki / Kp, and makes the same
-    effort at every tick as ``Kp (b r - y) + Ki ∫(r - y)``, but leaves the integral what holds the
-    load alone, instead of ``Kp (1 - b) r`` besides.
+    It is ``b r + (1 - b) x``, with x the setpoint r through a lag of Ki / Kp. It makes the same
+    effort at every tick as ``Kp (b r - y) + Ki ∫(r - y)``. But it leaves the integral what holds
+    the load alone, instead of ``Kp (1 - b) r`` besides.
 
     A setpoint farther than ``room / (b Kp)`` counts as nearer, so that the drive can brake: see
     :func:`teleop_core.slave.controllers.motion_estimates.approach`.

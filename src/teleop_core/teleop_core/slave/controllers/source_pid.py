@@ -5,8 +5,8 @@ which feels every encoder count. Only the axes whose gravity nobody feeds forwar
 action; that is what the published rest positions show.
 
 In one thing it differs from what is printed: the integral ends at what the drive can give. Printed
-without a bound, it winds up at each stop from more than about 50 mm/s of joint 3, and the loop,
-whose three poles are at one place, then runs away at a standing setpoint.
+without a bound, it winds up at each stop from more than about 50 mm/s of joint 3. The loop, whose
+three poles are at one place, then runs away at a standing setpoint.
 
 Source:
     Vongbunyong 2008, eqs. 6.1-6.4, with u_I(k-1) in place of the printed u(k-1).

@@ -70,6 +70,6 @@ FAULTS: Mapping[Fault, FaultKind] = {
 }
 """What there is, with its reaction; those that a session names as ``reported`` only report."""
 ALWAYS = (Fault.STOP, Fault.HEARTBEAT)
-"""Faults that no session can have told only: an emergency stop stops."""
+"""Faults that always stop the arm; ``reported`` cannot demote them to a message."""
 NAMES = tuple(fault.word for fault in Fault if fault and fault not in ALWAYS)
 """Those that a session can name as ``reported``."""

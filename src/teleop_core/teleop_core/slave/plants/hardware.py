@@ -10,10 +10,11 @@ import numpy as np
 
 from teleop_core.base.errors import ParameterError, UnknownNameError
 from teleop_core.base.parameters import parameter
+from teleop_core.graph.signals import DT
 from teleop_core.kernels import pointer
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots.chains import true_chain
-from teleop_core.robots.drives import ACCELERATION
+from teleop_core.robots.drives import ACCELERATION, Drives
 from teleop_core.robots.hardware import Hardware
 from teleop_core.robots.rigid_body import write_model
 from teleop_core.robots.robot import Robot
@@ -108,6 +109,16 @@ def faults_of(robot: Robot) -> Hardware:
     )  # fmt: skip
 
 
+def _steps(drives: Drives, bits: int) -> Array:
+    """Steps of the converters over their range [N·m or N].
+
+    It ends at the drive's effort, or where that brings the axis to full speed within a tick: files
+    give links of some grams drives of 100 N·m and no motor, and one step would throw them.
+    """
+    quick = drives.inertia * drives.speed_limit / DT
+    return 2.0 * np.minimum(drives.effort_limit, quick) / 2.0**bits
+
+
 def hardware_physics(parameters: HardwareParameters, robot: Robot) -> Physics:
     """Numbers of a robot's drive table and of its faults, less those that are left out.
 
@@ -133,9 +144,7 @@ def hardware_physics(parameters: HardwareParameters, robot: Robot) -> Physics:
         wander=number("wander", "wandering"),
         wander_travel=parameters.wander_travel * drives.encoder_step,
         bias=number("bias", "bias"),
-        effort_step=(
-            zero if "drive_steps" in out else 2.0 * drives.effort_limit / 2.0**parameters.drive_bits
-        ),
+        effort_step=zero if "drive_steps" in out else _steps(drives, parameters.drive_bits),
         encoder_step=drives.encoder_step,
         play=number("play", "play"),
         coupling=np.zeros((robot.n, robot.n)) if "play" in out else faults.coupling,
