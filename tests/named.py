@@ -190,7 +190,8 @@ FILES: dict[str, Callable[[Path], None]] = {
     "hand.csv": _hand, "two.csv": _two, "mocap.txt": _mocap, "tool.csv": _tool,
     "skull.stl": _mesh, "part.stl": _mesh, "heights.csv": _heights,
     "my_arm.urdf": _arm, "arm.urdf": _arm, "poses.csv": _poses,
-    "hands.csv": _hands, "drives.yaml": _drives, "delay.yaml": _study, "tube.py": _tube, "dataset": _data_set,
+    "hands.csv": _hands, "drives.yaml": _drives, "delay.yaml": _study, "tube.py": _tube,
+    "dataset": _data_set,
 }  # fmt: skip
 """Makers of the files that commands name and readers have."""
 
