@@ -7,6 +7,7 @@ import pandas as pd
 import pytest
 
 import teleop_core as tc
+from teleop_core.cli import main
 from teleop_lab.grading import FIGURES, ODD, REASON, WORST, grade, usual
 
 RATE, ODD_ONE = 50.0, 4
@@ -80,3 +81,17 @@ def test_the_figures_are_keys_of_the_score() -> None:
 
     known = {name for key in keys() for name in key.names()}
     assert {f"motion.hand.{name}" for name in FIGURES} <= known
+
+
+def test_the_command_prints_and_writes_what_the_function_finds(
+    table: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    keep, page, csv = (tmp_path / name for name in ("keep.txt", "page.html", "grades.csv"))
+    words = ["grade", str(table), "--usual", str(keep), "--html", str(page), "--csv", str(csv)]
+    assert main(words) == 0
+    found = grade(table)
+    assert [int(line) for line in keep.read_text().split()] == usual(found)
+    assert pd.read_csv(csv)["episode"].tolist() == found.index.tolist()
+    assert "class=odd" in page.read_text()
+    assert f"{len(usual(found))} of 8 episodes" in capsys.readouterr().out
+    assert main(["grade", str(tmp_path / "nothing.csv")]) == 2

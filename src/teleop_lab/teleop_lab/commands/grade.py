@@ -42,7 +42,7 @@ def _run(arguments: argparse.Namespace) -> int:
     if not arguments.most >= 0.0:
         raise ParameterError("--most", arguments.most, "0 or more standard deviations")
     check_places(arguments.csv, arguments.html, arguments.usual)
-    options = ImportOptions(position=arguments.position, unit=arguments.unit)
+    options = ImportOptions(position=tuple(arguments.position or ()), unit=arguments.unit)
     table = grade(arguments.data, options=options, recordings=arguments.recordings)
     shown = table.drop(columns=REASON).head(20)
     print(shown.to_string(float_format="{:.4g}".format, na_rep="–"))
