@@ -72,6 +72,18 @@ class Listener:
         self.stamps, self.values = [], []
 
 
+def at_rest(listener: Listener, count: int = 1000) -> Callable[[], object]:
+    """Whether the tip has been at rest for so many samples, but for steps of its encoders."""
+
+    def is_at_rest() -> bool:
+        if listener.take() < count:
+            return False
+        last = np.array(listener.values[-count:])[:, :3]
+        return np.ptp(last, axis=0).max() < 1e-4
+
+    return is_at_rest
+
+
 def _is_of_arm(key: str) -> bool:
     """Whether a parameter, with double underscores for dots, is that of a simulated arm alone."""
     name = key.replace("__", ".")

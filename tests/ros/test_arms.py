@@ -81,7 +81,7 @@ def test_a_recorder_in_a_namespace_records_the_topics_of_its_arm(
 @pytest.mark.parametrize(
     "processes",
     # Fourteen processes need more than two processors.
-    [Processes.SIDES, pytest.param(Processes.NODES, marks=pytest.mark.soak), Processes.ONE],
+    [Processes.SIDES, pytest.param(Processes.NODES, marks=pytest.mark.soak)],
 )
 def test_two_arms_are_recorded_together_and_scored_one_by_one(
     peer: "Peer", session_until: Callable[..., tuple[Bag, str]], processes: Processes
