@@ -111,7 +111,8 @@ def test_slave_refuses_bad_commands_and_holds(peer: "Peer") -> None:
 
     def typed(names: list[Any] | tuple[str, ...], position: Any) -> Callable[..., object]:
         def publish(stamp: int) -> None:
-            message = JointState(name=list(names), position=list(map(float, position)))
+            q = list(map(float, position))
+            message = JointState(name=list(names), position=q, velocity=[0.0] * len(q))
             message.header.stamp.sec, message.header.stamp.nanosec = divmod(stamp, 10**9)
             publisher.publish(message)
 
