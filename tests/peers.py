@@ -5,6 +5,8 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState
 from rcl_interfaces.msg import Parameter as ParameterMessage
 from rcl_interfaces.srv import SetParameters, SetParametersAtomically
 from rclpy.parameter import Parameter
@@ -286,6 +288,12 @@ class AnyPeer:
             return future.result()
         finally:
             self.ros.destroy(client)
+
+    def change(self, name: str, transition: int) -> bool:
+        """Whether a node makes a transition of its lifecycle that is asked for by service."""
+        request = ChangeState.Request(transition=Transition(id=transition))
+        answer = self.call(ChangeState, f"/{name}/change_state", request)
+        return bool(answer.success)
 
     def set(self, name: str, at_once: bool = False, **values: Any) -> list[Any]:
         """Results of setting parameters over the node's services."""

@@ -213,8 +213,8 @@ def foreign_arm(*faults: object) -> Iterator[Arm]:
 
 LOOKED = (("",), ("stamp", "no state"), ("nan", "unit"), ("length", "type"), ("qos",))
 MOVED = (
-    ("honest",), ("moves paused", "frozen"), ("never busy", "late"), ("any word",), ("scaled",),
-    ("speeds",),
+    ("honest",), ("moves paused", "frozen"), ("never busy", "speeds"), ("any word",), ("scaled",),
+    ("late",),
 )  # fmt: skip
 """Faults of each arm: of several none hides another."""
 

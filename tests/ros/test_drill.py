@@ -29,8 +29,9 @@ def test_the_short_form_of_the_fault_matrix_holds_for_lone_nodes(tmp_path: Path)
     assert {file.name for file in (tmp_path / "bags").rglob("metadata.yaml")} == {"metadata.yaml"}
 
 
+@pytest.mark.soak
 def test_a_composed_session_survives_a_hand_that_lies_and_is_stopped(tmp_path: Path) -> None:
-    names = ("stop_service", "teleport")
+    names = ("stop_service", "nan", "infinite", "teleport")
     code, text, outcomes = run_drill(tmp_path, "--composed", *names)
     assert set(outcomes) == set(names)
     for one in outcomes.values():

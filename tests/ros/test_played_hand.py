@@ -26,7 +26,7 @@ def test_a_recorded_hand_that_is_played_is_the_operator(
 ) -> None:
     bag = tmp_path / "hand"
     settings = {"operator.approach_time": 1.0, "tremor_amplitude": 0.0}
-    tc.run("free_motion", duration=60.0, out=bag, settings=settings)
+    tc.run("free_motion", duration=30.0, out=bag, settings=settings)
     slave = {"starts_at_home": True, "operation": {"longest_outage": 0.0}}
     compose(operator={"kind": "elsewhere"}, slave=slave)
     tips = peer.listen(SLAVE_MEASURED_CP)

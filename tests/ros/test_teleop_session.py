@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 from lifecycle_msgs.msg import Transition
-from lifecycle_msgs.srv import ChangeState
 
 from teleop_core.graph import topics
 
@@ -14,11 +13,6 @@ if TYPE_CHECKING:
     from ros.conftest import Listener, Peer
 
 pytestmark = [pytest.mark.ros, pytest.mark.slow, pytest.mark.alone]
-
-
-def change(peer: "Peer", name: str, transition: Any) -> None:
-    request = ChangeState.Request(transition=Transition(id=transition))
-    assert peer.call(ChangeState, f"/{name}/change_state", request).success
 
 
 def rest_of(measured: "Listener") -> Any:
@@ -34,7 +28,7 @@ def test_a_flood_of_commands_is_not_followed_faster_and_drops_no_step(
 ) -> None:
     scaling = {"reach_force": {"is_on": False}}
     compose(operator={"approach_time": 1.0, "patience": 0.0}, motion_scaling=scaling)
-    change(peer, "inverse_kinematics", Transition.TRANSITION_DEACTIVATE)
+    assert peer.change("inverse_kinematics", Transition.TRANSITION_DEACTIVATE)
     peer.wait_state("inverse_kinematics", "inactive")
     measured = peer.listen(topics.SLAVE_MEASURED_JS)
     peer.wait(measured.take, "joints")

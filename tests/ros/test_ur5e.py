@@ -185,6 +185,7 @@ def test_it_starts_twenty_times_without_a_jump(tmp_path: Path, bridge: list[Any]
         goes_home_and_follows(*led(tmp_path, bridge, seed))
 
 
+@pytest.mark.soak
 def test_the_drill_stops_it_as_a_simulated_arm(tmp_path: Path, bridge: list[Any]) -> None:
     code, text, outcomes = run_drill(
         tmp_path, "stop_topic", "--drives", shlex.join(bridge), "--arm", shlex.join(CONTROLLER),

@@ -11,7 +11,8 @@ from typing import Any
 
 import pytest
 
-from example_runs import EXAMPLES, NAMES, numbers, run
+from example_runs import EXAMPLES, NAMES, numbers
+from example_runs import run_again as run
 from present import present
 from teleop_core.session.configuration import configure
 from teleop_core.session.virtual import VirtualTime

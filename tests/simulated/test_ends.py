@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 from lifecycle_msgs.msg import Transition
-from lifecycle_msgs.srv import ChangeState
 
 from teleop_core.bags.reader import Bag
 
@@ -15,26 +14,20 @@ if TYPE_CHECKING:
     from peers import AnyPeer as Peer
 
 
-def change(peer: "Peer", name: str, transition: Any) -> Any:
-    """Whether a transition was made, asked for by service."""
-    request = ChangeState.Request(transition=Transition(id=transition))
-    return peer.call(ChangeState, f"/{name}/change_state", request).success
-
-
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_node_that_was_shut_down_by_service_still_ends_well(
     peer: "Peer", tmp_path: Path, number: Any
 ) -> None:
     node = peer.start("recorder", out=str(tmp_path / "bag"))
-    assert change(peer, "recorder", Transition.TRANSITION_ACTIVE_SHUTDOWN)
+    assert peer.change("recorder", Transition.TRANSITION_ACTIVE_SHUTDOWN)
     assert (tmp_path / "bag" / "metadata.yaml").exists()
     assert node.end(number) == 0, node.stderr.read_text()
 
 
 def test_a_transition_that_there_is_not_is_refused_and_the_node_goes_on(peer: "Peer") -> None:
     node = peer.start("slave")
-    assert not change(peer, "slave", Transition.TRANSITION_ACTIVATE)
-    assert not change(peer, "slave", Transition.TRANSITION_CONFIGURE)
+    assert not peer.change("slave", Transition.TRANSITION_ACTIVATE)
+    assert not peer.change("slave", Transition.TRANSITION_CONFIGURE)
     before = peer.status("slave").number("ticks")
     peer.wait_value("slave", "ticks", lambda ticks: ticks > before + 500)
     assert node.end() == 0
@@ -51,7 +44,7 @@ def test_a_composed_session_of_which_a_node_was_shut_down_ends_well(
     peer: "Peer", composed: Any, tmp_path: Path, name: str
 ) -> None:
     peer.wait_value("slave", "ticks", lambda ticks: ticks > 100)
-    assert change(peer, name, Transition.TRANSITION_ACTIVE_SHUTDOWN)
+    assert peer.change(name, Transition.TRANSITION_ACTIVE_SHUTDOWN)
     peer.wait_state(name, "finalized")
     composed.send_signal(signal.SIGTERM)
     assert composed.wait() == 0

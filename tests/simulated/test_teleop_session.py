@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 from lifecycle_msgs.msg import Transition
-from lifecycle_msgs.srv import ChangeState
 from std_srvs.srv import Trigger
 
 from present import present
@@ -55,11 +54,6 @@ def recorded(composed_session: Any) -> Bag:
         return Bag(bag)
 
 
-def change(peer: "Peer", name: str, transition: Any) -> None:
-    request = ChangeState.Request(transition=Transition(id=transition))
-    assert peer.call(ChangeState, f"/{name}/change_state", request).success
-
-
 def test_a_composed_session_loses_no_sample_between_its_stages(recorded: Bag) -> None:
     sample, pose, joints = (
         recorded.read(t).stamp_ns
@@ -85,7 +79,7 @@ def test_a_composed_session_computes_what_virtual_time_computes(recorded: Bag) -
 def test_an_outside_master_takes_over_when_the_inside_one_is_off(
     peer: "Peer", session: object
 ) -> None:
-    change(peer, "haptic_master", Transition.TRANSITION_DEACTIVATE)
+    assert peer.change("haptic_master", Transition.TRANSITION_DEACTIVATE)
     peer.wait_state("haptic_master", "inactive")
     commands = peer.listen(topics.SLAVE_SERVO_CP)
     rest = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
@@ -110,10 +104,10 @@ def test_the_inside_master_comes_back_without_a_jump(peer: "Peer", session: obje
         lambda: measured.take() and np.ptp(np.array(measured.values)[:, :3], axis=0).max() > 1e-3,
         "motion",
     )
-    change(peer, "haptic_master", Transition.TRANSITION_DEACTIVATE)
+    assert peer.change("haptic_master", Transition.TRANSITION_DEACTIVATE)
     peer.wait_state("haptic_master", "inactive")
     peer.wait(peer.slave_holds, "slave holds")
-    change(peer, "haptic_master", Transition.TRANSITION_ACTIVATE)
+    assert peer.change("haptic_master", Transition.TRANSITION_ACTIVATE)
     peer.wait_state("haptic_master", "active")
     # An outage of more than two seconds has paused the arm, which goes on on purpose only, and at
     # rest. What it is asked for while it brakes is refused.
@@ -130,7 +124,7 @@ def test_a_node_may_leave_a_composed_session_in_any_moment(peer: "Peer", session
             Transition.TRANSITION_DEACTIVATE, Transition.TRANSITION_CLEANUP,
             Transition.TRANSITION_CONFIGURE, Transition.TRANSITION_ACTIVATE,
         ):  # fmt: skip
-            change(peer, "haptic_master", transition)
+            assert peer.change("haptic_master", transition)
     ticks = peer.status("slave").number("ticks")
     peer.wait_value("slave", "ticks", lambda now: now > ticks + 500)
     session.send_signal(signal.SIGINT)
