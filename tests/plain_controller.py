@@ -73,7 +73,7 @@ class Controller:
     """
 
     def __init__(
-        self, kind: str, arm: str = "rcrt1", seed: str = "",
+        self, kind: str, arm: str = "rcrt1", seed: str = "", *,
         now: Callable[[], float] = time.monotonic, time_ns: Callable[[], int] = time.time_ns,
     ) -> None:  # fmt: skip
         self.joints, stands, self.rated, order = ARMS[arm]
