@@ -96,8 +96,7 @@ ENTRIES = """
     failing = my_stages:FAILING
 """
 RAISED, TWICE = (Topic(name, Kind.POSE) for name in ("slave/raised_cp", "slave/plain_cp"))
-IN_BETWEEN = ("teleop.stages=[compiled_raise, plain_raise]", "plain_raise.height=0.003")
-ALL = (
+SETTINGS = (
     "teleop.stages=[helper, compiled_raise, plain_raise]", "teleop.delays=[slave/servo_jp=0.05]",
     "plain_raise.height=0.003",
 )  # fmt: skip
@@ -131,7 +130,7 @@ def common(*series: Any) -> list[Any]:
 
 
 def assert_delay_is_seen_in_the_latency(recorded: Bag) -> None:
-    """The one of :data:`ALL`, once."""
+    """The one of :data:`SETTINGS`, once."""
     answers, setpoints = (
         recorded.read(topic) for topic in (topics.SLAVE_SERVO_JP, topics.SLAVE_SETPOINT_JS)
     )

@@ -7,7 +7,16 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from links import ENTRIES, IN_BETWEEN, STAGES, WATCHED, assert_stages_run_between_ours, is_enough
+from links import (
+    ENTRIES,
+    SETTINGS,
+    STAGES,
+    WATCHED,
+    assert_delay_is_seen_in_the_latency,
+    assert_second_source_of_force_acts_beside_the_first,
+    assert_stages_run_between_ours,
+    is_enough,
+)
 from live_process import CALM, LiveProcess, wait_until
 
 if TYPE_CHECKING:
@@ -16,7 +25,9 @@ if TYPE_CHECKING:
 pytestmark = [pytest.mark.ros, pytest.mark.slow]
 
 
-def test_stages_of_an_installed_package_run_between_ours(peer: "Peer", tmp_path: Path) -> None:
+def test_stages_of_an_installed_package_sum_and_run_between_ours(
+    peer: "Peer", tmp_path: Path
+) -> None:
     site = tmp_path / "site"
     about = site / "my_stages-1.0.dist-info"
     about.mkdir(parents=True)
@@ -27,7 +38,7 @@ def test_stages_of_an_installed_package_run_between_ours(peer: "Peer", tmp_path:
     session = LiveProcess(
         tmp_path, "--scenario", "free_motion",
         env={"ROS_DOMAIN_ID": peer.domain, "PYTHONPATH": str(site)},
-        settings=(*IN_BETWEEN, "operator.approach_time=1.0", CALM),
+        settings=(*SETTINGS, "operator.approach_time=1.0", CALM),
     )  # fmt: skip
 
     def has_enough() -> bool:
@@ -41,4 +52,7 @@ def test_stages_of_an_installed_package_run_between_ours(peer: "Peer", tmp_path:
         assert session.wait() == 0, session.text
     finally:
         session.close()
-    assert_stages_run_between_ours(session.recorded())
+    recorded = session.recorded()
+    assert_delay_is_seen_in_the_latency(recorded)
+    assert_second_source_of_force_acts_beside_the_first(recorded)
+    assert_stages_run_between_ours(recorded)

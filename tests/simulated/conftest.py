@@ -121,6 +121,17 @@ class SimulatedPeer(AnyPeer):
         self.bus.watch(made)
         return made
 
+    def side(self, *names: str, **parameters: Mapping[str, Any]) -> SimulatedNode:
+        """Some nodes of a session in one process, at work."""
+        made = SimulatedNode(
+            self, "side", lambda world: TeleopSession("", names, world, build_graph()),
+            {name: flattened(values) for name, values in parameters.items()},
+        )  # fmt: skip
+        self.nodes.append(made)
+        for name in names:
+            self.wait_state(name, "active")
+        return made
+
     def compose(self, namespace: str = "", **parameters: Mapping[str, Any]) -> SimulatedNode:
         """A session in one process, at work, with its arm at home."""
         home = {"slave": {"start": load_robot("rcrt1").home.tolist()}}

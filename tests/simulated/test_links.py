@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from links import (
-    ALL,
     HELPER,
+    SETTINGS,
     STAGES,
     WATCHED,
     assert_delay_is_seen_in_the_latency,
@@ -96,7 +96,7 @@ def stages(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
 def recorded(stages: None, common_peer: Any, tmp_path_factory: pytest.TempPathFactory) -> Bag:
     """Recording of a session with all of these stages."""
     listeners = [common_peer.listen(topic) for topic in WATCHED]
-    settings = [*ALL, "operator.approach_time=1.0"]
+    settings = [*SETTINGS, "operator.approach_time=1.0"]
     out = tmp_path_factory.mktemp("session") / "bag"
     found: Bag = common_peer.run(
         configure("free_motion", settings=settings), lambda: is_enough(*listeners), out
