@@ -69,11 +69,10 @@ format: $(VENV)/.tested
 
 # Live tests come last, when the kernels are compiled. Quick ones wait most of the time, so that two
 # run at once; slow ones run sessions of many processes, which need both processors. In a worker a
-# crash of the middleware inside a test costs that test, not the run; it is run again, which files
-# that stay together would not allow: stolen work allows it, and keeps nearly all tests of a file,
-# and the session they share, in one process. Elsewhere the tests of a file stay together: what they
-# compile, one process does. All parts run, whatever fails: one run tells all that is wrong.
-CORE := $(BIN)/pytest -n 2 --dist loadfile
+# crash of the middleware inside a test costs that test, not the run; it is run again. Stolen work
+# ends in both workers at once, and keeps nearly all tests of a file, and the session they share, in
+# one process. All parts run, whatever fails: one run tells all that is wrong.
+CORE := $(BIN)/pytest -n 2 --dist worksteal
 LIVE := $(BIN)/pytest -n 2 --dist worksteal tests/ros
 ALONE := $(BIN)/pytest -n 1 tests/ros
 test: $(VENV)/.tested crtk_msgs

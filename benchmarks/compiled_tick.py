@@ -83,7 +83,7 @@ def in_python(node: Any, publishers: list[Any], late: Any, took: Any) -> None:
             woken_ns = time.monotonic_ns()
             for entry, output in zip(inputs, outputs, strict=True):
                 if entry.newest() or entry.stamp_ns:
-                    output.publish(entry.stamp_ns or 0, 0)
+                    output.send(entry.stamp_ns or 0)
             late[tick], took[tick] = woken_ns - due_ns, time.monotonic_ns() - woken_ns
             tick += 1
 

@@ -5,18 +5,14 @@ import re
 import signal
 import subprocess
 import sys
-import threading
-import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import psutil
 
 import patience
 from teleop_core.bags.reader import Bag
-from teleop_core.nodes.chances import Chances
 
 TIMEOUT = 90.0
 CALM = "operation.longest_outage=0.0"
@@ -106,38 +102,6 @@ class LiveProcess:
 def wait_until(condition: Callable[[], Any], what: str, timeout: float = TIMEOUT) -> Any:
     """Result of ``condition`` as soon as it is true."""
     return patience.wait_until(condition, what, timeout)
-
-
-class WorkingTime:
-    """Time for which a process could have worked, from making on, to be used with ``with``.
-
-    On a busy machine a healthy process waits for a processor: what it must do within a time is
-    held against the time for which it had one, or could have had one.
-    """
-
-    def __init__(self, pid: int) -> None:
-        self._chances, self._is_over = Chances(pid), threading.Event()
-        self._times, self._worked = [time.time()], [0.0]
-        self._thread = threading.Thread(target=self._look, daemon=True)
-        self._thread.start()
-
-    def _look(self) -> None:
-        while not self._is_over.wait(0.02):
-            worked = self._worked[-1] + self._chances.look()
-            self._times.append(time.time())
-            self._worked.append(worked)
-
-    def __enter__(self) -> "WorkingTime":
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._is_over.set()
-        self._thread.join()
-
-    def between(self, begin: float, end: float) -> float:
-        """Its part of the time between two times of the clock [s]."""
-        first, last = np.interp((begin, end), self._times, self._worked)
-        return float(last - first)
 
 
 def has_recorded(status: Any, counts: Mapping[str, int]) -> bool:

@@ -5,6 +5,8 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState
 from rcl_interfaces.msg import Parameter as ParameterMessage
 from rcl_interfaces.srv import SetParameters, SetParametersAtomically
 from rclpy.parameter import Parameter
@@ -70,6 +72,18 @@ class Listener:
         """Throw away what has come so far."""
         self.take()
         self.stamps, self.values = [], []
+
+
+def at_rest(listener: Listener, count: int = 1000) -> Callable[[], object]:
+    """Whether the tip has been at rest for so many samples, but for steps of its encoders."""
+
+    def is_at_rest() -> bool:
+        if listener.take() < count:
+            return False
+        last = np.array(listener.values[-count:])[:, :3]
+        return np.ptp(last, axis=0).max() < 1e-4
+
+    return is_at_rest
 
 
 def _is_of_arm(key: str) -> bool:
@@ -274,6 +288,12 @@ class AnyPeer:
             return future.result()
         finally:
             self.ros.destroy(client)
+
+    def change(self, name: str, transition: int) -> bool:
+        """Whether a node makes a transition of its lifecycle that is asked for by service."""
+        request = ChangeState.Request(transition=Transition(id=transition))
+        answer = self.call(ChangeState, f"/{name}/change_state", request)
+        return bool(answer.success)
 
     def set(self, name: str, at_once: bool = False, **values: Any) -> list[Any]:
         """Results of setting parameters over the node's services."""

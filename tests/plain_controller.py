@@ -17,9 +17,10 @@ import random
 import signal
 import sys
 import time
+from collections.abc import Callable
+from typing import Any
 
 import rclpy
-from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray, String
@@ -57,47 +58,49 @@ COMMANDS = {
 RATE, BANDWIDTH = 500.0, 200.0
 
 
-class Controller(Node):
-    """Joints whose speed is in proportion to their distance from what they are told."""
+class Controller:
+    """Joints whose speed is in proportion to their distance from what they are told.
 
-    def __init__(self, kind: str, arm: str = "rcrt1", seed: str = "") -> None:
-        super().__init__("plain_controller")
+    Args:
+        kind: What it takes.
+        arm: Which joints.
+        seed: Of where they stand; empty: where they always do.
+        now, time_ns: Clock of motion [s], and of stamps [ns].
+
+    Attributes:
+        topics: Those it listens to: name, class of the messages, and what takes them.
+        says: Topic of its joints.
+    """
+
+    def __init__(
+        self, kind: str, arm: str = "rcrt1", seed: str = "", *,
+        now: Callable[[], float] = time.monotonic, time_ns: Callable[[], int] = time.time_ns,
+    ) -> None:  # fmt: skip
         self.joints, stands, self.rated, order = ARMS[arm]
         self.order = order or self.joints
         chance = random.Random(seed)
         off = [chance.uniform(-0.3, 0.3) if seed else 0.0 for _ in stands]
-        message, told, says = COMMANDS[kind]
-        self._sender = self.create_publisher(JointState, says, 10)
-        self._witness = self.create_publisher(Float64MultiArray, "witness", 10)
-        take = {"forward_command": self._array, "joint_trajectory": self._trajectory}.get(
-            kind, self._joint_state
-        )
-        self._taken = [
-            (self.create_subscription(message, told, take, 1000), take),  # none is lost
-            (self.create_subscription(String, "misbehave", self._misbehave, 10), self._misbehave),
-        ]
+        message, told, self.says = COMMANDS[kind]
+        take: Callable[[Any], None] = self._joint_state
+        if kind in {"forward_command", "joint_trajectory"}:
+            take = self._array if kind == "forward_command" else self._trajectory
+        self.topics: Any = ((told, message, take), ("misbehave", String, self._misbehave))
         self.place = {j: s + o for j, s, o in zip(self.joints, stands, off, strict=True)}
-        self.goal = dict(self.place)
+        self.goal, self._now, self._time_ns = dict(self.place), now, time_ns
         self.is_leading, self.arrival = False, 0.0
         self.first, self.largest, self.mode, self.frozen_ns = math.nan, 0.0, "", 0
-        self.speed, self.now, self.cycles = dict.fromkeys(self.joints, 0.0), time.monotonic(), 0
+        self.speed, self.now, self.cycles = dict.fromkeys(self.joints, 0.0), now(), 0
 
-    def cycle(self) -> None:
-        """Take all that has come, go on by the time since the last cycle, and say where it is."""
-        for subscription, take in self._taken:
-            handle, kind = subscription.handle, subscription.msg_type
-            with handle:
-                while (taken := handle.take_message(kind, False)) is not None:
-                    take(taken[0])
+    def cycle(self) -> tuple[JointState | None, Float64MultiArray | None]:
+        """Go on by the time since the last cycle: what it says, and what it witnesses."""
         self._go_on()
         self.cycles += 1
-        if self.mode != "mute":
-            self._sender.publish(self._said())
-        if self.cycles % 50 == 0:
-            self._witness.publish(Float64MultiArray(data=[self.first, self.largest]))
+        is_due = self.cycles % 50 == 0
+        witness = Float64MultiArray(data=[self.first, self.largest]) if is_due else None
+        return (None if self.mode == "mute" else self._said()), witness
 
     def _misbehave(self, message: String) -> None:
-        self.mode, self.frozen_ns = message.data, time.time_ns()
+        self.mode, self.frozen_ns = message.data, self._time_ns()
         if self.mode == "jump":
             self.place[self.joints[0]] += 0.5
             self.goal[self.joints[0]] += 0.5
@@ -122,11 +125,11 @@ class Controller(Node):
     def _trajectory(self, message: JointTrajectory) -> None:
         (point,) = message.points
         ahead = point.time_from_start.sec + 1e-9 * point.time_from_start.nanosec
-        self.arrival = time.monotonic() + ahead
+        self.arrival = self._now() + ahead
         self._go(dict(zip(message.joint_names, point.positions, strict=True)))
 
     def _go_on(self) -> None:
-        begun, self.now = self.now, time.monotonic()
+        begun, self.now = self.now, self._now()
         passed = self.now - begun
         left = self.arrival - begun  # to the end of a trajectory's point
         share = passed / left if left > passed else 1.0 - math.exp(-BANDWIDTH * passed)
@@ -149,7 +152,7 @@ class Controller(Node):
             message.name = [name.replace("slide", "lift") for name in names]
         elif self.mode == "strange":
             message.name = [f"left_{name}" for name in names]
-        now_ns = time.time_ns()
+        now_ns = self._time_ns()
         if self.mode == "stale":
             now_ns -= 1_000_000_000
         elif self.mode == "back":
@@ -158,19 +161,37 @@ class Controller(Node):
         return message
 
 
+def take_all(takers: Any) -> None:
+    """Take all that has come."""
+    for subscription, take in takers:
+        handle, kind = subscription.handle, subscription.msg_type
+        with handle:
+            while (taken := handle.take_message(kind, False)) is not None:
+                take(taken[0])
+
+
 def main() -> int:
     """Be a controller until it is told to end."""
     ended: list[int] = []  # an event's lock may be held where the signal comes
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda number, _: ended.append(number))
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
-    controller, due = Controller(*sys.argv[1:]), time.monotonic()
+    node, controller = rclpy.create_node("plain_controller"), Controller(*sys.argv[1:])
+    takers = [
+        (node.create_subscription(kind, name, take, 1000), take)  # none is lost
+        for name, kind, take in controller.topics
+    ]
+    says = node.create_publisher(JointState, controller.says, 10)
+    witness, due = node.create_publisher(Float64MultiArray, "witness", 10), time.monotonic()
     # No executor: it would wait, wake and look through its entities for each message anew, and on a
     # slow machine fall ever farther behind what it is told.
     while not ended:
         due = max(due + 1.0 / RATE, time.monotonic())
         time.sleep(max(due - time.monotonic(), 0.0))
-        controller.cycle()
+        take_all(takers)
+        for publisher, message in zip((says, witness), controller.cycle(), strict=True):
+            if message is not None:
+                publisher.publish(message)
     return 0
 
 

@@ -29,6 +29,7 @@ def test_the_short_form_of_the_fault_matrix_holds_for_lone_nodes(tmp_path: Path)
     assert {file.name for file in (tmp_path / "bags").rglob("metadata.yaml")} == {"metadata.yaml"}
 
 
+@pytest.mark.soak
 def test_a_composed_session_survives_a_hand_that_lies_and_is_stopped(tmp_path: Path) -> None:
     names = ("stop_service", "nan", "infinite", "teleport")
     code, text, outcomes = run_drill(tmp_path, "--composed", *names)
@@ -47,12 +48,3 @@ def test_drives_that_end_are_named_with_what_they_wrote_last() -> None:
     assert done.returncode == 2, done.stdout + done.stderr
     assert "slave_sim ended with exit code 1" in done.stderr
     assert "no arm on this cable" in done.stderr
-
-
-def test_a_fault_that_there_is_not_is_refused_in_one_line_before_anything_starts() -> None:
-    command = [sys.executable, "-m", "teleop_core.cli", "drill", "kill_motion_scalin"]
-    done = subprocess.run(command, check=False, capture_output=True, text=True, timeout=60)
-    assert done.returncode == 2
-    assert len(done.stderr.strip().splitlines()) == 1
-    assert "kill_motion_scalin" in done.stderr
-    assert "kill_motion_scaling" in done.stderr

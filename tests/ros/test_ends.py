@@ -12,19 +12,16 @@ from typing import TYPE_CHECKING, Any
 
 import psutil
 import pytest
-from lifecycle_msgs.msg import Transition
-from lifecycle_msgs.srv import ChangeState
 
-from live_process import TIMEOUT, LiveProcess, WorkingTime, are_gone, wait_until
+from live_process import TIMEOUT, LiveProcess, are_gone, wait_until
 from teleop_core.bags.reader import Bag
 from teleop_core.graph import topics
 from teleop_core.graph.graph import BUILT_IN, RECORDER_NAME
 from teleop_core.middleware.real_time import is_priority_granted
-from teleop_core.nodes.children import free_domain
 from teleop_core.nodes.observer import Observer
 
 if TYPE_CHECKING:
-    from ros.conftest import Peer
+    pass
 
 pytestmark = [pytest.mark.ros, pytest.mark.slow]
 NODES = [*BUILT_IN, RECORDER_NAME]
@@ -61,10 +58,10 @@ tc.register_stage(
 '''
 
 
-def change(peer: "Peer", name: str, transition: Any) -> Any:
-    """Whether a transition was made, asked for by service."""
-    request = ChangeState.Request(transition=Transition(id=transition))
-    return peer.call(ChangeState, f"/{name}/change_state", request).success
+both_ways = pytest.mark.parametrize(
+    "composed_option",
+    [pytest.param((), id="sides"), pytest.param(("--composed",), id="one", marks=pytest.mark.soak)],
+)
 
 
 @pytest.fixture
@@ -81,44 +78,6 @@ def start(tmp_path: Path) -> Iterator[Callable[..., object]]:
         process.close()
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_a_node_that_was_shut_down_by_service_still_ends_well(
-    peer: "Peer", tmp_path: Path, number: Any
-) -> None:
-    node = peer.start("recorder", out=str(tmp_path / "bag"))
-    assert change(peer, "recorder", Transition.TRANSITION_ACTIVE_SHUTDOWN)
-    assert (tmp_path / "bag" / "metadata.yaml").exists()
-    assert node.end(number) == 0, node.stderr.read_text()
-
-
-def test_a_transition_that_there_is_not_is_refused_and_the_node_goes_on(peer: "Peer") -> None:
-    node = peer.start("slave")
-    assert not change(peer, "slave", Transition.TRANSITION_ACTIVATE)
-    assert not change(peer, "slave", Transition.TRANSITION_CONFIGURE)
-    before = peer.status("slave").number("ticks")
-    peer.wait_value("slave", "ticks", lambda ticks: ticks > before + 500)
-    assert node.end() == 0
-
-
-@pytest.fixture
-def composed(compose: Callable[..., object]) -> Any:
-    """Process of the composed session, all its nodes active."""
-    return compose(operator={"approach_time": 1.0, "patience": 0.0})
-
-
-@pytest.mark.parametrize("name", ["slave", "recorder"])
-def test_a_composed_session_of_which_a_node_was_shut_down_ends_well(
-    peer: "Peer", composed: Any, tmp_path: Path, name: str
-) -> None:
-    peer.wait_value("slave", "ticks", lambda ticks: ticks > 100)
-    assert change(peer, name, Transition.TRANSITION_ACTIVE_SHUTDOWN)
-    peer.wait_state(name, "finalized")
-    composed.send_signal(signal.SIGTERM)
-    assert composed.wait(TIMEOUT) == 0
-    assert (tmp_path / "bag" / "metadata.yaml").exists()
-    assert Bag(tmp_path / "bag").topics["slave/measured_js"].count > 0
-
-
 @pytest.mark.parametrize(
     ("number", "composed_option"),
     [
@@ -126,8 +85,8 @@ def test_a_composed_session_of_which_a_node_was_shut_down_ends_well(
         pytest.param(signal.SIGQUIT, (), id="SIGQUIT-sides", marks=pytest.mark.soak),
         pytest.param(signal.SIGKILL, (), id="SIGKILL-sides"),
         pytest.param(signal.SIGHUP, ("--composed",), id="SIGHUP-one", marks=pytest.mark.soak),
-        pytest.param(signal.SIGQUIT, ("--composed",), id="SIGQUIT-one"),
-        pytest.param(signal.SIGKILL, ("--composed",), id="SIGKILL-one"),
+        pytest.param(signal.SIGQUIT, ("--composed",), id="SIGQUIT-one", marks=pytest.mark.soak),
+        pytest.param(signal.SIGKILL, ("--composed",), id="SIGKILL-one", marks=pytest.mark.soak),
     ],
 )
 def test_no_node_outlives_the_command_and_the_recording_is_closed(
@@ -148,25 +107,7 @@ def test_no_node_outlives_the_command_and_the_recording_is_closed(
     assert left == (marks if number == signal.SIGKILL else [])
 
 
-def test_the_domain_that_others_need_and_the_place_of_the_recording_are_said_first(
-    start: Callable[..., Any],
-) -> None:
-    session = start("--composed")
-    session.wait_running()
-    lines = [line for line in session.text.splitlines() if not line.startswith("note: ")]
-    assert lines[1] == f"recording to {session.bag}"
-    with Observer(int(lines[0].rpartition("ROS_DOMAIN_ID=")[2])) as observer:
-
-        def is_heard() -> bool:
-            observer.listen(0.1)
-            return "slave" in observer.statuses
-
-        wait_until(is_heard, "its nodes there")
-    session.signal(signal.SIGINT)
-    assert session.wait() == 0
-
-
-@pytest.mark.parametrize("composed_option", [(), ("--composed",)], ids=["sides", "one"])
+@both_ways
 def test_a_stage_that_never_comes_back_is_found_within_a_second(
     start: Callable[..., Any], tmp_path: Path, composed_option: tuple[str, ...]
 ) -> None:
@@ -174,34 +115,48 @@ def test_a_stage_that_never_comes_back_is_found_within_a_second(
     parts.write_text(HANGS)
     session = start(*composed_option, "--parts", str(parts), "--set", "teleop.stages=[hanging]")
     session.wait_running()
-    (process,) = session.nodes("teleop_session" if composed_option else "hanging")
-    with WorkingTime(process.pid) as working_time:
-        (tmp_path / "hang").touch()
-        assert session.wait(120) == 2
+    (tmp_path / "hang").touch()
+    assert session.wait(120) == 2
     found = re.search(r"\[FATAL\] \[([\d.]+)\].* hangs: nothing came of it for 0.8 s", session.text)
     assert found, session.text
     assert "hangs.py" in session.text  # where it is
     bag = session.recorded()
     # When its last step was made, whenever that was recorded.
     begin, end = bag.read("test/beat").stamp_ns[-1] * 1e-9, float(found[1])
-    assert 0.7 < end - begin < 120.0
-    assert working_time.between(begin, end) < 2.0
+    assert 0.7 < end - begin < 60.0  # one that waits for a processor does not hang
     assert bag.topics["slave/measured_js"].count > 0
 
 
-def test_a_second_session_in_the_same_domain_is_refused_though_another_user_started_it(
+def domain_said_first(session: LiveProcess) -> str:
+    """The domain that others need; the place of the recording is said next."""
+    lines = [line for line in session.text.splitlines() if not line.startswith("note: ")]
+    assert lines[1] == f"recording to {session.bag}"
+    domain = lines[0].rpartition("ROS_DOMAIN_ID=")[2]
+    with Observer(int(domain)) as observer:
+
+        def is_heard() -> bool:
+            observer.listen(0.1)
+            return "slave" in observer.statuses
+
+        wait_until(is_heard, "its nodes there")
+    return domain
+
+
+def test_a_second_session_in_a_domain_is_refused_and_the_first_ends_in_order_whoever_asks(
     start: Callable[..., Any], tmp_path: Path
 ) -> None:
-    domain = {"ROS_DOMAIN_ID": free_domain()}
-    first = start("--composed", env=domain)
+    first = start("--composed")
     first.wait_running()
+    domain = domain_said_first(first)
     folder = tmp_path / "second"  # with temporary files of its own, as another user's
     folder.mkdir()
-    second = LiveProcess(folder, "--composed", env=domain)
+    second = LiveProcess(folder, "--composed", env={"ROS_DOMAIN_ID": domain})
     assert second.wait(120) == 2, second.text
     assert "another session sends slave/setpoint_js on ROS domain" in second.text
-    first.signal(signal.SIGINT)
+    nodes = first.signal(signal.SIGQUIT)
     assert first.wait() == 0, first.text
+    wait_until(lambda: are_gone(nodes), "end of all nodes")
+    assert first.recorded().topics["slave/measured_js"].count > 100
 
 
 def test_a_process_that_stands_still_ends_the_session(start: Callable[..., Any]) -> None:
@@ -214,14 +169,11 @@ def test_a_process_that_stands_still_ends_the_session(start: Callable[..., Any])
     assert session.recorded().topics["slave/measured_js"].count > 100
 
 
-@pytest.mark.parametrize("priority", [0, 31])
 def test_a_session_that_waits_for_a_recorder_that_stands_still_uses_no_processor(
-    start: Callable[..., Any], priority: int
+    start: Callable[..., Any],
 ) -> None:
-    if priority and not is_priority_granted(priority):
-        pytest.skip("the system grants no SCHED_FIFO")
-    policy = os.SCHED_FIFO if priority else os.SCHED_OTHER
-    os.sched_setscheduler(0, policy, os.sched_param(priority))
+    if is_priority_granted(31):  # where it matters most
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(31))
     try:
         session = start()
     finally:
@@ -246,6 +198,7 @@ def used(process: psutil.Process) -> float:
     return sum(sum(one.cpu_times()[:2]) for one in every)
 
 
+@pytest.mark.soak
 def test_a_session_starts_with_no_kernel_compiled_on_a_busy_machine(
     start: Callable[..., Any], tmp_path: Path
 ) -> None:
@@ -277,7 +230,7 @@ def test_sessions_start_and_end_again_and_again(
         assert bag.end_ns - bag.start_ns > 1e9 * (0.1 + 0.3 * number)
 
 
-@pytest.mark.parametrize("composed_option", [(), ("--composed",)], ids=["sides", "one"])
+@both_ways
 def test_a_session_that_a_shell_started_in_the_background_ends_like_any(
     start: Callable[..., Any], composed_option: tuple[str, ...]
 ) -> None:

@@ -68,50 +68,37 @@ def recorded(peer: "Peer", process: Any, tmp_path: Any, *slaves: Any) -> Bag:
 
 
 @pytest.mark.slow
-def test_a_composed_session_that_is_given_a_name_keeps_the_names_of_its_nodes(
-    peer: "Peer", start: Callable[..., Any], tmp_path: Path
-) -> None:
-    groups = {"operator": PATIENCE, "slave": RCRT1 | {"command_timeout": 0.25}}
-    process = start(groups, "-r", "__ns:=/left", "-r", "__node:=arm")
-    peer.wait_state("left/slave", "active")
-    assert parameter(peer, "/left/slave", "command_timeout").double_value == 0.25
-
-    def inside() -> set[Any]:
-        names = peer.node.get_node_names_and_namespaces()
-        return {name for name, where in names if where == "/left"}
-
-    peer.wait(lambda: len(inside()) >= 7, "all nodes to be found")
-    assert inside() == {
-        "operator", "haptic_master", "motion_scaling", "inverse_kinematics", "slave", "slave_sim",
-        "recorder",
-    }  # fmt: skip
-    bag = recorded(peer, process, tmp_path, "left/slave")
-    shared = {topics.DIAGNOSTICS.name, TF.name}
-    assert all(name.startswith("left/") for name in {*bag.topics} - shared)
-    (score,) = scores(bag)
-    assert (score.session.arm, score.session.robot) == ("left", "rcrt1")
-    assert score.session.duration_s > 1.0
-
-
-@pytest.mark.slow
-def test_arms_of_a_session_in_a_namespace_stay_apart_below_it(
+def test_arms_of_a_session_in_a_namespace_stay_apart_below_it_and_keep_the_names_of_their_nodes(
     peer: "Peer", start: Callable[..., Any], tmp_path: Path
 ) -> None:
     puma = {"robot": "puma560"}
     groups = {
         "teleop": {"arms": ["left", "right"]},
         "operator": PATIENCE,
-        "slave": RCRT1,
+        "slave": RCRT1 | {"command_timeout": 0.25},
         "right/slave": puma | PUMA,
         "right/slave_sim": puma,
         "right/inverse_kinematics": puma,
     }
-    process = start(groups, "-r", "__ns:=/lab")
+    process = start(groups, "-r", "__ns:=/lab", "-r", "__node:=arm")
     peer.wait_state("lab/right/slave", "active")
     peer.wait_state("lab/slave", "active")
     assert parameter(peer, "/lab/right/slave", "robot").string_value == "puma560"
     assert parameter(peer, "/lab/slave", "robot").string_value == "rcrt1"
+    assert parameter(peer, "/lab/slave", "command_timeout").double_value == 0.25
+
+    def inside() -> set[str]:
+        names = peer.node.get_node_names_and_namespaces()
+        return {name for name, where in names if where == "/lab"}
+
+    peer.wait(lambda: len(inside()) >= 7, "all nodes to be found")
+    assert inside() == {
+        "operator", "haptic_master", "motion_scaling", "inverse_kinematics", "slave", "slave_sim",
+        "recorder",
+    }  # fmt: skip
     bag = recorded(peer, process, tmp_path, "lab/slave", "lab/right/slave")
+    shared = {topics.DIAGNOSTICS.name, TF.name}
+    assert all(name.startswith("lab/") for name in {*bag.topics} - shared)
     assert bag.topics[f"lab/{MEASURED}"].count > 1000
     joints = bag.read(f"lab/right/{topics.SLAVE_MEASURED_JS.name}")
     assert joints.names == load_robot("puma560").joint_names

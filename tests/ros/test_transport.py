@@ -133,18 +133,16 @@ def test_what_the_user_says_of_the_range_holds(said: Any, chosen: Any) -> None:
 
 
 @pytest.mark.slow
-def test_the_stream_of_a_slave_goes_on_while_those_who_read_it_are_killed(
+def test_the_stream_of_a_slave_goes_on_while_one_who_reads_it_is_killed(
     peer: "Peer", tmp_path: Path
 ) -> None:
     """A reader that was killed held its writer's thread up for two seconds at a time."""
     peer.start("slave", real_time__freeze_gc=True)
-    listener, longest = peer.listen(topics.SLAVE_MEASURED_CP), []
-    for number in range(3):
-        recorder = peer.start("recorder", out=str(tmp_path / f"bag{number}"))
-        peer.wait_value("recorder", "received.slave/measured_js", lambda n: n > 500)
-        listener.forget()
-        recorder.process.kill()
-        recorder.process.wait()
-        peer.wait(lambda: listener.take() > 3000, "three seconds of samples")
-        longest.append(int(np.diff(listener.stamps).max()))
-    assert max(longest) < BLOCKED_NS
+    listener = peer.listen(topics.SLAVE_MEASURED_CP)
+    recorder = peer.start("recorder", out=str(tmp_path / "bag"))
+    peer.wait_value("recorder", "received.slave/measured_js", lambda n: n > 500)
+    listener.forget()
+    recorder.process.kill()
+    recorder.process.wait()
+    peer.wait(lambda: listener.take() > 3000, "three seconds of samples")
+    assert np.diff(listener.stamps).max() < BLOCKED_NS

@@ -185,18 +185,14 @@ def test_it_starts_twenty_times_without_a_jump(tmp_path: Path, bridge: list[Any]
         goes_home_and_follows(*led(tmp_path, bridge, seed))
 
 
-def test_the_drill_stops_it_and_finds_it_lost_as_a_simulated_arm(
-    tmp_path: Path, bridge: list[Any]
-) -> None:
-    names = ("stop_topic", "kill_slave_sim")
+@pytest.mark.soak
+def test_the_drill_stops_it_as_a_simulated_arm(tmp_path: Path, bridge: list[Any]) -> None:
     code, text, outcomes = run_drill(
-        tmp_path, *names, "--drives", shlex.join(bridge), "--arm", shlex.join(CONTROLLER),
+        tmp_path, "stop_topic", "--drives", shlex.join(bridge), "--arm", shlex.join(CONTROLLER),
         "--set", *ARM,
     )  # fmt: skip
-    assert set(outcomes) == set(names)
-    assert (outcomes["stop_topic"]["state"], outcomes["stop_topic"]["told"]) == ("FAULT", "stop")
-    assert outcomes["kill_slave_sim"]["told"] == "feedback", text
-    for one in outcomes.values():
-        assert one["measured"]["step_ratio"]["value"] <= 1.0 + 1e-9, text
-        assert one["recovered_s"] is not None, text
-    assert (code == 0) is all(one["is_passed"] for one in outcomes.values())
+    one = outcomes["stop_topic"]
+    assert (one["state"], one["told"]) == ("FAULT", "stop")
+    assert one["measured"]["step_ratio"]["value"] <= 1.0 + 1e-9, text
+    assert one["recovered_s"] is not None, text
+    assert (code == 0) is one["is_passed"]

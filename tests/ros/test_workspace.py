@@ -98,6 +98,7 @@ def test_teleop_of_the_workspace_finds_the_commands_of_the_other_packages(worksp
         assert text in done.stdout, done.stderr
 
 
+@pytest.mark.soak
 def test_colcon_test_runs_the_quick_tests_and_keeps_their_results(workspace: Path) -> None:
     select = ("--packages-select", "teleop_core")
     colcon(workspace, "test", *select, "--return-code-on-test-failure")

@@ -244,15 +244,15 @@ def test_recover_saves_what_a_truncated_bag_holds(
 
 
 @pytest.mark.slow
-def test_lookups_answer_without_a_session(teleop: "Run") -> None:
+def test_lookups_answer_without_a_session(teleop: "Run", teleop_again: "Run") -> None:
     assert "coarse_box" in teleop("scenarios").stdout
     assert "motion_scaling.fine_gain" in teleop("parameters").stdout
-    assert "slave_sim" not in teleop("parameters", "motion_scaling").stdout
-    assert teleop("parameters", "--markdown").stdout.startswith("| parameter")
+    assert "slave_sim" not in teleop_again("parameters", "motion_scaling").stdout
+    assert teleop_again("parameters", "--markdown").stdout.startswith("| parameter")
     assert "rcrt1" in teleop("robot").stdout
-    assert "theta2" in teleop("robot", "rcrt1").stdout
-    assert "rcrt1" in one_line(teleop("robot", "r2d2", code=2))
-    assert "motion_scaling" in one_line(teleop("parameters", "nobody", code=2))
+    assert "theta2" in teleop_again("robot", "rcrt1").stdout
+    assert "rcrt1" in one_line(teleop_again("robot", "r2d2", code=2))
+    assert "motion_scaling" in one_line(teleop_again("parameters", "nobody", code=2))
 
 
 def test_help_answers_without_numpy(teleop: "Run") -> None:
@@ -319,10 +319,12 @@ def test_the_shell_completes_commands_and_options(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_an_operator_can_follow_a_recording(teleop: "Run", recording: Path, tmp_path: Path) -> None:
+def test_an_operator_can_follow_a_recording(
+    teleop_again: "Run", recording: Path, tmp_path: Path
+) -> None:
     out = tmp_path / "followed"
     settings = ("path.kind=bag", f"path.bag={recording}", "tremor_amplitude=0.0")
-    teleop("sim", "--duration", 8, "--out", out, "--set", *settings)
+    teleop_again("sim", "--duration", 8, "--out", out, "--set", *settings)
     wanted, got = (Bag(p).read(topics.MASTER_MEASURED_CP).values for p in (recording, out))
     wanted, got = wanted[:8000], got[-8000:]  # before, the arm gets ready and the hand rests
     # The hand lags behind by its own dynamics, less than a tenth of a second at 40 mm/s.
@@ -334,7 +336,7 @@ def test_an_operator_can_follow_a_recording(teleop: "Run", recording: Path, tmp_
     # The gimbal's noise, once recorded and once anew, with that of the first sample in both.
     assert (turns[0].inv() * turns[1]).magnitude().max() < 4 * 2e-3 * 3**0.5
     assert "missing.bag" in one_line(
-        teleop(
+        teleop_again(
             "sim", "--out", tmp_path / "x", "--set", "path.kind=bag", "path.bag=missing.bag", code=2
         )
     )

@@ -11,7 +11,8 @@ from typing import Any
 
 import pytest
 
-from example_runs import EXAMPLES, NAMES, numbers, run
+from example_runs import EXAMPLES, NAMES, numbers
+from example_runs import run_again as run
 from present import present
 from teleop_core.session.configuration import configure
 from teleop_core.session.virtual import VirtualTime
@@ -365,3 +366,13 @@ def test_examples_pass_a_strict_type_check_of_a_user() -> None:
             text=True, check=False,
         )  # fmt: skip
     assert done.returncode == 0, done.stdout
+
+
+def test_a_bridge_is_drilled_with_a_model_of_its_controller_and_one_that_coasts_is_found(
+    tmp_path: Path,
+) -> None:
+    sound, coasting = run("simulated_controller", tmp_path).split("coasts:")
+    assert "\u2713 stop_topic: FAULT: stop" in sound
+    assert "\u2713 freeze_slave_sim: FAULT: feedback" in sound
+    assert "\u2713 stop_topic: FAULT: stop" in coasting
+    assert "\u2717 freeze_slave_sim: the tip moved" in coasting

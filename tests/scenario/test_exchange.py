@@ -59,12 +59,12 @@ def test_import_says_what_it_took_and_what_to_do_next(imported: Any) -> None:
 
 
 def test_a_motion_goes_in_through_the_graph_and_out_unchanged(
-    teleop: "Run", imported: Any, tmp_path: Path
+    teleop_again: "Run", imported: Any, tmp_path: Path
 ) -> None:
     _, text = imported
-    teleop(*next_command(text))
+    teleop_again(*next_command(text))
     answer = next_command(text)[-1]
-    teleop("export", answer, "--out", tmp_path / "a.csv", "--topics", "master/measured_cp",
+    teleop_again("export", answer, "--out", tmp_path / "a.csv", "--topics", "master/measured_cp",
            "slave/measured_cp", "teleop/state")  # fmt: skip
     table = pd.read_csv(tmp_path / "a.csv")
     columns = [f"master/measured_cp.{axis}" for axis in "xyz"]
@@ -80,12 +80,12 @@ def test_a_motion_goes_in_through_the_graph_and_out_unchanged(
 
 
 def test_replaying_the_file_itself_gives_the_same_motion(
-    teleop: "Run", hand: Path, imported: Any, tmp_path: Path
+    teleop_again: "Run", hand: Path, imported: Any, tmp_path: Path
 ) -> None:
     out, text = imported
     if not (out.parent / "hand_replayed").exists():
-        teleop(*next_command(text))
-    said = teleop("replay", hand, "--out", tmp_path / "direct").stderr
+        teleop_again(*next_command(text))
+    said = teleop_again("replay", hand, "--out", tmp_path / "direct").stderr
     assert "note: hand.csv: x, y, z" in said
     a, b = (
         Bag(p).read(SLAVE_MEASURED_CP).values for p in (next_command(text)[-1], tmp_path / "direct")
@@ -94,7 +94,7 @@ def test_replaying_the_file_itself_gives_the_same_motion(
 
 
 def test_import_is_repeated_by_what_its_metadata_say(
-    teleop: "Run", hand: Path, imported: Any, tmp_path: Path
+    teleop_again: "Run", hand: Path, imported: Any, tmp_path: Path
 ) -> None:
     out, _ = imported
     about = Bag(out).metadata
@@ -113,11 +113,11 @@ def test_import_is_repeated_by_what_its_metadata_say(
 
 
 def test_axes_with_a_minus_are_values_not_options(
-    teleop: "Run", hand: Path, tmp_path: Path
+    teleop_again: "Run", hand: Path, tmp_path: Path
 ) -> None:
     for number, axes in enumerate((("-y", "+x", "+z"), ("+y", "-x", "+z"), ("z", "x", "y"))):
         out = tmp_path / str(number)
-        teleop("import", hand, "--out", out, "--axes", *axes, "--scale", "0.5")
+        teleop_again("import", hand, "--out", out, "--axes", *axes, "--scale", "0.5")
         turn = np.zeros((3, 3))
         for row, axis in enumerate(axes):
             turn[row, "xyz".index(axis[-1])] = -1.0 if axis[0] == "-" else 1.0
@@ -126,13 +126,15 @@ def test_axes_with_a_minus_are_values_not_options(
 
 
 def test_a_session_follows_the_recording_for_as_long_as_it_is(
-    teleop: "Run", imported: Any, tmp_path: Path
+    teleop_again: "Run", imported: Any, tmp_path: Path
 ) -> None:
     out, _ = imported
     center = np.array([0.0, 0.01, 0.03])
     settings = (f"operator.center={center.tolist()}", "operator.approach_time=1.0")
     followed = tmp_path / "followed"
-    teleop("sim", "--out", followed, "--set", "operator=bag", f"operator.bag={out}", *settings)
+    teleop_again(
+        "sim", "--out", followed, "--set", "operator=bag", f"operator.bag={out}", *settings
+    )
     series = Bag(followed).read(MASTER_MEASURED_CP)
     end = REST_POSITION + center + PLACES[-1] - PLACES[0]
     assert np.linalg.norm(series.values[-1, :3] - end) < 5e-3  # the hand lags behind
@@ -155,10 +157,15 @@ def test_a_session_follows_the_recording_for_as_long_as_it_is(
     ],
 )
 def test_mistakes_are_one_line_and_leave_nothing(
-    teleop: "Run", imported: Any, hand: Path, tmp_path: Path, arguments: tuple[str, ...], text: str
+    teleop_again: "Run",
+    imported: Any,
+    hand: Path,
+    tmp_path: Path,
+    arguments: tuple[str, ...],
+    text: str,
 ) -> None:
     places = {"hand": hand, "out": tmp_path / "out", "bag": imported[0]}
-    done = teleop(*(word.format(**places) for word in arguments), code=2)
+    done = teleop_again(*(word.format(**places) for word in arguments), code=2)
     lines = [line for line in done.stderr.splitlines() if not line.startswith("note:")]
     assert len(lines) == 1, done.stderr
     assert text in lines[0]
@@ -166,13 +173,13 @@ def test_mistakes_are_one_line_and_leave_nothing(
 
 
 def test_a_data_set_of_several_recordings_is_made(
-    teleop: "Run", imported: Any, tmp_path: Path
+    teleop_again: "Run", imported: Any, tmp_path: Path
 ) -> None:
     _, text = imported
     answer = next_command(text)[-1]
     if not Bag(imported[0]).path.with_name("hand_replayed").exists():
-        teleop(*next_command(text))
-    said = teleop("export", answer, answer, "--out", tmp_path / "set", "--task", "draw")
+        teleop_again(*next_command(text))
+    said = teleop_again("export", answer, answer, "--out", tmp_path / "set", "--task", "draw")
     assert "2 episodes" in said.stdout
     info = json.loads((tmp_path / "set" / "meta" / "info.json").read_text())
     assert info["robot_type"] == "rcrt1"

@@ -154,12 +154,12 @@ def test_page_of_three_recordings_draws_everything_without_asking_the_network(
 @pytest.mark.browser
 @pytest.mark.slow
 def test_page_of_a_session_shows_both_arms_with_their_fixtures(
-    browser: str, teleop: "Run", tmp_path: Path
+    browser: str, teleop_again: "Run", tmp_path: Path
 ) -> None:
     bag, page = tmp_path / "two", tmp_path / "report.html"
     arms = ("arms=[left,right]", "right/robot=puma560", "right/seed=2", "right/fixture=sphere")
-    teleop("sim", "--scenario", "coarse_box", "--duration", 6, "--out", bag, "--set", *arms)
-    teleop("evaluate", bag, "--html", page)
+    teleop_again("sim", "--scenario", "coarse_box", "--duration", 6, "--out", bag, "--set", *arms)
+    teleop_again("evaluate", bag, "--html", page)
     attributes, _, _ = opened(browser, page, tmp_path)
     assert attributes.get("errors", "") == ""
     assert int(attributes["drawn"]) == sum(

@@ -9,7 +9,8 @@ from typing import Any
 import pytest
 
 from peers import AnyPeer
-from teleop_core.graph.graph import BUILT_IN, RECORDER_NAME, build_graph
+from teleop_core.bags.reader import Bag
+from teleop_core.graph.graph import BUILT_IN, RECORDER_NAME, Graph, build_graph
 from teleop_core.graph.stage import STAGES
 from teleop_core.nodes.making import make_node
 from teleop_core.nodes.observer import Observer
@@ -17,10 +18,12 @@ from teleop_core.nodes.process import serve
 from teleop_core.nodes.teleop_session import TeleopSession
 from teleop_core.nodes.watch import Crew
 from teleop_core.robots import load_robot
+from teleop_core.session.configuration import Configuration
 from teleop_drill.simulation.bus import Bus
 from teleop_drill.simulation.machine import Machine, Process
 from teleop_drill.simulation.scheduler import Scheduler
-from teleop_drill.simulation.stand_ins import SimulatedWatch
+from teleop_drill.simulation.session import flattened, parameters_of
+from teleop_drill.simulation.stand_ins import SimulatedWatch, Work
 from teleop_drill.simulation.world import SimulatedWorld
 
 _START = 0.05  # of a process [s]
@@ -105,26 +108,61 @@ class SimulatedPeer(AnyPeer):
         self, name: str, parameters: dict[str, Any], arm: str, env: Mapping[str, str] | None
     ) -> SimulatedNode:
         full = f"{arm}/{name}".strip("/")
-        given = {k: tuple(v) if isinstance(v, list) else v for k, v in parameters.items()}
         return SimulatedNode(
-            self, full,
-            lambda world: make_node(STAGES.find(name), namespace=arm, world=world), {full: given},
+            self, full, lambda world: make_node(STAGES.find(name), namespace=arm, world=world),
+            {full: flattened(parameters)},
         )  # fmt: skip
+
+    def foreign(self, name: str, work: Work) -> Process:
+        """Start a process of others, which goes on until it is ended."""
+        made = self.machine.start(
+            name, lambda process: work(SimulatedWorld(self.bus, process)), after=_START
+        )
+        self.bus.watch(made)
+        return made
+
+    def side(self, *names: str, **parameters: Mapping[str, Any]) -> SimulatedNode:
+        """Some nodes of a session in one process, at work."""
+        made = SimulatedNode(
+            self, "side", lambda world: TeleopSession("", names, world, build_graph()),
+            {name: flattened(values) for name, values in parameters.items()},
+        )  # fmt: skip
+        self.nodes.append(made)
+        for name in names:
+            self.wait_state(name, "active")
+        return made
 
     def compose(self, namespace: str = "", **parameters: Mapping[str, Any]) -> SimulatedNode:
         """A session in one process, at work, with its arm at home."""
-        home = {"slave": {"start": tuple(load_robot("rcrt1").home.tolist())}}
+        home = {"slave": {"start": load_robot("rcrt1").home.tolist()}}
         names = (*BUILT_IN, RECORDER_NAME)
         given = {
-            f"{namespace}/{name}".strip("/"): {**home.get(name, {}), **parameters.get(name, {})}
+            f"{namespace}/{name}".strip("/"): home.get(name, {}) | dict(parameters.get(name, {}))
             for name in names
         }
+        return self._session(namespace, build_graph(), given)
+
+    def run(
+        self, configuration: Configuration, until: Callable[[], Any], out: Path,
+        namespace: str = "",
+    ) -> Bag:  # fmt: skip
+        """Recording of a configured session in one process, which lasts until something is so."""
+        given = parameters_of(configuration, str(out), namespace)
+        session = self._session(namespace, configuration.graph, given)
+        self.wait(until, "what the session is to come to")
+        assert session.end() == 0
+        return Bag(out)
+
+    def _session(
+        self, namespace: str, graph: Graph, given: Mapping[str, Mapping[str, Any]]
+    ) -> SimulatedNode:
         made = SimulatedNode(
-            self, "session", lambda world: TeleopSession(namespace, (), world, build_graph()), given
-        )
+            self, "session", lambda world: TeleopSession(namespace, (), world, graph),
+            {name: flattened(values) for name, values in given.items()},
+        )  # fmt: skip
         self.nodes.append(made)
-        for full in given:
-            self.wait_state(full, "active")
+        for name in (*(member.name for member in graph.members), RECORDER_NAME):
+            self.wait_state(f"{namespace}/{name}".strip("/"), "active")
         return made
 
     def until(self, condition: Callable[[], Any], what: str, timeout: float) -> Any:

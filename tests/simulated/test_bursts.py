@@ -1,7 +1,7 @@
 """Bursts: what a late sender makes up for, and what a late reader finds."""
 
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
@@ -24,11 +24,15 @@ def has(listener: "Listener", count: int) -> bool:
     return listener.take() >= count
 
 
+@pytest.mark.parametrize("is_side", [False, True], ids=["alone", "in a side of a session"])
 def test_slave_answers_every_sample_of_its_arm_also_several_that_come_within_a_tick(
-    peer: "Peer",
+    peer: Any, is_side: bool
 ) -> None:
     answers = peer.listen(topics.SLAVE_MEASURED_CP)
-    peer.start("slave", has_arm=False)
+    if is_side:
+        peer.side("slave", slave={"start": ARM.home.tolist()})
+    else:
+        peer.start("slave", has_arm=False)
     where: dict[int, Array] = {}
 
     def say(count: int) -> None:

@@ -2,35 +2,51 @@
 
 import subprocess
 import sys
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 from drill_runs import run_drill
 from mutants import ROOT
-from teleop_drill.drill import chosen
+from teleop_drill.drill import SHORT, chosen
 
 pytestmark = pytest.mark.slow
 PARTS = 4
-"""Sessions that share the rows of one way: each test is short, and two run at once."""
+"""Sessions that share the rows: each test is short, and two run at once."""
 MUTANTS = ("stop_late", "not_recorded", "braking_weak", "second_publishers")
 
 
-@pytest.mark.parametrize("part", range(PARTS))
-@pytest.mark.parametrize("way", ["nodes", "composed"])
-def test_an_arm_behaves_under_every_fault(way: Any, part: Any, tmp_path: Path) -> None:
-    is_composed = way == "composed"
-    rows = [one.name for one in chosen((), is_composed=is_composed)][part::PARTS]
-    words = ["--simulated", *(["--composed"] if is_composed else []), *rows]
-    code, text, outcomes = run_drill(tmp_path, *words)
+def assert_it_behaves(folder: Path, rows: Sequence[str], *words: str) -> None:
+    code, text, outcomes = run_drill(folder, "--simulated", *words, *rows)
     assert set(outcomes) == set(rows)
     assert {name: one["failures"] for name, one in outcomes.items() if one["failures"]} == {}, text
     assert code == 0
 
 
+def rows_of(*, is_composed: bool) -> list[str]:
+    return [one.name for one in chosen((), is_composed=is_composed)]
+
+
+@pytest.mark.parametrize("part", range(PARTS))
+def test_an_arm_behaves_under_every_fault(part: int, tmp_path: Path) -> None:
+    assert_it_behaves(tmp_path, rows_of(is_composed=False)[part::PARTS])
+
+
+def test_an_arm_behaves_under_every_fault_that_a_process_for_all_has_alone(tmp_path: Path) -> None:
+    rows = set(rows_of(is_composed=True))
+    own = sorted((rows - set(rows_of(is_composed=False))) | (rows & set(SHORT)))
+    assert_it_behaves(tmp_path, own, "--composed")
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize("part", range(PARTS))
+def test_an_arm_behaves_under_every_fault_in_one_process(part: int, tmp_path: Path) -> None:
+    assert_it_behaves(tmp_path, rows_of(is_composed=True)[part::PARTS], "--composed")
+
+
 @pytest.mark.parametrize("name", MUTANTS)
-def test_a_broken_safety_is_found(name: Any) -> None:
+def test_a_broken_safety_is_found(name: str) -> None:
     """The others, and both forms of each: make drill-mutants."""
     command = [sys.executable, str(ROOT / "tests/mutants.py"), name, "--processes"]
     done = subprocess.run(command, check=False, capture_output=True, text=True, timeout=400)

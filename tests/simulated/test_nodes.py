@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 from lifecycle_msgs.msg import Transition
-from lifecycle_msgs.srv import ChangeState, GetState
+from lifecycle_msgs.srv import GetState
 from rcl_interfaces.srv import DescribeParameters, GetParameters
 
 from teleop_core.bags.reader import Bag
@@ -318,11 +318,6 @@ def test_a_new_gain_is_used_from_the_next_sample_on(peer: "Peer") -> None:
     assert moved() == pytest.approx(0.25e-3, rel=1e-6)
 
 
-def change(peer: "Peer", name: str, transition: Any) -> Any:
-    request = ChangeState.Request(transition=Transition(id=transition))
-    return peer.call(ChangeState, f"/{name}/change_state", request).success
-
-
 @pytest.mark.parametrize("name", list(STAGES))
 def test_a_supervisor_drives_the_lifecycle_twice(
     peer: "Peer", tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: Any
@@ -332,19 +327,19 @@ def test_a_supervisor_drives_the_lifecycle_twice(
     watched = topics.SLAVE_MEASURED_JS if name == "slave_sim" else None
     listener = peer.listen(watched) if watched else None
     for _ in range(2):
-        assert change(peer, name, Transition.TRANSITION_CONFIGURE)
+        assert peer.change(name, Transition.TRANSITION_CONFIGURE)
         if listener:
             assert listener.take() == 0
-        assert change(peer, name, Transition.TRANSITION_ACTIVATE)
+        assert peer.change(name, Transition.TRANSITION_ACTIVATE)
         if listener:
             peer.wait(lambda: listener.take() > 10, "samples while active")
         state = peer.call(GetState, f"/{name}/get_state", GetState.Request())
         assert state.current_state.label == "active"
-        assert change(peer, name, Transition.TRANSITION_DEACTIVATE)
+        assert peer.change(name, Transition.TRANSITION_DEACTIVATE)
         if listener:
             peer.wait_value(name, "ticks", lambda n: n > 0)
             listener.forget()
-        assert change(peer, name, Transition.TRANSITION_CLEANUP)
+        assert peer.change(name, Transition.TRANSITION_CLEANUP)
         if name == "recorder":
             (bag,) = (tmp_path / "bags").iterdir()
             assert (bag / "metadata.yaml").exists()
@@ -357,9 +352,9 @@ def test_a_refused_configure_leaves_the_node_usable_by_the_supervisor(
 ) -> None:
     (tmp_path / "taken").mkdir()
     node = peer.start("recorder", autostart=False, out=str(tmp_path / "taken"), wait="unconfigured")
-    assert not change(peer, "recorder", Transition.TRANSITION_CONFIGURE)
+    assert not peer.change("recorder", Transition.TRANSITION_CONFIGURE)
     (tmp_path / "taken").rmdir()
-    assert change(peer, "recorder", Transition.TRANSITION_CONFIGURE)
+    assert peer.change("recorder", Transition.TRANSITION_CONFIGURE)
     assert node.end() == 0
 
 

@@ -1,7 +1,6 @@
 """Operation over real topics: who may move, how an arm is stopped, and how it goes on."""
 
 import signal
-import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
@@ -270,7 +269,7 @@ def test_each_button_that_was_heard_has_its_own_heartbeat(peer: "Peer") -> None:
         def turn() -> Any:
             for one in alive:
                 one.publish(Bool(data=False))
-            time.sleep(0.02)  # the rate of heartbeats, not a wait
+            peer.sleep(0.02)  # the rate of heartbeats, not a wait
             return until()
 
         peer.wait(turn, what)

@@ -39,7 +39,7 @@ def test_port_is_free_again_at_once_when_its_server_has_ended() -> None:
 
 
 def test_server_that_ends_while_others_come_in_leaves_no_connection_open() -> None:
-    for _ in range(10):
+    for _ in range(4):
         with ConsoleServer(0) as server:
             came, ends = threading.Barrier(3), threading.Event()
             guests = [threading.Thread(target=come_in, args=(server.port, came, ends))

@@ -3,6 +3,7 @@
 import ast
 import re
 from collections.abc import Iterator
+from configparser import ConfigParser
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -53,3 +54,12 @@ def test_every_python_dependency_is_declared_or_noted_as_one_of_pip(package: str
     for name in names:
         key = NAMED_BY.get(name, f"python3-{name}")
         assert (key in declared) != (f" {name} " in note.replace("\n", " ")), name
+
+
+def test_the_files_that_colcon_test_runs_are_there() -> None:
+    package = Path(__file__).resolve().parents[2] / "src" / "teleop_core"
+    given = ConfigParser()
+    given.read(package / "setup.cfg", encoding="utf-8")
+    files = given["tool:pytest"]["testpaths"].split()
+    assert len(files) >= 10
+    assert all((package / file).is_file() for file in files)

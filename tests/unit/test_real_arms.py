@@ -143,13 +143,13 @@ def test_a_hand_of_noisy_readings_leads_seven_axes_past_a_shoulder_in_line(tmp_p
     """The arm keeps away from that posture, in which it fell 60 mm behind."""
     path = tmp_path / "iiwa14.urdf"
     path.write_text(urdf_of("iiwa14"))
-    session = run("coarse_box", duration=10.0, seed=2, robot=str(path), geometry=["tip=tip"])
+    session = run("coarse_box", duration=6.0, seed=2, robot=str(path), geometry=["tip=tip"])
     told, asked = session["slave/servo_jp"], session["slave/servo_cp"]
     stamps, joints, poses = np.intersect1d(told.stamp_ns, asked.stamp_ns, return_indices=True)
     late = stamps > stamps[0] + 4_000_000_000  # it follows from there on
     tips = load_robot(str(path), tip="tip").fk(told.values[joints[late], :7])[:, :3, 3]
     lag = np.linalg.norm(tips - asked.values[poses[late], :3], axis=1)
-    assert len(lag) > 5000
+    assert len(lag) > 2000
     assert lag.max() < 3e-3
 
 

@@ -302,20 +302,20 @@ class Output:
         self.sent = 0
         self.inputs: list[Input] = []
         self.tap: Callable[[bytes, int], None] | None = None
-        self.pending: list[tuple[Output, int, int]] | None = None
+        self.pending: list[tuple[Output, bytes, int]] | None = None
 
     def send(self, stamp_ns: int) -> None:
         """Hand on the present values under a stamp [ns], inside the process first."""
         for entry in self.inputs:
             entry.give(stamp_ns, self._source)
+        data = self._encode(stamp_ns, self._source)  # the next sample may be of the same tick
         if self.pending is None:
-            self.publish(stamp_ns, 0 if self.tap is None else self._time_ns())
+            self.publish(data, 0 if self.tap is None else self._time_ns())
         else:
-            self.pending.append((self, stamp_ns, self._time_ns()))
+            self.pending.append((self, data, self._time_ns()))
 
-    def publish(self, stamp_ns: int, sent_ns: int) -> None:
-        """Publish the present values under a stamp, handed on inside at ``sent_ns`` [ns]."""
-        data = self._encode(stamp_ns, self._source)
+    def publish(self, data: bytes, sent_ns: int) -> None:
+        """Publish a message that was handed on inside at ``sent_ns`` [ns]."""
         self._send(data)
         if self.tap is not None:
             self.tap(data, sent_ns)

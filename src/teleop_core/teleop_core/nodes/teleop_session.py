@@ -78,7 +78,7 @@ class TeleopSession:
             phase_ns=0 if members[0] is graph.members[0] else _AFTER_NS,
         )  # fmt: skip
         self._at_work: tuple[bool, ...] = ()
-        self._pending: list[tuple[Output, int, int]] = []
+        self._pending: list[tuple[Output, bytes, int]] = []
         self._ticks = 0
         self._loop = Loop(world, "session", self._turn, last.fail, patience=last.patience)
         self._loop.start()
@@ -128,7 +128,7 @@ class TeleopSession:
     def _tick(self, tick_ns: int) -> None:
         """One tick [ns, monotonic]; the gate keeps all nodes open until all is published."""
         self._ticks += 1
-        waiting: list[tuple[Output, int, int]] = []
+        waiting: list[tuple[Output, bytes, int]] = []
         with self._gate:
             for node in self._stages:
                 if node.is_at_work:
@@ -137,8 +137,8 @@ class TeleopSession:
                     # last.
                     waiting[:0] = self._pending
                     self._pending.clear()
-            for output, stamp_ns, sent_ns in waiting:
-                output.publish(stamp_ns, sent_ns)
+            for output, data, sent_ns in waiting:
+                output.publish(data, sent_ns)
             self._feed.flush()
             for node in self._stages:
                 if node.is_at_work:

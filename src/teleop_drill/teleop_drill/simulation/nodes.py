@@ -240,13 +240,21 @@ class SimulatedNode:
         self, kind: Any, name: str, callback: Callable[[Any], None], qos: Qos
     ) -> Reader:
         """Subscription whose messages the executor hands over."""
-        reader = self.create_taker(kind, name, qos)
+        reader, turns = self.create_taker(kind, name, qos), 0
 
         def hand_over() -> None:
+            nonlocal turns
+            turns -= 1
             if (taken := reader.take()) is not None:
                 callback(read_message(taken.data, kind))
 
-        reader.told = lambda: self.post(hand_over)
+        def told() -> None:
+            nonlocal turns
+            if qos.keeps_all or turns < qos.depth:  # no turn for what the queue has lost
+                turns += 1
+                self.post(hand_over)
+
+        reader.told = told
         return reader
 
     def create_service(self, kind: Any, name: str, callback: Callable[[Any, Any], Any]) -> Service:

@@ -118,13 +118,7 @@ class SimulatedSession:
 
     def _given(self) -> dict[str, dict[str, Any]]:
         """Parameters of all nodes, as their file has them."""
-        text = parameter_file(self._configuration, str(self.recordings[-1]))
-        content: dict[str, Any] = yaml.safe_load(text)
-        content.pop(SESSION, None)
-        found = {
-            name.strip("/"): dict(_flat(node["ros__parameters"])) for name, node in content.items()
-            if "ros__parameters" in node
-        }  # fmt: skip
+        found = parameters_of(self._configuration, str(self.recordings[-1]))
         if self._master is not Master.DEVICE:
             for name in _DRILLED:
                 found[name]["autostart"] = False
@@ -242,12 +236,30 @@ class SimulatedSession:
             self._bystander = None
 
 
-def _flat(values: Mapping[str, Any], prefix: str = "") -> "list[tuple[str, Any]]":
+def parameters_of(
+    configuration: Configuration, out: str, namespace: str = ""
+) -> dict[str, dict[str, Any]]:
+    """Parameters of all nodes of a session, by their full names, as their file has them.
+
+    Args:
+        configuration: The session.
+        out: Directory of the recording.
+        namespace: Where all nodes are, without slashes before and after it.
+    """
+    content: dict[str, Any] = yaml.safe_load(parameter_file(configuration, out, namespace))
+    content.pop(SESSION, None)
+    return {
+        name.strip("/"): flattened(node["ros__parameters"])
+        for name, node in content.items() if "ros__parameters" in node
+    }  # fmt: skip
+
+
+def flattened(values: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
     """Parameters with dotted names; lists as tuples."""
-    found: list[tuple[str, Any]] = []
+    found: dict[str, Any] = {}
     for name, value in values.items():
         if isinstance(value, dict):
-            found += _flat(value, f"{prefix}{name}.")
+            found |= flattened(value, f"{prefix}{name}.")
         else:
-            found.append((f"{prefix}{name}", tuple(value) if isinstance(value, list) else value))
+            found[f"{prefix}{name}"] = tuple(value) if isinstance(value, list) else value
     return found

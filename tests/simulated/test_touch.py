@@ -1,17 +1,16 @@
-"""Touch over real topics: what the slave's tip feels reaches the hand, and the recording."""
+"""Touch over topics: what the slave's tip feels reaches the hand, and the recording."""
 
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
-import pytest
 
 from teleop_core.graph.topics import MASTER_SERVO_CF, SLAVE_MEASURED_CF
+from teleop_core.robots import load_robot
 
 if TYPE_CHECKING:
-    from ros.conftest import Listener, Peer
-
-pytestmark = [pytest.mark.ros, pytest.mark.slow]
+    from peers import AnyPeer as Peer
+    from peers import Listener
 
 
 def test_the_hand_feels_the_block_that_the_slave_presses(
@@ -22,7 +21,7 @@ def test_the_hand_feels_the_block_that_the_slave_presses(
                   "period": 4.0, "rotation": 0.0},
         motion_scaling={"reflection": {"architecture": "position_force"},
                         "reach_force": {"is_on": False}},
-        slave={"operation": {"longest_outage": 0.0}},
+        slave={"start": load_robot("rcrt1").start.tolist()},
         slave_sim={"world": {"kind": "box", "place": [0.241, -0.236, -0.087]}},
     )  # fmt: skip
     felt, given = peer.listen(SLAVE_MEASURED_CF), peer.listen(MASTER_SERVO_CF)

@@ -1,36 +1,26 @@
-"""Every robot through the ROS nodes: all in live sessions, closed loops in separate processes."""
+"""Every robot through the nodes: all in sessions, closed loops in separate processes."""
 
-import subprocess
-import sys
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Callable
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
-from _pytest.compat import NotSetType
-from _pytest.mark.structures import Mark, MarkDecorator, _HiddenParam
 
-from live_process import CALM
 from teleop_core.bags.messages import layout
-from teleop_core.bags.reader import Bag
 from teleop_core.graph import topics
 from teleop_core.kernels.geometry import Array, pose_from_transform, rotation, transform
-from teleop_core.nodes.children import environment
-from teleop_core.nodes.crews import Processes
 from teleop_core.robots import list_robots, load_robot
 from teleop_core.robots.robot import Robot
 from teleop_core.session.configuration import configure
 from teleop_core.session.virtual import VirtualTime
 
 if TYPE_CHECKING:
-    from ros.conftest import Peer
+    from peers import AnyPeer as Peer
 
-pytestmark = [pytest.mark.ros, pytest.mark.slow]
-SHORT = (
-    "teleop.duration=600.0", "operator.approach_time=0.5", "operator.size=[0.02, 0.02, 0.02]", CALM,
-)  # fmt: skip
+SHORT = ("operator.approach_time=0.5", "operator.size=[0.02, 0.02, 0.02]")
 KINDS = ("rcrt1", "puma560", "stewart", "scara_stewart", "three_finger_hand")
-"""Robots of each kind; the others go live by ``make soak``."""
+"""Robots of each kind; the others go by ``make soak``."""
 SLAVES = [
     pytest.param(name, marks=() if name in KINDS else pytest.mark.soak)
     for name in list_robots()
@@ -41,14 +31,10 @@ MS = 1_000_000
 
 
 @pytest.fixture
-def short_session(
-    peer: "Peer", session_until: Callable[..., tuple[Bag, str]]
-) -> Callable[..., Any]:
-    """Recording of two seconds of a live session, and joints (n,) that moved less than in virtual
-    time.
+def short_session(peer: Any, tmp_path: Path) -> Callable[..., Any]:
+    """Recording of two seconds of a session, and joints (n,) that moved less than in virtual time.
 
-    Half as far is enough: a live hand waits until the slave follows. Seconds are those of the
-    slave's own steps, of which a busy machine makes fewer.
+    Half as far is enough: the hand waits until the slave follows.
     """
 
     def run(setting: Any) -> Any:
@@ -62,7 +48,7 @@ def short_session(
                 begin = slave.number("ticks")
             return begin is not None and slave.number("ticks") > begin + 2000
 
-        bag, _ = session_until(configuration, has_led, processes=Processes.ONE)
+        bag = peer.run(configuration, has_led, tmp_path / "bag")
         session = VirtualTime(configuration)
         measured = bag.read(topics.SLAVE_MEASURED_JS)
         wanted = session.run(2000)["slave_measured_js"]
@@ -83,18 +69,15 @@ def off_grid(bag: Any) -> Any:
 
 
 @pytest.mark.parametrize("name", SLAVES)
-def test_every_slave_follows_the_hand_through_a_live_session(
-    short_session: Callable[..., Any],
-    name: tuple[
-        Sequence[Any | NotSetType], Collection[MarkDecorator | Mark], str | _HiddenParam | None
-    ],
+def test_every_slave_follows_the_hand_through_a_session_of_nodes(
+    short_session: Callable[..., Any], name: str
 ) -> None:
     bag, is_short = short_session(f"robot={name}")
     assert not is_short.any()
     assert off_grid(bag) < 1e-6
 
 
-def test_the_mma_leads_a_live_session_with_its_own_encoders(
+def test_the_mma_leads_a_session_of_nodes_with_its_own_encoders(
     short_session: Callable[..., Any],
 ) -> None:
     bag, is_short = short_session("device.handle=mma")
@@ -116,29 +99,8 @@ def beside_home(robot: Robot) -> Array:
     return transform(home[:3, :3] @ turn, home[:3, 3] + [4e-3, -3e-3, 2e-3])
 
 
-@pytest.fixture
-def hybrid_node(peer: "Peer") -> Iterator[subprocess.Popen[bytes]]:
-    """Inverse kinematics of the hybrid as ``ros2 run ... -p robot:=scara_stewart`` starts it."""
-    command = [sys.executable, "-m", "teleop_core.nodes", "inverse_kinematics"]
-    process = subprocess.Popen(
-        [*command, "--ros-args", "-p", "robot:=scara_stewart"],
-        env=environment() | {"ROS_DOMAIN_ID": peer.domain},
-    )
-    try:
-        peer.wait_state("inverse_kinematics", "active")
-        yield process
-    finally:
-        process.terminate()
-        try:
-            process.wait(20)
-        except subprocess.TimeoutExpired:
-            process.kill()
-            process.wait()
-
-
-def test_the_hybrids_node_answers_a_pose_with_joints_that_lead_there(
-    peer: "Peer", hybrid_node: subprocess.Popen[bytes]
-) -> None:
+def test_the_hybrids_node_answers_a_pose_with_joints_that_lead_there(peer: "Peer") -> None:
+    peer.start("inverse_kinematics", robot="scara_stewart")
     robot = load_robot("scara_stewart")
     goal, answers = beside_home(robot), peer.listen(topics.SLAVE_SERVO_JP)
     written = layout(topics.SLAVE_SETPOINT_JS, robot.joint_names)

@@ -1,22 +1,16 @@
-"""A person as the hand over real topics: what they send moves the slave, silence holds it."""
+"""A person as the hand over topics: what they send moves the slave, silence holds it."""
 
-import subprocess
-import sys
-import time
 from collections.abc import Callable, Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
 from numpy.typing import ArrayLike
 
-import teleop_core as tc
+from peers import at_rest
 from teleop_core.chain.operators.rest import rest_pose
 from teleop_core.console.status import RESTS
 from teleop_core.graph.topics import (
-    HAND_BUTTONS,
-    HAND_SERVO_CP,
     MASTER_BUTTONS,
     MASTER_MEASURED_CP,
     OPERATOR_BUTTONS,
@@ -24,12 +18,10 @@ from teleop_core.graph.topics import (
     SLAVE_MEASURED_CP,
 )
 from teleop_core.kernels.geometry import Array
-from teleop_core.nodes.children import environment
 
 if TYPE_CHECKING:
-    from ros.conftest import Listener, Peer
+    from peers import AnyPeer as Peer
 
-pytestmark = pytest.mark.ros
 # A device without friction and noise goes where the hand is.
 EXACT: dict[str, Any] = {"device__friction": 0.0, "device__gimbal_noise": 0.0}
 GAIN = 0.5
@@ -55,8 +47,8 @@ class Person:
         pose[:3] += place
 
         def turn() -> object:
-            self.peer.send(OPERATOR_SERVO_CP, time.time_ns(), pose)
-            time.sleep(0.02)  # the rate of poses, not a wait
+            self.peer.send(OPERATOR_SERVO_CP, self.peer.time_ns(), pose)
+            self.peer.sleep(0.02)  # the rate of poses, not a wait
             return until()
 
         self.peer.wait(turn, what)
@@ -82,20 +74,6 @@ def is_held(peer: "Peer") -> Callable[[], object]:
     return lambda: peer.status("operator").values.get("hand.is_held") == "1"
 
 
-def at_rest(listener: "Listener", count: int = 1000) -> Callable[[], object]:
-    """Whether the tip has been at rest for so many samples, but for steps of its encoders."""
-
-    def is_at_rest() -> bool:
-        if listener.take() < count:
-            return False
-        last = np.array(listener.values[-count:])[:, :3]
-        return np.ptp(last, axis=0).max() < 1e-4
-
-    return is_at_rest
-
-
-@pytest.mark.slow
-@pytest.mark.alone
 def test_the_slave_goes_with_a_person_holds_without_and_no_grip_makes_it_jump(
     peer: "Peer", session: object
 ) -> None:
@@ -130,7 +108,6 @@ def test_the_slave_goes_with_a_person_holds_without_and_no_grip_makes_it_jump(
     np.testing.assert_allclose(tips.values[-1][:3] - there, [0.0, -GAIN * 0.004, 0.0], atol=3e-4)
 
 
-@pytest.mark.slow
 def test_a_node_of_its_own_hears_buttons_and_refuses_what_is_no_pose(peer: "Peer") -> None:
     poses, buttons = peer.listen(MASTER_MEASURED_CP), peer.listen(MASTER_BUTTONS)
     hand: dict[str, Any] = {"operator__kind": "remote", "operator__remote__timeout": PATIENT}
@@ -154,41 +131,10 @@ def test_a_node_of_its_own_hears_buttons_and_refuses_what_is_no_pose(peer: "Peer
     deep = peer.publisher(OPERATOR_BUTTONS, readers=0)
     peer.wait(deep.get_subscription_count, "a reader of the buttons")
     for pressed in ([0.0, 1.0, 0.0], [0.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 0.0]):
-        peer.send(OPERATOR_BUTTONS, time.time_ns(), pressed)
+        peer.send(OPERATOR_BUTTONS, peer.time_ns(), pressed)
 
     def presses() -> bool:
         is_there = buttons.take() > 1
         return is_there and (np.diff(np.array(buttons.values)[:, 1]) > 0.0).sum() == 2
 
     peer.wait(presses, "two presses of the fixture button")
-
-
-@pytest.mark.slow
-@pytest.mark.alone
-def test_a_recorded_hand_that_is_played_is_the_operator(
-    peer: "Peer", compose: Callable[..., object], tmp_path: Path
-) -> None:
-    bag = tmp_path / "hand"
-    settings = {"operator.approach_time": 1.0, "tremor_amplitude": 0.0}
-    tc.run("free_motion", duration=60.0, out=bag, settings=settings)
-    slave = {"starts_at_home": True, "operation": {"longest_outage": 0.0}}
-    compose(operator={"kind": "elsewhere"}, slave=slave)
-    tips = peer.listen(SLAVE_MEASURED_CP)
-    peer.wait(lambda: peer.status("haptic_master").message.endswith(RESTS), "a free stylus")
-    peer.wait(at_rest(tips), "rest")
-    tips.forget()
-    command = [sys.executable, "-m", "teleop_core.cli", "play", str(bag), "--topics",
-               HAND_SERVO_CP.name, HAND_BUTTONS.name]  # fmt: skip
-    player = subprocess.Popen(
-        command, stdout=subprocess.DEVNULL, env=environment() | {"ROS_DOMAIN_ID": peer.domain}
-    )
-
-    def moves() -> int:
-        assert player.poll() is None, "the player ended"
-        return tips.take() and np.ptp(np.array(tips.values)[:, :3], axis=0).max() > 5e-3
-
-    try:
-        peer.wait(moves, "motion of the slave")
-    finally:
-        player.terminate()
-        player.wait(60)

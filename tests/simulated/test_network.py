@@ -1,15 +1,12 @@
-"""Network over real topics: a foreign publisher behind it, and a session across it."""
+"""Network over topics: a foreign publisher behind it, and a session across it."""
 
-import time
-from collections.abc import Callable
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pytest
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import SetParameters
 
-from teleop_core.bags.reader import Bag
 from teleop_core.graph.topics import (
     NETWORK_SERVO_CP,
     NETWORK_SETPOINT_CP,
@@ -17,13 +14,11 @@ from teleop_core.graph.topics import (
     SLAVE_SETPOINT_CP,
     SLAVE_SETPOINT_JS,
 )
-from teleop_core.nodes.crews import Processes
 from teleop_core.session.configuration import configure
 
 if TYPE_CHECKING:
-    from ros.conftest import Peer
+    from peers import AnyPeer as Peer
 
-pytestmark = [pytest.mark.ros, pytest.mark.slow]
 MS = 1_000_000
 DELAY = 0.15
 
@@ -39,7 +34,7 @@ class Sender:
         stamp = (len(self.sent_ns) + 2) * MS
         pose = (1e-9 * stamp, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
         self.peer.send(SLAVE_SETPOINT_CP, stamp, (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0))
-        self.sent_ns[stamp] = time.monotonic_ns()
+        self.sent_ns[stamp] = self.peer.world.monotonic_ns()
         self.peer.send(SLAVE_SERVO_CP, stamp, pose)
 
 
@@ -55,7 +50,7 @@ def test_a_foreign_publisher_is_behind_the_network_and_nothing_comes_before_its_
         sender.send()
         before = len(came.stamps)
         came.take()
-        now_ns = time.monotonic_ns()
+        now_ns = peer.world.monotonic_ns()
         ages.extend(now_ns - sender.sent_ns[stamp] for stamp in came.stamps[before:])
         return len(ages) > 200 and back.take()
 
@@ -66,25 +61,24 @@ def test_a_foreign_publisher_is_behind_the_network_and_nothing_comes_before_its_
     value = ParameterValue(type=ParameterType.PARAMETER_DOUBLE, double_value=1.0)
     request = SetParameters.Request(parameters=[Parameter(name="there.loss", value=value)])
     assert peer.call(SetParameters, "/network/set_parameters", request).results[0].successful
-    set_ns = time.monotonic_ns()
+    set_ns = peer.world.monotonic_ns()
 
     def quiet() -> bool:
         sender.send()
         came.take()
-        return time.monotonic_ns() - set_ns > 3 * DELAY * 1e9
+        return peer.world.monotonic_ns() - set_ns > 3 * DELAY * 1e9
 
     peer.wait(quiet, "what was on its way has come")
     last = came.stamps[-1]
     assert sender.sent_ns[last] < set_ns + 50 * MS < max(sender.sent_ns.values())
 
 
-@pytest.mark.parametrize("processes", [Processes.ONE, Processes.SIDES])
 def test_a_slave_is_led_across_a_network_and_the_recording_tells_the_age(
-    peer: "Peer", session_until: Callable[..., tuple[Bag, str]], processes: Processes
+    peer: Any, tmp_path: Path
 ) -> None:
     settings = [
         "teleop.stages=[network]", "network.there.least_delay=0.2", "network.back.least_delay=0.2",
-        "slave.starts_at_home=true", "slave.operation.longest_outage=0", "duration=600",
+        "slave.starts_at_home=true", "slave.operation.longest_outage=0",
     ]  # fmt: skip
     setpoints = peer.listen(SLAVE_SETPOINT_JS)
 
@@ -93,10 +87,11 @@ def test_a_slave_is_led_across_a_network_and_the_recording_tells_the_age(
         q = setpoints.values
         return len(q) > 1000 and np.abs(q[-1] - q[0]).max() > 2e-3
 
-    bag, text = session_until(
-        configure("free_motion", settings=settings), is_led, processes=processes
-    )
-    assert "not newer" not in text, text  # what did not arrive anew is not sent again
+    bag = peer.run(configure("free_motion", settings=settings), is_led, tmp_path / "bag")
+    said = [one.text for one in peer.machine.log]
+    assert not any(
+        "not newer" in text for text in said
+    )  # what did not arrive anew is not sent again
     series = bag.read(NETWORK_SERVO_CP.name)
     ages = (series.log_ns - series.stamp_ns)[series.stamp_ns > 0]
     assert ages.min() >= 199 * MS

@@ -1,4 +1,4 @@
-"""Masters of others with another number of buttons, as real messages at real nodes."""
+"""Masters of others with another number of buttons, at nodes."""
 
 from typing import TYPE_CHECKING
 
@@ -8,9 +8,7 @@ from foreign_hand import WHERE, Hand
 from teleop_core.graph import topics
 
 if TYPE_CHECKING:
-    from ros.conftest import Peer
-
-pytestmark = pytest.mark.ros
+    from peers import AnyPeer as Peer
 
 
 @pytest.mark.parametrize(

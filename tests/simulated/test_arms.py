@@ -1,0 +1,51 @@
+"""Arms as nodes: namespaces keep topics, reports and recordings apart."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from teleop_core.bags.reader import Bag
+from teleop_core.bags.transforms import TF
+from teleop_core.graph import topics
+from teleop_core.robots import load_robot
+
+if TYPE_CHECKING:
+    from peers import AnyPeer as Peer
+
+MS = 1_000_000
+REST = [0.0, -0.06, -0.08, 1.0, 0.0, 0.0, 0.0]
+LEFT_JOINTS = topics.SLAVE_MEASURED_JS.of_arm("left")
+LEFT_MASTER = topics.MASTER_MEASURED_CP.of_arm("left")
+
+
+def test_a_node_in_a_namespace_publishes_and_reports_below_it(peer: "Peer") -> None:
+    inside, outside = peer.listen(LEFT_JOINTS), peer.listen(topics.SLAVE_MEASURED_JS)
+    peer.start("slave", arm="left", robot="puma560")
+    peer.wait(lambda: inside.take() > 100, "left/slave/measured_js")
+    np.testing.assert_allclose(inside.values[0][:6], load_robot("puma560").home, atol=1e-3)
+    assert outside.take() == 0
+    assert set(peer.observer.statuses) == {"left/slave", "left/slave_sim"}
+
+
+def test_a_recorder_in_a_namespace_records_the_topics_of_its_arm(
+    peer: "Peer", tmp_path: Path
+) -> None:
+    recorder = peer.start("recorder", arm="left", out=str(tmp_path / "bag"))
+    stamp = 0
+
+    def heard() -> Any:
+        nonlocal stamp
+        stamp += MS
+        peer.send(LEFT_MASTER, stamp, REST)
+        peer.send(topics.MASTER_MEASURED_CP, stamp, [0.1, *REST[1:]], readers=0)
+        return peer.status("left/recorder").number(f"received.{LEFT_MASTER.name}") > 100
+
+    peer.wait(heard, "samples at the recorder")
+    assert recorder.end() == 0
+    bag = Bag(tmp_path / "bag")
+    streams = {name for name in bag.topics if bag.topics[name].count}
+    assert streams == {LEFT_MASTER.name, topics.DIAGNOSTICS.name}
+    shared = {topics.DIAGNOSTICS.name, TF.name}
+    assert all(name.startswith("left/") for name in {*bag.topics} - shared)
+    assert (bag.read(LEFT_MASTER).values == REST).all()

@@ -1,0 +1,99 @@
+"""CRTK: a stock client moves our arms."""
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+from geometry_msgs.msg import PoseStamped, WrenchStamped
+from sensor_msgs.msg import JointState
+
+from stock_client import MIDDLE, StockClient, crtk
+from teleop_core.kernels.geometry import Array, framed_wrenches
+from teleop_core.middleware.world import Qos
+
+if TYPE_CHECKING:
+    from peers import AnyPeer as Peer
+
+
+@pytest.fixture
+def client(peer: "Peer") -> StockClient:
+    return StockClient.of_slave(peer)
+
+
+def test_a_pose_is_moved_to_and_one_out_of_reach_is_refused_and_counted(
+    client: StockClient,
+) -> None:
+    pose = client.newest["setpoint_cp"].pose
+    goal = PoseStamped(pose=pose)
+    goal.pose.position.z -= 0.01
+    client.was_busy = False
+    client.send("move_cp", goal)
+    client.wait(lambda: client.was_busy, "busy")
+    client.reaches(("ENABLED", True, False))
+    z = goal.pose.position.z
+    client.wait(lambda: abs(client.newest["setpoint_cp"].pose.position.z - z) < 1e-9, "the pose")
+    goal.pose.position.z -= 5.0
+    client.send("move_cp", goal)
+    client.peer.wait_value("slave", "refused.slave/move_cp", lambda count: count == 1)
+
+
+def test_states_are_commanded_and_told_and_a_paused_arm_refuses_to_move(
+    client: StockClient,
+) -> None:
+    client.send("state_command", crtk.StringStamped(string="pause"))
+    client.reaches(("PAUSED", True, False))
+    client.send("move_jp", JointState(position=[a - 0.05 for a in MIDDLE]))
+    client.peer.wait_value("slave", "refused.slave/move_jp", lambda count: count == 1)
+
+    def resumed() -> Any:  # which an arm refuses that is not known to be at rest yet
+        client.send("state_command", crtk.StringStamped(string="resume"))
+        return client.state() == ("ENABLED", True, False)
+
+    client.wait(resumed, "resumed")
+    client.wait(lambda: np.array_equal(client.joints(), MIDDLE), "where it was")
+
+
+def six(wrench: Any) -> Array:
+    force, torque = wrench.force, wrench.torque
+    return np.array([force.x, force.y, force.z, torque.x, torque.y, torque.z])
+
+
+def test_a_measured_force_is_told_along_the_tip_and_about_the_base_under_its_stamp(
+    client: StockClient,
+) -> None:
+    node, newest = client.peer.ros, client.newest
+    for name in ("body/measured_cf", "spatial/measured_cf"):
+        node.create_subscription(WrenchStamped, f"slave/{name}", client.taker(name), Qos())
+    node.create_subscription(PoseStamped, "slave/measured_cp", client.taker("measured_cp"), Qos())
+    message = WrenchStamped()
+    message.wrench.force.x, message.wrench.torque.z = 2.0, 0.1
+
+    def tip() -> Array:
+        p, q = newest["measured_cp"].pose.position, newest["measured_cp"].pose.orientation
+        return np.array([p.x, p.y, p.z, q.w, q.x, q.y, q.z])
+
+    def told() -> (
+        bool | tuple[Any, Any] | None
+    ):  # between the zeros of the simulated sensor; the pose is one of the arm at rest
+        client.send("measured_cf", message)
+        client.spin()
+        if not {"body/measured_cf", "spatial/measured_cf", "measured_cp"} <= newest.keys():
+            return None
+        body, spatial = newest["body/measured_cf"], newest["spatial/measured_cf"]
+        if spatial.wrench.force.x != 2.0 or body.header.stamp != spatial.header.stamp:
+            return None
+        expected = framed_wrenches(six(message.wrench), tip())
+        said = six(body.wrench), six(spatial.wrench)
+        return np.allclose(said, expected, rtol=0.0, atol=1e-6) and (body, spatial)
+
+    body, spatial = client.wait(told, "the force in both frames")
+    assert body.header.stamp.sec > 0
+    assert (body.header.frame_id, spatial.header.frame_id) == ("slave_tip", "slave_base")
+
+
+def test_a_disabled_master_pushes_with_no_force(peer: "Peer") -> None:
+    peer.start("haptic_master", patience=3600.0)
+    client = StockClient(peer, "master")
+    client.reaches(("ENABLED", True, False))
+    client.send("state_command", crtk.StringStamped(string="disable"))
+    client.reaches(("DISABLED", True, False))

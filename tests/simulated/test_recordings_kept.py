@@ -1,0 +1,56 @@
+"""What the recorder has heard is on the disk, whatever ends it."""
+
+import signal
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from teleop_core.bags.reader import Bag, recover
+from teleop_core.graph import topics
+
+if TYPE_CHECKING:
+    from peers import AnyPeer as Peer
+
+LOST = 0.2
+"""What a recorder that is killed may lose [s]."""
+
+
+def start(peer: Any, tmp_path: Path) -> Any:
+    """A recorder that hears a master at 1 kHz."""
+    recorder = peer.start("recorder", out=str(tmp_path / "bag"))
+    peer.wait_value("recorder", "received.master/measured_cp", lambda n: n >= 0)
+    peer.start("haptic_master")
+    peer.wait_value("recorder", "received.master/measured_cp", lambda n: n > 1500)
+    return recorder
+
+
+def test_a_killed_recorder_loses_at_most_a_fifth_of_a_second(peer: "Peer", tmp_path: Path) -> None:
+    recorder = start(peer, tmp_path)
+    received = peer.status("recorder").number("received.master/measured_cp")
+    peer.wait_value("recorder", "received.master/measured_cp", lambda n: n > received + 1000)
+    killed_ns = peer.time_ns()
+    recorder.process.send_signal(signal.SIGKILL)
+    out, _ = recover(tmp_path / "bag")
+    series = Bag(out).read(topics.MASTER_MEASURED_CP)
+    assert killed_ns - series.log_ns[-1] < 1e9 * LOST
+    assert len(series) > 1000
+
+
+def test_a_recorder_whose_directory_moved_keeps_everything_and_does_not_say_success(
+    peer: "Peer", tmp_path: Path
+) -> None:
+    recorder = start(peer, tmp_path)
+    (tmp_path / "bag").rename(tmp_path / "moved")
+    assert recorder.end(signal.SIGTERM) == 1
+    assert f"messages are in {tmp_path / 'moved'}" in recorder.stderr.read_text()
+    assert Bag(tmp_path / "moved").topics["master/measured_cp"].count > 1500
+
+
+def test_a_recorder_that_cannot_write_metadata_keeps_everything_for_recover(
+    peer: "Peer", tmp_path: Path
+) -> None:
+    recorder = start(peer, tmp_path)
+    (tmp_path / "bag" / "metadata.yaml").mkdir()
+    assert recorder.end(signal.SIGINT) == 1
+    assert "`teleop recover " in recorder.stderr.read_text()
+    out, _ = recover(tmp_path / "bag")
+    assert Bag(out).topics["master/measured_cp"].count > 1500
