@@ -94,7 +94,7 @@ def test_a_result_that_is_cut_off_counts_as_missing(found: Found, tmp_path: Path
     assert Result.from_json(text).to_json() == text
 
 
-def test_a_session_that_fails_is_a_point_with_its_error(tmp_path: Path) -> None:
+def test_a_session_that_fails_is_a_point_with_its_error(own_parts: None, tmp_path: Path) -> None:
     parts = tmp_path / "bad.py"
     parts.write_text(
         "import teleop_core as tc\n"
