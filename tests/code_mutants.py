@@ -53,10 +53,9 @@ CODE_MUTANTS = (
             "    runner.reset()\n", "", "warming"),
     _mutant("warm_signals", "a step for practice leaves its outputs", "graph/warming.py",
             "    assign(runner.signals, before)\n", "", "warming"),
-    _mutant("stop_leaves_moves", "a stop leaves a move active (as in dimos #3004)",
-            "slave/operation/states.py", "    if follower != _ENABLED:\n        s.is_busy",
-            "    if follower not in (_ENABLED, _FAULT):\n        s.is_busy",
-            "tests/simulated/test_laws.py"),
+    _mutant("last_scaled", "speeds of joints are scaled for the last one that is too fast (as in "
+            "moveit2 #2540)", "slave/velocity.py", "share = min(share, most / fast)",
+            "share = most / fast", "motion_commands"),
     _mutant("buttons_paused", "a pause of the poses makes single presses of a stream of buttons",
             "chain/mapping/plausibility.py", "max(s.in_row - _STREAM, 0)", "0", "plausible_hand"),
     # kernels and robots

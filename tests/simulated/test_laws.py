@@ -1,11 +1,16 @@
-"""Laws in schedules that no random one of the first thousands has."""
+"""Laws in schedules that no random one of the first thousands has; mutants that each law finds."""
 
+import pytest
+
+from mutants import MUTANTS, SOUND, Mutant, scheduled
 from teleop_core.slave.operation.states import COMMANDS
+from teleop_drill.simulation.laws import LAWS
 from teleop_drill.simulation.schedules import Fault
 from teleop_drill.simulation.seeds import run_seed
 
 _NAMES = sorted((*COMMANDS, "release"))
 HOME = (_NAMES.index("home") + 0.5) / len(_NAMES)
+FOUND_BY_LAWS = tuple(one for one in MUTANTS if one.schedule is not None)
 
 
 def test_a_stop_in_the_middle_of_a_move_leaves_nothing_to_go_on_with() -> None:
@@ -13,3 +18,16 @@ def test_a_stop_in_the_middle_of_a_move_leaves_nothing_to_go_on_with() -> None:
     found = run_seed(0, faults)
     assert not found.broken
     assert found.met["press", "ENABLED"] == 1
+
+
+def test_each_law_has_a_mutant_that_breaks_it() -> None:
+    assert {one.schedule.law for one in FOUND_BY_LAWS if one.schedule} == set(LAWS)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("mutant", FOUND_BY_LAWS, ids=lambda one: one.name)
+def test_a_schedule_finds_what_a_law_forbids_and_nothing_in_what_is_sound(mutant: Mutant) -> None:
+    schedule = mutant.schedule
+    assert schedule is not None
+    assert schedule.law in dict(scheduled(mutant, schedule))
+    assert scheduled(SOUND, schedule) == []

@@ -133,15 +133,30 @@ def _command(stage: Stage, fault: Fault) -> None:
 
 
 def _drive(stage: Stage, fault: Fault) -> Callable[[], None]:
-    """Drive the joints as a client of CRTK does, far faster than they may go."""
-    speeds = np.sin(np.arange(1.0, stage.robot.n + 1.0) * (1.0 + 9.0 * fault.amount)) * 5.0
-    return stage.every(0.01, lambda: stage.drive(speeds))
+    """Drive the joints as a client of CRTK does, far faster than they may go.
+
+    As long as the hand's commands come, the arm refuses others: who drives it silences these.
+    """
+    drives = stage.robot.drives
+    assert drives is not None
+    speeds = np.sin(np.arange(1.0, stage.robot.n + 1.0) * (1.0 + 9.0 * fault.amount))
+    speeds *= 3.0 * drives.speed_limit
+    stage.lead(by_hand=False)
+    stop = stage.every(0.01, lambda: stage.drive(speeds))
+
+    def give_back() -> None:
+        stop()
+        stage.lead(by_hand=True)
+
+    return give_back
 
 
 def _intrude(stage: Stage, fault: Fault) -> Callable[[], None]:
-    """Command the joints as another publisher of the same topic does."""
-    form = layout(SLAVE_SERVO_JP, stage.robot.joint_names)
-    place = stage.robot.home + 0.3 * np.sin(np.arange(stage.robot.n) + 10.0 * fault.amount)
+    """Command the joints beside where they are, as another publisher of the same topic does."""
+    form, drives = layout(SLAVE_SERVO_JP, stage.robot.joint_names), stage.robot.drives
+    assert drives is not None
+    off = 0.05 * np.sin(np.arange(stage.robot.n) + 10.0 * fault.amount)
+    place = stage.setpoint + off * drives.speed_limit
 
     def send() -> None:
         stage.publish(SLAVE_SERVO_JP, form.encode_one(stage.world.time_ns(), place))
