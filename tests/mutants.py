@@ -238,6 +238,9 @@ MUTANTS = (
             "return found\n", "            return found\n",
             schedule=Schedule("ends", (
                 (1.0, "kill", "hand_side", 0.1, 0.5), (2.0, "garbage", "", 0.5, 0.5)))),
+    _mutant("saved_all", "a recorder whose disk is gone says that all is safe",
+            "bags/ending.py", "s ({found.message_count} of", "s ({given} of",
+            schedule=Schedule("recorded", ((2.0, "gone disk", "", 1.0, 0.5),))),
     Mutant("losses_untold", "what waits for a recorder that stands still is lost, and not counted "
            "(as in rosbag2 #477)",
            (("nodes/feed.py", "len(self._feed.waiting) < MOST", "len(self._feed.waiting) < 50_000"),

@@ -20,6 +20,15 @@ def test_a_stop_in_the_middle_of_a_move_leaves_nothing_to_go_on_with() -> None:
     assert found.met["press", "ENABLED"] == 1
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("disk", ["slow", "full", "read-only", "gone"])
+def test_a_disk_that_fails_costs_what_the_recorder_says_and_harms_nobody_else(disk: str) -> None:
+    found = run_seed(0, (Fault(2.0, f"{disk} disk", "", 1.0, 0.5),))
+    assert found.broken == ()
+    assert found.looks["recorded"] == 1
+    assert found.looks["owner"] > 5000
+
+
 def test_each_law_has_a_mutant_that_breaks_it() -> None:
     assert {one.schedule.law for one in FOUND_BY_LAWS if one.schedule} == set(LAWS)
 

@@ -170,8 +170,7 @@ class McapFile:
 
     def _cut(self) -> None:
         """Take away what stands behind the last whole chunk."""
-        self._file.seek(self._end)
-        self._file.truncate()
+        self._background.cut(self._file, self._end)
 
     @property
     def place(self) -> Path | None:

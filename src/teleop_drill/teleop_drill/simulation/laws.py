@@ -1,5 +1,7 @@
 """Laws: what must hold whatever goes wrong, judged by who sees all at once."""
 
+import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -7,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from teleop_core.bags.messages import layout
-from teleop_core.bags.reader import Bag
+from teleop_core.bags.reader import Bag, recover
 from teleop_core.graph.signals import DT
 from teleop_core.graph.topics import NO_COMMAND_NS, SLAVE_SETPOINT_JS
 from teleop_core.kernels.geometry import Array
@@ -20,6 +22,8 @@ from teleop_drill.simulation.owner import Owner
 from teleop_drill.simulation.stage import Stage
 
 _LOOK_NS = 5_000_000
+_BAD = ("error", "fatal")
+_SAFE = re.compile(r"the first [\d.]+ s \((\d+) of \d+ messages\)")
 _SLACK = 1e-6
 _CURVED = 1e-2
 """Share by which the tip's way in a tick exceeds that of joints whose steps were shortened."""
@@ -57,6 +61,12 @@ class Broken:
     law: str
     at: float
     text: str
+
+
+def _saved(said: Sequence[str]) -> int | None:
+    """Messages that a recorder has said to be safe when its disk failed; None if it has not."""
+    found = [_SAFE.search(text) for text in said]
+    return next((int(one[1]) for one in reversed(found) if one), None)
 
 
 class Laws:
@@ -227,7 +237,9 @@ class Laws:
         for process in self._stage.session.running.values():
             if process.is_dead and process not in self._stage.killed:
                 self._stage.killed.add(process)
-                said = [one.text for one in self._stage.machine.log if one.level == "fatal"]
+                said = [one.text for one in self._stage.machine.log if one.level in _BAD]
+                if process in self._stage.lost_disk and _saved(said) is not None:
+                    continue  # it has said what it has saved, which is judged at the end
                 self._break("ends", f"{process.name} has ended: {' '.join(said[-1:])[-300:]}")
 
     def _judge_queues(self) -> None:
@@ -246,15 +258,25 @@ class Laws:
     # -- at the end ------------------------------------------------------------------------------
 
     def judge_recording(self, path: Path) -> None:
-        """What was sent is recorded, or counted as lost.
+        """What was sent is recorded, or counted as lost; of a disk that failed, what was saved.
 
         Args:
-            path: A recording whose recorder ended in order, while no clock was stepped.
+            path: A recording whose recorder was not killed, while no clock was stepped.
         """
         self._count("recorded")
+        said = [one.text for one in self._stage.machine.log if str(path) in one.text]
+        saved = _saved(said) if self._stage.lost_disk else None
+        if saved == 0:
+            return
+        if saved is not None:
+            path, count = recover(path)
+            if count != saved:
+                self._break("recorded", f"{saved} messages were said to be safe, {count} are")
         kept_ns = Bag(path).read(SLAVE_SETPOINT_JS).log_ns
         sent_ns = np.array(self._sent_ns)
         begin_ns, end_ns = int(kept_ns[0]) + _FOUND_NS, int(sent_ns[-1]) - _ON_THE_WAY_NS
+        if saved is not None:
+            end_ns = int(kept_ns[-1]) - _ON_THE_WAY_NS
         kept, sent = (
             int(np.sum((begin_ns < times) & (times < end_ns))) for times in (kept_ns, sent_ns)
         )

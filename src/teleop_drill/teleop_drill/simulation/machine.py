@@ -56,6 +56,8 @@ class Process(Turns):
         """Bytes that it may write still; None: as many as it likes."""
         self.disk_delay = 0.0
         """What each of its writes waits for the disk [s]."""
+        self.disk_error = 0
+        """Number of the error that its writes meet; 0: none."""
         self.due: list[deque[Callable[[], object]]] = []
         """What waits for each of its executors."""
         self.lines: list[SocketEnd] = []

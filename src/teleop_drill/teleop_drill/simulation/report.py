@@ -65,5 +65,6 @@ def told(found: Found, shortest: Found, law: str) -> list[str]:
     return [
         f"seed {found.seed} breaks `{law}`, {one.at:.3f} s after the arm followed: {one.text}",
         *(f"    {fault.text()}" for fault in shortest.faults),
-        f"    again: teleop drill --seeds 1 --seed {found.seed}{way} --faults {kept or '-'} --out DIR",
+        f"    again: teleop drill --seeds 1 --seed {found.seed}{way} --faults {kept or '-'} "
+        "--out DIR",
     ]

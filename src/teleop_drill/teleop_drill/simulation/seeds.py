@@ -36,6 +36,7 @@ _CIRCLE = (
     "operator.kind=circle", f"operator.size=[{2 * hand.RADIUS}, 0.0, {2 * hand.RADIUS}]",
     f"operator.period={hand.ROUND}", "operator.approach_time=1.0", "operator.patience=0.0",
     "operator.rotation=0.0", "slave.operation.tool_speed=0.5",
+    "slave.start_speed=1.0",
 )  # fmt: skip
 _PER_CHILD = 25  # sessions of one process of this machine: what was killed in them stays
 

@@ -68,6 +68,8 @@ class Stage:
         )
         self.killed: set[Process] = set()
         """Processes that were told to end."""
+        self.lost_disk: set[Process] = set()
+        """Processes that may end for want of a disk, if they say what they have saved."""
         self.stopped: list[tuple[Process, int]] = []
         """Processes that were stopped, each with the time [ns]."""
         self.presses: list[int] = []
@@ -117,11 +119,23 @@ class Stage:
         """Note that a process stands still from now on."""
         self.stopped.append((process, self.machine.scheduler.now_ns))
 
+    def fail_disk(self, error: int) -> Callable[[], None]:
+        """Let writes of the recorder fail by an error's number; what is returned mends the disk."""
+        process = self.process(RECORDER_NAME)
+        process.disk_error = error
+        self.lost_disk.add(process)
+        return lambda: setattr(process, "disk_error", 0)
+
     def kill(self, name: str) -> None:
-        """Kill a process, and let it be started again."""
+        """Kill a process."""
         process = self.process(name)
         self.killed.add(process)
         process.end(-9, is_orderly=False)
+
+    def restart(self, name: str) -> None:
+        """Start a process again that has ended, as who supervises it does."""
+        if self.process(name).is_dead:
+            self.session.launch(name)
 
     def press(self, button: int, *, is_pressed: bool) -> None:
         """Send a message of a stop button."""
