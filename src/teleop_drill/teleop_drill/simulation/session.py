@@ -122,7 +122,7 @@ class SimulatedSession:
     def _given(self) -> dict[str, dict[str, Any]]:
         """Parameters of all nodes, as their file has them."""
         text = parameter_file(self._configuration, str(self.recordings[-1]))
-        content: dict[str, Any] = yaml.load(text, Loader=_LOADER)  # noqa: S506  a safe one
+        content: dict[str, Any] = yaml.load(text, Loader=_LOADER)
         content.pop(SESSION, None)
         found = {
             name.strip("/"): dict(_flat(node["ros__parameters"])) for name, node in content.items()
