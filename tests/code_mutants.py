@@ -56,6 +56,9 @@ CODE_MUTANTS = (
     _mutant("last_scaled", "speeds of joints are scaled for the last one that is too fast (as in "
             "moveit2 #2540)", "slave/velocity.py", "share = min(share, most / fast)",
             "share = most / fast", "motion_commands"),
+    _mutant("gap_followed", "a jump of the hand in a gap of its samples is followed",
+            "chain/mapping/plausibility.py", "max(_GAP, 2e-9 * s.raw_elapsed_ns) / period",
+            "1.0", "plausible_hand"),
     _mutant("buttons_paused", "a pause of the poses makes single presses of a stream of buttons",
             "chain/mapping/plausibility.py", "max(s.in_row - _STREAM, 0)", "0", "plausible_hand"),
     # kernels and robots

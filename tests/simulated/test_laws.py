@@ -3,6 +3,7 @@
 import pytest
 
 from mutants import MUTANTS, SOUND, Mutant, scheduled
+from teleop_core.nodes.crews import Processes
 from teleop_core.slave.operation.states import COMMANDS
 from teleop_drill.simulation.laws import LAWS
 from teleop_drill.simulation.schedules import Fault
@@ -27,6 +28,13 @@ def test_a_disk_that_fails_costs_what_the_recorder_says_and_harms_nobody_else(di
     assert found.broken == ()
     assert found.looks["recorded"] == 1
     assert found.looks["owner"] > 5000
+
+
+@pytest.mark.slow
+def test_a_recorder_that_starts_while_its_disk_is_gone_says_so() -> None:
+    """Of seed 2001, composed: the law had asked it for what it had saved."""
+    faults = (Fault(1.0, "kill", "recorder", 0.2, 0.5), Fault(1.4, "gone disk", "", 1.5, 0.5))
+    assert run_seed(2001, faults, None, Processes.ONE).broken == ()
 
 
 def test_each_law_has_a_mutant_that_breaks_it() -> None:

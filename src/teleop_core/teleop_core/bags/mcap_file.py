@@ -87,7 +87,11 @@ class McapFile:
             self._metadata.append(MetadataIndex(len(start), len(record), name))
             start += record
         self._end = len(start)
-        self._write(start)
+        try:
+            self._write(start)
+        except OSError:
+            self._file.close()
+            raise
 
     def _write(self, data: bytes | bytearray) -> None:
         view = memoryview(data)
