@@ -56,6 +56,9 @@ CODE_MUTANTS = (
     _mutant("last_scaled", "speeds of joints are scaled for the last one that is too fast (as in "
             "moveit2 #2540)", "slave/velocity.py", "share = min(share, most / fast)",
             "share = most / fast", "motion_commands"),
+    _mutant("thaw_leads", "a bridge that stood still leads on from where the arm was",
+            "slave/bridges/arm_bridge.py", "if is_late and self.lead_arm.has_lost(",
+            "if False and self.lead_arm.has_lost(", "arm_bridge"),
     _mutant("gap_followed", "a jump of the hand in a gap of its samples is followed",
             "chain/mapping/plausibility.py", "max(_GAP, 2e-9 * s.raw_elapsed_ns) / period",
             "1.0", "plausible_hand"),
