@@ -37,6 +37,15 @@ def test_a_recorder_that_starts_while_its_disk_is_gone_says_so() -> None:
     assert run_seed(2001, faults, None, Processes.ONE).broken == ()
 
 
+@pytest.mark.slow
+def test_a_slave_that_was_started_while_the_clock_was_behind_follows_once_it_is_right() -> None:
+    """Of seed 10003: it refused every command as one of the future."""
+    faults = (
+        Fault(1.3, "kill", "slave_side", 1.0, 0.5), Fault(2.57, "clock step", "", 0.5, 0.91)
+    )  # fmt: skip
+    assert run_seed(10003, faults).broken == ()
+
+
 def test_each_law_has_a_mutant_that_breaks_it() -> None:
     assert {one.schedule.law for one in FOUND_BY_LAWS if one.schedule} == set(LAWS)
 
