@@ -133,7 +133,7 @@ class SlaveNode(TickingNode):
             self._fail(Fault.FLOOD)
 
     def _relate_anew(self, offset_ns: int) -> None:
-        """Take the present clock if that was behind at the start: commands would be of the future."""
+        """Take the present clock if that of the start was behind: else no command is followed."""
         stamp_ns, now_ns = int(self.row["slave_servo_jp_ns"]), int(self.row["now_ns"])
         behind_ns = offset_ns - self.epoch_ns
         if stamp_ns - now_ns > SECOND_NS > abs(stamp_ns - now_ns - behind_ns):
