@@ -222,6 +222,9 @@ MUTANTS = (
     _mutant("stopped_says_ready", "a stopped arm says that it is ready", _WATCH,
             "row[0], row[1], row[2], row[3] = s.state,",
             "row[0], row[1], row[2], row[3] = max(1, s.state % 3),", "stop_topic"),
+    _mutant("clock_kept", "a slave keeps the clock of its start, however wrong that was", _SLAVE,
+            "self.epoch_ns = offset_ns", "pass", schedule=Schedule("recovery", (
+                (1.3, "kill", "slave_side", 1.0, 0.5), (2.57, "clock step", "", 0.5, 0.91)))),
     _mutant("late_reports", "a restarted slave reports late what it is", _SLAVE,
             "        before = self._reported\n        super().send_report",
             "        if self._turns < 2000:\n            return\n        before = self._reported\n"
