@@ -29,6 +29,21 @@ PRIORITY = "real_time.priority=30"
 
 
 @dataclass(frozen=True)
+class Schedule:
+    """Faults in simulated time under which a mutant breaks a law; mostly what is left of a seed.
+
+    Attributes:
+        law: Which law.
+        faults: Time, kind, process, length and amount of each, as of ``schedules.Fault``.
+        seed: Of the machine.
+    """
+
+    law: str
+    faults: tuple[tuple[float, str, str, float, float], ...]
+    seed: int = 0
+
+
+@dataclass(frozen=True)
 class Mutant:
     """One broken safety.
 
@@ -38,7 +53,7 @@ class Mutant:
         changes: Files in the package, each with text that stands in it once, and what replaces it.
         rows: Exercises of the drill that must find it, at least one of them.
         composed: Those in one process, if they are others.
-        seeds: Schedules of ``teleop drill --seeds`` that must find it, in place of exercises.
+        schedule: Schedule that must find it, beside exercises or in their place.
     """
 
     name: str
@@ -46,7 +61,7 @@ class Mutant:
     changes: tuple[tuple[str, str, str], ...]
     rows: tuple[str, ...]
     composed: tuple[str, ...] | None = None
-    seeds: tuple[int, ...] = ()
+    schedule: Schedule | None = None
 
     def rows_of(self, *, is_composed: bool) -> tuple[str, ...]:
         """Exercises in one form; empty where that form does not have what is broken."""
@@ -55,13 +70,21 @@ class Mutant:
 
 def _mutant(
     name: str, text: str, file: str, before: str, after: str, *rows: str,
-    composed: tuple[str, ...] | None = None, seeds: tuple[int, ...] = (),
+    composed: tuple[str, ...] | None = None, schedule: Schedule | None = None,
 ) -> Mutant:  # fmt: skip
-    return Mutant(name, text, ((file, before, after),), rows, composed, seeds)
+    return Mutant(name, text, ((file, before, after),), rows, composed, schedule)
 
 
 _SLAVE, _COMMANDS, _WATCH = "nodes/slave.py", "slave/commands.py", "slave/operation/watch.py"
 _RECORDER, _STAGE, _STEP = "nodes/recorder.py", "slave/slave.py", "slave/step.py"
+_SCRIPT = """
+import json, sys
+from teleop_drill.simulation.schedules import Fault
+from teleop_drill.simulation.seeds import run_seed
+seed, faults = json.loads(sys.argv[1])
+found = run_seed(seed, [Fault(*one) for one in faults])
+print(json.dumps([(one.law, one.text) for one in found.broken]))
+"""
 _RELEASED = """            self.request(Event.STOP)
         elif self.state["state"] == State.FAULT:
             self.request(Event.RESET)
@@ -82,7 +105,8 @@ _LATE = """self._held = [*getattr(self, "_held", []),
             for is_pressed in ready:"""
 MUTANTS = (
     _mutant("stop_ignored", "nobody hears the stop button", _SLAVE,
-            "in self._stop.take(now_ns, is_idle=is_idle):", "in ():", "stop_topic"),
+            "in self._stop.take(now_ns, is_idle=is_idle):", "in ():", "stop_topic",
+            schedule=Schedule("stop", ((2.0, "press", "", 0.5, 0.5),))),
     _mutant("stop_late", "the stop button is heard 20 ms late", _SLAVE,
             "for is_pressed in self._stop.take(now_ns, is_idle=is_idle):", _LATE, "stop_topic"),
     _mutant("stop_unlatched", "a released stop button enables the arm", _STAGE,
@@ -118,9 +142,11 @@ MUTANTS = (
     _mutant("steps_large", "setpoints move 1.5 times as fast as their drives", _COMMANDS,
             "reach = p.speed_limit[i] * dt\n        step = min(max(s.filtered",
             "reach = 1.5 * p.speed_limit[i] * dt\n        step = min(max(s.filtered",
-            "loss_heavy", "hiccup", "delay"),
-    _mutant("tool_fast", "nothing limits the speed of the tool", _COMMANDS,
-            "if step > most:", "if step > 1e9:", "fast_hand"),
+            "loss_heavy", "hiccup", "delay",
+            schedule=Schedule("speed", ((1.0, "standstill", "hand_side", 0.3, 0.5),))),
+    _mutant("tool_fast", "nothing limits the speed of the tool that joints move (as in "
+            "xArm-Python-SDK #88)", _COMMANDS, "if step > most:", "if step > 1e9:", "fast_hand",
+            schedule=Schedule("tool speed", ((1.0, "drive", "", 2.0, 0.5),))),
     _mutant("limits_off", "driven joints go beyond their limits", "slave/velocity.py",
             """        step = min(step, _stoppable(p.upper[i] - s.setpoint[i], most))
         step = max(step, -_stoppable(s.setpoint[i] - p.lower[i], most))
@@ -145,9 +171,11 @@ MUTANTS = (
             composed=()),
     _mutant("clock_unnoticed", "a stepped clock is none", _SLAVE,
             "> _CLOCK_STEP_NS:", "> 10**30:", "clock_ahead", "clock_back"),
-    _mutant("second_publishers", "messages of all publishers are taken", "nodes/sender.py",
+    _mutant("second_publishers", "messages of all publishers are taken (as in ros2_control #870)",
+            "nodes/sender.py",
             "if self._owner and now_ns", "if False and now_ns",
-            "second_master", "second_commander", composed=("second_master",)),
+            "second_master", "second_commander", composed=("second_master",),
+            schedule=Schedule("owner", ((2.0, "intruder", "", 1.0, 0.5),))),
     _mutant("old_messages", "messages older than the last one are taken (axol #187)",
             "nodes/streams.py", "check(self.topic.kind, stamp_ns, values, last_ns)",
             "check(self.topic.kind, stamp_ns, values, None)", "replayed", "stamps_frozen"),
@@ -170,7 +198,11 @@ MUTANTS = (
            "stretch_web_teleop #3)",
            (("nodes/streams.py", "_WAITING = 20", "_WAITING = 20_000"),
             ("nodes/streams.py", "if has_buttons and self._target.tobytes() !=", "if b'x' !=")),
-           (), seeds=(884,)),
+           (), schedule=Schedule("age", ((2.0, "standstill", "slave_side", 3.0, 0.5),))),
+    Mutant("queue_kept", "a queue grows for as long as its reader stands still",
+           (("nodes/streams.py", "_WAITING = 20", "_WAITING = 20_000"),
+            ("nodes/streams.py", "if has_buttons and self._target.tobytes() !=", "if b'x' !=")),
+           (), schedule=Schedule("queues", ((2.0, "standstill", "slave_side", 4.5, 0.5),))),
     _mutant("engage_jumps", "who engages leads on from where the hand was (as in moveit2 #3378 and "
             "IsaacTeleop #730)", "chain/mapping/motion_scaling.py",
             "        s.must_latch = 1\n        if not is_doubtful:\n"
@@ -181,7 +213,8 @@ MUTANTS = (
            (("nodes/sender.py", "now_ns - self._heard_ns <= self._silence_ns",
              "now_ns - self._heard_ns <= 10**18"),
             ("nodes/sender.py", 'gone."""\n        self._owner = b""', 'gone."""')),
-           ("kill_motion_scaling",), composed=()),
+           ("kill_motion_scaling",), composed=(),
+           schedule=Schedule("recovery", ((2.0, "kill", "hand_side", 1.0, 0.5),))),
     _mutant("drive_goes_on", "a joint goes on at its last speed when the link is lost (as in "
             "turtlebot3 #1154)", "slave/velocity.py",
             "is_stale = now_ns - s.driven_ns > p.timeout_ns",
@@ -189,10 +222,33 @@ MUTANTS = (
     _mutant("stopped_says_ready", "a stopped arm says that it is ready", _WATCH,
             "row[0], row[1], row[2], row[3] = s.state,",
             "row[0], row[1], row[2], row[3] = max(1, s.state % 3),", "stop_topic"),
+    _mutant("clock_kept", "a slave keeps the clock of its start, however wrong that was", _SLAVE,
+            "self.epoch_ns = offset_ns", "pass", schedule=Schedule("recovery", (
+                (1.3, "kill", "slave_side", 1.0, 0.5), (2.57, "clock step", "", 0.5, 0.91)))),
     _mutant("late_reports", "a restarted slave reports late what it is", _SLAVE,
             "        before = self._reported\n        super().send_report",
             "        if self._turns < 2000:\n            return\n        before = self._reported\n"
-            "        super().send_report", seeds=(460,)),
+            "        super().send_report",
+            schedule=Schedule("told", ((2.0, "kill", "slave_side", 1.0, 0.5),))),
+    _mutant("stop_leaves_moves", "a stop leaves a move active (as in dimos #3004 and "
+            "Universal_Robots_ROS_Driver #68)", "slave/operation/states.py",
+            "    if follower != _ENABLED:\n        s.is_busy",
+            "    if follower not in (_ENABLED, _FAULT):\n        s.is_busy",
+            schedule=Schedule("motion", (
+                (1.0, "command", "", 0.1, 0.28), (1.15, "press", "", 0.5, 0.5)))),
+    _mutant("garbage_ends", "bytes that are no message end the node that reads them",
+            "nodes/streams.py", "            if not isinstance(found, Refusal):\n                "
+            "return found\n", "            return found\n",
+            schedule=Schedule("ends", (
+                (1.0, "kill", "hand_side", 0.1, 0.5), (2.0, "garbage", "", 0.5, 0.5)))),
+    _mutant("saved_all", "a recorder whose disk is gone says that all is safe",
+            "bags/ending.py", "s ({found.message_count} of", "s ({given} of",
+            schedule=Schedule("recorded", ((2.0, "gone disk", "", 1.0, 0.5),))),
+    Mutant("losses_untold", "what waits for a recorder that stands still is lost, and not counted "
+           "(as in rosbag2 #477)",
+           (("nodes/feed.py", "len(self._feed.waiting) < MOST", "len(self._feed.waiting) < 50_000"),
+            ("nodes/feed.py", "lost = number - self._last.get(index, number - 1) - 1", "lost = 0")),
+           (), schedule=Schedule("recorded", ((2.0, "standstill", "recorder", 2.5, 0.5),))),
     _mutant("not_closed", "the recording is left open at the end", _RECORDER,
             _CLOSED, _CLOSED.replace("self._writer.close()", "pass"), "hiccup"),
 )  # fmt: skip
@@ -255,19 +311,15 @@ def drilled(
     return {one["fault"]: one["failures"] for one in found}
 
 
-def scheduled(mutant: Mutant, seeds: Sequence[int]) -> dict[str, list[str]]:
-    """Laws that a mutant breaks in random schedules, by seed."""
-    env, found = os.environ | {"PYTHONPATH": str(tree(mutant))}, {}
-    for seed in seeds:
-        command = [sys.executable, "-m", "teleop_core.cli", "drill", "--seeds", "1"]
-        command += ["--seed", str(seed)]
-        done = subprocess.run(command, check=False, capture_output=True, text=True, env=env)
-        if not any(line[:1] in {"✓", "✗"} for line in done.stdout.splitlines()):
-            raise RuntimeError((done.stdout + done.stderr)[-2000:])
-        found[f"seed {seed}"] = [
-            one for one in done.stdout.splitlines() if "✗" in one and "✗ seed" not in one
-        ]
-    return found
+def scheduled(mutant: Mutant, schedule: Schedule) -> list[tuple[str, str]]:
+    """Laws that a mutant breaks under a schedule, each with what happened."""
+    env = os.environ | {"PYTHONPATH": str(tree(mutant))}
+    given = json.dumps([schedule.seed, schedule.faults])
+    command = [sys.executable, "-c", _SCRIPT, given]
+    done = subprocess.run(command, check=False, capture_output=True, text=True, env=env)
+    if done.returncode:
+        raise RuntimeError((done.stdout + done.stderr)[-2000:])
+    return [(law, text) for law, text in json.loads(done.stdout.splitlines()[-1])]
 
 
 def hunt(mutants: Sequence[Mutant], *, is_composed: bool, is_live: bool) -> list[str]:
@@ -275,22 +327,25 @@ def hunt(mutants: Sequence[Mutant], *, is_composed: bool, is_live: bool) -> list
     missed = []
     for mutant in mutants:
         rows = mutant.rows_of(is_composed=is_composed)
-        seeds = () if is_composed or is_live else mutant.seeds
-        if not (rows or seeds):
+        schedule = None if is_composed or is_live else mutant.schedule
+        if not (rows or schedule):
             continue
         begin = time.monotonic()
         try:
-            found = scheduled(mutant, seeds)
+            found = {}
             if rows:
-                found |= drilled(mutant, rows, is_composed=is_composed, is_live=is_live)
+                found = drilled(mutant, rows, is_composed=is_composed, is_live=is_live)
+            if schedule:
+                broken = dict(scheduled(mutant, schedule))
+                found[schedule.law] = [broken[schedule.law]] if schedule.law in broken else []
         except Exception as error:  # a session that does not start is not found by its rows
             found = {}
             print(f"  {type(error).__name__}: {error}", flush=True)
         failures = [f"{row}: {text}" for row, texts in found.items() for text in texts]
-        if not failures:
+        if not failures or (schedule and not found.get(schedule.law)):
             missed.append(mutant.name)
         way, took = "composed" if is_composed else "processes", time.monotonic() - begin
-        mark = "found" if failures else "MISSED"
+        mark = "MISSED" if mutant.name in missed else "found"
         print(f"{mark} {mutant.name} ({way}, {took:.0f} s): {'; '.join(failures)}", flush=True)
     return missed
 
@@ -305,10 +360,10 @@ def check_sound(mutants: Sequence[Mutant], *, is_composed: bool, is_live: bool) 
     if len(found) < len(rows):
         wrong.append("not all rows were done")
     if not (is_composed or is_live):
-        seeds = sorted({seed for one in mutants for seed in one.seeds})
-        found = scheduled(SOUND, seeds)
-        wrong += [f"{name}: {text}" for name, texts in found.items() for text in texts]
-        print(f"sound: {len(seeds)} seeds, {sum(map(len, found.values()))} break a law", flush=True)
+        schedules = {one.schedule for one in mutants if one.schedule}
+        broken = [one for schedule in schedules for one in scheduled(SOUND, schedule)]
+        wrong += [f"{law}: {text}" for law, text in broken]
+        print(f"sound: {len(schedules)} schedules, {len(broken)} laws broken", flush=True)
     return wrong
 
 
@@ -326,8 +381,8 @@ def main() -> int:
         parser.error(f"no mutant {', '.join(sorted(unknown))}; see --list")
     if asked.is_list:
         for one in MUTANTS:
-            seeds = (f"seed {seed}" for seed in one.seeds)
-            print(f"{one.name:20} {one.text} ({', '.join((*one.rows, *seeds))})")
+            laws = () if one.schedule is None else (f"law {one.schedule.law}",)
+            print(f"{one.name:20} {one.text} ({', '.join((*one.rows, *laws))})")
         return 0
     begin, wrong = time.monotonic(), []
     for is_composed in (False, True):

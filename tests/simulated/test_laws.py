@@ -1,11 +1,17 @@
-"""Laws in schedules that no random one of the first thousands has."""
+"""Laws in schedules that no random one of the first thousands has; mutants that each law finds."""
 
+import pytest
+
+from mutants import MUTANTS, Mutant, scheduled
+from teleop_core.nodes.crews import Processes
 from teleop_core.slave.operation.states import COMMANDS
+from teleop_drill.simulation.laws import LAWS
 from teleop_drill.simulation.schedules import Fault
 from teleop_drill.simulation.seeds import run_seed
 
 _NAMES = sorted((*COMMANDS, "release"))
 HOME = (_NAMES.index("home") + 0.5) / len(_NAMES)
+FOUND_BY_LAWS = tuple(one for one in MUTANTS if one.schedule is not None)
 
 
 def test_a_stop_in_the_middle_of_a_move_leaves_nothing_to_go_on_with() -> None:
@@ -13,3 +19,41 @@ def test_a_stop_in_the_middle_of_a_move_leaves_nothing_to_go_on_with() -> None:
     found = run_seed(0, faults)
     assert not found.broken
     assert found.met["press", "ENABLED"] == 1
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("disk", ["slow", "full", "read-only", "gone"])
+def test_a_disk_that_fails_costs_what_the_recorder_says_and_harms_nobody_else(disk: str) -> None:
+    found = run_seed(0, (Fault(2.0, f"{disk} disk", "", 1.0, 0.5),))
+    assert found.broken == ()
+    assert found.looks["recorded"] == 1
+    assert found.looks["owner"] > 5000
+
+
+@pytest.mark.slow
+def test_a_recorder_that_starts_while_its_disk_is_gone_says_so() -> None:
+    """Of seed 2001, composed: the law had asked it for what it had saved."""
+    faults = (Fault(1.0, "kill", "recorder", 0.2, 0.5), Fault(1.4, "gone disk", "", 1.5, 0.5))
+    assert run_seed(2001, faults, None, Processes.ONE).broken == ()
+
+
+@pytest.mark.slow
+def test_a_slave_that_was_started_while_the_clock_was_behind_follows_once_it_is_right() -> None:
+    """Of seed 10003: it refused every command as one of the future."""
+    faults = (
+        Fault(1.3, "kill", "slave_side", 1.0, 0.5), Fault(2.57, "clock step", "", 0.5, 0.91)
+    )  # fmt: skip
+    assert run_seed(10003, faults).broken == ()
+
+
+def test_each_law_has_a_mutant_that_breaks_it() -> None:
+    assert {one.schedule.law for one in FOUND_BY_LAWS if one.schedule} == set(LAWS)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("mutant", FOUND_BY_LAWS, ids=lambda one: one.name)
+def test_a_schedule_finds_what_a_law_forbids_and_nothing_in_what_is_sound(mutant: Mutant) -> None:
+    schedule = mutant.schedule
+    assert schedule is not None
+    assert schedule.law in dict(scheduled(mutant, schedule))
+    assert run_seed(schedule.seed, [Fault(*one) for one in schedule.faults]).broken == ()

@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -159,6 +160,17 @@ def bridge(**values: int) -> ArmBridge:
 
 def home_sample(made: ArmBridge, stamp_ns: int) -> Sample:
     return Sample(made.joints.theirs, made.signals["slave_setpoint_js"].tolist(), (), (), stamp_ns)
+
+
+def test_a_bridge_that_stood_still_does_not_lead_on_an_arm_that_has_moved_meanwhile() -> None:
+    made = bridge()
+    for ms in (2, 4, 3000):  # after a standstill too, as long as it is where it was commanded
+        assert made.hear(home_sample(made, ms * MS), ms * MS)
+        assert made.command(ms * MS, 0.0, True) is not None
+    home = home_sample(made, 6000 * MS)
+    assert made.hear(replace(home, position=[q + 0.05 for q in home.position]), home.stamp_ns)
+    assert made.command(home.stamp_ns, 0.0, True) is None
+    assert "from its setpoint" in made.trouble()
 
 
 def test_a_silent_arm_server_or_setpoint_ends_the_commands() -> None:

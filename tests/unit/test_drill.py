@@ -1,6 +1,7 @@
 """Drill: what it measures, what it does to a hand, and when it is not satisfied."""
 
 import math
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from enum import Enum
@@ -401,6 +402,11 @@ def test_every_mutant_fits_the_source_and_names_rows_that_there_are(mutant: Muta
     for is_composed in (False, True):
         rows = mutant.rows_of(is_composed=is_composed)
         assert {one.name for one in drill.chosen(rows, is_composed=is_composed)} >= set(rows)
+
+
+def test_twelve_reports_of_bugs_in_public_stacks_have_a_mutant() -> None:
+    texts = " ".join(one.text for one in (*MUTANTS, *CODE_MUTANTS))
+    assert len(set(re.findall(r"[\w-]+ #\d+", texts))) >= 12
 
 
 @pytest.mark.parametrize("mutant", CODE_MUTANTS, ids=lambda one: one.name)

@@ -66,6 +66,25 @@ def test_a_teleport_moves_nothing_and_the_hand_is_followed_from_there(period_ns:
     assert np.linalg.norm(after[:3] - before[:3]) == pytest.approx(19 * 2e-4, rel=1e-6)
 
 
+@pytest.mark.parametrize("gap", [1, 25, 40, 60, 90])
+def test_a_teleport_in_a_gap_of_the_samples_moves_nothing(gap: int) -> None:
+    hand = Hand()
+    before = hand.rest()
+    hand.now_ns += (gap - 1) * TICK_NS
+    there = moved(REST, [0.1, 0.0, 0.0])
+    assert np.array_equal(hand.give(there), before)
+    assert np.allclose(hand.rest(pose=there), before, rtol=0, atol=1e-15)
+
+
+@pytest.mark.parametrize(("period", "gap"), [(1, 40), (50, 50), (50, 90)])
+def test_a_fast_hand_is_followed_through_a_gap_and_at_a_slow_rate(period: int, gap: int) -> None:
+    hand = Hand(period * TICK_NS)
+    before = hand.rest()
+    hand.now_ns += (gap - period) * TICK_NS
+    after = hand.give(moved(REST, [0.055, 0.0, 0.0]))
+    assert np.linalg.norm(after[:3] - before[:3]) == pytest.approx(0.055, rel=1e-9)
+
+
 def test_a_hand_that_moves_on_after_a_teleport_loses_that_step_and_the_next() -> None:
     hand = Hand()
     before = hand.rest()

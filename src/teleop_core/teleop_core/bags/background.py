@@ -45,6 +45,13 @@ class Background(Protocol):
             OSError: The disk takes no more.
         """
 
+    def cut(self, file: BinaryIO, size: int) -> None:
+        """Let a file end after so many bytes, and go on to write there.
+
+        Raises:
+            OSError: The disk does not.
+        """
+
 
 class System:
     """Threads and files as they are."""
@@ -60,6 +67,11 @@ class System:
     def write(self, file: BinaryIO, data: bytes | memoryview) -> int:
         """Write to a file without a buffer; how much was taken."""
         return file.write(data)
+
+    def cut(self, file: BinaryIO, size: int) -> None:
+        """Let a file end after so many bytes, and go on to write there."""
+        file.seek(size)
+        file.truncate()
 
 
 SYSTEM = System()

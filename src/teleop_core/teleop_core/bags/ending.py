@@ -8,7 +8,9 @@ from teleop_core.bags.mcap_file import McapFile
 from teleop_core.base.errors import RecordingError
 
 
-def end(path: Path, file: McapFile, start_ns: int, stopped: OSError | None) -> Exception | None:
+def end(
+    path: Path, file: McapFile, start_ns: int, stopped: OSError | None, given: int = 0
+) -> Exception | None:
     """Finish file and directory, wherever they are now.
 
     Args:
@@ -16,6 +18,7 @@ def end(path: Path, file: McapFile, start_ns: int, stopped: OSError | None) -> E
         file: What was written to it, whole chunk by whole chunk.
         start_ns: Log time at which the session started, [ns].
         stopped: What kept a chunk from being written; None if all were.
+        given: Messages that were to be written.
 
     Returns:
         What to tell who recorded; None if all is where it should be.
@@ -25,7 +28,7 @@ def end(path: Path, file: McapFile, start_ns: int, stopped: OSError | None) -> E
         what = f"all {found.message_count} messages"
     else:
         seconds = max(0, found.message_end_time - start_ns) / SECOND_NS
-        what = f"the first {seconds:.1f} s ({found.message_count} messages)"
+        what = f"the first {seconds:.1f} s ({found.message_count} of {given} messages)"
     said = f"cannot be written any further ({stopped.strerror}); " if stopped else ""
     try:
         home = _finished(path, file, start_ns)

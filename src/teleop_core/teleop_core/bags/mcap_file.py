@@ -87,7 +87,11 @@ class McapFile:
             self._metadata.append(MetadataIndex(len(start), len(record), name))
             start += record
         self._end = len(start)
-        self._write(start)
+        try:
+            self._write(start)
+        except OSError:
+            self._file.close()
+            raise
 
     def _write(self, data: bytes | bytearray) -> None:
         view = memoryview(data)
@@ -170,8 +174,7 @@ class McapFile:
 
     def _cut(self) -> None:
         """Take away what stands behind the last whole chunk."""
-        self._file.seek(self._end)
-        self._file.truncate()
+        self._background.cut(self._file, self._end)
 
     @property
     def place(self) -> Path | None:

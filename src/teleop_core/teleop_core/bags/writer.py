@@ -253,7 +253,8 @@ class BagWriter:
         except BaseException as error:  # a fault of ours: what is written stays readable
             self._failure = error
         try:
-            told = ending.end(self.path, self._mcap, self._start_ns, stopped)
+            given = sum(self.counts.values())
+            told = ending.end(self.path, self._mcap, self._start_ns, stopped, given)
             self._failure = self._failure or told
         finally:
             self._mcap.close()

@@ -6,8 +6,6 @@ where nobody records, the streams themselves, best effort and one deep.
 
 import math
 import re
-import threading
-import time
 from contextlib import suppress
 from pathlib import Path
 from types import MappingProxyType
@@ -29,7 +27,8 @@ from teleop_core.graph.topics import (
     Topic,
 )
 from teleop_core.kernels.geometry import Array
-from teleop_core.middleware.world import Owner, Qos, WorldEndedError
+from teleop_core.middleware.ros import ROS
+from teleop_core.middleware.world import Owner, Qos, World, WorldEndedError
 from teleop_core.nodes.display import SEEN, displayed
 from teleop_core.nodes.observer import WARNING, Observer
 from teleop_core.nodes.operation import StopButton
@@ -47,6 +46,11 @@ _PRESS = 0.12  # of a button [s]
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}")
 
 
+def _now(owner: Owner) -> float:
+    """Time of a clock that never goes back [s]."""
+    return 1e-9 * owner.world.monotonic_ns()
+
+
 class _Seen:
     """Newest sample of one stream of one arm."""
 
@@ -54,7 +58,7 @@ class _Seen:
         self.topic, self._joints = topic, arm.robot.joint_names
         self._layout: Layout = layout(topic, self._joints)
         self._owner, self._own = owner, topic.of_arm(arm.name)
-        self._name, self._since = displayed(self._own).name, time.monotonic()
+        self._name, self._since = displayed(self._own).name, _now(owner)
         self._subscription = Subscription(owner, self._own, self._name, 1)
 
     def take(self, view: ArmView) -> bool:
@@ -76,8 +80,8 @@ class _Seen:
     def _find_another(self) -> None:
         """Read the stream itself where nobody says it again."""
         is_slow = self._name.startswith("/display/")
-        if is_slow and time.monotonic() - self._since > _SILENCE:
-            self._since = time.monotonic()
+        if is_slow and _now(self._owner) - self._since > _SILENCE:
+            self._since = _now(self._owner)
             if not self._owner.ros.count_publishers(self._name):
                 self._subscription.close()
                 self._name = f"/{self._own.name}"
@@ -95,6 +99,7 @@ class LiveLink(Observer):
         title: What it is called.
         patience: Time in which an arm must be found [s].
         button: Stop button that may have been pressed before the arm was found; None: a new one.
+        world: Where it is.
 
     Raises:
         SessionError: There is no arm on this domain, or one does not say which robot it is.
@@ -104,17 +109,16 @@ class LiveLink(Observer):
 
     def __init__(
         self, domain: int, title: str = "", patience: float = PATIENCE,
-        button: StopButton | None = None,
+        button: StopButton | None = None, world: World = ROS,
     ) -> None:  # fmt: skip
-        super().__init__(domain, "teleop_console", button, start_parameter_services=False)
+        super().__init__(domain, "teleop_console", button, world, start_parameter_services=False)
         self.domain = domain
         self._executor = self.world.executor()
         self._executor.add_node(self.ros)
         self._is_closed = False
-        self._thread = threading.Thread(target=self._spin, name="console link", daemon=True)
+        self._thread = self.world.thread("console link", self._spin)
         self._thread.start()
-        self._lock = threading.Lock()
-        self._pressing = threading.Lock()
+        self._lock, self._pressing = self.world.lock(), self.world.lock()
         self._clients: dict[str, Any] = {}
         self._client, self._events = ParameterClient(self), ParameterEvents(self)
         self._known: dict[tuple[str, str], ParameterInfo] = {}
@@ -145,17 +149,17 @@ class LiveLink(Observer):
 
     def _find(self, patience: float) -> None:
         """Find arms and their robots."""
-        end, suffix, names = time.monotonic() + patience, f"/{SLAVE_OPERATION.name}", set[str]()
+        end, suffix, names = _now(self) + patience, f"/{SLAVE_OPERATION.name}", set[str]()
         while not names:
             topics = self.ros.get_topic_names_and_types()
             names = {name.removesuffix(suffix).strip("/") for name, _ in topics
                      if name.endswith(suffix)}  # fmt: skip
-            if not names and time.monotonic() > end:
+            if not names and _now(self) > end:
                 raise SessionError(
                     f"no arm answers on ROS domain {self.domain}; `teleop live` says which is its "
                     "own, --domain N names another"
                 )
-            time.sleep(0.02)
+            self.world.sleep(0.02)
         self.arms = tuple(Arm(name, self._robot(name)) for name in sorted(names))
         self._seen = {arm.name: [_Seen(self, t, arm) for t in SEEN] for arm in self.arms}
         self._told = {
@@ -167,7 +171,7 @@ class LiveLink(Observer):
         }  # fmt: skip
         self._hands = {arm.name: _Hand(self, arm.name) for arm in self.arms}
         self._view = View(arms={arm.name: ArmView() for arm in self.arms})
-        self._begun = self._heard = time.monotonic()
+        self._begun = self._heard = _now(self)
 
     def _robot(self, arm: str) -> Robot:
         slave = "/".join(filter(None, (arm, "slave")))
@@ -195,7 +199,7 @@ class LiveLink(Observer):
     def view(self) -> View:
         """What is known now."""
         with self._lock:
-            view, now = self._view, time.monotonic()
+            view, now = self._view, _now(self)
             for arm in self.arms:
                 taken = [seen.take(view.arms[arm.name]) for seen in self._seen[arm.name]]
                 if any(taken):
@@ -246,7 +250,7 @@ class LiveLink(Observer):
             if name not in self._clients:
                 self._clients[name] = self.ros.create_client(Trigger, name)
         try:
-            answer = call(self._clients[name], Trigger.Request(), PATIENCE)
+            answer = call(self.world, self._clients[name], Trigger.Request(), PATIENCE)
         except SessionError as error:
             return False, str(error)
         return bool(answer.success), str(answer.message)
@@ -335,7 +339,8 @@ class _Hand:
 
     def __init__(self, owner: Owner, arm: str) -> None:
         self._layout, self._pressed = layout(OPERATOR_SERVO_CP, ()), layout(OPERATOR_BUTTONS, ())
-        self._lock, self._pressing = threading.Lock(), threading.Lock()
+        self._world = owner.world
+        self._lock, self._pressing = self._world.lock(), self._world.lock()
         self._publishers = [
             owner.ros.create_publisher(
                 message_type(topic.kind.ros_type), f"/{topic.of_arm(arm).name}", Qos(depth=10)
@@ -346,20 +351,20 @@ class _Hand:
     def hold(self, pose: Array) -> None:
         """Want the stylus somewhere."""
         with self._lock:
-            data = self._layout.encode_one(time.time_ns(), np.asarray(pose, np.float64))
+            data = self._layout.encode_one(self._world.time_ns(), np.asarray(pose, np.float64))
             self._publishers[0].publish(data)
 
     def press(self, name: str) -> None:
         """Press a button and release it a moment later; presses follow one another."""
-        threading.Thread(target=self._press, args=(name,), daemon=True).start()
+        self._world.thread("press", lambda: self._press(name)).start()
 
     def _press(self, name: str) -> None:
         with self._pressing, suppress(RuntimeError):  # rclpy, once the link is closed
             self._say(np.array([0.0, name == "fixture", name == "mode"]))
-            time.sleep(_PRESS)
+            self._world.sleep(_PRESS)
             self._say(np.zeros(3))
-            time.sleep(_PRESS)  # released for as long, or two presses were one
+            self._world.sleep(_PRESS)  # released for as long, or two presses were one
 
     def _say(self, pressed: Array) -> None:
         with self._lock:
-            self._publishers[1].publish(self._pressed.encode_one(time.time_ns(), pressed))
+            self._publishers[1].publish(self._pressed.encode_one(self._world.time_ns(), pressed))

@@ -1,8 +1,6 @@
 """Parameter client: what the parameters of other nodes are, what they may be, and setting them."""
 
-import threading
 from collections.abc import Callable
-from concurrent.futures import Future
 from typing import Any
 
 from rcl_interfaces.msg import ParameterDescriptor, ParameterEvent, ParameterType
@@ -11,7 +9,7 @@ from rcl_interfaces.srv import DescribeParameters, GetParameters, ListParameters
 from teleop_core.base.errors import SessionError
 from teleop_core.console.link import ParameterInfo, Setting
 from teleop_core.middleware.ros_parameters import EVENTS, from_message, to_message
-from teleop_core.middleware.world import Client, Owner
+from teleop_core.middleware.world import Client, Owner, World
 
 PATIENCE = 3.0
 """Time that a node has for an answer [s]."""
@@ -28,7 +26,7 @@ class ParameterEvents:
     """
 
     def __init__(self, owner: Owner) -> None:
-        self._lock = threading.Lock()
+        self._lock = owner.world.lock()
         self._changed: dict[tuple[str, str], Setting] = {}
         self._own = owner.ros.create_subscription(
             ParameterEvent, "/parameter_events", self._hear, EVENTS
@@ -56,7 +54,7 @@ class ParameterClient:
     """
 
     def __init__(self, owner: Owner) -> None:
-        self._node = owner.ros
+        self._node, self._world = owner.ros, owner.world
         self._clients: dict[tuple[type, str], Client] = {}
 
     def read(self, name: str) -> dict[str, ParameterInfo]:
@@ -101,10 +99,10 @@ class ParameterClient:
         key = (kind, f"/{name}/{service}")
         if key not in self._clients:
             self._clients[key] = self._node.create_client(kind, key[1])
-        return call(self._clients[key], request, PATIENCE)
+        return call(self._world, self._clients[key], request, PATIENCE)
 
 
-def call(client: Client, request: object, patience: float) -> Any:
+def call(world: World, client: Client, request: object, patience: float) -> Any:
     """Answer of a service, asked from another thread than the executor's.
 
     Raises:
@@ -112,14 +110,14 @@ def call(client: Client, request: object, patience: float) -> Any:
     """
     if not client.wait_for_service(timeout_sec=patience):
         raise SessionError(f"{client.srv_name} is not there")
-    done: Future[Any] = Future()
+    waits = world.lock()
+    waits.acquire()
     asked = client.call_async(request)
-    asked.add_done_callback(lambda answered: done.set_result(answered.result()))
-    try:
-        return done.result(patience)
-    except TimeoutError as error:
+    asked.add_done_callback(lambda _: waits.release())
+    if not waits.acquire(True, patience):
         client.remove_pending_request(asked)
-        raise SessionError(f"{client.srv_name} does not answer") from error
+        raise SessionError(f"{client.srv_name} does not answer")
+    return asked.result()
 
 
 def _plain(value: Any) -> Setting:

@@ -123,6 +123,7 @@ class SlaveNode(TickingNode):
             step = 1e-9 * (offset_ns - self._offset_ns)
             self._offset_ns = offset_ns
             self._fail(Fault.CLOCK, abs(step), 1e-9 * _CLOCK_STEP_NS)
+        self._relate_anew(offset_ns)
         commands = self.ports.inputs[_SERVO]
         if any(entry.conflict for entry in commands):
             self._fail(Fault.PUBLISHERS)
@@ -130,6 +131,14 @@ class SlaveNode(TickingNode):
         if floods > self._floods:
             self._floods = floods
             self._fail(Fault.FLOOD)
+
+    def _relate_anew(self, offset_ns: int) -> None:
+        """Take the present clock if that of the start was behind: else no command is followed."""
+        stamp_ns, now_ns = int(self.row["slave_servo_jp_ns"]), int(self.row["now_ns"])
+        behind_ns = offset_ns - self.epoch_ns
+        if stamp_ns - now_ns > SECOND_NS > abs(stamp_ns - now_ns - behind_ns):
+            self.epoch_ns = offset_ns
+            self._fail(Fault.CLOCK, 1e-9 * behind_ns, 1e-9 * _CLOCK_STEP_NS)
 
     def _holders(self) -> tuple[bytes, ...]:
         """Stop buttons that are pressed, or missed."""

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from teleop_core.base.errors import ParameterError, RecordingError
 from teleop_core.commands.arguments import ros_module
+from teleop_core.nodes.crews import Processes
 
 if TYPE_CHECKING:
     from teleop_drill.simulation.report import Coverage
@@ -20,23 +21,24 @@ def run_schedules(arguments: argparse.Namespace) -> int:
         RecordingError: The folder for recordings exists already.
     """
     count, first, out = arguments.seeds or 1, arguments.seed, arguments.out
-    if arguments.names or arguments.short or arguments.composed or arguments.drives:
-        raise ParameterError("--seeds", count, "without names, --short, --composed and --drives")
+    if arguments.names or arguments.short or arguments.drives:
+        raise ParameterError("--seeds", count, "without names, --short and --drives")
     if (arguments.faults is not None or out is not None) and count != 1:
         raise ParameterError("--seeds", count, "1 with --faults and --out")
     if out is not None and out.exists():
         raise RecordingError(out, "exists already; choose another --out")
     ros_module("seeds", "teleop_drill.simulation")
+    processes = Processes.ONE if arguments.composed else Processes.SIDES
     if count == 1:
-        return _run_one(first, arguments.faults, out)
-    return _run_many(range(first, first + count), arguments.json)
+        return _run_one(first, arguments.faults, out, processes)
+    return _run_many(range(first, first + count), arguments.json, processes)
 
 
-def _run_one(seed: int, chosen: str | None, out: Path | None) -> int:
+def _run_one(seed: int, chosen: str | None, out: Path | None, processes: Processes) -> int:
     from teleop_drill.simulation.schedules import draw
     from teleop_drill.simulation.seeds import PROCESSES, run_seed
 
-    faults = draw(seed, PROCESSES)
+    faults = draw(seed, PROCESSES[processes])
     if chosen is not None:
         numbers = [] if chosen == "-" else chosen.split(",")
         known = [str(index) for index in range(len(faults))]
@@ -45,7 +47,7 @@ def _run_one(seed: int, chosen: str | None, out: Path | None) -> int:
         faults = tuple(faults[int(number)] for number in numbers)
     if out is not None:
         out.mkdir(parents=True)
-    found = run_seed(seed, faults, out)
+    found = run_seed(seed, faults, out, processes)
     for fault in found.faults:
         print(fault.text())
     for one in found.broken:
@@ -54,7 +56,7 @@ def _run_one(seed: int, chosen: str | None, out: Path | None) -> int:
     return 1 if found.broken else 0
 
 
-def _run_many(seeds: range, json_file: Path | None) -> int:
+def _run_many(seeds: range, json_file: Path | None, processes: Processes) -> int:
     from rich.console import Console
     from rich.progress import track
     from rich.table import Table
@@ -63,7 +65,7 @@ def _run_many(seeds: range, json_file: Path | None) -> int:
     from teleop_drill.simulation.seeds import run_seeds, shrink
 
     console, coverage = Console(), Coverage()
-    for found in track(run_seeds(seeds), "schedules", len(seeds), console=console):
+    for found in track(run_seeds(seeds, None, processes), "schedules", len(seeds), console=console):
         coverage.add(found)
         for one in found.broken:
             for line in told(found, shrink(found, one.law), one.law):

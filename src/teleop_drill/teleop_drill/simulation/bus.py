@@ -66,8 +66,10 @@ class Bus:
         self._gids = self._orders = 0
         self.lines: dict[tuple[str, str], Line] = {}
         """Lines that are not perfect, by the names of both processes; * for any."""
-        self.seen: dict[str, Callable[[bytes], None]] = {}
+        self.seen: dict[str, Callable[[Taken], None]] = {}
         """Who sees the messages of a topic as they are sent, by its full name."""
+        self.heard: dict[str, Callable[[Reader, Taken], None]] = {}
+        """Who sees them as they are taken."""
         self._plain = Line()
         self.find = (0.07, 0.3, 1.6)
         """Least, usual and longest time in which one end finds another [s]."""

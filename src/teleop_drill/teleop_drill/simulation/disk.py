@@ -6,6 +6,7 @@ from collections import deque
 from collections.abc import Callable
 from typing import Any, BinaryIO
 
+from teleop_core.bags.background import SYSTEM
 from teleop_drill.simulation.machine import Process
 from teleop_drill.simulation.scheduler import Strand
 
@@ -70,8 +71,10 @@ class Disk:
 
     def write(self, file: BinaryIO, data: bytes | memoryview) -> int:
         """Write, as far as the process may; raises OSError."""
-        room, scheduler = self._process.room, self._process.machine.scheduler
+        scheduler = self._process.machine.scheduler
         scheduler.sleep(self._process.disk_delay + 1e-9 * _BYTE_NS * len(data))
+        self._insist()
+        room = self._process.room
         if room is None:
             return file.write(data)
         taken = file.write(data[: max(0, room)])
@@ -79,3 +82,12 @@ class Disk:
         if not taken:
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
         return taken
+
+    def cut(self, file: BinaryIO, size: int) -> None:
+        """Let a file end after so many bytes, if the disk lets it; raises OSError."""
+        self._insist()
+        SYSTEM.cut(file, size)
+
+    def _insist(self) -> None:
+        if number := self._process.disk_error:
+            raise OSError(number, os.strerror(number))

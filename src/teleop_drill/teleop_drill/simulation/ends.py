@@ -68,7 +68,7 @@ class Writer:
         taken = Taken(data, self.sender, self.number, now_ns + bus.offset_of(self.process), 0)
         self.history.append(taken)
         if self.topic in bus.seen:
-            bus.seen[self.topic](data)
+            bus.seen[self.topic](taken)
         for link in self.links:
             if link.writer_knows_ns <= now_ns and not link.awaits_last:
                 bus.carry(self, link, taken)
@@ -119,6 +119,8 @@ class Reader:
         if not ready or not self.is_open:
             return None
         came_ns, _, taken = ready.popleft()
+        if self.topic in self._bus.heard:
+            self._bus.heard[self.topic](self, taken)
         return taken._replace(came_ns=came_ns + self._bus.offset_of(self.process))
 
     def wait(self, seconds: float) -> None:
@@ -138,6 +140,14 @@ class Reader:
             self._bus.scheduler.wake(self.waiting)
         if self.told is not None:
             self.told()
+
+    def waits(self, least: int) -> int:
+        """Messages that have come and are kept; 0 where not more than so many may be."""
+        if len(self._ready) + len(self.coming) <= least:
+            return 0
+        now_ns = self._bus.scheduler.now_ns
+        came = len(self._ready) + sum(entry[0] <= now_ns for entry in self.coming)
+        return came if self.qos.keeps_all else min(came, self.qos.depth)
 
     def close(self) -> None:
         """Stop listening."""

@@ -1,5 +1,7 @@
 """Laws: what must hold whatever goes wrong, judged by who sees all at once."""
 
+import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -7,18 +9,25 @@ from typing import Any
 import numpy as np
 
 from teleop_core.bags.messages import layout
-from teleop_core.bags.reader import Bag
+from teleop_core.bags.reader import Bag, recover
 from teleop_core.graph.signals import DT
 from teleop_core.graph.topics import NO_COMMAND_NS, SLAVE_SETPOINT_JS
 from teleop_core.kernels.geometry import Array
+from teleop_core.middleware.world import Taken
 from teleop_core.slave.commands import CommandStatus
 from teleop_core.slave.operation import State
 from teleop_drill.drill.numbers import Numbers
 from teleop_drill.simulation.machine import Process
+from teleop_drill.simulation.owner import Owner
 from teleop_drill.simulation.stage import Stage
 
 _LOOK_NS = 5_000_000
+_BAD = ("error", "fatal")
+_NO_DISK = "cannot be written"
+_SAFE = re.compile(r"the first [\d.]+ s \((\d+) of \d+ messages\)")
 _SLACK = 1e-6
+_CURVED = 1e-2
+"""Share by which the tip's way in a tick exceeds that of joints whose steps were shortened."""
 _TELL = 0.3
 """Time within which the operator is told a new state [s], of the time in which the arm works."""
 _OBEY = 0.1
@@ -31,8 +40,13 @@ _JOINING = 20
 """Setpoints in which one that was enabled goes to where the arm is, by no command."""
 _AFTER_STEP_NS = 5_000_000_000
 """Time for which stamps of before a step of the clock may come [ns]."""
-_QUEUES = 20_000
-"""Messages that may wait anywhere."""
+_QUEUES = 2500
+"""Messages that may wait anywhere: what the recorder's longest queue holds, and some."""
+LAWS = (
+    "speed", "tool speed", "motion", "told", "stop", "owner", "age", "ends", "queues", "recorded",
+    "recovery",
+)  # fmt: skip
+"""Names of all laws."""
 
 
 @dataclass(frozen=True)
@@ -48,6 +62,12 @@ class Broken:
     law: str
     at: float
     text: str
+
+
+def _saved(said: Sequence[str]) -> int | None:
+    """Messages that a recorder has said to be safe when its disk failed; None if it has not."""
+    found = [_SAFE.search(text) for text in said]
+    return next((int(one[1]) for one in reversed(found) if one), None)
 
 
 class Laws:
@@ -66,10 +86,12 @@ class Laws:
         self._stage, self._numbers = stage, numbers
         self._scheduler = stage.machine.scheduler
         self._form = layout(SLAVE_SETPOINT_JS, stage.robot.joint_names)
+        self._owner = Owner(stage.bus, numbers.command_timeout)
         self.broken: dict[str, Broken] = {}
         self.looks: dict[str, int] = {}
         self.begin_ns = self._scheduler.now_ns
-        self._last: tuple[Array, Process | None] | None = None
+        self._last: tuple[Array, Array, Process | None] | None = None
+        """Newest setpoint: joints, the tip's place, and whose it is."""
         self._braking = float(np.max(numbers.speed_limit / numbers.braking))
         self._slave: Any = None
         self._process: Process | None = None
@@ -95,22 +117,35 @@ class Laws:
 
     # -- at every setpoint -----------------------------------------------------------------------
 
-    def _judge_setpoint(self, data: bytes) -> None:
+    def _judge_setpoint(self, taken: Taken) -> None:
         self._sent_ns.append(self._stage.world.time_ns())
-        found = self._form.decode_one(data)
+        found = self._form.decode_one(taken.data)
         slave = self._stage.session.node("slave")
         if found is None or slave is None:
             self._last = None
             return
         q = np.array(found[1][: self._stage.robot.n])
-        process = self._stage.session.process_of("slave")
-        if self._last is not None and self._last[1] is process:
-            self._judge_speed(q - self._last[0])
+        tip, process = self._stage.robot.fk(q)[:3, 3], self._stage.session.process_of("slave")
+        self._judge_owner(slave, process, found[0])
+        if self._last is not None and self._last[2] is process:
+            self._judge_speed(q - self._last[0], float(np.linalg.norm(tip - self._last[1])))
             if slave.row["command_status"] == CommandStatus.FRESH:  # else it may brake still
                 self._judge_age(found[0], bool((q != self._last[0]).any()))
-        self._last, self._stage.has_command = (q, process), found[0] != NO_COMMAND_NS
+        self._last, self._stage.setpoint = (q, tip, process), q
 
-    def _judge_speed(self, step: Array) -> None:
+    def _judge_owner(self, slave: Any, process: Process | None, stamp_ns: int) -> None:
+        """One sender leads at a time."""
+        self._count("owner")
+        is_driven = slave.stage is not None and slave.stage.motion.source == "velocity"
+        if wrong := self._owner.judge(process, stamp_ns, is_driven=is_driven):
+            self._break("owner", wrong)
+        self._stage.commanded_ns = self._owner.followed_ns
+
+    def _judge_speed(self, step: Array, way: float) -> None:
+        self._count("tool speed")
+        most = self._numbers.tool_speed
+        if way > most * DT * (1.0 + _CURVED):
+            self._break("tool speed", f"the tip was sent at {way / DT:.3g} m/s, at most {most:.3g}")
         self._count("speed")
         speed = np.abs(step) / DT
         if (speed > self._numbers.speed_limit * (1.0 + _SLACK)).any():
@@ -203,7 +238,9 @@ class Laws:
         for process in self._stage.session.running.values():
             if process.is_dead and process not in self._stage.killed:
                 self._stage.killed.add(process)
-                said = [one.text for one in self._stage.machine.log if one.level == "fatal"]
+                said = [one.text for one in self._stage.machine.log if one.level in _BAD]
+                if process in self._stage.lost_disk and _NO_DISK in "".join(said[-1:]):
+                    continue  # what it has saved is judged at the end
                 self._break("ends", f"{process.name} has ended: {' '.join(said[-1:])[-300:]}")
 
     def _judge_queues(self) -> None:
@@ -211,21 +248,36 @@ class Laws:
         self._count("queues")
         for readers in self._stage.bus.readers.values():
             for reader in readers:
-                if len(reader.coming) > _QUEUES and not reader.process.is_stopped:
-                    self._break("queues", f"{len(reader.coming)} messages of {reader.topic} wait")
+                if not reader.process.is_stopped and reader.waits(_QUEUES) > _QUEUES:
+                    count = reader.waits(_QUEUES)
+                    self._break("queues", f"{count} messages of {reader.topic} wait")
+        for process in self._stage.session.running.values():
+            count = max(map(len, process.due), default=0)
+            if count > _QUEUES and not (process.is_stopped or process.is_dead):
+                self._break("queues", f"{count} calls wait in {process.name}")
 
     # -- at the end ------------------------------------------------------------------------------
 
     def judge_recording(self, path: Path) -> None:
-        """What was sent is recorded, or counted as lost.
+        """What was sent is recorded, or counted as lost; of a disk that failed, what was saved.
 
         Args:
-            path: A recording whose recorder ended in order, while no clock was stepped.
+            path: A recording whose recorder was not killed, while no clock was stepped.
         """
         self._count("recorded")
+        said = [one.text for one in self._stage.machine.log if str(path) in one.text]
+        saved = _saved(said) if self._stage.lost_disk else None
+        if saved == 0:
+            return
+        if saved is not None:
+            path, count = recover(path)
+            if count != saved:
+                self._break("recorded", f"{saved} messages were said to be safe, {count} are")
         kept_ns = Bag(path).read(SLAVE_SETPOINT_JS).log_ns
         sent_ns = np.array(self._sent_ns)
         begin_ns, end_ns = int(kept_ns[0]) + _FOUND_NS, int(sent_ns[-1]) - _ON_THE_WAY_NS
+        if saved is not None:
+            end_ns = int(kept_ns[-1]) - _ON_THE_WAY_NS
         kept, sent = (
             int(np.sum((begin_ns < times) & (times < end_ns))) for times in (kept_ns, sent_ns)
         )

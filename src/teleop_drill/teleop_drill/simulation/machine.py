@@ -1,6 +1,7 @@
 """Machine: simulated processes, what may become of them, and the sockets between them."""
 
 import traceback
+from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
@@ -55,6 +56,10 @@ class Process(Turns):
         """Bytes that it may write still; None: as many as it likes."""
         self.disk_delay = 0.0
         """What each of its writes waits for the disk [s]."""
+        self.disk_error = 0
+        """Number of the error that its writes meet; 0: none."""
+        self.due: list[deque[Callable[[], object]]] = []
+        """What waits for each of its executors."""
         self.lines: list[SocketEnd] = []
         self.listeners: list[Listener] = []
         self.on_end: list[Callable[[bool], None]] = []

@@ -9,16 +9,17 @@ from teleop_core.middleware.ros_messages import read_message, write_message
 from teleop_core.middleware.world import Endpoint, Qos
 from teleop_drill.simulation.bus import Bus
 from teleop_drill.simulation.ends import Reader, Service, Writer
-from teleop_drill.simulation.machine import Machine, Process, Said
+from teleop_drill.simulation.machine import Process, Said
 from teleop_drill.simulation.scheduler import Strand
 
 
 class SimulatedExecutor:
     """As of :class:`~teleop_core.middleware.world.Executor`."""
 
-    def __init__(self, machine: Machine) -> None:
-        self._scheduler = machine.scheduler
+    def __init__(self, process: Process) -> None:
+        self._scheduler = process.machine.scheduler
         self._due: deque[Callable[[], object]] = deque()
+        process.due.append(self._due)
         self._waiting: Strand | None = None
 
     def add_node(self, node: Any) -> None:

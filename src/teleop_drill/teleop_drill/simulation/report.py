@@ -3,6 +3,7 @@
 from collections import Counter
 from dataclasses import dataclass, field
 
+from teleop_core.nodes.crews import Processes
 from teleop_core.slave.operation import State
 from teleop_drill.simulation.schedules import KINDS
 from teleop_drill.simulation.seeds import Found
@@ -60,8 +61,10 @@ def told(found: Found, shortest: Found, law: str) -> list[str]:
     """
     (one,) = (broken for broken in shortest.broken if broken.law == law)
     kept = ",".join(str(found.faults.index(fault)) for fault in shortest.faults)
+    way = " --composed" if found.processes is Processes.ONE else ""
     return [
         f"seed {found.seed} breaks `{law}`, {one.at:.3f} s after the arm followed: {one.text}",
         *(f"    {fault.text()}" for fault in shortest.faults),
-        f"    again: teleop drill --seeds 1 --seed {found.seed} --faults {kept or '-'} --out DIR",
+        f"    again: teleop drill --seeds 1 --seed {found.seed}{way} --faults {kept or '-'} "
+        "--out DIR",
     ]

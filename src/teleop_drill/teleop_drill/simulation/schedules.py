@@ -1,5 +1,6 @@
 """Schedules: faults and commands at random times, drawn from a seed."""
 
+import errno
 from collections.abc import Callable
 from dataclasses import dataclass
 from random import Random
@@ -15,6 +16,9 @@ from teleop_drill.simulation.stage import Stage
 BEGIN, END = 1.0, 9.0
 """Within this time of a session all faults begin [s]."""
 _LONGEST = 3.0  # that one lasts [s]
+_NAMES = sorted((*COMMANDS, "release"))
+_LEADS = {"": 8, "disable": 2, "kill": 3, "pause": 4, "press": 2}
+"""What goes before a fault, and how often: the more, the seldomer faults met what follows."""
 _CLOCK_NS = (200_000_000, 3_600_000_000_000)
 
 
@@ -47,7 +51,10 @@ Act = Callable[[Stage, Fault], Callable[[], None] | None]
 
 
 def draw(seed: int, processes: tuple[str, ...]) -> tuple[Fault, ...]:
-    """One to five faults of a seed, in the order of their times.
+    """One to five faults of a seed, and commands before them, in the order of their times.
+
+    Before more than half of them somebody brings the arm out of ENABLED, in which nearly all would
+    meet it otherwise.
 
     Args:
         seed: What they are drawn from.
@@ -59,8 +66,18 @@ def draw(seed: int, processes: tuple[str, ...]) -> tuple[Fault, ...]:
         kind = random.choice(sorted(KINDS))
         where = random.choice(processes) if kind in _OF_PROCESS else ""
         seconds = min(_LONGEST, random.expovariate(1.0))
-        faults.append(Fault(random.uniform(BEGIN, END), kind, where, seconds, random.random()))
+        fault = Fault(random.uniform(BEGIN, END), kind, where, seconds, random.random())
+        (lead,) = random.choices(list(_LEADS), list(_LEADS.values()))
+        faults += [*_led(lead, fault.at - random.uniform(0.2, 0.6), processes), fault]
     return tuple(sorted(faults, key=lambda fault: fault.at))
+
+
+def _led(lead: str, at: float, processes: tuple[str, ...]) -> list[Fault]:
+    """What brings the arm into another state."""
+    if lead in COMMANDS:
+        return [Fault(at, "command", "", 0.1, (_NAMES.index(lead) + 0.5) / len(_NAMES))]
+    where = processes[-2] if lead == "kill" else ""  # the slave's: the recorder's is the last
+    return [Fault(at, lead, where, 1.0, 0.5)] if lead else []
 
 
 def _stop(stage: Stage, fault: Fault) -> Callable[[], None]:
@@ -72,7 +89,7 @@ def _stop(stage: Stage, fault: Fault) -> Callable[[], None]:
 
 def _kill(stage: Stage, fault: Fault) -> Callable[[], None]:
     stage.kill(fault.where)
-    return lambda: None
+    return lambda: stage.restart(fault.where)
 
 
 def _crowd(stage: Stage, fault: Fault) -> Callable[[], None]:
@@ -121,6 +138,10 @@ def _disk(stage: Stage, fault: Fault) -> Callable[[], None]:
     return lambda: setattr(process, "disk_delay", 0.0)
 
 
+def _failing_disk(error: int) -> Act:
+    return lambda stage, _: stage.fail_disk(error)
+
+
 def _press(stage: Stage, fault: Fault) -> Callable[[], None]:
     button = int(1e6 * fault.amount) % 2
     stage.press(button, is_pressed=True)
@@ -128,20 +149,34 @@ def _press(stage: Stage, fault: Fault) -> Callable[[], None]:
 
 
 def _command(stage: Stage, fault: Fault) -> None:
-    names = sorted((*COMMANDS, "release"))
-    stage.command(names[int(fault.amount * len(names)) % len(names)])
+    stage.command(_NAMES[int(fault.amount * len(_NAMES)) % len(_NAMES)])
 
 
 def _drive(stage: Stage, fault: Fault) -> Callable[[], None]:
-    """Drive the joints as a client of CRTK does, far faster than they may go."""
-    speeds = np.sin(np.arange(1.0, stage.robot.n + 1.0) * (1.0 + 9.0 * fault.amount)) * 5.0
-    return stage.every(0.01, lambda: stage.drive(speeds))
+    """Drive the joints as a client of CRTK does, far faster than they may go.
+
+    As long as the hand's commands come, the arm refuses others: who drives it silences these.
+    """
+    drives = stage.robot.drives
+    assert drives is not None
+    speeds = np.sin(np.arange(1.0, stage.robot.n + 1.0) * (1.0 + 9.0 * fault.amount))
+    speeds *= 3.0 * drives.speed_limit
+    stage.lead(by_hand=False)
+    stop = stage.every(0.01, lambda: stage.drive(speeds))
+
+    def give_back() -> None:
+        stop()
+        stage.lead(by_hand=True)
+
+    return give_back
 
 
 def _intrude(stage: Stage, fault: Fault) -> Callable[[], None]:
-    """Command the joints as another publisher of the same topic does."""
-    form = layout(SLAVE_SERVO_JP, stage.robot.joint_names)
-    place = stage.robot.home + 0.3 * np.sin(np.arange(stage.robot.n) + 10.0 * fault.amount)
+    """Command the joints beside where they are, as another publisher of the same topic does."""
+    form, drives = layout(SLAVE_SERVO_JP, stage.robot.joint_names), stage.robot.drives
+    assert drives is not None
+    off = 0.05 * np.sin(np.arange(stage.robot.n) + 10.0 * fault.amount)
+    place = stage.setpoint + off * drives.speed_limit
 
     def send() -> None:
         stage.publish(SLAVE_SERVO_JP, form.encode_one(stage.world.time_ns(), place))
@@ -178,6 +213,9 @@ KINDS: dict[str, Act] = {
     "clock step": _clock,
     "clock drift": _drift,
     "slow disk": _disk,
+    "full disk": _failing_disk(errno.ENOSPC),
+    "read-only disk": _failing_disk(errno.EROFS),
+    "gone disk": _failing_disk(errno.EIO),
     "press": _press,
     "command": _command,
     "drive": _drive,

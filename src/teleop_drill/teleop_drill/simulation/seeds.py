@@ -11,6 +11,9 @@ from functools import partial
 from multiprocessing import get_context
 from pathlib import Path
 
+from teleop_core.graph.graph import RECORDER_NAME
+from teleop_core.nodes.crews import Processes
+from teleop_core.nodes.start import SESSION
 from teleop_core.session import api
 from teleop_core.slave.operation import State
 from teleop_drill.drill import hand
@@ -22,14 +25,18 @@ from teleop_drill.simulation.scheduler import BEGIN_NS, Scheduler
 from teleop_drill.simulation.schedules import KINDS, Fault, draw
 from teleop_drill.simulation.stage import Stage
 
-PROCESSES = ("hand_side", "slave_side", "recorder")
-"""What a schedule may befall."""
+PROCESSES = {
+    Processes.SIDES: ("hand_side", "slave_side", RECORDER_NAME),
+    Processes.ONE: (SESSION, RECORDER_NAME),
+}
+"""What a schedule may befall, by how the nodes are shared out."""
 _START, _CURED = 20.0, 15.0
 """Time in which the arm must follow, at first and after all is cured [s]."""
 _CIRCLE = (
     "operator.kind=circle", f"operator.size=[{2 * hand.RADIUS}, 0.0, {2 * hand.RADIUS}]",
     f"operator.period={hand.ROUND}", "operator.approach_time=1.0", "operator.patience=0.0",
-    "operator.rotation=0.0",
+    "operator.rotation=0.0", "slave.operation.tool_speed=0.5",
+    "slave.start_speed=1.0",
 )  # fmt: skip
 _PER_CHILD = 25  # sessions of one process of this machine: what was killed in them stays
 
@@ -41,6 +48,7 @@ class Found:
     Attributes:
         seed: Of everything.
         faults: What was done.
+        processes: How the nodes were shared out.
         broken: Laws that did not hold.
         met: How often each fault met each state of the arm.
         looks: How often each law was looked at.
@@ -49,46 +57,51 @@ class Found:
 
     seed: int
     faults: tuple[Fault, ...]
+    processes: Processes = Processes.SIDES
     broken: tuple[Broken, ...] = ()
     met: Counter[tuple[str, str]] = field(default_factory=Counter)
     looks: Counter[str] = field(default_factory=Counter)
     seconds: float = 0.0
 
 
-def run_seed(seed: int, faults: Sequence[Fault] | None = None, folder: Path | None = None) -> Found:
+def run_seed(
+    seed: int, faults: Sequence[Fault] | None = None, folder: Path | None = None,
+    processes: Processes = Processes.SIDES,
+) -> Found:  # fmt: skip
     """Run one schedule.
 
     Args:
         seed: Of the machine, and of the schedule if none is given.
         faults: The schedule.
         folder: Where its recording goes; None: nowhere.
+        processes: How the nodes are shared out: by side, or all but the recorder in one.
     """
-    planned = draw(seed, PROCESSES) if faults is None else tuple(faults)
+    planned = draw(seed, PROCESSES[processes]) if faults is None else tuple(faults)
     with tempfile.TemporaryDirectory(prefix="drill_") as place:
         machine = Machine(Scheduler(seed))
         bus = Bus(machine.scheduler)
         try:
             found: Found = machine.run(
-                lambda owner: _Run(bus, owner, seed, planned, folder or Path(place)).run()
+                lambda owner: _Run(
+                    bus, owner, Found(seed, planned, processes), folder or Path(place)
+                ).run()
             )
         except Exception as error:  # of one schedule, which must not end all others
             at = 1e-9 * (machine.scheduler.now_ns - BEGIN_NS)
             text = "".join(traceback.format_exception(error)[-2:])
-            found = Found(seed, planned, (Broken("runs", at, text),), seconds=at)
+            found = Found(seed, planned, processes, (Broken("runs", at, text),), seconds=at)
     return found
 
 
 class _Run:
     """One schedule."""
 
-    def __init__(
-        self, bus: Bus, owner: Process, seed: int, faults: tuple[Fault, ...], folder: Path
-    ) -> None:
+    def __init__(self, bus: Bus, owner: Process, found: Found, folder: Path) -> None:
         bus.watch(owner)
         made = api.configuration("free_motion", texts=(*_CIRCLE, "real_time.priority=20"))
         numbers = Numbers.of(made)
-        self._found, self._scheduler = Found(seed, faults), owner.machine.scheduler
-        self._stage = Stage(bus, owner, made, numbers.robot, folder)
+        self._found, self._scheduler = found, owner.machine.scheduler
+        self._stage = Stage(bus, owner, made, numbers.robot, folder, found.processes)
         self._laws = Laws(self._stage, numbers)
         self._ends: list[Callable[[], None]] = []
 
@@ -158,21 +171,24 @@ def shrink(found: Found, law: str) -> Found:
         must_look = False
         for left_out in range(len(best.faults)):
             fewer = best.faults[:left_out] + best.faults[left_out + 1 :]
-            again = run_seed(found.seed, fewer)
+            again = run_seed(found.seed, fewer, processes=found.processes)
             if any(one.law == law for one in again.broken):
                 best, must_look = again, True
                 break
     return best
 
 
-def run_seeds(seeds: Sequence[int], workers: int | None = None) -> Iterator[Found]:
-    """Run schedules on all cores, in the order in which they end.
+def run_seeds(
+    seeds: Sequence[int], workers: int | None = None, processes: Processes = Processes.SIDES
+) -> Iterator[Found]:
+    """Run schedules on all cores, in their order.
 
     Args:
         seeds: Of the schedules.
         workers: How many at once; None: one for each core.
+        processes: How the nodes are shared out.
     """
     count = workers or os.cpu_count() or 1
     context = get_context("forkserver")
     with ProcessPoolExecutor(count, context, max_tasks_per_child=_PER_CHILD) as pool:
-        yield from pool.map(run_seed, seeds)
+        yield from pool.map(partial(run_seed, processes=processes), seeds)

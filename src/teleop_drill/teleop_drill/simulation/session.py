@@ -25,6 +25,7 @@ from teleop_drill.simulation.machine import Process
 from teleop_drill.simulation.stand_ins import SimulatedWatch, Work, stand_by
 from teleop_drill.simulation.world import SimulatedWorld
 
+_LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 _START = 0.4  # of a process, until its node is made [s]
 _STARTED = 60.0  # patience with the start [s]
 _ENDED = 10.0  # patience with the end [s]
@@ -85,10 +86,12 @@ class SimulatedSession:
         for crew in (first, rest):
             new = [name for name in crew if name not in self.running or self.running[name].is_dead]
             for name in new:
-                self._launch(name, crew[name])
+                self.launch(name)
             self._await([node for name in new if name not in self._foreign for node in crew[name]])
 
-    def _launch(self, name: str, nodes: tuple[str, ...]) -> None:
+    def launch(self, name: str) -> None:
+        """Start a process, and do not wait for it."""
+        nodes = self._processes[name]
         if RECORDER_NAME in nodes:
             self.recordings.append(self._folder / f"recording_{len(self.recordings) + 1}")
             self._begun_ns.append(self.observer.world.time_ns())
@@ -246,7 +249,9 @@ def parameters_of(
         out: Directory of the recording.
         namespace: Where all nodes are, without slashes before and after it.
     """
-    content: dict[str, Any] = yaml.safe_load(parameter_file(configuration, out, namespace))
+    content: dict[str, Any] = yaml.load(
+        parameter_file(configuration, out, namespace), Loader=_LOADER
+    )
     content.pop(SESSION, None)
     return {
         name.strip("/"): flattened(node["ros__parameters"])

@@ -5,6 +5,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+from lifecycle_msgs.srv import ChangeState
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool
 from std_srvs.srv import Trigger
@@ -14,7 +15,7 @@ from teleop_core.base.errors import SessionError
 from teleop_core.graph.graph import RECORDER_NAME
 from teleop_core.graph.topics import OPERATION, SLAVE_OPERATION, TELEOP_STATE, Topic
 from teleop_core.kernels.geometry import Array
-from teleop_core.middleware.world import Qos
+from teleop_core.middleware.world import Qos, Taken
 from teleop_core.nodes.crews import Processes, crews
 from teleop_core.nodes.observer import Observer
 from teleop_core.nodes.operation import STOP_TOPIC
@@ -30,6 +31,7 @@ from teleop_drill.simulation.session import SimulatedSession
 from teleop_drill.simulation.world import SimulatedWorld
 
 _RELEASE = "release"
+_FRESH_NS = 200_000_000
 
 
 class Stage:
@@ -41,11 +43,13 @@ class Stage:
         configuration: What runs.
         robot: The slave.
         folder: Where recordings go.
+        processes: How the nodes are shared out.
     """
 
     def __init__(
-        self, bus: Bus, owner: Process, configuration: Configuration, robot: Robot, folder: Path
-    ) -> None:
+        self, bus: Bus, owner: Process, configuration: Configuration, robot: Robot, folder: Path,
+        processes: Processes = Processes.SIDES,
+    ) -> None:  # fmt: skip
         self.bus, self.machine, self.robot = bus, owner.machine, robot
         self.world = SimulatedWorld(bus, owner)
         self._executor = self.world.executor()
@@ -55,7 +59,7 @@ class Stage:
         observer = Observer(0, world=self.world)
         shared = {
             name: nodes
-            for crew in crews(configuration.graph, Processes.SIDES)
+            for crew in crews(configuration.graph, processes)
             for name, nodes in crew.items()
         }
         self.names = tuple(shared)
@@ -64,6 +68,8 @@ class Stage:
         )
         self.killed: set[Process] = set()
         """Processes that were told to end."""
+        self.lost_disk: set[Process] = set()
+        """Processes that may end for want of a disk, if they say what they have saved."""
         self.stopped: list[tuple[Process, int]] = []
         """Processes that were stopped, each with the time [ns]."""
         self.presses: list[int] = []
@@ -76,13 +82,16 @@ class Stage:
             name: self._node.create_client(Trigger, f"/slave/{name}")
             for name in (*COMMANDS, _RELEASE)
         }
+        self._hand = self._node.create_client(ChangeState, "/inverse_kinematics/change_state")
         self._publishers: dict[str, Any] = {}
         self.operation: dict[str, float] = {}
         """Newest report of the slave, by the names of its numbers."""
         self.is_following = False
         """Whether the mapping has said so."""
-        self.has_command = False
-        """Whether the newest setpoint was made from a command: else the arm goes its own way."""
+        self.setpoint: Array = robot.home
+        """Newest setpoint of the joints (n,) [rad or m]."""
+        self.commanded_ns = 0
+        """When a setpoint followed another command than the one before [ns]."""
         bus.seen[f"/{SLAVE_OPERATION.name}"] = self._note_operation
         bus.seen[f"/{TELEOP_STATE.name}"] = self._note_state
 
@@ -90,13 +99,13 @@ class Stage:
         while True:
             self._executor.spin_once()
 
-    def _note_operation(self, data: bytes) -> None:
-        found = read_numbers(data, OPERATION)
+    def _note_operation(self, taken: Taken) -> None:
+        found = read_numbers(taken.data, OPERATION)
         if isinstance(found, tuple):
             self.operation = dict(zip(OPERATION, found[1].tolist(), strict=True))
 
-    def _note_state(self, data: bytes) -> None:
-        found = read_numbers(data, TELEOP_STATE.columns)
+    def _note_state(self, taken: Taken) -> None:
+        found = read_numbers(taken.data, TELEOP_STATE.columns)
         if isinstance(found, tuple):
             self.is_following = found[1][0] > 0.0
 
@@ -110,11 +119,23 @@ class Stage:
         """Note that a process stands still from now on."""
         self.stopped.append((process, self.machine.scheduler.now_ns))
 
+    def fail_disk(self, error: int) -> Callable[[], None]:
+        """Let writes of the recorder fail by an error's number; what is returned mends the disk."""
+        process = self.process(RECORDER_NAME)
+        process.disk_error = error
+        self.lost_disk.add(process)
+        return lambda: setattr(process, "disk_error", 0)
+
     def kill(self, name: str) -> None:
-        """Kill a process, and let it be started again."""
+        """Kill a process."""
         process = self.process(name)
         self.killed.add(process)
         process.end(-9, is_orderly=False)
+
+    def restart(self, name: str) -> None:
+        """Start a process again that has ended, as who supervises it does."""
+        if self.process(name).is_dead:
+            self.session.launch(name)
 
     def press(self, button: int, *, is_pressed: bool) -> None:
         """Send a message of a stop button."""
@@ -125,6 +146,12 @@ class Stage:
     def command(self, name: str) -> None:
         """Ask the slave for something, without waiting for its answer."""
         self._clients[name].call_async(Trigger.Request())
+
+    def lead(self, *, by_hand: bool) -> None:
+        """Have what the hand commands sent to the arm or not, without waiting for the answer."""
+        request = ChangeState.Request()
+        request.transition.label = "activate" if by_hand else "deactivate"
+        self._hand.call_async(request)
 
     def drive(self, speeds: Array) -> None:
         """Send speeds (n,) of the joints [rad/s or m/s]."""
@@ -167,7 +194,8 @@ class Stage:
         """Whether the arm says that it goes where the hand leads."""
         told = self.operation
         return bool(
-            not self.session.dead() and self.is_following and self.has_command
+            not self.session.dead() and self.is_following
+            and self.machine.scheduler.now_ns - self.commanded_ns < _FRESH_NS
             and told.get("state") == State.ENABLED
             and told["is_homed"] and not told["is_busy"]
         )  # fmt: skip

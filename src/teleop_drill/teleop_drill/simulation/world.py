@@ -86,7 +86,7 @@ class SimulatedWorld:
 
     def executor(self) -> SimulatedExecutor:
         """Executor of the nodes of this process."""
-        return SimulatedExecutor(self.process.machine)
+        return SimulatedExecutor(self.process)
 
     def guest(self, domain: int | None = None) -> "SimulatedWorld":
         """The same world: there is one domain."""

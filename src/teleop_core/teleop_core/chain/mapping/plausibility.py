@@ -1,7 +1,8 @@
 """Plausibility: samples that no hand can have made move nothing.
 
 A sample is measured against the one before. What is too fast, too sudden or too far away holds the
-command, as a pressed clutch does; from the next plausible sample on the hand is followed again,
+command, as a pressed clutch does, and so does a way in a gap of the samples that is long for their
+stream; from the next plausible sample on the hand is followed again,
 from where it is then. So a teleport moves nothing, and neither do random poses.
 """
 
@@ -64,6 +65,7 @@ class PlausibilityState(Fields):
     raw: PoseRow
     raw_rate: Vector3
     raw_ns: int
+    raw_elapsed_ns: int  # from the sample before
     implausible: int
     is_doubted: int
     is_lost: int
@@ -73,6 +75,9 @@ class PlausibilityState(Fields):
 
 # Samples that come faster than this [s] are taken to be so far apart: stamps may be uneven.
 _SHORTEST = 1e-3
+# In a gap of the samples nobody sees whether a hand moves or jumps: it is given no more way than
+# its limit allows in this time [s], or in two periods of a slower stream.
+_GAP = 20e-3
 # So many messages no farther apart than this are a stream [ns]. A pause takes so many away from at
 # most twice as many: the one in which the poses were silent too leaves a stream one, two do not.
 _STREAM, _STREAM_NS = 20, 100_000_000
@@ -106,13 +111,14 @@ def is_plausible(p: PlausibilityNumbers, s: PlausibilityState, pose: Array, stam
         sudden += change * change
         s.raw_rate[i] = rate
     turn = 0.0 if is_first else _turn(s.raw[3:7], pose[3:7]) / period
+    share = min(1.0, max(_GAP, 2e-9 * s.raw_elapsed_ns) / period)
     is_sound = (
-        math.sqrt(far) <= p.hand_reach and math.sqrt(fast) <= p.hand_speed
-        and math.sqrt(sudden) <= p.hand_acceleration and turn <= p.hand_turn
+        math.sqrt(far) <= p.hand_reach and math.sqrt(fast) <= p.hand_speed * share
+        and math.sqrt(sudden) <= p.hand_acceleration and turn <= p.hand_turn * share
     )  # fmt: skip
     for i in range(7):
         s.raw[i] = pose[i]
-    s.raw_ns = stamp_ns
+    s.raw_ns, s.raw_elapsed_ns = stamp_ns, 0 if is_first else elapsed_ns
     if not is_sound:
         s.implausible += 1
     s.is_doubted = 0 if is_sound else 1

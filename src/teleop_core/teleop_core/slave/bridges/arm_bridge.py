@@ -167,6 +167,9 @@ class ControllerBridge(RunningStage):
             is_led: Whether the server has said how it is, in ``slave/operation``.
         """
         elapsed, self._sent_ns = 1e-9 * (now_ns - self._sent_ns), now_ns
+        is_late = elapsed > self.parameters.setpoint_timeout
+        if is_late and self.lead_arm.has_lost(self.hearing.position):
+            self.lead_arm.let_go("the arm has moved while nobody commanded it")
         if not self._moves(now_ns, setpoint_age, is_led, elapsed):
             return None
         joints, lead = self.joints, self.lead_arm

@@ -48,6 +48,11 @@ class Lead:
         self.waits = f"commands nothing: {reason}"
         return False
 
+    def has_lost(self, measured: Array) -> bool:
+        """Whether an arm that is led is not where it was commanded, as after it was not led."""
+        off = np.abs(measured - self.position)
+        return self.is_leading and not self._presses and not bool((off <= self.tolerance).all())
+
     def step(
         self, setpoint: Array, measured: Array, names: tuple[str, ...], elapsed: float
     ) -> bool:
