@@ -21,7 +21,7 @@ from teleop_core.chain.tasks import Act
 from teleop_core.graph.signals import STATE
 from teleop_core.graph.topics import TASK_STATE
 from teleop_core.kernels.geometry import Array
-from teleop_core.kernels.portable import length
+from teleop_core.kernels.portable import dot, length, product
 
 AHEAD = 16
 """Ticks for which it is asked at once, about a frame: the eye needs longer, so nothing is late."""
@@ -219,14 +219,14 @@ class Observer:
 
     def _half_way(self, move: _Move, until: float) -> float:
         """When the tip was seen half way [s]; infinite if it was not until then."""
-        whole = float(move.way @ move.way)
+        whole = float(dot(move.way, move.way))
         before: tuple[float, float] | None = None
         for glance in self._glances:
             if glance.time < move.begin:
                 continue
             if glance.time > until - self._p.eye:
                 break
-            gone = float((glance.tip - move.tip) @ move.way) / whole
+            gone = float(dot(glance.tip - move.tip, move.way)) / whole
             if gone >= 0.5:
                 at = glance.time
                 if before is not None and gone > before[1]:
@@ -255,9 +255,9 @@ class Observer:
         duration = max(duration, distance / gain / p.fastest)
         spread = p.noise * distance / duration
         along, noise = way / distance, self._rng.standard_normal(3)
-        ahead = along * float(along @ noise)
+        ahead = along * float(dot(along, noise))
         ended = way + spread * (ahead + p.noise_across * (noise - ahead))
-        step = self._hand_of_slave @ ended / gain
+        step = product(self._hand_of_slave, ended) / gain
         self._move = _Move(now, duration, self._place, step, tip, ended)
         self._place = self._place + step
         self._next, self._half_seen, self._is_still = now + duration, math.inf, False
