@@ -82,6 +82,7 @@ def kept(metadata: dict[str, str]) -> list[str]:
     return [key for key in metadata if key.startswith("sha256:")]
 
 
+@pytest.mark.slow
 def test_a_moved_recording_is_replayed_scored_and_drawn_as_ever_once_the_arms_folder_is_gone(
     tmp_path: Path,
 ) -> None:

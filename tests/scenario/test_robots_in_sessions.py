@@ -56,6 +56,7 @@ def test_the_mma_reads_the_hand_as_well_as_its_encoders_allow(model: str) -> Non
     assert np.abs(poses[0][:, :3] - poses[1][:, :3]).max() < 1e-4
 
 
+@pytest.mark.slow
 def test_an_option_of_a_robot_reaches_both_stages_that_need_it() -> None:
     session = VirtualTime(configure(settings=["robot=scara_stewart", "geometry=[heading=carried]"]))
     fixed = load_robot("scara_stewart")

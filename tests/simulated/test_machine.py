@@ -168,6 +168,7 @@ def test_whoever_waits_for_what_never_comes_is_told() -> None:
         machine.run(wait)
 
 
+@pytest.mark.slow
 def test_the_drill_gives_the_same_bits_in_processes_that_hash_otherwise(tmp_path: Path) -> None:
     """The same folder each time, for its name stands in the recording."""
     seen = []

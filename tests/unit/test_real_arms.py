@@ -139,6 +139,7 @@ def test_poses_beside_singular_postures_and_limits_are_reached_by_longer_searche
     assert robot.ik(robot.fk(q)).residual.max() < 1e-9
 
 
+@pytest.mark.slow
 def test_a_hand_of_noisy_readings_leads_seven_axes_past_a_shoulder_in_line(tmp_path: Path) -> None:
     """The arm keeps away from that posture, in which it fell 60 mm behind."""
     path = tmp_path / "iiwa14.urdf"
