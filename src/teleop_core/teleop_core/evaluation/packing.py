@@ -1,6 +1,7 @@
 """Packing: numbers of a page as few bytes, by differences of rounded values."""
 
 import base64
+import math
 import zlib
 from bisect import bisect_left
 from collections.abc import Sequence
@@ -118,7 +119,7 @@ def step_for(filled: Array, bits: float) -> float:
     change = min(float(np.abs(np.diff(filled, order)).mean()) if len(filled) > order else 0.0
                  for order in (1, 2))  # fmt: skip
     finest = float(np.ptp(filled)) / _LEVELS
-    wanted = max(2.0 * np.e * change * 2.0**-bits, finest)
+    wanted = max(2.0 * math.e * change * 2.0**-bits, finest)
     if not wanted:
         return 1.0
     power = int(np.floor(np.log10(wanted)))
