@@ -73,6 +73,16 @@ def test_a_stop_is_over_with_the_first_setpoint_that_stands_still(moving_for: in
     assert drill.measure.stop_delay(trace(places), since_ns) == pytest.approx((moving_for + 1) * DT)
 
 
+def test_a_tip_that_moves_on_never_rests_but_one_that_falls_silent_is_where_it_was() -> None:
+    places = np.cumsum(np.full((300, 1), 1e-3), axis=0) * np.array([[1.0, 0.0, 0.0]])
+    moving = trace(places)
+    last_ns = int(moving.sent_ns[-1])
+    since_ns = last_ns - 50_000_000
+    rest = drill.measure.rest_delay
+    assert np.isnan(rest(moving, since_ns, 0.01, last_ns + 20_000_000))
+    assert rest(moving, since_ns, 0.01, last_ns + 500_000_000) == pytest.approx(0.05)
+
+
 def test_who_never_stands_still_has_no_time_of_stopping() -> None:
     assert math.isnan(drill.measure.stop_delay(trace(np.arange(100.0)[:, None]), 1_050 * MS))
 

@@ -208,7 +208,7 @@ def _rests(exercise: Exercise, seen: Seen, numbers: Numbers, going: float) -> It
     text = "setpoints stood still after {0:.0f} ms, at most {1:.0f}"
     yield Measured("still_s", text, _or_never(still), most)
     moving = seen.true_cp.within(0, seen.end_ns)
-    rest = measure.rest_delay(moving, begin_ns, _SLOW * numbers.tip_speed)
+    rest = measure.rest_delay(moving, begin_ns, _SLOW * numbers.tip_speed, seen.end_ns)
     text = "the tip was at rest after {0:.0f} ms, at most {1:.0f}"
     yield Measured("rest_s", text, _or_never(rest), until + braking + _CALM * numbers.coast)
 

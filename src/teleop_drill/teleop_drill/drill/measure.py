@@ -15,6 +15,7 @@ _BEFORE_NS = 300_000_000
 """How long before a fault the motion is looked at."""
 JUST_BEFORE_NS = 11_000_000
 """Before a moment, time in which the present speed is measured [ns]."""
+_SILENT_NS = 100_000_000  # longer than any teller of the tip waits
 _SHORT = 10  # samples of which the present speed is taken
 _ROUNDING = 1e-12  # of a step [rad or m]
 _ENOUGH = 41  # samples from which it is told whether an arm follows
@@ -142,15 +143,26 @@ def _speeds(places: Trace) -> tuple[Array, Stamps]:
     return speeds, places.sent_ns[_SHORT:][is_later]
 
 
-def rest_delay(places: Trace, since_ns: int, slow: float) -> float:
-    """Time from a moment until the tip is slower than a speed [m/s] for good [s]; NaN if never."""
+def rest_delay(places: Trace, since_ns: int, slow: float, until_ns: int) -> float:
+    """Time from a moment until the tip is slower than a speed [m/s] for good [s]; NaN if never.
+
+    Of a tip that nobody tells any more, it is the time of its last sample.
+
+    Args:
+        places: Of the tip.
+        since_ns: The moment [ns].
+        slow: The speed [m/s].
+        until_ns: Until when it was looked at [ns].
+    """
     speeds, sent_ns = _speeds(places)
     after = sent_ns >= since_ns
     fast = np.flatnonzero(speeds[after] > slow)
     if not len(fast):
         return 0.0
     if fast[-1] + 1 >= np.sum(after):
-        return float("nan")
+        last_ns = int(sent_ns[after][-1])
+        is_told = until_ns - last_ns <= _SILENT_NS
+        return float("nan") if is_told else 1e-9 * (last_ns - since_ns)
     return 1e-9 * float(sent_ns[after][fast[-1] + 1] - since_ns)
 
 
