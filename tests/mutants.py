@@ -240,7 +240,7 @@ MUTANTS = (
             "nodes/streams.py", "            if not isinstance(found, Refusal):\n                "
             "return found\n", "            return found\n",
             schedule=Schedule("ends", (
-                (1.0, "kill", "hand_side", 0.1, 0.5), (2.0, "garbage", "", 0.5, 0.5)))),
+                (1.0, "kill", "hand_side", 1.5, 0.5), (2.0, "garbage", "", 0.5, 0.5)))),
     _mutant("saved_all", "a recorder whose disk is gone says that all is safe",
             "bags/ending.py", "s ({found.message_count} of", "s ({given} of",
             schedule=Schedule("recorded", ((2.0, "gone disk", "", 1.0, 0.5),))),
