@@ -73,6 +73,10 @@ def test_the_operator_sees_the_slave_as_late_as_the_display_says() -> None:
         age = ages - (stream.stamp_ns[is_new] - shown.bag.start_ns)
         assert np.diff(stream.stamp_ns[is_new])[1:] == pytest.approx(20_000_000, abs=1_000_000)
         assert np.median(age) == pytest.approx(1e9 * latency + 1e6, abs=1.1e6)
+        # A frame is 20 ms on the screen: half of that older than when it came.
+        seen, rate = (shown.score().value(f"display.{key}") for key in ("age_mean_ms", "rate_hz"))
+        assert seen == pytest.approx(1e-6 * np.median(age) + 10.0, abs=0.1)
+        assert rate == pytest.approx(50.0, abs=0.1)
 
 
 def test_a_display_is_dark_until_the_slave_says_where_it_is() -> None:

@@ -99,7 +99,7 @@ class Study:
             raise ParameterError("seed", tuple(self.seeds), "whole numbers >= 0 that differ")
         if not len(self.metrics):
             raise ParameterError("metrics", (), "at least one key of a score, as task.time_s")
-        known = [name for key in keys() if key.unit != "" for name in key.names()]
+        known = [name for key in keys() for name in key.names()]
         for metric in self.metrics:
             path = tuple(metric.split("."))
             if not any(key.covers(path) for key in keys()):

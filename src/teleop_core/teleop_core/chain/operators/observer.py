@@ -3,7 +3,7 @@
 Each look-move cycle is one submovement towards the goal of a task, with the noise of a fast hand.
 Its end is seen as late as display, network and eye make it, and only then the next one begins. So
 a delay slows it down by its share of the cycle, and nothing in here knows how long the delay is.
-Where the constants come from stands in ``docs/observer.md``.
+Where the constants come from stands in ``docs/tasks.md``.
 """
 
 import math
@@ -15,7 +15,7 @@ import numpy as np
 
 from teleop_core.base.parameters import parameter
 from teleop_core.chain.mapping.parameters import axis_map
-from teleop_core.chain.operators import Motion, Operator, Setting
+from teleop_core.chain.operators import Operator, Setting
 from teleop_core.chain.operators.shapes import minimum_jerk
 from teleop_core.chain.tasks import Act
 from teleop_core.graph.signals import STATE
@@ -25,14 +25,14 @@ from teleop_core.kernels.portable import dot, length, product
 
 AHEAD = 16
 """Ticks for which it is asked at once, about a frame: the eye needs longer, so nothing is late."""
-_GAIN, _CLUTCHED = STATE["gain"], STATE["is_clutched"]
+_GAIN = STATE["gain"]
 _NUMBER, _ACT, _GOAL, _WIDTH = (
     TASK_STATE.columns.index(name) for name in ("number", "act", "goal_x", "width")
 )
 _PRESS_TIME = 0.06  # for which the hand stays closed [s]
 _STILL_TIME, _STILL = 0.02, 0.05  # at rest: in this time [s] it goes this share of its way
 _SHORTEST = 0.1  # of a width: a way that is not worth a submovement
-_MITT = "published: MacKenzie and Ware 1993, fitted to their four times of movement"
+_FITTED = "fitted: to the four times of movement of MacKenzie and Ware 1993"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,20 +46,20 @@ class ObserverParameters:
     )  # fmt: skip
     reaction: float = parameter(
         0.25, unit="s", lower=0.0, upper=2.0, fixed=True,
-        doc="from a new goal to the first submovement", source="fitted: " + _MITT,
+        doc="from a new goal to the first submovement", source=_FITTED,
     )  # fmt: skip
     least_time: float = parameter(
         0.06, unit="s", lower=0.02, upper=1.0, fixed=True,
-        doc="duration of a submovement of no difficulty", source="fitted: " + _MITT,
+        doc="duration of a submovement of no difficulty", source=_FITTED,
     )  # fmt: skip
     time_per_bit: float = parameter(
         0.02, unit="s", lower=0.0, upper=1.0, fixed=True,
-        doc="what each bit of difficulty adds to it", source="fitted: " + _MITT,
+        doc="what each bit of difficulty adds to it", source=_FITTED,
     )  # fmt: skip
     noise: float = parameter(
         0.04, unit="s", lower=0.0, upper=0.5, fixed=True,
         doc="standard deviation of a submovement's end along its way, per mean speed",
-        source="fitted: " + _MITT + "; linear in speed: Meyer et al. 1988",
+        source=_FITTED + "; linear in speed: Meyer et al. 1988",
     )  # fmt: skip
     noise_across: float = parameter(
         0.36, lower=0.0, upper=1.0, fixed=True, doc="the same across its way, per that along it",
@@ -279,8 +279,4 @@ class Observer:
         return (last.goal - first.goal) / max(last.time - first.time, 1e-9)
 
 
-def _make(p: ObserverParameters, setting: Setting) -> Motion:
-    return Observer(p, setting)
-
-
-OBSERVER = Operator("observer", _make, ObserverParameters, ahead=AHEAD, needs=("task",))
+OBSERVER = Operator("observer", Observer, ObserverParameters, ahead=AHEAD, needs=("task",))

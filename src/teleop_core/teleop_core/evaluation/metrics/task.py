@@ -8,7 +8,7 @@ from teleop_core.evaluation.context import Context
 from teleop_core.evaluation.metric import Metric, figure, keys_of
 from teleop_core.evaluation.rows import Row, row
 from teleop_core.evaluation.windows import Window
-from teleop_core.graph.topics import DISPLAY_MEASURED_CP, TASK_STATE
+from teleop_core.graph.topics import DISPLAY_MEASURED_CP, NO_COMMAND_NS, TASK_STATE
 
 GROUP = "task"
 _ATTEMPTS, _SUCCESSES, _WAY, _OFF, _TIME = (
@@ -113,29 +113,32 @@ class DisplayMetric(Metric):
     topics = (DISPLAY_MEASURED_CP,)
 
     def __init__(self, _: Context) -> None:
-        self._logs: list[np.ndarray] = []
-        self._stamps: list[np.ndarray] = []
+        self._log_ns = self._stamp_ns = NO_COMMAND_NS  # of the newest frame
+        self._frames, self._span_s, self._seen = 0, 0.0, 0.0
 
     def add(self, window: Window) -> None:
         """Take one window."""
         shown = window.samples(DISPLAY_MEASURED_CP)
-        self._logs.append(shown.log_ns)
-        self._stamps.append(shown.stamp_ns)
+        # A stamp that is none is of a screen that is dark yet.
+        is_new = np.diff(shown.stamp_ns, prepend=self._stamp_ns) > 0
+        if not is_new.any():
+            return
+        logs = np.append(self._log_ns, shown.log_ns[is_new])
+        stamps = np.append(self._stamp_ns, shown.stamp_ns[is_new])
+        first = int(self._frames == 0)  # nothing was shown before it
+        until = 1e-9 * np.diff(logs)[first:]
+        # An age grows from the frame's arrival to that of the next one.
+        ages = 1e-9 * (logs[:-1] - stamps[:-1])[first:] + 0.5 * until
+        self._seen += float((ages * until).sum())
+        self._span_s += float(until.sum())
+        self._frames += int(is_new.sum())
+        self._log_ns, self._stamp_ns = int(logs[-1]), int(stamps[-1])
 
     def values(self) -> DisplayScore:
         """Score of everything so far."""
-        logs, stamps = (
-            np.concatenate(part or [np.empty(0, np.int64)]) for part in (self._logs, self._stamps)
-        )
-        is_new = np.diff(stamps, prepend=-1) > 0
-        logs, stamps = logs[is_new], stamps[is_new]
-        if len(logs) < 2:
+        if not self._span_s:
             return DisplayScore(None, None)
-        until = np.diff(logs)
-        # An age grows from the frame's arrival to that of the next one.
-        ages = (logs[:-1] - stamps[:-1]) + 0.5 * until
-        span = float(until.sum())
-        return DisplayScore(1e-6 * float((ages * until).sum()) / span, 1e9 * (len(logs) - 1) / span)
+        return DisplayScore(1e3 * self._seen / self._span_s, (self._frames - 1) / self._span_s)
 
     def rows(self) -> list[Row]:
         """Both; nothing without a display."""
