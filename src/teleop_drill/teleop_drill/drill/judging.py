@@ -22,6 +22,7 @@ _LEAST = 0.8
 """Share of the hand's way that an arm that goes on must go."""
 _SLOW = 0.05
 """Share of the hand's speed below which the tip is at rest."""
+_NOW_NS = 15_000_000  # over which the speed of the moment is taken
 _CALM = 10.0
 """Times :attr:`Numbers.coast` after which the loop has settled to that share: its answer to a
 setpoint that stops, of speed :math:`(1 + x - x^2) e^{-x}`, is below it from x = 6.6 on."""
@@ -248,9 +249,11 @@ def _goes_on(exercise: Exercise, seen: Seen, numbers: Numbers) -> Iterator[Measu
         measure.tips(numbers.robot.fk, seen.setpoint_js, numbers.robot.n), seen.true_cp, begin_ns
     )
     # On its circle the hand gets no farther than the diameter; what it goes while the arm stands,
-    # the circle of the arm is shifted by. An arm that has just come up from rest is off the circle
-    # by what the filter of its setpoints is behind the hand.
-    far = 2.0 * RADIUS * numbers.gain + speed * (min(stands, elapsed) + numbers.filter_time)
+    # the circle of the arm is shifted by. Behind a filter of first order the setpoint trails the
+    # command by its speed times the time constant: while it comes up from rest, by so much less.
+    now = measure.tip_speed(seen.true_cp.within(begin_ns - _NOW_NS, begin_ns))
+    coming = max(0.0, speed - now)
+    far = 2.0 * RADIUS * numbers.gain + speed * min(stands, elapsed) + coming * numbers.filter_time
     text = "the tip moved {0:.1f} mm, at most {1:.1f}"
     bound = lag + measure.RESOLUTION + min(OVERSHOOT * speed * elapsed, far)
     yield Measured("travel_m", text, measure.travel(seen.true_cp, begin_ns, end_ns), bound)
