@@ -48,7 +48,7 @@ def test_a_slave_that_was_started_while_the_clock_was_behind_follows_once_it_is_
 
 @pytest.mark.slow
 def test_an_intruder_under_a_clock_that_was_ahead_does_not_shut_the_hand_out_for_good() -> None:
-    """Of seed 21039: the slave, started anew, took commands of the future from who was there first."""
+    """Of seed 21039: the slave, started anew, took the first it heard, of the future."""
     faults = (
         Fault(6.913, "kill", "slave_side", 1.0, 0.5), Fault(7.854, "intruder", "", 1.52, 0.0658),
         Fault(8.179, "clock step", "", 0.595, 0.9609472),
