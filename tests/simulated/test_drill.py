@@ -46,7 +46,7 @@ def test_drives_that_stood_still_catch_up_as_their_loop_does_wherever_on_the_cir
     looks: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(drill, "_STEADY", looks)
-    rows = chosen(["freeze_slave_sim"], is_composed=False)
+    rows = chosen(("freeze_slave_sim",), is_composed=False)
     (found,) = simulated_drill(rows, tmp_path, lambda _: None)
     speed = found.measured("tip_speed_m_s")
     assert not found.failures()

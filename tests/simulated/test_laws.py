@@ -38,6 +38,16 @@ def test_a_recorder_that_starts_while_its_disk_is_gone_says_so() -> None:
 
 
 @pytest.mark.slow
+def test_a_recorder_says_that_a_process_was_killed_with_what_waited_in_it() -> None:
+    """Of seed 60060: it made up for a standstill, faster than its socket took what it recorded."""
+    faults = (
+        Fault(1.8555, "standstill", "teleop_session", 0.8036, 0.7),
+        Fault(2.79, "kill", "teleop_session", 1.0, 0.5),
+    )  # fmt: skip
+    assert run_seed(60060, faults, None, Processes.ONE).broken == ()
+
+
+@pytest.mark.slow
 def test_a_slave_that_was_started_while_the_clock_was_behind_follows_once_it_is_right() -> None:
     """Of seed 10003: it refused every command as one of the future."""
     faults = (

@@ -72,6 +72,7 @@ from .robots import (
 )
 from .robots.parameters import RobotParameters as RobotParameters
 from .session.configuration import Configuration as Configuration
+from .session.stepped import Observation as Observation, Session as Session, Space as Space
 from .session.virtual import VirtualTime as VirtualTime
 from .graph.row import Row as Row
 from .graph.stage import Runner as Runner, Stage as Stage, register_stage as register_stage

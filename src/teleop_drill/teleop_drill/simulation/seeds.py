@@ -124,9 +124,10 @@ class _Run:
         for process in self._stage.session.running.values():
             self._stage.killed.add(process)  # from now on they are told to
         first, was_killed = self._stage.session.recordings[0], self._was("kill", "recorder")
+        recorder = self._stage.session.node(RECORDER_NAME)
         self._stage.session.close()
         if not (was_killed or self._was("clock step") or self._was("clock drift")):
-            self._laws.judge_recording(first)
+            self._laws.judge_recording(first, {} if recorder is None else recorder.values())
         self._found.broken = tuple(self._laws.broken.values())
         self._found.looks.update(self._laws.looks)
         return self._found

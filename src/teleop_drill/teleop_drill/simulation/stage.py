@@ -68,6 +68,8 @@ class Stage:
         )
         self.killed: set[Process] = set()
         """Processes that were told to end."""
+        self.kills = 0
+        """How many processes of nodes were killed."""
         self.lost_disk: set[Process] = set()
         """Processes that may end for want of a disk, if they say what they have saved."""
         self.stopped: list[tuple[Process, int]] = []
@@ -130,6 +132,7 @@ class Stage:
         """Kill a process."""
         process = self.process(name)
         self.killed.add(process)
+        self.kills += name != RECORDER_NAME
         process.end(-9, is_orderly=False)
 
     def restart(self, name: str) -> None:
