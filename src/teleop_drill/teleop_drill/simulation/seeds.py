@@ -123,8 +123,8 @@ class _Run:
         self._found.seconds = 1e-9 * (self._scheduler.now_ns - begin_ns)
         for process in self._stage.session.running.values():
             self._stage.killed.add(process)  # from now on they are told to
-        first, was_killed = self._stage.session.recordings[0], self._was("kill", "recorder")
-        recorder = self._stage.session.node(RECORDER_NAME)
+        (first, *more), was_killed = self._stage.session.recordings, self._was("kill", "recorder")
+        recorder = None if more else self._stage.session.node(RECORDER_NAME)
         self._stage.session.close()
         if not (was_killed or self._was("clock step") or self._was("clock drift")):
             self._laws.judge_recording(first, {} if recorder is None else recorder.values())
