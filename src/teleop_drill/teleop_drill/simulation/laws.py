@@ -1,6 +1,7 @@
 """Laws: what must hold whatever goes wrong, judged by who sees all at once."""
 
 import re
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -80,6 +81,8 @@ class Laws:
     Attributes:
         broken: First breach of each law.
         looks: How often each law was looked at.
+        in_force: Kinds of the faults that are in force.
+        under: How often each law was looked at while a fault met a state of the arm.
     """
 
     def __init__(self, stage: Stage, numbers: Numbers) -> None:
@@ -88,7 +91,9 @@ class Laws:
         self._form = layout(SLAVE_SETPOINT_JS, stage.robot.joint_names)
         self._owner = Owner(stage.bus, numbers.command_timeout)
         self.broken: dict[str, Broken] = {}
-        self.looks: dict[str, int] = {}
+        self.looks: Counter[str] = Counter()
+        self.in_force: list[str] = []
+        self.under: Counter[tuple[str, str, str]] = Counter()
         self.begin_ns = self._scheduler.now_ns
         self._last: tuple[Array, Array, Process | None] | None = None
         """Newest setpoint: joints, the tip's place, and whose it is."""
@@ -113,7 +118,9 @@ class Laws:
         self.broken.setdefault(law, Broken(law, at, text))
 
     def _count(self, law: str) -> None:
-        self.looks[law] = self.looks.get(law, 0) + 1
+        self.looks[law] += 1
+        for kind in self.in_force:
+            self.under[kind, self._stage.state, law] += 1
 
     # -- at every setpoint -----------------------------------------------------------------------
 

@@ -30,6 +30,7 @@ from teleop_drill.simulation.machine import Process
 from teleop_drill.simulation.session import SimulatedSession
 from teleop_drill.simulation.world import SimulatedWorld
 
+NO_STATE = "none"
 _RELEASE = "release"
 _FRESH_NS = 200_000_000
 
@@ -192,6 +193,12 @@ class Stage:
             self.command("enable")
         elif state == State.ENABLED and not told["is_homed"] and not told["is_busy"]:
             self.command("home")
+
+    @property
+    def state(self) -> str:
+        """Name of the arm's state, as it told last; ``none`` before it told any."""
+        state = self.operation.get("state")
+        return NO_STATE if state is None else State(int(state)).name
 
     def follows(self) -> bool:
         """Whether the arm says that it goes where the hand leads."""
