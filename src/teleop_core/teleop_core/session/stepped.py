@@ -70,8 +70,7 @@ class Observation:
 class Session:
     """A session whose hand a program leads: :meth:`command`, :meth:`step`, :meth:`observe`.
 
-    >>> import teleop_core as tc
-    >>> session = tc.Session("free_motion")
+    >>> session = Session("free_motion")
     >>> begin = session.reset().measured_cp[:3]
     >>> session.command([0.0, 0.01, 0.0])  # the hand goes up by a centimetre
     >>> end = session.step(50).measured_cp[:3]  # within the first 20 ms of this second
