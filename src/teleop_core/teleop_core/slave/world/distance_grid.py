@@ -179,7 +179,7 @@ def _check_size(request: GridRequest, size: Array) -> None:
     longest = float(size.max())
     if not _SIDES[0] <= longest <= _SIDES[1]:
         text = (
-            f"so chosen that the {request.kind.replace('_', ' ')}, now {longest:.3g} m long, is between "
+            f"so that the {request.kind.replace('_', ' ')}, now {longest:.3g} m long, is between "
             f"{_SIDES[0]:g} and {_SIDES[1]:g} m long"
         )
         raise request.error("scale", request.scale, text)
