@@ -6,13 +6,13 @@ from collections.abc import Mapping
 import numpy as np
 
 from teleop_core.bags.markers import Color, Marker, Shape
-from teleop_core.chain.fixtures.box import BOX
 from teleop_core.chain.fixtures.reported_fixture import ReportedFixture, reported_fixture
-from teleop_core.chain.fixtures.sphere import SPHERE
 from teleop_core.chain.mapping.parameters import MotionScalingParameters, axis_map
 from teleop_core.kernels.geometry import Array
 from teleop_core.kernels.portable import length
 from teleop_core.session.model import MASTER, SLAVE
+from teleop_core.shapes.box import BOX
+from teleop_core.shapes.sphere import SPHERE
 
 TAIL = 200
 """Points of a path."""
