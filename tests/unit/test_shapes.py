@@ -39,6 +39,7 @@ ROUNDING = 1e-14
 TURNED = 1e-12
 # Places that are nearer to the surface are not compared with points around them [m].
 SHALLOW = 1e-6
+SOME = np.random.default_rng(3).uniform(-0.06, 0.06, (20, 3))
 EVERY = pytest.mark.parametrize("name", KINDS)
 
 
@@ -57,15 +58,17 @@ def test_every_shape_there_is_is_tried_here() -> None:
 @EVERY
 @given(st.data())
 def test_way_out_leads_to_the_surface_from_either_side(name: str, data: Any) -> None:
-    parameters, offset = data.draw(KINDS[name]), np.array(data.draw(places))
-    distance, out = found(name, parameters, offset)
+    parameters = data.draw(KINDS[name])
     off = off_by(name, parameters)
-    assert math.isclose(np.linalg.norm(out), 1.0, abs_tol=TURNED)
-    beyond = BEYOND[name](parameters, offset)
-    assert abs(beyond) <= off or (beyond > 0.0) == (distance > 0.0)
-    if distance > 0.0 or name not in THIN:
-        assert abs(found(name, parameters, offset - distance * out)[0]) <= ON_AXIS
-        assert abs(BEYOND[name](parameters, offset - distance * out)) <= off + ON_AXIS
+    for offset in (np.array(data.draw(places)), *(SOME if name != "path" else ())):
+        distance, out = found(name, parameters, offset)
+        assert math.isclose(np.linalg.norm(out), 1.0, abs_tol=TURNED)
+        beyond = BEYOND[name](parameters, offset)
+        assert abs(beyond) <= off or (beyond > 0.0) == (distance > 0.0)
+        if distance > 0.0 or name not in THIN:
+            surface = offset - distance * out
+            assert abs(found(name, parameters, surface)[0]) <= ON_AXIS
+            assert abs(BEYOND[name](parameters, surface)) <= off + ON_AXIS
 
 
 @pytest.mark.parametrize("name", [name for name in KINDS if name not in THIN])
