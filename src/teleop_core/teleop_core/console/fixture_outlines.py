@@ -14,6 +14,7 @@ from teleop_core.console.link import Setting
 from teleop_core.console.look import GOOD, WRONG
 from teleop_core.kernels.geometry import Array
 from teleop_core.shapes import SHAPES
+from teleop_core.shapes.basis.drawing import segments_of
 from teleop_core.shapes.box import BOX
 
 _STILL = 5e-5  # [m]
@@ -49,10 +50,7 @@ def unit_outline(look: Look) -> Array:
         found.size()
         fixture = found
     extent = fixture.size()
-    points = fixture.outline() / np.where(extent > _FLAT, extent, 1.0)
-    pairs = np.stack((points[:-1], points[1:]), axis=1)
-    drawn: Array = pairs[np.isfinite(pairs).all(axis=(1, 2))]
-    return drawn
+    return segments_of(fixture.outline() / np.where(extent > _FLAT, extent, 1.0))
 
 
 def scale_of(outline: Array, size: Array, gain: float) -> Array:

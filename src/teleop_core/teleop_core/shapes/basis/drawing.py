@@ -18,7 +18,7 @@ _CORNERS = np.array(
 )  # fmt: skip
 
 
-def edges_of(size: tuple[float, ...]) -> Array:
+def edges_of(size: tuple[float, ...] | Array) -> Array:
     """All edges of a box of a size (3,) [m], (16, 3) [m] around its middle, as one line."""
     edges: Array = (_CORNERS - 0.5) * np.array(size)
     return edges
@@ -57,6 +57,13 @@ def ring(middle: Array, axis: Array, radius: float) -> Array:
     angle = np.linspace(0.0, 2.0 * math.pi, 41)[:, None]
     circle: Array = middle + radius * (np.cos(angle) * first + np.sin(angle) * second)
     return circle
+
+
+def segments_of(line: Array) -> Array:
+    """Segments (N, 2, 3) between the points of a line (M, 3) whose pen is down."""
+    pairs = np.stack((line[:-1], line[1:]), axis=1)
+    drawn: Array = pairs[np.isfinite(pairs).all(axis=(1, 2))]
+    return drawn
 
 
 def with_lifts(lines: list[Array]) -> Array:
