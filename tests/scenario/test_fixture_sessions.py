@@ -16,7 +16,7 @@ SECONDS = 10.0
 SETTINGS: dict[str, dict[str, Any]] = {
     "half_space": {"fixture__half_space__normal": (0.0, -1.0, 0.0)},
     "plane": {"fixture__plane__normal": (0.0, 1.0, 0.0)},
-    "hole": {"fixture__keep_out": True},
+    "hole": {"fixture__keep_out": True, "fixture__place": (0.0, 0.0, 0.015)},
 }
 # The least of what a hand without a wall goes beyond that the wall takes away.
 HELD = 0.2
@@ -41,9 +41,10 @@ def ways(recording: tc.Recording, kind: Any) -> Any:
     offsets = hand[["x", "y", "z"]][after]
     offsets = np.ascontiguousarray(offsets - offsets[0])
     shape, given = SHAPES.find(kind), dict(SETTINGS.get(kind, {}))
-    keep_out = bool(given.pop("fixture__keep_out", False))
-    own = {name.rpartition("__")[2]: value for name, value in given.items()}
-    fixture = Fixture(shape, shape.parameters(**own), keep_out=keep_out)
+    own = ("place", "keep_out")
+    used = {name: given.pop(f"fixture__{name}") for name in own if f"fixture__{name}" in given}
+    numbers = {name.rpartition("__")[2]: value for name, value in given.items()}
+    fixture = Fixture(shape, shape.parameters(**numbers), **used)
     depths, out = zip(*(depth_of(fixture, offset) for offset in offsets), strict=True)
     return np.array(depths), np.array(out), force[["fx", "fy", "fz"]][after]
 
