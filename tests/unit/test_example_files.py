@@ -14,7 +14,7 @@ PUBLIC = {
     "teleop_core.console.app", "teleop_core.console.controls", "teleop_core.console.link",
     "teleop_core.console.recorded", "teleop_core.console.server",
     "teleop_core", "teleop_core.evaluation", "teleop_core.chain.operators",
-    "teleop_core.chain.fixtures",
+    "teleop_core.shapes",
     "teleop_core.slave.controllers", "teleop_core.robots", "teleop_core.graph.topics",
     "teleop_drill", "teleop_lab.experiments", "numpy",
     "numpy.typing", "pandas", "plotly.graph_objects",

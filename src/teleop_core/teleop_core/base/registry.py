@@ -1,9 +1,9 @@
 """Registry: parts by name, from this package, from installed packages and from the running program.
 
-Each seam (stages, operators, fixtures, controllers, robots, metrics) has one registry. An installed
+Each seam (stages, operators, shapes, controllers, robots, metrics) has one registry. An installed
 package adds parts through a Python entry-point group of the registry's name::
 
-    [project.entry-points."teleop_core.fixtures"]
+    [project.entry-points."teleop_core.shapes"]
     my_cone = "my_package.cone:CONE"
 
 A program adds them with :meth:`Registry.add`. Nothing is imported before it is asked for.
@@ -37,6 +37,7 @@ class Registry(Generic[Part]):
         trial: Tries a part that is not of the package, and raises as ``check`` does.
         package: Whose registry it is.
         others: What serves in place of a name, for messages: "FILE.urdf".
+        base: Registry whose parts are parts here too.
     """
 
     def __init__(
@@ -49,10 +50,12 @@ class Registry(Generic[Part]):
         *,
         package: str = "teleop_core",
         others: tuple[str, ...] = (),
+        base: "Registry[Part] | None" = None,
     ) -> None:
         self.kind, self.kinds, self.group = kind, kinds, f"{package}.{kinds}"
         self._builtin, self._check, self._trial = dict(builtin), check, trial
-        self._others = others
+        self._others, self._base = others, base
+        self.builtin = tuple(builtin)
         self._parts: dict[str, Part] = {}
         self._own: set[str] = set()
         self._installed: dict[str, EntryPoint] | None = None
@@ -69,7 +72,8 @@ class Registry(Generic[Part]):
 
     def names(self) -> tuple[str, ...]:
         """Names of all parts: built in, installed, added."""
-        return tuple(dict.fromkeys((*self._builtin, *self._entries(), *self._parts)))
+        base = self._base or ()
+        return tuple(dict.fromkeys((*self._builtin, *base, *self._entries(), *self._parts)))
 
     def find(self, name: str) -> Part:
         """Part of a name.
@@ -78,6 +82,8 @@ class Registry(Generic[Part]):
             UnknownNameError: No such part; the alternatives are listed.
             PartError: An installed part cannot be loaded, or is no such part.
         """
+        if self._base is not None and name in self._base.names():
+            return self._base.find(name)
         if name not in self._parts:
             part = self._check(name, self._load(name))
             if name not in self._builtin and self._trial is not None:

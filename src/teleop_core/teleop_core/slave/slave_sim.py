@@ -109,7 +109,7 @@ class SlaveSim(RunningStage):
             jacobian=pointer(
                 self.robot.kernels.jacobian if is_as_drawn else dh_kernels.jacobian, FK
             ),
-            distance=touched.distance_pointer,
+            distance=touched.pointer,
             acceleration=pointer(model.acceleration, ACCELERATION),
             gravity=pointer(model.gravity, GRAVITY),
             control=self._law.control_pointer,

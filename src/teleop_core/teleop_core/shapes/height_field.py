@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 from teleop_core.base.parameters import parameter
 from teleop_core.kernels.geometry import Array
-from teleop_core.slave.world import WorldObject
-from teleop_core.slave.world.distance_grid import DistanceGrid, GridRequest, distance_grid
-from teleop_core.slave.world.mesh import mesh_distance
+from teleop_core.shapes import Shape
+from teleop_core.shapes.basis.distance_grid import DistanceGrid, GridRequest, distance_grid
+from teleop_core.shapes.mesh import mesh_distance
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -26,9 +26,7 @@ class HeightFieldParameters:
 
 
 def _grid(p: HeightFieldParameters) -> DistanceGrid:
-    return distance_grid(
-        GridRequest(p.file, p.spacing, (), p.step, "height_field", "world.height_field")
-    )
+    return distance_grid(GridRequest(p.file, p.spacing, (), p.step, "height_field"))
 
 
 def height_field_numbers(parameters: HeightFieldParameters) -> Array:
@@ -41,6 +39,6 @@ def height_field_outline(parameters: HeightFieldParameters) -> Array:
     return _grid(parameters).outline
 
 
-HEIGHT_FIELD = WorldObject(
+HEIGHT_FIELD = Shape(
     "height_field", HeightFieldParameters, mesh_distance, height_field_outline, height_field_numbers
 )

@@ -1,6 +1,6 @@
 """Mesh: a closed surface of triangles from a file, read from a grid of distances.
 
-The distances are made once, see :mod:`teleop_core.slave.world.distance_grid`. Between the nodes
+The distances are made once, see :mod:`teleop_core.shapes.basis.distance_grid`. Between the nodes
 they are a cubic spline, so that the normal, which is its gradient, turns without a kink.
 """
 
@@ -10,9 +10,16 @@ from dataclasses import dataclass
 from teleop_core.base.parameters import parameter
 from teleop_core.kernels import inner, kernel
 from teleop_core.kernels.geometry import Array
-from teleop_core.slave.world import WorldObject
-from teleop_core.slave.world.distance_grid import EDGE, HEADER, GridRequest, distance_grid
-from teleop_core.slave.world.spline import slopes, weights
+from teleop_core.shapes import Shape
+from teleop_core.shapes.basis.directions import length_of, make_unit
+from teleop_core.shapes.basis.distance_grid import (
+    EDGE,
+    HEADER,
+    DistanceGrid,
+    GridRequest,
+    distance_grid,
+)
+from teleop_core.shapes.basis.spline import slopes, weights
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -77,44 +84,43 @@ def _gradient(
 
 
 @kernel
-def mesh_distance(offset: Array, shape: Array, normal: Array) -> float:
-    """Write the way out of a mesh (3,); returns how far a point (3,) [m] is outside.
+def mesh_distance(offset: Array, numbers: Array, out: Array) -> float:
+    """Write the way out of a mesh (3,), of length 1; returns how far a point (3,) [m] is outside.
 
     Where the distance ``f`` has a ridge (behind an edge, in the middle of the mesh) its spline has
-    a slope below 1. What is returned is ``f |∇f|``, for then a spring along the normal pushes with
+    a slope below 1. What is returned is ``f |∇f|``, for then a spring along the way out pushes with
     the gradient of ``f²``, and no way around the ridge gains energy. Beyond the grid it is the
     distance from the place of the surface that is nearest to where the grid ends.
     """
-    i, u, x = _cell(offset[0], shape, 0)
-    j, v, y = _cell(offset[1], shape, 1)
-    k, w, z = _cell(offset[2], shape, 2)
-    value = _gradient(shape, (i, j, k), (u, v, w), normal)
-    slope = math.sqrt(normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2])
+    i, u, x = _cell(offset[0], numbers, 0)
+    j, v, y = _cell(offset[1], numbers, 1)
+    k, w, z = _cell(offset[2], numbers, 2)
+    value = _gradient(numbers, (i, j, k), (u, v, w), out)
+    slope = length_of(out)
     if slope > 0.0:
-        for axis in range(3):
-            normal[axis] /= slope
+        make_unit(out)
     else:
-        normal[2] = 1.0
+        out[2] = 1.0
     if x == 0.0 and y == 0.0 and z == 0.0:
         return value * slope
-    x, y, z = x + value * normal[0], y + value * normal[1], z + value * normal[2]
-    length = math.sqrt(x * x + y * y + z * z)
-    normal[0], normal[1], normal[2] = x / length, y / length, z / length
-    return length
+    out[0], out[1], out[2] = x + value * out[0], y + value * out[1], z + value * out[2]
+    distance = length_of(out)
+    make_unit(out)
+    return distance
 
 
-def _request(p: MeshParameters) -> GridRequest:
-    return GridRequest(p.file, p.scale, p.angles, p.step)
+def _grid(p: MeshParameters) -> DistanceGrid:
+    return distance_grid(GridRequest(p.file, p.scale, p.angles, p.step))
 
 
 def mesh_numbers(parameters: MeshParameters) -> Array:
     """Numbers of the grid, as :func:`mesh_distance` takes them; raises as :func:`distance_grid`."""
-    return distance_grid(_request(parameters)).numbers
+    return _grid(parameters).numbers
 
 
 def mesh_outline(parameters: MeshParameters) -> Array:
     """Its sharp edges and three sections through its middle, (N, 3) [m]; raises as the numbers."""
-    return distance_grid(_request(parameters)).outline
+    return _grid(parameters).outline
 
 
-MESH = WorldObject("mesh", MeshParameters, mesh_distance, mesh_outline, mesh_numbers)
+MESH = Shape("mesh", MeshParameters, mesh_distance, mesh_outline, mesh_numbers)

@@ -3,22 +3,17 @@
 import math
 from dataclasses import dataclass
 
-import numpy as np
-
 from teleop_core.base.errors import ParameterError
 from teleop_core.base.parameters import parameter
 from teleop_core.kernels import inner, kernel
 from teleop_core.kernels.geometry import Array
-from teleop_core.kernels.portable import length
-from teleop_core.slave.world import WorldObject
-from teleop_core.slave.world.plane import across
-
-_ON_AXIS = 1e-12  # nearer to the axis no way from it is known [m]
+from teleop_core.shapes import Shape
+from teleop_core.shapes.basis import directions, drawing
 
 
 @dataclass(frozen=True, kw_only=True)
 class HoleParameters:
-    """A round plate and a hole through it; the object's middle is that of the hole's mouth."""
+    """A round plate and a hole through it; its middle is that of the hole's mouth."""
 
     radius: float = parameter(0.0055, unit="m", lower=1e-4, upper=1.0, doc="of the hole")
     thickness: float = parameter(0.03, unit="m", lower=1e-3, upper=1.0, doc="of the plate")
@@ -33,8 +28,7 @@ class HoleParameters:
     )  # fmt: skip
 
     def __post_init__(self) -> None:
-        if not math.hypot(*self.axis) > 0.0:
-            raise ParameterError("hole.axis", self.axis, "a direction")
+        directions.require_direction("hole.axis", self.axis)
         if not self.chamfer < self.thickness:
             text = f"less than thickness ({self.thickness:g} m)"
             raise ParameterError("hole.chamfer", self.chamfer, text)
@@ -97,50 +91,38 @@ def _section_distance(out: float, up: float, shape: Array) -> tuple[float, float
         else:
             x, z = out - rim, up - min(max(up, -thickness), 0.0)
         beyond = math.sqrt(x * x + z * z)
+        if beyond <= directions.MIDDLE:  # on a face, but for rounding
+            return _section_depth(out, up, shape)
         if beyond < distance:
             distance, way_out, way_up = beyond, x / beyond, z / beyond
     return distance, way_out, way_up
 
 
 @kernel
-def hole_distance(offset: Array, shape: Array, normal: Array) -> float:
+def hole_distance(offset: Array, numbers: Array, out: Array) -> float:
     """Write the way out of the plate (3,); returns how far a point (3,) [m] is outside.
 
     On the axis, where all ways to the wall are as long, one of them is taken.
     """
-    axis, up, square = shape[4:], 0.0, 0.0
-    size = math.sqrt(axis[0] * axis[0] + axis[1] * axis[1] + axis[2] * axis[2])
-    for k in range(3):
-        up += offset[k] * axis[k] / size
-    for k in range(3):
-        normal[k] = offset[k] - up * axis[k] / size
-        square += normal[k] * normal[k]
-    out = long = math.sqrt(square)
-    if out <= _ON_AXIS:
-        least = 0
-        for k in range(3):
-            least = k if abs(axis[k]) < abs(axis[least]) else least
-        for k in range(3):
-            normal[k] = (1.0 if k == least else 0.0) - axis[least] * axis[k] / (size * size)
-        long = math.sqrt(1.0 - axis[least] * axis[least] / (size * size))
-    distance, way_out, way_up = _section_distance(out, up, shape)
-    for k in range(3):
-        normal[k] = way_out * normal[k] / long + way_up * axis[k] / size
+    axis = directions.unit(numbers[4], numbers[5], numbers[6])
+    up = directions.part_along(offset, axis)
+    for i in range(3):
+        out[i] = offset[i]
+    aside = long = directions.take_along(out, up, axis)
+    if aside <= directions.ON_AXIS:
+        long = directions.look_across(axis, out)
+    distance, way_out, way_up = _section_distance(aside, up, numbers)
+    for i in range(3):
+        out[i] = way_out * out[i] / long + way_up * axis[i]
     return distance
 
 
 def hole_outline(parameters: HoleParameters) -> Array:
     """Both ends of the chamfer, of the hole and of the plate, (N, 3) [m] around the middle."""
-    axis = np.array(parameters.axis) / length(parameters.axis)
-    first, second = across(axis)
-    angle, lift = np.linspace(0.0, 2.0 * math.pi, 41)[:, None], np.full((1, 3), np.nan)
-    ring = np.cos(angle) * first + np.sin(angle) * second
-    p = parameters
+    p, axis = parameters, drawing.unit_vector(parameters.axis)
     rings = ((p.radius + p.chamfer, 0.0), (p.radius, p.chamfer), (p.radius, p.thickness),
              (p.plate_radius, 0.0), (p.plate_radius, p.thickness))  # fmt: skip
-    return np.concatenate(
-        [np.concatenate((wide * ring - deep * axis, lift)) for wide, deep in rings]
-    )
+    return drawing.with_lifts([drawing.ring(-deep * axis, axis, wide) for wide, deep in rings])
 
 
-HOLE = WorldObject("hole", HoleParameters, hole_distance, hole_outline)
+HOLE = Shape("hole", HoleParameters, hole_distance, hole_outline)

@@ -30,7 +30,7 @@ class Triangles(NamedTuple):
     faces: NDArray[np.int64]
 
 
-def read_triangles(path: Path, data: bytes, placed: Array, group: str = "world.mesh") -> Triangles:
+def read_triangles(path: Path, data: bytes, placed: Array) -> Triangles:
     """Read a mesh and make sure that it encloses a volume.
 
     A mesh that is inside out is turned.
@@ -38,15 +38,14 @@ def read_triangles(path: Path, data: bytes, placed: Array, group: str = "world.m
     Args:
         path: Its name, for what is said, and for the format.
         data: What the file holds.
-        placed: From the file's axes to those of the object (3, 3), scale included [m].
-        group: Parameters of the object, by which an error names its file.
+        placed: From the file's axes to those of the shape (3, 3), scale included [m].
 
     Raises:
         ParameterError: It is no mesh, has a hole or no volume; a hole is told by the middle of an
             edge along it, in the units of the file.
         TeleopError: The library that reads it is not installed.
     """
-    name = f"{group}.file"
+    name = "mesh.file"
     try:
         import trimesh
     except ImportError as error:

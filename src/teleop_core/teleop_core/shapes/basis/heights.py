@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 
 from teleop_core.base.errors import ParameterError
 from teleop_core.kernels.geometry import Array
-from teleop_core.slave.world.spline import write_between, write_spline
-from teleop_core.slave.world.triangles import Triangles
+from teleop_core.shapes.basis.spline import write_between, write_spline
+from teleop_core.shapes.basis.triangles import Triangles
 
-FIELD = "world.height_field"
+FIELD = "height_field"
 THICKNESS = 0.02
 """Of the block below the lowest height [m]."""
 _LEAST = 4  # heights along x and along y

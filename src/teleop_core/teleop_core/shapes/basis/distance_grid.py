@@ -21,10 +21,10 @@ from teleop_core.kernels.geometry import Array, rotation
 from teleop_core.kernels.portable import dot, product
 from teleop_core.kernels.progress import told
 from teleop_core.kernels.store import user_cache
-from teleop_core.slave.world.contact import NEAR
-from teleop_core.slave.world.heights import read_heights
-from teleop_core.slave.world.spline import write_spline
-from teleop_core.slave.world.triangles import (
+from teleop_core.shapes.basis.directions import NEAR
+from teleop_core.shapes.basis.heights import read_heights
+from teleop_core.shapes.basis.spline import write_spline
+from teleop_core.shapes.basis.triangles import (
     Triangles,
     edges_of,
     read_triangles,
@@ -48,12 +48,11 @@ class GridRequest(NamedTuple):
     """What a grid depends on.
 
     Attributes:
-        file: Path of what is touched.
+        file: Path of the mesh or the heights.
         scale: Length of a mesh's unit; between heights of a field [m].
         angles: Of a mesh [rad]; empty for a field of heights.
         step: Between nodes of the grid [m].
-        kind: Name of the object.
-        group: Of the parameters that say so.
+        kind: Name of the shape.
     """
 
     file: str
@@ -61,12 +60,11 @@ class GridRequest(NamedTuple):
     angles: tuple[float, ...]
     step: float
     kind: str = "mesh"
-    group: str = "world.mesh"
 
     def error(self, name: str, value: object, text: str) -> ParameterError:
-        """What is said of the file, ``scale`` or ``step``, by the parameter of the object."""
+        """What is said of the file, ``scale`` or ``step``, by the parameter of the shape."""
         is_spacing = name == "scale" and self.kind != "mesh"
-        full = f"{self.group}.{'spacing' if is_spacing else name}"
+        full = f"{self.kind}.{'spacing' if is_spacing else name}"
         return ParameterError(full, value, text)
 
 
@@ -138,7 +136,7 @@ def _keep(kept: Path, grid: DistanceGrid) -> None:
 
 
 def _make(request: GridRequest) -> DistanceGrid:
-    """Read what is touched and make its grid, and tell how far that is."""
+    """Read a file and make its grid, and tell how far that is."""
     path, step = Path(request.file).expanduser(), request.step
     with told(f"making the distance grid of {path.name}") as tell:
         triangles = _read(request, path)
@@ -161,7 +159,7 @@ def _read(request: GridRequest, path: Path) -> Triangles:
         return read_heights(path, path.read_bytes(), request.scale, request.step)
     x, y, z = request.angles
     turned = product(rotation("z", z), product(rotation("y", y), rotation("x", x)))
-    return read_triangles(path, path.read_bytes(), request.scale * turned, request.group)
+    return read_triangles(path, path.read_bytes(), request.scale * turned)
 
 
 def _nodes(size: Array, step: float) -> list[int]:
