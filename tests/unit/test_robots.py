@@ -25,7 +25,8 @@ from teleop_core.robots import (
     register_robot,
     robot_from_table,
 )
-from teleop_core.robots.drives import ENTRIES, Drives, electric_cylinders, geared_motors
+from teleop_core.robots.drives import ENTRIES, Drives
+from teleop_machines.drives import electric_cylinders, geared_motors
 
 robots = pytest.mark.parametrize("name", list_robots())
 

@@ -13,9 +13,9 @@ from teleop_core.base.ranges import MOST_OF_ARM, check
 from teleop_core.base.registry import Registry
 from teleop_core.robots.robot import Robot
 
-_BUILT_IN = (
-    "rcrt1", "mma", "four_bar", "parallelogram", "stewart", "rps3", "scara_stewart",
-    "three_finger_hand", "puma560", "scara", "planar_3r", "five_axis",
+_BUILT_IN = ("rcrt1", "puma560", "scara", "planar_3r", "five_axis")
+_OF_MACHINES = (
+    "four_bar", "mma", "parallelogram", "rps3", "scara_stewart", "stewart", "three_finger_hand",
 )  # fmt: skip
 _TABLE_ENDINGS = (".yaml", ".yml")
 _URDF_ENDINGS = (".urdf", ".xacro")
@@ -176,5 +176,6 @@ ROBOTS: Registry[RobotPart] = Registry(
     _checked,
     _try,
     others=("FILE.urdf", "FILE.xacro", "FILE.yaml"),
+    elsewhere=dict.fromkeys(_OF_MACHINES, "teleop_machines"),
 )
 """All robots by name; see :data:`RobotPart` for what can be added."""

@@ -1,11 +1,11 @@
 """Robot: the one interface of every arm, on top of that arm's compiled kernels."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from types import MappingProxyType
-from typing import cast, overload
+from typing import TYPE_CHECKING, cast, overload
 
 import numpy as np
 
@@ -34,6 +34,9 @@ from teleop_core.robots.kinematics import (
     is_ready,
 )
 from teleop_core.robots.visuals import Visual
+
+if TYPE_CHECKING:
+    from teleop_core.robots.bodies.body import Bodies
 
 
 class _Start:
@@ -83,6 +86,8 @@ class Robot:
         solution: How inverse kinematics are solved, in words; empty for robots that do not say.
         visuals: What its links look like, if a file says so; nothing is read before it is drawn.
         notes: What was read of its file otherwise than it may be meant, in words.
+        describe: Draws its bodies (:func:`teleop_core.robots.bodies.bodies_of`), for joints that
+            are no chain; None for a chain, or where nobody knows.
 
     Raises:
         ShapeError: Limits, home, start or drives are not vectors (n,).
@@ -103,6 +108,7 @@ class Robot:
     solution: str = ""
     visuals: tuple[Visual, ...] = ()
     notes: tuple[str, ...] = ()
+    describe: "Callable[[Robot], Bodies] | None" = None
     home_is_assumed: bool = False
     start: _Start = _Start()
     # Writable copies for the kernels, which are compiled for such arrays alone.

@@ -13,7 +13,7 @@ import numpy as np
 
 from teleop_core.kernels import inner, kernel
 from teleop_core.kernels.geometry import Array
-from teleop_core.robots.mma_forward import groups
+from teleop_machines.mma_forward import groups
 
 BRANCHES = 8
 _ROUNDING = 1e-12  # a point this far out of reach [m] still counts as on the edge

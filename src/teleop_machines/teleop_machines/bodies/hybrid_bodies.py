@@ -9,11 +9,11 @@ from teleop_core.kernels.geometry import Array
 from teleop_core.kernels.portable import product
 from teleop_core.robots.bodies.body import HERE, Bodies, Body, Coordinates, Joint
 from teleop_core.robots.bodies.frames import pose, tips
-from teleop_core.robots.bodies.parallel import Telescope, plate
-from teleop_core.robots.bodies.planar import pivoted
 from teleop_core.robots.bodies.solids import ball, capsule, cylinder
 from teleop_core.robots.robot import Robot
-from teleop_core.robots.scara_stewart_legs import layout
+from teleop_machines.bodies.parallel import Telescope, plate
+from teleop_machines.bodies.planar import pivoted
+from teleop_machines.scara_stewart_legs import layout
 
 _LEGS = slice(4, 9)  # of the geometry: what the leg kernels take
 _UP = np.array([0.0, 0.0, 1.0])

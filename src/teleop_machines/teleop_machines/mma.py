@@ -25,11 +25,12 @@ from teleop_core.kernels.geometry import Array
 from teleop_core.kernels.portable import product
 from teleop_core.robots.drives import ENTRIES, Drives
 from teleop_core.robots.kinematics import Kernels
-from teleop_core.robots.mma_balance import ShoulderSpring, shoulder_load
-from teleop_core.robots.mma_forward import GEOMETRY, MODEL_A, fk, jacobian
-from teleop_core.robots.mma_ik import ik, ik_all
-from teleop_core.robots.mma_models import MODELS, vector
 from teleop_core.robots.robot import Robot, geometry_of
+from teleop_machines.bodies.mma_bodies import mma_bodies
+from teleop_machines.mma_balance import ShoulderSpring, shoulder_load
+from teleop_machines.mma_forward import GEOMETRY, MODEL_A, fk, jacobian
+from teleop_machines.mma_ik import ik, ik_all
+from teleop_machines.mma_models import MODELS, vector
 
 JOINTS = ("theta1", "theta2", "theta3", "theta3_prime", "theta6", "theta8", "theta10")
 HOME = np.radians([0.0, -90.0, 0.0, 90.0, 90.0, 0.0, 0.0])
@@ -81,6 +82,7 @@ def make(model: str = "C", **geometry: float) -> Robot:
         geometry=row,
         kernels=Kernels(fk=fk, jacobian=jacobian, ik=ik, ik_all=ik_all),
         drives=DRIVES,
+        describe=mma_bodies,
     )
 
 

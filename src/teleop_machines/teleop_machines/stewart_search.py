@@ -16,7 +16,7 @@ from teleop_core.kernels import inner, kernel
 from teleop_core.kernels.geometry import Array, rotation_angle_between
 from teleop_core.robots.damped import is_near_singular
 from teleop_core.robots.kinematics import MAX_ASSEMBLIES, REACHED, FkStatus
-from teleop_core.robots.stewart_legs import direct, leg_system
+from teleop_machines.stewart_legs import direct, leg_system
 
 # Smallest over largest singular value of the leg Jacobian under which a pose is close to singular.
 NEAR = 1e-3

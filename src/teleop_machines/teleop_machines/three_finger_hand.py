@@ -19,9 +19,11 @@ from teleop_core.base.errors import ParameterError
 from teleop_core.kernels import inner, kernel
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots import kinematics
-from teleop_core.robots.drives import finger_motors
-from teleop_core.robots.hand_fingers import Triple, finger_branch, finger_joints
-from teleop_core.robots.hand_grasp import (
+from teleop_core.robots.robot import Robot
+from teleop_machines.bodies.hand_bodies import hand_bodies
+from teleop_machines.drives import finger_motors
+from teleop_machines.hand_fingers import Triple, finger_branch, finger_joints
+from teleop_machines.hand_grasp import (
     FINGERS,
     GEOMETRY,
     SIDE,
@@ -35,8 +37,7 @@ from teleop_core.robots.hand_grasp import (
     local_point,
     wanted_contact,
 )
-from teleop_core.robots.robot import Robot
-from teleop_core.robots.rps3_loop import frame
+from teleop_machines.rps3_loop import frame
 
 __all__ = ["GEOMETRY", "Grasp", "GraspResult", "Hand", "make"]
 
@@ -184,4 +185,5 @@ def make(**geometry: float | str) -> Robot:
             fk=fk, jacobian=jacobian, ik=ik, ik_all=ik_all, assemble=assemble
         ),
         drives=drives,
+        describe=hand_bodies,
     )

@@ -21,9 +21,10 @@ from teleop_core.kernels import inner, kernel
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots import kinematics
 from teleop_core.robots.branches import bounded, turned, wrapped
-from teleop_core.robots.drives import geared_motors
-from teleop_core.robots.four_bar_loop import Assembly, Closure, FourBar
 from teleop_core.robots.robot import Robot, geometry_of
+from teleop_machines.bodies.planar import four_bar_bodies
+from teleop_machines.drives import geared_motors
+from teleop_machines.four_bar_loop import Assembly, Closure, FourBar
 
 __all__ = ["GEOMETRY", "Assembly", "Closure", "FourBar", "make"]
 
@@ -283,4 +284,5 @@ def make(**geometry: float | str) -> Robot:
         ),
         drives=drives,
         task_mask=(True, True, False, False, False, False),
+        describe=four_bar_bodies,
     )

@@ -19,10 +19,10 @@ import numpy as np
 from teleop_core.base.errors import ParameterError, ShapeError
 from teleop_core.kernels import inner, kernel
 from teleop_core.kernels.geometry import Array, checked_array, is_rigid
-from teleop_core.robots.hand_fingers import Triple, finger_branch, finger_jacobian, finger_point
 from teleop_core.robots.kinematics import REACHED
 from teleop_core.robots.robot import geometry_of
-from teleop_core.robots.rps3_loop import COSINES, SINES, frame
+from teleop_machines.hand_fingers import Triple, finger_branch, finger_jacobian, finger_point
+from teleop_machines.rps3_loop import COSINES, SINES, frame
 
 FINGERS = 3
 # No lengths are published: those of a hand that holds an object of 5 cm.

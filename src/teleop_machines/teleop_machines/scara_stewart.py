@@ -22,11 +22,13 @@ import numpy as np
 from teleop_core.base.errors import ParameterError, UnknownNameError
 from teleop_core.kernels import inner, kernel
 from teleop_core.kernels.geometry import Array
-from teleop_core.robots import kinematics, scara_stewart_drives, scara_stewart_legs
+from teleop_core.robots import kinematics
 from teleop_core.robots.branches import bounded, hold, is_allowed, move_cost, slowed, turned
 from teleop_core.robots.robot import Robot, geometry_of
-from teleop_core.robots.stewart_legs import invert
-from teleop_core.robots.stewart_search import closing_poses
+from teleop_machines import scara_stewart_drives, scara_stewart_legs
+from teleop_machines.bodies.hybrid_bodies import scara_stewart_bodies
+from teleop_machines.stewart_legs import invert
+from teleop_machines.stewart_search import closing_poses
 
 JOINTS = ("theta1", "theta2", "d3", "leg1", "leg2", "leg3", "leg4", "leg5", "leg6")
 # r_b to sigma_m are handed to the leg kernels as they stand here.
@@ -351,6 +353,7 @@ def make(*, heading: str = "fixed", **geometry: float | str) -> Robot:
             fk=fk, jacobian=jacobian, ik=ik, ik_all=ik_all, assemble=assemble, assemblies=assemblies
         ),
         drives=scara_stewart_drives.DRIVES,
+        describe=scara_stewart_bodies,
     )
 
 

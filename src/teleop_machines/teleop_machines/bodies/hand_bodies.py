@@ -7,11 +7,11 @@ import numpy as np
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots.bodies.body import HERE, Bodies, Body, Joint
 from teleop_core.robots.bodies.frames import pose, tips
-from teleop_core.robots.bodies.planar import pivoted
 from teleop_core.robots.bodies.solids import ball, capsule, rim
-from teleop_core.robots.hand_grasp import FINGERS
 from teleop_core.robots.robot import Robot
-from teleop_core.robots.rps3_loop import COSINES, SINES
+from teleop_machines.bodies.planar import pivoted
+from teleop_machines.hand_grasp import FINGERS
+from teleop_machines.rps3_loop import COSINES, SINES
 
 _UP = np.array([0.0, 0.0, 1.0])
 

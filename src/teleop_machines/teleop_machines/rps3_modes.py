@@ -13,7 +13,7 @@ from numpy.polynomial import chebyshev
 
 from teleop_core.base.errors import ParameterError, ShapeError
 from teleop_core.kernels.geometry import Array, checked_array
-from teleop_core.robots.rps3_loop import frame, points, settle
+from teleop_machines.rps3_loop import frame, points, settle
 
 _CLOSED = 1e-10  # what is left of the loop equations in an assembly mode, over a²
 

@@ -31,10 +31,11 @@ from teleop_core.kernels.portable import length
 from teleop_core.robots import kinematics
 from teleop_core.robots.branches import slowed
 from teleop_core.robots.damped import is_near_singular
-from teleop_core.robots.drives import electric_cylinders
 from teleop_core.robots.robot import Robot, geometry_of
-from teleop_core.robots.stewart_legs import CLOSED, direct, invert, leg_system, moved
-from teleop_core.robots.stewart_search import NEAR, close_legs, closing_poses
+from teleop_machines.bodies.parallel import stewart_bodies
+from teleop_machines.drives import electric_cylinders
+from teleop_machines.stewart_legs import CLOSED, direct, invert, leg_system, moved
+from teleop_machines.stewart_search import NEAR, close_legs, closing_poses
 
 # Smallest over largest singular value of the leg Jacobian that counts as zero in every pose.
 _RANK = 1e-10
@@ -310,4 +311,5 @@ def make(**geometry: float | str) -> Robot:
             fk=fk, jacobian=jacobian, ik=ik, ik_all=ik_all, assemble=assemble, assemblies=assemblies
         ),
         drives=drives,
+        describe=stewart_bodies,
     )

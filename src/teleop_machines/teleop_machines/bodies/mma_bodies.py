@@ -14,9 +14,9 @@ from teleop_core.kernels.portable import product
 from teleop_core.robots.bodies.body import Bodies, Body, Joint
 from teleop_core.robots.bodies.chain import axes_of, chain, places, tip_of
 from teleop_core.robots.bodies.frames import moved, pose, pose_of
-from teleop_core.robots.bodies.planar import pivoted
-from teleop_core.robots.mma_models import SHORT_SIDE
 from teleop_core.robots.robot import Robot
+from teleop_machines.bodies.planar import pivoted
+from teleop_machines.mma_models import SHORT_SIDE
 
 _NAMES = ("link1", "link2", "link3", "link4", "link6", "link8", "link10")
 # Coordinates of the chain: joints, then θ3 - θ3'; the last of all is θ3' - θ3 of link 3b.

@@ -28,18 +28,19 @@ from teleop_core.kernels import inner, kernel
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots import kinematics
 from teleop_core.robots.branches import slowed
-from teleop_core.robots.drives import electric_cylinders
 from teleop_core.robots.robot import Robot, geometry_of
-from teleop_core.robots.rps3_loop import COSINES, SINES, constraints, frame, points, settle
-from teleop_core.robots.rps3_modes import (
+from teleop_machines.bodies.parallel import rps3_bodies
+from teleop_machines.drives import electric_cylinders
+from teleop_machines.rps3_loop import COSINES, SINES, constraints, frame, points, settle
+from teleop_machines.rps3_modes import (
     Assembly,
     AssemblyModes,
     assembly_modes,
     joint_points,
     leg_coordinates,
 )
-from teleop_core.robots.rps3_search import angles_of, assemble, assemblies, is_near_singular, lean
-from teleop_core.robots.stewart_legs import invert
+from teleop_machines.rps3_search import angles_of, assemble, assemblies, is_near_singular, lean
+from teleop_machines.stewart_legs import invert
 
 __all__ = [
     "GEOMETRY",
@@ -183,4 +184,5 @@ def make(**geometry: float | str) -> Robot:
         ),
         drives=drives,
         task_mask=(False, False, True, True, True, False),
+        describe=rps3_bodies,
     )

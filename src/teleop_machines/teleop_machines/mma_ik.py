@@ -18,8 +18,8 @@ from teleop_core.kernels.geometry import Array
 from teleop_core.robots import damped
 from teleop_core.robots.branches import bounded
 from teleop_core.robots.kinematics import IkStatus, is_askable, pose_residual
-from teleop_core.robots.mma_branches import BRANCHES, branch, least_miss, nearest_branch, unwrapped
-from teleop_core.robots.mma_forward import fk, groups, jacobian_at
+from teleop_machines.mma_branches import BRANCHES, branch, least_miss, nearest_branch, unwrapped
+from teleop_machines.mma_forward import fk, groups, jacobian_at
 
 LENGTH = 0.1  # distance [m] that weighs as much as one radian
 _ROUNDS, _PATH_ROUNDS = 60, 12  # of the local search

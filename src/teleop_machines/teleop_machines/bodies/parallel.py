@@ -11,7 +11,7 @@ from teleop_core.robots.bodies.body import HERE, Bodies, Body, Joint
 from teleop_core.robots.bodies.frames import tips
 from teleop_core.robots.bodies.solids import Solid, along, ball, capsule, rim
 from teleop_core.robots.robot import Robot
-from teleop_core.robots.rps3_loop import COSINES, SINES
+from teleop_machines.rps3_loop import COSINES, SINES
 
 _SHARE = 0.95  # of the shortest leg: length of a tube
 _THINNER = 0.72  # radius of a tube over that of the one around it

@@ -19,8 +19,8 @@ import numpy as np
 from teleop_core.kernels import inner, kernel
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots.kinematics import AGREED, FkStatus
-from teleop_core.robots.stewart_legs import direct, leg_system
-from teleop_core.robots.stewart_search import close_legs, side_of
+from teleop_machines.stewart_legs import direct, leg_system
+from teleop_machines.stewart_search import close_legs, side_of
 
 # Sine of sigma_b + sigma_m under which the layout counts as similar hexagons.
 _SIMILAR = 1e-9

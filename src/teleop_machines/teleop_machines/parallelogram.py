@@ -16,9 +16,10 @@ from teleop_core.base.errors import ParameterError
 from teleop_core.kernels import kernel
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots.branches import bounded, turned
-from teleop_core.robots.drives import geared_motors
 from teleop_core.robots.kinematics import REACHED, IkStatus, Kernels, is_askable, pose_residual
 from teleop_core.robots.robot import Robot, geometry_of
+from teleop_machines.bodies.planar import parallelogram_bodies
+from teleop_machines.drives import geared_motors
 
 # No lengths are published: ground (and coupler), crank (and rocker), coupler point [m].
 GEOMETRY = {"l0": 0.3, "l1": 0.2, "a": 0.15}
@@ -91,4 +92,5 @@ def make(**geometry: float | str) -> Robot:
         kernels=Kernels(fk=fk, jacobian=jacobian, ik=ik, ik_all=ik_all),
         drives=drives,
         task_mask=(True, True, False, False, False, False),
+        describe=parallelogram_bodies,
     )
