@@ -23,7 +23,7 @@ PACKAGES = [ROOT / "src" / name / name for name in ("teleop_core", "teleop_machi
 TESTS = (
     "geometry", "filters", "fixtures", "pid", "haptic_master", "motion_scaling", "slave_sim",
     "inverse_kinematics", "operators", "end_stops", "rcrt1", "rcrt1_dynamics", "stewart", "rps3",
-    "four_bar", "scara", "planar_3r", "five_axis", "puma560", "mma", "mma_models", "mma_balance",
+    "four_bar", "textbook_arms", "mma", "mma_models", "mma_balance",
     "mma_ik", "three_finger_hand", "scara_stewart", "dh", "robot_laws", "robots", "fixture_parts",
     "controller_parts", "limits", "interpolation", "source_pid", "rigid_body", "motion_estimates",
     "fixture_shapes",

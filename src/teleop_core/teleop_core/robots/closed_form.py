@@ -343,6 +343,13 @@ def settled(
         _best_of_step(T, seed, limits, geometry, reach == 2, q)
     else:
         _best_of_rest(T, seed, limits, geometry, found, count, q)
+    return told(T, geometry, reach, q, residual)
+
+
+@kernel
+def told(T: Array, geometry: Array, reach: int, q: Array, residual: Array) -> int:
+    """Write the residual (2,) of joints within limits and steps, and say how well they do."""
+    reached, J = room(4, 4), room(6, 7)
     is_flat = pose_of_chain(q, geometry, J, reached)
     if not pose_residual(reached, T, residual):
         return _LIMITED if reach > 0 else _UNREACHABLE

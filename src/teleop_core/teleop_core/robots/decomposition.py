@@ -4,12 +4,14 @@ Classes, in the order in which they are looked for, from the base and, turned ro
 
 - *spherical wrist*: six turning joints, the last three axes meet in a point;
 - *three parallel axes*: six turning joints, axes 2, 3 and 4 are parallel;
-- *spherical shoulder and wrist*: seven turning joints, axes 1, 2, 3 meet, and 5, 6, 7 do.
+- *spherical shoulder and wrist*: seven turning joints, axes 1, 2, 3 meet, and 5, 6, 7 do;
+- *arm in a plane*: three parallel turning joints, with a slide along them, or with a joint before
+  them that turns their plane, one behind them that rolls the tool in it, or both.
 
 Axes meet or are parallel within :data:`NEARLY`, as in files that say 1.571 for a quarter turn; what
-that leaves, Newton steps on the chain as it is take away. Arms that control fewer directions of the
-tip, that slide, or that are of another class, which say by how much their axes miss one, are solved
-by search (:mod:`teleop_core.robots.dh_kernels`).
+that leaves, Newton steps on the chain as it is take away. Arms in a plane must be so exactly. All
+others are solved by search (:mod:`teleop_core.robots.dh_kernels`); those with six directions say by
+how much their axes miss a class.
 """
 
 import math
@@ -21,12 +23,13 @@ import numpy as np
 
 from teleop_core.kernels.geometry import Array, rotation, transform
 from teleop_core.kernels.portable import arctangent, dot, inverse_motion, length, product
-from teleop_core.robots import dh_kernels, parallel_axes, spherical_wrist, swivel
+from teleop_core.robots import dh_kernels, parallel_axes, plane_arm, spherical_wrist, swivel
 from teleop_core.robots.kinematics import Kernels
 
 NEARLY = 1e-3
 """Angle [rad] up to which axes are parallel, and share of the reach within which they meet."""
 _EXACT = 1e-5  # the same, up to which a Newton step is all that an arm needs beside the class
+_LEVEL = 1e-9  # the same, of arms in a plane
 _LEAST = 1e-3  # share of the reach, or sine, under which an arm of a class counts as degenerate
 _PARALLEL, _MEETING, _SKEW = 0.0, 1.0, 2.0
 _NEAR = ", within 1e-3 of the class and finished by Newton steps"
@@ -181,6 +184,8 @@ def solution_of(
     Returns:
         The first class that fits, else :data:`SEARCH`, with what the axes lack for a class.
     """
+    if reach > 0.0 and len(task) == len(kinds) < 6:
+        return _arm_in_plane(kinds, fixed, reach, task) or SEARCH
     if len(task) < 6 or reach <= 0.0 or any(abs(kind) > 1.5 for kind in kinds):
         return SEARCH
     misses: dict[str, str] = {}
@@ -281,6 +286,79 @@ def _shoulder_and_wrist(chain: _Chain) -> Solution | None:
         kernels=_closed(swivel.ik, swivel.ik_all),
         constants=chain.constants((2, 2, 2, 1, 3, 3, 3), ()),
     )
+
+
+def _arm_in_plane(
+    kinds: Sequence[float], fixed: Sequence[Array], reach: float, task: Sequence[str]
+) -> Solution | None:
+    """Three parallel turning joints, with a slide along them, or with a first and a last joint."""
+    turns = [i for i, kind in enumerate(kinds) if abs(kind) < 1.5]
+    slides = [i for i in range(len(kinds)) if i not in turns]
+    shoulder = int(len(turns) > 3)
+    wanted = {"x", "y", "z"} if shoulder else {"x", "y", "rz", *("z" for _ in slides)}
+    if len(turns) < 3 or len(slides) > 1 - shoulder or not wanted <= set(task):
+        return None
+    frames, merged = [fixed[0]], [fixed[0]]  # slides stand at zero
+    for i, after in enumerate(fixed[1:]):
+        frames.append(product(frames[-1], after))
+        merged[-1:] = [merged[-1], after] if i in turns else [product(merged[-1], after)]
+    chain = _Chain(order=1.0, signs=[kinds[i] for i in turns], fixed=merged, reach=reach)
+    tip = _lay_in_plane(chain, shoulder)
+    F, hand, normal = chain.fixed, shoulder + 2, chain.fixed[0][:3, 2]
+    slide, push = -1.0, 0.0
+    for i in slides:
+        axis = frames[i][:3, 2]
+        slide, push = float(i), 0.5 * kinds[i] * math.copysign(1.0, float(dot(normal, axis)))
+        chain.off = max(chain.off, float(length(np.cross(normal, axis))))
+    off = float(abs(F[1][2, 2]) if shoulder else length(normal[:2]))
+    if tip is None or max(chain.off, off) > _LEVEL:
+        return None
+    places, signs = [-1.0] * 5, [1.0] * 5
+    first, last = 1 - shoulder, 1 - shoulder + len(turns)
+    places[first:last], signs[first:last] = map(float, turns), chain.signs
+    bend = _about_z(F[hand - 1])
+    height = F[hand - 1][2, 3] + F[hand][2, 3] + tip[2]
+    numbers = [
+        *places, *signs, slide, push, F[hand - 1][0, 3], F[hand][0, 3], bend,
+        bend + _about_z(F[hand]), tip[0], tip[1], height, *inverse_motion(F[0])[:3].ravel(),
+        *F[-1][:3, :3].T.ravel(), *(F[1] if shoulder else np.eye(4))[:3].ravel(),
+    ]  # fmt: skip
+    return Solution(
+        text=f"arm in a plane, closed form, {2 + 2 * shoulder} solutions",
+        kernels=_closed(plane_arm.ik, plane_arm.ik_all),
+        constants=tuple(map(float, numbers)),
+    )
+
+
+def _lay_in_plane(chain: _Chain, shoulder: int) -> Array | None:
+    """Lay the x axes of three parallel joints along their links, and the tool's axis along -y.
+
+    Returns:
+        The tip in the frame of the third (3,); None where the joints are of another kind.
+    """
+    F, hand = chain.fixed, shoulder + 2
+    if not chain.is_parallel((shoulder, shoulder + 1, hand)):
+        return None
+    for joint in (shoulder + 1, hand):
+        if dot(chain.frames()[shoulder][:3, 2], chain.frames()[joint][:3, 2]) < 0.0:
+            chain.flip(joint)
+    for joint in (shoulder, shoulder + 1):
+        x, y = F[joint + 1][:2, 3].tolist()
+        if math.hypot(x, y) < _LEAST * chain.reach:
+            return None
+        chain.spin(joint, float(arctangent(y, x)))
+    if len(chain.signs) == hand + 1:
+        return F[-1][:3, 3]
+    x, y, z = F[hand + 1][:3, 2].tolist()
+    chain.spin(hand, float(arctangent(y, x)) + 0.5 * math.pi)
+    chain.slide(hand + 1, float(F[-1][2, 3]))
+    chain.spin(hand + 1, -float(arctangent(F[hand + 1][2, 0], F[hand + 1][0, 0])))
+    chain.off = max(chain.off, abs(z), float(length(F[-1][:3, 3])) / chain.reach)
+    return F[hand + 1][:3, 3]
+
+
+def _about_z(matrix: Array) -> float:
+    return float(arctangent(matrix[1, 0], matrix[0, 0]))
 
 
 def _closed(ik: object, ik_all: object) -> Kernels:

@@ -2,13 +2,14 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 
 import numpy as np
 
 from teleop_core.base.errors import ShapeError
 from teleop_core.kernels.geometry import Array, checked_array, rotation, transform
 from teleop_core.kernels.portable import product
-from teleop_core.robots.decomposition import SEARCH, Solution
+from teleop_core.robots.decomposition import SEARCH, Solution, solution_of
 from teleop_core.robots.dh_drives import drives_of
 from teleop_core.robots.drives import Drives
 from teleop_core.robots.followers import Followers
@@ -100,9 +101,17 @@ class DhTable:
                 out[i] = product(out[i], elementary(kind, axis, amount))
         return out
 
-    def robot(self) -> Robot:
-        """The chain as a robot with numeric inverse kinematics, which can be a slave."""
+    def robot(
+        self, geometry: Mapping[str, float] = MappingProxyType({}), drives: Drives | None = None
+    ) -> Robot:
+        """The chain as a robot, which can be a slave; in closed form if its axes allow it.
+
+        Args:
+            geometry: Symbols and values that the robot is to show; none for those of its row.
+            drives: Drive table in place of the table's own.
+        """
         kinds, fixed, reach = self._frames()
+        stated = self.drives or ({},) * len(self.joints)
         return chain_robot(
             name=self.name,
             joints=self.joints,
@@ -110,7 +119,9 @@ class DhTable:
             fixed=fixed,
             reach=reach,
             task=self.task,
-            drives=drives_of(self.kinds, self.drives or ({},) * len(self.joints)),
+            drives=drives or drives_of(self.kinds, stated),
+            solution=solution_of(kinds, fixed, reach, self.task),
+            geometry=geometry,
         )
 
     def _frames(self) -> tuple[list[float], list[Array], float]:
@@ -140,6 +151,7 @@ def chain_robot(
     drives: Drives,
     solution: Solution = SEARCH,
     followers: Followers | None = None,
+    geometry: Mapping[str, float] = MappingProxyType({}),
 ) -> Robot:
     """Robot whose joints move about or along z, with constant transforms between them.
 
@@ -153,6 +165,7 @@ def chain_robot(
         drives: Drive table.
         solution: How its inverse kinematics are solved.
         followers: What the motions do; None where they are the joints.
+        geometry: Symbols and values [m, rad] that the robot is to show; none for those of its row.
     """
     weights = {
         "reach": reach if reach > 0.0 else 1.0,
@@ -173,6 +186,11 @@ def chain_robot(
         for r in range(3)
         for c in range(4)
     }
+    row = {
+        **chain,
+        **numbers,
+        **{f"solution{i}": value for i, value in enumerate(solution.constants)},
+    }
     starts = [joint.home if joint.start is None else joint.start for joint in joints]
     return Robot(
         name=name,
@@ -181,11 +199,8 @@ def chain_robot(
         upper=np.array([joint.upper for joint in joints]),
         home=np.array([joint.home for joint in joints]),
         start=None if all(joint.start is None for joint in joints) else np.array(starts),
-        geometry={
-            **chain,
-            **numbers,
-            **{f"solution{i}": value for i, value in enumerate(solution.constants)},
-        },
+        geometry=geometry or row,
+        row=np.array(list(row.values())) if geometry else None,
         kernels=solution.kernels,
         solution=solution.text,
         drives=drives,

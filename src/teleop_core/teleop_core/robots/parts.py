@@ -13,7 +13,9 @@ from teleop_core.base.ranges import MOST_OF_ARM, check
 from teleop_core.base.registry import Registry
 from teleop_core.robots.robot import Robot
 
-_BUILT_IN = ("rcrt1", "puma560", "scara", "planar_3r", "five_axis")
+_BUILT_IN = {"rcrt1": "rcrt1:make"} | {
+    name: f"textbook:{name}" for name in ("puma560", "scara", "planar_3r", "five_axis")
+}
 _OF_MACHINES = (
     "four_bar", "mma", "parallelogram", "rps3", "scara_stewart", "stewart", "three_finger_hand",
 )  # fmt: skip
@@ -172,7 +174,7 @@ def part_name(part: RobotPart) -> str:
 ROBOTS: Registry[RobotPart] = Registry(
     "robot",
     "robots",
-    {name: f"teleop_core.robots.{name}:make" for name in _BUILT_IN},
+    {name: f"teleop_core.robots.{place}" for name, place in _BUILT_IN.items()},
     _checked,
     _try,
     others=("FILE.urdf", "FILE.xacro", "FILE.yaml"),

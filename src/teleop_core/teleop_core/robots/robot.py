@@ -77,8 +77,10 @@ class Robot:
         start: Joint vector (n,) at which a session starts, inside the limits; None for one with
             room in all directions (:func:`teleop_core.robots.room.start_posture`), looked for
             when it is first asked for.
-        geometry: Symbols and their values [m, rad], in the order the kernels expect.
+        geometry: Symbols and their values [m, rad], in the order the kernels expect if there is no
+            row.
         kernels: Compiled functions.
+        row: Numbers that the kernels take (k,); None for the values of the geometry.
         drives: Drive table, None for robots that are not used as slaves.
         dynamics: Rigid-body model; None for axes that do not act on each other.
         hardware: What the real arm does beside its model; None where nobody knows.
@@ -101,6 +103,7 @@ class Robot:
     home: Array
     geometry: Mapping[str, float]
     kernels: Kernels
+    row: Array | None = None
     drives: Drives | None = None
     dynamics: Dynamics | None = None
     hardware: Hardware | None = None
@@ -134,7 +137,10 @@ class Robot:
             raise ShapeError("hardware", shape, self.hardware.coulomb.shape)
         geometry = MappingProxyType(dict(self.geometry))
         object.__setattr__(self, "geometry", geometry)
-        object.__setattr__(self, "_row", np.array(list(geometry.values()), dtype=np.float64))
+        numbers = list(geometry.values()) if self.row is None else self.row
+        object.__setattr__(self, "_row", np.array(numbers, dtype=np.float64))
+        if self.row is not None:
+            object.__setattr__(self, "row", read_only("row", self.row))
         object.__setattr__(self, "_free", self.limits())
         object.__setattr__(self, "_home", self.home.copy())
 
@@ -168,7 +174,7 @@ class Robot:
 
     @property
     def geometry_row(self) -> Array:
-        """Values of the geometry, as kernels take them: a new array each time, the caller's."""
+        """Numbers that the kernels take: a new array each time, the caller's."""
         return self._row.copy()
 
     @cached_property

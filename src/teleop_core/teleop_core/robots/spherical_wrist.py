@@ -18,7 +18,7 @@ from teleop_core.kernels import inner, kernel
 from teleop_core.kernels.geometry import Array
 from teleop_core.kernels.room import room
 from teleop_core.robots import closed_form
-from teleop_core.robots.branches import BESIDE, OUTSIDE
+from teleop_core.robots.branches import BESIDE, OUTSIDE, hold, is_allowed, turn, wrapped
 from teleop_core.robots.kinematics import is_askable
 from teleop_core.robots.subproblems import close_pair, one_angle, open_pairs, turn_between
 
@@ -29,6 +29,7 @@ _LEVEL, _SECOND, _COST, _TRIG = 3, 4, 5, 6
 # An arm's row: joints 1 and 3, whether it reaches, how many of its joints are known (0: one,
 # 1: both, 2: joint 2 too), joint 2, the least cost of its branches, cosine and sine of 1 and 3.
 _ALIGNED = 1e-10  # sine under which axes 4 and 6 count as one line, and joint 4 keeps its value
+_BARE = 1e-12  # distance [m] of tip and wrist centre that counts as none
 _EVEN = 1e-9  # constant term of joint 5's equation that counts as none
 
 
@@ -254,6 +255,50 @@ def _branches(
             arms[other, _COST] = 0.0 if do_all else _arm_cost(arms[other], K, seed, limits)
 
 
+@inner
+def _held(K: Array, i: int, angle: float, seed: Array, limits: Array, q: Array) -> float:
+    """Write joint i of the closed form as limits and step allow; its angle [rad] then."""
+    closed_form.set_angle(K, 6, i, angle, q)
+    place = closed_form.joint_of(K, 6, i)
+    turn(q, seed, limits, place, place + 1)
+    hold(q, place, seed, limits)
+    return closed_form.angle_of(K, 6, i, q)
+
+
+@inner
+def _has_no_tool(K: Array) -> bool:
+    """Whether the tip is the wrist centre: then an attitude that lags costs no place."""
+    return K[0] > 0.0 and max(abs(K[28]), abs(K[32]), abs(K[36])) < _BARE
+
+
+@kernel
+def _settle(T: Array, seed: Array, limits: Array, geometry: Array, q: Array) -> None:
+    """Keep a branch inside limits and steps; each joint makes the best of those before it."""
+    K, arm = geometry[closed_form.constants_at(6) :], room(10)
+    G, M, N, A, B, h = room(4, 4), room(4, 4), room(4, 7), room(2, 2), room(2, 2), room(2)
+    closed_form.wanted_motion(T, K, 6, M, G)
+    _equations(G, K, A, B, h)
+    third, fourth = closed_form.angle_of(K, 6, 2, q), closed_form.angle_of(K, 6, 3, q)
+    arm[0] = _held(K, 0, closed_form.angle_of(K, 6, 0, q), seed, limits, q)
+    d = h[1] - A[1, 0] * math.cos(arm[0]) - A[1, 1] * math.sin(arm[0])
+    base, spread, _ = one_angle(B[1, 0], B[1, 1], d, third)
+    if abs(wrapped(base + spread - third)) > abs(wrapped(base - spread - third)):
+        spread = -spread
+    arm[1] = _held(K, 2, base + spread, seed, limits, q)
+    second = _joint2(G, K, arm, closed_form.angle_of(K, 6, 1, seed))
+    arm[_SECOND] = _held(K, 1, second, seed, limits, q)
+    _attitude(G, K, arm, M, N)
+    angle = _held(K, 3, fourth, seed, limits, q)
+    closed_form.undo_turn(math.cos(angle), math.sin(angle), N, 3)
+    closed_form.undo_between(K, _F4, N, M, 3)
+    fifth = closed_form.angle_of(K, 6, 4, seed)
+    angle = turn_between(K[_F5 + 2], K[_F5 + 6], M[0, 2], M[1, 2], fifth)
+    angle = _held(K, 4, angle, seed, limits, q)
+    closed_form.undo_turn(math.cos(angle), math.sin(angle), M, 3)
+    closed_form.undo_between(K, _F5, M, N, 3)
+    _held(K, 5, math.atan2(N[1, 0] - N[0, 1], N[0, 0] + N[1, 1]), seed, limits, q)
+
+
 @kernel
 def ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual: Array) -> int:
     """Write joints (6,) for ``T_base_tip``; see :class:`teleop_core.robots.robot.Kernels`."""
@@ -265,6 +310,9 @@ def ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual
     K = geometry[closed_form.constants_at(6) :]
     count, least = _branches(T, geometry, seed, limits, False, found)
     reach, _ = closed_form.choose(found, count, seed, limits, K, least < BESIDE, q)
+    if math.isfinite(limits[2, 0]) and _has_no_tool(K) and not is_allowed(q, seed, limits):
+        _settle(T, seed, limits, geometry, q)
+        return int(closed_form.told(T, geometry, reach, q, residual))
     return int(closed_form.settled(T, seed, limits, geometry, reach, found, count, q, residual))
 
 
