@@ -23,17 +23,14 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import reduce
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from teleop_core.base.errors import ParameterError, UnknownNameError
 from teleop_core.kernels.geometry import Array, rotation, transform
 from teleop_core.kernels.portable import inverse_motion, product
+from teleop_core.robots.arm import Arm
 from teleop_core.robots.drives import read_only
-
-if TYPE_CHECKING:
-    from teleop_core.robots.robot import Robot
 
 SYMBOLS = ("a", "alpha", "d", "theta")
 """Kinds of errors, in the order of every vector of them: a1 ... an, alpha1 ... thetan."""
@@ -94,7 +91,7 @@ class LinkErrors:
         return LinkErrors.from_vector(np.zeros(4 * n))
 
     @staticmethod
-    def of(robot: "Robot", given: Mapping[str, float]) -> "LinkErrors":
+    def of(robot: Arm, given: Mapping[str, float]) -> "LinkErrors":
         """Errors by name, such as ``{"d3": 5.5e-3}``; all others are zero.
 
         Raises:

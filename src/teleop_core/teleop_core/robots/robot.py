@@ -13,7 +13,7 @@ from teleop_core.base.errors import ParameterError, ShapeError, UnknownNameError
 from teleop_core.kernels import direct, pointer, raise_pending
 from teleop_core.kernels.geometry import Array, checked_array, is_rigid
 from teleop_core.kernels.portable import product
-from teleop_core.robots import forward_kinematics, kinematics
+from teleop_core.robots import description, forward_kinematics, kinematics
 from teleop_core.robots.drives import Drives, Dynamics, independent_axes, read_only
 from teleop_core.robots.hardware import Hardware
 from teleop_core.robots.kinematics import (
@@ -33,6 +33,7 @@ from teleop_core.robots.kinematics import (
     WriteKernel,
     is_ready,
 )
+from teleop_core.robots.room import start_of
 from teleop_core.robots.visuals import Visual
 
 if TYPE_CHECKING:
@@ -50,8 +51,6 @@ class _Start:
         if robot is None:
             return None  # the field's default
         if robot.__dict__["start"] is None:
-            from teleop_core.robots.room import start_of
-
             posture = read_only("start", start_of(robot), (robot.n,))
             robot.__dict__["start"] = posture
         return cast("Array", robot.__dict__["start"])
@@ -153,14 +152,10 @@ class Robot:
             raise ParameterError("start", self.start.tolist(), "inside the limits")
 
     def __repr__(self) -> str:
-        from teleop_core.robots.description import short
-
-        return short(self)
+        return description.short(self)
 
     def _repr_html_(self) -> str:
-        from teleop_core.robots.description import html
-
-        return html(self)
+        return description.html(self)
 
     @cached_property
     def n(self) -> int:
