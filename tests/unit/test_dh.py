@@ -13,7 +13,7 @@ from random_arms import table
 from teleop_core.base import errors
 from teleop_core.kernels.geometry import Array, rotation, transform
 from teleop_core.robots import IkStatus, load_robot
-from teleop_core.robots.dh import CONVENTIONS, elementary, load_table, parse_table
+from teleop_core.robots.arms.dh import CONVENTIONS, elementary, load_table, parse_table
 from ways import stepped
 
 ROUNDING = 1e-14

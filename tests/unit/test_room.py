@@ -14,7 +14,7 @@ from teleop_core.base.errors import ParameterError, ShapeError
 from teleop_core.graph.layers import list_scenarios
 from teleop_core.kernels import IS_COMPILED
 from teleop_core.robots import IkStatus
-from teleop_core.robots.dh import robot_from_table
+from teleop_core.robots.arms.dh import robot_from_table
 from teleop_core.robots.room import lever, room, samples, start_posture
 
 ANY_ARM = str(Path(__file__).resolve().parents[2] / "examples/any_arm.urdf")

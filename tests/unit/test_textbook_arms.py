@@ -16,8 +16,8 @@ from random_arms import table
 from teleop_core.base.errors import ParameterError
 from teleop_core.kernels.geometry import Array, rotation, transform
 from teleop_core.robots import IkStatus, load_robot
-from teleop_core.robots.decomposition import SEARCH
-from teleop_core.robots.dh import load_table
+from teleop_core.robots.arms.dh import load_table
+from teleop_core.robots.closed_form.decomposition import SEARCH
 from ways import followed
 
 ANSWERS = json.loads(

@@ -15,8 +15,8 @@ import numpy as np
 
 from teleop_core.kernels import inner, kernel
 from teleop_core.kernels.geometry import Array
-from teleop_core.robots import damped
 from teleop_core.robots.branches import bounded
+from teleop_core.robots.chains import damped
 from teleop_core.robots.kinematics import IkStatus, is_askable, pose_residual
 from teleop_machines.mma_branches import BRANCHES, branch, least_miss, nearest_branch, unwrapped
 from teleop_machines.mma_forward import fk, groups, jacobian_at

@@ -22,7 +22,7 @@ import numpy as np
 from teleop_core.base.errors import ShapeError, UnknownNameError
 from teleop_core.kernels.geometry import Array, checked_array
 from teleop_core.kernels.portable import product
-from teleop_core.robots.dh import DhJoint, DhRow, DhTable
+from teleop_core.robots.arms.dh import DhJoint, DhRow, DhTable
 
 # Half of d5: the thesis only gives the sum of the two equal symbols a3 + a4'.
 SHORT_SIDE = 0.03391

@@ -30,7 +30,7 @@ from teleop_core.kernels.geometry import Array, checked_array, is_rigid
 from teleop_core.kernels.portable import length
 from teleop_core.robots import kinematics
 from teleop_core.robots.branches import slowed
-from teleop_core.robots.damped import is_near_singular
+from teleop_core.robots.chains.damped import is_near_singular
 from teleop_core.robots.robot import Robot, geometry_of
 from teleop_machines.bodies.parallel import stewart_bodies
 from teleop_machines.drives import electric_cylinders

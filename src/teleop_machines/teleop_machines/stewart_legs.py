@@ -13,7 +13,7 @@ import numpy as np
 
 from teleop_core.kernels import inner, kernel
 from teleop_core.kernels.geometry import Array
-from teleop_core.robots.damped import eliminate
+from teleop_core.robots.chains.damped import eliminate
 
 # Legs count as closed within this error of length [m].
 CLOSED = 1e-11

@@ -14,7 +14,7 @@ import numpy as np
 
 from teleop_core.kernels import inner, kernel
 from teleop_core.kernels.geometry import Array, rotation_angle_between
-from teleop_core.robots.damped import is_near_singular
+from teleop_core.robots.chains.damped import is_near_singular
 from teleop_core.robots.kinematics import MAX_ASSEMBLIES, REACHED, FkStatus
 from teleop_machines.stewart_legs import direct, leg_system
 

@@ -34,10 +34,10 @@ from teleop_core.robots.kinematics import (
     is_ready,
 )
 from teleop_core.robots.room import start_of
-from teleop_core.robots.visuals import Visual
 
 if TYPE_CHECKING:
     from teleop_core.robots.bodies.body import Bodies
+    from teleop_core.robots.files.visuals import Visual
 
 
 class _Start:
@@ -108,7 +108,7 @@ class Robot:
     hardware: Hardware | None = None
     task_mask: tuple[bool, ...] = (True,) * 6
     solution: str = ""
-    visuals: tuple[Visual, ...] = ()
+    visuals: "tuple[Visual, ...]" = ()
     notes: tuple[str, ...] = ()
     describe: "Callable[[Robot], Bodies] | None" = None
     home_is_assumed: bool = False

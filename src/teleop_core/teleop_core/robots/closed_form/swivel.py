@@ -21,9 +21,11 @@ import math
 from teleop_core.kernels import inner, kernel
 from teleop_core.kernels.geometry import Array
 from teleop_core.kernels.room import room
-from teleop_core.robots import swivel_families
 from teleop_core.robots.branches import BESIDE, cost_of, is_allowed, turn
-from teleop_core.robots.closed_form import (
+from teleop_core.robots.chains.damped import ZERO, assign
+from teleop_core.robots.chains.dh_kernels import descend
+from teleop_core.robots.closed_form import swivel_families
+from teleop_core.robots.closed_form.candidates import (
     BESIDE_SEED,
     angle_of,
     box_around,
@@ -37,11 +39,9 @@ from teleop_core.robots.closed_form import (
     settled,
     wanted_motion,
 )
-from teleop_core.robots.damped import ZERO, assign
-from teleop_core.robots.dh_kernels import descend
+from teleop_core.robots.closed_form.spherical_wrist import wrist_angles
+from teleop_core.robots.closed_form.swivel_arcs import MARGIN, blend, cut_circle, swivel_of
 from teleop_core.robots.kinematics import is_askable
-from teleop_core.robots.spherical_wrist import wrist_angles
-from teleop_core.robots.swivel_arcs import MARGIN, blend, cut_circle, swivel_of
 
 _SPEED = 0.3  # share of a joint's largest step by which psi goes back to its margin in a path
 _ROUNDS, _MORE_ROUNDS = 8, 40  # of the search for the least move, and if it comes close

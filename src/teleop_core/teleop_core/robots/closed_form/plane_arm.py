@@ -5,11 +5,11 @@ joint may turn the plane about an axis in it, and a last one roll the tool about
 in five-axis arms. The arm controls fewer than six directions: the place of the tip as far as it has
 one, and of the attitudes that it has there the nearest.
 
-Behind the chain in the geometry row (:mod:`teleop_core.robots.dh_kernels`) there stand: places of
-the joints first, shoulder, elbow, hand, roll (-1 for none) and their signs; place of the slide and
-what it adds to the height; both links; the angles that elbow and attitude have beside the joints;
-the tip in the hand's frame and its height over the plane; then transforms that undo what stands
-before the first joint and behind the last, and the one from the first joint to the shoulder.
+Behind the chain in the geometry row (:mod:`teleop_core.robots.chains.dh_kernels`) there stand:
+places of the joints first, shoulder, elbow, hand, roll (-1 for none) and their signs; place of the
+slide and what it adds to the height; both links; the angles that elbow and attitude have beside the
+joints; the tip in the hand's frame and its height over the plane; then transforms that undo what
+stands before the first joint and behind the last, and the one from the first joint to the shoulder.
 
 Source:
     Craig 2005, section 4.4 (two links); the nearest attitude is derived.
@@ -20,11 +20,11 @@ import math
 from teleop_core.kernels import inner, kernel
 from teleop_core.kernels.geometry import Array
 from teleop_core.kernels.room import room
-from teleop_core.robots import closed_form
 from teleop_core.robots.branches import OUTSIDE, cost_of, hold, is_allowed, turn, wrapped
-from teleop_core.robots.dh_kernels import fk
+from teleop_core.robots.chains.dh_kernels import fk
+from teleop_core.robots.closed_form import candidates
+from teleop_core.robots.closed_form.subproblems import one_angle
 from teleop_core.robots.kinematics import REACHED, IkStatus, is_askable, pose_residual
-from teleop_core.robots.subproblems import one_angle
 
 FIRST, SHOULDER, ELBOW, HAND, ROLL = 0, 1, 2, 3, 4
 """Joints of the closed form, by their places among the constants; signs follow."""
@@ -124,8 +124,8 @@ def _seen(G: Array, K: Array, first: float, M: Array, H: Array) -> None:
         for j in range(4):
             H[i, j] = M[i, j] = G[i, j]
     if K[FIRST] >= 0.0:
-        closed_form.undo_turn(math.cos(first), math.sin(first), M, 4)
-        closed_form.undo_between(K, _TO_PLANE, M, H, 4)
+        candidates.undo_turn(math.cos(first), math.sin(first), M, 4)
+        candidates.undo_between(K, _TO_PLANE, M, H, 4)
 
 
 @inner
@@ -267,7 +267,7 @@ def ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual
     """
     if not is_askable(T, seed):
         return -1
-    K, G, reached = geometry[closed_form.constants_at(q.shape[0]) :], room(3, 4), room(4, 4)
+    K, G, reached = geometry[candidates.constants_at(q.shape[0]) :], room(3, 4), room(4, 4)
     _wanted(T, K, G)
     is_reachable = _choose(T, seed, limits, K, G, q)
     if not is_allowed(q, seed, limits):
@@ -289,7 +289,7 @@ def ik_all(T: Array, geometry: Array, solutions: Array) -> int:
     A pose that the arm cannot take in every direction has none.
     """
     n, count = solutions.shape[1], 0
-    K, G, H = geometry[closed_form.constants_at(n) :], room(3, 4), room(3, 4)
+    K, G, H = geometry[candidates.constants_at(n) :], room(3, 4), room(3, 4)
     reached, residual, free = room(4, 4), room(2), room(6)
     for i in range(6):
         free[i] = 0.0

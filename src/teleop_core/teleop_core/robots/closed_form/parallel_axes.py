@@ -16,10 +16,15 @@ import math
 from teleop_core.kernels import inner, kernel
 from teleop_core.kernels.geometry import Array
 from teleop_core.kernels.room import room
-from teleop_core.robots import closed_form
 from teleop_core.robots.branches import BESIDE, OUTSIDE
+from teleop_core.robots.closed_form import candidates
+from teleop_core.robots.closed_form.subproblems import (
+    close_pair,
+    one_angle,
+    open_pairs,
+    turn_between,
+)
 from teleop_core.robots.kinematics import is_askable
-from teleop_core.robots.subproblems import close_pair, one_angle, open_pairs, turn_between
 
 _F1, _F2, _F3, _F4, _F5 = (37, 49, 61, 73, 85)
 RULE = 97
@@ -103,8 +108,8 @@ def _behind_first(G: Array, K: Array, first: float, M: Array, N: Array) -> None:
     for i in range(3):
         for j in range(4):
             M[i, j] = G[i, j]
-    closed_form.undo_turn(math.cos(first), math.sin(first), M, 4)
-    closed_form.undo_between(K, _F1, M, N, 4)
+    candidates.undo_turn(math.cos(first), math.sin(first), M, 4)
+    candidates.undo_between(K, _F1, M, N, 4)
 
 
 @inner
@@ -112,16 +117,16 @@ def _elbows(G: Array, K: Array, pair: Array, seed: Array, q: Array) -> None:
     """Write both branches of a pair of joints 1 and 5 into q (2, 7)."""
     M, N, angles = room(3, 4), room(3, 4), room(2, 3)
     _behind_first(G, K, pair[0], M, N)
-    sixth = _sixth(N, K, pair[1], closed_form.angle_of(K, 6, 5, seed))
+    sixth = _sixth(N, K, pair[1], candidates.angle_of(K, 6, 5, seed))
     _hand(K, pair[1], sixth, M)
-    is_near = _plane(N, M, K, closed_form.angle_of(K, 6, 1, seed), angles)
+    is_near = _plane(N, M, K, candidates.angle_of(K, 6, 1, seed), angles)
     for j in range(2):
         q[j, 6] = pair[2] * is_near
-        closed_form.set_angle(K, 6, 0, pair[0], q[j])
-        closed_form.set_angle(K, 6, 4, pair[1], q[j])
-        closed_form.set_angle(K, 6, 5, sixth, q[j])
+        candidates.set_angle(K, 6, 0, pair[0], q[j])
+        candidates.set_angle(K, 6, 4, pair[1], q[j])
+        candidates.set_angle(K, 6, 5, sixth, q[j])
         for i in range(3):
-            closed_form.set_angle(K, 6, 1 + i, angles[j, i], q[j])
+            candidates.set_angle(K, 6, 1 + i, angles[j, i], q[j])
 
 
 @inner
@@ -143,16 +148,16 @@ def _cost(pair: Array, K: Array, seed: Array, limits: Array, first: float, least
     come later.
     """
     is_path, is_closed = math.isfinite(limits[2, 0]), pair[_LEVEL] > 0.5
-    one = closed_form.angle_cost(K, 6, 0, pair[0], seed, limits, not is_path)
+    one = candidates.angle_cost(K, 6, 0, pair[0], seed, limits, not is_path)
     if is_path and one > first:
         return _LATER + one
     five = 0.0
     if is_closed:
         do_count = not is_path or least < BESIDE
-        five = closed_form.angle_cost(K, 6, 4, pair[1], seed, limits, do_count)
+        five = candidates.angle_cost(K, 6, 4, pair[1], seed, limits, do_count)
     if is_path:
         return five
-    return max(one, five) + (closed_form.INEXACT if pair[2] < 0.5 else 0.0)
+    return max(one, five) + (candidates.INEXACT if pair[2] < 0.5 else 0.0)
 
 
 @inner
@@ -162,8 +167,8 @@ def _known_cost(q: Array, K: Array, seed: Array, limits: Array, least: float) ->
     if q[6] < 0.5:
         return math.inf
     for i in range(4 if is_path else 0, 6):
-        angle, do_count = closed_form.angle_of(K, 6, i, q), not is_path or least < BESIDE
-        cost = max(cost, closed_form.angle_cost(K, 6, i, angle, seed, limits, do_count))
+        angle, do_count = candidates.angle_of(K, 6, i, q), not is_path or least < BESIDE
+        cost = max(cost, candidates.angle_cost(K, 6, i, angle, seed, limits, do_count))
     return cost
 
 
@@ -179,18 +184,18 @@ def _branches(
     Returns:
         How many, and in a path the least sine between axis 6 and the parallel ones.
     """
-    K, is_path = geometry[closed_form.constants_at(6) :], math.isfinite(limits[2, 0])
+    K, is_path = geometry[candidates.constants_at(6) :], math.isfinite(limits[2, 0])
     G, M, A, B, h, seeds = room(4, 4), room(4, 4), room(2, 2), room(2, 2), room(2), room(2)
     pairs, rule = room(4, 5), K[RULE:]
-    do_any = do_all or closed_form.is_nearly(geometry)
-    closed_form.wanted_motion(T, K, 6, M, G)
+    do_any = do_all or candidates.is_nearly(geometry)
+    candidates.wanted_motion(T, K, 6, M, G)
     _equations(G, K, A, B, h)
-    seeds[0], seeds[1] = closed_form.angle_of(K, 6, 0, seed), closed_form.angle_of(K, 6, 4, seed)
+    seeds[0], seeds[1] = candidates.angle_of(K, 6, 0, seed), candidates.angle_of(K, 6, 4, seed)
     count, first, best = open_pairs(A, B, h, rule, seeds, pairs), math.inf, math.inf
     least = _least_sine(G, K, pairs, count) if is_path else math.inf
     for k in range(count):
-        found[2 * k, 6] = found[2 * k + 1, 6] = closed_form.UNKNOWN
-        first = min(first, closed_form.angle_cost(K, 6, 0, pairs[k, 0], seed, limits, False))
+        found[2 * k, 6] = found[2 * k + 1, 6] = candidates.UNKNOWN
+        first = min(first, candidates.angle_cost(K, 6, 0, pairs[k, 0], seed, limits, False))
     for k in range(count):
         pairs[k, _COST] = 0.0 if do_all else _cost(pairs[k], K, seed, limits, first, least)
     while True:
@@ -218,12 +223,12 @@ def ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual
     if not is_askable(T, seed):
         return -1
     found = room(8, 7)
-    if closed_form.is_beside(T, seed, limits, geometry, q):
-        return int(closed_form.settled(T, seed, limits, geometry, 2, found, 0, q, residual))
+    if candidates.is_beside(T, seed, limits, geometry, q):
+        return int(candidates.settled(T, seed, limits, geometry, 2, found, 0, q, residual))
     count, least = _branches(T, geometry, seed, limits, False, found)
-    K = geometry[closed_form.constants_at(6) :]
-    reach, _ = closed_form.choose(found, count, seed, limits, K, least < BESIDE, q)
-    return int(closed_form.settled(T, seed, limits, geometry, reach, found, count, q, residual))
+    K = geometry[candidates.constants_at(6) :]
+    reach, _ = candidates.choose(found, count, seed, limits, K, least < BESIDE, q)
+    return int(candidates.settled(T, seed, limits, geometry, reach, found, count, q, residual))
 
 
 @kernel
@@ -233,6 +238,6 @@ def ik_all(T: Array, geometry: Array, solutions: Array) -> int:
     On a singularity, where a joint is free, it is zero and branches may coincide.
     """
     found, limits, seed = room(8, 7), room(3, 6), room(6)
-    closed_form.forget(seed, limits)
+    candidates.forget(seed, limits)
     count = _branches(T, geometry, seed, limits, True, found)[0]
-    return int(closed_form.kept(T, found, count, geometry, solutions))
+    return int(candidates.kept(T, found, count, geometry, solutions))

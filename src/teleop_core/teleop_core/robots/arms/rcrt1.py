@@ -17,7 +17,7 @@ from teleop_core.base.errors import ParameterError
 from teleop_core.kernels import inner, kernel
 from teleop_core.kernels.geometry import Array
 from teleop_core.kernels.room import room
-from teleop_core.robots import rcrt1_dynamics, rcrt1_hardware
+from teleop_core.robots.arms import rcrt1_dynamics, rcrt1_hardware
 from teleop_core.robots.branches import BESIDE, bounded, cost_of, hold, is_allowed, turn, wrapped
 from teleop_core.robots.kinematics import IkStatus, Kernels, is_askable, pose_residual
 from teleop_core.robots.robot import Robot, geometry_of

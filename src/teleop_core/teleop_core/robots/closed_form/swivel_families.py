@@ -1,8 +1,8 @@
 """Families of rotations of a swivel: those of the shoulder, and of the wrist, over the angle psi.
 
 An arm of seven axes with a spherical shoulder and wrist holds its tip while its elbow turns about
-the line between the two (:mod:`teleop_core.robots.swivel`). Then the rotation of the shoulder is
-P cos psi + Q sin psi + N, and that of the wrist another of this kind.
+the line between the two (:mod:`teleop_core.robots.closed_form.swivel`). Then the rotation of the
+shoulder is P cos psi + Q sin psi + N, and that of the wrist another of this kind.
 
 Source:
     Shimizu, Kakuya, Yoon, Kitagaki and Kosuge 2008, IEEE T-RO 24(5), section on the arm angle.
@@ -13,7 +13,7 @@ import math
 from teleop_core.kernels import inner
 from teleop_core.kernels.geometry import Array
 from teleop_core.kernels.room import room
-from teleop_core.robots.subproblems import one_angle
+from teleop_core.robots.closed_form.subproblems import one_angle
 
 F1, F2, F3, F4, F5 = (39, 51, 63, 75, 87)
 """Places, among the constants, of the transforms after joints 1 to 5."""

@@ -9,10 +9,10 @@ import numpy as np
 from teleop_core.base.errors import ShapeError
 from teleop_core.kernels.geometry import Array, checked_array, rotation, transform
 from teleop_core.kernels.portable import product
-from teleop_core.robots.decomposition import SEARCH, Solution, solution_of
-from teleop_core.robots.dh_drives import drives_of
+from teleop_core.robots.arms.dh_drives import drives_of
+from teleop_core.robots.chains.followers import Followers
+from teleop_core.robots.closed_form.decomposition import SEARCH, Solution, solution_of
 from teleop_core.robots.drives import Drives
-from teleop_core.robots.followers import Followers
 from teleop_core.robots.kinematics import DIRECTIONS
 from teleop_core.robots.robot import Robot
 

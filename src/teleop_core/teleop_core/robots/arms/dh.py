@@ -27,8 +27,8 @@ Every chain can be a slave. What its drives are stands, joint by joint, in a sec
 The entries are those of :class:`~teleop_core.robots.drives.Drives`: ``speed_limit``,
 ``friction_speed`` (per second) and ``encoder_step`` of turning joints are in the table's unit of
 angles, all others in SI units (N·m·s/rad, rad/s). What is left out is assumed
-(:mod:`teleop_core.robots.dh_drives`), and ``Robot.drives.assumed`` names it. Axes do not act on
-each other, and gravity counts as balanced.
+(:mod:`teleop_core.robots.arms.dh_drives`), and ``Robot.drives.assumed`` names it. Axes do not act
+on each other, and gravity counts as balanced.
 
 Source:
     Denavit and Hartenberg 1955 (standard, also distal); Craig 2005 (modified, proximal); Sheth
@@ -46,8 +46,8 @@ from teleop_core.base import plain_yaml
 from teleop_core.base.damage import damage_told
 from teleop_core.base.errors import ParameterError, UnknownNameError
 from teleop_core.base.ranges import MOST_OF_ARM, check
-from teleop_core.robots.dh_chain import CONVENTIONS, DhJoint, DhRow, DhTable, elementary
-from teleop_core.robots.dh_drives import parse_drives
+from teleop_core.robots.arms.dh_chain import CONVENTIONS, DhJoint, DhRow, DhTable, elementary
+from teleop_core.robots.arms.dh_drives import parse_drives
 from teleop_core.robots.kinematics import DIRECTIONS
 from teleop_core.robots.robot import Robot
 

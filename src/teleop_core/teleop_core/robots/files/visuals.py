@@ -14,7 +14,7 @@ import numpy as np
 from teleop_core.base.errors import ParameterError
 from teleop_core.kernels.geometry import Array, rotation, transform
 from teleop_core.kernels.portable import product
-from teleop_core.robots.urdf_tree import (
+from teleop_core.robots.files.urdf_tree import (
     Links,
     UrdfJoint,
     chain_to,

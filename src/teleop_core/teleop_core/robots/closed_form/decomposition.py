@@ -10,8 +10,8 @@ Classes, in the order in which they are looked for, from the base and, turned ro
 
 Axes meet or are parallel within :data:`NEARLY`, as in files that say 1.571 for a quarter turn; what
 that leaves, Newton steps on the chain as it is take away. Arms in a plane must be so exactly. All
-others are solved by search (:mod:`teleop_core.robots.dh_kernels`); those with six directions say by
-how much their axes miss a class.
+others are solved by search (:mod:`teleop_core.robots.chains.dh_kernels`); those with six directions
+say by how much their axes miss a class.
 """
 
 import math
@@ -23,7 +23,8 @@ import numpy as np
 
 from teleop_core.kernels.geometry import Array, rotation, transform
 from teleop_core.kernels.portable import arctangent, dot, inverse_motion, length, product
-from teleop_core.robots import dh_kernels, parallel_axes, plane_arm, spherical_wrist, swivel
+from teleop_core.robots.chains import dh_kernels
+from teleop_core.robots.closed_form import parallel_axes, plane_arm, spherical_wrist, swivel
 from teleop_core.robots.kinematics import Kernels
 
 NEARLY = 1e-3
@@ -46,11 +47,17 @@ class Solution:
     constants: tuple[float, ...] = ()
 
 
+def _closed(ik: object, ik_all: object) -> Kernels:
+    return Kernels(fk=dh_kernels.fk, jacobian=dh_kernels.jacobian, ik=ik, ik_all=ik_all)  # type: ignore[arg-type]
+
+
+def _searched() -> Kernels:
+    return _closed(dh_kernels.ik, dh_kernels.ik_all)
+
+
 SEARCH = Solution(
     text="search: damped least squares from the seed, then from 24 starts or more",
-    kernels=Kernels(
-        fk=dh_kernels.fk, jacobian=dh_kernels.jacobian, ik=dh_kernels.ik, ik_all=dh_kernels.ik_all
-    ),
+    kernels=_searched(),
 )
 
 
@@ -147,7 +154,7 @@ class _Chain:
             self.slide(joint, float(dot(gap, w) - share * dot(gap, v)) / (1.0 - share * share))
 
     def constants(self, groups: Sequence[float], beside: Sequence[float]) -> tuple[float, ...]:
-        """Numbers of a closed form, as :mod:`teleop_core.robots.closed_form` reads them."""
+        """Numbers of a closed form, as its file ``candidates`` reads them."""
         inverse = [inverse_motion(self.fixed[0]), inverse_motion(self.fixed[-1])]
         matrices = [*inverse, *self.fixed[1:-1]]
         rows = np.concatenate([matrix[:3].ravel() for matrix in matrices]).tolist()
@@ -359,10 +366,6 @@ def _lay_in_plane(chain: _Chain, shoulder: int) -> Array | None:
 
 def _about_z(matrix: Array) -> float:
     return float(arctangent(matrix[1, 0], matrix[0, 0]))
-
-
-def _closed(ik: object, ik_all: object) -> Kernels:
-    return Kernels(fk=dh_kernels.fk, jacobian=dh_kernels.jacobian, ik=ik, ik_all=ik_all)  # type: ignore[arg-type]
 
 
 _CLASSES: dict[int, tuple[Callable[[_Chain], Solution | None], ...]] = {

@@ -3,10 +3,10 @@
 A closed form sees the arm as G = Rz(q1) F1 Rz(q2) F2 ... Rz(qn), with constant transforms between
 the joints and every joint about its own z axis; for arms that decompose from the tip it is the arm
 from tip to base. Its constants stand behind the chain's in the geometry row
-(:mod:`teleop_core.robots.dh_kernels`): 1 or -1 for the order, n signs, n groups, then transforms of
-twelve numbers each: before and after G, and those between the joints. Behind them stands what a
-class of arms has beside, and last 1 for an arm that is of its class only nearly
-(:mod:`teleop_core.robots.decomposition`).
+(:mod:`teleop_core.robots.chains.dh_kernels`): 1 or -1 for the order, n signs, n groups, then
+transforms of twelve numbers each: before and after G, and those between the joints. Behind them
+stands what a class of arms has beside, and last 1 for an arm that is of its class only nearly
+(:mod:`teleop_core.robots.closed_form.decomposition`).
 
 Branches are candidates: joint vectors in the arm's own order, with 1.0 behind those that reach the
 pose, 0.0 behind those that come nearest, and :data:`UNKNOWN` behind those that cannot be the answer
@@ -31,8 +31,8 @@ from teleop_core.robots.branches import (
     turned,
     wrapped,
 )
-from teleop_core.robots.damped import ZERO, assign, pose_error
-from teleop_core.robots.dh_kernels import descend, descend_long, fk, pose_of_chain
+from teleop_core.robots.chains.damped import ZERO, assign, pose_error
+from teleop_core.robots.chains.dh_kernels import descend, descend_long, fk, pose_of_chain
 from teleop_core.robots.kinematics import IkStatus, pose_residual
 
 _ROUNDS, _PATH_ROUNDS = 60, 12  # of the search that makes the best of a branch out of limits

@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterator, Sequence
 
 from teleop_core.base.ranges import MOST_OF_ARM, unusual
 from teleop_core.kernels.portable import length
-from teleop_core.robots.urdf_tree import (
+from teleop_core.robots.files.urdf_tree import (
     ASSUMED,
     KINDS,
     UNITS,

@@ -17,10 +17,15 @@ import math
 from teleop_core.kernels import inner, kernel
 from teleop_core.kernels.geometry import Array
 from teleop_core.kernels.room import room
-from teleop_core.robots import closed_form
 from teleop_core.robots.branches import BESIDE, OUTSIDE, hold, is_allowed, turn, wrapped
+from teleop_core.robots.closed_form import candidates
+from teleop_core.robots.closed_form.subproblems import (
+    close_pair,
+    one_angle,
+    open_pairs,
+    turn_between,
+)
 from teleop_core.robots.kinematics import is_askable
-from teleop_core.robots.subproblems import close_pair, one_angle, open_pairs, turn_between
 
 _F1, _F2, _F3, _F4, _F5 = (37, 49, 61, 73, 85)
 RULE = 97
@@ -74,15 +79,15 @@ def _joint2(G: Array, K: Array, arm: Array, seed: float) -> float:
 def _arm_cost(arm: Array, K: Array, seed: Array, limits: Array) -> float:
     """Least cost of all branches of an arm, by those of its joints 1 to 3 that are known."""
     do_count, level = not math.isfinite(limits[2, 0]), arm[_LEVEL]
-    cost = closed_form.INEXACT if do_count and arm[2] < 0.5 else 0.0
+    cost = candidates.INEXACT if do_count and arm[2] < 0.5 else 0.0
     worst = 0.0
     if level > 0.5 or K[RULE] < 0.5:
-        worst = closed_form.angle_cost(K, 6, 0, arm[0], seed, limits, do_count)
+        worst = candidates.angle_cost(K, 6, 0, arm[0], seed, limits, do_count)
     if level > 0.5 or K[RULE] > 0.5:
-        third = closed_form.angle_cost(K, 6, 2, arm[1], seed, limits, do_count)
+        third = candidates.angle_cost(K, 6, 2, arm[1], seed, limits, do_count)
         worst = max(worst, third)
     if level > 1.5:
-        second = closed_form.angle_cost(K, 6, 1, arm[_SECOND], seed, limits, do_count)
+        second = candidates.angle_cost(K, 6, 1, arm[_SECOND], seed, limits, do_count)
         worst = max(worst, second)
     return worst + cost
 
@@ -156,12 +161,12 @@ def _attitude(G: Array, K: Array, arm: Array, M: Array, N: Array) -> None:
     for i in range(3):
         for j in range(3):
             M[i, j] = G[i, j]
-    closed_form.undo_turn(arm[_TRIG], arm[_TRIG + 1], M, 3)
-    closed_form.undo_between(K, _F1, M, N, 3)
-    closed_form.undo_turn(math.cos(arm[_SECOND]), math.sin(arm[_SECOND]), N, 3)
-    closed_form.undo_between(K, _F2, N, M, 3)
-    closed_form.undo_turn(arm[_TRIG + 2], arm[_TRIG + 3], M, 3)
-    closed_form.undo_between(K, _F3, M, N, 3)
+    candidates.undo_turn(arm[_TRIG], arm[_TRIG + 1], M, 3)
+    candidates.undo_between(K, _F1, M, N, 3)
+    candidates.undo_turn(math.cos(arm[_SECOND]), math.sin(arm[_SECOND]), N, 3)
+    candidates.undo_between(K, _F2, N, M, 3)
+    candidates.undo_turn(arm[_TRIG + 2], arm[_TRIG + 3], M, 3)
+    candidates.undo_between(K, _F3, M, N, 3)
 
 
 @inner
@@ -181,29 +186,29 @@ def _wrist(
     base, spread, is_wrist = middle_angle(N, K, _F4)
     least = min(spread, math.pi - spread)
     do_both = do_both or (is_path and (least < BESIDE or arm[2] < 0.5))
-    first = closed_form.angle_cost(K, 6, 4, base + spread, seed, limits, not is_path)
-    second = closed_form.angle_cost(K, 6, 4, base - spread, seed, limits, not is_path)
+    first = candidates.angle_cost(K, 6, 4, base + spread, seed, limits, not is_path)
+    second = candidates.angle_cost(K, 6, 4, base - spread, seed, limits, not is_path)
     other, start = max(first, second), 1 if second < first else 0
     other = other if is_path else max(other, arm[_COST])
     for k in range(2):
         j = start if k == 0 else 1 - start
         if k == 1 and not do_both and lowest < min(other, OUTSIDE):
-            q[j, 6] = closed_form.UNKNOWN
+            q[j, 6] = candidates.UNKNOWN
             break
         y = base + spread if j == 0 else base - spread
-        wrist_at(N, K, _F4, y, closed_form.angle_of(K, 6, 3, seed), angles)
+        wrist_at(N, K, _F4, y, candidates.angle_of(K, 6, 3, seed), angles)
         q[j, 6] = arm[2] * is_wrist
-        closed_form.set_angle(K, 6, 0, arm[0], q[j])
-        closed_form.set_angle(K, 6, 1, arm[_SECOND], q[j])
-        closed_form.set_angle(K, 6, 2, arm[1], q[j])
+        candidates.set_angle(K, 6, 0, arm[0], q[j])
+        candidates.set_angle(K, 6, 1, arm[_SECOND], q[j])
+        candidates.set_angle(K, 6, 2, arm[1], q[j])
         cost = 0.0
         for i in range(3):
-            closed_form.set_angle(K, 6, 3 + i, angles[i], q[j])
+            candidates.set_angle(K, 6, 3 + i, angles[i], q[j])
             if is_path:
-                move = closed_form.angle_cost(K, 6, 3 + i, angles[i], seed, limits, False)
+                move = candidates.angle_cost(K, 6, 3 + i, angles[i], seed, limits, False)
                 cost = max(cost, move)
         if not is_path:
-            cost = closed_form.branch_cost(q[j], seed, limits)
+            cost = candidates.branch_cost(q[j], seed, limits)
         lowest = min(lowest, cost)
     return least, lowest
 
@@ -221,12 +226,12 @@ def _branches(
     Returns:
         How many, and the least half difference [rad] of a wrist's two angles y.
     """
-    K, is_path = geometry[closed_form.constants_at(6) :], math.isfinite(limits[2, 0])
+    K, is_path = geometry[candidates.constants_at(6) :], math.isfinite(limits[2, 0])
     G, M, A, B, h, seeds = room(4, 4), room(4, 4), room(2, 2), room(2, 2), room(2), room(2)
-    arms, rule, do_both = room(4, 10), K[RULE:], do_all or closed_form.is_nearly(geometry)
-    closed_form.wanted_motion(T, K, 6, M, G)
+    arms, rule, do_both = room(4, 10), K[RULE:], do_all or candidates.is_nearly(geometry)
+    candidates.wanted_motion(T, K, 6, M, G)
     _equations(G, K, A, B, h)
-    seeds[0], seeds[1] = closed_form.angle_of(K, 6, 0, seed), closed_form.angle_of(K, 6, 2, seed)
+    seeds[0], seeds[1] = candidates.angle_of(K, 6, 0, seed), candidates.angle_of(K, 6, 2, seed)
     count = open_pairs(A, B, h, rule, seeds, arms)
     for k in range(count):
         arms[k, _COST] = 0.0 if do_all else _arm_cost(arms[k], K, seed, limits)
@@ -241,7 +246,7 @@ def _branches(
         if arm[_LEVEL] < 0.5:
             close_pair(A, B, h, rule, seeds, k, arms)
         elif arm[_LEVEL] < 1.5:
-            arm[_SECOND] = _joint2(G, K, arm, closed_form.angle_of(K, 6, 1, seed))
+            arm[_SECOND] = _joint2(G, K, arm, candidates.angle_of(K, 6, 1, seed))
             arm[_LEVEL] = 2.0
         else:
             near, cost = _wrist(G, K, arm, seed, limits, do_both, found[done : done + 2])
@@ -258,11 +263,11 @@ def _branches(
 @inner
 def _held(K: Array, i: int, angle: float, seed: Array, limits: Array, q: Array) -> float:
     """Write joint i of the closed form as limits and step allow; its angle [rad] then."""
-    closed_form.set_angle(K, 6, i, angle, q)
-    place = closed_form.joint_of(K, 6, i)
+    candidates.set_angle(K, 6, i, angle, q)
+    place = candidates.joint_of(K, 6, i)
     turn(q, seed, limits, place, place + 1)
     hold(q, place, seed, limits)
-    return closed_form.angle_of(K, 6, i, q)
+    return candidates.angle_of(K, 6, i, q)
 
 
 @inner
@@ -274,28 +279,28 @@ def _has_no_tool(K: Array) -> bool:
 @kernel
 def _settle(T: Array, seed: Array, limits: Array, geometry: Array, q: Array) -> None:
     """Keep a branch inside limits and steps; each joint makes the best of those before it."""
-    K, arm = geometry[closed_form.constants_at(6) :], room(10)
+    K, arm = geometry[candidates.constants_at(6) :], room(10)
     G, M, N, A, B, h = room(4, 4), room(4, 4), room(4, 7), room(2, 2), room(2, 2), room(2)
-    closed_form.wanted_motion(T, K, 6, M, G)
+    candidates.wanted_motion(T, K, 6, M, G)
     _equations(G, K, A, B, h)
-    third, fourth = closed_form.angle_of(K, 6, 2, q), closed_form.angle_of(K, 6, 3, q)
-    arm[0] = _held(K, 0, closed_form.angle_of(K, 6, 0, q), seed, limits, q)
+    third, fourth = candidates.angle_of(K, 6, 2, q), candidates.angle_of(K, 6, 3, q)
+    arm[0] = _held(K, 0, candidates.angle_of(K, 6, 0, q), seed, limits, q)
     d = h[1] - A[1, 0] * math.cos(arm[0]) - A[1, 1] * math.sin(arm[0])
     base, spread, _ = one_angle(B[1, 0], B[1, 1], d, third)
     if abs(wrapped(base + spread - third)) > abs(wrapped(base - spread - third)):
         spread = -spread
     arm[1] = _held(K, 2, base + spread, seed, limits, q)
-    second = _joint2(G, K, arm, closed_form.angle_of(K, 6, 1, seed))
+    second = _joint2(G, K, arm, candidates.angle_of(K, 6, 1, seed))
     arm[_SECOND] = _held(K, 1, second, seed, limits, q)
     _attitude(G, K, arm, M, N)
     angle = _held(K, 3, fourth, seed, limits, q)
-    closed_form.undo_turn(math.cos(angle), math.sin(angle), N, 3)
-    closed_form.undo_between(K, _F4, N, M, 3)
-    fifth = closed_form.angle_of(K, 6, 4, seed)
+    candidates.undo_turn(math.cos(angle), math.sin(angle), N, 3)
+    candidates.undo_between(K, _F4, N, M, 3)
+    fifth = candidates.angle_of(K, 6, 4, seed)
     angle = turn_between(K[_F5 + 2], K[_F5 + 6], M[0, 2], M[1, 2], fifth)
     angle = _held(K, 4, angle, seed, limits, q)
-    closed_form.undo_turn(math.cos(angle), math.sin(angle), M, 3)
-    closed_form.undo_between(K, _F5, M, N, 3)
+    candidates.undo_turn(math.cos(angle), math.sin(angle), M, 3)
+    candidates.undo_between(K, _F5, M, N, 3)
     _held(K, 5, math.atan2(N[1, 0] - N[0, 1], N[0, 0] + N[1, 1]), seed, limits, q)
 
 
@@ -305,15 +310,15 @@ def ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual
     if not is_askable(T, seed):
         return -1
     found = room(8, 7)
-    if closed_form.is_beside(T, seed, limits, geometry, q):
-        return int(closed_form.settled(T, seed, limits, geometry, 2, found, 0, q, residual))
-    K = geometry[closed_form.constants_at(6) :]
+    if candidates.is_beside(T, seed, limits, geometry, q):
+        return int(candidates.settled(T, seed, limits, geometry, 2, found, 0, q, residual))
+    K = geometry[candidates.constants_at(6) :]
     count, least = _branches(T, geometry, seed, limits, False, found)
-    reach, _ = closed_form.choose(found, count, seed, limits, K, least < BESIDE, q)
+    reach, _ = candidates.choose(found, count, seed, limits, K, least < BESIDE, q)
     if math.isfinite(limits[2, 0]) and _has_no_tool(K) and not is_allowed(q, seed, limits):
         _settle(T, seed, limits, geometry, q)
-        return int(closed_form.told(T, geometry, reach, q, residual))
-    return int(closed_form.settled(T, seed, limits, geometry, reach, found, count, q, residual))
+        return int(candidates.told(T, geometry, reach, q, residual))
+    return int(candidates.settled(T, seed, limits, geometry, reach, found, count, q, residual))
 
 
 @kernel
@@ -323,6 +328,6 @@ def ik_all(T: Array, geometry: Array, solutions: Array) -> int:
     On a singularity, where a joint is free, it is zero and branches may coincide.
     """
     found, limits, seed = room(8, 7), room(3, 6), room(6)
-    closed_form.forget(seed, limits)
+    candidates.forget(seed, limits)
     count = _branches(T, geometry, seed, limits, True, found)[0]
-    return int(closed_form.kept(T, found, count, geometry, solutions))
+    return int(candidates.kept(T, found, count, geometry, solutions))

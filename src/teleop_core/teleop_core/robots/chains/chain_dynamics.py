@@ -2,8 +2,9 @@
 
 All motions and forces are written about the origin of the base and in its axes, so that what the
 links need adds up without a change of frame. The parameter row holds, for n joints: the geometry of
-:mod:`teleop_core.robots.dh_kernels`, gravity (3,) [m/s²], for each joint the thirteen numbers of
-the body that it moves (:func:`body_row`), and the inertias (n,) of the motors at the joints.
+:mod:`teleop_core.robots.chains.dh_kernels`, gravity (3,) [m/s²], for each joint the thirteen
+numbers of the body that it moves (:func:`body_row`), and the inertias (n,) of the motors at the
+joints.
 
 Source:
     Luh, Walker and Paul 1980 (recursive Newton-Euler); Walker and Orin 1982 (composite bodies);
@@ -16,9 +17,9 @@ import numpy as np
 
 from teleop_core.kernels import inner, kernel
 from teleop_core.kernels.geometry import Array
-from teleop_core.robots.dh_kernels import append_fixed, jacobian, move_joint
+from teleop_core.robots.chains.dh_kernels import append_fixed, jacobian, move_joint
+from teleop_core.robots.chains.rigid_body import invert_positive
 from teleop_core.robots.drives import Dynamics
-from teleop_core.robots.rigid_body import invert_positive
 
 GRAVITY = (0.0, 0.0, -9.81)
 """Acceleration of free fall in the base [m/s²]: the base stands, z up."""

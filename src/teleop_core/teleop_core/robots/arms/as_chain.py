@@ -7,8 +7,9 @@ import numpy as np
 
 from teleop_core.base.errors import ParameterError
 from teleop_core.kernels.geometry import Array
-from teleop_core.robots import dh_kernels, rcrt1
-from teleop_core.robots.dh import robot_from_table
+from teleop_core.robots.arms import rcrt1
+from teleop_core.robots.arms.dh import robot_from_table
+from teleop_core.robots.chains import dh_kernels
 from teleop_core.robots.link_errors import Chain, LinkErrors
 from teleop_core.robots.robot import Robot
 
@@ -30,7 +31,7 @@ def chain_of(robot: Robot) -> Chain | None:
 
 
 def true_chain(robot: Robot, errors: LinkErrors) -> Array | None:
-    """Geometry row of the arm as built, for the kernels of :mod:`teleop_core.robots.dh_kernels`.
+    """Geometry row of the arm as built, for the kernels of chains.
 
     Args:
         robot: The arm as drawn.

@@ -7,7 +7,7 @@ accelerations bring no term of their own.
 
 The row of a dynamics here holds m, then leader, factor and offset of each motion (m,), and the
 inertias (n,) of the motors at the joints. Behind them stands the row of
-:mod:`~teleop_core.robots.chain_dynamics` of the m motions, with motors of none.
+:mod:`~teleop_core.robots.chains.chain_dynamics` of the m motions, with motors of none.
 
 Source:
     Featherstone 2008, section 3.2 (implicit and explicit constraints) and equation 3.21.
@@ -19,10 +19,10 @@ import numpy as np
 
 from teleop_core.kernels import inner, kernel
 from teleop_core.kernels.geometry import Array
-from teleop_core.robots.chain_dynamics import inertia_matrix, inverse_dynamics
-from teleop_core.robots.dh_kernels import jacobian, spread
+from teleop_core.robots.chains.chain_dynamics import inertia_matrix, inverse_dynamics
+from teleop_core.robots.chains.dh_kernels import jacobian, spread
+from teleop_core.robots.chains.rigid_body import invert_positive
 from teleop_core.robots.drives import Dynamics
-from teleop_core.robots.rigid_body import invert_positive
 from teleop_core.robots.robot import Robot
 
 
@@ -91,7 +91,7 @@ def dynamics_row(followers: Followers, chain: Array, motors: Array) -> Array:
 
     Args:
         followers: What the motions of the chain do.
-        chain: Row of :func:`~teleop_core.robots.chain_dynamics.chain_row` of the motions.
+        chain: Row of :func:`~teleop_core.robots.chains.chain_dynamics.chain_row` of the motions.
         motors: Inertia of each motor at its joint (n,) [kg·m² or kg].
     """
     return np.concatenate([[float(len(followers.motions))], followers.row, motors, chain])

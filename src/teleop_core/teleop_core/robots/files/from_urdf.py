@@ -1,14 +1,14 @@
 """Robots from URDF: the chain from the root link to a tip, with what the file says of its drives.
 
 What moves the tip are the joints between root and tip; all others stay at zero, and weigh. A joint
-between them that mimics another moves with it (:mod:`teleop_core.robots.followers`). The kinematics
-are those of Denavit-Hartenberg chains (:mod:`teleop_core.robots.dh_kernels`), the dynamics those of
-rigid bodies (:mod:`teleop_core.robots.chain_dynamics`). Effort and velocity limits, damping and
-friction are the drives' where they stand in the file and are above zero. The inertia of a drive is
-that of the links at home; that of its motor is in no URDF. A file of drives may state it, and what
-else a URDF leaves out. Whatever is left out there too is assumed as for tables
-(:mod:`teleop_core.robots.dh_drives`), and ``Robot.drives.assumed`` names it. Meshes are read where
-they are drawn (:mod:`teleop_core.robots.bodies.looks`).
+between them that mimics another moves with it (:mod:`teleop_core.robots.chains.followers`). The
+kinematics are those of Denavit-Hartenberg chains (:mod:`teleop_core.robots.chains.dh_kernels`), the
+dynamics those of rigid bodies (:mod:`teleop_core.robots.chains.chain_dynamics`). Effort and
+velocity limits, damping and friction are the drives' where they stand in the file and are above
+zero. The inertia of a drive is that of the links at home; that of its motor is in no URDF. A file
+of drives may state it, and what else a URDF leaves out. Whatever is left out there too is assumed
+as for tables (:mod:`teleop_core.robots.arms.dh_drives`), and ``Robot.drives.assumed`` names it.
+Meshes are read where they are drawn (:mod:`teleop_core.robots.bodies.looks`).
 
 Source:
     The XML specification of URDF, pages joint and link.
@@ -27,23 +27,20 @@ import numpy as np
 from teleop_core.base.errors import ParameterError, UnknownNameError
 from teleop_core.kernels.geometry import Array
 from teleop_core.kernels.portable import dot, length, product
-from teleop_core.robots.chain_dynamics import body_row, chain_dynamics, chain_row
-from teleop_core.robots.decomposition import SEARCH, solution_of
-from teleop_core.robots.dh_chain import DhJoint, chain_robot
-from teleop_core.robots.dh_drives import drives_of, least_inertia, parse_drives, read_drives
-from teleop_core.robots.drives import ENTRIES, Drives, Dynamics
-from teleop_core.robots.followers import (
+from teleop_core.robots.arms.dh_chain import DhJoint, chain_robot
+from teleop_core.robots.arms.dh_drives import drives_of, least_inertia, parse_drives, read_drives
+from teleop_core.robots.chains.chain_dynamics import body_row, chain_dynamics, chain_row
+from teleop_core.robots.chains.followers import (
     Follower,
     Followers,
     dynamics_row,
     follower_dynamics,
     follower_inertia,
 )
-from teleop_core.robots.kinematics import DIRECTIONS
-from teleop_core.robots.rank import directions_of
-from teleop_core.robots.robot import Robot
-from teleop_core.robots.urdf_notes import notes_on
-from teleop_core.robots.urdf_tree import (
+from teleop_core.robots.closed_form.decomposition import SEARCH, solution_of
+from teleop_core.robots.drives import ENTRIES, Drives, Dynamics
+from teleop_core.robots.files.urdf_notes import notes_on
+from teleop_core.robots.files.urdf_tree import (
     KINDS,
     UNITS,
     Links,
@@ -61,8 +58,11 @@ from teleop_core.robots.urdf_tree import (
     tip_of,
     turn_of_z,
 )
-from teleop_core.robots.visuals import visuals_of
-from teleop_core.robots.xacro_files import xml_of
+from teleop_core.robots.files.visuals import visuals_of
+from teleop_core.robots.files.xacro_files import xml_of
+from teleop_core.robots.kinematics import DIRECTIONS
+from teleop_core.robots.rank import directions_of
+from teleop_core.robots.robot import Robot
 
 MODELS = ("independent", "links")
 """How the arm of a file may move: see :func:`load_urdf`."""
@@ -99,8 +99,8 @@ def load_urdf(
 
     Returns:
         The robot, its base the root link, with inverse kinematics in closed form if it is of a
-        class of :mod:`~teleop_core.robots.decomposition`, else by search. Home is zero, or the
-        middle of limits without zero; continuous joints turn two rounds (assumed: ±2π).
+        class of :mod:`~teleop_core.robots.closed_form.decomposition`, else by search. Home is zero,
+        or the middle of limits without zero; continuous joints turn two rounds (assumed: ±2π).
 
     Raises:
         RecordingError: The file cannot be read, or is not XML.

@@ -5,9 +5,10 @@ the local z axis and Fi constant. The geometry row holds, for n joints: n kinds 
 or -2 a slide, negative against its axis); the reach [m]; six weights of the controlled directions
 (1 or 0); and n + 1 transforms of twelve numbers, row by row.
 
-In a chain of m motions of which some follow others (:mod:`teleop_core.robots.followers`) there
-stand, in place of the transforms: m + 1, which is no entry of a rotation, as the first one is; for
-all motions their joints, then their factors, then their offsets; and the row of the m motions.
+In a chain of m motions of which some follow others (:mod:`teleop_core.robots.chains.followers`)
+there stand, in place of the transforms: m + 1, which is no entry of a rotation, as the first one
+is; for all motions their joints, then their factors, then their offsets; and the row of the m
+motions.
 """
 
 import math
@@ -17,7 +18,7 @@ import numpy as np
 from teleop_core.kernels import inner, kernel
 from teleop_core.kernels.geometry import Array
 from teleop_core.kernels.room import room
-from teleop_core.robots.damped import ZERO, damped_move, free_joints, pose_error
+from teleop_core.robots.chains.damped import ZERO, damped_move, free_joints, pose_error
 from teleop_core.robots.kinematics import REACHED, IkStatus, is_askable, pose_residual
 
 _ROUNDS, _PATH_ROUNDS = 60, 12  # of one search

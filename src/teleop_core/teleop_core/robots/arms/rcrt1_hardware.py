@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from teleop_core.base.errors import ParameterError
 from teleop_core.kernels.geometry import Array
 from teleop_core.kernels.portable import product
+from teleop_core.robots.arms.rcrt1_dynamics import LINKS, link_row
 from teleop_core.robots.hardware import Hardware
 from teleop_core.robots.link_errors import LinkErrors
-from teleop_core.robots.rcrt1_dynamics import LINKS, link_row
 
 _FIT = "fitted: to tables 7.1-7.6 with the gains of source_pid, by `teleop fit`"
 # What is left of the accuracy test once d3 is mended, 0.352 mm, over the 37 mm from wrist to tip

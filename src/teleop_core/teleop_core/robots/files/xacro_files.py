@@ -11,8 +11,8 @@ from pathlib import Path
 
 from teleop_core.base.damage import damage_told
 from teleop_core.base.errors import ParameterError, TeleopError, UnknownNameError
-from teleop_core.robots.urdf_tree import tree_of
-from teleop_core.robots.visuals import package_folder
+from teleop_core.robots.files.urdf_tree import tree_of
+from teleop_core.robots.files.visuals import package_folder
 
 EXPANDED = ".expanded.urdf"
 """Ending of the URDF that a recording keeps of a xacro; arguments may stand, and do nothing."""

@@ -1,8 +1,8 @@
 """Arcs of the swivel: where the limits of shoulder and wrist cut the circle of psi.
 
 A joint of a spherical shoulder is at a given angle where an equation linear in cos psi and sin psi
-says so (:mod:`teleop_core.robots.swivel`), and likewise of the wrist. Between such cuts a branch is
-legal as a whole or not at all.
+says so (:mod:`teleop_core.robots.closed_form.swivel`), and likewise of the wrist. Between such cuts
+a branch is legal as a whole or not at all.
 
 Source:
     Shimizu, Kakuya, Yoon, Kitagaki and Kosuge 2008, IEEE T-RO 24(5), sections on joint limits;
@@ -14,10 +14,10 @@ import math
 from teleop_core.kernels import inner, kernel
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots.branches import turned, wrapped
-from teleop_core.robots.closed_form import joint_of
-from teleop_core.robots.spherical_wrist import wrist_angles
-from teleop_core.robots.subproblems import one_angle
-from teleop_core.robots.swivel_families import F1, F5
+from teleop_core.robots.closed_form.candidates import joint_of
+from teleop_core.robots.closed_form.spherical_wrist import wrist_angles
+from teleop_core.robots.closed_form.subproblems import one_angle
+from teleop_core.robots.closed_form.swivel_families import F1, F5
 
 MARGIN = 0.1
 """Angle psi [rad] to the ends of its arc, at most a quarter of the arc."""
