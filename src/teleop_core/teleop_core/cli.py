@@ -370,7 +370,7 @@ def _robot(arguments: argparse.Namespace) -> int:
     from teleop_core.robots.description import text
 
     if arguments.table is not None:
-        from teleop_core.robots.dh import load_table
+        from teleop_core.robots.arms.dh import load_table
 
         robot = load_table(arguments.table).robot()
     elif arguments.name is not None:

@@ -21,9 +21,9 @@ from pathlib import Path
 from teleop_core.base.errors import TeleopWarning
 from teleop_core.base.texts import printable
 from teleop_core.robots import geometry_of
+from teleop_core.robots.files.visuals import kept_mesh, meshes_of
+from teleop_core.robots.files.xacro_files import EXPANDED, xml_of
 from teleop_core.robots.parts import DESCRIPTION, arguments_of, file_of
-from teleop_core.robots.visuals import kept_mesh, meshes_of
-from teleop_core.robots.xacro_files import EXPANDED, xml_of
 
 TOUCHED, FIXTURE = "mesh", "fixture_mesh"
 _PLACES = range(8)  # of a shape that is made of several: they are called mesh, mesh1, mesh2

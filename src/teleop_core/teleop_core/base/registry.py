@@ -17,6 +17,7 @@ from dataclasses import is_dataclass
 from functools import cache
 from importlib import import_module
 from importlib.metadata import EntryPoint, EntryPoints, entry_points
+from types import MappingProxyType
 from typing import Generic, TypeVar
 
 from teleop_core.base.errors import PartError, UnknownNameError
@@ -38,6 +39,7 @@ class Registry(Generic[Part]):
         package: Whose registry it is.
         others: What serves in place of a name, for messages: "FILE.urdf".
         base: Registry whose parts are parts here too.
+        elsewhere: Names of parts that come with other distributions of this project, to these.
     """
 
     def __init__(
@@ -51,10 +53,11 @@ class Registry(Generic[Part]):
         package: str = "teleop_core",
         others: tuple[str, ...] = (),
         base: "Registry[Part] | None" = None,
+        elsewhere: Mapping[str, str] = MappingProxyType({}),
     ) -> None:
         self.kind, self.kinds, self.group = kind, kinds, f"{package}.{kinds}"
         self._builtin, self._check, self._trial = dict(builtin), check, trial
-        self._others, self._base = others, base
+        self._others, self._base, self.elsewhere = others, base, dict(elsewhere)
         self.builtin = tuple(builtin)
         self._parts: dict[str, Part] = {}
         self._own: set[str] = set()
@@ -80,7 +83,8 @@ class Registry(Generic[Part]):
 
         Raises:
             UnknownNameError: No such part; the alternatives are listed.
-            PartError: An installed part cannot be loaded, or is no such part.
+            PartError: An installed part cannot be loaded, is no such part, or comes with another
+                distribution of this project that is not installed.
         """
         if self._base is not None and name in self._base.names():
             return self._base.find(name)
@@ -152,6 +156,9 @@ class Registry(Generic[Part]):
             module, _, attribute = place.partition(":")
             return getattr(import_module(module), attribute)
         if (entry := self._entries().get(name)) is None:
+            if (distribution := self.elsewhere.get(name)) is not None:
+                text = f"one that is installed: install {distribution}, which has it"
+                raise PartError(self.kind, name, text)
             raise UnknownNameError(self.kind, name, (*self.names(), *self._others))
         try:
             return entry.load()

@@ -34,7 +34,7 @@ from teleop_core.graph.stage import STAGES, Stage
 from teleop_core.graph.topics import Topic
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots import ROBOTS, Robot
-from teleop_core.robots.dh import DhTable
+from teleop_core.robots.arms.dh import DhTable
 from teleop_core.session import runner
 from teleop_core.session.configuration import Configuration
 from teleop_core.session.length import as_long_as_followed
