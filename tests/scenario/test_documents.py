@@ -30,6 +30,7 @@ TUTORIALS = sorted((ROOT / "docs" / "tutorials").glob("*.md"))
 PAGES = [*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md"), *ROOT.glob("bags/*.md")]
 NAMES = [path.relative_to(ROOT).as_posix() for path in sorted(PAGES)]
 HISTORY = {"CHANGELOG.md", "docs/style.md"}  # what was written before, and the words themselves
+HISTORY |= {name for name in NAMES if name.startswith("docs/changes/")}
 COUNTS = {"three": 3, "four": 4, "five": 5, "six": 6}
 PACKAGE_HEADING = "## As an installed package"
 
@@ -222,4 +223,12 @@ def test_version_is_the_same_wherever_it_stands() -> None:
         assert f'VERSION = "{version}"' in text_of(f"src/{package}/setup.py")
     for said in (f'version = "{version}"', f"teleop_core=={version}"):
         assert said in text_of("src/lerobot_robot_teleop_core/pyproject.toml")
-    assert f"## {version}" in text_of("CHANGELOG.md")
+    assert re.findall(r"^## (\d\S*)", text_of("CHANGELOG.md"), re.MULTILINE) == [version]
+
+
+def test_each_release_is_told_in_at_most_forty_lines() -> None:
+    pages = sorted((ROOT / "docs/changes").glob("*.md"))
+    texts = [path.read_text(encoding="utf-8") for path in pages]
+    newest = text_of("CHANGELOG.md").split("\n## ")[-1]
+    assert pages
+    assert max(len(text.splitlines()) for text in [*texts, newest]) <= 40
