@@ -4,7 +4,7 @@ from pathlib import Path
 
 from setuptools import find_packages, setup
 
-VERSION = "0.6.0"  # released together with teleop_lab and teleop_drill
+VERSION = "0.6.0"  # released together with the other distributions
 NODES = (
     "operator",
     "haptic_master",
@@ -36,7 +36,6 @@ setup(
         "teleop_core": [
             "py.typed",
             "*.pyi",
-            "session/exchange/*.pyi",
             "console/page.js",
             "evaluation/report/*",
             "kernels/compiled/**/*.nb?",
@@ -52,7 +51,6 @@ setup(
         "mcap",
         "rosbags",
         "pandas",
-        "pyarrow",
         "lz4",
         "zstandard",
         "pyyaml",

@@ -1,4 +1,4 @@
-"""Three distributions: the core works alone, and the others add their commands to it."""
+"""Distributions: the core works alone, and the others add their commands to it."""
 
 import subprocess
 import sys
@@ -14,7 +14,8 @@ from teleop_core.commands import installed
 ALONE = """
 import importlib.metadata, sys
 
-sys.modules["teleop_lab"] = sys.modules["teleop_drill"] = None  # cannot be imported
+for name in ("teleop_exchange", "teleop_lab", "teleop_drill"):
+    sys.modules[name] = None  # cannot be imported
 entries = (entry for found in importlib.metadata.distributions() for entry in found.entry_points)
 others = [entry for entry in entries if not entry.group.startswith("teleop_")]
 importlib.metadata.entry_points = importlib.metadata.EntryPoints(others).select
@@ -22,7 +23,7 @@ from teleop_core import cli
 
 sys.exit(cli.main(sys.argv[1:]))
 """
-"""Command of the core, as if neither of the others were installed."""
+"""Command of the core, as if none of the others were installed."""
 
 
 def alone(*words: object, code: int = 0) -> subprocess.CompletedProcess[str]:
@@ -70,8 +71,14 @@ def test_command_of_a_missing_distribution_says_what_to_install(
 
 def test_commands_of_the_other_distributions_are_where_the_advice_says() -> None:
     found = {entry.name: entry.module for entry in entry_points(group=installed.GROUP)}
-    places = installed.RELEASED_TOGETHER.items()
-    assert found.items() >= {(name, f"{package}.commands.{name}") for name, package in places}
+    for name, package in installed.RELEASED_TOGETHER.items():
+        assert found[name].startswith(f"{package}.commands")
+
+
+def test_core_alone_names_what_reads_recordings_of_others(tmp_path: Path) -> None:
+    (tmp_path / "hand.csv").write_text("t,x,y,z\n0,0,0,0\n1,0,0,0\n", encoding="utf-8")
+    done = alone("replay", tmp_path / "hand.csv", "--out", tmp_path / "out", code=2)
+    assert "install teleop_exchange" in done.stderr
 
 
 def test_commands_of_the_core_ask_no_installed_package(

@@ -16,7 +16,7 @@ PUBLIC = {
     "teleop_core", "teleop_core.evaluation", "teleop_core.chain.operators",
     "teleop_core.chain.fixtures",
     "teleop_core.slave.controllers", "teleop_core.robots", "teleop_core.graph.topics",
-    "teleop_drill", "teleop_lab.experiments", "numpy",
+    "teleop_drill", "teleop_exchange", "teleop_lab.experiments", "numpy",
     "numpy.typing", "pandas", "plotly.graph_objects",
 }  # fmt: skip
 ROS_EXAMPLES = {

@@ -13,9 +13,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import teleop_core as tc
+import teleop_exchange
 from teleop_core.kernels.geometry import Array
-from teleop_core.session.exchange import names, orientation
-from teleop_core.session.exchange.times import ordered
+from teleop_exchange import names, orientation
+from teleop_exchange.times import ordered
 
 COUNT, RATE = 400, 100.0
 TIMES = np.arange(COUNT) / RATE
@@ -38,7 +39,7 @@ def frame(columns: list[str] = HEAD, rows: Array = TABLE) -> Any:
 
 def imported(path: Path, tmp_path: Path, **options: Any) -> Any:
     """Report and stream of an import."""
-    report = tc.import_recording(path, tmp_path / "out", **options)
+    report = teleop_exchange.import_recording(path, tmp_path / "out", **options)
     return report, report.recording["master/measured_cp"]
 
 
@@ -83,7 +84,7 @@ def test_packed_text_is_read_by_what_it_is_not_how_it_is_called(
     (tmp_path / name).write_bytes(pack(frame().to_csv(index=False).encode()))
     assert_same_motion(imported(tmp_path / name, tmp_path)[1])
     (tmp_path / "plain").write_bytes(pack(frame().to_csv(index=False).encode()))
-    report = tc.import_recording(tmp_path / "plain", tmp_path / "second")
+    report = teleop_exchange.import_recording(tmp_path / "plain", tmp_path / "second")
     assert_same_motion(report.recording["master/measured_cp"])
 
 
@@ -156,7 +157,7 @@ def test_lines_can_be_skipped(tmp_path: Path) -> None:
 
 def turned(
     path: Path, tmp_path: Path, columns: list[str], values: Array, **options: str | Sequence[str]
-) -> tuple[tc.ImportReport, tc.Stream]:
+) -> tuple[teleop_exchange.ImportReport, tc.Stream]:
     rows = np.column_stack((TIMES, PLACES, values))
     frame(["t", "x", "y", "z", *columns], rows).to_csv(path, index=False)
     return imported(path, tmp_path, **options)
@@ -292,7 +293,7 @@ def test_dates_are_times(tmp_path: Path) -> None:
     table.to_csv(tmp_path / "a.csv", index=False)
     table.to_parquet(tmp_path / "a.parquet")
     for number, name in enumerate(("a.csv", "a.parquet")):
-        report = tc.import_recording(tmp_path / name, tmp_path / str(number))
+        report = teleop_exchange.import_recording(tmp_path / name, tmp_path / str(number))
         got = report.recording["master/measured_cp"].stamp_ns
         assert np.array_equal(got, stamps.as_unit("ns").astype("int64"))
 
@@ -302,7 +303,7 @@ def test_stamps_that_begin_near_zero_begin_at_a_second_and_others_stay(tmp_path:
         rows = TABLE.copy()
         rows[:, 0] += start
         frame(rows=rows).to_csv(tmp_path / "a.csv", index=False)
-        report = tc.import_recording(tmp_path / "a.csv", tmp_path / str(number))
+        report = teleop_exchange.import_recording(tmp_path / "a.csv", tmp_path / str(number))
         assert report.start_ns == round(first * 1e9)
 
 
@@ -332,7 +333,7 @@ def test_unit_of_the_place_is_given_or_stands_in_the_names(
         ((["t", "x", "y", "z"], {"unit": unit}), (["t", *(f"{a} [{unit}]" for a in "xyz")], {}))
     ):
         frame(head, rows).to_csv(tmp_path / "a.csv", index=False)
-        report = tc.import_recording(
+        report = teleop_exchange.import_recording(
             tmp_path / "a.csv", tmp_path / str(number), **dict[str, Any](options)
         )
         got = report.recording["master/measured_cp"][["x", "y", "z"]]
@@ -539,7 +540,7 @@ def test_dates_keep_to_their_zone(ending: str, sep: str, tmp_path: Path) -> None
 
 def test_our_own_export_comes_back(tmp_path: Path) -> None:
     recording = tc.run("coarse_box", duration=3.0)
-    tc.export_recording(recording, tmp_path / "bag.csv")
+    teleop_exchange.export_recording(recording, tmp_path / "bag.csv")
     topic = "master/measured_cp"
     _, stream = imported(
         tmp_path / "bag.csv", tmp_path, position=[f"{topic}.{axis}" for axis in "xyz"],

@@ -21,15 +21,6 @@ from .evaluation import (
     frame_of as frame_of,
     register_metric as register_metric,
 )
-from .session.exchange import (
-    EpisodesReport as EpisodesReport,
-    ExportReport as ExportReport,
-    ImportOptions as ImportOptions,
-    ImportReport as ImportReport,
-    export_recording as export_recording,
-    import_episodes as import_episodes,
-    import_recording as import_recording,
-)
 from .chain.passivity import Passivity as Passivity, register_passivity as register_passivity
 from .chain.architectures import (
     Architecture as Architecture,

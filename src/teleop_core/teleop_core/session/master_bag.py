@@ -1,13 +1,9 @@
 """Master bag: any recording as one whose masters can be replayed and followed.
 
-Recordings that are sound are taken as they are. Of others a copy in memory is made: of another
-topic or message of the pose, stamps that say nothing, buttons of another Joy, damaged rows.
+Recordings that are sound are taken as they are; an installed reader takes others, and tables.
 """
 
-import warnings
-from collections.abc import Iterator
-from contextlib import contextmanager
-from dataclasses import replace
+from importlib.metadata import entry_points
 from pathlib import Path
 
 import numpy as np
@@ -15,31 +11,29 @@ import numpy as np
 from teleop_core.bags.memory import MemoryBag
 from teleop_core.bags.messages import QUATERNION_TOLERANCE
 from teleop_core.bags.reader import Bag
-from teleop_core.bags.series import Series
-from teleop_core.base.errors import RecordingError, TeleopError, TeleopWarning
-from teleop_core.graph.topics import MASTER_BUTTONS, MASTER_MEASURED_CP, Kind, Topic
+from teleop_core.base.errors import RecordingError
+from teleop_core.graph.topics import MASTER_BUTTONS, MASTER_MEASURED_CP, Kind
 from teleop_core.kernels.portable import length
-from teleop_core.session.exchange.imported_motion import Motion
-from teleop_core.session.exchange.options import ImportOptions
-from teleop_core.session.exchange.spool import Spool
-from teleop_core.session.exchange.times import is_constant
+
+READERS = "teleop_core.readers"
+"""Entry-point group of functions ``reader(path, bag, prefixes)``: see :func:`as_master_bag`."""
 
 
-def as_master_bag(recording: Path | str | Bag, options: ImportOptions | None = None) -> Bag:
+def as_master_bag(recording: Path | str | Bag) -> Bag:
     """Recording with ``master/measured_cp`` of its arms, and ``master/buttons`` where it has some.
 
     What had to be guessed, changed or left out is told as a warning.
 
     Args:
-        recording: A recording, opened or where it is: rosbag2, ROS 1, CSV or Parquet.
-        options: What is taken of a recording of others.
+        recording: A recording, opened or where it is; with ``teleop_exchange`` also ROS 1, CSV
+            or Parquet, other topics, and recordings of damaged rows.
 
     Returns:
         The recording itself if it has what is needed, else a copy in memory of these topics, with
         the same stamps and metadata.
 
     Raises:
-        RecordingError: It cannot be read, or holds no motion.
+        RecordingError: It cannot be read, holds no motion, or needs a reader that is not installed.
         ParameterError: It has several topics of poses.
     """
     if isinstance(recording, MemoryBag):
@@ -49,12 +43,11 @@ def as_master_bag(recording: Path | str | Bag, options: ImportOptions | None = N
     prefixes = [] if ours is None else _prefixes(ours)
     if ours is not None and prefixes and all(is_sound(ours, prefix) for prefix in prefixes):
         return ours
-    wanted = options or ImportOptions()
-    series: dict[Topic, Series] = {}
-    for prefix in prefixes or [""]:
-        chosen = wanted if ours is None else _of_arm(ours, prefix, wanted)
-        series |= _read(path, prefix.rstrip("/"), chosen)
-    return MemoryBag(str(path), series, {}, {} if ours is None else ours.metadata)
+    for entry in entry_points(group=READERS):
+        found: Bag = entry.load()(path, ours, prefixes)
+        return found
+    reason = "holds no sound motion of a master; install teleop_exchange, which reads others"
+    raise RecordingError(path, reason)
 
 
 def _ours(path: Path) -> Bag | None:
@@ -107,44 +100,6 @@ def _are_sound(bag: Bag, name: str) -> bool:
         stamps = bag.read(name).stamp_ns
     except RecordingError:  # more or fewer buttons
         return False
-    return not is_constant(stamps) and bool((np.diff(stamps) >= 0).all())
-
-
-def _of_arm(bag: Bag, prefix: str, options: ImportOptions) -> ImportOptions:
-    """Options that take an arm's topics, where it has them and nothing else is wanted."""
-    poses, buttons = prefix + MASTER_MEASURED_CP.name, prefix + MASTER_BUTTONS.name
-    topic = options.topic or (poses if poses in bag.topics else "")
-    known = bag.topics.get(buttons)
-    is_joy = known is not None and known.count and known.type == Kind.BUTTONS.ros_type
-    return replace(
-        options, topic=topic, buttons_topic=options.buttons_topic or (buttons if is_joy else "")
+    return not (len(stamps) > 1 and (stamps == stamps[0]).all()) and bool(
+        (np.diff(stamps) >= 0).all()
     )
-
-
-def _read(path: Path, arm: str, options: ImportOptions) -> dict[Topic, Series]:
-    """Streams of one arm."""
-    with Spool(7) as spool, _options_told(path):
-        motion = Motion(path, options, spool)
-        blocks = [poses for _, poses in motion.blocks()]
-        presses = motion.presses()
-    stamps, poses = motion.stamp_ns, np.concatenate(blocks)
-    topic = MASTER_MEASURED_CP.of_arm(arm)
-    found = {topic: Series(stamps, stamps, poses, (), topic.frame_id)}
-    if presses is not None:
-        topic = MASTER_BUTTONS.of_arm(arm)
-        at, pressed = presses
-        found[topic] = Series(at, at, pressed.astype(np.float64), (), topic.frame_id)
-    if notes := [*motion.told, *motion.losses()]:
-        warnings.warn(f"{path.name}: {'; '.join(notes)}", TeleopWarning, stacklevel=4)
-    return found
-
-
-@contextmanager
-def _options_told(path: Path) -> Iterator[None]:
-    """Say whose options those are that an error advises: who plays a recording takes none."""
-    try:
-        yield
-    except TeleopError as error:
-        if "--" in str(error):
-            error.args = (f"{error} (an option of `teleop import {path} --out DIR`)",)
-        raise

@@ -13,7 +13,7 @@ from teleop_core.base.damage import damage_told
 from teleop_core.base.errors import ParameterError, RecordingError, UnknownNameError
 from teleop_core.graph.topics import MASTER_BUTTONS, MASTER_MEASURED_CP
 from teleop_core.kernels.geometry import Array
-from teleop_core.session.exchange.bag_messages import (
+from teleop_exchange.bag_messages import (
     JOY,
     POSES,
     TRANSFORMS,
@@ -24,11 +24,11 @@ from teleop_core.session.exchange.bag_messages import (
     frames,
     plain,
 )
-from teleop_core.session.exchange.options import BUTTONS, ImportOptions, button_map
-from teleop_core.session.exchange.orientation import Attitudes
-from teleop_core.session.exchange.ros_bags import OurBag, RosBag, is_plain_mcap, opened_by_rosbags
-from teleop_core.session.exchange.source import Block, Presses
-from teleop_core.session.exchange.transform_chain import chain_to, composed
+from teleop_exchange.options import BUTTONS, ImportOptions, button_map
+from teleop_exchange.orientation import Attitudes
+from teleop_exchange.ros_bags import OurBag, RosBag, is_plain_mcap, opened_by_rosbags
+from teleop_exchange.source import Block, Presses
+from teleop_exchange.transform_chain import chain_to, composed
 
 _LOOKED_AT = 1000
 """Messages of transforms whose frames are listed."""
@@ -37,7 +37,7 @@ _TABLE_OPTIONS = ("time", "rate", "position", "quaternion", "matrix", "euler", "
 
 
 class BagSource:
-    """A recording of ROS as a source; see :class:`~teleop_core.session.exchange.source.Source`.
+    """A recording of ROS as a source; see :class:`~teleop_exchange.source.Source`.
 
     Args:
         path: Directory of a rosbag2 recording, ``.mcap`` or ``.db3`` file, or ROS 1 ``.bag``.

@@ -26,8 +26,8 @@ from teleop_core.graph.topics import (
     SLAVE_SERVO_JP,
 )
 from teleop_core.kernels.geometry import Array
-from teleop_core.session.exchange.joining import Streams
 from teleop_core.session.recording import Recording
+from teleop_exchange.joining import Streams
 
 VERSION = "v3.0"
 FPS = 50

@@ -19,7 +19,7 @@ from teleop_core.bags import ros_types
 from teleop_core.bags.finding import METADATA, compression_mode
 from teleop_core.bags.reader import Bag
 from teleop_core.base.errors import RecordingError, TeleopWarning
-from teleop_core.session.exchange.bag_messages import Raw, plain
+from teleop_exchange.bag_messages import Raw, plain
 
 _SHORT = re.compile(r"^(\w+)/(\w+)$")
 _TRANSFORMS = "geometry_msgs/TransformStamped[] transforms"  # of tf2_msgs, which that store lacks

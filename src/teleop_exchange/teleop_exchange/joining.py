@@ -12,9 +12,9 @@ from teleop_core.bags.series import Series, in_order, kind_of
 from teleop_core.base.errors import TeleopWarning, UnknownNameError
 from teleop_core.graph.topics import BY_NAME, Kind
 from teleop_core.kernels.geometry import Array
-from teleop_core.session.exchange.times import SECOND_NS, Stamps
 from teleop_core.session.recording import Recording, Stream
 from teleop_core.session.replayed_span import LONGEST_GAP_NS
+from teleop_exchange.times import SECOND_NS, Stamps
 
 _SLACK_NS = SECOND_NS
 """How much earlier than the last chunk of a file messages of the next one may be."""

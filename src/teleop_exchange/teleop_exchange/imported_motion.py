@@ -10,17 +10,21 @@ from numpy.typing import NDArray
 
 from teleop_core.base.damage import damage_told
 from teleop_core.base.errors import RecordingError
-from teleop_core.kernels.geometry import Array, quaternion_from_rotation, quaternion_products
+from teleop_core.kernels.geometry import (
+    Array,
+    continuous,
+    quaternion_from_rotation,
+    quaternion_products,
+)
 from teleop_core.kernels.portable import product
-from teleop_core.session.exchange.gathering import bridge, gather
-from teleop_core.session.exchange.options import ImportOptions
-from teleop_core.session.exchange.orientation import continuous
-from teleop_core.session.exchange.source import Source
-from teleop_core.session.exchange.spool import Spool
-from teleop_core.session.exchange.times import SECOND_NS, Stamps, gaps, ordered, restarts
+from teleop_exchange.gathering import bridge, gather
+from teleop_exchange.options import ImportOptions
+from teleop_exchange.source import Source
+from teleop_exchange.spool import Spool
+from teleop_exchange.times import SECOND_NS, Stamps, gaps, ordered, restarts
 
 if TYPE_CHECKING:
-    from teleop_core.session.exchange.tables import Table
+    from teleop_exchange.tables import Table
 
 ROWS = 20_000
 """Rows of a block."""
@@ -233,10 +237,10 @@ def open_source(path: Path, options: ImportOptions) -> Source:
     if not path.exists():
         raise RecordingError(path, "does not exist")
     if is_bag(path):
-        from teleop_core.session.exchange.bag_source import BagSource
+        from teleop_exchange.bag_source import BagSource
 
         return BagSource(path, options)
-    from teleop_core.session.exchange.table_source import TableSource
+    from teleop_exchange.table_source import TableSource
 
     return TableSource(open_table(path, options), options)
 
@@ -247,8 +251,8 @@ def open_table(path: Path, options: ImportOptions) -> "Table":
     Raises:
         RecordingError: It cannot be read.
     """
-    from teleop_core.session.exchange.tables import ParquetTable
-    from teleop_core.session.exchange.text_table import TextTable
+    from teleop_exchange.tables import ParquetTable
+    from teleop_exchange.text_table import TextTable
 
     with damage_told(path), path.open("rb") as file:
         magic = file.read(4)

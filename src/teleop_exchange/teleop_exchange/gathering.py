@@ -10,16 +10,10 @@ from numpy.typing import NDArray
 from teleop_core.base.errors import RecordingError
 from teleop_core.base.ranges import check
 from teleop_core.kernels.portable import dot, length
-from teleop_core.session.exchange.options import LENGTHS, ImportOptions
-from teleop_core.session.exchange.source import Presses, Source
-from teleop_core.session.exchange.spool import Spool
-from teleop_core.session.exchange.times import (
-    SECOND_NS,
-    Stamps,
-    guessed_unit,
-    is_constant,
-    joined_ns,
-)
+from teleop_exchange.options import LENGTHS, ImportOptions
+from teleop_exchange.source import Presses, Source
+from teleop_exchange.spool import Spool
+from teleop_exchange.times import SECOND_NS, Stamps, guessed_unit, is_constant, joined_ns
 
 SAMPLE = 1000
 """Times of a block, and blocks, from which the unit is guessed."""

@@ -3,7 +3,7 @@
 import re
 from collections.abc import Sequence
 
-from teleop_core.session.exchange.options import LENGTHS, TIMES_NS
+from teleop_exchange.options import LENGTHS, TIMES_NS
 
 _UNITS = {
     **{name: name for name in (*LENGTHS, *TIMES_NS)},

@@ -9,8 +9,8 @@ from typing import Any, NoReturn
 from teleop_core.base.errors import ParameterError
 from teleop_core.base.texts import printable
 from teleop_core.commands.arguments import command, out_argument
-from teleop_core.session.exchange.options import BUTTONS, LENGTHS, TIMES_NS, ImportOptions
-from teleop_core.session.exchange.presets import PRESETS
+from teleop_exchange.options import BUTTONS, LENGTHS, TIMES_NS, ImportOptions
+from teleop_exchange.presets import PRESETS
 
 _IMPORT = """\
 Make a recording of a hand's motion from a file of others: CSV, TSV or blanks (also .gz), Parquet,
@@ -34,13 +34,8 @@ then:
 """
 
 
-def add(commands: Any) -> None:
-    """Add the commands."""
-    _add_import(commands)
-    _add_export(commands)
-
-
-def _add_import(commands: Any) -> None:
+def add_import(commands: Any) -> None:
+    """Add ``teleop import``."""
     text = "turn a file from another system into a recording"
     listed = "\n".join(f"  --preset {name:9} {one.text}" for name, one in PRESETS.items())
     parser = command(commands, "import", _import, text, _EXAMPLES % listed)
@@ -191,7 +186,8 @@ examples:
 """
 
 
-def _add_export(commands: Any) -> None:
+def add_export(commands: Any) -> None:
+    """Add ``teleop export``."""
     text = "write recordings as tables or a data set"
     parser = command(commands, "export", _export, text, _EXPORT_EXAMPLES)
     parser.description = _EXPORT
@@ -223,7 +219,7 @@ def _add_export(commands: Any) -> None:
 
 
 def _export(arguments: argparse.Namespace) -> int:
-    from teleop_core.session.exchange import export_recording
+    from teleop_exchange import export_recording
 
     report = export_recording(
         arguments.bags, arguments.out, arguments.format, topics=arguments.topics,
@@ -240,7 +236,7 @@ def _episode(text: str) -> int | str:
 
 
 def _import(arguments: argparse.Namespace) -> int:
-    from teleop_core.session.exchange import import_episodes, import_recording
+    from teleop_exchange import import_episodes, import_recording
 
     arms = {name: _given(_of_arm(name, text)) for name, text in arguments.arm}
     if arguments.episode == "all":

@@ -7,8 +7,8 @@ import numpy as np
 from teleop_core.base.errors import ParameterError, UnknownNameError
 from teleop_core.kernels.geometry import Array, quaternion_products, rotations_from_quaternions
 from teleop_core.kernels.portable import length
-from teleop_core.session.exchange.bag_messages import Frames, Rows
-from teleop_core.session.exchange.times import Stamps
+from teleop_exchange.bag_messages import Frames, Rows
+from teleop_exchange.times import Stamps
 
 
 def chain_to(top: str, frame: str, parents: Mapping[str, Collection[str]]) -> list[Frames]:

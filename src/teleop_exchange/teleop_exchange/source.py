@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from teleop_core.kernels.geometry import Array
-from teleop_core.session.exchange.orientation import Attitudes
-from teleop_core.session.exchange.times import Stamps
+from teleop_exchange.orientation import Attitudes
+from teleop_exchange.times import Stamps
 
 
 @dataclass(frozen=True, eq=False)

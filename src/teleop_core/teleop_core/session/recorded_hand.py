@@ -5,7 +5,6 @@ approach to ``operator.center``; where that is zero, it is there from the start.
 hand moves and turns along straight lines; over gaps it waits.
 """
 
-import csv
 import warnings
 from dataclasses import dataclass
 from functools import lru_cache
@@ -15,18 +14,15 @@ from typing import NamedTuple
 import numpy as np
 
 from teleop_core.bags.reader import Bag
-from teleop_core.base.damage import damage_told
 from teleop_core.base.errors import ParameterError, RecordingError, TeleopWarning
 from teleop_core.base.parameters import parameter
 from teleop_core.chain.operators import Motion, Operator, Setting
 from teleop_core.chain.operators.rest import REST_TILT
 from teleop_core.chain.operators.shapes import minimum_jerk
 from teleop_core.graph.topics import HAND_JAW, MASTER_BUTTONS, MASTER_MEASURED_CP, Topic
-from teleop_core.kernels.geometry import Array, quaternion_products
+from teleop_core.kernels.geometry import Array, continuous, quaternion_products
 from teleop_core.kernels.portable import arctangent, length
-from teleop_core.session.exchange.master_bag import as_master_bag
-from teleop_core.session.exchange.options import ImportOptions
-from teleop_core.session.exchange.orientation import continuous
+from teleop_core.session.master_bag import as_master_bag
 
 COLUMNS = ("t", "x", "y", "z", "rx", "ry", "rz", "clutch", "fixture", "mode")
 """Columns of a table: time [s], position [m], rotation vector [rad], buttons (1 pressed)."""
@@ -75,7 +71,7 @@ def _bag(parameters: object, setting: Setting) -> Motion:
         RecordingError: It is missing or holds no motion.
         ParameterError: It has several topics of poses.
     """
-    return _motion(Path(setting.common.bag), None, setting)
+    return _motion(Path(setting.common.bag), setting)
 
 
 def _file(parameters: FileParameters, setting: Setting) -> Motion:
@@ -85,8 +81,7 @@ def _file(parameters: FileParameters, setting: Setting) -> Motion:
         RecordingError: The file cannot be read, or its numbers are no motion.
         ParameterError: No file is named, or its columns cannot be guessed.
     """
-    path = _named(parameters)
-    return _motion(path, columns_of(path), setting)
+    return _motion(_named(parameters), setting)
 
 
 def _named(parameters: FileParameters) -> Path:
@@ -97,13 +92,12 @@ def _named(parameters: FileParameters) -> Path:
 
 def _bag_length(parameters: object, setting: Setting) -> float:
     """Time of the approach and of the recording [s]."""
-    return _length(samples_of(Path(setting.common.bag), None), setting)
+    return _length(samples_of(Path(setting.common.bag)), setting)
 
 
 def _file_length(parameters: FileParameters, setting: Setting) -> float:
     """Time of the approach and of the table [s]."""
-    path = _named(parameters)
-    return _length(samples_of(path, columns_of(path)), setting)
+    return _length(samples_of(_named(parameters)), setting)
 
 
 def _length(samples: Samples, setting: Setting) -> float:
@@ -115,23 +109,7 @@ def _approach(setting: Setting) -> float:
     return float(setting.common.approach_time) if any(setting.common.center) else 0.0
 
 
-def columns_of(path: Path) -> ImportOptions | None:
-    """Columns of a table that are called as :data:`COLUMNS`; None for other tables."""
-    try:
-        with damage_told(path), path.open(newline="", encoding="utf-8") as file:
-            head = [name.strip() for name in next(csv.reader(file), [])]
-    except RecordingError:  # whoever reads all of it says what is wrong
-        return None
-    if not set(COLUMNS[:4]) <= set(head):
-        return None
-    turn = COLUMNS[4:7] if set(COLUMNS[4:7]) <= set(head) else ()
-    return ImportOptions(
-        time=COLUMNS[:1], time_unit="s", position=COLUMNS[1:4], unit="m", rotation_vector=turn,
-        angles="rad", orientation="none",
-    ).changed(**{name: name for name in COLUMNS[7:] if name in head})  # fmt: skip
-
-
-def samples_of(path: Path, options: ImportOptions | None) -> Samples:
+def samples_of(path: Path) -> Samples:
     """Samples of a recording or table; what was left out or guessed is told as a warning.
 
     Raises:
@@ -142,12 +120,12 @@ def samples_of(path: Path, options: ImportOptions | None) -> Samples:
         changed = path.stat().st_mtime_ns
     except OSError as error:
         raise RecordingError(path, f"cannot be read: {error.strerror}") from error
-    return _read(path, options, changed)
+    return _read(path, changed)
 
 
 @lru_cache(maxsize=2)
-def _read(path: Path, options: ImportOptions | None, changed_ns: int) -> Samples:
-    bag = as_master_bag(path, options)
+def _read(path: Path, changed_ns: int) -> Samples:
+    bag = as_master_bag(path)
     bag.require((MASTER_MEASURED_CP,))
     series = bag.read(MASTER_MEASURED_CP)
     new = np.concatenate(([True], np.diff(series.stamp_ns) > 0))
@@ -167,9 +145,9 @@ def _changes(bag: Bag, topic: Topic, start_ns: int) -> tuple[Array, Array]:
     return (series.stamp_ns - start_ns) * np.float64(1e-9), series.values
 
 
-def _motion(path: Path, options: ImportOptions | None, setting: Setting) -> Motion:
+def _motion(path: Path, setting: Setting) -> Motion:
     """Motion that approaches the centre and follows the samples there."""
-    samples = samples_of(path, options)
+    samples = samples_of(path)
     _tell_stops(path, samples, setting)
     approach, center = _approach(setting), np.array(setting.common.center)
     period = float(np.median(np.diff(samples.at))) if len(samples.at) > 1 else 0.0

@@ -9,8 +9,8 @@ import numpy as np
 
 from teleop_core.kernels.geometry import Array
 from teleop_core.kernels.portable import dot, length
-from teleop_core.session.exchange.imported_motion import Counts, Motion
-from teleop_core.session.exchange.times import spread_ms
+from teleop_exchange.imported_motion import Counts, Motion
+from teleop_exchange.times import spread_ms
 
 if TYPE_CHECKING:
     from teleop_core.session.recording import Recording

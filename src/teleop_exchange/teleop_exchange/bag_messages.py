@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from teleop_core.base.errors import UnknownNameError
 from teleop_core.kernels.geometry import Array
-from teleop_core.session.exchange.times import SECOND_NS, Stamps
+from teleop_exchange.times import SECOND_NS, Stamps
 
 POSES = {
     "geometry_msgs/msg/PoseStamped": ("pose", True),

@@ -7,7 +7,6 @@ import math
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from teleop_core.kernels import kernel
 from teleop_core.kernels.geometry import Array, multiply_quaternions, quaternion_from_rotation
@@ -146,14 +145,3 @@ def write_quaternions(matrices: Array, quaternions: Array) -> None:
     """Write the unit quaternions (N, 4) of rotation matrices (N, 3, 3), which may be off a bit."""
     for i in range(matrices.shape[0]):
         quaternion_from_rotation(matrices[i], quaternions[i])
-
-
-def continuous(quaternions: Array, last: Array | None) -> Array:
-    """The same rotations (N, 4) with signs that never jump, from ``last`` on."""
-    if not len(quaternions):
-        return quaternions
-    first = quaternions[:1] if last is None else last[None]
-    before = np.concatenate((first, quaternions[:-1]))
-    flips: NDArray[np.float64] = np.where((quaternions * before).sum(axis=1) < 0.0, -1.0, 1.0)
-    signed: Array = quaternions * np.cumprod(flips)[:, None]
-    return signed

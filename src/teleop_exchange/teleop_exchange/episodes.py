@@ -5,8 +5,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from teleop_core.base.errors import ParameterError, RecordingError, UnknownNameError
-from teleop_core.session.exchange import names
-from teleop_core.session.exchange.tables import Numbers, Table
+from teleop_exchange import names
+from teleop_exchange.tables import Numbers, Table
 
 _LISTED = 8
 _NEEDED = "left out: no column is called episode_index or the like"

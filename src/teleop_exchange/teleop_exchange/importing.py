@@ -19,12 +19,12 @@ from teleop_core.bags.writer import BagWriter
 from teleop_core.base.errors import RecordingError
 from teleop_core.graph.topics import MASTER_BUTTONS, MASTER_MEASURED_CP, Topic
 from teleop_core.kernels.geometry import Array
-from teleop_core.session.exchange.import_report import ImportReport, summary
-from teleop_core.session.exchange.imported_motion import Motion
-from teleop_core.session.exchange.options import ImportOptions, Option
-from teleop_core.session.exchange.presets import options_of
-from teleop_core.session.exchange.spool import Spool
-from teleop_core.session.exchange.times import Stamps
+from teleop_exchange.import_report import ImportReport, summary
+from teleop_exchange.imported_motion import Motion
+from teleop_exchange.options import ImportOptions, Option
+from teleop_exchange.presets import options_of
+from teleop_exchange.spool import Spool
+from teleop_exchange.times import Stamps
 
 _READ = 1 << 20
 
@@ -49,7 +49,7 @@ def import_recording(
         out: Directory of the recording, made here; nothing is left there after an error.
         options: What is taken of the file; what is not said is guessed and told.
         preset: Options for files of a known system:
-            :data:`~teleop_core.session.exchange.presets.PRESETS`.
+            :data:`~teleop_exchange.presets.PRESETS`.
         arms: Several hands of one file, each with options beside those of all: ``{"left":
             {"position": "1-3"}, "right": {"position": "4-6"}}``. The first is the default arm.
         **changes: Options by name: ``position=("x", "y", "z"), unit="mm"``.

@@ -10,7 +10,7 @@ from scipy.ndimage import median_filter
 
 from teleop_core.base.ranges import LATEST_S
 from teleop_core.kernels.geometry import Array
-from teleop_core.session.exchange.options import TIMES_NS
+from teleop_exchange.options import TIMES_NS
 
 Stamps = NDArray[np.int64]
 SECOND_NS = 1_000_000_000

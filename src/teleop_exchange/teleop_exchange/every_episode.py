@@ -8,13 +8,13 @@ from types import MappingProxyType
 
 from teleop_core.bags.finding import METADATA
 from teleop_core.base.errors import RecordingError, TeleopError
-from teleop_core.session.exchange.episodes import numbers_of
-from teleop_core.session.exchange.import_report import ImportReport
-from teleop_core.session.exchange.imported_motion import open_table
-from teleop_core.session.exchange.importing import command_of, import_recording
-from teleop_core.session.exchange.options import ImportOptions, Option
-from teleop_core.session.exchange.presets import options_of
 from teleop_core.session.recording import open_recording
+from teleop_exchange.episodes import numbers_of
+from teleop_exchange.import_report import ImportReport
+from teleop_exchange.imported_motion import open_table
+from teleop_exchange.importing import command_of, import_recording
+from teleop_exchange.options import ImportOptions, Option
+from teleop_exchange.presets import options_of
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ def import_episodes(
     Args:
         file: Table with a column ``episode_index`` or the like, or folder of the data set.
         out: Folder of the recordings ``episode_000000`` and so on; may be there.
-        options: As of :func:`teleop_core.import_recording`, without ``episode``.
+        options: As of :func:`teleop_exchange.import_recording`, without ``episode``.
         preset: As there.
         arms: As there.
         say: Told a line after each episode.

@@ -14,7 +14,7 @@ import pyarrow.csv as pc
 
 from teleop_core.base.damage import damage_told
 from teleop_core.base.errors import RecordingError
-from teleop_core.session.exchange.tables import ROWS, SAMPLE, Numbers, numbers, unique
+from teleop_exchange.tables import ROWS, SAMPLE, Numbers, numbers, unique
 
 _HEAD_BYTES = 1 << 18
 _PACKED = {b"\x1f\x8b": "gzip", b"BZh": "bz2", b"\x28\xb5\x2f\xfd": "zstd"}
@@ -49,7 +49,7 @@ class Form(NamedTuple):
 
 
 class TextTable:
-    """A text of rows; see :class:`~teleop_core.session.exchange.tables.Table`.
+    """A text of rows; see :class:`~teleop_exchange.tables.Table`.
 
     Args:
         path: The file; compressed by gzip, bzip2 or zstd too.

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 from teleop_core.base.errors import ParameterError, UnknownNameError
 
 if TYPE_CHECKING:
-    from teleop_core.session.exchange.options import ImportOptions, Option
+    from teleop_exchange.options import ImportOptions, Option
 
 Changes = Mapping[str, "Option"]
 """Import options by name."""

@@ -10,13 +10,13 @@ from numpy.typing import NDArray
 from teleop_core.base.errors import ParameterError, RecordingError
 from teleop_core.kernels.geometry import Array
 from teleop_core.kernels.portable import length
-from teleop_core.session.exchange import names
-from teleop_core.session.exchange.episodes import Episodes
-from teleop_core.session.exchange.options import BUTTONS, CHOICES, ImportOptions, option
-from teleop_core.session.exchange.orientation import TOLERANCE, Attitudes
-from teleop_core.session.exchange.source import Block, Presses
-from teleop_core.session.exchange.tables import Numbers, Table, column_of
-from teleop_core.session.exchange.times import SECOND_NS, nanoseconds
+from teleop_exchange import names
+from teleop_exchange.episodes import Episodes
+from teleop_exchange.options import BUTTONS, CHOICES, ImportOptions, option
+from teleop_exchange.orientation import TOLERANCE, Attitudes
+from teleop_exchange.source import Block, Presses
+from teleop_exchange.tables import Numbers, Table, column_of
+from teleop_exchange.times import SECOND_NS, nanoseconds
 
 _TOLD = 8  # columns that are told by name
 
@@ -32,7 +32,7 @@ class Columns:
 
 
 class TableSource:
-    """A table as a source of an import; see :class:`~teleop_core.session.exchange.source.Source`.
+    """A table as a source of an import; see :class:`~teleop_exchange.source.Source`.
 
     Args:
         table: The table.

@@ -13,8 +13,8 @@ import pyarrow.parquet as pq
 
 from teleop_core.base.errors import ParameterError, RecordingError, UnknownNameError
 from teleop_core.graph.topics import BY_NAME, Kind
-from teleop_core.session.exchange.joining import Joined, Streams
 from teleop_core.session.recording import Recording, open_recording
+from teleop_exchange.joining import Joined, Streams
 
 _BY_COLUMN = {
     **dict.fromkeys("xyz", "m"),
@@ -163,7 +163,7 @@ def _by_name(path: Path) -> str:
 def _data_set(
     recordings: list[Recording], path: Path, rate: float | None, action: str, task: str
 ) -> ExportReport:
-    from teleop_core.session.exchange.lerobot import FPS, write_data_set
+    from teleop_exchange.lerobot import FPS, write_data_set
 
     if action not in ACTIONS:
         raise UnknownNameError("--action", action, ACTIONS)
