@@ -29,7 +29,6 @@ NOT_RUN = {
     r"fit rests\.csv|sim --config scara\.yaml": "needs measurements of a machine",
     r"import user\.bag": "needs a bag of ROS 1: tests/unit/test_import_bags.py",
     r".*--format lerobot": "needs its library: tests/unit/test_lerobot.py",
-    r".*--presets? jigsaws": "needs a data set: tests/unit/test_import_systems.py",
     r"study .* --scheduler": "needs a Dask scheduler: tests/unit/test_studies.py",
     r"experiment": "each is run by a test of its own, below its name",
 }

@@ -585,7 +585,10 @@ def test_both_masters_of_the_da_vinci_kit_and_its_pedal_are_two_arms(
             messages += [("/console/clutch", log, pedal), ("/footpedals/camera", log, pedal)]
     write, name = (write2, "kit") if is_ros2 else (write1, "kit.bag")
     report = teleop_exchange.import_recording(
-        write(tmp_path / name, messages), tmp_path / "bag", preset="dvrk", axes=("+x", "+y", "+z")
+        write(tmp_path / name, messages),
+        tmp_path / "bag",
+        buttons_topic="console/clutch",
+        arms={"left": {"topic": "MTML/measured_cp"}, "right": {"topic": "MTMR/measured_cp"}},
     )
     assert [one.arm for one in (report, *report.others)] == ["left", "right"]
     for prefix in ("", "right/"):

@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 import teleop_core as tc
 import teleop_exchange
 from teleop_core.kernels.geometry import Array
-from teleop_exchange import names, orientation
+from teleop_exchange import names
 from teleop_exchange.times import ordered
 
 COUNT, RATE = 400, 100.0
@@ -216,28 +216,6 @@ def test_quaternions_of_any_sign_and_nearly_unit_length_give_a_continuous_one(
     assert np.allclose(np.linalg.norm(got, axis=1), 1.0, rtol=0, atol=1e-15)
 
 
-def test_a_direction_gives_the_attitude_that_turns_least(tmp_path: Path) -> None:
-    directions = TURNS.apply([0.0, 0.0, 1.0])
-    columns = ["ax", "ay", "az"]
-    _, stream = turned(tmp_path / "a.csv", tmp_path, columns, 7.0 * directions, forward=columns)
-    got = Rotation.from_quat(stream[HEAD[4:]], scalar_first=True)
-    assert np.allclose(got.apply([0.0, 0.0, 1.0]), directions, rtol=0, atol=1e-12)
-    # From one to the next it turns by the angle between the directions, and not about them.
-    steps = (got[1:] * got[:-1].inv()).as_rotvec()
-    cosines = np.clip(np.sum(directions[1:] * directions[:-1], axis=1), -1.0, 1.0)
-    assert np.allclose(np.linalg.norm(steps, axis=1), np.arccos(cosines), rtol=0, atol=1e-7)
-    assert np.abs(np.sum(steps * directions[:-1], axis=1)).max() < 1e-12
-
-
-def test_a_direction_that_turns_back_still_gives_rotations() -> None:
-    reader = orientation.Attitudes("forward")
-    rows = np.array([[0.0, 0.0, -1.0], [1.0, 0.0, 0.0], [-1.0, 0.0, 0.0], [np.nan, 0.0, 0.0]])
-    got = reader.quaternions(rows)
-    turned_to = Rotation.from_quat(got[:3], scalar_first=True).apply([0.0, 0.0, 1.0])
-    assert np.allclose(turned_to, rows[:3], rtol=0, atol=1e-12)
-    assert np.isnan(got[3]).all()
-
-
 def test_without_an_orientation_it_is_constant(tmp_path: Path) -> None:
     frame(HEAD[:4], TABLE[:, :4]).to_csv(tmp_path / "a.csv", index=False)
     report, stream = imported(tmp_path / "a.csv", tmp_path)
@@ -402,21 +380,6 @@ def test_holes_of_a_file_are_not_messages_that_are_missing_in_its_session(tmp_pa
         assert {topic.gaps for topic in recording.score().topics.values()} <= {0, None}
 
 
-def test_short_stretches_of_missing_rows_are_bridged_on_request(tmp_path: Path) -> None:
-    rows = TABLE.copy()
-    rows[100:105, 1:4] = np.nan
-    rows[200:260, 4:] = np.nan
-    frame(rows=rows).to_csv(tmp_path / "a.csv", index=False)
-    options: dict[str, Any] = {"missing": "interpolate", "missing_time": 0.1}
-    report, stream = imported(tmp_path / "a.csv", tmp_path, **options)
-    assert (report.counts.filled, report.counts.missing) == (5, 60)
-    share = np.linspace(0.0, 1.0, 7)[1:-1, None]
-    expected = (1.0 - share) * PLACES[99] + share * PLACES[105]
-    assert np.allclose(stream[["x", "y", "z"]][100:105], expected, rtol=0, atol=1e-12)
-    got = Rotation.from_quat(stream[HEAD[4:]][100:105], scalar_first=True)
-    assert (got.inv() * TURNS[100:105]).magnitude().max() < 1e-3
-
-
 def test_doubled_times_keep_the_first_row(tmp_path: Path) -> None:
     rows = np.repeat(TABLE, 2, axis=0)[: 2 * COUNT - 30]
     rows[1::2, 1] += 1.0
@@ -560,7 +523,7 @@ def test_rows_of_wrong_length_are_left_out_and_counted(tmp_path: Path) -> None:
     assert report.counts.rows == COUNT
 
 
-def test_a_long_table_passes_through_the_disk_and_gives_the_same(tmp_path: Path) -> None:
+def test_a_long_table_gives_the_same(tmp_path: Path) -> None:
     count = 700_000
     times = np.arange(count) * 1e-3
     rows = np.column_stack((times, np.sin(times), np.cos(times), 0.0 * times))

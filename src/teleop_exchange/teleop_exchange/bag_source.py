@@ -24,7 +24,7 @@ from teleop_exchange.bag_messages import (
     frames,
     plain,
 )
-from teleop_exchange.options import BUTTONS, ImportOptions, button_map
+from teleop_exchange.options import BUTTONS, ORIENTATIONS, ImportOptions, button_map
 from teleop_exchange.orientation import Attitudes
 from teleop_exchange.ros_bags import OurBag, RosBag, is_plain_mcap, opened_by_rosbags
 from teleop_exchange.source import Block, Presses
@@ -32,8 +32,7 @@ from teleop_exchange.transform_chain import chain_to, composed
 
 _LOOKED_AT = 1000
 """Messages of transforms whose frames are listed."""
-_TABLE_OPTIONS = ("time", "rate", "position", "quaternion", "matrix", "euler", "rotation_vector",
-                  "forward", *BUTTONS)  # fmt: skip
+_TABLE_OPTIONS = (*ORIENTATIONS, "time", "rate", "position", *BUTTONS)
 
 
 class BagSource:

@@ -10,7 +10,6 @@ from teleop_core.base.errors import ParameterError
 from teleop_core.base.texts import printable
 from teleop_core.commands.arguments import command, out_argument
 from teleop_exchange.options import BUTTONS, LENGTHS, TIMES_NS, ImportOptions
-from teleop_exchange.presets import PRESETS
 
 _IMPORT = """\
 Make a recording of a hand's motion from a file of others: CSV, TSV or blanks (also .gz), Parquet,
@@ -24,9 +23,6 @@ examples:
   teleop import mocap.txt --out bags/mocap --rate 100 --position 1-3 --matrix 4-12
   teleop import tool.csv --out bags/tool --euler ZYX yaw pitch roll --angles deg --axes +y -x +z
   teleop import user.bag --out bags/user --topic /MTMR/measured_cp --buttons clutch=0,mode=2
-files of known systems:
-%s
-  teleop import Suturing_B001.txt --out bags/suturing --preset jigsaws
 both hands of one file, with options of each hand beside those of all:
   teleop import two.csv --out bags/two --arm left "--position 2-4" --arm right "--position 5-7"
 then:
@@ -37,14 +33,10 @@ then:
 def add_import(commands: Any) -> None:
     """Add ``teleop import``."""
     text = "turn a file from another system into a recording"
-    listed = "\n".join(f"  --preset {name:9} {one.text}" for name, one in PRESETS.items())
-    parser = command(commands, "import", _import, text, _EXAMPLES % listed)
+    parser = command(commands, "import", _import, text, _EXAMPLES)
     parser.description = _IMPORT
     parser.add_argument("file", type=Path, metavar="FILE", help="file or directory to import")
     out_argument(parser)
-    parser.add_argument(
-        "--preset", choices=sorted(PRESETS), help="options for files of a known system, see below"
-    )
     parser.add_argument(
         "--arm", nargs=2, action="append", default=[], metavar=("NAME", "OPTIONS"),
         help="one of several hands in the file, with options for it alone",
@@ -104,9 +96,6 @@ def _place(group: Any) -> None:
     )  # fmt: skip
     group.add_argument("--rotation-vector", nargs="+", metavar="COL", help="three columns")
     group.add_argument(
-        "--forward", nargs="+", metavar="COL", help="three columns: direction of the tool's z axis"
-    )
-    group.add_argument(
         "--angles", choices=("auto", "rad", "deg"), help="unit of --euler and --rotation-vector"
     )
     group.add_argument(
@@ -154,15 +143,6 @@ def _damage(group: Any) -> None:
         help="which recording of a table that holds several; all: each, into a folder of them, of "
         "the folder of a LeRobot data set too",
     )  # fmt: skip
-    group.add_argument(
-        "--missing", choices=("drop", "interpolate"), help="rows with NaN (default: drop)"
-    )
-    group.add_argument(
-        "--missing-time",
-        type=float,
-        metavar="S",
-        help="longest gap to interpolate [s] (default: 0.1)",
-    )
     group.add_argument(
         "--backwards",
         choices=("auto", "refuse", "drop", "sort"),
@@ -242,14 +222,12 @@ def _import(arguments: argparse.Namespace) -> int:
     if arguments.episode == "all":
         arguments.episode = None
         episodes = import_episodes(
-            arguments.file, arguments.out, preset=arguments.preset or "", arms=arms,
+            arguments.file, arguments.out, arms=arms,
             say=lambda line: print(printable(line), flush=True), **_given(arguments),
         )  # fmt: skip
         print(printable(str(episodes)))
         return 2 if episodes.refused else 0
-    report = import_recording(
-        arguments.file, arguments.out, preset=arguments.preset or "", arms=arms, **_given(arguments)
-    )
+    report = import_recording(arguments.file, arguments.out, arms=arms, **_given(arguments))
     print(printable(str(report)))
     print(f"{arguments.out}: {report.duration:.1f} s imported; next: "
           f"teleop replay {arguments.out} --out {arguments.out}_replayed")  # fmt: skip

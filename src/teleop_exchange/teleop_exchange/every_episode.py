@@ -13,8 +13,7 @@ from teleop_exchange.episodes import numbers_of
 from teleop_exchange.import_report import ImportReport
 from teleop_exchange.imported_motion import open_table
 from teleop_exchange.importing import command_of, import_recording
-from teleop_exchange.options import ImportOptions, Option
-from teleop_exchange.presets import options_of
+from teleop_exchange.options import Changes, ImportOptions, Option, options_of
 
 
 @dataclass(frozen=True)
@@ -43,8 +42,7 @@ def import_episodes(
     out: Path | str,
     options: ImportOptions | None = None,
     *,
-    preset: str = "",
-    arms: Mapping[str, Mapping[str, Option]] = MappingProxyType({}),
+    arms: Mapping[str, Changes] = MappingProxyType({}),
     say: Callable[[str], object] = lambda _: None,
     **changes: Option,
 ) -> EpisodesReport:
@@ -57,7 +55,6 @@ def import_episodes(
         file: Table with a column ``episode_index`` or the like, or folder of the data set.
         out: Folder of the recordings ``episode_000000`` and so on; may be there.
         options: As of :func:`teleop_exchange.import_recording`, without ``episode``.
-        preset: As there.
         arms: As there.
         say: Told a line after each episode.
         **changes: As ``options``.
@@ -67,23 +64,21 @@ def import_episodes(
         ParameterError: No column says which episodes there are, or an option is wrong.
     """
     base, out = options or ImportOptions(), Path(out)
-    options_of(base, preset, arms, changes)  # refused here, not once for each episode
+    options_of(base, arms, changes)  # refused here, not once for each episode
     files = files_of(Path(file), base.changed(**changes))
     made: dict[int, ImportReport] = {}
     kept, refused = [], dict[int, str]()
     for count, (number, path) in enumerate(sorted(files.items()), start=1):
         target, of_one = out / f"episode_{number:06d}", replace(base, episode=number)
         where = f"{target.name} ({count} of {len(files)})"
-        wanted = options_of(of_one, preset, arms, changes)
+        wanted = options_of(of_one, arms, changes)
         try:
             if _is_there(target, command_of(path, target, wanted)):
                 kept.append(number)
                 say(f"{where}: kept")
                 continue
             out.mkdir(parents=True, exist_ok=True)
-            made[number] = import_recording(
-                path, target, of_one, preset=preset, arms=arms, **changes
-            )
+            made[number] = import_recording(path, target, of_one, arms=arms, **changes)
             say(f"{where}: {made[number].duration:.1f} s imported")
         except TeleopError as error:
             refused[number] = str(error)

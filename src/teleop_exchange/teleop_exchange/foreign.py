@@ -22,7 +22,6 @@ from teleop_core.graph.topics import MASTER_BUTTONS, MASTER_MEASURED_CP, Kind, T
 from teleop_core.session.recorded_hand import COLUMNS
 from teleop_exchange.imported_motion import Motion
 from teleop_exchange.options import ImportOptions
-from teleop_exchange.spool import Spool
 
 
 def master_of_others(path: Path, bag: Bag | None, prefixes: Sequence[str]) -> MemoryBag:
@@ -76,13 +75,11 @@ def _of_arm(bag: Bag, prefix: str, options: ImportOptions) -> ImportOptions:
 
 def _read(path: Path, arm: str, options: ImportOptions) -> dict[Topic, Series]:
     """Streams of one arm."""
-    with Spool(7) as spool, _options_told(path):
-        motion = Motion(path, options, spool)
-        blocks = [poses for _, poses in motion.blocks()]
-        presses = motion.presses()
-    stamps, poses = motion.stamp_ns, np.concatenate(blocks)
+    with _options_told(path):
+        motion = Motion(path, options)
+    presses, stamps = motion.presses(), motion.stamp_ns
     topic = MASTER_MEASURED_CP.of_arm(arm)
-    found = {topic: Series(stamps, stamps, poses, (), topic.frame_id)}
+    found = {topic: Series(stamps, stamps, motion.poses, (), topic.frame_id)}
     if presses is not None:
         topic = MASTER_BUTTONS.of_arm(arm)
         at, pressed = presses

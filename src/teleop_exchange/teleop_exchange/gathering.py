@@ -1,7 +1,6 @@
-"""Gathering: one pass over a source, its rows spooled, its times and what is missing kept."""
+"""Gathering: all rows of a source, with their times and what is missing."""
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,10 +8,9 @@ from numpy.typing import NDArray
 
 from teleop_core.base.errors import RecordingError
 from teleop_core.base.ranges import check
-from teleop_core.kernels.portable import dot, length
+from teleop_core.kernels.geometry import Array
 from teleop_exchange.options import LENGTHS, ImportOptions
 from teleop_exchange.source import Presses, Source
-from teleop_exchange.spool import Spool
 from teleop_exchange.times import SECOND_NS, Stamps, guessed_unit, is_constant, joined_ns
 
 SAMPLE = 1000
@@ -31,7 +29,7 @@ class Gathered:
     """A file after the first pass.
 
     Attributes:
-        spool: Rows (N, 7): position [m] in the file's axes, quaternion w, x, y, z.
+        rows: Rows (N, 7): position [m] in the file's axes, quaternion w, x, y, z.
         stamp_ns: Times (N,) [ns]; rows without one are not usable.
         is_usable: Which rows are numbers throughout (N,).
         buttons: Pressed or not (N, 3), in step with the rows; None without such columns.
@@ -42,7 +40,7 @@ class Gathered:
         order: Rows in the order in which they were recorded (N,); None if it is that of the file.
     """
 
-    spool: Spool
+    rows: Array
     stamp_ns: Stamps
     is_usable: NDArray[np.bool_]
     buttons: NDArray[np.uint8] | None
@@ -57,6 +55,7 @@ class Gathered:
 class _Parts:
     """What is collected block by block."""
 
+    rows: list[Array]
     times: list[NDArray[np.float64] | Stamps]
     logs: list[Stamps]
     usable: list[NDArray[np.bool_]]
@@ -65,18 +64,18 @@ class _Parts:
     farthest: float = 0.0
 
 
-def gather(source: Source, options: ImportOptions, spool: Spool) -> Gathered:
+def gather(source: Source, options: ImportOptions) -> Gathered:
     """Read all of a source.
 
     Raises:
         RecordingError: It holds no rows, or a column of nothing, or its orientations are none, or
             nobody says in which unit places far beyond a hand's reach are.
     """
-    parts = _Parts([], [], [], [], np.zeros(4))
+    parts = _Parts([], [], [], [], [], np.zeros(4))
     scale = LENGTHS[source.unit]
     for block in source.blocks():
         rows = np.column_stack((scale * block.position, block.quaternion))
-        spool.add(rows)
+        parts.rows.append(rows)
         is_number: NDArray[np.bool_] = np.isfinite(rows)
         parts.finite += [*is_number[:, :3].sum(axis=0), is_number[:, 3:].all(axis=1).sum()]
         sizes = np.abs(rows[:, :3][is_number[:, :3]])
@@ -87,9 +86,10 @@ def gather(source: Source, options: ImportOptions, spool: Spool) -> Gathered:
             parts.logs.append(block.log_ns)
         if block.buttons is not None:
             parts.buttons.append(block.buttons)
-    if not spool.count:
+    count = sum(map(len, parts.rows))
+    if not count:
         raise RecordingError(source.path, "holds no rows")
-    _check(source, parts, spool.count)
+    _check(source, parts, count)
     told = list(source.told)
     if source.attitudes.longest > TOLD_LENGTH:
         told.append(f"quaternions up to {source.attitudes.longest:.2g} off unit length made unit")
@@ -100,7 +100,8 @@ def gather(source: Source, options: ImportOptions, spool: Spool) -> Gathered:
         presses = Presses(presses.log_ns, presses.log_ns, presses.pressed)
     buttons = np.concatenate(parts.buttons) if parts.buttons else None
     strange = source.attitudes.strange
-    return Gathered(spool, stamps, usable, buttons, presses, told, source.bad_rows, strange, order)
+    rows = np.concatenate(parts.rows)
+    return Gathered(rows, stamps, usable, buttons, presses, told, source.bad_rows, strange, order)
 
 
 def _recorded_order(logs: list[Stamps]) -> NDArray[np.int32] | None:
@@ -198,41 +199,3 @@ def _without_stamps(source: Source, parts: _Parts, value: float, told: list[str]
 def _few(parts: list[NDArray[np.float64] | Stamps]) -> NDArray[np.float64]:
     """Some of the times, in order."""
     return np.concatenate([part[:SAMPLE] for part in parts[:SAMPLE]], dtype=np.float64)
-
-
-def bridge(gathered: Gathered, longest_ns: int) -> int:
-    """Fill stretches of missing rows between two usable ones by straight lines.
-
-    Attitudes turn by normalised straight lines, too.
-
-    Args:
-        gathered: Rows; written.
-        longest_ns: Longest time between the usable rows [ns].
-
-    Returns:
-        Number of rows filled.
-    """
-    stamps, usable = gathered.stamp_ns, gathered.is_usable
-    filled = 0
-    for first, last in _stretches(~usable):
-        if first == 0 or last == len(usable) or (stamps[first:last] == _NO_TIME).any():
-            continue
-        begin, end = int(stamps[first - 1]), int(stamps[last])
-        inside = stamps[first:last]
-        if not 0 < end - begin <= longest_ns or not ((begin < inside) & (inside < end)).all():
-            continue
-        a, b = gathered.spool.chosen(np.array([first - 1, last]))
-        b[3:] *= 1.0 if dot(a[3:], b[3:]) >= 0.0 else -1.0
-        share = ((inside - begin) / (end - begin))[:, None]
-        rows = (1.0 - share) * a + share * b
-        rows[:, 3:] /= length(rows[:, 3:])[:, None]
-        gathered.spool.put(first, rows)
-        usable[first:last] = True
-        filled += last - first
-    return filled
-
-
-def _stretches(chosen: NDArray[np.bool_]) -> Iterator[tuple[int, int]]:
-    """First and after the last of every run of chosen rows."""
-    edges = np.flatnonzero(np.diff(np.concatenate(([False], chosen, [False])).astype(np.int8)))
-    yield from zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True)

@@ -10,7 +10,7 @@ import numpy as np
 from teleop_core.kernels.geometry import Array
 from teleop_core.kernels.portable import dot, length
 from teleop_exchange.imported_motion import Counts, Motion
-from teleop_exchange.times import spread_ms
+from teleop_exchange.times import Stamps, spread_ms
 
 if TYPE_CHECKING:
     from teleop_core.session.recording import Recording
@@ -111,94 +111,44 @@ class ImportReport:
 
 
 def summary(file: str, out: Path | None, motion: Motion, arm: str = "") -> ImportReport:
-    """Report of a motion; reads all of it."""
-    found = _Figures(motion)
+    """Report of a motion."""
     period = spread_ms(motion.stamp_ns)
-    duration = float(motion.stamp_ns[-1] - motion.stamp_ns[0]) * 1e-9
+    places, turns = motion.poses[:, :3], motion.poses[:, 3:]
     rate = 1e3 / period[0] if period[0] > 0.0 else 0.0
-    extent = found.high - found.low
+    extent = places.max(axis=0) - places.min(axis=0)
+    steps = speeds(motion.stamp_ns, places)
+    every = max(1, round(rate / SPEED_HZ))
+    median, high = np.percentile(speeds(motion.stamp_ns[::every], places[::every]), (50, 95))
+    cosine = np.clip(np.abs(dot(turns, turns[0])), 0.0, 1.0).min()
     return ImportReport(
         file=file, out=out, counts=motion.counts, losses=tuple(motion.losses()),
         start_ns=int(motion.stamp_ns[0]),
-        duration=duration, rate=rate, period_ms=period,
-        range=(float(extent[0]), float(extent[1]), float(extent[2])), rotation=found.rotation,
-        speed=found.speed(), fastest=found.fastest, gaps=motion.gaps, told=tuple(motion.told),
-        warnings=tuple(_warnings(motion, found, extent, rate)), arm=arm,
+        duration=float(motion.stamp_ns[-1] - motion.stamp_ns[0]) * 1e-9,
+        rate=rate, period_ms=period,
+        range=(float(extent[0]), float(extent[1]), float(extent[2])),
+        rotation=2.0 * math.acos(cosine), speed=(float(median), float(high)),
+        fastest=float(steps.max()), gaps=motion.gaps, told=tuple(motion.told),
+        warnings=tuple(_warnings(motion, steps, float(extent.max()), rate)), arm=arm,
     )  # fmt: skip
 
 
-class _Figures:
-    """Range, rotation and speed of a motion, block by block."""
-
-    def __init__(self, motion: Motion) -> None:
-        self.low, self.high = np.full(3, np.inf), np.full(3, -np.inf)
-        self.rotation, self.fastest, self.fastest_at, self.fast = 0.0, 0.0, 0.0, 0
-        period = float(np.median(np.diff(motion.stamp_ns))) * 1e-9
-        self._every = max(1, round(1.0 / (SPEED_HZ * period)))
-        self._speeds: list[Array] = []
-        self._first: Array | None = None
-        last_at, last, place_at, place = motion.stamp_ns[:0], None, motion.stamp_ns[:0], None
-        begin, start_ns = 0, int(motion.stamp_ns[0])
-        for stamps, poses in motion.blocks():
-            self._extent(poses)
-            self._jumps(np.concatenate((last_at, stamps)), _after(last, poses[:, :3]), start_ns)
-            last_at, last = stamps[-1:], poses[-1:, :3]
-            turn = slice(-begin % self._every, None, self._every)
-            at, places = np.concatenate((place_at, stamps[turn])), _after(place, poses[turn, :3])
-            self._speeds.append(_speeds(at, places)[1].astype(np.float32))
-            if len(at):
-                place_at, place = at[-1:], places[-1:]
-            begin += len(stamps)
-
-    def _extent(self, poses: Array) -> None:
-        self._first = poses[0, 3:].copy() if self._first is None else self._first
-        self.low = np.minimum(self.low, poses[:, :3].min(axis=0))
-        self.high = np.maximum(self.high, poses[:, :3].max(axis=0))
-        cosine = np.clip(np.abs(dot(poses[:, 3:], self._first)), 0.0, 1.0).min()
-        self.rotation = max(self.rotation, 2.0 * math.acos(cosine))
-
-    def _jumps(self, stamps: "np.ndarray[tuple[int], np.dtype[np.int64]]", places: Array,
-               start_ns: int) -> None:  # fmt: skip
-        _, speeds = _speeds(stamps, places)
-        if not len(speeds):
-            return
-        self.fast += int((speeds > FAST).sum())
-        at = int(speeds.argmax())
-        if speeds[at] > self.fastest:
-            self.fastest, self.fastest_at = float(speeds[at]), (int(stamps[at]) - start_ns) * 1e-9
-
-    def speed(self) -> tuple[float, float]:
-        """Median and 95 % [m/s]."""
-        speeds = np.concatenate(self._speeds)
-        if not len(speeds):
-            return 0.0, 0.0
-        median, high = np.percentile(speeds, (50, 95))
-        return float(median), float(high)
+def speeds(stamps: Stamps, places: Array) -> Array:
+    """Speeds [m/s] between rows; one of zero for a row alone."""
+    if len(stamps) < 2:
+        return np.zeros(1)
+    return np.asarray(length(np.diff(places, axis=0)) / (np.diff(stamps) * 1e-9))
 
 
-def _after(last: Array | None, places: Array) -> Array:
-    return places if last is None else np.concatenate((last, places))
-
-
-def _speeds(
-    stamps: "np.ndarray[tuple[int], np.dtype[np.int64]]", places: Array
-) -> tuple[Array, Array]:
-    """Periods [s] and speeds [m/s] between rows."""
-    steps = np.diff(stamps) * 1e-9
-    speeds: Array = length(np.diff(places, axis=0)) / steps
-    return steps, speeds
-
-
-def _warnings(motion: Motion, found: _Figures, extent: Array, rate: float) -> list[str]:
+def _warnings(motion: Motion, steps: Array, largest: float, rate: float) -> list[str]:
     out, c = [], motion.counts
-    largest = float(extent.max())
     if largest > LARGE:
         out.append(f"the hand moves {largest:,.4g} m: is the unit mm? (--unit mm, or --scale)")
     elif largest < 1e-3:
         out.append(f"the hand moves {1e6 * largest:.3g} µm at most: is the unit right? (--unit)")
-    if found.fast:
-        out.append(f"{found.fast} steps faster than {FAST:g} m/s, up to {found.fastest:.3g} m/s at "
-                   f"{found.fastest_at:.3f} s: a wrong unit, or the tracking jumps")  # fmt: skip
+    if fast := int((steps > FAST).sum()):
+        at = float(motion.stamp_ns[steps.argmax()] - motion.stamp_ns[0]) * 1e-9
+        out.append(f"{fast} steps faster than {FAST:g} m/s, up to {steps.max():.3g} m/s at "
+                   f"{at:.3f} s: a wrong unit, or the tracking jumps")  # fmt: skip
     if rate < SLOW_HZ:
         out.append(f"{rate:.3g} Hz is slow for a hand (below {SLOW_HZ:g} Hz): is the unit of the "
                    "time right? (--time-unit)")  # fmt: skip

@@ -1,6 +1,5 @@
-"""Motion: an imported hand, cleaned and in the master's axes, to be read block by block."""
+"""Motion: an imported hand, cleaned and in the master's axes."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -17,17 +16,14 @@ from teleop_core.kernels.geometry import (
     quaternion_products,
 )
 from teleop_core.kernels.portable import product
-from teleop_exchange.gathering import bridge, gather
+from teleop_exchange.gathering import gather
 from teleop_exchange.options import ImportOptions
 from teleop_exchange.source import Source
-from teleop_exchange.spool import Spool
 from teleop_exchange.times import SECOND_NS, Stamps, gaps, ordered, restarts
 
 if TYPE_CHECKING:
     from teleop_exchange.tables import Table
 
-ROWS = 20_000
-"""Rows of a block."""
 MOST_BACKWARDS = 0.01
 """Share of rows whose time may go back before the file is refused."""
 MOST_DOUBLED = 0.5
@@ -41,7 +37,6 @@ class Counts:
         rows: Rows in the file.
         samples: Rows that are left.
         missing: Rows left out because a number is missing or NaN, or the orientation is none.
-        filled: Missing rows that were interpolated.
         doubled: Rows left out because their time was there already.
         backwards: Rows whose time went back; left out or sorted in.
         damaged: Rows left out because they have too few or too many cells.
@@ -50,7 +45,6 @@ class Counts:
     rows: int
     samples: int
     missing: int
-    filled: int
     doubled: int
     backwards: int
     damaged: int
@@ -62,10 +56,10 @@ class Motion:
     Args:
         path: The file.
         options: What is taken of it, and what becomes of that.
-        spool: Where its rows are kept; it must stay open as long as they are read.
 
     Attributes:
         stamp_ns: Times (N,) [ns], rising.
+        poses: Position [m] and quaternion w, x, y, z (N, 7).
         counts: What became of the rows.
         told: What was taken, guessed and changed, in words.
         strange: How many rows were left out because their orientation is none.
@@ -77,36 +71,28 @@ class Motion:
         ParameterError: An option does not fit the file.
     """
 
-    def __init__(self, path: Path, options: ImportOptions, spool: Spool) -> None:
-        gathered = gather(open_source(path, options), options, spool)
+    def __init__(self, path: Path, options: ImportOptions) -> None:
+        gathered = gather(open_source(path, options), options)
         self._path, self._gathered, self._options = path, gathered, options
         self.told, self.strange = list(gathered.told), gathered.strange
-        filled = 0
-        if options.missing == "interpolate":
-            filled = bridge(gathered, round(options.missing_time * SECOND_NS))
-        # Every copy of the times of an hour at 1 kHz takes 29 MB.
-        usable = np.flatnonzero(gathered.is_usable).astype(np.int32)
-        is_whole = len(usable) == len(gathered.is_usable) and gathered.order is None
+        usable: NDArray[np.integer] = np.flatnonzero(gathered.is_usable)
         if gathered.order is not None:
             usable = gathered.order[gathered.is_usable[gathered.order]]
-        stamps = gathered.stamp_ns if is_whole else gathered.stamp_ns[usable]
-        gathered.stamp_ns = stamps[:0]
+        stamps = gathered.stamp_ns[usable]
         self._refuse_several(stamps)
         order = ordered(stamps, is_sorted=options.backwards == "sort")
-        is_kept = not order.doubled and not order.backwards
-        self._rows = usable if is_kept else usable[order.rows]
-        self.stamp_ns: Stamps = stamps if is_kept else stamps[order.rows]
+        self._rows = usable[order.rows]
+        self.stamp_ns: Stamps = stamps[order.rows]
         self.counts = Counts(
-            rows=gathered.spool.count + gathered.bad_rows, samples=len(self._rows),
-            missing=gathered.spool.count - len(usable), filled=filled, doubled=order.doubled,
+            rows=len(gathered.rows) + gathered.bad_rows, samples=len(self._rows),
+            missing=len(gathered.rows) - len(usable), doubled=order.doubled,
             backwards=order.backwards, damaged=gathered.bad_rows,
         )  # fmt: skip
         self._check()
         self.gaps = gaps(self.stamp_ns, options.gap)
-        self._turn = options.axis_map()
         self._shift_ns = 0
-        self._origin = np.zeros(3)
-        self._origin = self._center()
+        self.poses = self._in_axes_of_master(gathered.rows[self._rows])
+        gathered.rows = gathered.rows[:0]
 
     def _refuse_several(self, stamps: Stamps) -> None:
         """Refuse several recordings in one table: no policy makes one hand of them.
@@ -156,49 +142,32 @@ class Motion:
         """Rows that were left out or changed, in words."""
         c = self.counts
         parts = [
-            (c.missing, "with missing numbers left out"), (c.filled, "filled by straight lines"),
+            (c.missing, "with missing numbers left out"),
             (c.doubled, "doubled left out"), (c.backwards, "going back in time"),
             (c.damaged, "with a wrong number of cells left out"),
         ]  # fmt: skip
         return [f"{count} {text}" for count, text in parts if count]
 
-    def _center(self) -> Array:
-        """Place in the master's axes [m] that comes to zero."""
-        if self._options.center == "keep":
-            return np.zeros(3)
-        total, low, high = np.zeros(3), np.full(3, np.inf), np.full(3, -np.inf)
-        start = None
-        for _, poses in self.blocks():
-            start = poses[0, :3].copy() if start is None else start
-            total += poses[:, :3].sum(axis=0)
-            low = np.minimum(low, poses[:, :3].min(axis=0))
-            high = np.maximum(high, poses[:, :3].max(axis=0))
-        assert start is not None
-        mean = total / len(self.stamp_ns)
-        center = {"mean": mean, "middle": 0.5 * (low + high), "start": start}[self._options.center]
-        listed = ", ".join(f"{1e3 * value:z.1f}" for value in center)
-        self.told.append(f"{self._options.center} of the motion at ({listed}) mm brought to zero")
-        return center
+    def _in_axes_of_master(self, rows: Array) -> Array:
+        """Poses (N, 7) of rows of the file, the centre brought to zero."""
+        turn = self._options.axis_map()
+        place = self._options.scale * product(rows[:, :3], turn.T)
+        if (name := self._options.center) != "keep":
+            low, high = place.min(axis=0), place.max(axis=0)
+            centers = {"mean": place.mean(axis=0), "middle": 0.5 * (low + high), "start": place[0]}
+            listed = ", ".join(f"{1e3 * value:z.1f}" for value in centers[name])
+            self.told.append(f"{name} of the motion at ({listed}) mm brought to zero")
+            place = place - centers[name]
+        return np.column_stack((place, continuous(self._turned(rows[:, 3:], turn), None)))
 
-    def blocks(self) -> Iterator[tuple[Stamps, Array]]:
-        """Stamps (n,) [ns] and poses (n, 7), one block after the other."""
-        last = None
-        for begin in range(0, len(self._rows), ROWS):
-            part = slice(begin, begin + ROWS)
-            rows = self._gathered.spool.chosen(self._rows[part])
-            place = self._options.scale * product(rows[:, :3], self._turn.T) - self._origin
-            turns = continuous(self._turned(rows[:, 3:]), last)
-            last = turns[-1]
-            yield self.stamp_ns[part], np.column_stack((place, turns))
-
-    def _turned(self, quaternions: Array) -> Array:
+    def _turned(self, quaternions: Array, axes: Array) -> Array:
         """Attitudes (n, 4) in the master's axes; a mirror turns those of the body as well."""
         if self._options.handedness == "right":
             turn = np.empty(4)
-            quaternion_from_rotation(np.ascontiguousarray(self._turn), turn)
+            quaternion_from_rotation(np.ascontiguousarray(axes), turn)
             return quaternion_products(turn, quaternions)
         # A turn of the file about an axis is the opposite turn about the mirrored axis.
-        return np.column_stack((quaternions[:, 0], -product(quaternions[:, 1:], self._turn.T)))
+        return np.column_stack((quaternions[:, 0], -product(quaternions[:, 1:], axes.T)))
 
     def presses(self) -> tuple[Stamps, NDArray[np.uint8]] | None:
         """Stamps (n,) [ns] and buttons (n, 3) where they change, the first time; None without."""

@@ -5,14 +5,11 @@ import json
 import shlex
 import shutil
 from collections.abc import Iterator, Mapping
-from contextlib import ExitStack
 from dataclasses import asdict, replace
-from itertools import zip_longest
 from pathlib import Path
 from types import MappingProxyType
 
 import numpy as np
-from numpy.typing import NDArray
 
 from teleop_core.bags.arms import ARMS_KEY
 from teleop_core.bags.writer import BagWriter
@@ -21,12 +18,11 @@ from teleop_core.graph.topics import MASTER_BUTTONS, MASTER_MEASURED_CP, Topic
 from teleop_core.kernels.geometry import Array
 from teleop_exchange.import_report import ImportReport, summary
 from teleop_exchange.imported_motion import Motion
-from teleop_exchange.options import ImportOptions, Option
-from teleop_exchange.presets import options_of
-from teleop_exchange.spool import Spool
+from teleop_exchange.options import Changes, ImportOptions, Option, options_of
 from teleop_exchange.times import Stamps
 
-_READ = 1 << 20
+ROWS = 20_000
+"""Rows that are written at once."""
 
 
 def import_recording(
@@ -34,8 +30,7 @@ def import_recording(
     out: Path | str,
     options: ImportOptions | None = None,
     *,
-    preset: str = "",
-    arms: Mapping[str, Mapping[str, Option]] = MappingProxyType({}),
+    arms: Mapping[str, Changes] = MappingProxyType({}),
     **changes: Option,
 ) -> ImportReport:
     """Make a recording of a file: CSV, TSV, Parquet, rosbag2 (MCAP, db3) or a ROS 1 bag.
@@ -48,8 +43,6 @@ def import_recording(
         file: What is imported.
         out: Directory of the recording, made here; nothing is left there after an error.
         options: What is taken of the file; what is not said is guessed and told.
-        preset: Options for files of a known system:
-            :data:`~teleop_exchange.presets.PRESETS`.
         arms: Several hands of one file, each with options beside those of all: ``{"left":
             {"position": "1-3"}, "right": {"position": "4-6"}}``. The first is the default arm.
         **changes: Options by name: ``position=("x", "y", "z"), unit="mm"``.
@@ -64,33 +57,32 @@ def import_recording(
         UnknownNameError: A column or topic is not there; those that are there are listed.
     """
     path, out = Path(file), Path(out)
-    wanted = options_of(options or ImportOptions(), preset, arms, changes)
+    wanted = options_of(options or ImportOptions(), arms, changes)
     if out.exists():
         raise RecordingError(out, "exists already; choose another --out")
-    with ExitStack() as spools:
-        motions = {
-            arm: Motion(path, one, spools.enter_context(Spool(7))) for arm, one in wanted.items()
-        }
-        first_ns = min(int(motion.stamp_ns[0]) for motion in motions.values())
-        for motion in motions.values():
-            motion.begin(first_ns)
-        found = [summary(path.name, out, motion, arm) for arm, motion in motions.items()]
-        report = replace(found[0], others=tuple(found[1:]))
-        write(motions, out, _about(path, out, wanted, report))
+    motions = {arm: Motion(path, one) for arm, one in wanted.items()}
+    first_ns = min(int(motion.stamp_ns[0]) for motion in motions.values())
+    for motion in motions.values():
+        motion.begin(first_ns)
+    found = [summary(path.name, out, motion, arm) for arm, motion in motions.items()]
+    report = replace(found[0], others=tuple(found[1:]))
+    write(motions, out, _about(path, out, wanted, report))
     return report
-
-
-Block = dict[Topic, tuple[Stamps, Array, Stamps]]
 
 
 def write(motions: Mapping[str, Motion], out: Path, metadata: dict[str, str]) -> None:
     """Record the motion of each arm, the default one first; the directory is whole or not there."""
-    hands = [_Hand(arm if number else "", m) for number, (arm, m) in enumerate(motions.items())]
-    topics = [topic for hand in hands for topic in hand.topics]
+    streams: dict[Topic, tuple[Stamps, Array]] = {}
+    for number, (arm, motion) in enumerate(motions.items()):
+        name = arm if number else ""
+        streams[MASTER_MEASURED_CP.of_arm(name)] = (motion.stamp_ns, motion.poses)
+        if (presses := motion.presses()) is not None:
+            stamps, pressed = presses
+            streams[MASTER_BUTTONS.of_arm(name)] = (stamps, pressed.astype(np.float64))
     try:
-        with BagWriter(out, topics, (), metadata=metadata) as writer:
-            for blocks in zip_longest(*(hand.blocks() for hand in hands), fillvalue={}):
-                writer.write_block({t: part for block in blocks for t, part in block.items()})
+        with BagWriter(out, list(streams), (), metadata=metadata) as writer:
+            for block in _blocks(streams):
+                writer.write_block(block)
     except BaseException as error:
         # A directory that another process made in the meantime is not ours to remove.
         if not (isinstance(error, RecordingError) and "exists already" in error.reason):
@@ -98,32 +90,19 @@ def write(motions: Mapping[str, Motion], out: Path, metadata: dict[str, str]) ->
         raise
 
 
-class _Hand:
-    """Topics and blocks of one arm; its buttons stand in the block of the poses at their time."""
-
-    def __init__(self, arm: str, motion: Motion) -> None:
-        self._motion, self._presses = motion, motion.presses()
-        self._poses, self._buttons = MASTER_MEASURED_CP.of_arm(arm), MASTER_BUTTONS.of_arm(arm)
-        self.topics = [self._poses] + [self._buttons] * (self._presses is not None)
-
-    def blocks(self) -> Iterator[Block]:
-        written = 0
-        for stamps, poses in self._motion.blocks():
-            block: Block = {self._poses: (stamps, poses, stamps)}
-            if self._presses is not None:
-                end = int(np.searchsorted(self._presses[0], stamps[-1], side="right"))
-                block[self._buttons] = _pressed(self._presses, written, end)
-                written = end
-            yield block
-        if self._presses is not None:
-            yield {self._buttons: _pressed(self._presses, written, len(self._presses[0]))}
-
-
-def _pressed(
-    presses: tuple[Stamps, NDArray[np.uint8]], begin: int, end: int
-) -> tuple[Stamps, Array, Stamps]:
-    stamps = presses[0][begin:end]
-    return stamps, presses[1][begin:end].astype(np.float64), stamps
+def _blocks(
+    streams: Mapping[Topic, tuple[Stamps, Array]],
+) -> Iterator[dict[Topic, tuple[Stamps, Array, Stamps]]]:
+    """Stretches of time, each with the samples of every stream."""
+    ends = np.sort(np.concatenate([s[ROWS - 1 :: ROWS] for s, _ in streams.values()]))
+    written = dict.fromkeys(streams, 0)
+    for end in (*ends, np.iinfo(np.int64).max):
+        block = {}
+        for topic, (stamps, values) in streams.items():
+            part = slice(written[topic], int(np.searchsorted(stamps, end, side="right")))
+            block[topic] = (stamps[part], values[part], stamps[part])
+            written[topic] = part.stop
+        yield block
 
 
 def command_of(path: Path, out: Path, options: Mapping[str, ImportOptions]) -> str:
@@ -160,6 +139,6 @@ def checksum(path: Path) -> str:
     found = hashlib.sha256()
     for file in files:
         with file.open("rb") as stream:
-            while data := stream.read(_READ):
+            while data := stream.read(1 << 20):
                 found.update(data)
     return found.hexdigest()

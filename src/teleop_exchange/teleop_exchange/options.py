@@ -1,5 +1,6 @@
 """Import options: which columns or topics of a file are the hand, in which units and axes."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from itertools import pairwise
 from typing import TYPE_CHECKING
@@ -13,6 +14,8 @@ Columns = tuple[str, ...]
 """Names of columns; or their numbers, counted from 1; ``4-12`` stands for nine of them."""
 Option = str | int | float | bool | None | tuple[str | int, ...] | list[str] | list[int]
 """Value of one option; numbers of columns may be whole numbers."""
+Changes = Mapping[str, Option]
+"""Import options by name."""
 
 LENGTHS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "in": 0.0254}
 """Units of length [m]."""
@@ -20,7 +23,7 @@ TIMES_NS = {"s": 1_000_000_000, "ms": 1_000_000, "us": 1000, "ns": 1}
 """Units of time [ns]."""
 BUTTONS = ("clutch", "fixture", "mode")
 AXES = ("+x", "-x", "+y", "-y", "+z", "-z")
-ORIENTATIONS = ("quaternion", "matrix", "euler", "rotation_vector", "forward")
+ORIENTATIONS = ("quaternion", "matrix", "euler", "rotation_vector")
 """Options that say where the orientation is."""
 CHOICES = {
     "time_unit": ("auto", *TIMES_NS),
@@ -31,13 +34,12 @@ CHOICES = {
     "angles": ("auto", "rad", "deg"),
     "orientation": ("auto", "none"),
     "center": ("keep", "mean", "middle", "start"),
-    "missing": ("drop", "interpolate"),
     "backwards": ("auto", "refuse", "drop", "sort"),
     "handedness": ("right", "left"),
 }
 _COUNTS = {
     "time": (0, 1, 2), "position": (0, 3), "quaternion": (0, 4), "matrix": (0, 9),
-    "euler": (0, 4), "rotation_vector": (0, 3), "forward": (0, 3),
+    "euler": (0, 4), "rotation_vector": (0, 3),
 }  # fmt: skip
 _TUPLES = (*_COUNTS, "axes")
 
@@ -63,8 +65,6 @@ class ImportOptions:
         euler: Order of the axes and three columns: ``("xyz", "roll", "pitch", "yaw")``. Small
             letters turn about fixed axes, capital ones about those that turn along (as in SciPy).
         rotation_vector: Three columns.
-        forward: Three columns of the direction of the tool's z axis; it turns no further about it
-            than it must.
         angles: Unit of Euler angles and rotation vectors: ``auto``, ``rad`` or ``deg``.
         orientation: ``auto``: guessed if nothing is said; ``none``: constant.
         clutch: Column of the button, pressed above ``threshold``; empty for none.
@@ -86,8 +86,6 @@ class ImportOptions:
         scale: All positions are multiplied by it.
         center: What comes to zero: ``mean`` of the positions, ``middle`` of their range, or their
             ``start``; ``keep``: nothing.
-        missing: Rows with NaN or without a value: ``drop``, or ``interpolate`` short ones.
-        missing_time: Longest time over which is interpolated [s].
         backwards: Rows whose time goes back: ``refuse``, ``drop``, ``sort``; ``auto``: drop up to
             1 %, refuse more.
         gap: A gap is told that is longer than so many periods.
@@ -105,7 +103,6 @@ class ImportOptions:
     matrix_order: str = "row"
     euler: Columns = ()
     rotation_vector: Columns = ()
-    forward: Columns = ()
     angles: str = "auto"
     orientation: str = "auto"
     clutch: str = ""
@@ -123,8 +120,6 @@ class ImportOptions:
     handedness: str = "right"
     scale: float = 1.0
     center: str = "keep"
-    missing: str = "drop"
-    missing_time: float = 0.1
     backwards: str = "auto"
     gap: float = 5.0
 
@@ -193,8 +188,6 @@ class ImportOptions:
             raise ParameterError("--episode", self.episode, "a number; import_episodes takes all")
         if self.skip < 0:
             raise ParameterError("--skip", self.skip, "0 or more")
-        if not 0.0 <= self.missing_time < float("inf"):
-            raise ParameterError("--missing-time", self.missing_time, "0 or more")
 
     @property
     def signed_axes(self) -> Columns:
@@ -222,6 +215,27 @@ class ImportOptions:
                 words.append(option(field.name))
                 words += [str(one) for one in value] if isinstance(value, tuple) else [str(value)]
         return words
+
+
+def options_of(
+    base: ImportOptions, arms: Mapping[str, Changes], changes: Changes
+) -> dict[str, ImportOptions]:
+    """Options of each arm, the default one first; ``{"": ...}`` if there is one without a name.
+
+    Args:
+        base: Where they start.
+        arms: What is said of each hand beside what is said of all.
+        changes: What is said of all.
+
+    Raises:
+        UnknownNameError: There is no such option.
+        ParameterError: An arm has no name that a topic can have.
+    """
+    for name in arms:
+        if not name.isidentifier() or not name.isascii():
+            raise ParameterError("--arm", name, "a name of letters, digits and _")
+    own = arms or {"": {}}
+    return {name: base.changed(**{**changes, **one}) for name, one in own.items()}
 
 
 def button_map(text: str) -> dict[str, int]:

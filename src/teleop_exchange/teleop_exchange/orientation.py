@@ -4,17 +4,17 @@ What cannot be a rotation becomes NaN and is counted as strange, what is missing
 """
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
 from teleop_core.kernels import kernel
-from teleop_core.kernels.geometry import Array, multiply_quaternions, quaternion_from_rotation
+from teleop_core.kernels.geometry import Array, quaternion_from_rotation
 from teleop_core.kernels.portable import dot, length, product
 
 TOLERANCE = 0.1
 """How far a quaternion's length, or a matrix from being a rotation, may be off."""
-_MISSING = 1e-6  # shorter quaternions and directions mean that nothing was measured
+_MISSING = 1e-6  # shorter quaternions mean that nothing was measured
 
 
 @dataclass
@@ -22,7 +22,7 @@ class Attitudes:
     """Rows of one notation, one block after the other.
 
     Attributes:
-        kind: ``quaternion``, ``matrix``, ``euler``, ``rotation_vector``, ``forward`` or ``none``.
+        kind: ``quaternion``, ``matrix``, ``euler``, ``rotation_vector`` or ``none``.
         order: ``wxyz`` or ``xyzw``; ``row`` or ``column``; or the order of Euler angles.
         degrees: Whether angles are in degrees.
         strange: How many rows cannot be rotations.
@@ -36,7 +36,6 @@ class Attitudes:
     strange: int = 0
     mirrored: int = 0
     longest: float = 0.0
-    _last: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0]))
 
     @property
     def width(self) -> int:
@@ -55,8 +54,6 @@ class Attitudes:
             return self._of_matrices(
                 matrices.transpose(0, 2, 1) if self.order == "column" else matrices
             )
-        if self.kind == "forward":
-            return self._of_directions(rows)
         return self._of_angles(np.radians(rows) if self.degrees else rows)
 
     def _of_angles(self, angles: Array) -> Array:
@@ -90,54 +87,6 @@ class Attitudes:
         write_quaternions(np.ascontiguousarray(matrices), quaternions)
         quaternions[off | mirror | missing] = math.nan
         return quaternions
-
-    def _of_directions(self, directions: Array) -> Array:
-        """By parallel transport: from each direction to the next by the shortest turn."""
-        lengths = length(directions)
-        lengths[lengths < _MISSING] = math.nan
-        quaternions = np.empty((len(directions), 4))
-        transport(directions / lengths[:, None], self._last, quaternions)
-        return quaternions
-
-
-@kernel
-def transport(directions: Array, last: Array, quaternions: Array) -> None:
-    """Write the quaternions (N, 4) of directions (N, 3) that turn along by the shortest way.
-
-    Args:
-        directions: Unit vectors; rows with NaN give NaN.
-        last: The last direction and quaternion (7,); written.
-        quaternions: Written.
-
-    Source:
-        Hanson and Ma 1995, Parallel transport approach to curve framing, section 3.
-    """
-    turn = np.empty(4)
-    for i in range(directions.shape[0]):
-        ax, ay, az = last[0], last[1], last[2]
-        bx, by, bz = directions[i, 0], directions[i, 1], directions[i, 2]
-        if not math.isfinite(bx + by + bz):
-            for j in range(4):
-                quaternions[i, j] = math.nan
-            continue
-        w = 1.0 + ax * bx + ay * by + az * bz
-        x, y, z = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
-        if w < 1e-12:  # straight back: about any axis at right angles
-            w = 0.0
-            if abs(ax) < 0.9:
-                x, y, z = 0.0, az, -ay
-            else:
-                x, y, z = -az, 0.0, ax
-        scale = 1.0 / math.sqrt(w * w + x * x + y * y + z * z)
-        turn[0], turn[1], turn[2], turn[3] = w * scale, x * scale, y * scale, z * scale
-        multiply_quaternions(turn, last[3:7], last[3:7])
-        last[0], last[1], last[2] = bx, by, bz
-        size = 0.0
-        for j in range(4):
-            size += last[3 + j] * last[3 + j]
-        for j in range(4):
-            last[3 + j] /= math.sqrt(size)
-            quaternions[i, j] = last[3 + j]
 
 
 @kernel

@@ -126,7 +126,7 @@ class TableSource:
     def _orientation(self, taken: set[int]) -> tuple[Attitudes, tuple[int, ...]]:
         o = self._options
         orders = {"matrix": o.matrix_order, "euler": o.euler[0] if o.euler else "xyz"}
-        for kind in ("quaternion", "matrix", "euler", "rotation_vector", "forward"):
+        for kind in ("quaternion", "matrix", "euler", "rotation_vector"):
             if columns := self._given(kind):
                 if kind == "quaternion":
                     orders[kind] = self._quaternion_order(columns)
