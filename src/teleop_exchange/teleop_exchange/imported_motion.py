@@ -24,6 +24,8 @@ from teleop_exchange.times import SECOND_NS, Stamps, gaps, ordered, restarts
 if TYPE_CHECKING:
     from teleop_exchange.tables import Table
 
+ROWS = 20_000
+"""Rows that are turned at once."""
 MOST_BACKWARDS = 0.01
 """Share of rows whose time may go back before the file is refused."""
 MOST_DOUBLED = 0.5
@@ -91,7 +93,7 @@ class Motion:
         self._check()
         self.gaps = gaps(self.stamp_ns, options.gap)
         self._shift_ns = 0
-        self.poses = self._in_axes_of_master(gathered.rows[self._rows])
+        self.poses = self._in_axes_of_master(gathered.rows)
         gathered.rows = gathered.rows[:0]
 
     def _refuse_several(self, stamps: Stamps) -> None:
@@ -149,16 +151,22 @@ class Motion:
         return [f"{count} {text}" for count, text in parts if count]
 
     def _in_axes_of_master(self, rows: Array) -> Array:
-        """Poses (N, 7) of rows of the file, the centre brought to zero."""
-        turn = self._options.axis_map()
-        place = self._options.scale * product(rows[:, :3], turn.T)
+        """Poses (N, 7) of the rows that stay, the centre brought to zero."""
+        axes, poses = self._options.axis_map(), np.empty((len(self._rows), 7))
+        for begin in range(0, len(poses), ROWS):  # an hour at 1 kHz has 200 MB
+            part = slice(begin, begin + ROWS)
+            own = rows[self._rows[part]]
+            poses[part, :3] = self._options.scale * product(own[:, :3], axes.T)
+            last = poses[begin - 1, 3:] if begin else None
+            poses[part, 3:] = continuous(self._turned(own[:, 3:], axes), last)
         if (name := self._options.center) != "keep":
+            place = poses[:, :3]
             low, high = place.min(axis=0), place.max(axis=0)
             centers = {"mean": place.mean(axis=0), "middle": 0.5 * (low + high), "start": place[0]}
             listed = ", ".join(f"{1e3 * value:z.1f}" for value in centers[name])
             self.told.append(f"{name} of the motion at ({listed}) mm brought to zero")
-            place = place - centers[name]
-        return np.column_stack((place, continuous(self._turned(rows[:, 3:], turn), None)))
+            place -= centers[name].copy()
+        return poses
 
     def _turned(self, quaternions: Array, axes: Array) -> Array:
         """Attitudes (n, 4) in the master's axes; a mirror turns those of the body as well."""
