@@ -2,33 +2,25 @@
 
 import json
 from collections.abc import Sequence
-from hashlib import blake2b
 from html import escape
-from math import isfinite
 from typing import Any
 
 import numpy as np
 from plotly.offline import get_plotlyjs, get_plotlyjs_version
 
 from teleop_core.evaluation.bands import Band
-from teleop_core.evaluation.figure import Figure, Numbers, is_against_time
+from teleop_core.evaluation.figure import Figure, is_against_time
 from teleop_core.evaluation.html_table import html_table
 from teleop_core.evaluation.overview import overview
-from teleop_core.evaluation.packing import bits_within, deflated, pack
+from teleop_core.evaluation.packing import Arrays, deflated
 from teleop_core.evaluation.page_template import PAGE, POLICY, TIMES, script, style
-from teleop_core.evaluation.preview import preview
 from teleop_core.evaluation.published import ANGLE_FACTOR, POSITION_SHARE, SOURCE
 from teleop_core.evaluation.rows import is_compared, side_by_side
 from teleop_core.evaluation.score import Score
 from teleop_core.evaluation.scoring import Study
 from teleop_core.evaluation.traces import spacing_s
 
-_ROOM = 6_800_000
-"""Bytes for the curves of a recording: with everything else a page of it stays below 10 MB."""
-
 _HEADER = "<h1>Teleoperation report</h1>"
-REPLAYS = 7
-"""Recordings of a page with replays: browsers keep 16 pictures in space, and each has another."""
 
 
 def report_page(studies: Sequence[Study]) -> str:
@@ -37,13 +29,9 @@ def report_page(studies: Sequence[Study]) -> str:
     It works offline and asks for nothing: plotly.js is inside, once. All plots against time of a
     recording show the same time, down to single samples. Texts from recordings are escaped.
     """
-    sections, drawn, arrays = [], [], Arrays(len(studies))
-    plotted: list[list[Figure]] = []
+    sections, drawn, arrays = [], [], Arrays()
     for number, study in enumerate(studies):
         plots = study.figures()
-        if len(studies) > REPLAYS:
-            plots = [plot for plot in plots if "meta" not in plot.layout]
-        plotted.append(plots)
         places = [f"plot-{number}-{i}" for i in range(len(plots))]
         sections.append(_section(number, study, plots, places))
         for place, plot in zip(places, plots, strict=True):
@@ -56,7 +44,6 @@ def report_page(studies: Sequence[Study]) -> str:
     found = {"recordings": recordings, "arrays": arrays.packed(), "figures": drawn}
     data = json.dumps(found, allow_nan=False)
     scores = [study.score for study in studies]
-    opening = overview(scores, plotted, [study.bands for study in studies])
     table = (  # page.js folds it; without scripts it stays open
         f'<details class="card table" open><summary>All figures</summary>{_note(scores)}'
         f"{html_table(scores)}</details>"
@@ -65,54 +52,12 @@ def report_page(studies: Sequence[Study]) -> str:
         policy=POLICY,
         title=escape("Teleoperation: " + ", ".join(score.session.title for score in scores)),
         style=style(),
-        body="\n".join((_HEADER, opening, table, *sections)),
+        body="\n".join((_HEADER, overview(scores), table, *sections)),
         data=data.replace("<", "\\u003c"),  # nothing inside can end the script element
         plotly=deflated(get_plotlyjs().encode()),
         library=f"plotly.js {get_plotlyjs_version()}",
         script=script(),
     )
-
-
-class Arrays:
-    """Arrays of a page, each packed once.
-
-    Args:
-        recordings: How many sections share the room of the page.
-    """
-
-    def __init__(self, recordings: int) -> None:
-        self._room = _ROOM * recordings
-        self._arrays: list[Numbers] = []
-        self._places: dict[bytes, int] = {}  # by contents
-        self._seen: dict[object, tuple[int, Numbers]] = {}  # by where they are, and stay
-
-    def named(self, tree: Any) -> Any:
-        """A trace or layout with places in the list instead of arrays of numbers."""
-        if isinstance(tree, dict):
-            return {key: self.named(value) for key, value in tree.items()}
-        if isinstance(tree, (list, tuple)):
-            return [self.named(value) for value in tree]
-        if isinstance(tree, np.ndarray) and tree.ndim == 1 and tree.dtype.kind in "fiu":
-            return {"array": self._place(tree)}
-        if isinstance(tree, (np.ndarray, np.generic)):
-            return self.named(tree.tolist())
-        return None if isinstance(tree, float) and not isfinite(tree) else tree
-
-    def packed(self) -> list[dict[str, Any]]:
-        """All arrays, as fine as the page has room."""
-        bits = bits_within(self._arrays, self._room)
-        return [vars(pack(array, bits)) for array in self._arrays]
-
-    def _place(self, array: Numbers) -> int:
-        where = array.ctypes.data, array.shape, array.strides, array.dtype.str
-        if where not in self._seen:
-            data = np.ascontiguousarray(array).data
-            name = blake2b(data, person=array.dtype.str.encode()).digest()
-            if name not in self._places:
-                self._places[name] = len(self._arrays)
-                self._arrays.append(array)
-            self._seen[where] = self._places[name], array
-        return self._seen[where][0]
 
 
 def _recording(study: Study) -> dict[str, Any]:
@@ -147,7 +92,7 @@ def _note(scores: Sequence[Score]) -> str:
 
 def _section(number: int, study: Study, plots: list[Figure], places: list[str]) -> str:
     session = study.score.session
-    cards = [_card(plot, place, study.bands) for plot, place in zip(plots, places, strict=True)]
+    cards = [_card(plot, place) for plot, place in zip(plots, places, strict=True)]
     told = list(session.facts)
     if kept_s := _kept_s(study.score):
         told.append(f"plots hold the smallest and largest value of each {kept_s * 1e3:.3g} ms")
@@ -167,12 +112,12 @@ def _legend(bands: Sequence[Band]) -> str:
     return f'<p class="bands">In the state: {entries}</p>' if entries else ""
 
 
-def _card(plot: Figure, place: str, bands: Sequence[Band]) -> str:
-    """Place of a plot with its sketch, or its text if there is nothing to draw."""
+def _card(plot: Figure, place: str) -> str:
+    """Place of a plot, or its text if there is nothing to draw."""
     title, sentence = escape(plot.title), escape(plot.sentence)
     if not plot.traces:
         return f'<p class="facts">{title}: {sentence}</p>'
     return (
         f'<figure class="card"><h3>{title}</h3><figcaption>{sentence}</figcaption>'
-        f'<div id="{place}" class="plot">{preview(plot, bands)}</div></figure>'
+        f'<div id="{place}" class="plot"></div></figure>'
     )

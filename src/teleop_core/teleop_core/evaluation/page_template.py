@@ -8,7 +8,7 @@ POLICY = (
     "default-src 'none'; script-src 'unsafe-inline' 'unsafe-eval'; style-src 'unsafe-inline'; "
     "img-src data: blob:; font-src data:; worker-src blob:"
 )
-_SCRIPTS = ("unpack", "thin", "bands", "paths", "plot", "replay", "recording", "page")
+_SCRIPTS = ("unpack", "thin", "bands", "paths", "plot", "recording", "page")
 
 
 @cache
@@ -42,8 +42,8 @@ PAGE = """\
 </head>
 <body data-drawn="0">
 <main>
-<noscript><p class="notice">This page draws its plots with JavaScript, which is off here. Tables and
-sketches of the plots are there without it; nothing is loaded from anywhere.</p></noscript>
+<noscript><p class="notice">This page draws its plots with JavaScript, which is off here. Tables are
+there without it; nothing is loaded from anywhere.</p></noscript>
 <p id="errors" class="error"></p>
 {body}
 </main>

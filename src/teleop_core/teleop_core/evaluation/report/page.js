@@ -23,7 +23,7 @@ async function drawPage() {
     const recording = recordings[figure.recording];
     let plot;
     try {
-      plot = new (figure.layout.meta ? Replay : Plot)(figure, arrays, recording);
+      plot = new Plot(figure, arrays, recording);
       await plot.draw();
       if (plot.place.querySelector(".no-webgl")) throw new Error("no WebGL");
       document.body.dataset.drawn = String(Number(document.body.dataset.drawn) + 1);

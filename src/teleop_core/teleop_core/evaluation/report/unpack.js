@@ -10,24 +10,14 @@ async function inflated(text) {
   return new Uint8Array(await new Response(stream).arrayBuffer());
 }
 
-// Sums of differences, as packing.py writes them: the lowest bytes of all first, the sign in the
-// lowest bit, holes as bits. A few numbers come as they are.
-async function unpacked({ count, first, step, order, planes, data, holes, wide }) {
-  const bytes = await inflated(data);
-  if (order === 0) return new Float64Array(bytes.buffer, 0, count);
-  const numbers = wide ? new Float64Array(count) : new Float32Array(count);
-  for (let i = 0, level = 0, change = 0; i < count; i++) {
-    let code = 0;
-    for (let plane = planes - 1; plane >= 0; plane--) code = 256 * code + bytes[plane * count + i];
-    const difference = code % 2 ? -(code + 1) / 2 : code / 2;
-    change = order === 2 ? change + difference : difference;
-    level += change;
-    numbers[i] = first + step * level;
+// Sums of differences of the bits of float32, as packing.py writes them: the lowest bytes of all first.
+async function unpacked(text) {
+  const bytes = await inflated(text), count = bytes.length / 4, bits = new Uint32Array(count);
+  for (let i = 0, sum = 0; i < count; i++) {
+    sum += bytes[i] + 256 * bytes[count + i] + 65536 * bytes[2 * count + i] + 16777216 * bytes[3 * count + i];
+    bits[i] = sum >>>= 0;
   }
-  if (!holes) return numbers;
-  const bits = await inflated(holes);
-  for (let i = 0; i < count; i++) if ((bits[i >> 3] >> (i & 7)) & 1) numbers[i] = NaN;
-  return numbers;
+  return new Float32Array(bits.buffer);
 }
 
 // Run a script of the page itself: the policy lets none come from elsewhere.
