@@ -13,7 +13,7 @@ from typing import Any, NoReturn
 
 from teleop_core.base.errors import SessionError, TeleopError, TeleopWarning
 from teleop_core.base.texts import one_line
-from teleop_core.commands import compiling, console, devices, installed, map_device, operate
+from teleop_core.commands import compiling, console, devices, installed, operate
 from teleop_core.commands.arguments import (
     command,
     configured,
@@ -137,7 +137,7 @@ def _core() -> tuple[argparse.ArgumentParser, Any]:
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     for add in (_add_sim, _add_live, _add_replay, _add_play, _add_evaluate, _add_lookups):
         add(commands)
-    for module in (operate, console, devices, map_device, compiling):
+    for module in (operate, console, devices, compiling):
         module.add(commands)
     return parser, commands
 
