@@ -12,6 +12,7 @@ from teleop_core.cli import _parser
 ROOT = Path(__file__).resolve().parents[1]
 TITLES = {
     "teleop_core": "Everything a user needs",
+    "teleop_console": "A session in the browser, and scores as a page",
     "teleop_exchange": "Recordings of others come in, ours go out",
     "teleop_lab": "Experiments, calibration, fitting and planning",
 }

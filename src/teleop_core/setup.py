@@ -33,14 +33,7 @@ setup(
     license="Apache-2.0",
     packages=find_packages(include=["teleop_core", "teleop_core.*"]),
     package_data={
-        "teleop_core": [
-            "py.typed",
-            "*.pyi",
-            "console/page.js",
-            "evaluation/report/*",
-            "kernels/compiled/**/*.nb?",
-            "nodes/profiles/*.xml",
-        ]
+        "teleop_core": ["py.typed", "*.pyi", "kernels/compiled/**/*.nb?", "nodes/profiles/*.xml"]
     },
     python_requires=">=3.11",
     install_requires=[
@@ -54,14 +47,13 @@ setup(
         "lz4",
         "zstandard",
         "pyyaml",
-        "plotly",
         "rich",
         "scipy",
     ],
     extras_require={
         "mesh": ["trimesh"],
         "urdf": ["xacro", "robot_descriptions"],
-        "console": ["viser>=1.1,<1.2", "msgspec", "pygame-ce", "hidapi"],
+        "devices": ["pygame-ce", "hidapi"],
         "ros": ["ros-jazzy-rclpy[fastrtps]", "ros-jazzy-common-interfaces", "setproctitle"],
         "test": [
             "EAIK",

@@ -12,7 +12,7 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 STYLE = tomllib.loads((ROOT / "docs" / "words.toml").read_text(encoding="utf-8"))
-ROOMS = ("teleop_core", "teleop_exchange", "teleop_lab", "teleop_drill")
+ROOMS = ("teleop_core", "teleop_console", "teleop_exchange", "teleop_lab", "teleop_drill")
 FILES = sorted(path for room in ROOMS for path in (ROOT / "src" / room / room).rglob("*.py"))
 # Where a sentence or an item of a list ends, or an entry of Args begins.
 ENDS = r"\n\s*\n|\n\s*[-*] |:\n|\n\s*\w+: "

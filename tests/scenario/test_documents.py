@@ -218,7 +218,13 @@ def test_pages_agree_on_how_many_distributions_and_extras_there_are() -> None:
 def test_version_is_the_same_wherever_it_stands() -> None:
     version = teleop_core.__version__
     assert version == teleop_lab.__version__ == teleop_drill.__version__
-    for package in ("teleop_core", "teleop_exchange", "teleop_lab", "teleop_drill"):
+    for package in (
+        "teleop_core",
+        "teleop_console",
+        "teleop_exchange",
+        "teleop_lab",
+        "teleop_drill",
+    ):
         assert ET.parse(ROOT / f"src/{package}/package.xml").findtext("version") == version
         assert f'VERSION = "{version}"' in text_of(f"src/{package}/setup.py")
     for said in (f'version = "{version}"', f"teleop_core=={version}"):

@@ -5,10 +5,10 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from teleop_core.console.history import SPAN, History, LiveScores
-from teleop_core.console.link import Arm, ArmView
-from teleop_core.console.plots import Plots
-from teleop_core.console.server import ConsoleServer
+from teleop_console.history import SPAN, History, LiveScores
+from teleop_console.link import Arm, ArmView
+from teleop_console.plots import Plots
+from teleop_console.server import ConsoleServer
 from teleop_core.graph.topics import (
     ENERGY,
     MASTER_ENERGY,

@@ -6,7 +6,7 @@ import zlib
 import numpy as np
 import pytest
 
-from teleop_core.evaluation.packing import Arrays, packed
+from teleop_console.report.packing import Arrays, packed
 from teleop_core.kernels.geometry import Array
 
 

@@ -15,7 +15,7 @@ Everything a user needs is here:
   :class:`Operator`, :class:`Metric` and the ``register_...`` functions: parts of your own;
 - :func:`kernel`, :func:`parameter`, ``topics``: what parts are made of.
 
-``teleop_exchange``, ``teleop_lab`` and ``teleop_drill`` are distributions that use this one.
+``teleop_console``, ``teleop_exchange``, ``teleop_lab`` and ``teleop_drill`` use this one.
 """
 
 import lazy_loader

@@ -45,7 +45,6 @@ from .chain.operators import (
 from .chain.operators.remote import RemoteHand as RemoteHand, remote_operator as remote_operator
 from .chain.tasks import Task as Task, register_task as register_task
 from .base.parameters import NoParameters as NoParameters, parameter as parameter
-from .console.controls import Control as Control, register_control as register_control
 from .slave.bridges import Bridge as Bridge, Command as Command, register_bridge as register_bridge
 from .slave.world import WorldObject as WorldObject, register_world_object as register_world_object
 from .slave.plants import Physics as Physics, Plant as Plant, register_plant as register_plant

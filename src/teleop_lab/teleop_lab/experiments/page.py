@@ -8,9 +8,9 @@ from typing import Any
 
 from plotly.offline import get_plotlyjs, get_plotlyjs_version
 
+from teleop_console.report.packing import Arrays, deflated
+from teleop_console.report.page_template import PAGE, POLICY, TIMES, script, style
 from teleop_core.evaluation.figure import Figure, is_against_time
-from teleop_core.evaluation.packing import Arrays, deflated
-from teleop_core.evaluation.page_template import PAGE, POLICY, TIMES, script, style
 from teleop_lab.experiments.experiment_table import MARKS, empty, numbers, spread, summary, within
 from teleop_lab.experiments.outcome import BASES, Outcome, Row
 
