@@ -39,7 +39,7 @@ class BodyNodes:
                 f"{path}/{body.name}", show_axes=False, axes_length=axis, axes_radius=0.04 * axis
             )
             for body in bodies.bodies
-        }  # fmt: skip
+        }
         self._list = list(self.frames.values())
         self._meshes: list[dict[Role, viser.MeshHandle]] = []
         for i, body in enumerate(bodies.bodies):

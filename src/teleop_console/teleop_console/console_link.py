@@ -168,7 +168,7 @@ class LiveLink(Observer):
                 for topic in (SLAVE_OPERATION, TELEOP_STATE)
             ]
             for arm in self.arms
-        }  # fmt: skip
+        }
         self._hands = {arm.name: _Hand(self, arm.name) for arm in self.arms}
         self._view = View(arms={arm.name: ArmView() for arm in self.arms})
         self._begun = self._heard = _now(self)

@@ -84,16 +84,14 @@ class ImportReport:
         x, y, z = (f"{1e3 * value:.1f}" for value in self.range)
         median, fast = (f"{1e3 * value:.0f}" for value in self.speed)
         out = [f"arm       {self.arm}"] * bool(self.arm)
-        out += [
-            f"taken     {text}" for text in self.told
-        ] + [
+        out += [f"taken     {text}" for text in self.told] + [
             f"samples   {self._samples()}",
             f"time      {self.duration:.3f} s at {self.rate:.4g} Hz; 90 % of the periods are "
             f"{low:.3g} to {high:.3g} ms, median {middle:.4g} ms",
             f"range     x {x}, y {y}, z {z} mm; rotation {math.degrees(self.rotation):.1f}°",
             f"speed     median {median}, 95 % {fast} mm/s",
             f"gaps      {self._gaps()}",
-        ]  # fmt: skip
+        ]
         return out + [f"warning   {text}" for text in self.warnings]
 
     def _samples(self) -> str:
