@@ -5,22 +5,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from teleop_console.link import Arm, ArmView
-from teleop_core.graph.topics import (
-    ENERGY,
-    MASTER_ENERGY,
-    MASTER_MEASURED_CF,
-    SLAVE_ENERGY,
-    SLAVE_MEASURED_CP,
-    SLAVE_MEASURED_JS,
-    SLAVE_SERVO_CP,
-    SLAVE_SETPOINT_JS,
-)
+from teleop_core.graph import topics
 from teleop_core.kernels.geometry import Array
 
 SPAN = 30.0
 """How far plots reach back [s]."""
 _ROWS = 1200  # 30 s at 40 Hz
-_LEFT = ENERGY.index("margin")
+_LEFT = topics.ENERGY.index("margin")
 
 
 class History:
@@ -55,9 +46,9 @@ class History:
         row, n = self._rows[self._next], self.arm.robot.n
         row[:] = np.nan
         for name, topic, width in (
-            ("wanted", SLAVE_SETPOINT_JS, n), ("joints", SLAVE_MEASURED_JS, n),
-            ("reference", SLAVE_SERVO_CP, 3), ("place", SLAVE_MEASURED_CP, 3),
-            ("force", MASTER_MEASURED_CF, 3),
+            ("wanted", topics.SLAVE_SETPOINT_JS, n), ("joints", topics.SLAVE_MEASURED_JS, n),
+            ("reference", topics.SLAVE_SERVO_CP, 3), ("place", topics.SLAVE_MEASURED_CP, 3),
+            ("force", topics.MASTER_MEASURED_CF, 3),
         ):  # fmt: skip
             values = view.get(topic)
             if values is not None:
@@ -65,7 +56,7 @@ class History:
         away = row[self._columns["reference"]] - row[self._columns["place"]]
         row[self._columns["error"]] = np.sqrt(away @ away)
         row[self._columns["delay"]] = delay
-        for i, topic in enumerate((MASTER_ENERGY, SLAVE_ENERGY)):
+        for i, topic in enumerate((topics.MASTER_ENERGY, topics.SLAVE_ENERGY)):
             if (energies := view.get(topic)) is not None:
                 row[self._columns["left"].start + i] = energies[_LEFT]
         self._times[self._next] = time
@@ -110,8 +101,8 @@ class LiveScores:
 
     def add(self, time: float, view: ArmView) -> None:
         """Take account of what is known at a time [s]; only what follows the hand counts."""
-        reference, place = view.get(SLAVE_SERVO_CP), view.get(SLAVE_MEASURED_CP)
-        force = view.get(MASTER_MEASURED_CF)
+        reference, place = view.get(topics.SLAVE_SERVO_CP), view.get(topics.SLAVE_MEASURED_CP)
+        force = view.get(topics.MASTER_MEASURED_CF)
         is_led = view.state.get("is_following") and not view.state.get("is_clutched")
         if reference is None or place is None or not is_led:
             self._last = None

@@ -9,12 +9,7 @@ from numpy.typing import NDArray
 
 from teleop_core.base.damage import damage_told
 from teleop_core.base.errors import RecordingError
-from teleop_core.kernels.geometry import (
-    Array,
-    continuous,
-    quaternion_from_rotation,
-    quaternion_products,
-)
+from teleop_core.kernels import geometry
 from teleop_core.kernels.portable import product
 from teleop_exchange.gathering import gather
 from teleop_exchange.options import ImportOptions
@@ -150,7 +145,7 @@ class Motion:
         ]  # fmt: skip
         return [f"{count} {text}" for count, text in parts if count]
 
-    def _in_axes_of_master(self, rows: Array) -> Array:
+    def _in_axes_of_master(self, rows: geometry.Array) -> geometry.Array:
         """Poses (N, 7) of the rows that stay, the centre brought to zero."""
         axes, poses = self._options.axis_map(), np.empty((len(self._rows), 7))
         for begin in range(0, len(poses), ROWS):  # an hour at 1 kHz has 200 MB
@@ -158,7 +153,7 @@ class Motion:
             own = rows[self._rows[part]]
             poses[part, :3] = self._options.scale * product(own[:, :3], axes.T)
             last = poses[begin - 1, 3:] if begin else None
-            poses[part, 3:] = continuous(self._turned(own[:, 3:], axes), last)
+            poses[part, 3:] = geometry.continuous(self._turned(own[:, 3:], axes), last)
         if (name := self._options.center) != "keep":
             place = poses[:, :3]
             low, high = place.min(axis=0), place.max(axis=0)
@@ -168,12 +163,12 @@ class Motion:
             place -= centers[name].copy()
         return poses
 
-    def _turned(self, quaternions: Array, axes: Array) -> Array:
+    def _turned(self, quaternions: geometry.Array, axes: geometry.Array) -> geometry.Array:
         """Attitudes (n, 4) in the master's axes; a mirror turns those of the body as well."""
         if self._options.handedness == "right":
             turn = np.empty(4)
-            quaternion_from_rotation(np.ascontiguousarray(axes), turn)
-            return quaternion_products(turn, quaternions)
+            geometry.quaternion_from_rotation(np.ascontiguousarray(axes), turn)
+            return geometry.quaternion_products(turn, quaternions)
         # A turn of the file about an axis is the opposite turn about the mirrored axis.
         return np.column_stack((quaternions[:, 0], -product(quaternions[:, 1:], axes.T)))
 
