@@ -21,7 +21,6 @@ from scipy.spatial.transform import Rotation
 import teleop_core as tc
 import teleop_exchange
 from teleop_core.kernels.geometry import Array
-from teleop_exchange import bag_messages
 
 START_NS = 1_700_000_000_000_000_000
 COUNT = 300
@@ -230,21 +229,13 @@ def test_rows_are_those_of_the_rosbags_library(tmp_path: Path) -> None:
     assert_same(stream, [row[0] for row in expected], rows)
 
 
-def test_messages_that_are_not_alike_are_read_one_by_one(tmp_path: Path) -> None:
+def test_messages_need_not_be_alike(tmp_path: Path) -> None:
     messages = poses("TFMessage", "/tf")
     cameras = poses("TFMessage", "/tf", child="camera")
     for i in range(0, COUNT, 3):
         messages[i][2].transforms.append(cameras[i][2].transforms[0])
     path = write2(tmp_path / "bag", messages, StoragePlugin.SQLITE3)
     assert_same(imported(path, tmp_path, frame="tool")[1])
-
-
-def test_messages_that_are_alike_are_read_as_one_array(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(bag_messages.PoseReader, "_one", None)  # reading one by one would fail
-    path = write2(tmp_path / "bag", poses("TransformStamped"), StoragePlugin.SQLITE3)
-    assert_same(imported(path, tmp_path)[1])
 
 
 # In which order.
