@@ -5,7 +5,7 @@ import re
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -14,7 +14,7 @@ import pyarrow.csv as pc
 
 from teleop_core.base.damage import damage_told
 from teleop_core.base.errors import RecordingError
-from teleop_exchange.tables import ROWS, SAMPLE, Numbers, numbers, unique
+from teleop_exchange.tables import SAMPLE, Numbers, numbers, unique
 
 _HEAD_BYTES = 1 << 18
 _PACKED = {b"\x1f\x8b": "gzip", b"BZh": "bz2", b"\x28\xb5\x2f\xfd": "zstd"}
@@ -73,6 +73,14 @@ class TextTable:
     def _stream(self) -> pa.NativeFile:
         return pa.input_stream(str(self.path), compression=self._packed)
 
+    def _rows(self) -> pa.NativeFile:
+        """The file; with one blank between cells where blanks part them."""
+        if self._form.separator != _BLANK:
+            return self._stream()
+        with self._stream() as stream:
+            lines = stream.read().splitlines()
+        return pa.BufferReader(b"\n".join(b" ".join(line.split()) for line in lines))
+
     def _beginning(self) -> tuple[str, str]:
         """The first lines, and how letters are encoded."""
         with self._stream() as stream:
@@ -116,28 +124,28 @@ class TextTable:
     def blocks(self, columns: Sequence[int]) -> Iterator[list[Numbers]]:
         """As of any table."""
         self.bad_rows = 0
-        read = self._by_pandas if self._form.separator == _BLANK else self._by_arrow
         with damage_told(self.path):
             try:
-                yield from read(columns)
+                yield from self._read(columns)
             except ValueError as error:
                 self._refuse_cell(error)
                 raise
 
-    def _by_arrow(self, columns: Sequence[int]) -> Iterator[list[Numbers]]:
+    def _read(self, columns: Sequence[int]) -> Iterator[list[Numbers]]:
         form = self._form
         names = [f"c{i}" for i in range(form.width)]
         read = pc.ReadOptions(
             column_names=names, skip_rows=form.head, encoding=self._encoding, block_size=1 << 20
         )
-        parse = pc.ParseOptions(delimiter=form.separator, invalid_row_handler=self._bad_row)
+        separator = " " if form.separator == _BLANK else form.separator
+        parse = pc.ParseOptions(delimiter=separator, invalid_row_handler=self._bad_row)
         wanted = list(dict.fromkeys(names[column] for column in columns))
         convert = pc.ConvertOptions(
             include_columns=wanted, null_values=list(_MISSING), strings_can_be_null=True,
             quoted_strings_can_be_null=True, decimal_point=form.decimal,
             column_types={names[c]: self._type(c) for c in columns},
         )  # fmt: skip
-        with self._stream() as stream, pc.open_csv(stream, read, parse, convert) as reader:
+        with self._rows() as stream, pc.open_csv(stream, read, parse, convert) as reader:
             for batch in reader:
                 yield [numbers(batch.column(names[column])) for column in columns]
 
@@ -154,23 +162,6 @@ class TextTable:
     def _bad_row(self, row: pc.InvalidRow) -> str:
         self.bad_rows += 1
         return "skip"
-
-    def _by_pandas(self, columns: Sequence[int]) -> Iterator[list[Numbers]]:
-        form = self._form
-        names = [f"c{i}" for i in range(form.width)]
-        wanted = sorted(dict.fromkeys(columns))
-        kinds = {pa.float64(): "float64", pa.bool_(): "boolean"}
-        types = {names[c]: kinds.get(self._type(c), "Int64") for c in wanted}
-        types |= {names[c]: "str" for c in wanted if self.is_clock(c)}
-        reader = pd.read_csv(
-            self.path, sep=_BLANK, header=None, names=names, usecols=[names[c] for c in wanted],
-            skiprows=form.head, chunksize=ROWS, engine="c",
-            dtype=types, na_values=list(_MISSING), decimal=form.decimal, index_col=False,
-            encoding=self._encoding, compression=self._packed, on_bad_lines="skip",
-        )  # fmt: skip
-        with reader:
-            for frame in reader:
-                yield [_numbers(frame[names[column]]) for column in columns]
 
     def _refuse_cell(self, error: ValueError) -> None:
         """Say which column holds what, if a library's error tells it.
@@ -195,14 +186,6 @@ def _clock_ns(column: "pd.Series[str]") -> Numbers:
     clock = pd.to_datetime(column, format="ISO8601", utc=True).dt.as_unit("ns")
     stamps = np.asarray(clock.astype("int64"), np.int64)
     return np.where(clock.isna(), np.nan, stamps) if clock.hasnans else stamps
-
-
-def _numbers(column: "pd.Series[Any]") -> Numbers:
-    if pd.api.types.is_string_dtype(column):
-        return _clock_ns(column)
-    if column.dtype == "Int64" and not column.hasnans:
-        return np.asarray(column.to_numpy(np.int64))
-    return np.asarray(column.to_numpy(np.float64, na_value=np.nan))
 
 
 def recognised(path: Path, text: str, skip: int = 0) -> Form:
