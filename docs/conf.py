@@ -84,12 +84,16 @@ def menu(text: str) -> str:
 
 
 def versions() -> dict[str, Any]:
-    """What the menu of versions shows: all of the changelog, and whether this is one of them."""
+    """What the menu of versions shows: releases and their pages, and whether this is one."""
     text = (HERE.parent / "CHANGELOG.md").read_text(encoding="utf-8")
-    heads = re.findall(r"^## (\d\S*)(.*)$", text, re.MULTILINE)
-    anchors = [(name, re.sub(r"[^\w-]+", "-", name + rest).strip("-")) for name, rest in heads]
+    newest = re.findall(r"^## (\d\S*)", text, re.MULTILINE)
+    older = sorted((path.stem for path in (HERE / "changes").glob("*.md")), reverse=True)
+    pages = [
+        *((name, "changelog") for name in newest),
+        *((name, f"changes/{name}") for name in older),
+    ]
     unreleased = text.partition("## Unreleased")[2].partition("\n## ")[0]
-    return {"versions": anchors, "is_ahead": bool(unreleased.strip())}
+    return {"versions": pages, "is_ahead": bool(unreleased.strip())}
 
 
 html_context = versions()

@@ -12,6 +12,8 @@ from teleop_core.cli import _parser
 ROOT = Path(__file__).resolve().parents[1]
 TITLES = {
     "teleop_core": "Everything a user needs",
+    "teleop_console": "A session in the browser, and scores as a page",
+    "teleop_exchange": "Recordings of others come in, ours go out",
     "teleop_lab": "Experiments, calibration, fitting and planning",
 }
 
@@ -78,9 +80,9 @@ def api_page() -> list[str]:
     """Public names of the packages, with directives that put their docstrings in."""
     parts = [
         "# API",
-        "Names of `import teleop_core as tc` and `import teleop_lab as lab`, by the module that "
-        "they come from. [Python API](python_api.md) shows them at work. The site puts each "
-        "docstring in.",
+        "Names of `import teleop_core as tc`, `import teleop_exchange` and `import teleop_lab as "
+        "lab`, by the module that they come from. [Python API](python_api.md) shows them at work. "
+        "The site puts each docstring in.",
     ]
     for package, title in TITLES.items():
         parts += [f"## {package}", f"{title}."]

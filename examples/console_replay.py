@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 
 import teleop_core as tc
-from teleop_core.console.app import Console
-from teleop_core.console.recorded import RecordedLink
-from teleop_core.console.server import ConsoleServer
+from teleop_console.app import Console
+from teleop_console.recorded import RecordedLink
+from teleop_console.server import ConsoleServer
 
 
 def main() -> None:

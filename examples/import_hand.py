@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 
 import teleop_core as tc
+import teleop_exchange
 
 
 def record_elsewhere(file: Path) -> None:
@@ -34,10 +35,10 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         place = Path(folder)
         record_elsewhere(place / "hand.csv")
-        report = tc.import_recording(place / "hand.csv", place / "hand", center="mean")
+        report = teleop_exchange.import_recording(place / "hand.csv", place / "hand", center="mean")
         print(report)
         answer = tc.replay(report.recording)
-        tc.export_recording(answer, place / "answer.parquet", rate=100.0)
+        teleop_exchange.export_recording(answer, place / "answer.parquet", rate=100.0)
         table = pd.read_parquet(place / "answer.parquet")
         print(f"answer.parquet: {len(table)} rows, {len(table.columns)} columns")
         table = table[table["teleop/state.is_following"] == 1.0]  # before, the arm gets ready

@@ -3,9 +3,9 @@
 teleop console --parts examples/own_control.py
 """
 
-import teleop_core as tc
-from teleop_core.console.controls import CONTROLS, Answers
-from teleop_core.console.link import Link
+import teleop_console
+from teleop_console.controls import CONTROLS, Answers
+from teleop_console.link import Link
 
 GENTLE, USUAL = 0.02, 0.0
 """Largest speeds of the tip [m/s]; 0: what its joints make."""
@@ -21,7 +21,9 @@ def be_gentle(link: Link, arm: str) -> Answers:
     return [(not refused, refused or f"{node}: the tip moves by at most {limit}")]
 
 
-tc.register_control(tc.Control("Gentle", "slower limits for the arm; again: the usual", be_gentle))
+teleop_console.register_control(
+    teleop_console.Control("Gentle", "slower limits for the arm; again: the usual", be_gentle)
+)
 
 
 def main() -> None:

@@ -19,7 +19,14 @@ HERE = Path(__file__).resolve().parent
 PLATFORM = "manylinux_2_28_x86_64"  # as numba's own
 TAG = f"cp{sys.version_info[0]}{sys.version_info[1]}"
 CORE = "teleop_core"
-OTHERS = ("teleop_machines", "teleop_lab", "teleop_drill", "lerobot_robot_teleop_core")
+OTHERS = (
+    "teleop_machines",
+    "teleop_console",
+    "teleop_exchange",
+    "teleop_lab",
+    "teleop_drill",
+    "lerobot_robot_teleop_core",
+)
 COMPILE = "import sys; from teleop_core.cli import main; sys.exit(main(['compile', '--all']))"
 RUN = """
 import hashlib

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from teleop_core.console.app import Console
-from teleop_core.console.link import Arm, ArmView, ParameterInfo, View
-from teleop_core.console.server import ConsoleServer
+from teleop_console.app import Console
+from teleop_console.link import Arm, ArmView, ParameterInfo, View
+from teleop_console.server import ConsoleServer
 from teleop_core.graph.topics import MASTER_MEASURED_CP, OPERATION
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot_set

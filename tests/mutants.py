@@ -265,7 +265,7 @@ def changed(mutant: Mutant) -> dict[str, str]:
     """
     texts: dict[str, str] = {}
     for file, before, after in mutant.changes:
-        text = texts.get(file) or (PACKAGE / file).read_text(encoding="utf-8")
+        text = texts.get(file) or source(file).read_text(encoding="utf-8")
         if (times := text.count(before)) != 1:
             reason = f"{before!r} stands {times} times in {file}, must once"
             raise ValueError(f"mutant {mutant.name}: {reason}; change it as the source has changed")
@@ -273,17 +273,28 @@ def changed(mutant: Mutant) -> dict[str, str]:
     return texts
 
 
+def source(file: str) -> Path:
+    """File of the core, or of another distribution where its package stands first in the name."""
+    package = file.partition("/")[0]
+    return ROOT / "src" / package / file if package.startswith("teleop_") else PACKAGE / file
+
+
 def tree(mutant: Mutant) -> Path:
-    """Directory that holds the mutant's package, made or brought up to date."""
-    texts, copy = changed(mutant), PLACE / mutant.name / "teleop_core"
-    for file in PACKAGE.rglob("*"):
-        name = str(file.relative_to(PACKAGE))
-        if file.is_dir() or file.parent.name == "__pycache__":
-            continue
-        _put(texts[name].encode() if name in texts else file.read_bytes(), copy / name)
-    if not (config := copy.parent / "config").exists():
+    """Directory that holds the mutant's packages, made or brought up to date."""
+    texts = {source(file): text for file, text in changed(mutant).items()}
+    copy = PLACE / mutant.name
+    for root in {
+        PACKAGE.parent,
+        *(ROOT / "src" / path.parts[len(ROOT.parts) + 1] for path in texts),
+    }:
+        for file in (root / root.name).rglob("*"):
+            if not file.is_dir() and file.parent.name != "__pycache__":
+                text = texts.get(file)
+                data = file.read_bytes() if text is None else text.encode()
+                _put(data, copy / file.relative_to(root))
+    if not (config := copy / "config").exists():
         config.symlink_to(ROOT / "config")
-    return copy.parent
+    return copy
 
 
 def _put(data: bytes, file: Path) -> None:

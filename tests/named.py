@@ -24,12 +24,11 @@ _LIVE = "needs a session that runs, or is one: tests/ros starts and stops it"
 _DEVICE = "needs a device"
 NOT_RUN = {
     r"live|console|play|stop|operate|conformance|drill(?! --list)|--parts mine\.py drill": _LIVE,
-    r"devices|map-device": _DEVICE,
+    r"devices": _DEVICE,
     r"compile": "the kernels are compiled before tests: tests/scenario/test_compile_command.py",
     r"fit rests\.csv|sim --config scara\.yaml": "needs measurements of a machine",
     r"import user\.bag": "needs a bag of ROS 1: tests/unit/test_import_bags.py",
     r".*--format lerobot": "needs its library: tests/unit/test_lerobot.py",
-    r".*--presets? jigsaws": "needs a data set: tests/unit/test_import_systems.py",
     r"study .* --scheduler": "needs a Dask scheduler: tests/unit/test_studies.py",
     r"experiment": "each is run by a test of its own, below its name",
 }

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from setuptools import find_packages, setup
 
-VERSION = "0.6.0"  # released together with teleop_lab and teleop_drill
+VERSION = "0.6.0"  # released together with the other distributions
 NODES = (
     "operator",
     "haptic_master",
@@ -33,15 +33,7 @@ setup(
     license="Apache-2.0",
     packages=find_packages(include=["teleop_core", "teleop_core.*"]),
     package_data={
-        "teleop_core": [
-            "py.typed",
-            "*.pyi",
-            "session/exchange/*.pyi",
-            "console/page.js",
-            "evaluation/report/*",
-            "kernels/compiled/**/*.nb?",
-            "nodes/profiles/*.xml",
-        ]
+        "teleop_core": ["py.typed", "*.pyi", "kernels/compiled/**/*.nb?", "nodes/profiles/*.xml"]
     },
     python_requires=">=3.11",
     install_requires=[
@@ -52,18 +44,16 @@ setup(
         "mcap",
         "rosbags",
         "pandas",
-        "pyarrow",
         "lz4",
         "zstandard",
         "pyyaml",
-        "plotly",
         "rich",
         "scipy",
     ],
     extras_require={
         "mesh": ["trimesh"],
         "urdf": ["xacro", "robot_descriptions"],
-        "console": ["viser>=1.1,<1.2", "msgspec", "pygame-ce", "hidapi"],
+        "devices": ["pygame-ce", "hidapi"],
         "ros": ["ros-jazzy-rclpy[fastrtps]", "ros-jazzy-common-interfaces", "setproctitle"],
         "test": [
             "EAIK",

@@ -16,6 +16,8 @@ setup(
     install_requires=[
         f"teleop_core=={VERSION}",
         f"teleop_machines=={VERSION}",
+        f"teleop_console=={VERSION}",
+        f"teleop_exchange=={VERSION}",
         "lazy_loader",
         "numpy",
         "pandas",

@@ -9,16 +9,7 @@ from hypothesis.strategies import SearchStrategy
 
 from fuzzing import damaged, fuzz
 from present import present
-from teleop_core.bags.messages import (
-    Refusal,
-    check,
-    discover,
-    layout,
-    read_any,
-    read_numbers,
-    read_reports,
-    report,
-)
+from teleop_core.bags import messages
 from teleop_core.graph.stage import STAGES
 from teleop_core.graph.topics import DIAGNOSTICS, Kind, Topic
 
@@ -37,21 +28,21 @@ def broken(whole: bytes) -> SearchStrategy:
 def streams(topic: Topic) -> Callable[..., None]:
     """Test of what an input does with the bytes of a stream."""
     names, width = topic.names(JOINTS), topic.width(len(JOINTS))
-    form = layout(topic, JOINTS)
+    form = messages.layout(topic, JOINTS)
     whole = form.encode_one(7, present(form.decode_one(form.template.tobytes()))[1])
 
     @fuzz("CDR", PARTS, data=broken(whole), last_ns=STAMPS)
     def case(data: bytes, last_ns: int | None) -> None:
-        found = form.decode_one(data) or read_any(topic.kind, data, names)
-        if isinstance(found, Refusal):
+        found = form.decode_one(data) or messages.read_any(topic.kind, data, names)
+        if isinstance(found, messages.Refusal):
             return
         stamp_ns, values = found
         assert values.shape == (width,)
-        reason = check(topic.kind, stamp_ns, values, last_ns)
+        reason = messages.check(topic.kind, stamp_ns, values, last_ns)
         if reason is None:
             assert all(map(math.isfinite, values.tolist()))
             assert last_ns is None or stamp_ns > last_ns
-        discover(topic.kind, data)
+        messages.discover(topic.kind, data)
 
     return case
 
@@ -63,17 +54,17 @@ def test_any_bytes_of_a_stream_give_sound_numbers_or_a_reason(topic: Topic) -> N
 
 def reports(columns: tuple[str, ...]) -> Callable[..., None]:
     """Test of what is made of the bytes of a report."""
-    whole = report(5, "slave_sim", 1, "fine", dict.fromkeys(columns, "1.5"))
+    whole = messages.report(5, "slave_sim", 1, "fine", dict.fromkeys(columns, "1.5"))
 
     @fuzz("CDR", PARTS, data=broken(whole))
     def case(data: bytes) -> None:
-        found = read_numbers(data, columns)
-        assert isinstance(found, Refusal) or found[1].shape == (len(columns),)
-        if found is Refusal.MALFORMED:
+        found = messages.read_numbers(data, columns)
+        assert isinstance(found, messages.Refusal) or found[1].shape == (len(columns),)
+        if found is messages.Refusal.MALFORMED:
             with pytest.raises(ValueError, match="bytes are no"):
-                read_reports(data)
+                messages.read_reports(data)
         else:
-            read_reports(data)
+            messages.read_reports(data)
 
     return case
 

@@ -13,26 +13,19 @@ from teleop_core.bags.series import Series
 from teleop_core.base.parameters import specs
 from teleop_core.base.plain_yaml import UnreadableError, parse
 from teleop_core.evaluation.origin import read_origin
-from teleop_core.graph.layers import (
-    config_folder,
-    declared_groups,
-    list_scenarios,
-    load_file,
-    parse_setting,
-    scenario_file,
-)
+from teleop_core.graph import layers
 from teleop_core.graph.topics import MASTER_BUTTONS, TELEOP_STATE
 from teleop_core.session.configuration import Configuration, configure
 from teleop_core.session.runner import recorded_configuration
 
-BASE = load_file(config_folder() / "teleop.yaml")
+BASE = layers.load_file(layers.config_folder() / "teleop.yaml")
 KEYS = [
     key
-    for stage, group in declared_groups().items()
+    for stage, group in layers.declared_groups().items()
     for spec in specs(group)
     for key in (f"{stage}.{spec.name}", spec.name)
 ]
-FILES = [path.read_bytes() for path in map(scenario_file, list_scenarios())]
+FILES = [path.read_bytes() for path in map(layers.scenario_file, layers.list_scenarios())]
 STORED = b"\n".join(
     line
     for line in configure("coarse_box").text().encode().splitlines()
@@ -51,12 +44,14 @@ ANY_KEY = st.one_of(
     "settings", key=ANY_KEY, value=TEXTS, equals=st.sampled_from(("=", "=", "=", "==", "", " = "))
 )
 def test_any_setting_is_taken_or_refused(key: Any, value: Any, equals: Any) -> None:
-    layer = parse_setting(key + equals + value)
+    layer = layers.parse_setting(key + equals + value)
     Configuration.from_layers([BASE, layer])
 
 
 ENTRIES = st.dictionaries(ANY_KEY, st.one_of(TEXTS, st.sampled_from(NASTY)), max_size=4)
-STAGES = st.one_of(st.sampled_from((*declared_groups(), "/**/slave_sim", "left/slave_sim")), TEXTS)
+STAGES = st.one_of(
+    st.sampled_from((*layers.declared_groups(), "/**/slave_sim", "left/slave_sim")), TEXTS
+)
 
 
 @st.composite
@@ -84,7 +79,7 @@ def test_any_parameter_file_is_taken_or_refused(
 ) -> None:
     path = tmp_path_factory.getbasetemp() / "parameters.yaml"
     path.write_bytes(content)
-    Configuration.from_layers([BASE, load_file(path)])
+    Configuration.from_layers([BASE, layers.load_file(path)])
 
 
 def bag_with(configuration: str) -> MemoryBag:
@@ -107,7 +102,7 @@ def test_any_stored_configuration_can_be_scored_and_is_replayed_or_refused(conte
 def test_every_text_of_the_corpus_is_taken_or_refused_by_every_kind_of_parameter(text: str) -> None:
     for key in ("coarse_scale", "duration", "seed", "robot", "stages", "delays", "slave.start"):
         with lawful():
-            Configuration.from_layers([BASE, parse_setting(f"{key}={text}")])
+            Configuration.from_layers([BASE, layers.parse_setting(f"{key}={text}")])
 
 
 REFUSED = ("!!int x", "!!timestamp 2021-13-45", "&a [*a]", "9" * 5000, "[" * 400, NASTY[-1])

@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 from live_process import CALM, wait_until
+from teleop_console.console_link import LiveLink
+from teleop_console.console_session import ConsoleSession
+from teleop_console.link import box_of
 from teleop_core.bags.reader import Bag
 from teleop_core.base.errors import ParameterError, SessionError
-from teleop_core.console.link import box_of
 from teleop_core.graph import topics
 from teleop_core.graph.topics import JAW_TOPICS, PASSIVITY_TOPICS
 from teleop_core.nodes.children import free_domain
-from teleop_core.nodes.console_link import LiveLink
-from teleop_core.nodes.console_session import ConsoleSession
 from teleop_core.nodes.display import SEEN
 from teleop_core.session import api
 

@@ -15,8 +15,8 @@ pytest.importorskip("viser")
 import teleop_core as tc
 from browser import Tab, until
 from console_process import STARTS, ConsoleProcess
+from teleop_console.recorded_arms import configuration_of
 from teleop_core.bags.reader import Bag
-from teleop_core.console.recorded_arms import configuration_of
 from teleop_core.evaluation.origin import read_origin
 from teleop_core.slave.operation import State
 

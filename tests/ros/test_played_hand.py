@@ -11,7 +11,7 @@ import pytest
 
 import teleop_core as tc
 from peers import at_rest
-from teleop_core.console.status import RESTS
+from teleop_console.status import RESTS
 from teleop_core.graph.topics import HAND_BUTTONS, HAND_SERVO_CP, SLAVE_MEASURED_CP
 from teleop_core.nodes.children import environment
 

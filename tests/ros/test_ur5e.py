@@ -21,9 +21,9 @@ from drill_runs import run_drill
 from live_process import wait_until
 from mutants import ROOT
 from present import present
+from teleop_console.console_session import ConsoleSession
 from teleop_core.graph.topics import MASTER_MEASURED_CP, SLAVE_MEASURED_CP
 from teleop_core.nodes.children import environment, free_domain
-from teleop_core.nodes.console_session import ConsoleSession
 from teleop_core.session import api
 
 pytestmark = [pytest.mark.ros, pytest.mark.slow, pytest.mark.alone]

@@ -86,7 +86,14 @@ def test_the_workspace_builds_and_a_built_node_answers(workspace: Path, peer: "P
 def test_teleop_of_the_workspace_finds_the_commands_of_the_other_packages(workspace: Path) -> None:
     packages = [
         workspace / "install" / name
-        for name in ("teleop_core", "teleop_machines", "teleop_lab", "teleop_drill")
+        for name in (
+            "teleop_core",
+            "teleop_machines",
+            "teleop_console",
+            "teleop_exchange",
+            "teleop_lab",
+            "teleop_drill",
+        )
     ]
     places = [str(next(package.glob("lib/python*/site-packages"))) for package in packages]
     assert all((package / "share" / package.name / "hook").is_dir() for package in packages)

@@ -306,7 +306,7 @@ def test_sessions_of_an_experiment_are_counted() -> None:
 
 
 def test_the_shell_completes_commands_and_options(tmp_path: Path) -> None:
-    for line, expected in (("teleop ev", "evaluate"), ("teleop import --pre", "--preset")):
+    for line, expected in (("teleop ev", "evaluate"), ("teleop import --uni", "--unit")):
         answer = tmp_path / "answer"
         environment = os.environ | {
             "_ARGCOMPLETE": "1", "COMP_LINE": line, "COMP_POINT": str(len(line)),

@@ -17,10 +17,10 @@ import hostile
 from browser import until
 from desk import Desk, shown
 from page_client import PageClient, ask
-from teleop_core.console.connection import Crowd
-from teleop_core.console.filter import BURST, FLOOD, Budget
-from teleop_core.console.front import WAITING
-from teleop_core.console.server import ConsoleServer
+from teleop_console.connection import Crowd
+from teleop_console.filter import BURST, FLOOD, Budget
+from teleop_console.front import WAITING
+from teleop_console.server import ConsoleServer
 
 # viser warns of what is queued for a page that leaves at this moment.
 pytestmark = pytest.mark.filterwarnings("ignore:Queued a")

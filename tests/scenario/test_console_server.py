@@ -22,9 +22,9 @@ from viser import _messages
 from viser.infra import _infra
 
 from browser import Tab, handshake, until
+from teleop_console import connection
+from teleop_console.server import ConsoleServer
 from teleop_core.base.errors import SessionError
-from teleop_core.console import connection
-from teleop_core.console.server import ConsoleServer
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
 

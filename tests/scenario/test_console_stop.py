@@ -7,8 +7,8 @@ from typing import Any
 import pytest
 
 from headless import Headless
-from teleop_core.console.app import splash
-from teleop_core.console.server import ConsoleServer
+from teleop_console.app import splash
+from teleop_console.server import ConsoleServer
 
 pytest.importorskip("viser")
 

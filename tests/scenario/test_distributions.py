@@ -15,7 +15,7 @@ from teleop_core.robots import ROBOTS
 ALONE = """
 import importlib.metadata, sys
 
-for name in ("teleop_machines", "teleop_lab", "teleop_drill"):
+for name in ("teleop_machines", "teleop_console", "teleop_exchange", "teleop_lab", "teleop_drill"):
     sys.modules[name] = None  # cannot be imported
 entries = (entry for found in importlib.metadata.distributions() for entry in found.entry_points)
 others = [entry for entry in entries if not entry.group.startswith("teleop_")]
@@ -84,8 +84,19 @@ def test_robots_of_the_machines_are_those_that_the_core_knows_to_be_there() -> N
 
 def test_commands_of_the_other_distributions_are_where_the_advice_says() -> None:
     found = {entry.name: entry.module for entry in entry_points(group=installed.GROUP)}
-    places = installed.RELEASED_TOGETHER.items()
-    assert found.items() >= {(name, f"{package}.commands.{name}") for name, package in places}
+    for name, package in installed.RELEASED_TOGETHER.items():
+        assert found[name].startswith(f"{package}.commands")
+
+
+def test_core_alone_names_what_reads_recordings_of_others(tmp_path: Path) -> None:
+    (tmp_path / "hand.csv").write_text("t,x,y,z\n0,0,0,0\n1,0,0,0\n", encoding="utf-8")
+    done = alone("replay", tmp_path / "hand.csv", "--out", tmp_path / "out", code=2)
+    assert "install teleop_exchange" in done.stderr
+
+
+def test_core_alone_names_what_makes_pages(tmp_path: Path) -> None:
+    done = alone("evaluate", "bags/example", "--html", tmp_path / "page.html", code=2)
+    assert done.stderr == "teleop evaluate: --html: install teleop_console, which makes pages\n"
 
 
 def test_commands_of_the_core_ask_no_installed_package(

@@ -31,6 +31,7 @@ TUTORIALS = sorted((ROOT / "docs" / "tutorials").glob("*.md"))
 PAGES = [*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md"), *ROOT.glob("bags/*.md")]
 NAMES = [path.relative_to(ROOT).as_posix() for path in sorted(PAGES)]
 HISTORY = {"CHANGELOG.md", "docs/style.md"}  # what was written before, and the words themselves
+HISTORY |= {name for name in NAMES if name.startswith("docs/changes/")}
 COUNTS = {"three": 3, "four": 4, "five": 5, "six": 6}
 PACKAGE_HEADING = "## As an installed package"
 
@@ -189,8 +190,8 @@ def test_parts_of_the_package_in_the_documents_are_there_once_it_is_installed(
     (tmp_path / "my_teleop_parts.py").write_text(snippets(section, "python")[0])
     # What an editable installation does, without pip, which would ask an index for build tools.
     run(["-c", "import setuptools; setuptools.setup()", "-q", "egg_info"], tmp_path)
-    sim = ["sim", "--duration", "1", "--out", "bag", "--set", "fixture=fence", "fixture.fence.room=0.02",
-           "operator=still"]  # fmt: skip
+    sim = ["sim", "--duration", "1", "--out", "bag", "--set", "fixture=fence",
+           "fixture.fence.room=0.02", "operator=still"]  # fmt: skip
     run(["-m", "teleop_core.cli", *sim], tmp_path, PYTHONPATH=str(tmp_path))
 
 
@@ -219,9 +220,20 @@ def test_version_is_the_same_wherever_it_stands() -> None:
     version = teleop_core.__version__
     assert version == teleop_lab.__version__ == teleop_drill.__version__
     assert version == teleop_machines.__version__
-    for package in ("teleop_core", "teleop_machines", "teleop_lab", "teleop_drill"):
+    for package in (
+        "teleop_core", "teleop_machines", "teleop_console", "teleop_exchange", "teleop_lab",
+        "teleop_drill",
+    ):  # fmt: skip
         assert ET.parse(ROOT / f"src/{package}/package.xml").findtext("version") == version
         assert f'VERSION = "{version}"' in text_of(f"src/{package}/setup.py")
     for said in (f'version = "{version}"', f"teleop_core=={version}"):
         assert said in text_of("src/lerobot_robot_teleop_core/pyproject.toml")
-    assert f"## {version}" in text_of("CHANGELOG.md")
+    assert re.findall(r"^## (\d\S*)", text_of("CHANGELOG.md"), re.MULTILINE) == [version]
+
+
+def test_each_release_is_told_in_at_most_forty_lines() -> None:
+    pages = sorted((ROOT / "docs/changes").glob("*.md"))
+    texts = [path.read_text(encoding="utf-8") for path in pages]
+    newest = text_of("CHANGELOG.md").split("\n## ")[-1]
+    assert pages
+    assert max(len(text.splitlines()) for text in [*texts, newest]) <= 40

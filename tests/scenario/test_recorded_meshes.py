@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 
 import teleop_core as tc
 from present import present
+from teleop_console.recorded_arms import configuration_of, recorded_arms
 from teleop_core.bags import kept_files
 from teleop_core.bags.kept_files import KeptFiles, recorded_files
 from teleop_core.bags.reader import Bag
-from teleop_core.console.recorded_arms import configuration_of, recorded_arms
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots.bodies.looks import looks_of
 

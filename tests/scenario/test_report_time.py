@@ -22,7 +22,7 @@ pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 LONG, SHORT = 600_000, 20_000
-LARGEST_PAGE = 10_000_000
+LARGEST_PAGE = 40_000_000
 # Curves are rounded to less than this.
 ROUNDING_MM, ROUNDING_N = 1e-3, 1e-3
 LIMITED = (
@@ -429,7 +429,7 @@ def test_page_follows_a_window_that_becomes_narrow_and_wide_again(
         assert tab.value("document.documentElement.scrollWidth") <= width
 
 
-def test_without_scripts_there_are_tables_sketches_and_a_word(
+def test_without_scripts_there_are_tables_and_a_word(
     chromium: str, short: Any, tmp_path: Path
 ) -> None:
     with Headless(chromium, tmp_path) as tab:
@@ -440,11 +440,6 @@ def test_without_scripts_there_are_tables_sketches_and_a_word(
         text = tab.value("document.body.innerText")
         assert "JavaScript, which is off here" in text
         assert "position, RMS" in text
-        sketches = tab.value(
-            "[...document.querySelectorAll('.preview svg')].map((s) => s.clientHeight)"
-        )
-        assert len(sketches) >= 8
-        assert min(sketches) > 50
         assert tab.value("document.querySelector('.times').clientHeight") == 0
 
 

@@ -5,9 +5,9 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
+from teleop_console.console_link import LiveLink
 from teleop_core.bags.reader import Bag
 from teleop_core.graph import topics
-from teleop_core.nodes.console_link import LiveLink
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -8,8 +8,8 @@ import pytest
 from numpy.typing import ArrayLike
 
 from peers import at_rest
+from teleop_console.status import RESTS
 from teleop_core.chain.operators.rest import rest_pose
-from teleop_core.console.status import RESTS
 from teleop_core.graph.topics import (
     MASTER_BUTTONS,
     MASTER_MEASURED_CP,

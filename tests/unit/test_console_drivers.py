@@ -6,7 +6,7 @@ from typing import Any
 from hypothesis import given
 from hypothesis import strategies as st
 
-from teleop_core.console.drivers import PATIENCE, Drivers
+from teleop_console.drivers import PATIENCE, Drivers
 
 STEPS = st.lists(
     st.tuples(

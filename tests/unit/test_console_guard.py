@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from teleop_core.console.guard import Guard, Request, is_loopback, is_wildcard
+from teleop_console.guard import Guard, Request, is_loopback, is_wildcard
 
 
 def ask(guard: Guard, path: str = "/", is_socket: bool = False, **headers: str | list[str]) -> str:

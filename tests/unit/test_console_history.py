@@ -5,18 +5,11 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from teleop_core.console.history import SPAN, History, LiveScores
-from teleop_core.console.link import Arm, ArmView
-from teleop_core.console.plots import Plots
-from teleop_core.console.server import ConsoleServer
-from teleop_core.graph.topics import (
-    ENERGY,
-    MASTER_ENERGY,
-    MASTER_MEASURED_CF,
-    SLAVE_ENERGY,
-    SLAVE_MEASURED_CP,
-    SLAVE_SERVO_CP,
-)
+from teleop_console.history import SPAN, History, LiveScores
+from teleop_console.link import Arm, ArmView
+from teleop_console.plots import Plots
+from teleop_console.server import ConsoleServer
+from teleop_core.graph import topics
 from teleop_core.robots import load_robot
 
 ARM = Arm("", load_robot("rcrt1"))
@@ -32,9 +25,9 @@ def seen(
     """A view of an arm whose tip is wanted in one place and is in another [m]."""
     turn = [1.0, 0.0, 0.0, 0.0]
     streams = {
-        SLAVE_SERVO_CP.name: np.array([*reference, *turn]),
-        SLAVE_MEASURED_CP.name: np.array([*place, *turn]),
-        MASTER_MEASURED_CF.name: np.array([*force, 0.0, 0.0, 0.0]),
+        topics.SLAVE_SERVO_CP.name: np.array([*reference, *turn]),
+        topics.SLAVE_MEASURED_CP.name: np.array([*place, *turn]),
+        topics.MASTER_MEASURED_CF.name: np.array([*force, 0.0, 0.0, 0.0]),
     }
     return ArmView(streams=streams, state={"is_following": float(is_following)})
 
@@ -57,8 +50,8 @@ def test_what_was_not_known_is_not_a_number_in_history() -> None:
 
 def test_the_energy_that_both_ports_may_still_give_is_drawn_in_joules() -> None:
     history, view = History(ARM), seen((0, 0, 0), (0, 0, 0))
-    for topic, left in ((MASTER_ENERGY, 0.004), (SLAVE_ENERGY, -0.001)):
-        view.streams[topic.name] = np.where(np.array(ENERGY) == "margin", left, 7.0)
+    for topic, left in ((topics.MASTER_ENERGY, 0.004), (topics.SLAVE_ENERGY, -0.001)):
+        view.streams[topic.name] = np.where(np.array(topics.ENERGY) == "margin", left, 7.0)
     history.add(1.0, view, 0.001)
     assert history.read("left")[1].tolist() == [[0.004, -0.001]]
 

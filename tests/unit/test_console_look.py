@@ -8,10 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from teleop_core import console
-from teleop_core.console.link import View
-from teleop_core.console.look import CURVES, MEANINGS, ROLES, Color, style
-from teleop_core.console.status import RESTS, status_html
+import teleop_console
+from teleop_console.link import View
+from teleop_console.look import CURVES, MEANINGS, ROLES, Color, style
+from teleop_console.status import RESTS, status_html
 
 COLOR = re.compile(r"#[0-9a-fA-F]{6}\b|rgba?\(|\(\d{2,3}, \d{1,3}, \d{2,3}\)")
 GROUNDS = {"light": "#ffffff", "dark": "#1f2328"}
@@ -63,7 +63,7 @@ def test_texts_stand_out_from_their_ground(name: str, ground: str) -> None:
 
 
 def test_colors_of_the_page_stand_in_one_table() -> None:
-    for file in Path(console.__path__[0]).glob("*.*"):
+    for file in Path(teleop_console.__path__[0]).glob("*.*"):
         if file.suffix in {".py", ".js"} and file.name != "look.py":
             found = re.findall(
                 r"#[0-9a-fA-F]{6}\b|rgba?\(|\(\d{2,3}, \d{1,3}, \d{2,3}\)", file.read_text()

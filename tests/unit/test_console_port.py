@@ -10,8 +10,8 @@ from contextlib import suppress
 import pytest
 
 from present import present
+from teleop_console.server import ConsoleServer, free_port, listen, owner
 from teleop_core.base.errors import ParameterError, SessionError
-from teleop_core.console.server import ConsoleServer, free_port, listen, owner
 
 
 def test_taken_port_is_refused_with_its_owner_and_one_that_is_free() -> None:

@@ -12,11 +12,11 @@ from hypothesis import strategies as st
 from rosbags.highlevel import AnyReader
 
 import teleop_core as tc
+from teleop_console.app import Console
+from teleop_console.recorded import FRAME, RecordedLink
+from teleop_console.recorded_arms import configuration_of, recorded_arms
+from teleop_console.server import ConsoleServer
 from teleop_core.bags.memory import MemoryBag
-from teleop_core.console.app import Console
-from teleop_core.console.recorded import FRAME, RecordedLink
-from teleop_core.console.recorded_arms import configuration_of, recorded_arms
-from teleop_core.console.server import ConsoleServer
 from teleop_core.graph.topics import MASTER_MEASURED_CP, SLAVE_MEASURED_CP, Kind, Topic
 
 

@@ -12,16 +12,16 @@ from viser._scene_handles import BoxHandle, FrameHandle
 
 import teleop_core as tc
 from present import present
+from teleop_console.fixture_outlines import Look, scale_of, unit_outline
+from teleop_console.hooks import Server
+from teleop_console.jaw_nodes import finger_poses
+from teleop_console.link import Arm, ArmView, View
+from teleop_console.look import GOOD, ROLES, WRONG
+from teleop_console.recorded import RecordedLink
+from teleop_console.scene import Scene
+from teleop_console.server import ConsoleServer
+from teleop_console.world_nodes import object_outline
 from teleop_core.chain.fixtures import Fixture
-from teleop_core.console.fixture_outlines import Look, scale_of, unit_outline
-from teleop_core.console.hooks import Server
-from teleop_core.console.jaw_nodes import finger_poses
-from teleop_core.console.link import Arm, ArmView, View
-from teleop_core.console.look import GOOD, ROLES, WRONG
-from teleop_core.console.recorded import RecordedLink
-from teleop_core.console.scene import Scene
-from teleop_core.console.server import ConsoleServer
-from teleop_core.console.world_nodes import object_outline
 from teleop_core.graph.topics import Limit
 from teleop_core.kernels.geometry import Array, rotations_from_quaternions
 from teleop_core.robots.bodies import Solid

@@ -5,11 +5,11 @@ from typing import Any
 import pytest
 
 from desk import Desk
+from teleop_console.link import ParameterInfo
+from teleop_console.server import ConsoleServer
+from teleop_console.settings import SettingsPanel, _control, _parsed, _shown, _text
 from teleop_core.base.parameters import specs, values_of
 from teleop_core.base.plain_yaml import parse
-from teleop_core.console.link import ParameterInfo
-from teleop_core.console.server import ConsoleServer
-from teleop_core.console.settings import SettingsPanel, _control, _parsed, _shown, _text
 from teleop_core.graph.layers import declared_groups
 
 MODE, GAIN = ("motion_scaling", "mode"), ("motion_scaling", "fine_gain")

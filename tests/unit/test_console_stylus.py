@@ -10,11 +10,11 @@ import viser
 
 import teleop_core as tc
 from present import present
-from teleop_core.console.hooks import Server
-from teleop_core.console.link import Arm, ArmView, View
-from teleop_core.console.scene import Scene
-from teleop_core.console.server import ConsoleServer
-from teleop_core.console.stylus import LINGER, STEP_LENGTH, STEP_TURN, Stylus, stepped
+from teleop_console.hooks import Server
+from teleop_console.link import Arm, ArmView, View
+from teleop_console.scene import Scene
+from teleop_console.server import ConsoleServer
+from teleop_console.stylus import LINGER, STEP_LENGTH, STEP_TURN, Stylus, stepped
 from teleop_core.kernels.geometry import Array, rotations_from_quaternions
 
 POSE = np.array([0.01, -0.06, -0.08, 0.98, -0.2, 0.0, 0.0])

@@ -3,8 +3,8 @@
 import numpy as np
 
 import teleop_core as tc
-from teleop_core.console.recorded_arms import parameters_of
-from teleop_core.console.scene import targets_of
+from teleop_console.recorded_arms import parameters_of
+from teleop_console.scene import targets_of
 from teleop_core.graph.topics import MASTER_MEASURED_CP
 
 

@@ -13,12 +13,12 @@ from rich.console import Console
 
 from present import present
 from recipes import JOINTS, START_NS, Recipe, pose_rows, state
+from teleop_console.report.page import report_page
 from teleop_core.bags.reader import Bag
 from teleop_core.bags.reports import report
 from teleop_core.bags.writer import BagWriter
 from teleop_core.base.errors import EvaluationError, RecordingError
 from teleop_core.evaluation.command import evaluate_bags
-from teleop_core.evaluation.page import report_page
 from teleop_core.evaluation.score import key_table, keys
 from teleop_core.evaluation.score_table import score_tables
 from teleop_core.evaluation.scoring import evaluate, study

@@ -11,12 +11,12 @@ from present import present
 
 PUBLIC = {
     "teleop_lab", "teleop_lab.calibration", "teleop_core.slave.operation",
-    "teleop_core.console.app", "teleop_core.console.controls", "teleop_core.console.link",
-    "teleop_core.console.recorded", "teleop_core.console.server",
+    "teleop_console.app", "teleop_console.controls", "teleop_console.link",
+    "teleop_console.recorded", "teleop_console.server",
     "teleop_core", "teleop_core.evaluation", "teleop_core.chain.operators",
     "teleop_core.shapes",
     "teleop_core.slave.controllers", "teleop_core.robots", "teleop_core.graph.topics",
-    "teleop_drill", "teleop_lab.experiments", "numpy",
+    "teleop_drill", "teleop_console", "teleop_exchange", "teleop_lab.experiments", "numpy",
     "numpy.typing", "pandas", "plotly.graph_objects",
 }  # fmt: skip
 ROS_EXAMPLES = {

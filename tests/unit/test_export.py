@@ -15,10 +15,11 @@ import pytest
 from pyarrow.lib import ChunkedArray, Table
 
 import teleop_core as tc
+import teleop_exchange
 from teleop_core.bags.writer import BagWriter
 from teleop_core.graph.topics import MASTER_BUTTONS, MASTER_MEASURED_CP
 from teleop_core.kernels.geometry import Array
-from teleop_core.session.exchange.joining import Streams
+from teleop_exchange.joining import Streams
 
 STATE_TOPIC = "teleop/state"
 
@@ -45,7 +46,7 @@ def test_table_is_the_frame_of_the_recording(
 ) -> None:
     recording = session if place == "memory" else saved
     topics = ("slave/measured_cp", "slave/measured_js", "master/buttons")
-    report = tc.export_recording(recording, tmp_path / name, topics=topics)
+    report = teleop_exchange.export_recording(recording, tmp_path / name, topics=topics)
     got = READERS[name](tmp_path / name).set_index("time")
     expected = recording.frame(*topics)
     assert list(got.columns) == list(expected.columns)
@@ -58,7 +59,7 @@ def test_table_is_the_frame_of_the_recording(
 def test_without_topics_all_numbers_are_there_and_states_are_held(
     saved: tc.Recording, tmp_path: Path
 ) -> None:
-    tc.export_recording(saved, tmp_path / "all.parquet")
+    teleop_exchange.export_recording(saved, tmp_path / "all.parquet")
     got = pd.read_parquet(tmp_path / "all.parquet")
     for name in saved.topics:
         if name not in {"diagnostics", "robot_description", "tf"}:
@@ -71,13 +72,15 @@ def test_without_topics_all_numbers_are_there_and_states_are_held(
 
 
 def test_a_report_alone_has_a_row_for_each_message(saved: tc.Recording, tmp_path: Path) -> None:
-    tc.export_recording(saved, tmp_path / "state.csv", topics=[STATE_TOPIC])
+    teleop_exchange.export_recording(saved, tmp_path / "state.csv", topics=[STATE_TOPIC])
     got = pd.read_csv(tmp_path / "state.csv")
     assert np.array_equal(got[f"{STATE_TOPIC}.gain"], saved[STATE_TOPIC]["gain"])
 
 
 def test_rows_at_a_rate_hold_the_newest_message(saved: tc.Recording, tmp_path: Path) -> None:
-    tc.export_recording(saved, tmp_path / "a.csv", topics=["slave/measured_cp"], rate=125.0)
+    teleop_exchange.export_recording(
+        saved, tmp_path / "a.csv", topics=["slave/measured_cp"], rate=125.0
+    )
     got = pd.read_csv(tmp_path / "a.csv")
     stream = saved["slave/measured_cp"]
     assert np.allclose(got["time"], np.arange(len(got)) / 125.0, rtol=0, atol=1e-9)
@@ -90,7 +93,7 @@ def test_units_stand_in_the_metadata_and_on_request_in_the_names(
 ) -> None:
     topics = ["slave/measured_cp", "slave/measured_js", "master/measured_cf"]
     for name, units in (("plain.parquet", False), ("named.parquet", True)):
-        tc.export_recording(saved, tmp_path / name, topics=topics, units=units)
+        teleop_exchange.export_recording(saved, tmp_path / name, topics=topics, units=units)
     schema = pq.read_schema(tmp_path / "plain.parquet")
     found = {field.name: field.metadata[b"unit"].decode() for field in schema}
     assert found["time"] == "s"
@@ -117,7 +120,7 @@ def sparse(path: Path, chunks: int) -> tc.Recording:
 
 def test_streams_of_different_rates_are_joined_over_many_chunks(tmp_path: Path) -> None:
     recording = sparse(tmp_path / "bag", 40)
-    tc.export_recording(recording, tmp_path / "a.parquet")
+    teleop_exchange.export_recording(recording, tmp_path / "a.parquet")
     got = pd.read_parquet(tmp_path / "a.parquet").set_index("time")
     expected = recording.frame("master/measured_cp", "master/buttons").sort_index()
     assert np.array_equal(got[expected.columns].to_numpy(), expected.to_numpy(), equal_nan=True)
@@ -128,7 +131,7 @@ def test_streams_of_different_rates_are_joined_over_many_chunks(tmp_path: Path) 
 
 def test_newest_values_are_held_over_many_chunks(tmp_path: Path) -> None:
     recording = sparse(tmp_path / "bag", 40)
-    tc.export_recording(recording, tmp_path / "a.parquet", rate=50.0)
+    teleop_exchange.export_recording(recording, tmp_path / "a.parquet", rate=50.0)
     got = pd.read_parquet(tmp_path / "a.parquet")
     buttons = recording["master/buttons"]
     held = np.searchsorted(buttons.time, got["time"] + 1e-9, side="right") - 1
@@ -152,7 +155,7 @@ def test_wrong_exports_are_refused_and_leave_nothing(
 ) -> None:
     out = tmp_path / options.pop("out", "a.csv")
     with pytest.raises(tc.TeleopError) as error:
-        tc.export_recording(session, out, **options)
+        teleop_exchange.export_recording(session, out, **options)
     assert text in str(error.value)
     assert "\n" not in str(error.value)
     assert not list(tmp_path.iterdir())
@@ -161,13 +164,13 @@ def test_wrong_exports_are_refused_and_leave_nothing(
 def test_existing_files_are_never_touched(session: tc.Recording, tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text("precious")
     with pytest.raises(tc.RecordingError, match="exists already"):
-        tc.export_recording(session, tmp_path / "a.csv")
+        teleop_exchange.export_recording(session, tmp_path / "a.csv")
     assert (tmp_path / "a.csv").read_text() == "precious"
 
 
 def test_a_table_holds_one_recording(session: tc.Recording, tmp_path: Path) -> None:
     with pytest.raises(tc.ParameterError, match="lerobot takes several"):
-        tc.export_recording([session, session], tmp_path / "a.csv")
+        teleop_exchange.export_recording([session, session], tmp_path / "a.csv")
 
 
 # Data sets.
@@ -176,9 +179,9 @@ def test_a_table_holds_one_recording(session: tc.Recording, tmp_path: Path) -> N
 @pytest.fixture(scope="module")
 def data_set(
     session: tc.Recording, saved: tc.Recording, tmp_path_factory: pytest.TempPathFactory
-) -> tuple[Path, tc.ExportReport]:
+) -> tuple[Path, teleop_exchange.ExportReport]:
     out = tmp_path_factory.mktemp("sets") / "cut"
-    report = tc.export_recording([saved, session], out, task="follow the edge")
+    report = teleop_exchange.export_recording([saved, session], out, task="follow the edge")
     return out, report
 
 
@@ -191,7 +194,7 @@ def vectors(column: ChunkedArray) -> Array:
 
 
 def test_a_data_set_has_the_newest_values_fifty_times_a_second(
-    data_set: tuple[Path, tc.ExportReport], saved: tc.Recording
+    data_set: tuple[Path, teleop_exchange.ExportReport], saved: tc.Recording
 ) -> None:
     out, report = data_set
     frames = frames_of(out)
@@ -213,7 +216,7 @@ def test_a_data_set_has_the_newest_values_fifty_times_a_second(
     assert np.allclose(np.diff(np.array(one["timestamp"])), 0.02, rtol=0, atol=1e-4)
 
 
-def test_counters_of_a_data_set_count(data_set: tuple[Path, tc.ExportReport]) -> None:
+def test_counters_of_a_data_set_count(data_set: tuple[Path, teleop_exchange.ExportReport]) -> None:
     frames = frames_of(data_set[0])
     count = len(frames) // 2
     assert np.array_equal(frames["index"], np.arange(2 * count))
@@ -223,7 +226,7 @@ def test_counters_of_a_data_set_count(data_set: tuple[Path, tc.ExportReport]) ->
 
 
 def test_descriptions_of_a_data_set_agree_with_its_frames(
-    data_set: tuple[Path, tc.ExportReport],
+    data_set: tuple[Path, teleop_exchange.ExportReport],
 ) -> None:
     out, _ = data_set
     frames, info = frames_of(out), json.loads((out / "meta/info.json").read_text())
@@ -252,7 +255,7 @@ def test_descriptions_of_a_data_set_agree_with_its_frames(
 
 
 def test_actions_may_be_poses_of_the_tip(session: tc.Recording, tmp_path: Path) -> None:
-    tc.export_recording(session, tmp_path / "set", action="tip", rate=10.0)
+    teleop_exchange.export_recording(session, tmp_path / "set", action="tip", rate=10.0)
     info = json.loads((tmp_path / "set/meta/info.json").read_text())
     names = info["features"]["action"]["names"]
     assert names == [f"tip.{c}" for c in ("x", "y", "z", "qw", "qx", "qy", "qz")]
@@ -265,14 +268,14 @@ def test_actions_may_be_poses_of_the_tip(session: tc.Recording, tmp_path: Path) 
 def test_recordings_of_other_arms_do_not_mix(session: tc.Recording, tmp_path: Path) -> None:
     other = tc.run("coarse_box", duration=0.1, robot="puma560")
     with pytest.raises(tc.RecordingError, match="other joints"):
-        tc.export_recording([session, other], tmp_path / "set")
+        teleop_exchange.export_recording([session, other], tmp_path / "set")
     assert not list(tmp_path.iterdir())
 
 
 def test_a_recording_without_a_slave_makes_no_data_set(tmp_path: Path) -> None:
     recording = sparse(tmp_path / "bag", 2)
     with pytest.raises(tc.RecordingError, match="slave/measured_js"):
-        tc.export_recording(recording, tmp_path / "set")
+        teleop_exchange.export_recording(recording, tmp_path / "set")
     assert not (tmp_path / "set").exists()
 
 
@@ -289,7 +292,7 @@ print(json.dumps([len(found), found.num_episodes, found[0]["task"],
 
 
 def test_the_loader_of_lerobot_reads_the_same_numbers(
-    data_set: tuple[Path, tc.ExportReport],
+    data_set: tuple[Path, teleop_exchange.ExportReport],
 ) -> None:
     """LEROBOT_PYTHON names a Python that has the lerobot package; else that of the tests."""
     python = os.environ.get("LEROBOT_PYTHON", sys.executable)

@@ -11,8 +11,8 @@ import pytest
 import teleop_core as tc
 from led_tip import lead
 from present import present
+from teleop_console.world_nodes import object_outline
 from teleop_core.base.errors import ParameterError
-from teleop_core.console.world_nodes import object_outline
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot
 from teleop_core.shapes.basis.heights import THICKNESS, read_heights

@@ -10,7 +10,7 @@ import pytest
 import teleop_core as tc
 from free_tool import drag, fly
 from present import present
-from teleop_core.console.world_nodes import object_outline
+from teleop_console.world_nodes import object_outline
 from teleop_core.evaluation.metrics.insertion import depth_in_hole
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot

@@ -19,8 +19,8 @@ from rosbags.typesys.store import Typestore
 from scipy.spatial.transform import Rotation
 
 import teleop_core as tc
+import teleop_exchange
 from teleop_core.kernels.geometry import Array
-from teleop_core.session.exchange import bag_messages
 
 START_NS = 1_700_000_000_000_000_000
 COUNT = 300
@@ -161,8 +161,10 @@ def in_order(*parts: list[tuple[str, int, object]]) -> list[tuple[str, int, obje
     return sorted((m for part in parts for m in part), key=lambda message: message[1])
 
 
-def imported(path: Path, tmp_path: Path, **options: Any) -> tuple[tc.ImportReport, tc.Stream]:
-    report = tc.import_recording(path, tmp_path / "out", **options)
+def imported(
+    path: Path, tmp_path: Path, **options: Any
+) -> tuple[teleop_exchange.ImportReport, tc.Stream]:
+    report = teleop_exchange.import_recording(path, tmp_path / "out", **options)
     return report, report.recording["master/measured_cp"]
 
 
@@ -210,7 +212,7 @@ def test_single_files_are_recordings_too(tmp_path: Path) -> None:
     for number, storage in enumerate(StoragePlugin):
         folder = write2(tmp_path / f"bag{number}", poses(), storage)
         (file,) = [path for path in folder.iterdir() if path.suffix != ".yaml"]
-        report = tc.import_recording(file, tmp_path / f"out{number}")
+        report = teleop_exchange.import_recording(file, tmp_path / f"out{number}")
         assert_same(report.recording["master/measured_cp"])
 
 
@@ -227,21 +229,13 @@ def test_rows_are_those_of_the_rosbags_library(tmp_path: Path) -> None:
     assert_same(stream, [row[0] for row in expected], rows)
 
 
-def test_messages_that_are_not_alike_are_read_one_by_one(tmp_path: Path) -> None:
+def test_messages_need_not_be_alike(tmp_path: Path) -> None:
     messages = poses("TFMessage", "/tf")
     cameras = poses("TFMessage", "/tf", child="camera")
     for i in range(0, COUNT, 3):
         messages[i][2].transforms.append(cameras[i][2].transforms[0])
     path = write2(tmp_path / "bag", messages, StoragePlugin.SQLITE3)
     assert_same(imported(path, tmp_path, frame="tool")[1])
-
-
-def test_messages_that_are_alike_are_read_as_one_array(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(bag_messages.PoseReader, "_one", None)  # reading one by one would fail
-    path = write2(tmp_path / "bag", poses("TransformStamped"), StoragePlugin.SQLITE3)
-    assert_same(imported(path, tmp_path)[1])
 
 
 # In which order.
@@ -288,7 +282,7 @@ def test_messages_that_lie_beside_a_db3_are_told(end: str, tmp_path: Path) -> No
     log.write_bytes(b"changes of a recorder that was killed")
     for path in (file, file.parent):
         with pytest.raises(tc.RecordingError, match=log.name):
-            tc.import_recording(path, tmp_path / "other")
+            teleop_exchange.import_recording(path, tmp_path / "other")
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -316,7 +310,7 @@ def test_messages_of_ros_1_in_mcap_are_read(kind: str, tmp_path: Path) -> None:
 def test_several_topics_of_poses_are_listed_in_one_line(tmp_path: Path) -> None:
     path = write2(tmp_path / "bag", in_order(poses(topic="/left"), poses("Pose", "/right")))
     with pytest.raises(tc.UnknownNameError, match="left, right") as error:
-        tc.import_recording(path, tmp_path / "out")
+        teleop_exchange.import_recording(path, tmp_path / "out")
     assert "--topic" in str(error.value)
     assert not (tmp_path / "out").exists()
     assert_same(imported(path, tmp_path, topic="/left")[1])
@@ -325,19 +319,19 @@ def test_several_topics_of_poses_are_listed_in_one_line(tmp_path: Path) -> None:
 def test_topics_that_are_no_poses_are_told(tmp_path: Path) -> None:
     path = write2(tmp_path / "bag", in_order(poses(), presses(lambda i: [0])))
     with pytest.raises(tc.UnknownNameError, match="hand/pose"):
-        tc.import_recording(path, tmp_path / "out", topic="foot/pose")
+        teleop_exchange.import_recording(path, tmp_path / "out", topic="foot/pose")
     with pytest.raises(tc.RecordingError, match="hand/pose"):
-        tc.import_recording(path, tmp_path / "out", topic="joy")
+        teleop_exchange.import_recording(path, tmp_path / "out", topic="joy")
     only = write2(tmp_path / "joys", presses(lambda i: [0]))
     with pytest.raises(tc.RecordingError, match="no topic of poses; it has joy"):
-        tc.import_recording(only, tmp_path / "out")
+        teleop_exchange.import_recording(only, tmp_path / "out")
 
 
 def test_of_several_transforms_one_frame_is_taken(tmp_path: Path) -> None:
     both = in_order(poses("TFMessage", "/tf"), poses("TFMessage", "/tf", child="camera"))
     path = write2(tmp_path / "bag", both)
     with pytest.raises(tc.UnknownNameError, match="camera, tool"):
-        tc.import_recording(path, tmp_path / "out")
+        teleop_exchange.import_recording(path, tmp_path / "out")
     assert_same(imported(path, tmp_path, frame="tool")[1])
 
 
@@ -351,9 +345,9 @@ def test_poses_in_two_frames_are_never_mixed(kind: str, second: str, tmp_path: P
         (message.transforms[0] if kind == "TFMessage" else message).header.frame_id = "camera"
     path = write2(tmp_path / "bag", messages)
     with pytest.raises(tc.UnknownNameError, match=r"--parent.*base, camera"):
-        tc.import_recording(path, tmp_path / "out")
+        teleop_exchange.import_recording(path, tmp_path / "out")
     with pytest.raises(tc.RecordingError, match=r"no pose of.*table"):
-        tc.import_recording(path, tmp_path / "out", parent="table")
+        teleop_exchange.import_recording(path, tmp_path / "out", parent="table")
     report, stream = imported(path, tmp_path, parent="camera")
     kept = np.flatnonzero(others)
     assert_same(stream, STAMPS[kept], POSES[kept])
@@ -366,7 +360,7 @@ def test_poses_of_two_frames_on_one_topic_are_never_mixed(tmp_path: Path) -> Non
         message.child_frame_id = "probe"
     path = write2(tmp_path / "bag", messages)
     with pytest.raises(tc.UnknownNameError, match=r"--frame.*probe, tool"):
-        tc.import_recording(path, tmp_path / "out")
+        teleop_exchange.import_recording(path, tmp_path / "out")
     assert_same(imported(path, tmp_path, frame="probe")[1], STAMPS[200:], POSES[200:])
 
 
@@ -433,18 +427,18 @@ def test_frames_with_two_parents_or_in_a_circle_are_not_composed(tmp_path: Path)
     two = [carried("arm", "tool"), carried("base", "arm"), carried("room", "arm")]
     path = write2(tmp_path / "two", in_order(*two))
     with pytest.raises(tc.UnknownNameError, match=r"--parent.*poses of arm.*base, room"):
-        tc.import_recording(path, tmp_path / "out", frame="tool")
+        teleop_exchange.import_recording(path, tmp_path / "out", frame="tool")
     _, stream = imported(path, tmp_path, frame="tool", parent="room")
     assert_composed(stream, STAMPS, matrices(POSES) @ matrices(POSES))
     path = write2(tmp_path / "circle", in_order(carried("arm", "tool"), carried("tool", "arm")))
     with pytest.raises(tc.ParameterError, match="carries itself"):
-        tc.import_recording(path, tmp_path / "other", frame="tool")
+        teleop_exchange.import_recording(path, tmp_path / "other", frame="tool")
 
 
 def test_options_of_columns_do_not_fit_a_bag(tmp_path: Path) -> None:
     path = write2(tmp_path / "bag", poses())
     with pytest.raises(tc.ParameterError, match="topics, not columns"):
-        tc.import_recording(path, tmp_path / "out", position=("x", "y", "z"))
+        teleop_exchange.import_recording(path, tmp_path / "out", position=("x", "y", "z"))
 
 
 # Stamps.
@@ -507,7 +501,7 @@ def test_any_joy_has_its_buttons_mapped(
 def test_a_button_that_the_joy_lacks_is_told(tmp_path: Path) -> None:
     path = write2(tmp_path / "bag", in_order(poses(), presses(lambda i: [0, 1])))
     with pytest.raises(tc.ParameterError, match="below 2"):
-        tc.import_recording(path, tmp_path / "out", buttons="clutch=2")
+        teleop_exchange.import_recording(path, tmp_path / "out", buttons="clutch=2")
 
 
 def test_buttons_follow_the_poses_to_the_log_times(tmp_path: Path) -> None:
@@ -542,7 +536,7 @@ def test_what_is_no_recording_is_told_in_one_line(name: str, tmp_path: Path) -> 
     else:
         path.mkdir()
     with pytest.raises(tc.RecordingError) as error:
-        tc.import_recording(path, tmp_path / "out")
+        teleop_exchange.import_recording(path, tmp_path / "out")
     assert "\n" not in str(error.value)
     assert not (tmp_path / "out").exists()
 
@@ -552,7 +546,7 @@ def test_an_entry_that_a_recording_lacks_is_named(tmp_path: Path) -> None:
     with sqlite3.connect(file) as storage:
         storage.execute("UPDATE topics SET offered_qos_profiles = '- history: 1'")
     with pytest.raises(tc.RecordingError, match="it lacks 'depth'"):
-        tc.import_recording(file, tmp_path / "out")
+        teleop_exchange.import_recording(file, tmp_path / "out")
 
 
 def test_a_bag_that_was_cut_off_is_told(tmp_path: Path) -> None:
@@ -560,12 +554,12 @@ def test_a_bag_that_was_cut_off_is_told(tmp_path: Path) -> None:
     data = path.read_bytes()
     path.write_bytes(data[: len(data) // 2])
     with pytest.raises(tc.RecordingError):
-        tc.import_recording(path, tmp_path / "out")
+        teleop_exchange.import_recording(path, tmp_path / "out")
     folder = write2(tmp_path / "bag", poses())
     (file,) = folder.glob("*.mcap")
     file.write_bytes(file.read_bytes()[:-50])
     with pytest.raises(tc.RecordingError, match="teleop recover"):
-        tc.import_recording(folder, tmp_path / "out")
+        teleop_exchange.import_recording(folder, tmp_path / "out")
 
 
 @pytest.mark.parametrize("is_ros2", [True, False])
@@ -581,8 +575,11 @@ def test_both_masters_of_the_da_vinci_kit_and_its_pedal_are_two_arms(
             pedal = maker.joy(stamp, [int(i >= 100)])
             messages += [("/console/clutch", log, pedal), ("/footpedals/camera", log, pedal)]
     write, name = (write2, "kit") if is_ros2 else (write1, "kit.bag")
-    report = tc.import_recording(
-        write(tmp_path / name, messages), tmp_path / "bag", preset="dvrk", axes=("+x", "+y", "+z")
+    report = teleop_exchange.import_recording(
+        write(tmp_path / name, messages),
+        tmp_path / "bag",
+        buttons_topic="console/clutch",
+        arms={"left": {"topic": "MTML/measured_cp"}, "right": {"topic": "MTMR/measured_cp"}},
     )
     assert [one.arm for one in (report, *report.others)] == ["left", "right"]
     for prefix in ("", "right/"):

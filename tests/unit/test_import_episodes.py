@@ -8,6 +8,7 @@ import pandas as pd
 import pytest
 
 import teleop_core as tc
+import teleop_exchange
 from teleop_core.cli import main
 
 NUMBERS, ROWS = (0, 1, 5), (120, 200, 80)
@@ -40,14 +41,14 @@ def test_each_recording_is_that_of_its_episode_alone(kind: str, tmp_path: Path) 
     else:
         table().to_csv(path) if kind == "csv" else table().to_parquet(path)
     said: list[str] = []
-    report = tc.import_episodes(path, tmp_path / "out", say=said.append)
+    report = teleop_exchange.import_episodes(path, tmp_path / "out", say=said.append)
     assert (tuple(report.made), report.kept, dict(report.refused)) == (NUMBERS, (), {})
     assert [line.partition(":")[0] for line in said] == [
         f"episode_{number:06d} ({i + 1} of 3)" for i, number in enumerate(NUMBERS)
     ]
     for number, rows in zip(NUMBERS, ROWS, strict=True):
         table((number,)).to_csv(tmp_path / f"{number}.csv")
-        alone = tc.import_recording(
+        alone = teleop_exchange.import_recording(
             tmp_path / f"{number}.csv", tmp_path / str(number), episode=number
         )
         one, other = (r.recording["master/measured_cp"] for r in (report.made[number], alone))
@@ -58,24 +59,24 @@ def test_each_recording_is_that_of_its_episode_alone(kind: str, tmp_path: Path) 
 
 def test_an_import_goes_on_where_it_was_interrupted(tmp_path: Path) -> None:
     path, out = data_set(tmp_path / "set"), tmp_path / "out"
-    tc.import_episodes(path, out)
+    teleop_exchange.import_episodes(path, out)
     whole = {file: file.read_bytes() for file in out.rglob("*.*") if file.is_file()}
     shutil.rmtree(out / "episode_000000")
     (out / "episode_000001/metadata.yaml").unlink()  # as a kill leaves it
-    report = tc.import_episodes(path, out)
+    report = teleop_exchange.import_episodes(path, out)
     assert (tuple(report.made), report.kept) == ((0, 1), (5,))
     assert {file: file.read_bytes() for file in out.rglob("*.*") if file.is_file()} == whole
 
 
 def test_a_recording_that_was_made_otherwise_is_not_taken_for_the_same(tmp_path: Path) -> None:
     path, out = data_set(tmp_path / "set"), tmp_path / "out"
-    tc.import_episodes(path, out)
-    report = tc.import_episodes(path, out, scale=2.0)
+    teleop_exchange.import_episodes(path, out)
+    report = teleop_exchange.import_episodes(path, out, scale=2.0)
     assert (tuple(report.refused), report.kept, dict(report.made)) == (NUMBERS, (), {})
     assert "choose another --out" in report.refused[5]
     (out / "episode_000001/metadata.yaml").unlink()
     (out / "episode_000001/notes.txt").write_text("mine")
-    tc.import_episodes(path, out)
+    teleop_exchange.import_episodes(path, out)
     assert (out / "episode_000001/notes.txt").read_text() == "mine"
 
 
@@ -98,18 +99,18 @@ def test_an_episode_that_cannot_be_imported_does_not_keep_the_others(
 def test_what_is_wrong_for_all_episodes_is_said_once(tmp_path: Path) -> None:
     path = data_set(tmp_path / "set")
     with pytest.raises(tc.UnknownNameError, match="import option"):
-        tc.import_episodes(path, tmp_path / "out", sclae=2.0)
+        teleop_exchange.import_episodes(path, tmp_path / "out", sclae=2.0)
     with pytest.raises(tc.ParameterError, match="import_episodes takes all"):
-        tc.import_recording(path, tmp_path / "out", episode="all")
+        teleop_exchange.import_recording(path, tmp_path / "out", episode="all")
     table().drop(columns="episode").to_csv(tmp_path / "one.csv")
     with pytest.raises(tc.ParameterError, match=r"--episode is 'all'.*episode_index"):
-        tc.import_episodes(tmp_path / "one.csv", tmp_path / "out")
+        teleop_exchange.import_episodes(tmp_path / "one.csv", tmp_path / "out")
     table((1,)).to_parquet(path / "data/again.parquet")
     with pytest.raises(tc.RecordingError, match=r"holds episode 1 in .* and "):
-        tc.import_episodes(path, tmp_path / "out")
+        teleop_exchange.import_episodes(path, tmp_path / "out")
     for missing, reason in (("no", "does not exist"), ("out", "data/")):
         (tmp_path / "out").mkdir(exist_ok=True)
         with pytest.raises(tc.RecordingError, match=reason):
-            tc.import_episodes(tmp_path / missing, tmp_path / "other")
+            teleop_exchange.import_episodes(tmp_path / missing, tmp_path / "other")
     with pytest.raises(SystemExit):
         main(["import", str(path), "--out", str(tmp_path / "x"), "--episode", "both"])

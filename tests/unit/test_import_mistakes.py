@@ -11,8 +11,9 @@ import pandas as pd
 import pytest
 
 import teleop_core as tc
+import teleop_exchange
 from teleop_core.kernels.geometry import Array
-from teleop_core.session.exchange import ImportOptions
+from teleop_exchange import ImportOptions
 
 COUNT = 200
 T = np.arange(COUNT) * 0.01
@@ -27,7 +28,7 @@ def refusal(path: Path, tmp_path: Path, **options: Any) -> str:
     out = tmp_path / "out"
     before = set(tmp_path.iterdir())
     with pytest.raises(tc.TeleopError) as error:
-        tc.import_recording(path, out, **options)
+        teleop_exchange.import_recording(path, out, **options)
     assert set(tmp_path.iterdir()) == before
     text = str(error.value)
     assert "\n" not in text
@@ -151,7 +152,7 @@ def test_an_existing_directory_is_never_touched(tmp_path: Path) -> None:
     out.mkdir()
     (out / "precious").write_text("1")
     with pytest.raises(tc.RecordingError, match="exists already"):
-        tc.import_recording(written(tmp_path, GOOD), out)
+        teleop_exchange.import_recording(written(tmp_path, GOOD), out)
     assert (out / "precious").read_text() == "1"
 
 
@@ -212,7 +213,7 @@ def test_numbers_that_nothing_physical_has_are_refused(column: str, tmp_path: Pa
 
 def test_columns_that_are_left_unused_are_told(tmp_path: Path) -> None:
     table = GOOD.assign(PedalDown=0, grip=0.5)
-    report = tc.import_recording(written(tmp_path, table), tmp_path / "out")
+    report = teleop_exchange.import_recording(written(tmp_path, table), tmp_path / "out")
     assert "left unused: 'PedalDown', 'grip'" in report.told
 
 

@@ -1,6 +1,7 @@
 """Importing files of known systems, as these write them: Qualisys, JIGSAWS, Unity, da Vinci kit."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -8,9 +9,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import teleop_core as tc
+import teleop_exchange
 from teleop_core import cli
 from teleop_core.kernels.geometry import Array, rotation_from_quaternion
-from teleop_core.session.exchange import ImportOptions
+from teleop_exchange import ImportOptions
 
 COUNT = 300
 T = np.arange(COUNT) / 100.0
@@ -22,6 +24,22 @@ HEAD = ["NO_OF_FRAMES\t300", "NO_OF_CAMERAS\t4", "NO_OF_BODIES\t1", "FREQUENCY\t
         "BODY_NAMES\tStylus"]  # fmt: skip
 NAMES = ["Frame", "Time", "Stylus X", "Y", "Z", "Roll", "Pitch", "Yaw", "Residual",
          *(f"Rot[{i}]" for i in range(9))]  # fmt: skip
+
+QUALISYS: dict[str, Any] = {
+    "unit": "mm", "time_unit": "s", "matrix_order": "column",
+    "matrix": tuple(f"Rot[{i}]" for i in range(9)),
+}  # fmt: skip
+JIGSAWS: dict[str, Any] = {
+    "rate": 30.0, "unit": "m",
+    "arms": {"left": {"position": "1-3", "matrix": "4-12"},
+             "right": {"position": "20-22", "matrix": "23-31"}},
+}  # fmt: skip
+UNITY: dict[str, Any] = {
+    "unit": "m",
+    "handedness": "left",
+    "axes": ("+z", "-x", "+y"),
+    "quaternion_order": "xyzw",
+}
 
 
 def poses(recording: tc.Recording, topic: str = "master/measured_cp") -> tuple[Array, Array]:
@@ -48,8 +66,8 @@ def qualisys(path: Path, end: str = "") -> Path:
 
 @pytest.mark.parametrize("end", ["", "\t"])
 def test_a_rigid_body_of_qualisys_is_what_it_was(tmp_path: Path, end: str) -> None:
-    report = tc.import_recording(
-        qualisys(tmp_path / "hand.tsv", end), tmp_path / "bag", preset="qualisys"
+    report = teleop_exchange.import_recording(
+        qualisys(tmp_path / "hand.tsv", end), tmp_path / "bag", **QUALISYS
     )
     assert report.counts.samples == report.counts.rows == COUNT
     places, matrices = poses(report.recording)
@@ -63,9 +81,9 @@ def test_places_far_beyond_a_hand_are_refused_until_somebody_says_their_unit(
 ) -> None:
     file = qualisys(tmp_path / "hand.tsv")
     with pytest.raises(tc.TeleopError, match=r"up to 50 m from the origin.*--unit mm, or --unit m"):
-        tc.import_recording(file, tmp_path / "bag")
+        teleop_exchange.import_recording(file, tmp_path / "bag")
     assert not (tmp_path / "bag").exists()
-    assert tc.import_recording(file, tmp_path / "said", unit="m").range[0] > 5.0
+    assert teleop_exchange.import_recording(file, tmp_path / "said", unit="m").range[0] > 5.0
 
 
 def jigsaws(path: Path) -> Path:
@@ -79,7 +97,9 @@ def jigsaws(path: Path) -> Path:
 
 
 def test_both_masters_of_jigsaws_are_two_arms_that_replay(tmp_path: Path) -> None:
-    report = tc.import_recording(jigsaws(tmp_path / "a.txt"), tmp_path / "bag", preset="jigsaws")
+    report = teleop_exchange.import_recording(
+        jigsaws(tmp_path / "a.txt"), tmp_path / "bag", **JIGSAWS
+    )
     assert [one.arm for one in (report, *report.others)] == ["left", "right"]
     assert report.rate == pytest.approx(30.0, rel=1e-3)
     for number, topic in enumerate(("master/measured_cp", "right/master/measured_cp")):
@@ -105,7 +125,9 @@ def unity(path: Path) -> Path:
 
 
 def test_left_handed_axes_of_unity_are_mirrored_with_their_turns(tmp_path: Path) -> None:
-    report = tc.import_recording(unity(tmp_path / "hand.csv"), tmp_path / "bag", preset="unity")
+    report = teleop_exchange.import_recording(
+        unity(tmp_path / "hand.csv"), tmp_path / "bag", **UNITY
+    )
     places, matrices = poses(report.recording)
     np.testing.assert_allclose(places, PLACES, atol=1e-12)
     np.testing.assert_allclose(matrices, TURNS.as_matrix(), atol=1e-12)
@@ -122,7 +144,7 @@ def test_a_left_handed_map_must_mirror_and_a_right_handed_one_must_not() -> None
 def test_a_clutch_of_true_and_false_is_taken(tmp_path: Path, separator: str) -> None:
     table = pd.read_csv(unity(tmp_path / "hand.csv"))
     table.to_csv(tmp_path / "again.csv", index=False, sep=separator)
-    report = tc.import_recording(tmp_path / "again.csv", tmp_path / "bag", preset="unity")
+    report = teleop_exchange.import_recording(tmp_path / "again.csv", tmp_path / "bag", **UNITY)
     buttons = report.recording["master/buttons"]
     assert buttons["clutch"].tolist() == [0.0, 1.0, 0.0]
     np.testing.assert_allclose(np.diff(buttons.stamp_ns) * 1e-9, [1.01, 0.99])
@@ -131,7 +153,7 @@ def test_a_clutch_of_true_and_false_is_taken(tmp_path: Path, separator: str) -> 
 def test_a_column_that_is_called_clutch_and_is_no_button_is_told(tmp_path: Path) -> None:
     table = pd.read_csv(unity(tmp_path / "hand.csv")).assign(Clutch=0.7)
     table.to_csv(tmp_path / "hand.csv", index=False)
-    report = tc.import_recording(tmp_path / "hand.csv", tmp_path / "bag", preset="unity")
+    report = teleop_exchange.import_recording(tmp_path / "hand.csv", tmp_path / "bag", **UNITY)
     assert any("no button clutch: 'Clutch' holds more than 0 and 1" in text for text in report.told)
 
 

@@ -13,9 +13,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import teleop_core as tc
+import teleop_exchange
 from teleop_core.kernels.geometry import Array
-from teleop_core.session.exchange import names, orientation
-from teleop_core.session.exchange.times import ordered
+from teleop_exchange import names
+from teleop_exchange.times import ordered
 
 COUNT, RATE = 400, 100.0
 TIMES = np.arange(COUNT) / RATE
@@ -38,7 +39,7 @@ def frame(columns: list[str] = HEAD, rows: Array = TABLE) -> Any:
 
 def imported(path: Path, tmp_path: Path, **options: Any) -> Any:
     """Report and stream of an import."""
-    report = tc.import_recording(path, tmp_path / "out", **options)
+    report = teleop_exchange.import_recording(path, tmp_path / "out", **options)
     return report, report.recording["master/measured_cp"]
 
 
@@ -83,7 +84,7 @@ def test_packed_text_is_read_by_what_it_is_not_how_it_is_called(
     (tmp_path / name).write_bytes(pack(frame().to_csv(index=False).encode()))
     assert_same_motion(imported(tmp_path / name, tmp_path)[1])
     (tmp_path / "plain").write_bytes(pack(frame().to_csv(index=False).encode()))
-    report = tc.import_recording(tmp_path / "plain", tmp_path / "second")
+    report = teleop_exchange.import_recording(tmp_path / "plain", tmp_path / "second")
     assert_same_motion(report.recording["master/measured_cp"])
 
 
@@ -156,7 +157,7 @@ def test_lines_can_be_skipped(tmp_path: Path) -> None:
 
 def turned(
     path: Path, tmp_path: Path, columns: list[str], values: Array, **options: str | Sequence[str]
-) -> tuple[tc.ImportReport, tc.Stream]:
+) -> tuple[teleop_exchange.ImportReport, tc.Stream]:
     rows = np.column_stack((TIMES, PLACES, values))
     frame(["t", "x", "y", "z", *columns], rows).to_csv(path, index=False)
     return imported(path, tmp_path, **options)
@@ -215,28 +216,6 @@ def test_quaternions_of_any_sign_and_nearly_unit_length_give_a_continuous_one(
     assert np.allclose(np.linalg.norm(got, axis=1), 1.0, rtol=0, atol=1e-15)
 
 
-def test_a_direction_gives_the_attitude_that_turns_least(tmp_path: Path) -> None:
-    directions = TURNS.apply([0.0, 0.0, 1.0])
-    columns = ["ax", "ay", "az"]
-    _, stream = turned(tmp_path / "a.csv", tmp_path, columns, 7.0 * directions, forward=columns)
-    got = Rotation.from_quat(stream[HEAD[4:]], scalar_first=True)
-    assert np.allclose(got.apply([0.0, 0.0, 1.0]), directions, rtol=0, atol=1e-12)
-    # From one to the next it turns by the angle between the directions, and not about them.
-    steps = (got[1:] * got[:-1].inv()).as_rotvec()
-    cosines = np.clip(np.sum(directions[1:] * directions[:-1], axis=1), -1.0, 1.0)
-    assert np.allclose(np.linalg.norm(steps, axis=1), np.arccos(cosines), rtol=0, atol=1e-7)
-    assert np.abs(np.sum(steps * directions[:-1], axis=1)).max() < 1e-12
-
-
-def test_a_direction_that_turns_back_still_gives_rotations() -> None:
-    reader = orientation.Attitudes("forward")
-    rows = np.array([[0.0, 0.0, -1.0], [1.0, 0.0, 0.0], [-1.0, 0.0, 0.0], [np.nan, 0.0, 0.0]])
-    got = reader.quaternions(rows)
-    turned_to = Rotation.from_quat(got[:3], scalar_first=True).apply([0.0, 0.0, 1.0])
-    assert np.allclose(turned_to, rows[:3], rtol=0, atol=1e-12)
-    assert np.isnan(got[3]).all()
-
-
 def test_without_an_orientation_it_is_constant(tmp_path: Path) -> None:
     frame(HEAD[:4], TABLE[:, :4]).to_csv(tmp_path / "a.csv", index=False)
     report, stream = imported(tmp_path / "a.csv", tmp_path)
@@ -292,7 +271,7 @@ def test_dates_are_times(tmp_path: Path) -> None:
     table.to_csv(tmp_path / "a.csv", index=False)
     table.to_parquet(tmp_path / "a.parquet")
     for number, name in enumerate(("a.csv", "a.parquet")):
-        report = tc.import_recording(tmp_path / name, tmp_path / str(number))
+        report = teleop_exchange.import_recording(tmp_path / name, tmp_path / str(number))
         got = report.recording["master/measured_cp"].stamp_ns
         assert np.array_equal(got, stamps.as_unit("ns").astype("int64"))
 
@@ -302,7 +281,7 @@ def test_stamps_that_begin_near_zero_begin_at_a_second_and_others_stay(tmp_path:
         rows = TABLE.copy()
         rows[:, 0] += start
         frame(rows=rows).to_csv(tmp_path / "a.csv", index=False)
-        report = tc.import_recording(tmp_path / "a.csv", tmp_path / str(number))
+        report = teleop_exchange.import_recording(tmp_path / "a.csv", tmp_path / str(number))
         assert report.start_ns == round(first * 1e9)
 
 
@@ -332,7 +311,7 @@ def test_unit_of_the_place_is_given_or_stands_in_the_names(
         ((["t", "x", "y", "z"], {"unit": unit}), (["t", *(f"{a} [{unit}]" for a in "xyz")], {}))
     ):
         frame(head, rows).to_csv(tmp_path / "a.csv", index=False)
-        report = tc.import_recording(
+        report = teleop_exchange.import_recording(
             tmp_path / "a.csv", tmp_path / str(number), **dict[str, Any](options)
         )
         got = report.recording["master/measured_cp"][["x", "y", "z"]]
@@ -399,21 +378,6 @@ def test_holes_of_a_file_are_not_messages_that_are_missing_in_its_session(tmp_pa
     session = tc.replay(report.recording)
     for recording in (session, tc.replay(session)):
         assert {topic.gaps for topic in recording.score().topics.values()} <= {0, None}
-
-
-def test_short_stretches_of_missing_rows_are_bridged_on_request(tmp_path: Path) -> None:
-    rows = TABLE.copy()
-    rows[100:105, 1:4] = np.nan
-    rows[200:260, 4:] = np.nan
-    frame(rows=rows).to_csv(tmp_path / "a.csv", index=False)
-    options: dict[str, Any] = {"missing": "interpolate", "missing_time": 0.1}
-    report, stream = imported(tmp_path / "a.csv", tmp_path, **options)
-    assert (report.counts.filled, report.counts.missing) == (5, 60)
-    share = np.linspace(0.0, 1.0, 7)[1:-1, None]
-    expected = (1.0 - share) * PLACES[99] + share * PLACES[105]
-    assert np.allclose(stream[["x", "y", "z"]][100:105], expected, rtol=0, atol=1e-12)
-    got = Rotation.from_quat(stream[HEAD[4:]][100:105], scalar_first=True)
-    assert (got.inv() * TURNS[100:105]).magnitude().max() < 1e-3
 
 
 def test_doubled_times_keep_the_first_row(tmp_path: Path) -> None:
@@ -539,7 +503,7 @@ def test_dates_keep_to_their_zone(ending: str, sep: str, tmp_path: Path) -> None
 
 def test_our_own_export_comes_back(tmp_path: Path) -> None:
     recording = tc.run("coarse_box", duration=3.0)
-    tc.export_recording(recording, tmp_path / "bag.csv")
+    teleop_exchange.export_recording(recording, tmp_path / "bag.csv")
     topic = "master/measured_cp"
     _, stream = imported(
         tmp_path / "bag.csv", tmp_path, position=[f"{topic}.{axis}" for axis in "xyz"],
@@ -559,7 +523,7 @@ def test_rows_of_wrong_length_are_left_out_and_counted(tmp_path: Path) -> None:
     assert report.counts.rows == COUNT
 
 
-def test_a_long_table_passes_through_the_disk_and_gives_the_same(tmp_path: Path) -> None:
+def test_a_long_table_gives_the_same(tmp_path: Path) -> None:
     count = 700_000
     times = np.arange(count) * 1e-3
     rows = np.column_stack((times, np.sin(times), np.cos(times), 0.0 * times))

@@ -19,7 +19,7 @@ from teleop_core.bags.series import Series
 from teleop_core.bags.writer import BagWriter
 from teleop_core.graph.topics import MASTER_BUTTONS, MASTER_MEASURED_CP, Kind, Topic
 from teleop_core.kernels.geometry import Array
-from teleop_core.session.exchange import as_master_bag
+from teleop_core.session.master_bag import as_master_bag
 
 START_NS = 1_700_000_000_000_000_000
 COUNT = 200

@@ -16,7 +16,6 @@ from teleop_core.base.errors import ParameterError
 from teleop_core.base.parameters import build
 from teleop_core.chain.mapping.parameters import AXES
 from teleop_core.chain.master import master_bridge
-from teleop_core.chain.master.device_axes import UNITS, axis_of, device_axes
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot
 
@@ -177,32 +176,7 @@ def test_what_no_device_can_be_is_refused_by_its_name(values: Mapping[str, Any],
     assert caught.value.name == f"master_bridge.{name}"
 
 
-# -- axes from motions -----------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("axes", FRAMES, ids="".join)
-def test_axes_and_unit_come_out_of_three_motions_that_are_not_quite_straight(axes: Any) -> None:
-    rng = np.random.default_rng(len(axes))
-    for unit in UNITS:
-        ways = (
-            present(rows(axes)) * 0.1 / unit
-        )  # of the device, for a way along x, y and z of the master
-        ways = ways * rng.uniform(0.6, 1.5, (3, 1)) + rng.uniform(-0.02, 0.02, (3, 3)) / unit
-        found = device_axes(ways)
-        assert (found.axes, found.unit) == (axes, unit)
-
-
-@pytest.mark.parametrize("way", [(0.0, 0.0, 0.0), (0.1, 0.1, 0.0), (0.1, 0.07, 0.0)])
-def test_a_motion_that_is_no_straight_one_is_refused(way: tuple[float, float, float]) -> None:
-    with pytest.raises(ParameterError, match="straighter"):
-        axis_of(way)
-
-
-def test_two_motions_along_one_axis_and_left_handed_frames_are_refused() -> None:
-    with pytest.raises(ParameterError, match="three motions along three axes"):
-        device_axes([(0.1, 0.0, 0.0), (-0.1, 0.0, 0.0), (0.0, 0.0, 0.1)])
-    with pytest.raises(ParameterError, match="right-handed"):
-        device_axes([(0.1, 0.0, 0.0), (0.0, 0.1, 0.0), (0.0, 0.0, -0.1)])
+# -- known devices ---------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("file", MASTERS, ids=lambda path: path.stem)

@@ -17,9 +17,9 @@ from trimesh import Trimesh
 import teleop_core as tc
 from led_tip import lead
 from present import present
+from teleop_console.world_nodes import object_outline
 from teleop_core.bags import kept_files
 from teleop_core.base.errors import ParameterError, TeleopError
-from teleop_core.console.world_nodes import object_outline
 from teleop_core.kernels.geometry import Array
 from teleop_core.kernels.progress import in_work, told
 from teleop_core.kernels.store import prune, user_cache

@@ -26,8 +26,6 @@ ELSEWHERE = {
     "robots/rank.py": "asks for ranks, and for directions that differ by more than rounding",
     "machines/rps3_modes.py": "all ways to assemble it, which no session asks for",
     "machines/stewart.py": "asks for ranks and signs alone",
-    "session/exchange/orientation.py": "turns what a file says, once, before it is recorded",
-    "session/exchange/times.py": "asks which rows stay, once, before they are recorded",
 }
 """Files of these rooms that decide no bits of a session, and why."""
 BLAS = {"linalg", "dot", "matmul", "inner", "vdot", "tensordot", "einsum", "cov", "corrcoef"}

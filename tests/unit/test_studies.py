@@ -153,7 +153,11 @@ def test_a_file_says_the_same_as_a_call(tmp_path: Path, found: Found) -> None:
         f"metrics: {json.dumps(METRICS)}\n"
     )
     assert read_study(file).explain(found[0]).to_run == 0
-    for text, said in (("seds: 1", "seeds"), ("sweep: {a: 1}", "a list of values"), ("[", "read")):
+    for text, said in (
+        ("seds: 1", "seeds"),
+        ("sweep: {a: 1}", "a list of values"),
+        ("[", "is not YAML"),
+    ):
         file.write_text(text)
         with pytest.raises(tc.TeleopError, match=said):
             read_study(file)

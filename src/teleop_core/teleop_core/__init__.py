@@ -10,15 +10,13 @@ Folders follow the data: ``chain`` is the way from the operator's hand to the co
 Everything a user needs is here:
 
 - :func:`run`, :func:`replay`, :func:`open_recording`: sessions and what was recorded of them;
-- :func:`import_recording`, :func:`import_episodes`, :func:`export_recording`: recordings of others,
-  and ours for others;
 - :func:`configuration`: what a session runs, checked;
 - :func:`load_robot`, :func:`list_robots`, :func:`robot_from_table`: arms;
 - :class:`Stage`, :class:`Shape`, :class:`Controller`, :class:`Plant`,
   :class:`Operator`, :class:`Metric` and the ``register_...`` functions: parts of your own;
 - :func:`kernel`, :func:`parameter`, ``topics``: what parts are made of.
 
-``teleop_lab`` and ``teleop_drill`` are distributions of their own that use this one.
+``teleop_console``, ``teleop_exchange``, ``teleop_lab`` and ``teleop_drill`` use this one.
 """
 
 import lazy_loader

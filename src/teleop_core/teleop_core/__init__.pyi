@@ -21,15 +21,6 @@ from .evaluation import (
     frame_of as frame_of,
     register_metric as register_metric,
 )
-from .session.exchange import (
-    EpisodesReport as EpisodesReport,
-    ExportReport as ExportReport,
-    ImportOptions as ImportOptions,
-    ImportReport as ImportReport,
-    export_recording as export_recording,
-    import_episodes as import_episodes,
-    import_recording as import_recording,
-)
 from .chain.passivity import Passivity as Passivity, register_passivity as register_passivity
 from .chain.architectures import (
     Architecture as Architecture,
@@ -53,7 +44,6 @@ from .chain.operators import (
 from .chain.operators.remote import RemoteHand as RemoteHand, remote_operator as remote_operator
 from .chain.tasks import Task as Task, register_task as register_task
 from .base.parameters import NoParameters as NoParameters, parameter as parameter
-from .console.controls import Control as Control, register_control as register_control
 from .slave.bridges import Bridge as Bridge, Command as Command, register_bridge as register_bridge
 from .shapes import Shape as Shape, register_shape as register_shape
 from .slave.plants import Physics as Physics, Plant as Plant, register_plant as register_plant

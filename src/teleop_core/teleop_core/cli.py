@@ -13,15 +13,7 @@ from typing import Any, NoReturn
 
 from teleop_core.base.errors import SessionError, TeleopError, TeleopWarning
 from teleop_core.base.texts import one_line
-from teleop_core.commands import (
-    compiling,
-    console,
-    devices,
-    exchange,
-    installed,
-    map_device,
-    operate,
-)
+from teleop_core.commands import compiling, devices, installed, operate
 from teleop_core.commands.arguments import (
     command,
     configured,
@@ -145,7 +137,7 @@ def _core() -> tuple[argparse.ArgumentParser, Any]:
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     for add in (_add_sim, _add_live, _add_replay, _add_play, _add_evaluate, _add_lookups):
         add(commands)
-    for module in (exchange, operate, console, devices, map_device, compiling):
+    for module in (operate, devices, compiling):
         module.add(commands)
     return parser, commands
 
@@ -327,7 +319,6 @@ def _parts(_: argparse.Namespace) -> int:
     from teleop_core.chain.operators import OPERATORS
     from teleop_core.chain.passivity import PASSIVITIES
     from teleop_core.chain.tasks import TASKS
-    from teleop_core.console.controls import CONTROLS
     from teleop_core.evaluation import METRICS
     from teleop_core.graph.stage import STAGES
     from teleop_core.robots import ROBOTS
@@ -339,7 +330,7 @@ def _parts(_: argparse.Namespace) -> int:
 
     parts = (
         OPERATORS, SHAPES, ROBOTS, CONTROLLERS, PLANTS, WORLD_OBJECTS, ARCHITECTURES, NETWORKS,
-        PASSIVITIES, TREMOR_FILTERS, TASKS, BRIDGES, STAGES, METRICS, CONTROLS,
+        PASSIVITIES, TREMOR_FILTERS, TASKS, BRIDGES, STAGES, METRICS,
     )  # fmt: skip
     for registry in parts:
         print(f"{registry.kinds:16}{', '.join(registry)}")
@@ -393,10 +384,11 @@ def _robot(arguments: argparse.Namespace) -> int:
 def _workspace(arguments: argparse.Namespace) -> int:
     import numpy as np
 
-    from teleop_core.evaluation.workspace import write_workspace_page
+    from teleop_core.evaluation.command import page_maker
     from teleop_core.robots import load_robot_set
     from teleop_core.robots.dexterity import sample_workspace, write_workspace_csv
 
+    write_page = page_maker("workspace") if arguments.html is not None else None
     robot = load_robot_set(arguments.name, arguments.geometry)
     rng = np.random.default_rng(arguments.seed)
     points, values = sample_workspace(robot, arguments.samples, rng)
@@ -408,8 +400,8 @@ def _workspace(arguments: argparse.Namespace) -> int:
     if arguments.csv is not None:
         write_workspace_csv(arguments.csv, points, values)
         print(arguments.csv)
-    if arguments.html is not None:
-        write_workspace_page(robot, points, values, arguments.html)
+    if write_page is not None:
+        write_page(robot, points, values, arguments.html)
         print(arguments.html)
     return 0
 

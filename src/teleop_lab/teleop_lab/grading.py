@@ -13,7 +13,7 @@ import numpy as np
 from teleop_core.bags.reader import Bag
 from teleop_core.base.errors import ParameterError, RecordingError
 from teleop_core.evaluation import measure
-from teleop_core.session.exchange import ImportOptions, import_episodes
+from teleop_exchange import ImportOptions, import_episodes
 
 if TYPE_CHECKING:
     import pandas
@@ -44,7 +44,7 @@ def grade(
     Args:
         data: Folder of a LeRobot data set, or a table with a column of episodes.
         figures: Keys below ``motion.hand`` of a score.
-        options: As of :func:`teleop_core.import_recording`: columns, units, frames.
+        options: As of :func:`teleop_exchange.import_recording`: columns, units, frames.
         recordings: Folder for a recording of each episode, kept; None: none are kept.
         say: Told a line after each episode.
 

@@ -11,6 +11,8 @@ from typing import Any
 
 import yaml
 
+from teleop_core.base.errors import TeleopError
+
 LARGEST_TEXT = 1 << 20
 """Bytes of a file: two seconds of reading. A recording's own parameters are five thousand."""
 MOST_VALUES = 50_000
@@ -100,6 +102,20 @@ def _count(node: yaml.Node, known: dict[int, int], within: set[int]) -> int:
         raise UnreadableError(f"stands for more than {MOST_VALUES} values, by aliases perhaps")
     known[id(node)] = total
     return total
+
+
+def load(path: Path) -> Any:
+    """Value of a file that a person named.
+
+    Raises:
+        TeleopError: It cannot be read, or is not YAML; the message names it.
+    """
+    try:
+        return read(path)
+    except OSError as error:
+        raise TeleopError(f"{path}: cannot be read: {error.strerror}") from error
+    except UnreadableError as error:
+        raise TeleopError(f"{path}: {error}") from error
 
 
 def read(path: Path) -> Any:

@@ -13,6 +13,8 @@ from teleop_core.base.texts import one_line
 
 GROUP = "teleop_core.commands"
 RELEASED_TOGETHER = {
+    "console": "teleop_console",
+    **dict.fromkeys(("export", "import"), "teleop_exchange"),
     **dict.fromkeys(("calibrate", "experiment", "fit", "reach"), "teleop_lab"),
     **dict.fromkeys(("conformance", "drill"), "teleop_drill"),
 }

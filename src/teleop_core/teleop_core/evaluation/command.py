@@ -1,7 +1,8 @@
 """Command: what ``teleop evaluate`` does."""
 
 import json
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from importlib.metadata import entry_points
 from pathlib import Path
 
 from rich.console import Console
@@ -11,8 +12,11 @@ from teleop_core.base.errors import EvaluationError
 from teleop_core.base.texts import printable
 from teleop_core.evaluation.score import Score
 from teleop_core.evaluation.score_table import score_tables
-from teleop_core.evaluation.scoring import Study, studies
+from teleop_core.evaluation.scoring import studies
 from teleop_core.evaluation.windows import Seconds
+
+PAGES = "teleop_core.pages"
+"""Entry-point group of functions that make pages."""
 
 
 def evaluate_bags(
@@ -41,6 +45,7 @@ def evaluate_bags(
         RecordingError: A recording is missing, damaged, or lacks a topic.
     """
     check_places(json_file, html_file)
+    report_page = page_maker("report") if html_file is not None else None
     found = [study for path in paths for study in studies(Bag(path), span=span)]
     scores = [study.score for study in found]
     for score in scores:
@@ -54,16 +59,22 @@ def evaluate_bags(
         text = json.dumps([score.to_json() for score in scores], indent=2, allow_nan=False)
         write_whole(json_file, text + "\n")
         console.print(f"scores: {json_file}", markup=False, highlight=False, soft_wrap=True)
-    if html_file is not None:
-        write_whole(html_file, _page(found))
+    if html_file is not None and report_page is not None:
+        write_whole(html_file, report_page(found))
         console.print(f"page: {html_file}", markup=False, highlight=False, soft_wrap=True)
     return scores
 
 
-def _page(found: Sequence[Study]) -> str:
-    from teleop_core.evaluation.page import report_page  # carries plotly, which few calls need
+def page_maker(name: str) -> Callable[..., str]:
+    """Function of an installed package that makes a page: ``report`` or ``workspace``.
 
-    return report_page(found)
+    Raises:
+        EvaluationError: None is installed.
+    """
+    for entry in entry_points(group=PAGES, name=name):
+        maker: Callable[..., str] = entry.load()
+        return maker
+    raise EvaluationError("--html: install teleop_console, which makes pages")
 
 
 def check_places(*files: Path | None) -> None:

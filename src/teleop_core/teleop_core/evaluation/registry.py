@@ -80,7 +80,6 @@ METRICS: Registry[type[Metric]] = Registry(
     "metrics",
     {
         "samples": f"{_FOLDER}.counts:SamplesMetric",
-        "replay": f"{_FOLDER}.replay:ReplayMetric",
         "path": f"{_FOLDER}.path:PathMetric",
         "reach": f"{_FOLDER}.reach:ReachMetric",
         "asked_error_mm": f"{_FOLDER}.asked_error:AskedErrorMetric",

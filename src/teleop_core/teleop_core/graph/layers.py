@@ -127,13 +127,7 @@ def load_file(path: Path) -> Layer:
     Raises:
         TeleopError: The file is missing, is not YAML, or has another shape.
     """
-    try:
-        content = plain_yaml.read(path)
-    except OSError as error:
-        raise TeleopError(f"{path}: cannot be read: {error.strerror}") from error
-    except plain_yaml.UnreadableError as error:
-        raise TeleopError(f"{path}: {error}") from error
-    return parse_layer(content, str(path))
+    return parse_layer(plain_yaml.load(path), str(path))
 
 
 def parse_text(text: str, where: str) -> Layer:

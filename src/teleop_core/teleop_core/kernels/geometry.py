@@ -263,6 +263,17 @@ def quaternion_products(a: Array, b: Array) -> Array:
     return np.stack(rows, axis=-1)
 
 
+def continuous(quaternions: Array, last: Array | None) -> Array:
+    """The same rotations (N, 4) with signs that never jump, from ``last`` on."""
+    if not len(quaternions):
+        return quaternions
+    first = quaternions[:1] if last is None else last[None]
+    before = np.concatenate((first, quaternions[:-1]))
+    flips = np.where((quaternions * before).sum(axis=1) < 0.0, -1.0, 1.0)
+    signed: Array = quaternions * np.cumprod(flips)[:, None]
+    return signed
+
+
 def framed_wrenches(wrench: Array, pose: Array) -> tuple[Array, Array]:
     """The same force on a tip in the two frames of CRTK's ``body`` and ``spatial``.
 

@@ -10,9 +10,8 @@ from typing import IO, Any
 
 import yaml
 
-from teleop_core.base.errors import TeleopError
 from teleop_core.base.parameters import build
-from teleop_core.base.plain_yaml import FullDumper
+from teleop_core.base.plain_yaml import FullDumper, load
 from teleop_core.graph.graph import Graph, build_graph
 from teleop_core.graph.layers import SESSION, SessionParameters
 
@@ -32,7 +31,7 @@ def checked_arguments(arguments: list[str]) -> list[str]:
     for index, (flag, file) in enumerate(pairwise(arguments)):
         if flag != _FLAG:
             continue
-        content = _read(Path(file))
+        content = load(Path(file))
         if isinstance(content, dict) and any(not str(key).startswith("/") for key in content):
             # Of two names that a node matches the later one wins: the one that says more.
             named = {str(key): value for key, value in content.items()}
@@ -44,15 +43,6 @@ def checked_arguments(arguments: list[str]) -> list[str]:
 def _anywhere(key: str) -> str:
     """Key that a node matches in any namespace: name as /lab/name, left/name as /lab/left/name."""
     return key if key.startswith("/") else f"/**/{key}"
-
-
-def _read(path: Path) -> Any:
-    try:
-        return yaml.safe_load(path.read_text())
-    except OSError as error:
-        raise TeleopError(f"{path}: cannot be read: {error.strerror}") from error
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise TeleopError(f"{path}: is not YAML: {' '.join(str(error).split())}") from error
 
 
 def _copy(content: dict[str, Any]) -> str:
@@ -83,7 +73,7 @@ def _remove(name: str) -> None:
 def _session_values(arguments: list[str]) -> Iterator[dict[str, Any]]:
     for flag, file in pairwise(arguments):
         if flag == _FLAG:
-            content = _read(Path(file)) or {}
+            content = load(Path(file)) or {}
             for key, inner in content.items():
                 if str(key).rpartition("/")[2] == SESSION and isinstance(inner, dict):
                     yield inner.get("ros__parameters") or {}

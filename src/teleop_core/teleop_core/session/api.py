@@ -234,7 +234,7 @@ def replay(
     Raises:
         TeleopError: A topic or file is missing, or a value is wrong.
     """
-    from teleop_core.session.exchange import as_master_bag
+    from teleop_core.session.master_bag import as_master_bag
 
     bag = as_master_bag(recording.bag if isinstance(recording, Recording) else recording)
     layer, scenario = runner.recorded_configuration(bag)
@@ -352,7 +352,7 @@ def _of_frame(frame: "pandas.DataFrame") -> tuple[Array, Array]:
     Raises:
         ParameterError: It has no time, no place, or columns of another name.
     """
-    from teleop_core.session.exchange.recorded_hand import COLUMNS
+    from teleop_core.session.recorded_hand import COLUMNS
 
     named = frame if "t" in frame else frame.reset_index(names="t")
     needed = f"columns of {', '.join(COLUMNS)}; t may be the index, and x, y, z are needed"

@@ -12,7 +12,7 @@ from teleop_core.base.damage import damage_told
 from teleop_core.base.errors import ParameterError, ShapeError, TeleopError
 from teleop_core.kernels.geometry import Array, checked_array
 from teleop_core.robots.robot import Robot
-from teleop_core.session.exchange.names import without_unit
+from teleop_exchange.names import without_unit
 
 if TYPE_CHECKING:
     import pandas as pd

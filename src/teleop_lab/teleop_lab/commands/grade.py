@@ -36,7 +36,7 @@ def add(commands: Any) -> None:
 def _run(arguments: argparse.Namespace) -> int:
     from teleop_core.base.errors import ParameterError
     from teleop_core.evaluation.command import check_places, write_whole
-    from teleop_core.session.exchange import ImportOptions
+    from teleop_exchange import ImportOptions
     from teleop_lab.grading import REASON, grade, usual
 
     if not arguments.most >= 0.0:

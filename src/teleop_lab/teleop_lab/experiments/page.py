@@ -8,11 +8,9 @@ from typing import Any
 
 from plotly.offline import get_plotlyjs, get_plotlyjs_version
 
+from teleop_console.report.packing import Arrays, deflated
+from teleop_console.report.page_template import PAGE, POLICY, TIMES, script, style
 from teleop_core.evaluation.figure import Figure, is_against_time
-from teleop_core.evaluation.packing import deflated
-from teleop_core.evaluation.page import Arrays
-from teleop_core.evaluation.page_template import PAGE, POLICY, TIMES, script, style
-from teleop_core.evaluation.preview import preview
 from teleop_lab.experiments.experiment_table import MARKS, empty, numbers, spread, summary, within
 from teleop_lab.experiments.outcome import BASES, Outcome, Row
 
@@ -36,7 +34,7 @@ def experiments_page(outcomes: Sequence[Outcome]) -> str:
     Args:
         outcomes: What was found, in the order of the page.
     """
-    arrays, drawn, sections = Arrays(max(1, len(outcomes))), [], []
+    arrays, drawn, sections = Arrays(), [], []
     for number, outcome in enumerate(outcomes):
         places = [f"plot-{number}-{i}" for i in range(len(outcome.figures))]
         sections.append(_section(number, outcome, places))
@@ -122,7 +120,7 @@ def _card(figure: Figure, place: str) -> str:
     return (
         f'<figure class="card"><h3>{escape(figure.title)}</h3>'
         f"<figcaption>{escape(figure.sentence)}</figcaption>"
-        f'<div id="{place}" class="plot">{preview(figure, ())}</div></figure>'
+        f'<div id="{place}" class="plot"></div></figure>'
     )
 
 

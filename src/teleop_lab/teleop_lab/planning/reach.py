@@ -19,7 +19,7 @@ from teleop_core.graph.layers import (
 from teleop_core.robots.robot import Robot
 from teleop_core.session.api import run
 from teleop_core.session.configuration import Configuration
-from teleop_core.session.exchange import as_master_bag
+from teleop_core.session.master_bag import as_master_bag
 from teleop_core.session.recording import Recording
 from teleop_core.session.runner import recorded_configuration, silent
 from teleop_lab.planning.aim import Aim

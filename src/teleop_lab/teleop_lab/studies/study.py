@@ -8,10 +8,9 @@ from os import sched_getaffinity
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import yaml
-
 from teleop_core.base.errors import ParameterError, UnknownNameError
 from teleop_core.base.own_parts import load_own_parts
+from teleop_core.base.plain_yaml import load
 from teleop_core.evaluation.score import keys
 from teleop_core.graph.layers import SESSION
 from teleop_core.session.api import Setting, configuration
@@ -282,11 +281,7 @@ def read_study(path: Path | str) -> Study:
 
 def _read(path: Path) -> dict[str, Any]:
     """Entries of a study's file."""
-    try:
-        content = yaml.safe_load(path.read_text("utf-8"))
-    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
-        needed = f"a YAML file that can be read ({' '.join(str(error).split())})"
-        raise ParameterError("study", str(path), needed) from error
+    content = load(path)
     if not isinstance(content, dict):
         raise ParameterError("study", str(path), f"a YAML file with {', '.join(_KEYS)}")
     for key in content:

@@ -52,7 +52,7 @@ class Sdl:
             self.pygame: Any = import_module("pygame")
             self.controllers: Any = import_module("pygame._sdl2.controller")
         except ImportError as error:
-            text = "a gamepad needs pygame-ce: pip install 'teleop_core[console]'"
+            text = "a gamepad needs pygame-ce: pip install 'teleop_core[devices]'"
             raise SessionError(text) from error
         self.pygame.display.init()
         self.pygame.joystick.init()

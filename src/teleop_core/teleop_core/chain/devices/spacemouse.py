@@ -140,7 +140,7 @@ def _hid() -> Any:
     try:
         return import_module("hid")
     except ImportError as error:
-        text = "a 3-D mouse needs hidapi: pip install 'teleop_core[console]'"
+        text = "a 3-D mouse needs hidapi: pip install 'teleop_core[devices]'"
         raise SessionError(text) from error
 
 

@@ -49,8 +49,7 @@ class MasterBridgeParameters:
     joy: JoyParameters = field(default_factory=JoyParameters)
     device_axes: tuple[str, ...] = parameter(
         _THREE, choices=AXES, length=3, fixed=True,
-        doc="the x (right), y (up), z (towards the person) of master_base as axes of the device; "
-        "`teleop map-device` finds them",
+        doc="the x (right), y (up), z (towards the person) of master_base as axes of the device",
     )  # fmt: skip
     stylus_axes: tuple[str, ...] = parameter(
         _THREE, choices=AXES, length=3, fixed=True,

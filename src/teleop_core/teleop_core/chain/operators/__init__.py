@@ -174,8 +174,8 @@ OPERATORS: Registry[Operator] = Registry(
         "remote": "teleop_core.chain.operators.remote:REMOTE",
         "gamepad": "teleop_core.chain.devices.gamepad:GAMEPAD",
         "spacemouse": "teleop_core.chain.devices.spacemouse:SPACEMOUSE",
-        "bag": "teleop_core.session.exchange.recorded_hand:BAG",
-        "file": "teleop_core.session.exchange.recorded_hand:FILE",
+        "bag": "teleop_core.session.recorded_hand:BAG",
+        "file": "teleop_core.session.recorded_hand:FILE",
     },
     _checked,
 )  # fmt: skip

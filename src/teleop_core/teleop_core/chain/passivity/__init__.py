@@ -109,10 +109,10 @@ def _try(part: Passivity) -> None:
             push[:], moved = size, np.full(3, 1e-4 * size)
             part.hand(
                 numbers, memory, push.copy(), moved, moved, flow, heard, port, push, 1.0, 1e-3
-            )  # fmt: skip
+            )
             part.slave(
                 np.ones(7), memory, flow, np.full(6, size), last, last, heard, port, command, 1e-3
-            )  # fmt: skip
+            )
             is_sound = np.isfinite(push).all() and np.isfinite(command).all()
             if not (is_sound and is_whole(fence) and is_whole(behind) and is_whole(after)):
                 text = f"one whose push and command are finite, not {push!r} and {command!r}"

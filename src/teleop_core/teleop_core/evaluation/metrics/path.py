@@ -77,11 +77,6 @@ class PathMetric(Metric):
             self._against_time(outlines),
         ]
 
-    def measured(self) -> tuple[figure.Numbers, figure.Numbers]:
-        """Times (N,) [s] and places (N, 3) [mm] of the tip."""
-        times, values = self._position.line()
-        return times, values[:, 6:]
-
     def _path(self, outlines: list[Outline]) -> _Path:
         """All of it, to be drawn with a fixture on, or always if none ever was."""
         times, values = self._position.line()

@@ -1,0 +1,134 @@
+"""Answers: what the server says beside viser's page: signs of life, the stop, style and script.
+
+The emergency stop does not go through viser: its button is our own, in view from the page's first
+byte, and its press a request of its own, which is answered when the stop has been sent. So it works
+while the page's connection is lost, flooded or being opened again, and the page knows whether it
+was heard.
+"""
+
+import gzip
+import http
+import json
+import secrets
+from collections import deque
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from urllib.parse import urlsplit
+
+from websockets.datastructures import Headers
+from websockets.http11 import Response
+
+from teleop_console.drivers import Drivers
+from teleop_console.guard import Request
+from teleop_console.look import style
+
+OWN_PAGE = "Teleop-Page"
+"""Header of our page's requests; to a page of another origin browsers do not allow it."""
+PRESS = "Teleop-Press"
+"""Header with the name of a press: one that is said again, unanswered, is the same."""
+_SCRIPT = Path(__file__).with_name("page.js")
+_FURNITURE = b'<head><link rel="stylesheet" href="teleop.css"><script src="teleop.js"></script>'
+
+
+@dataclass(frozen=True)
+class Situation:
+    """What every page shows beside viser's elements.
+
+    Attributes:
+        can_stop: Whether a stop is of any use: not where a recording is shown.
+        is_stopped: Whether an emergency stop is in force.
+        text: What has happened, and what to do next; empty if nothing has.
+        doing: What is going on before there is a session to see; empty once there is.
+    """
+
+    can_stop: bool = True
+    is_stopped: bool = False
+    text: str = ""
+    doing: str = ""
+
+
+class Answers:
+    """Answers to requests that are ours, and what is added to viser's page.
+
+    Args:
+        drivers: Hears that a page is alive.
+
+    Attributes:
+        situation: What pages show; whoever knows it writes it.
+        stop: Presses the emergency stop; it must not block.
+    """
+
+    def __init__(self, drivers: Drivers) -> None:
+        self.situation = Situation()
+        self.stop: Callable[[], None] | None = None
+        self._drivers = drivers
+        self._pages: dict[str, int] = {}  # by names that no other page can guess
+        self._heard: deque[str | None] = deque(maxlen=100)  # presses, by their names
+        self._paths = {
+            "/alive": self._alive, "/stop": self._stop, "/teleop.js": _script, "/teleop.css": _style
+        }  # fmt: skip
+
+    def name(self, page: int) -> str:
+        """Name by which a page gives signs of life; a new one each time."""
+        name = secrets.token_urlsafe(12)
+        self._pages[name] = page
+        return name
+
+    def forget(self, page: int) -> None:
+        """A page has gone."""
+        self._pages = {name: known for name, known in self._pages.items() if known != page}
+
+    @property
+    def paths(self) -> frozenset[str]:
+        """Paths of the requests that are ours to answer."""
+        return frozenset(self._paths)
+
+    def to(self, request: Request) -> Response:
+        """Answer to a request for one of :attr:`paths`; from any thread."""
+        return self._paths[urlsplit(request.path).path](request)
+
+    def furnish(self, request: Request, response: Response) -> None:
+        """Add our style and script to viser's page."""
+        if urlsplit(request.path).path not in {"/", "/index.html"}:
+            return
+        is_packed = response.headers.get("Content-Encoding") == "gzip"
+        page = gzip.decompress(response.body) if is_packed else bytes(response.body)
+        page = page.replace(b"<head>", _FURNITURE, 1)  # before viser's own script, which is long
+        response.body = gzip.compress(page, 1) if is_packed else page
+        del response.headers["Content-Length"]
+        response.headers["Content-Length"] = str(len(response.body))
+
+    def _alive(self, request: Request) -> Response:
+        names = request.header(OWN_PAGE)
+        if len(names) != 1:
+            return answer_of(http.HTTPStatus.FORBIDDEN)
+        page = self._pages.get(names[0], -1)
+        self._drivers.heard(page)
+        told = {**asdict(self.situation), "drives": self._drivers.may_drive(page)}
+        return answer_of(http.HTTPStatus.OK, json.dumps(told).encode(), "application/json")
+
+    def _stop(self, request: Request) -> Response:
+        if len(request.header(OWN_PAGE)) != 1:
+            return answer_of(http.HTTPStatus.FORBIDDEN)
+        if self.stop is None:
+            return answer_of(http.HTTPStatus.CONFLICT)
+        press = next(iter(request.header(PRESS)), None)
+        if press is None or press not in self._heard:
+            self.stop()
+            self._heard.append(press)
+        return answer_of(http.HTTPStatus.NO_CONTENT)
+
+
+def _script(_: Request) -> Response:
+    return answer_of(http.HTTPStatus.OK, _SCRIPT.read_bytes(), "text/javascript; charset=utf-8")
+
+
+def _style(_: Request) -> Response:
+    return answer_of(http.HTTPStatus.OK, style().encode(), "text/css; charset=utf-8")
+
+
+def answer_of(status: http.HTTPStatus, body: bytes = b"", kind: str = "text/plain") -> Response:
+    """A response with its headers."""
+    headers = Headers({"Content-Type": kind, "Content-Length": str(len(body))})
+    return Response(status.value, status.phrase, headers, body)

@@ -1,0 +1,170 @@
+"""Console: the page of one session, from its opening to its end."""
+
+import logging
+import os
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+from teleop_console.answers import Situation
+from teleop_console.link import Link, Parameters
+from teleop_console.panel import Panel
+from teleop_console.recorded import RecordedLink
+from teleop_console.scene import Scene
+from teleop_console.server import ConsoleServer
+from teleop_console.settings import Renew
+from teleop_console.status import situation
+from teleop_console.stylus import Steps, Stylus
+from teleop_console.view_tab import Insets, ViewTab, Visitors, theme
+
+RATE = 30.0
+"""How often the page is drawn [1/s]."""
+_NICE = 10
+_ASK_AGAIN = 2.0  # [s]
+
+
+class Console:
+    """A page that shows a session and drives it.
+
+    Args:
+        server: Where it is served.
+        link: The session.
+        renew: Begins a new session with other settings, and returns why it does not, empty if it
+            does; None where the session is not ours.
+        of_session: Parameters of the session as a whole, which no node has.
+    """
+
+    def __init__(
+        self, server: ConsoleServer, link: Link,
+        renew: Renew | None = None,
+        of_session: Parameters | None = None,
+    ) -> None:  # fmt: skip
+        self._server, self._link, drivers = server, link, server.drivers
+        theme(server.viser, is_dark=False)
+        self.scene = Scene(server.viser, link.arms)
+        self.stylus = Stylus(
+            server.viser, self.scene, on_hold=link.hold, on_let_go=self._let_go,
+            may_drive=drivers.hold,
+        )  # fmt: skip
+        drivers.is_for_all = not link.is_live
+        self._failed = set[str]()
+        self.panel = Panel(server.viser, link, drivers, renew, of_session)
+        self.panel.settings.on_change(self.scene.retune)
+        self._visitors = Visitors(server.viser, drivers, self.scene)
+        if link.is_live:
+            server.answers.stop = self._stop
+        else:
+            server.answers.situation = Situation(can_stop=False)
+        if link.is_live:
+            with self.panel.stylus_folder:
+                arms = tuple(arm.name for arm in link.arms)
+                Steps(server.viser, self.stylus, arms, drivers.may_drive)
+        with self.panel.view_tab:
+            ViewTab(server.viser, self.scene)
+            Insets(server.viser, self.scene)
+
+    def _stop(self) -> None:
+        self._link.press(is_pressed=True)
+
+    def _let_go(self, arm: str) -> None:
+        drivers = self._server.drivers
+        if drivers.driver is not None:
+            drivers.let_go(drivers.driver)
+        self._link.let_go(arm)
+
+    def draw(self) -> None:
+        """Show what is known now."""
+        view = self._link.view()
+        if self._link.is_live:
+            shown = self._server.answers.situation = situation(view)
+            self.stylus.show(is_shown=not shown.is_stopped)
+        self.scene.draw(view)
+        self.stylus.draw(view)
+        self.panel.draw(view)
+        self.panel.settings.follow(self._link.changes())
+        self._visitors.look()
+
+    def _ask(self, is_over: Callable[[], bool]) -> None:
+        """Ask the nodes for their parameters until all of them have come up and answered."""
+        while not is_over() and not self.panel.settings.refresh():
+            time.sleep(_ASK_AGAIN)
+
+    def try_to_draw(self, *before: Callable[[], None]) -> None:
+        """Draw; what fails is said once, and costs this drawing and not the session.
+
+        Args:
+            before: What else is drawn, first.
+        """
+        try:
+            for draw in before:
+                draw()
+            self.draw()
+        except Exception as error:
+            if (kind := repr(error)) not in self._failed:
+                self._failed.add(kind)
+                logging.getLogger("teleop_console").exception("the page could not be drawn")
+
+    def run(self, is_over: Callable[[], bool]) -> None:
+        """Draw until something is over; time that was lost is not made up for."""
+        if self._link.is_live:
+            give_way()
+        threading.Thread(target=self._ask, args=(is_over,), daemon=True).start()
+        due = time.monotonic()
+        while not is_over():
+            self.try_to_draw()
+            due = max(due + 1.0 / RATE, time.monotonic())
+            time.sleep(max(0.0, due - time.monotonic()))
+        self._server.answers.stop, self._server.answers.situation = None, Situation()
+        self._visitors.close()
+
+
+def give_way() -> None:
+    """Let the session go first where processors are short: the page can be late, the arm not."""
+    with suppress(OSError):  # elsewhere than on Linux threads have no priorities of their own
+        for thread in os.listdir("/proc/self/task"):
+            os.setpriority(os.PRIO_PROCESS, int(thread), _NICE)
+
+
+@contextmanager
+def splash(server: ConsoleServer) -> Iterator[Callable[[str], None]]:
+    """Show on an empty page what is going on until there is something to show."""
+    gui = server.viser.gui
+    gui.reset()
+    server.viser.scene.reset()
+    answers = server.answers
+
+    def say(line: str) -> None:
+        if answers.situation.doing:  # else the page is showing something else by now
+            answers.situation = Situation(doing=line)
+
+    answers.situation = Situation(doing="starting …")
+    try:
+        yield say
+    finally:
+        answers.situation = Situation()
+
+
+def replay(server: ConsoleServer, path: Path) -> None:
+    """Show a recording until Ctrl-C.
+
+    Raises:
+        RecordingError: It cannot be read, or is one of another system.
+    """
+    from teleop_console.replay_controls import ReplayControls
+
+    link = RecordedLink(path)
+    console = Console(server, link)
+    controls = ReplayControls(server.viser, link)
+    console.panel.settings.refresh()
+    console.scene.remember(link.path)
+    console.panel.remember(link.view)
+    console.stylus.show(is_shown=False)
+    before = time.monotonic()
+    while True:
+        now = time.monotonic()
+        link.advance(now - before)
+        before = now
+        console.try_to_draw(controls.draw)
+        time.sleep(max(0.0, now + 1.0 / RATE - time.monotonic()))

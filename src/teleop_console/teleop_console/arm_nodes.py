@@ -1,0 +1,252 @@
+"""Arm nodes: one arm with its master on the page."""
+
+from collections.abc import Callable
+from contextlib import suppress
+
+import numpy as np
+import viser
+
+from teleop_console.body_nodes import BodyNodes, extent
+from teleop_console.fixture_outlines import Look, OutlineNode, scale_of, unit_outline
+from teleop_console.jaw_nodes import JawNodes
+from teleop_console.link import Arm, ArmView, box_of
+from teleop_console.look import MEASURED, WANTED, Color
+from teleop_console.master_nodes import MasterNodes
+from teleop_console.stand import DEVICE, PUBLISHED_AXES, REST, stand_beside
+from teleop_console.tails import LENGTH, Tail, is_jump
+from teleop_console.world_nodes import WorldNodes
+from teleop_core.base.errors import TeleopError
+from teleop_core.graph.topics import (
+    MASTER_MEASURED_CF,
+    MASTER_MEASURED_CP,
+    SLAVE_MEASURED_CF,
+    SLAVE_MEASURED_CP,
+    SLAVE_MEASURED_JS,
+    SLAVE_SERVO_CP,
+    SLAVE_SETPOINT_CP,
+    SLAVE_SETPOINT_JS,
+    Limit,
+    Topic,
+)
+from teleop_core.kernels.geometry import Array
+from teleop_core.robots.bodies import bodies_of
+from teleop_core.robots.bodies.looks import looks_of
+from teleop_core.robots.bodies.meshes import mesh_of
+from teleop_core.robots.robot import Robot
+
+Path = Callable[[Topic, str, float], tuple[Array, Array]]
+"""From a topic, an arm and a length [s]: times (N,) [s] and rows (N, width) up to now."""
+_AT = 1e-3
+"""Share of a joint's range next to its end that counts as at its limit."""
+_WORK, _GRIP = 0.05, 0.1  # room on all sides of a tip and of a stylus with its handles [m]
+_TOUCH = 0.05  # force of a wall that somebody touches [N]
+
+
+class ArmNodes:
+    """One arm on the page: its bodies, ghost and paths, and its master.
+
+    Args:
+        server: The page.
+        arm: The arm.
+
+    Attributes:
+        bodies: Bodies of its robot.
+        world: What its tip touches.
+        jaw: Its fingers, and what they grip.
+        low: Lowest corner (3,) [m] of what arm and master take, in slave_base.
+        high: Highest corner (3,) [m].
+        fixture: What its fixture is.
+        recorded_path: Where paths come from when time jumps; None where nothing is recorded.
+    """
+
+    def __init__(self, server: viser.ViserServer, arm: Arm) -> None:
+        robot = self._robot = arm.robot
+        self._server, self.path = server, f"/{arm.name or 'arm'}"
+        self.bodies = bodies_of(robot)
+        start = posture(robot)
+        self._own_low, self._own_high = extent(self.bodies, start)
+        self._root = server.scene.add_frame(self.path, show_axes=False)
+        if arm.name:
+            server.scene.add_label(f"{self.path}/name", arm.name, anchor="top-center")
+        self._looks = looks_of(robot)
+        self.drawn = BodyNodes(server, f"{self.path}/robot", self.bodies, self._looks)
+        self._ghost: BodyNodes | None = None
+        self._is_ghost_shown = False
+        self.measured = Tail(server, f"{self.path}/measured", MEASURED)
+        self.reference = Tail(server, f"{self.path}/reference", WANTED, 1.5)
+        self._axes = PUBLISHED_AXES
+        self._stand = stand_beside(self._own_low, self._own_high, self._axes)
+        self.master = MasterNodes(server, f"{self.path}/master", self._stand)
+        self.world = WorldNodes(server, self.path, robot)
+        self.jaw = JawNodes(server, self.path)
+        self.fixture = Look()
+        self.outline = OutlineNode(server, f"{self.path}/fixture", self._stand.quaternion)
+        self._poses = self.drawn.move(start)
+        self._begin: Array | None = None
+        self._name, self._last = arm.name, 0.0
+        self.recorded_path: Path | None = None
+        self._side, self._count = 0.0, 0
+        self.low, self.high = self._room()
+
+    # -- places ----------------------------------------------------------------------------------
+
+    def place(self, side: float) -> None:
+        """Stand at a place along the page's y [m]."""
+        self._side = side
+        self._root.position = (0.0, side, 0.0)
+
+    def room(self) -> tuple[Array, Array]:
+        """Lowest and highest corner (3,) [m] of arm and master, in the axes of the page."""
+        shift = np.array([0.0, self._side, 0.0])
+        return self.low + shift, self.high + shift
+
+    def _room(self) -> tuple[Array, Array]:
+        vertices = np.concatenate([mesh_of(solid)[0] for solid in DEVICE] + [REST[None, :3]])
+        points = vertices @ self._stand.axes.T + self._stand.origin
+        points = np.concatenate((points, self._own_low[None], self._own_high[None]))
+        return points.min(axis=0), points.max(axis=0)
+
+    def work(self) -> tuple[Array, Array]:
+        """Lowest and highest corner (3,) [m] of where tip and stylus work, in the page's axes."""
+        hand = self._stand.axes @ REST[:3] + self._stand.origin + np.array([0.0, self._side, 0.0])
+        tip, room = self.begin(), max(_WORK, 0.08 * self.bodies.size)
+        points = np.stack((hand - _GRIP, hand + _GRIP, tip - room, tip + room))
+        return points.min(axis=0), points.max(axis=0)
+
+    def tip(self) -> Array:
+        """Pose (7,) of the tip as it is drawn, in the axes of the page."""
+        pose = self._poses[-1].copy()
+        pose[1] += self._side
+        return pose
+
+    def begin(self) -> Array:
+        """Place (3,) [m] of the tip where it was first measured, in the axes of the page."""
+        place = self.tip()[:3] if self._begin is None else self._begin.copy()
+        place[1] += 0.0 if self._begin is None else self._side
+        return place
+
+    def turn_master(self, axes: Array) -> None:
+        """Let the master stand so that a motion of the stylus and the tip's have one direction.
+
+        Args:
+            axes: Rotation (3, 3) from the master's base to the slave's axes.
+        """
+        if np.array_equal(axes, self._axes):
+            return
+        self._axes = axes
+        self._stand = stand_beside(self._own_low, self._own_high, axes)
+        self.master.stand(self._stand)
+        self.outline.turn(self._stand.quaternion)
+
+    # -- drawing ---------------------------------------------------------------------------------
+
+    def draw(self, time: float, view: ArmView) -> None:
+        """Draw what is known at a time of the session [s]."""
+        state = view.get(SLAVE_MEASURED_JS)
+        if state is not None:
+            joints = state[: self._robot.n]
+            self._poses = self.drawn.move(joints)
+            self.drawn.mark(self._at_limit(joints, view.state))
+        self._draw_ghost(view)
+        self._draw_paths(time, view)
+        force = view.get(MASTER_MEASURED_CF)
+        felt = self.master.draw(
+            time, view.get(MASTER_MEASURED_CP), None if force is None else force[:3]
+        )
+        self._draw_fixture(view, is_touched=felt > _TOUCH)
+        push = view.get(SLAVE_MEASURED_CF)
+        self.world.draw(self._poses[-1][:3], None if push is None else push[:3])
+        self.jaw.draw(self._poses[-1], view)
+
+    def _draw_ghost(self, view: ArmView) -> None:
+        """Draw the reference posture, every third time: it tells no more than where to."""
+        reference = view.get(SLAVE_SETPOINT_JS)
+        self._count = (self._count + 1) % 3
+        if self._ghost is None or reference is None or not self._is_ghost_shown or self._count:
+            return
+        self._ghost.move(reference)
+
+    def _draw_paths(self, time: float, view: ArmView) -> None:
+        if self.recorded_path is not None and is_jump(self._last, time):
+            for tail, topic in (
+                (self.measured, SLAVE_MEASURED_CP), (self.reference, SLAVE_SETPOINT_CP),
+                (self.master.tail, MASTER_MEASURED_CP),
+            ):  # fmt: skip
+                times, rows = self.recorded_path(topic, self._name, LENGTH)
+                tail.fill(times, rows[:, :3])
+        self._last = time
+        measured = view.get(SLAVE_MEASURED_CP)
+        if measured is not None and self._begin is None:
+            self._begin = measured[:3].copy()
+        reference = view.get(SLAVE_SETPOINT_CP)
+        if reference is None:
+            reference = view.get(SLAVE_SERVO_CP)
+        self.measured.draw(time, None if measured is None else measured[:3])
+        self.reference.draw(time, None if reference is None else reference[:3])
+
+    def _draw_fixture(self, view: ArmView, *, is_touched: bool) -> None:
+        """Draw the fixture around the slave, which is told, and its image around the hand."""
+        box = box_of(view.state)
+        hand, command = view.get(MASTER_MEASURED_CP), view.get(SLAVE_SERVO_CP)
+        gain = view.state.get("gain", 0.0)
+        if box is None or gain <= 0.0:
+            self.outline.hide()
+            self.master.outline.hide()
+            return
+        center, size = box
+        along = np.abs(self._axes.T) @ size  # the master's axes are the slave's, named otherwise
+        look, unit = self.fixture, unit_outline(self.fixture)
+        scale = scale_of(unit, along, gain)
+        self.outline.draw(look, center, scale, is_touched=is_touched)
+        if hand is not None and command is not None:
+            around = hand[:3] + self._axes.T @ (center - command[:3]) / gain
+            self.master.outline.draw(look, around, scale / gain, is_touched=is_touched)
+
+    def _at_limit(self, joints: Array, state: dict[str, float]) -> frozenset[int]:
+        """Joints that are at the ends of their ranges, or that the session says are.
+
+        One whose end is its home is at rest there: only the session says that it is in the way.
+        """
+        robot = self._robot
+        room = _AT * (robot.upper - robot.lower)
+        is_at = (joints <= robot.lower + room) | (joints >= robot.upper - room)
+        found = set(np.flatnonzero(is_at & (np.abs(joints - robot.home) > room)).tolist())
+        told = state.get("limited_joint", -1.0)  # NaN in recordings of early versions
+        if state.get("limit") == Limit.JOINT and 0 <= told < self._robot.n:
+            found.add(int(told))
+        return frozenset(found)
+
+    # -- what is shown ---------------------------------------------------------------------------
+
+    def show_axes(self, *, is_shown: bool) -> None:
+        """Show the axes of its bodies and of its master, or hide them."""
+        self.drawn.show_axes(is_shown=is_shown)
+        self.master.show_axes(is_shown=is_shown)
+
+    def show_ghost(self, *, is_shown: bool) -> None:
+        """Show its reference posture, or hide it; its meshes are sent when it is first shown."""
+        self._is_ghost_shown = is_shown
+        if self._ghost is None and is_shown:
+            self._ghost_root = self._server.scene.add_frame(f"{self.path}/ghost", show_axes=False)
+            place = f"{self.path}/ghost"
+            self._ghost = BodyNodes(self._server, place, self.bodies, self._looks, is_ghost=True)
+            self._ghost.move(posture(self._robot))
+        if self._ghost is not None:
+            self._ghost_root.visible = is_shown
+
+    def show_tails(self, *, is_shown: bool) -> None:
+        """Show its paths, or hide them."""
+        for tail in (self.measured, self.reference, self.master.tail):
+            tail.show(is_shown=is_shown)
+
+    def set_background(self, color: Color) -> None:
+        """Colour into which its paths fade."""
+        for tail in (self.measured, self.reference, self.master.tail):
+            tail.set_background(color)
+
+
+def posture(robot: Robot) -> Array:
+    """Where a session with it starts (n,) [rad, m]; its home if that cannot be found."""
+    with suppress(TeleopError):
+        return robot.start
+    return robot.home

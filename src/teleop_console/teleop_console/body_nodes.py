@@ -1,0 +1,129 @@
+"""Body nodes: the bodies of an arm on the page, of which only the frames move."""
+
+from collections.abc import Mapping
+
+import numpy as np
+import viser
+
+from teleop_console.look import ROLES, WANTED, WRONG
+from teleop_console.poses import moved, set_pose
+from teleop_core.kernels.geometry import Array, rotations_from_quaternions
+from teleop_core.robots.bodies import Bodies, Role, Solid
+from teleop_core.robots.bodies.meshes import Mesh, merged, mesh_of
+
+
+class BodyNodes:
+    """Bodies of a robot, one frame each with its solids as meshes that are sent once.
+
+    Args:
+        server: The page.
+        path: Path of the node that they are below.
+        bodies: The robot's bodies.
+        looks: Meshes in place of the solids of some bodies, by their index.
+        is_ghost: Whether they are drawn through and through in one colour, without axes.
+    """
+
+    def __init__(
+        self,
+        server: viser.ViserServer,
+        path: str,
+        bodies: Bodies,
+        looks: Mapping[int, Mesh],
+        *,
+        is_ghost: bool = False,
+    ) -> None:
+        axis = 0.08 * bodies.size
+        self._bodies = bodies
+        self.frames = {
+            body.name: server.scene.add_frame(
+                f"{path}/{body.name}", show_axes=False, axes_length=axis, axes_radius=0.04 * axis
+            )
+            for body in bodies.bodies
+        }
+        self._list = list(self.frames.values())
+        self._meshes: list[dict[Role, viser.MeshHandle]] = []
+        for i, body in enumerate(bodies.bodies):
+            place = f"{path}/{body.name}"
+            if i in looks:
+                role: Role = "link" if i else "base"
+                node = _add_mesh(server, place, role, looks[i], is_ghost=is_ghost, is_flat=True)
+                self._meshes.append({role: node})
+            else:
+                self._meshes.append(add_solids(server, place, body.solids, is_ghost=is_ghost))
+        self._drawn = np.tile(np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]), (len(self._list), 1))
+        self._marked: frozenset[int] = frozenset()
+
+    def move(self, joints: Array) -> Array:
+        """Draw them where joints (n,) [rad, m] bring them; returns the poses (B, 7) drawn.
+
+        Bodies whose place is not finite stay where they are.
+        """
+        poses = self._bodies.poses(joints)
+        for body in moved(poses, self._drawn):
+            set_pose(self._list[body], poses[body])
+            self._drawn[body] = poses[body]
+        return self._drawn.copy()
+
+    def mark(self, joints: frozenset[int]) -> None:
+        """Draw the bodies that these joints move first in another colour, and no others."""
+        bodies = frozenset(self._bodies.joint_body[joint] for joint in joints)
+        for body in bodies ^ self._marked:
+            for role, mesh in self._meshes[body].items():
+                mesh.color = WRONG if body in bodies else ROLES[role]
+        self._marked = bodies
+
+    def show_axes(self, *, is_shown: bool) -> None:
+        """Show the axes of every body's frame, or hide them."""
+        for frame in self._list:
+            frame.show_axes = is_shown
+
+
+def add_solids(
+    server: viser.ViserServer,
+    path: str,
+    solids: tuple[Solid, ...],
+    *,
+    is_ghost: bool = False,
+    opacity: float | None = None,
+) -> dict[Role, viser.MeshHandle]:
+    """Add solids below a node: one mesh for each role among them; an opacity of None is opaque."""
+    meshes = {}
+    for role in dict.fromkeys(solid.role for solid in solids):
+        mesh = merged([mesh_of(solid) for solid in solids if solid.role == role])
+        meshes[role] = _add_mesh(server, path, role, mesh, is_ghost=is_ghost, opacity=opacity)
+    return meshes
+
+
+def _add_mesh(
+    server: viser.ViserServer,
+    path: str,
+    role: Role,
+    mesh: Mesh,
+    *,
+    is_ghost: bool,
+    is_flat: bool = False,
+    opacity: float | None = None,
+) -> viser.MeshHandle:
+    vertices, faces = mesh
+    return server.scene.add_mesh_simple(
+        f"{path}/{role}", vertices.astype(np.float32), faces.astype(np.uint32),
+        color=WANTED if is_ghost else ROLES[role], opacity=0.3 if is_ghost else opacity,
+        flat_shading=is_flat, cast_shadow=False, receive_shadow=False,
+    )  # fmt: skip
+
+
+def extent(bodies: Bodies, joints: Array) -> tuple[Array, Array]:
+    """Lowest and highest corner (3,) [m] of what the bodies take, in slave_base."""
+    points = [np.zeros((1, 3))]
+    for body, pose in zip(bodies.bodies, bodies.poses(joints), strict=True):
+        if np.isfinite(pose).all():
+            points.append(pose[None, :3])
+            points += [_placed(solid, pose) for solid in body.solids]
+    every = np.concatenate(points)
+    return every.min(axis=0), every.max(axis=0)
+
+
+def _placed(solid: Solid, pose: Array) -> Array:
+    """Vertices (V, 3) [m] of a solid of a body with this pose (7,)."""
+    placed: Array = mesh_of(solid)[0] @ rotations_from_quaternions(pose[None, 3:])[0].T + pose[:3]
+    return placed

@@ -1,0 +1,370 @@
+"""Console link: a live session as the page sees it, over its topics and services alone.
+
+Of streams it reads the slow copies that the recorder gives (:mod:`teleop_core.nodes.display`);
+where nobody records, the streams themselves, best effort and one deep.
+"""
+
+import math
+import re
+from contextlib import suppress
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+from std_srvs.srv import Trigger
+
+from teleop_console.link import Arm, ArmView, ParameterInfo, Parameters, Setting, View
+from teleop_console.parameter_client import ParameterClient, ParameterEvents, call
+from teleop_core.bags.messages import Layout, layout, read_any, read_numbers
+from teleop_core.base.errors import ParameterError, SessionError
+from teleop_core.graph.graph import RECORDER_NAME
+from teleop_core.graph.topics import (
+    OPERATION,
+    OPERATOR_BUTTONS,
+    OPERATOR_SERVO_CP,
+    SLAVE_OPERATION,
+    TELEOP_STATE,
+    Topic,
+)
+from teleop_core.kernels.geometry import Array
+from teleop_core.middleware.ros import ROS
+from teleop_core.middleware.world import Owner, Qos, World, WorldEndedError
+from teleop_core.nodes.display import SEEN, displayed
+from teleop_core.nodes.observer import WARNING, Observer
+from teleop_core.nodes.operation import StopButton
+from teleop_core.nodes.streams import Subscription, message_type
+from teleop_core.robots import load_robot_set
+from teleop_core.robots.robot import Robot
+from teleop_core.slave.operation import operation_text
+
+PATIENCE = 5.0
+"""Time in which an arm must be found, and answer [s]."""
+_LIST, _SPLIT = "/list_parameters", "/split"
+_SILENCE = 1.0  # after which nothing is fresh [s]
+_PRESS = 0.12  # of a button [s]
+_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}")
+
+
+def _now(owner: Owner) -> float:
+    """Time of a clock that never goes back [s]."""
+    return 1e-9 * owner.world.monotonic_ns()
+
+
+class _Seen:
+    """Newest sample of one stream of one arm."""
+
+    def __init__(self, owner: Owner, topic: Topic, arm: Arm) -> None:
+        self.topic, self._joints = topic, arm.robot.joint_names
+        self._layout: Layout = layout(topic, self._joints)
+        self._owner, self._own = owner, topic.of_arm(arm.name)
+        self._name, self._since = displayed(self._own).name, _now(owner)
+        self._subscription = Subscription(owner, self._own, self._name, 1)
+
+    def take(self, view: ArmView) -> bool:
+        """Write the newest sample into a view; whether there was one."""
+        newest = None
+        while (taken := self._subscription.take()) is not None:
+            newest = taken.data
+        if newest is None:
+            self._find_another()
+            return False
+        found: Any = self._layout.decode_one(newest) or read_any(
+            self.topic.kind, newest, self._joints
+        )
+        if not isinstance(found, tuple) or not np.isfinite(found[1]).all():
+            return False  # refused and counted by the nodes that need it
+        view.stamp_ns[self.topic.name], view.streams[self.topic.name] = found[0], found[1].copy()
+        return True
+
+    def _find_another(self) -> None:
+        """Read the stream itself where nobody says it again."""
+        is_slow = self._name.startswith("/display/")
+        if is_slow and _now(self._owner) - self._since > _SILENCE:
+            self._since = _now(self._owner)
+            if not self._owner.ros.count_publishers(self._name):
+                self._subscription.close()
+                self._name = f"/{self._own.name}"
+                self._subscription = Subscription(self._owner, self._own, self._name, 1)
+
+
+_HEARTBEAT = "operation.heartbeat"
+
+
+class LiveLink(Observer):
+    """A :class:`~teleop_console.link.Link` to a running session.
+
+    Args:
+        domain: ROS domain of the session.
+        title: What it is called.
+        patience: Time in which an arm must be found [s].
+        button: Stop button that may have been pressed before the arm was found; None: a new one.
+        world: Where it is.
+
+    Raises:
+        SessionError: There is no arm on this domain, or one does not say which robot it is.
+    """
+
+    is_live = True
+
+    def __init__(
+        self, domain: int, title: str = "", patience: float = PATIENCE,
+        button: StopButton | None = None, world: World = ROS,
+    ) -> None:  # fmt: skip
+        super().__init__(domain, "teleop_console", button, world, start_parameter_services=False)
+        self.domain = domain
+        self._executor = self.world.executor()
+        self._executor.add_node(self.ros)
+        self._is_closed = False
+        self._thread = self.world.thread("console link", self._spin)
+        self._thread.start()
+        self._lock, self._pressing = self.world.lock(), self.world.lock()
+        self._clients: dict[str, Any] = {}
+        self._client, self._events = ParameterClient(self), ParameterEvents(self)
+        self._known: dict[tuple[str, str], ParameterInfo] = {}
+        self._runs, self._is_pressed = 0, False
+        try:
+            self._find(patience)
+        except BaseException:
+            self.close()
+            raise
+        self.title = title or str(self._value(self._recorder(), "scenario") or "session")
+
+    def close(self) -> None:
+        """Leave the session as it is."""
+        self._is_closed = True  # first: an executor that is shut down while it spins breaks
+        self._executor.wake()
+        self._thread.join(PATIENCE)
+        self._executor.shutdown()
+        self.world.shutdown()
+        with suppress(Exception):  # the middleware may have let go already
+            self.ros.destroy_node()
+
+    def _spin(self) -> None:
+        with suppress(WorldEndedError):
+            while not self._is_closed:
+                self._executor.spin_once(timeout_sec=0.1)
+
+    # -- finding ---------------------------------------------------------------------------------
+
+    def _find(self, patience: float) -> None:
+        """Find arms and their robots."""
+        end, suffix, names = _now(self) + patience, f"/{SLAVE_OPERATION.name}", set[str]()
+        while not names:
+            topics = self.ros.get_topic_names_and_types()
+            names = {name.removesuffix(suffix).strip("/") for name, _ in topics
+                     if name.endswith(suffix)}  # fmt: skip
+            if not names and _now(self) > end:
+                raise SessionError(
+                    f"no arm answers on ROS domain {self.domain}; `teleop live` says which is its "
+                    "own, --domain N names another"
+                )
+            self.world.sleep(0.02)
+        self.arms = tuple(Arm(name, self._robot(name)) for name in sorted(names))
+        self._seen = {arm.name: [_Seen(self, t, arm) for t in SEEN] for arm in self.arms}
+        self._told = {
+            arm.name: [
+                Subscription(self, topic.of_arm(arm.name), f"/{topic.of_arm(arm.name).name}")
+                for topic in (SLAVE_OPERATION, TELEOP_STATE)
+            ]
+            for arm in self.arms
+        }
+        self._hands = {arm.name: _Hand(self, arm.name) for arm in self.arms}
+        self._view = View(arms={arm.name: ArmView() for arm in self.arms})
+        self._begun = self._heard = _now(self)
+
+    def _robot(self, arm: str) -> Robot:
+        slave = "/".join(filter(None, (arm, "slave")))
+        values = self._client.values(slave, ["robot", "geometry"])  # no answer is no RCRT-1
+        told = self._client.values(slave, [_HEARTBEAT])  # which a slave of others may lack
+        self.has_heartbeat = self.has_heartbeat or bool(told.get(_HEARTBEAT))
+        geometry = values.get("geometry")
+        texts = tuple(map(str, geometry)) if isinstance(geometry, tuple) else ()
+        return load_robot_set(str(values.get("robot", "rcrt1")), texts)
+
+    def _recorder(self) -> str:
+        """Recorder of the session, in its namespace."""
+        services, end = self.ros.get_service_names_and_types(), f"/{RECORDER_NAME}{_SPLIT}"
+        found = (name.removesuffix(_SPLIT) for name, _ in services if name.endswith(end))
+        return next(found, RECORDER_NAME).strip("/")
+
+    def _value(self, node: str, name: str) -> Setting | None:
+        try:
+            return self._client.values(node, [name]).get(name)
+        except SessionError:
+            return None
+
+    # -- seeing ----------------------------------------------------------------------------------
+
+    def view(self) -> View:
+        """What is known now."""
+        with self._lock:
+            view, now = self._view, _now(self)
+            for arm in self.arms:
+                taken = [seen.take(view.arms[arm.name]) for seen in self._seen[arm.name]]
+                if any(taken):
+                    self._heard = now
+                self._hear(arm, view.arms[arm.name])
+            self._insist(view)
+            self._hear_nodes(view)
+            view.time, view.is_fresh = now - self._begun, now - self._heard < _SILENCE
+            return view
+
+    def _hear(self, arm: Arm, view: ArmView) -> None:
+        operation, state = self._told[arm.name]
+        while (taken := operation.take()) is not None:
+            found = read_numbers(taken.data, OPERATION)
+            if isinstance(found, tuple):
+                view.operation = dict(zip(OPERATION, map(float, found[1]), strict=True))
+                view.operation_text = operation_text(view.operation, arm.robot.joint_names)
+        while (taken := state.take()) is not None:
+            found = read_numbers(taken.data, TELEOP_STATE.columns)
+            if isinstance(found, tuple):
+                view.state = dict(zip(TELEOP_STATE.columns, map(float, found[1]), strict=True))
+
+    def _hear_nodes(self, view: View) -> None:
+        if not self.take():
+            return
+        named = (s for n, s in self.statuses.items() if n.rsplit("/", 1)[-1] == RECORDER_NAME)
+        recorder = next(named, None)
+        if recorder is not None and recorder.values.get("out"):
+            is_recording = recorder.number("is_recording") > 0
+            view.recording = Path(recorder.values["out"]) if is_recording else None
+        view.news = tuple(
+            f"{name}: {s.message}" for name, s in self.statuses.items() if s.level >= WARNING
+        )
+        slave = self.statuses.get("/".join(filter(None, (self.arms[0].name, "slave"))))
+        if slave is not None:
+            unknown = "delay_ms.median" not in slave.values
+            median, worst = (slave.number(f"delay_ms.{w}") * 1e-3 for w in ("median", "p99"))
+            view.delay = (math.nan, math.nan) if unknown else (median, worst)
+
+    # -- commanding ------------------------------------------------------------------------------
+
+    def command(self, word: str, arm: str = "") -> tuple[bool, str]:
+        """Send a state command; whether it was taken, and the arm's answer."""
+        return self._trigger("/" + "/".join(filter(None, (arm, "slave", word))))
+
+    def _trigger(self, name: str) -> tuple[bool, str]:
+        with self._lock:
+            if name not in self._clients:
+                self._clients[name] = self.ros.create_client(Trigger, name)
+        try:
+            answer = call(self.world, self._clients[name], Trigger.Request(), PATIENCE)
+        except SessionError as error:
+            return False, str(error)
+        return bool(answer.success), str(answer.message)
+
+    def press(self, *, is_pressed: bool = True) -> None:
+        """Press or release the emergency stop of all arms.
+
+        A stop is said again at every :meth:`view` until all arms have said that it is in force.
+        """
+        with self._pressing:
+            self._is_pressed = is_pressed
+            self._button.say(is_pressed=is_pressed)
+
+    def _insist(self, view: View) -> None:
+        """Say a stop again that some arm has not confirmed; never after its release."""
+        with self._pressing:
+            confirmed = all(arm.operation.get("is_stopped") for arm in view.arms.values())
+            self._is_pressed = self._is_pressed and not confirmed
+            if self._is_pressed:
+                self._button.say(is_pressed=True)
+
+    def parameters(self) -> Parameters:
+        """All parameters of all nodes, asked for anew."""
+        found: dict[tuple[str, str], ParameterInfo] = {}
+        services = [name for name, _ in self.ros.get_service_names_and_types()]
+        for node in sorted(
+            name.removesuffix(_LIST).strip("/") for name in services if name.endswith(_LIST)
+        ):
+            with suppress(SessionError):  # it may be leaving
+                found |= {(node, name): info for name, info in self._client.read(node).items()}
+        self._known = found
+        return MappingProxyType(found)
+
+    def changes(self) -> dict[tuple[str, str], Setting]:
+        """Parameters that anybody has changed since the last call, by node and name."""
+        return self._events.take()
+
+    def change(self, node: str, name: str, value: Setting) -> str:
+        """Set a parameter; returns why it was refused, empty if it was taken."""
+        return self._client.change(node, name, value)
+
+    def hold(self, arm: str, pose: Array) -> None:
+        """Want the stylus at a pose (7,) in the master's base."""
+        self._hands[arm].hold(pose)
+
+    def let_go(self, arm: str) -> None:
+        """Let go of the stylus: what is not held is let go, so there is nothing to say."""
+
+    def press_button(self, arm: str, name: str) -> None:
+        """Press and release the ``fixture`` or ``mode`` button of the stylus."""
+        self._hands[arm].press(name)
+
+    def save(self, name: str) -> Path:
+        """Close the recording under a name and go on recording; returns where it is.
+
+        Raises:
+            ParameterError: The name is no plain one, or is taken.
+            SessionError: The recorder refuses, or does not answer.
+        """
+        recording = self._view.recording
+        if recording is None:
+            raise SessionError("nothing is being recorded")
+        if not _NAME.fullmatch(name):
+            raise ParameterError(
+                "name", name, "letters, digits, '.', '_' and '-', no more than 100"
+            )
+        wanted = recording.with_name(name)
+        if wanted.exists():
+            raise ParameterError("name", name, f"a new one; {wanted} exists already")
+        is_done, text = self._trigger(f"/{self._recorder()}{_SPLIT}")
+        if not is_done:
+            raise SessionError(text)
+        closed = Path(text.split(" is closed; ")[0])
+        try:
+            closed.rename(wanted)
+        except OSError as error:
+            raise SessionError(f"{closed} is closed, but not called {name}: {error}") from error
+        self._runs += 1
+        with self._lock:
+            self._view.run = self._runs
+        return wanted
+
+
+class _Hand:
+    """Publishers of a person's hand on one arm."""
+
+    def __init__(self, owner: Owner, arm: str) -> None:
+        self._layout, self._pressed = layout(OPERATOR_SERVO_CP, ()), layout(OPERATOR_BUTTONS, ())
+        self._world = owner.world
+        self._lock, self._pressing = self._world.lock(), self._world.lock()
+        self._publishers = [
+            owner.ros.create_publisher(
+                message_type(topic.kind.ros_type), f"/{topic.of_arm(arm).name}", Qos(depth=10)
+            )
+            for topic in (OPERATOR_SERVO_CP, OPERATOR_BUTTONS)
+        ]
+
+    def hold(self, pose: Array) -> None:
+        """Want the stylus somewhere."""
+        with self._lock:
+            data = self._layout.encode_one(self._world.time_ns(), np.asarray(pose, np.float64))
+            self._publishers[0].publish(data)
+
+    def press(self, name: str) -> None:
+        """Press a button and release it a moment later; presses follow one another."""
+        self._world.thread("press", lambda: self._press(name)).start()
+
+    def _press(self, name: str) -> None:
+        with self._pressing, suppress(RuntimeError):  # rclpy, once the link is closed
+            self._say(np.array([0.0, name == "fixture", name == "mode"]))
+            self._world.sleep(_PRESS)
+            self._say(np.zeros(3))
+            self._world.sleep(_PRESS)  # released for as long, or two presses were one
+
+    def _say(self, pressed: Array) -> None:
+        with self._lock:
+            self._publishers[1].publish(self._pressed.encode_one(self._world.time_ns(), pressed))

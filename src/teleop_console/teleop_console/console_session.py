@@ -1,0 +1,122 @@
+"""Console session: the live session behind a page, started and ended by it."""
+
+import threading
+from collections.abc import Callable, Collection
+from pathlib import Path
+
+from rich.console import Console
+
+from teleop_console.console_link import LiveLink
+from teleop_core.base.errors import SessionError, TeleopError
+from teleop_core.nodes.children import environment
+from teleop_core.nodes.crews import Processes
+from teleop_core.nodes.guest import Guest
+from teleop_core.nodes.interrupt import Interrupt
+from teleop_core.nodes.live import live
+from teleop_core.nodes.operation import StopButton
+from teleop_core.session.configuration import Configuration
+
+_LOOK = 1.0  # for the arm, between looks whether the session has ended [s]
+_END_PATIENCE = 60.0
+
+
+class _Lines:
+    """Text file whose lines are handed on as they come."""
+
+    def __init__(self, say: Callable[[str], None]) -> None:
+        self._say, self._rest = say, ""
+
+    def write(self, text: str) -> int:
+        """Take text, hand on the lines that it ends."""
+        *lines, self._rest = (self._rest + text).split("\n")
+        for line in lines:
+            if line:
+                self._say(line)
+        return len(text)
+
+    def flush(self) -> None:
+        """Nothing waits."""
+
+
+class ConsoleSession:
+    """A session in a domain of its own, to be used with ``with``; composed if all nodes are ours.
+
+    Where ``ROS_DOMAIN_ID`` is set, its domain is that one, and the process can lead no second one.
+
+    Its processes end with this one, however that comes about.
+
+    Args:
+        configuration: What runs.
+        out: Directory of the recording.
+        say: Told what the session says, a line each, in a thread of its own.
+        without: Nodes that are not started, since others stand in their place.
+
+    Attributes:
+        domain: Its ROS domain.
+        button: Its stop button, which works before there is an arm.
+    """
+
+    def __init__(
+        self, configuration: Configuration, out: Path, say: Callable[[str], None],
+        without: Collection[str] = (),
+    ) -> None:  # fmt: skip
+        self.domain = int(environment()["ROS_DOMAIN_ID"])
+        self._configuration, self._out, self._without = configuration, out, without
+        self._console = Console(file=_Lines(say), width=200)  # type: ignore[arg-type]
+        self._interrupt, self._error = Interrupt(), ""
+        self._guest = Guest("teleop_console_stop", self.domain, start_parameter_services=False)
+        self.button = StopButton(self._guest)
+        self._thread = threading.Thread(target=self._run, name="session")
+        self._thread.start()
+
+    def __enter__(self) -> "ConsoleSession":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.end()
+
+    def _run(self) -> None:
+        try:
+            live(
+                self._configuration, self._out, self._console,
+                processes=Processes.ONE, without=self._without, interrupt=self._interrupt,
+                domain=self.domain,
+            )  # fmt: skip
+        except TeleopError as error:
+            if not self._interrupt.has_come:
+                self._error = str(error)
+
+    @property
+    def is_over(self) -> bool:
+        """Whether it has ended."""
+        return not self._thread.is_alive()
+
+    def check(self) -> None:
+        """Insist on a session that runs, or ended as it should.
+
+        Raises:
+            SessionError: It ended with an error.
+        """
+        if self._error:
+            raise SessionError(self._error)
+
+    def link(self) -> LiveLink:
+        """Link to it, as soon as its arm is there.
+
+        Raises:
+            SessionError: It ended before.
+        """
+        while True:
+            try:
+                title = self._configuration.scenario
+                return LiveLink(self.domain, title, patience=_LOOK, button=self.button)
+            except SessionError:
+                self.check()
+                if self.is_over:
+                    raise
+
+    def end(self) -> None:
+        """End it in order; its recording is closed."""
+        self._interrupt.ask()
+        self._thread.join(_END_PATIENCE)
+        self._guest.close()

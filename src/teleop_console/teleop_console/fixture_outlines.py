@@ -1,0 +1,112 @@
+"""Outlines: virtual fixtures on the page, around the hand and around the slave."""
+
+from contextlib import suppress
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+import viser
+
+from teleop_console.link import Setting
+from teleop_console.look import GOOD, WRONG
+from teleop_core.base.parameters import build
+from teleop_core.chain.fixtures import Fixture
+from teleop_core.kernels.geometry import Array
+from teleop_core.shapes import SHAPES
+from teleop_core.shapes.basis.drawing import segments_of
+from teleop_core.shapes.box import BOX
+
+_STILL = 5e-5  # [m]
+_FLAT = 1e-9  # [m]
+
+
+@dataclass(frozen=True)
+class Look:
+    """What a fixture is, wherever it stands.
+
+    Attributes:
+        kind: Name of its kind.
+        values: Names and values of its shape's parameters, and its place; those that are missing
+            have their defaults.
+    """
+
+    kind: str = BOX.name
+    values: tuple[tuple[str, Setting], ...] = ()
+
+
+@lru_cache(maxsize=64)
+def unit_outline(look: Look) -> Array:
+    """Segments (N, 2, 3) of a fixture along the master's axes, one long along each.
+
+    Along an axis on which it has no length they are in metres. A fixture that is not known here is
+    drawn as the box around it.
+    """
+    fixture = Fixture(BOX, BOX.parameters())
+    with suppress(Exception):  # of another's kind anything may fail, and the page goes on
+        values: dict[str, Any] = dict(look.values)
+        place, shape = values.pop("place", fixture.place), SHAPES.find(look.kind)
+        found = Fixture(shape, build(shape.parameters, values), tuple(place))
+        found.size()
+        fixture = found
+    extent = fixture.size()
+    return segments_of(fixture.outline() / np.where(extent > _FLAT, extent, 1.0))
+
+
+def scale_of(outline: Array, size: Array, gain: float) -> Array:
+    """Scale (3,) that gives a unit outline its size (3,) [m], and its metres where it is flat."""
+    is_flat = np.ptp(outline.reshape(-1, 3), axis=0) < 0.5
+    scale: Array = np.where(is_flat, gain, size)
+    return scale
+
+
+class OutlineNode:
+    """Outline of a fixture below a node.
+
+    Args:
+        server: The page.
+        name: Path of its node.
+        turn: Quaternion (4,) from the master's axes to those of the node above.
+    """
+
+    def __init__(self, server: viser.ViserServer, name: str, turn: Array) -> None:
+        self._server, self._name, self._turn = server, name, turn
+        self._look = Look()
+        self._scale = np.ones(3)
+        self.line: viser.LineSegmentsHandle | None = None
+
+    def turn(self, turn: Array) -> None:
+        """Take another turn (4,) from the master's axes to those of the node above."""
+        self._turn = turn
+        if self.line is not None:
+            self.line.wxyz = turn
+
+    def hide(self) -> None:
+        """Draw none."""
+        if self.line is not None:
+            self.line.visible = False
+
+    def draw(self, look: Look, center: Array, scale: Array, *, is_touched: bool) -> None:
+        """Draw one.
+
+        Args:
+            look: What it is.
+            center: Its middle (3,) [m] in the axes of the node above.
+            scale: Of its unit outline (3,), along the master's axes.
+            is_touched: Whether somebody stands at its wall.
+        """
+        color = WRONG if is_touched else GOOD
+        if self.line is None or look != self._look:
+            self.line = self._server.scene.add_line_segments(
+                self._name, unit_outline(look).astype(np.float32), color, thickness=2.0,
+                thickness_units="screen", wxyz=self._turn, position=center,
+                scale=tuple(scale.tolist()),
+            )  # fmt: skip
+            self._look, self._scale = look, scale
+        if np.abs(self.line.position - center).max() > _STILL:
+            self.line.position = center
+        if np.abs(self._scale - scale).max() > _STILL:
+            self._scale = scale
+            self.line.scale = tuple(scale.tolist())
+        self.line.colors = np.array(color, np.uint8)
+        self.line.visible = True

@@ -1,0 +1,345 @@
+"""Hooks: everything that is changed in viser, and the only place that knows its inner names.
+
+viser 1.1 opens its port itself, answers every request, counts ports up where one is taken, prints a
+banner and offers to lead the page out through a tunnel. It has no settings for these. What it is
+given here instead is the function with which it opens its server: ours hands a socket that listens
+already to the same library, asks the guard before viser sees a request, and the filter before it
+sees a message. Its buffers of messages wake their readers from the right thread. The version bound
+in ``setup.py`` belongs to this module.
+"""
+
+import asyncio
+import http
+import logging
+import threading
+from collections.abc import Awaitable, Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from functools import partial
+from socket import socket
+from types import SimpleNamespace, TracebackType
+from typing import Any, TypedDict, Unpack
+
+import rich
+import viser
+import websockets
+import websockets.asyncio.server as ws
+from viser import _messages
+from viser.infra import _async_message_buffer, _infra
+from websockets.datastructures import Headers
+from websockets.http11 import Request, Response
+from websockets.typing import Data, Subprotocol
+
+from teleop_console.answers import Answers, answer_of
+from teleop_console.connection import Connection, Crowd, Gate
+from teleop_console.drivers import Drivers
+from teleop_console.filter import FLOOD, LARGEST, NO_VALUE, WATCHES, Filter, Sets, decode
+from teleop_console.front import Front
+from teleop_console.guard import HEADERS, Guard
+from teleop_console.guard import Request as Asked
+from teleop_core.base.errors import SessionError
+
+PAGES = 16
+"""Pages that may be open at once; the youngest that does not drive gives way."""
+_NOTICE = 5.0  # for which a page is told something, and nothing else [s]
+_STARTING = threading.Lock()
+
+Answer = Callable[[ws.ServerConnection, Request], Response | None]
+
+
+class ServeOptions(TypedDict, total=False):
+    """What viser asks of its server beside the port and the answers."""
+
+    max_size: int
+    compression: str | None
+    subprotocols: list[Subprotocol] | None
+    select_subprotocol: Callable[[ws.ServerConnection, Sequence[Subprotocol]], Subprotocol | None]
+
+
+class Wake(asyncio.Event):
+    """Event that is set on an event loop alone.
+
+    viser sets its event from the drawing thread, and then asks the loop to set it too. A reader
+    that has looked at the event but does not wait yet misses the first. The second does nothing,
+    since the event is set already, nor does any later one: its page shows what is old without end.
+    """
+
+    def set(self) -> None:
+        """Wake who waits; in another thread nothing, since the loop is asked too."""
+        with suppress(RuntimeError):  # no loop runs in this thread
+            asyncio.get_running_loop()
+            super().set()
+
+
+class _Buffer(_async_message_buffer.AsyncMessageBuffer):
+    """Messages on their way to pages."""
+
+    def __init__(self, *arguments: Any, **options: Any) -> None:
+        super().__init__(*arguments, **options)
+        self.message_event = Wake()
+
+
+setattr(_infra, "AsyncMessageBuffer", _Buffer)  # noqa: B010
+
+
+class Server(viser.ViserServer):
+    """viser's server behind a guard and a filter, at a socket that listens already.
+
+    Args:
+        opened: Listening socket; it is closed with the server.
+        guard: Decides about requests.
+        drivers: Hears which pages are open and alive, and which hold a gizmo.
+        answers: What is answered beside viser's page.
+        label: Heading of the panel.
+
+    Attributes:
+        filter: Decides about messages.
+    """
+
+    def __init__(
+        self, opened: socket, guard: Guard, drivers: Drivers, answers: Answers, label: str
+    ) -> None:
+        host, port = opened.getsockname()[:2]
+        self._front = Front(opened, answers.paths, partial(_answered, guard, answers))
+        self._drivers, self._public = drivers, set[str]()
+        self.filter = Filter(self, drivers.may_drive, _logger().warning)
+        rich.get_console().quiet = True  # which viser alone writes to here
+        with _STARTING, _opening(_server_at(self._front.passed_on, guard, answers, self)):
+            super().__init__(host=host, port=port, label=label, verbose=False)
+        for message in (_messages.ShareUrlRequest, _messages.ShareUrlDisconnect):
+            self._websock_server.unregister_handler(message)
+        self.gui.configure_theme(show_logo=False, show_share_button=False)
+        self._tell(answers)
+
+    def stop(self) -> None:
+        """End the server."""
+        self._front.close()
+        super().stop()
+
+    def request_share_url(self, verbose: bool = True) -> str | None:
+        """Never: it would lead whoever knows the address around the guard."""
+        raise SessionError("the console is not led out of this machine by others")
+
+    def _tell(self, answers: Answers) -> None:
+        """Let the drivers hear of pages: in the order of events, hence on the server's loop."""
+        drivers = self._drivers
+
+        async def come(client: viser.ClientHandle) -> None:
+            script = f"window.teleopPage = '{answers.name(client.client_id)}';"
+            client._websock_connection.queue_message(_messages.RunJavascriptMessage(script))
+            drivers.join(client.client_id)
+
+        async def go(client: viser.ClientHandle) -> None:
+            answers.forget(client.client_id)
+            drivers.leave(client.client_id)
+
+        self.on_client_connect(come)
+        self.on_client_disconnect(go)
+        for message, tell in (
+            (_messages.TransformControlsDragStartMessage, drivers.hold),
+            (_messages.TransformControlsUpdateMessage, drivers.heard),
+            (_messages.TransformControlsDragEndMessage, drivers.let_go),
+        ):
+            self._websock_server.register_handler(message, _telling(tell))
+
+    # -- what the filter asks ----------------------------------------------------------------------
+
+    def make_public(self, handle: viser.GuiButtonHandle) -> None:
+        """Let pages that watch use an element too."""
+        self._public.add(handle._impl.uuid)
+
+    def is_public(self, uuid: str) -> bool:
+        """Whether pages that watch may use an element."""
+        return uuid in self._public
+
+    def control(self, page: int, uuid: str) -> Any | None:
+        """Handle of an input that is on a page; None if there is none."""
+        handle = self.gui._gui_input_handle_from_uuid.get(uuid)
+        return None if handle is None or handle._impl.removed else handle
+
+    def has_command(self, uuid: str) -> bool:
+        """Whether there is such a command."""
+        return uuid in self.gui._command_handle_from_uuid
+
+    def has_gizmo(self, name: str) -> bool:
+        """Whether there is such a gizmo; one that is hidden now may still be let go."""
+        return name in self.scene._handle_from_transform_controls_name
+
+    def is_asked(self, page: int) -> bool:
+        """Whether a page has been asked for a picture."""
+        client = self._connected_clients.get(page)
+        if client is None:
+            return False
+        handlers = client._websock_connection._incoming_handlers
+        return bool(handlers.get(_messages.GetRenderResponseMessage))
+
+    # -- what connections ask ----------------------------------------------------------------------
+
+    def passed(self, connection: Connection, data: Data) -> bytes:
+        """What of a message goes on to viser; a page that may not do something sees that."""
+        page = self._page(connection)
+        passed, reason = self.filter.judge(page, data)
+        if reason in {WATCHES, NO_VALUE}:
+            self._put_back(page, data)
+        if reason == WATCHES and connection.loop.time() > connection.silent_until:
+            connection.silent_until = connection.loop.time() + _NOTICE
+            self._notify(page, "You watch. Take control first.")
+        return passed
+
+    def cut(self, connection: Connection) -> None:
+        """Take note of a connection that is cut for a flood."""
+        self.filter.refuse(self._page(connection), FLOOD)
+
+    def come(self, connection: Connection) -> None:
+        """Let the youngest page that does not drive give way to a new one if there are too many."""
+        live = self._websock_server._live_connections
+        watchers = [page for page in live if not self._drivers.may_drive(page)]
+        if len(live) >= PAGES and watchers:
+            live[watchers[-1]].transport.abort()
+
+    def _page(self, connection: Connection) -> int:
+        live = self._websock_server._live_connections
+        return next((page for page, known in live.items() if known is connection), -1)
+
+    def _notify(self, page: int, text: str) -> None:
+        client = self._connected_clients.get(page)
+        if client is not None:
+            client.add_notification("Not done", text, auto_close_seconds=_NOTICE, color="yellow")
+
+    def _put_back(self, page: int, data: Data) -> None:
+        """Show the value of an element again that a page could not change."""
+        client, sets = self._connected_clients.get(page), decode(data)
+        if client is None or not isinstance(sets, Sets):
+            return
+        handle = self.control(page, sets.uuid)
+        if handle is not None and not handle._impl.is_button:
+            message = _messages.GuiUpdateMessage(sets.uuid, {"value": handle.value})
+            client._websock_connection.queue_message(message)
+
+    def forget(self) -> None:
+        """Drop what is kept of removed elements; viser does so only when a page comes."""
+        self._run_garbage_collector()
+
+    def connections(self) -> int:
+        """Number of pages that are connected, those that have not come up yet included."""
+        return len(self._states())
+
+    def kept(self) -> int:
+        """Number of messages that are kept for pages: what may grow if something is wrong."""
+        buffers = [state.message_buffer for state in self._states()]
+        buffers.append(self._websock_server.get_message_buffer())
+        return sum(len(buffer.message_from_id) for buffer in buffers)
+
+    def _states(self) -> list[_infra._ClientHandleState]:
+        return list(self._websock_server._client_state_from_id.values())
+
+
+def _telling(tell: Callable[[int], object]) -> Callable[[int, _messages.Message], None]:
+    """Tells which page a message is from."""
+
+    def handler(page: int, message: _messages.Message) -> None:
+        tell(page)
+
+    return handler
+
+
+def _server_at(
+    opened: socket, guard: Guard, answers: Answers, gate: Gate
+) -> Callable[..., ws.serve]:
+    """A function that opens a server at the socket, whatever address it is told."""
+
+    def serve(
+        handler: Callable[[ws.ServerConnection], Awaitable[None]],
+        host: str,
+        port: int,
+        *,
+        process_request: Answer,
+        **options: Unpack[ServeOptions],
+    ) -> ws.serve:
+        options["max_size"] = LARGEST
+        crowd = Crowd()
+        return _Serving(
+            handler,
+            sock=opened,
+            process_request=_guarded(process_request, guard, answers),
+            create_connection=partial(Connection, gate=gate, crowd=crowd),  # type: ignore[arg-type]
+            logger=_logger(),
+            **options,
+        )
+
+    return serve
+
+
+class _Serving(ws.serve):
+    """A server that accepts nobody any more a turn of the loop before it ends.
+
+    asyncio takes two turns to accept a connection, and the library waits for one of them. A
+    connection that began in the last turn would belong to nobody and stay open.
+    """
+
+    async def __aexit__(
+        self,
+        exc_type: type[BaseException] | None,
+        exc_value: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        loop = asyncio.get_running_loop()
+        for listens in self.server.sockets:
+            loop.remove_reader(listens.fileno())
+        await super().__aexit__(exc_type, exc_value, traceback)
+
+
+def _answered(guard: Guard, answers: Answers, request: Request) -> Response:
+    """Our own answer to a request, or a refusal."""
+    asked = Asked(request.path, False, request.headers.get_all)
+    if reason := guard.refusal(asked):
+        return answer_of(http.HTTPStatus.FORBIDDEN, f"{reason}\n".encode())
+    response = answers.to(asked)
+    _harden(response.headers, request.headers["Host"], guard)
+    return response
+
+
+def _guarded(answer: Answer, guard: Guard, answers: Answers) -> Answer:
+    """Answer of viser to a request, or a refusal."""
+
+    def guarded(connection: ws.ServerConnection, request: Request) -> Response | None:
+        headers = request.headers
+        asked = Asked(request.path, bool(headers.get_all("Upgrade")), headers.get_all)
+        if reason := guard.refusal(asked):
+            return connection.respond(http.HTTPStatus.FORBIDDEN, f"{reason}\n")
+        response = answer(connection, request)
+        if response is not None:
+            answers.furnish(asked, response)
+            _harden(response.headers, headers["Host"], guard)
+        return response
+
+    return guarded
+
+
+def _harden(headers: Headers, host: str, guard: Guard) -> None:
+    """Add what binds the page to this server."""
+    for name, value in HEADERS.items():
+        headers[name] = value.format(socket=f"ws://{host}")
+    if cookie := guard.cookie():
+        headers["Set-Cookie"] = cookie
+
+
+@contextmanager
+def _opening(serve: Callable[..., ws.serve]) -> Iterator[None]:
+    """Let viser open servers by another function."""
+    real = websockets
+    server = SimpleNamespace(**{**vars(real.asyncio.server), "serve": serve})
+    library = SimpleNamespace(**{**vars(real.asyncio), "server": server})
+    patched = SimpleNamespace(**{**vars(real), "asyncio": library})
+    setattr(_infra, "websockets", patched)  # noqa: B010
+    try:
+        yield
+    finally:
+        setattr(_infra, "websockets", real)  # noqa: B010
+
+
+def _logger() -> logging.Logger:
+    """Where the server tells what went wrong; that strangers speak something else is nothing."""
+    logger = logging.getLogger("teleop_console")
+    if not logger.filters:
+        logger.addFilter(lambda record: record.getMessage() != "opening handshake failed")
+    return logger

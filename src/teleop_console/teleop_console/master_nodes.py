@@ -1,0 +1,105 @@
+"""Master nodes: the device with its stylus on the page, the fixture around the hand, the force."""
+
+import numpy as np
+import viser
+
+from teleop_console.body_nodes import add_solids
+from teleop_console.fixture_outlines import OutlineNode
+from teleop_console.look import FORCE, HAND
+from teleop_console.poses import move
+from teleop_console.stand import DEVICE, REST, STYLUS, Stand
+from teleop_console.tails import Tail
+from teleop_core.kernels.geometry import Array
+
+METRES_PER_NEWTON = 0.05
+"""Scale of forces."""
+_LEAST = 0.03
+"""Force that is not drawn [N]; forces of the device are read in steps of some mN."""
+_STEP = 0.02  # change that is not drawn [N]
+
+
+class ForceArrow:
+    """Force at a place, in the axes of the node above.
+
+    Args:
+        server: The page.
+        name: Path of its node.
+    """
+
+    def __init__(self, server: viser.ViserServer, name: str) -> None:
+        self._frame = server.scene.add_frame(name, show_axes=False, visible=False)
+        self._arrow = server.scene.add_arrows(
+            f"{name}/arrow", np.zeros((1, 2, 3), np.float32), FORCE, shaft_radius=0.0025,
+            head_radius=0.006, head_length=0.014,
+        )  # fmt: skip
+        self._label = server.scene.add_label(
+            f"{name}/value", "0.0 N", font_screen_scale=0.9, anchor="bottom-left"
+        )
+        self._drawn = np.zeros(3)
+
+    def draw(self, place: Array, force: Array) -> float:
+        """Draw a force (3,) [N] at a place (3,) [m]; returns its size [N]."""
+        size = float(np.linalg.norm(force))
+        if not size >= _LEAST:  # NaN too
+            self._frame.visible = False
+            return 0.0
+        self._frame.position = place
+        if np.abs(force - self._drawn).max() > _STEP:
+            tip = METRES_PER_NEWTON * force
+            self._arrow.points = np.stack((np.zeros(3), tip))[None].astype(np.float32)
+            self._label.position = tip
+            self._label.text = f"{size:.1f} N"
+            self._drawn = force.copy()
+        self._frame.visible = True
+        return size
+
+
+_DIM = 0.35  # of the device, behind which the handles of the stylus are seen
+
+
+class MasterNodes:
+    """Device of an arm, below a node in master_base.
+
+    Args:
+        server: The page.
+        path: Path of that node.
+        stand: Where it stands.
+    """
+
+    def __init__(self, server: viser.ViserServer, path: str, stand: Stand) -> None:
+        self.path = path
+        self.base = server.scene.add_frame(
+            path, show_axes=False, axes_length=0.05, axes_radius=0.002, wxyz=stand.quaternion,
+            position=stand.origin,
+        )  # fmt: skip
+        add_solids(server, path, DEVICE, opacity=_DIM)
+        self.stylus = server.scene.add_frame(
+            f"{path}/stylus", show_axes=False, axes_length=0.04, axes_radius=0.0015,
+            wxyz=REST[3:], position=REST[:3],
+        )  # fmt: skip
+        add_solids(server, f"{path}/stylus", STYLUS)
+        self.outline = OutlineNode(server, f"{path}/fixture", np.array([1.0, 0.0, 0.0, 0.0]))
+        self.tail = Tail(server, f"{path}/path", HAND, 1.5)
+        self._force = ForceArrow(server, f"{path}/force")
+
+    def stand(self, stand: Stand) -> None:
+        """Stand elsewhere."""
+        self.base.wxyz, self.base.position = stand.quaternion, stand.origin
+
+    def draw(self, time: float, pose: Array | None, force: Array | None) -> float:
+        """Draw stylus, its path and the force on it; returns the size of the force [N].
+
+        Args:
+            time: Of the session [s].
+            pose: Of the stylus in master_base (7,); None where it is unknown.
+            force: Force on the stylus (3,) [N]; None where it is unknown.
+        """
+        if pose is None:
+            return 0.0
+        move(self.stylus, pose)
+        self.tail.draw(time, pose[:3])
+        return 0.0 if force is None else self._force.draw(pose[:3], force)
+
+    def show_axes(self, *, is_shown: bool) -> None:
+        """Show the axes of the device's base and of the stylus, or hide them."""
+        self.base.show_axes = self.stylus.show_axes = is_shown

@@ -1,0 +1,249 @@
+"""Panel: what an operator's console has: state, commands, stop, save, settings, plots, scores."""
+
+import html
+import math
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable
+from functools import partial
+from typing import Literal
+
+import numpy as np
+import viser
+
+from teleop_console.controls import CONTROLS, Control
+from teleop_console.drivers import Drivers
+from teleop_console.history import SPAN, History, LiveScores
+from teleop_console.hooks import Server
+from teleop_console.link import Link, Parameters, View
+from teleop_console.plots import Plots
+from teleop_console.settings import Renew, SettingsPanel
+from teleop_console.status import alive, next_button, status_html
+from teleop_console.tails import is_jump
+from teleop_core.base.errors import TeleopError
+
+_PERIOD = 0.2  # between two drawings of the texts [s]
+_RECALLED = 300  # points of a plot
+
+
+class Panel:
+    """Everything beside the scene.
+
+    Args:
+        server: The page.
+        link: The session.
+        drivers: Who drives.
+        renew: Begins a new session with other settings, and returns why it does not, empty if it
+            does; None where the session is not ours.
+        of_session: Parameters of the session as a whole, which no node has.
+    """
+
+    def __init__(
+        self, server: Server, link: Link, drivers: Drivers,
+        renew: Renew | None = None,
+        of_session: Parameters | None = None,
+    ) -> None:  # fmt: skip
+        self._server, self._gui, self._link = server, server.gui, link
+        self._make_public, self._may_drive = server.make_public, drivers.may_drive
+        self._take, self._drivers, self._drawn = drivers.take, drivers, 0.0
+        self._recorded: Callable[[float], View] | None = None
+        self._time = 0.0
+        self.histories = {arm.name: History(arm) for arm in link.arms}
+        self.scores = {arm.name: LiveScores() for arm in link.arms}
+        self._plots: list[Plots] = []
+        self._gui.main_panel.dock_right()  # beside the scene, not over it
+        self._buttons: dict[str, viser.GuiButtonHandle] = {}
+        self._controls: list[Control] = []
+        self._status = self._gui.add_html("")
+        tabs = self._gui.add_tab_group()
+        if link.is_live:
+            with tabs.add_tab("Drive"):
+                self._add_drive()
+        with tabs.add_tab("Plots"):
+            self._add_plots()
+        with tabs.add_tab("Settings"):
+            self.settings = SettingsPanel(server, link, self._guard, renew, of_session)
+        with tabs.add_tab("Scores"):
+            self._add_scores()
+        self.view_tab = tabs.add_tab("View")
+
+    # -- parts -----------------------------------------------------------------------------------
+
+    def _add_drive(self) -> None:
+        take = self._button("Take control", "one browser drives, the others watch", self._take)
+        self._make_public(take)
+        self._add_controls("")
+        with self._gui.add_folder("stylus"):
+            self._add_controls("stylus")
+            self.stylus_folder = self._gui.add_folder("small steps", expand_by_default=False)
+        with self._gui.add_folder("recording"):
+            self._name = self._gui.add_text("name", "run_1", hint="letters, digits, . _ -")
+            self._button("Save as", "closes the recording under this name", self._save)
+            self._saved = self._gui.add_markdown("")
+        self._told = self._gui.add_markdown("")
+
+    def _add_controls(self, folder: str) -> None:
+        for control in map(CONTROLS.find, CONTROLS):
+            if control.folder == folder:
+                self._controls.append(control)
+                self._button(control.name, control.hint, partial(self._act, control))
+
+    def _button(
+        self, label: str, hint: str, action: Callable[[int], None]
+    ) -> viser.GuiButtonHandle:
+        """Button that acts for the browser that drives, one press after the other."""
+        button = self._buttons[label] = self._gui.add_button(label, hint=hint, color="gray")
+        acts = threading.Lock()
+
+        @button.on_click
+        def _(event: viser.GuiEvent[viser.GuiButtonHandle]) -> None:
+            client = -1 if event.client_id is None else event.client_id
+            if action != self._take and not self._may_drive(client):
+                return  # the filter has refused and told others; control has changed since
+            if acts.acquire(blocking=False):  # what is pressed while it works is not done again
+                try:
+                    action(client)
+                finally:
+                    acts.release()
+
+        return button
+
+    def _tell(self, client: int, text: str) -> None:
+        """Tell the people at one page why something was not done."""
+        handle = self._server.get_clients().get(client)
+        if handle is not None:
+            handle.add_notification("Not done", text, auto_close_seconds=5.0, color="yellow")
+
+    def _add_plots(self) -> None:
+        for name, history in self.histories.items():
+            if len(self.histories) > 1:
+                with self._gui.add_folder(name or "first arm"):
+                    self._plots.append(Plots(self._gui, history))
+            else:
+                self._plots.append(Plots(self._gui, history))
+
+    def _add_scores(self) -> None:
+        self._live = self._gui.add_markdown("")
+        again = self._gui.add_button("begin anew", hint="the figures, not the recording")
+        again.on_click(lambda _: self._begin_scores())
+        self._score = self._button("Score the last saved recording", "evaluate", self._evaluate)
+        self._score.disabled = True
+        self._scored = self._gui.add_markdown("")
+
+    # -- actions ---------------------------------------------------------------------------------
+
+    def _guard(self, client: int | None) -> bool:
+        return client is not None and self._may_drive(client)
+
+    def _act(self, control: Control, client: int) -> None:
+        """Do it for every arm; what is refused, or goes wrong, is told."""
+        told: list[str] = []
+        for arm in self._link.arms:
+            try:
+                answers = control.act(self._link, arm.name)
+            except Exception as error:  # of anybody's control: the page goes on
+                reason = " ".join(str(error).split())
+                answers = [(False, f"{control.name}: {type(error).__name__}: {reason}")]
+            told += [f"- {'✓' if is_taken else '⚠'} {text}" for is_taken, text in answers]
+            if answers and not answers[-1][0]:
+                self._tell(client, answers[-1][1])
+        self._told.content = "\n".join(told)
+
+    def _save(self, client: int) -> None:
+        try:
+            self._last = self._link.save(self._name.value.strip())
+            self._saved.content = f"saved: `{self._last}`"
+            self._score.disabled = False
+            self._name.value = _next_name(self._name.value)  # type: ignore[misc]
+        except TeleopError as error:
+            self._saved.content = f"⚠ {html.escape(str(error))}"
+
+    def _begin_scores(self) -> None:
+        for name in self.scores:
+            self.scores[name] = LiveScores()
+
+    def _evaluate(self, client: int) -> None:
+        """Score in a process of its own, with what the session leaves of the processors."""
+        self._scored.content = "scoring …"
+        command = ["nice", "-n", "15", sys.executable, "-m", "teleop_core.cli", "evaluate"]
+        done = subprocess.run(
+            [*command, str(self._last)], capture_output=True, text=True, check=False
+        )
+        self._scored.content = f"```\n{done.stdout or done.stderr}\n```"
+
+    # -- drawing ---------------------------------------------------------------------------------
+
+    def remember(self, recorded: Callable[[float], View]) -> None:
+        """Take plots from a recording wherever time jumps; without that they begin anew there.
+
+        Args:
+            recorded: What was known at a time [s].
+        """
+        self._recorded = recorded
+
+    def _recall(self, recorded: Callable[[float], View], now: float) -> None:
+        """Fill the plots with what was before a time [s]."""
+        for history in self.histories.values():
+            history.clear()
+        for at in np.linspace(max(0.0, now - SPAN), now, _RECALLED, endpoint=False).tolist():
+            for name, arm in recorded(at).arms.items():
+                self.histories[name].add(at, arm, math.nan)
+
+    def draw(self, view: View) -> None:
+        """Take note of what is known now, and show it a few times a second."""
+        if self._recorded is not None and is_jump(self._time, view.time):
+            self._recall(self._recorded, view.time)
+        self._time = view.time
+        for name, arm in view.arms.items():
+            self.histories[name].add(view.time, arm, view.delay[0])
+            self.scores[name].add(view.time, arm)
+        for plots in self._plots:
+            plots.draw()
+        now = time.monotonic()
+        if now - self._drawn < _PERIOD:
+            return
+        self._drawn = now
+        doing = self._doing(view) if self._link.is_live else "replay"
+        self._set(self._status, status_html(view, self._link.title, doing))
+        if self._link.is_live:
+            self._draw_buttons(view)
+        tables = [
+            (f"**{name}**\n\n" if len(self.scores) > 1 else "") + scores.text()
+            for name, scores in self.scores.items()
+        ]
+        if self._live.content != (text := "\n\n".join(tables)):
+            self._live.content = text
+
+    def _draw_buttons(self, view: View) -> None:
+        """Show on the buttons what is so, which of them can do something, and which comes next."""
+        arm, soon, now = next(iter(view.arms.values())), next_button(view), alive(view)
+        labels = {c.name: f"{c.name.capitalize()}: {c.text(arm)}" for c in self._controls if c.text}
+        own = {c.name: c.is_alive(view) for c in self._controls if c.is_alive is not None}
+        for name, button in self._buttons.items():
+            label, is_dead = labels.get(name, button.label), not own.get(name, True)
+            color: Literal["blue", "gray"] = "blue" if name == soon else "gray"
+            if (button.label, button.color) != (label, color):
+                button.label, button.color = label, color
+            if name in own and button.disabled != is_dead:
+                button.disabled = is_dead
+        self.stylus_folder.visible = now["steps"]
+
+    def _doing(self, view: View) -> str:
+        """Run, recording, and who drives."""
+        where = view.recording.name if view.recording else "not recording"
+        driver = self._drivers.driver
+        who = "nobody drives" if driver is None else f"browser {driver + 1} drives"
+        return f"run {view.run + 1} · {where} · {who}"
+
+    @staticmethod
+    def _set(handle: viser.GuiHtmlHandle, text: str) -> None:
+        if handle.content != text:
+            handle.content = text
+
+
+def _next_name(name: str) -> str:
+    """``run_2`` after ``run_1``."""
+    head, digits = name.rstrip("0123456789"), name[len(name.rstrip("0123456789")) :]
+    return f"{head}{int(digits) + 1}" if digits else f"{name}_2"

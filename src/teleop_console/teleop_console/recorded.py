@@ -1,0 +1,204 @@
+"""Recorded link: a recording as the page sees a session, at any time of it."""
+
+import math
+import threading
+from pathlib import Path
+from types import MappingProxyType
+
+import numpy as np
+
+from teleop_console.link import ArmView, Parameters, Setting, View
+from teleop_console.recorded_arms import configuration_of, parameters_of, recorded_arms
+from teleop_core.bags.reader import Bag
+from teleop_core.base.errors import ParameterError, SessionError
+from teleop_core.graph.topics import Topic
+from teleop_core.kernels.geometry import Array
+
+SPEEDS = (0.1, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0)
+"""Speeds that the controls offer; any other from 0.01 to 100 is taken too."""
+FRAME = 1.0 / 30.0
+"""Length of a step [s]."""
+_PATH = 200  # points of a path
+_REFUSED = "a recording cannot be commanded"
+
+
+class RecordedLink:
+    """A :class:`~teleop_console.link.Link` to a recording.
+
+    A view is what was known at the present time of the replay: of each stream the last sample that
+    was recorded by then. Time goes on by :meth:`advance`, whose caller has the clock.
+
+    Args:
+        recording: Its path, or the recording itself.
+
+    Attributes:
+        duration: Time from the first to the last message [s].
+        loop: Whether it begins again at its end.
+        thinning: Of how many samples one is kept; 1 for all.
+
+    Raises:
+        RecordingError: It cannot be read, or does not say which robot moved or how its joints did;
+            the text says what is missing.
+    """
+
+    is_live = False
+
+    def __init__(self, recording: Bag | Path | str) -> None:
+        bag = recording if isinstance(recording, Bag) else Bag(recording)
+        self._bag, self.title = bag, bag.path.name
+        self._start_ns = bag.start_ns
+        self.duration = (bag.end_ns - bag.start_ns) * 1e-9
+        self.loop = False
+        self._time, self._speed, self._is_playing = 0.0, 1.0, False
+        self._lock = threading.RLock()
+        configuration = configuration_of(bag)
+        self._recorded, self.thinning = recorded_arms(bag, configuration)
+        self.arms = tuple(recorded.arm for recorded in self._recorded)
+        self._parameters = parameters_of(configuration)
+
+    # -- seeing ----------------------------------------------------------------------------------
+
+    def view(self, time: float | None = None) -> View:
+        """What was known at a time of the replay [s]; None for the present one."""
+        time = self._time if time is None else time
+        view = View(
+            time=time, arms={arm.name: ArmView() for arm in self.arms}, is_fresh=True,
+            news=self._news(), recording=self._bag.path,
+        )  # fmt: skip
+        time_ns = self._start_ns + round(time * 1e9)
+        for recorded in self._recorded:
+            recorded.show(time_ns, view.arms[recorded.arm.name])
+        return view
+
+    def _news(self) -> tuple[str, ...]:
+        if self.thinning == 1:
+            return ()
+        return (f"a long recording: one of {self.thinning} samples is shown",)
+
+    def path(self, topic: Topic, arm: str, length: float) -> tuple[Array, Array]:
+        """Way of a stream up to the present time.
+
+        Args:
+            topic: A stream; nothing is found of one that was not recorded.
+            arm: Namespace of the arm.
+            length: How long before the present time it begins [s].
+
+        Returns:
+            Times (N,) [s] and rows (N, width), N at most some hundreds.
+        """
+        one = next(recorded for recorded in self._recorded if recorded.arm.name == arm)
+        track = one.tracks.get(topic.name)
+        if track is None:
+            return np.empty(0), np.empty((0, topic.width(one.arm.robot.n)))
+        now_ns = self._start_ns + round(self._time * 1e9)
+        begin, end = track.at(now_ns - round(length * 1e9)) + 1, track.at(now_ns) + 1
+        chosen = np.unique(np.linspace(begin, max(begin, end - 1), _PATH).astype(int))
+        chosen = chosen[chosen < end]
+        times = np.asarray((track.log_ns[chosen] - self._start_ns) * 1e-9, np.float64)
+        return times, track.values[chosen]
+
+    def parameters(self) -> Parameters:
+        """Parameters that it was made with; none of recordings that do not tell."""
+        return MappingProxyType(self._parameters)
+
+    # -- time ------------------------------------------------------------------------------------
+
+    @property
+    def time(self) -> float:
+        """Present time of the replay [s], 0 to :attr:`duration`."""
+        return self._time
+
+    @property
+    def is_playing(self) -> bool:
+        """Whether time goes on."""
+        return self._is_playing
+
+    @property
+    def speed(self) -> float:
+        """Time of the replay per time that passes; a new one from 0.01 to 100.
+
+        Raises:
+            ParameterError: Another one.
+        """
+        return self._speed
+
+    @speed.setter
+    def speed(self, speed: float) -> None:
+        if not 0.01 <= speed <= 100.0:  # NaN too
+            raise ParameterError("speed", speed, "0.01 to 100")
+        self._speed = float(speed)
+
+    def seek(self, time: float) -> None:
+        """Go to a time [s]; before the begin and after the end that is the begin and the end.
+
+        Raises:
+            ParameterError: NaN.
+        """
+        if math.isnan(time):
+            raise ParameterError("time", time, f"0 to {self.duration:.3f} s")
+        with self._lock:
+            self._time = min(max(float(time), 0.0), self.duration)
+
+    def play(self) -> None:
+        """Let time go on; from the begin if it is at the end."""
+        with self._lock:
+            if self._time >= self.duration:
+                self._time = 0.0
+            self._is_playing = True
+
+    def pause(self) -> None:
+        """Hold time."""
+        self._is_playing = False
+
+    def step(self, count: int) -> None:
+        """Hold time and go some frames on, or back."""
+        self.pause()
+        self.seek(self._time + count * FRAME)
+
+    def advance(self, dt: float) -> None:
+        """Let time go on by what passed [s]; nothing happens while it is held."""
+        with self._lock:
+            if not self._is_playing:
+                return
+            self.seek(self._time + self._speed * max(0.0, dt))
+            if self._time >= self.duration:
+                if self.loop:
+                    self._time = 0.0
+                else:
+                    self.pause()
+
+    # -- what a recording does not take ----------------------------------------------------------
+
+    def command(self, word: str, arm: str = "") -> tuple[bool, str]:
+        """Refused."""
+        del word, arm
+        return False, _REFUSED
+
+    def press(self, *, is_pressed: bool) -> None:
+        """Nothing: there is nothing to stop."""
+
+    def changes(self) -> dict[tuple[str, str], Setting]:
+        """None: what is recorded stays."""
+        return {}
+
+    def change(self, node: str, name: str, value: Setting) -> str:
+        """Refused."""
+        del node, name, value
+        return _REFUSED
+
+    def hold(self, arm: str, pose: Array) -> None:
+        """Nothing: the hand has moved already."""
+
+    def let_go(self, arm: str) -> None:
+        """Nothing."""
+
+    def press_button(self, arm: str, name: str) -> None:
+        """Nothing."""
+
+    def save(self, name: str) -> Path:
+        """Refused.
+
+        Raises:
+            SessionError: Always.
+        """
+        raise SessionError(f"{name} is not saved: {_REFUSED}; it is {self._bag.path} already")

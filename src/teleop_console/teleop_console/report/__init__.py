@@ -1,0 +1,1 @@
+"""Report: scores and plots of recordings as one self-contained page."""

@@ -1,0 +1,213 @@
+"""Scene: the arms of a session on the page, with their masters, paths, fixtures and forces."""
+
+from collections.abc import Iterable
+
+import numpy as np
+import viser
+
+from teleop_console.arm_nodes import ArmNodes, Path
+from teleop_console.cameras import ASPECT, FIELD, Camera, around, from_tool, microscope
+from teleop_console.fixture_outlines import Look
+from teleop_console.link import Arm, Parameters, Setting, View
+from teleop_console.look import DARK, GRID, GRID_DARK, LIGHT, TARGET
+from teleop_console.stand import PUBLISHED_AXES
+from teleop_core.base.errors import TeleopError
+from teleop_core.chain.mapping.parameters import axis_map
+from teleop_core.chain.operators.rest import REST_POSITION
+from teleop_core.kernels.geometry import Array
+
+_POINTS = {"tour": "tour.points", "points": "points"}
+"""Operators that go to points, and where these stand."""
+
+
+def targets_of(parameters: Parameters, arm: str) -> Array:
+    """Points (N, 3) [m] in master_base to which the operator of an arm goes; none for others.
+
+    Args:
+        parameters: As :meth:`~teleop_console.link.Link.parameters` gives them.
+        arm: Namespace of the arm.
+    """
+    node = f"{arm}/operator" if arm else "operator"
+    values = {name: info.value for (owner, name), info in parameters.items() if owner == node}
+    points = values.get(_POINTS.get(str(values.get("kind")), ""))
+    center = np.array(values.get("center", (0.0, 0.0, 0.0)), dtype=np.float64)
+    if not isinstance(points, tuple) or not points or len(points) % 3:
+        return np.zeros((0, 3))
+    return np.asarray(REST_POSITION + center + np.reshape(np.array(points, np.float64), (-1, 3)))
+
+
+class Scene:
+    """What is seen of a session; the axes of the page are those of the first arm's base, z up.
+
+    Args:
+        server: The page.
+        arms: Arms of the session, at least one.
+    """
+
+    def __init__(self, server: viser.ViserServer, arms: Iterable[Arm]) -> None:
+        self._server = server
+        self.arms: dict[str, ArmNodes] = {}
+        side = 0.0
+        # Shadows and mirrored surroundings take half of the time of a picture drawn by software.
+        server.scene.configure_default_lights(cast_shadow=False)
+        server.scene.configure_environment_map(None)
+        server.scene.add_light_hemisphere("/light", intensity=1.5)
+        with server.atomic():
+            for arm in arms:
+                nodes = ArmNodes(server, arm)
+                low, high = nodes.low, nodes.high
+                if self.arms:  # beside the one before, to its right
+                    side -= float(high[1])
+                nodes.place(side)
+                side += float(low[1]) - 0.1 * nodes.bodies.size
+                self.arms[arm.name] = nodes
+            self._ground()
+            self.set_dark(is_dark=False)
+            self._begin()
+
+    # -- drawing ---------------------------------------------------------------------------------
+
+    def draw(self, view: View) -> None:
+        """Draw what is known now; sends only what has changed."""
+        with self._server.atomic():
+            for name, nodes in self.arms.items():
+                if (seen := view.arms.get(name)) is not None:
+                    nodes.draw(view.time, seen)
+
+    def retune(self, parameters: Parameters) -> None:
+        """Take what parameters of the session say of the picture: axes, fixture, targets, object.
+
+        Args:
+            parameters: As :meth:`~teleop_console.link.Link.parameters` gives them; what they
+                lack stays as it is.
+        """
+        with self._server.atomic():
+            for name, nodes in self.arms.items():
+                node = f"{name}/motion_scaling" if name else "motion_scaling"
+                if (axes := parameters.get((node, "axes"))) is not None:
+                    nodes.turn_master(_map(axes.value))
+                if (kind := parameters.get((node, "fixture.kind"))) is not None:
+                    nodes.fixture = _look(parameters, node, str(kind.value))
+                self._show_targets(nodes, targets_of(parameters, name))
+                plant = f"{name}/slave_sim" if name else "slave_sim"
+                nodes.world.retune(_values_below(parameters, plant, "world."))
+                jaw = f"{name}/jaw_sim" if name else "jaw_sim"
+                nodes.jaw.retune(_values_below(parameters, jaw, ""))
+
+    def _show_targets(self, nodes: ArmNodes, points: Array) -> None:
+        """Show the points of a task in the hand's space, as balls of 2 mm."""
+        if len(points):
+            self._server.scene.add_point_cloud(
+                f"{nodes.master.path}/targets", points, colors=TARGET, point_size=0.002,
+                point_shape="circle",
+            )  # fmt: skip
+
+    def remember(self, path: Path) -> None:
+        """Take paths from a recording wherever time jumps; without that they begin anew there."""
+        for nodes in self.arms.values():
+            nodes.recorded_path = path
+
+    # -- what is shown ---------------------------------------------------------------------------
+
+    def show_frames(self, is_shown: bool) -> None:
+        """Show the axes of all bodies and devices, or hide them."""
+        with self._server.atomic():
+            for nodes in self.arms.values():
+                nodes.show_axes(is_shown=is_shown)
+
+    def show_ghost(self, is_shown: bool) -> None:
+        """Show the reference posture as a ghost, or hide it."""
+        for nodes in self.arms.values():
+            nodes.show_ghost(is_shown=is_shown)
+
+    def show_tails(self, is_shown: bool) -> None:
+        """Show the paths of the last seconds, or hide them."""
+        for nodes in self.arms.values():
+            nodes.show_tails(is_shown=is_shown)
+
+    def set_dark(self, *, is_dark: bool) -> None:
+        """Take the colours for a dark page, or a light one."""
+        ground = DARK if is_dark else LIGHT
+        self._floor.cell_color = self._floor.section_color = GRID_DARK if is_dark else GRID
+        for nodes in self.arms.values():
+            nodes.set_background(ground)
+
+    # -- cameras ---------------------------------------------------------------------------------
+
+    def work(self, aspect: float = ASPECT) -> Camera:
+        """Camera that sees the work: all tips and styli with the room that they need."""
+        boxes = [nodes.work() for nodes in self.arms.values()]
+        low = np.min([low for low, _ in boxes], axis=0)
+        high = np.max([high for _, high in boxes], axis=0)
+        return around(low, high, aspect)
+
+    def whole(self, aspect: float = ASPECT) -> Camera:
+        """Camera that sees all arms and their masters; ``aspect``: width over height."""
+        boxes = [nodes.room() for nodes in self.arms.values()]
+        low = np.min([low for low, _ in boxes], axis=0)
+        high = np.max([high for _, high in boxes], axis=0)
+        return around(low, high, aspect)
+
+    def tool(self, arm: str = "") -> Camera:
+        """Camera on the tool of an arm, as it is now; of the first arm if there is no such arm."""
+        nodes = self._arm(arm)
+        return from_tool(nodes.tip(), nodes.bodies.size)
+
+    def microscope(self, arm: str = "") -> Camera:
+        """Fixed camera over where the tip of an arm starts; of the first if there is no such."""
+        nodes = self._arm(arm)
+        return microscope(nodes.begin(), nodes.bodies.size)
+
+    def _arm(self, name: str) -> ArmNodes:
+        return self.arms.get(name) or next(iter(self.arms.values()))
+
+    @property
+    def masters(self) -> dict[str, str]:
+        """Path of each arm's node in master_base, by namespace, as a Stylus takes them."""
+        return {name: nodes.master.path for name, nodes in self.arms.items()}
+
+    # -- the begin -------------------------------------------------------------------------------
+
+    def _ground(self) -> None:
+        boxes = [nodes.room() for nodes in self.arms.values()]
+        low = np.min([low for low, _ in boxes], axis=0)
+        high = np.max([high for _, high in boxes], axis=0)
+        wide = 2.5 * float((high - low)[:2].max())
+        cell = 10.0 ** np.floor(np.log10(wide / 5.0))
+        middle = 0.5 * (low + high)
+        self._floor = self._server.scene.add_grid(
+            "/ground", wide, wide, cell_size=cell, section_size=5.0 * cell,
+            cell_color=GRID, section_color=GRID, cell_thickness=0.5,
+            section_thickness=1.0, fade_distance=2.5 * wide, shadow_opacity=0.0,
+            position=(middle[0], middle[1], low[2] - 1e-3),
+        )  # fmt: skip
+
+    def _begin(self) -> None:
+        first, camera = self.work(), self._server.initial_camera
+        camera.fov, camera.up = FIELD, first.up
+        camera.position, camera.look_at = first.position, first.look_at
+
+
+def _look(parameters: Parameters, node: str, kind: str) -> Look:
+    """What the fixture of a node is."""
+    values = _values_below(parameters, node, f"fixture.{kind}.")
+    if (place := parameters.get((node, "fixture.place"))) is not None:
+        values["place"] = place.value
+    return Look(kind, tuple(values.items()))
+
+
+def _values_below(parameters: Parameters, node: str, start: str) -> dict[str, Setting]:
+    """Values of a node's parameters by what their names say after a beginning."""
+    return {
+        name.removeprefix(start): info.value
+        for (owner, name), info in parameters.items()
+        if owner == node and name.startswith(start)
+    }
+
+
+def _map(axes: object) -> Array:
+    """Rotation (3, 3) of axes as a parameter gives them; the published one of what is none."""
+    try:
+        return axis_map("axes", tuple(axes))  # type: ignore[arg-type]
+    except (TeleopError, TypeError, ValueError):
+        return PUBLISHED_AXES

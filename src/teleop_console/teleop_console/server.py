@@ -1,0 +1,177 @@
+"""ConsoleServer: serves the page to browsers of this machine, and knows which page drives.
+
+A taken port is told with who has it, never changed silently.
+"""
+
+import secrets
+import socket
+import threading
+from contextlib import suppress
+from pathlib import Path
+
+from teleop_console.answers import Answers
+from teleop_console.drivers import PATIENCE, Drivers
+from teleop_console.guard import Guard, is_loopback, is_wildcard
+from teleop_console.hooks import Server
+from teleop_core.base.errors import ParameterError, SessionError
+
+_LISTENS = "0A"  # state in /proc/net/tcp
+_SHOWN = 80
+
+
+def listen(host: str, port: int) -> socket.socket:
+    """A socket that listens.
+
+    Args:
+        host: Address of this machine.
+        port: Port; 0 for any free one.
+
+    Returns:
+        The socket, bound and listening.
+
+    Raises:
+        ParameterError: The port is none, or the address not one of this machine.
+        SessionError: The port is taken; the text says by what, and names a free one.
+    """
+    if not 0 <= port < 1 << 16:
+        raise ParameterError("port", port, "0 to 65535, 0 for any free one")
+    try:
+        found = socket.getaddrinfo(host or None, port, type=socket.SOCK_STREAM,
+                                   flags=socket.AI_PASSIVE)[0]  # fmt: skip
+    except OSError as error:
+        raise ParameterError("host", host, f"an address of this machine ({error})") from error
+    opened = socket.socket(found[0], found[1])
+    try:
+        opened.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        opened.bind(found[4])
+        opened.listen(64)
+    except OSError as error:
+        opened.close()
+        raise _refusal(host, port, error) from error
+    opened.setblocking(False)
+    return opened
+
+
+def _refusal(host: str, port: int, error: OSError) -> Exception:
+    """What to say when an address cannot be listened at."""
+    import errno
+
+    if error.errno == errno.EADDRINUSE:
+        free = free_port(host)
+        return SessionError(f"port {port} is taken by {owner(port)}; {free} is free: --port {free}")
+    if error.errno == errno.EACCES:
+        return SessionError(f"port {port} is not allowed to you, take one above 1023")
+    return ParameterError("host", host, f"an address of this machine ({error.strerror})")
+
+
+def free_port(host: str = "127.0.0.1") -> int:
+    """A port that is free now."""
+    with listen(host, 0) as opened:
+        return int(opened.getsockname()[1])
+
+
+def owner(port: int) -> str:
+    """Which process listens at a port, in words; ``another process`` where it cannot be known."""
+    wanted = {f"socket:[{inode}]" for inode in _inodes(port)}
+    for folder in Path("/proc").glob("[0-9]*"):
+        with suppress(OSError):
+            if any(str(link.readlink()) in wanted for link in (folder / "fd").iterdir()):
+                return f"{_command(folder)} (process {folder.name})"
+    return "another process"
+
+
+def _inodes(port: int) -> set[str]:
+    """Numbers of the sockets that listen at a port."""
+    found = set()
+    for table in ("tcp", "tcp6"):
+        with suppress(OSError):
+            for line in Path("/proc/net", table).read_text().splitlines()[1:]:
+                column = line.split()
+                if column[3] == _LISTENS and int(column[1].rpartition(":")[2], 16) == port:
+                    found.add(column[9])
+    return found
+
+
+def _command(folder: Path) -> str:
+    words = (folder / "cmdline").read_bytes().decode(errors="replace").split("\0")
+    return repr(" ".join(words).strip()[:_SHOWN] or "a process")
+
+
+PORT = 8080
+"""Where the page is if nothing else is asked."""
+_LOOK = 0.5  # s, between looks at the driver
+_FORGET = 20  # looks between clearing up
+
+
+class ConsoleServer:
+    """Server of the page, running from its making to :meth:`close`.
+
+    Without a token it serves this machine alone; other addresses always have one. Pages of other
+    origins, names that were made to lead here, and requests without the token get 403. Messages of
+    pages go through a :class:`~teleop_console.filter.Filter`.
+
+    Attributes:
+        viser: The server to which scene and panel are added.
+        drivers: Which page drives.
+        answers: What pages are told beside viser's elements, and where their stop goes.
+        token: Secret that the address must carry; empty for none.
+
+    Args:
+        port: Port; 0 for any free one.
+        host: Address of this machine to serve at; the loopback by default.
+        token: Secret; made if the address is not the loopback and none is given.
+        label: Heading of the panel.
+        patience: Time without a sign of life after which a page loses a held stylus [s].
+
+    Raises:
+        SessionError: The port is taken; the text says by what, and names a free one.
+        ParameterError: The address is none of this machine.
+    """
+
+    def __init__(
+        self,
+        port: int = PORT,
+        host: str = "127.0.0.1",
+        token: str = "",
+        *,
+        label: str = "",
+        patience: float = PATIENCE,
+    ) -> None:
+        opened = listen(host, port)
+        self.port = int(opened.getsockname()[1])
+        self.host = host
+        self.token = token or ("" if is_loopback(host) else secrets.token_urlsafe(24))
+        self.drivers = Drivers(patience)
+        self.answers = Answers(self.drivers)
+        guard = Guard(host, self.port, self.token)
+        self.viser = Server(opened, guard, self.drivers, self.answers, label)
+        self._ends = threading.Event()
+        self._watch = threading.Thread(target=self._look, name="console pages", daemon=True)
+        self._watch.start()
+
+    @property
+    def url(self) -> str:
+        """Address of the page, token included, as people of this machine open it."""
+        host = "localhost" if is_wildcard(self.host) else self.host
+        host = f"[{host}]" if ":" in host else host
+        return f"http://{host}:{self.port}/" + (f"?token={self.token}" if self.token else "")
+
+    def close(self) -> None:
+        """End the server; pages that are open show that they have lost it."""
+        self._ends.set()
+        self._watch.join()
+        self.viser.stop()
+
+    def __enter__(self) -> "ConsoleServer":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def _look(self) -> None:
+        looks = 0
+        while not self._ends.wait(_LOOK):
+            self.drivers.expire()
+            looks += 1
+            if looks % _FORGET == 0:
+                self.viser.forget()

@@ -1,0 +1,259 @@
+"""Settings: every parameter of the session as a control, with its unit, bounds and meaning."""
+
+import ast
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from typing import Any
+
+import viser
+
+from teleop_console.link import Link, ParameterInfo, Parameters, Setting
+from teleop_core.base.errors import TeleopError
+
+QUICK = (
+    ("motion_scaling", "mode"), ("motion_scaling", "coarse_gain"), ("motion_scaling", "fine_gain"),
+    ("motion_scaling", "fixture.kind"), ("motion_scaling", "fixture.box.size"),
+    ("motion_scaling", "fixture.sphere.radius"), ("motion_scaling", "reflection.architecture"),
+    ("motion_scaling", "reflection.passivity"), ("slave_sim", "world.kind"),
+    ("slave_sim", "world.material"), ("network", "preset"), ("slave", "reference_filter.is_on"),
+    ("slave_sim", "controller.kind"), ("slave_sim", "plant.kind"), ("teleop", "delays"),
+)  # fmt: skip
+"""What people change most, by stage and name."""
+Renew = Callable[[tuple[str, ...]], str]
+"""Begins a new session with other settings; why it does not, empty if it does."""
+Guard = Callable[[int | None], bool]
+"""Whether a browser may change something; tells it why not."""
+
+
+class SettingsPanel:
+    """Controls of all parameters in the present container of the page.
+
+    Args:
+        server: The page.
+        link: The session.
+        may_drive: Asked before anything is changed.
+        renew: Begins a new session with other texts ``node.name=value``, for what is fixed while
+            one runs, and returns why it does not, empty if it does; None where the session is not
+            ours.
+        of_session: Parameters of the session as a whole, which no node has.
+
+    Attributes:
+        known: All parameters, as they were when they were last asked for, or set here.
+    """
+
+    def __init__(
+        self, server: viser.ViserServer, link: Link, may_drive: Guard,
+        renew: Renew | None = None,
+        of_session: Parameters | None = None,
+    ) -> None:  # fmt: skip
+        self._gui, self._link, self._may, self._renew = server.gui, link, may_drive, renew
+        self._of_session = dict(of_session or {})
+        self.known: Parameters = {}
+        self._listeners: list[Callable[[Parameters], None]] = []
+        self._wanted: dict[tuple[str, str], Setting] = {}
+        self._told = self._gui.add_markdown("parameters are being asked for …")
+        self._choice = self._gui.add_dropdown("show", ("most used",), hint="stage and group")
+        self._folder = self._gui.add_folder("values")
+        self._by_key: dict[tuple[str, str], Any] = {}
+        self._controls: list[viser.GuiInputHandle | viser.GuiMarkdownHandle] = []  # type: ignore[type-arg]
+        with self._gui.add_folder("fixed while it runs", visible=False) as self._pending:
+            self._list = self._gui.add_markdown("")
+            begin = self._gui.add_button("New session with these", color="blue")
+        self._choice.on_update(lambda _: self._show())
+        begin.on_click(lambda event: self._begin(event.client_id))
+
+    def on_change(self, listener: Callable[[Parameters], None]) -> None:
+        """Call a function with all parameters whenever some of them are other ones."""
+        self._listeners.append(listener)
+
+    def refresh(self) -> bool:
+        """Ask the nodes anew, and show what they say; takes a moment.
+
+        Returns:
+            Whether they say as much as when they were asked before: all of them have come up.
+        """
+        before = self.known.keys()
+        try:
+            self._know({**self._of_session, **self._link.parameters()})
+        except TeleopError as error:
+            self._told.content = f"**{error}**"
+            return False
+        if self.known.keys() == before:
+            return len(before) > len(self._of_session)
+        groups = sorted({_group(*key) for key in self.known})
+        self._choice.options = ("most used", *groups)
+        self._told.content = f"{len(self.known)} parameters; hover over a name for its meaning"
+        self._show()
+        return False
+
+    def follow(self, changes: Mapping[tuple[str, str], Setting]) -> None:
+        """Show values that anybody has changed: a button of the stylus, a program, another page."""
+        known = {key: value for key, value in changes.items() if key in self.known}
+        if not known:
+            return
+        new = {key: replace(self.known[key], value=value) for key, value in known.items()}
+        self._know({**self.known, **new})
+        for key, value in known.items():
+            if (control := self._by_key.get(key)) is not None and control.value != _shown(value):
+                control.value = _shown(value)
+
+    def _know(self, known: Parameters) -> None:
+        self.known = known
+        for listener in self._listeners:
+            listener(known)
+
+    def _show(self) -> None:
+        chosen = self._choice.value
+        keys = [key for key in self.known if chosen == _group(*key)]
+        if chosen == "most used":
+            stages = {key: (key[0].rpartition("/")[2], key[1]) for key in self.known}
+            keys = [key for wanted in QUICK for key, known in stages.items() if known == wanted]
+        for control in self._controls:
+            control.remove()
+        self._controls.clear()
+        self._by_key.clear()
+        self._folder.label = chosen
+        with self._folder:
+            for key in keys:
+                self._add(self.known[key], with_node=chosen == "most used")
+
+    def _add(self, info: ParameterInfo, *, with_node: bool) -> None:
+        """Control of one parameter, and under it, when needed, why a value was refused."""
+        label = info.name.rpartition(".")[2] if not with_node else info.name
+        arm = info.node.rpartition("/")[0]
+        wanted = self._wanted.get((info.node, info.name), info.value)
+        control = _control(self._gui, f"{arm} {label}".strip(), replace(info, value=wanted))
+        why = self._gui.add_markdown("", visible=False)
+        key = info.node, info.name
+        self._controls += [control, why]
+        self._by_key[key] = control
+
+        @control.on_update
+        def _(event: viser.GuiEvent) -> None:  # type: ignore[type-arg]
+            shown = self._wanted.get(key, self.known[key].value)
+            if event.client_id is None or control.value == _shown(shown):
+                return
+            value = _parsed(control.value, info)
+            refusal = "" if value is not None else f"{control.value!r} is no {_form(info)}"
+            if not refusal and not self._may(event.client_id):
+                refusal = "you watch; take control first"
+            if not refusal and value is not None:
+                refusal = self._set(info, value)
+            why.content, why.visible = f"⚠ {refusal}", bool(refusal)
+            if refusal:
+                control.value = _shown(shown)
+
+    def _set(self, info: ParameterInfo, value: Setting) -> str:
+        key = info.node, info.name
+        if not info.is_fixed:
+            refusal = self._link.change(*key, value)
+            if not refusal:
+                self._know({**self.known, key: replace(self.known[key], value=value)})
+            return refusal
+        if self._renew is None:
+            return f"fixed while it runs: start it with --set {info.name}={_text(value)}"
+        self._wanted[key] = value
+        self._tell_pending()
+        return ""
+
+    def _tell_pending(self, refusal: str = "") -> None:
+        lines = [f"- `{n}.{p}` = {_text(v)}" for (n, p), v in self._wanted.items()]
+        lines += [f"\n⚠ {refusal}"] if refusal else []
+        self._list.content, self._pending.visible = "\n".join(lines), True
+
+    def _begin(self, client: int | None) -> None:
+        if self._renew is None:
+            return
+        texts = tuple(f"{n}.{p}={_text(v)}" for (n, p), v in self._wanted.items())
+        is_allowed = self._may(client)
+        self._tell_pending(self._renew(texts) if is_allowed else "you watch; take control first")
+
+
+def _group(node: str, name: str) -> str:
+    """Stage and group of a parameter, as the choice shows it."""
+    return " · ".join(filter(None, (node, name.rpartition(".")[0])))
+
+
+def _shown(value: Setting) -> bool | int | float | str:
+    """Value as a control shows it: lists as text."""
+    if not isinstance(value, tuple):
+        return value
+    words = [f"{one:g}" if isinstance(one, float) else str(one) for one in _words(value)]
+    return f"[{', '.join(words)}]"
+
+
+def _text(value: Setting) -> str:
+    """Value as ``--set`` takes it."""
+    if not isinstance(value, tuple):
+        return str(value)
+    return f"[{','.join(map(str, _words(value)))}]"
+
+
+def _words(values: tuple[float | str, ...]) -> list[float | str]:
+    """Numbers as they are; texts in quotes if one of them would fall apart in a list without."""
+    is_quoted = any(isinstance(one, str) and set(one) & set(",[]()'\"") for one in values)
+    return [repr(one) if is_quoted and isinstance(one, str) else one for one in values]
+
+
+def _form(info: ParameterInfo) -> str:
+    if isinstance(info.value, tuple):
+        return "list such as [0.1, 0.2]"
+    return {bool: "yes or no", int: "whole number", float: "number"}.get(type(info.value), "text")
+
+
+def _parsed(shown: object, info: ParameterInfo) -> Setting | None:
+    """Value that a control shows, of the parameter's type; None if it is none."""
+    if isinstance(info.value, bool):
+        return bool(shown)
+    if isinstance(info.value, tuple):
+        return _list(str(shown), info.value)
+    if isinstance(info.value, int | float):
+        assert isinstance(shown, int | float)
+        return int(shown) if isinstance(info.value, int) else float(shown)
+    return str(shown)
+
+
+def _list(text: str, like: tuple[object, ...]) -> Setting | None:
+    """Tuple of a text ``[1, 2]`` or ``[a, b]``; of numbers where the present one has numbers."""
+    try:
+        found = ast.literal_eval(text)
+    except (ValueError, SyntaxError):
+        words = text.strip().strip("[]()").split(",")
+        found = tuple(word.strip() for word in words if word.strip())
+    if not isinstance(found, list | tuple):
+        found = (found,)
+    if like and isinstance(like[0], float):
+        numbers = [float(one) for one in found if isinstance(one, int | float)]
+        return tuple(numbers) if len(numbers) == len(found) else None
+    return tuple(found)
+
+
+def _control(gui: viser.GuiApi, label: str, info: ParameterInfo) -> Any:
+    bounds = ""
+    if info.lower is not None or info.upper is not None:
+        low = "−∞" if info.lower is None else f"{info.lower:g}"
+        bounds = f" ({low} to {'∞' if info.upper is None else f'{info.upper:g}'})"
+    hint = f"{info.doc}{bounds}" + (" — takes effect in a new session" if info.is_fixed else "")
+    value, label = _shown(info.value), f"{label}{_unit(info.doc)}"
+    if isinstance(value, bool):
+        return gui.add_checkbox(label, value, hint=hint)
+    if info.choices and not isinstance(info.value, tuple):
+        options = info.choices if value in info.choices else (str(value), *info.choices)
+        return gui.add_dropdown(label, options, initial_value=str(value), hint=hint)
+    if isinstance(value, int | float):
+        step = 1 if isinstance(value, int) else _step(value)
+        return gui.add_number(label, value, step=step, hint=hint)
+    return gui.add_text(label, str(value), hint=hint)
+
+
+def _unit(doc: str) -> str:
+    """Unit in brackets as it ends a meaning, with a space before it; empty without one."""
+    _, bracket, unit = doc.rpartition(" [")
+    return f"{bracket}{unit}" if unit.endswith("]") else ""
+
+
+def _step(value: float) -> float:
+    """A twentieth of a value, in a round number."""
+    if value == 0.0:
+        return 0.001
+    return float(f"{abs(value) / 20.0:.0e}")

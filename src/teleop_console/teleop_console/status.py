@@ -1,0 +1,98 @@
+"""Status: what the page says of a session, which buttons are alive then, and which comes next."""
+
+import html
+
+from teleop_console.answers import Situation
+from teleop_console.link import ArmView, View
+from teleop_core.slave.operation import Fault, State
+
+_SIGNALS = {
+    State.ENABLED: "good", State.PAUSED: "held", State.DISABLED: "idle", State.FAULT: "wrong",
+}  # fmt: skip
+_PRESSED = (
+    "All arms are stopped, latched. Next: when nobody is in danger, press Initialize: it releases "
+    "the stop, resets, enables and homes. Release alone lets the arms stay where they are."
+)
+_RELEASED = "Released; the arms stay in FAULT. Next: press Initialize, which resets and homes them."
+_NEWS = 4  # lines
+RESTS = "nobody holds the stylus"
+"""How nodes of a hand end the line that says that it rests."""
+
+
+def situation(view: View) -> Situation:
+    """What every page shows of a live session, whatever is scrolled or folded."""
+    is_pressed = any(arm.operation.get("is_stopped") for arm in view.arms.values())
+    is_latched = any(
+        State(int(arm.operation["state"])) is State.FAULT
+        and Fault(int(arm.operation["fault"])) is Fault.STOP
+        for arm in view.arms.values()
+        if arm.operation
+    )
+    text = _PRESSED if is_pressed else _RELEASED if is_latched else ""
+    return Situation(can_stop=True, is_stopped=is_pressed or is_latched, text=text)
+
+
+def alive(view: View) -> dict[str, bool]:
+    """Which controls can do something now, by their names."""
+    states = {State(int(arm.operation["state"])) for arm in view.arms.values() if arm.operation}
+    is_stopped = situation(view).is_stopped
+    may_move = bool(states) and not is_stopped
+    return {
+        "Release": is_stopped and any(a.operation.get("is_stopped") for a in view.arms.values()),
+        "Start": may_move and bool(states & {State.PAUSED, State.DISABLED}),
+        "Pause": may_move and State.ENABLED in states,
+        "Home": may_move and State.ENABLED in states,
+        "mode": may_move, "fixture": may_move, "steps": may_move,
+    }  # fmt: skip
+
+
+def next_button(view: View) -> str:
+    """Button that an operator needs next; empty while all arms follow."""
+    states = {State(int(arm.operation["state"])) for arm in view.arms.values() if arm.operation}
+    if states & {State.FAULT, State.DISABLED}:
+        return "Initialize"
+    return "Start" if State.PAUSED in states else ""
+
+
+def mode_text(arm: ArmView) -> str:
+    """Mode and gain of an arm in words; empty before it has said them."""
+    if not arm.state:
+        return ""
+    return f"{'fine' if arm.state['is_fine'] else 'coarse'} × {arm.state['gain']:g}"
+
+
+def fixture_text(arm: ArmView) -> str:
+    """Whether the fixture of an arm is on, in words; empty before it has said that."""
+    return ("on" if arm.state["is_fixture_on"] else "off") if arm.state else ""
+
+
+def status_html(view: View, title: str, doing: str) -> str:
+    """State of every arm, mode, what is being done, and warnings."""
+    lines = [line for name, arm in view.arms.items() for line in _arm_lines(view, name, arm)]
+    lines.append(f'<span class="t-muted">{html.escape(title)} · {html.escape(doing)}</span>')
+    said = [arm.operation_text for arm in view.arms.values() if arm.operation_text]
+    news = [text for text in view.news if not any(known in text for known in said)]
+    lines += [_news_line(text) for text in news[:_NEWS]]
+    # Of one height, so that what is below stays where it is when there is more to say.
+    return f'<div class="t-status">{"".join(f"<p>{line}</p>" for line in lines)}</div>'
+
+
+def _news_line(text: str) -> str:
+    """A warning; a hand that rests is no more than information."""
+    signal, mark = ("muted", "ⓘ") if text.endswith(RESTS) else ("held", "⚠")
+    return f'<span class="t-{signal}">{mark} {html.escape(text)}</span>'
+
+
+def _arm_lines(view: View, name: str, arm: ArmView) -> list[str]:
+    signal = _SIGNALS[State(int(arm.operation["state"]))] if arm.operation else "idle"
+    text = arm.operation_text or "waits for the arm"
+    if not view.is_fresh:
+        text, signal = "nothing comes from the session", "wrong"
+    head, _, rest = text.partition(",") if text[:1].isupper() else (text, "", "")
+    label = f'<span class="t-muted">{html.escape(name)}</span> ' if name else ""
+    first = f'{label}<b class="t-{signal}">● {html.escape(head)}</b>'
+    lines = [f"{first}{',' if rest else ''}{html.escape(rest)}"]
+    if arm.state:
+        hand = "clutched" if arm.state["is_clutched"] else "follows"
+        lines.append(f"{mode_text(arm)} · {hand} · fixture {fixture_text(arm)}")
+    return lines

@@ -1,0 +1,102 @@
+"""Tails: the path of the last seconds as a line that fades."""
+
+import numpy as np
+import viser
+
+from teleop_console.look import Color
+from teleop_core.kernels.geometry import Array
+
+LENGTH = 10.0
+"""Time that a tail shows [s]."""
+PERIOD = 0.25
+"""Time between two drawings of a tail [s]."""
+_POINTS = 160
+_GAP = 1.0  # between two drawings, from which on something else is seen [s]
+_SHORTEST = 1e-4  # between two points of it [m]
+
+
+def is_jump(before: float, time: float) -> bool:
+    """Whether a time [s] is not one that follows another by drawing after drawing."""
+    return time < before or time > before + _GAP
+
+
+class Tail:
+    """Path of a point; few messages, of the same size whatever happens.
+
+    Args:
+        server: The page.
+        name: Path of its node.
+        color: Where it is new.
+        thickness: Of the line [px].
+    """
+
+    def __init__(
+        self, server: viser.ViserServer, name: str, color: Color, thickness: float = 2.5
+    ) -> None:
+        self._times = np.full(_POINTS + 1, -np.inf)
+        self._points = np.zeros((_POINTS + 1, 3))
+        self._color = np.array(color, np.float64)
+        self._sampled = self._drawn = self._last = -np.inf
+        self._background = np.full(3, 255.0)
+        self._is_hidden = False
+        self._line = server.scene.add_line_segments(
+            name, np.zeros((_POINTS, 2, 3), np.float32), np.zeros((_POINTS, 2, 3), np.uint8),
+            thickness=thickness, thickness_units="screen", visible=False,
+        )  # fmt: skip
+
+    def set_background(self, color: Color) -> None:
+        """Colour that it fades into."""
+        self._background = np.array(color, np.float64)
+        self._drawn = -np.inf
+
+    def show(self, *, is_shown: bool) -> None:
+        """Show or hide it; it goes on remembering."""
+        self._is_hidden = not is_shown
+        self._line.visible = is_shown and bool(np.isfinite(self._times[-1]))
+
+    def draw(self, time: float, point: Array | None) -> None:
+        """Take the place of the point (3,) [m] at a time [s]; None where it is unknown.
+
+        A time before the last one, or long after it, begins the tail anew.
+        """
+        if is_jump(self._last, time):
+            self.fill(np.empty(0), np.empty((0, 3)))
+        self._last = time
+        if point is not None and time >= self._sampled + LENGTH / _POINTS:
+            self._append(time, point)
+        if time >= self._drawn + PERIOD:
+            self._drawn = time
+            self._redraw(time)
+
+    def fill(self, times: Array, points: Array) -> None:
+        """Take a whole path at once: times (N,) [s], ascending, and points (N, 3) [m]."""
+        count = min(len(times), _POINTS + 1)
+        chosen = np.linspace(0, max(0, len(times) - 1), count).astype(int)
+        self._times[:] = -np.inf
+        if count:
+            self._times[-count:], self._points[-count:] = times[chosen], points[chosen]
+        self._sampled = self._last = float(self._times[-1])
+        self._drawn = -np.inf
+
+    def _append(self, time: float, point: Array) -> None:
+        is_new = not np.isfinite(self._times[-1])
+        if not is_new and np.abs(point - self._points[-1]).max() < _SHORTEST:
+            return
+        self._times[:-1], self._points[:-1] = self._times[1:].copy(), self._points[1:].copy()
+        self._times[-1], self._points[-1] = time, point
+        self._sampled = time
+
+    def _redraw(self, time: float) -> None:
+        """Send its segments; those that are too old have no length."""
+        age = np.clip((time - self._times) / LENGTH, 0.0, 1.0)
+        kept = np.flatnonzero(age < 1.0)
+        if not len(kept):
+            self._line.visible = False
+            return
+        places = self._points.copy()
+        places[: kept[0]] = places[kept[0]]
+        pairs = np.stack((places[:-1], places[1:]), axis=1)
+        shade = self._color + age[:, None] * (self._background - self._color)
+        self._line.points = pairs.astype(np.float32)
+        self._line.colors = np.stack((shade[:-1], shade[1:]), axis=1).astype(np.uint8)
+        self._line.visible = not self._is_hidden

@@ -1,0 +1,75 @@
+"""World nodes: the object that the slave's tip touches on the page, and how it pushes."""
+
+from collections.abc import Mapping
+from contextlib import suppress
+
+import numpy as np
+import viser
+
+from teleop_console.link import Setting
+from teleop_console.look import TARGET
+from teleop_console.master_nodes import ForceArrow
+from teleop_core.base.parameters import build
+from teleop_core.kernels.geometry import Array
+from teleop_core.robots.robot import Robot
+from teleop_core.shapes.basis.drawing import segments_of
+from teleop_core.slave.world import WORLD_OBJECTS
+from teleop_core.slave.world.parameters import WorldParameters
+
+
+def object_outline(values: Mapping[str, Setting], robot: Robot) -> Array:
+    """Segments (N, 2, 3) [m] of the object in the slave's base; none where nothing is known.
+
+    Args:
+        values: Parameters of the world by name, without what is in front of them.
+        robot: The slave, below whose start an object without a place lies.
+    """
+    nothing, kind = np.empty((0, 2, 3)), values.get("kind", "empty")
+    of_object = ("tool_", f"{kind}.")
+    own = {
+        name: value for name, value in values.items()
+        if name in {"kind", "place", "gap"} or name.startswith(of_object)
+    }  # fmt: skip
+    with suppress(Exception):  # of another's kind anything may fail, and the page goes on
+        world = build(WorldParameters, own)
+        if world.kind.kind == "empty":
+            return nothing
+        center = np.array(world.place or world.below(robot.fk(robot.start)))
+        part = WORLD_OBJECTS.find(world.kind.kind)
+        return segments_of(np.asarray(part.outline(world.kind.parameters), np.float64) + center)
+    return nothing
+
+
+class WorldNodes:
+    """Object and push of one arm, below a node in slave_base.
+
+    Args:
+        server: The page.
+        path: Path of that node.
+        robot: The slave.
+    """
+
+    def __init__(self, server: viser.ViserServer, path: str, robot: Robot) -> None:
+        self._server, self._path, self._robot = server, path, robot
+        self._values: Mapping[str, Setting] = {}
+        self.line: viser.LineSegmentsHandle | None = None
+        self.push = ForceArrow(server, f"{path}/push")
+
+    def retune(self, values: Mapping[str, Setting]) -> None:
+        """Draw the object that these parameters of the world say, in place of the one before."""
+        if values == self._values:
+            return
+        self._values = dict(values)
+        if self.line is not None:
+            self.line.remove()
+            self.line = None
+        outline = object_outline(values, self._robot)
+        if len(outline):
+            self.line = self._server.scene.add_line_segments(
+                f"{self._path}/world", outline.astype(np.float32), TARGET, thickness=2.0,
+                thickness_units="screen",
+            )  # fmt: skip
+
+    def draw(self, tip: Array, force: Array | None) -> None:
+        """Draw the push (3,) [N] at a tip (3,) [m]; None where it is unknown."""
+        self.push.draw(tip, np.zeros(3) if force is None else force)

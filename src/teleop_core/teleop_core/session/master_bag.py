@@ -1,0 +1,105 @@
+"""Master bag: any recording as one whose masters can be replayed and followed.
+
+Recordings that are sound are taken as they are; an installed reader takes others, and tables.
+"""
+
+from importlib.metadata import entry_points
+from pathlib import Path
+
+import numpy as np
+
+from teleop_core.bags.memory import MemoryBag
+from teleop_core.bags.messages import QUATERNION_TOLERANCE
+from teleop_core.bags.reader import Bag
+from teleop_core.base.errors import RecordingError
+from teleop_core.graph.topics import MASTER_BUTTONS, MASTER_MEASURED_CP, Kind
+from teleop_core.kernels.portable import length
+
+READERS = "teleop_core.readers"
+"""Entry-point group of functions ``reader(path, bag, prefixes)``: see :func:`as_master_bag`."""
+
+
+def as_master_bag(recording: Path | str | Bag) -> Bag:
+    """Recording with ``master/measured_cp`` of its arms, and ``master/buttons`` where it has some.
+
+    What had to be guessed, changed or left out is told as a warning.
+
+    Args:
+        recording: A recording, opened or where it is; with ``teleop_exchange`` also ROS 1, CSV
+            or Parquet, other topics, and recordings of damaged rows.
+
+    Returns:
+        The recording itself if it has what is needed, else a copy in memory of these topics, with
+        the same stamps and metadata.
+
+    Raises:
+        RecordingError: It cannot be read, holds no motion, or needs a reader that is not installed.
+        ParameterError: It has several topics of poses.
+    """
+    if isinstance(recording, MemoryBag):
+        return recording
+    path = recording.path if isinstance(recording, Bag) else Path(recording)
+    ours = recording if isinstance(recording, Bag) else _ours(path)
+    prefixes = [] if ours is None else _prefixes(ours)
+    if ours is not None and prefixes and all(is_sound(ours, prefix) for prefix in prefixes):
+        return ours
+    for entry in entry_points(group=READERS):
+        found: Bag = entry.load()(path, ours, prefixes)
+        return found
+    reason = "holds no sound motion of a master; install teleop_exchange, which reads others"
+    raise RecordingError(path, reason)
+
+
+def _ours(path: Path) -> Bag | None:
+    """The recording as we read it; None for other files."""
+    if not path.exists() or not (path.is_dir() or path.suffix == ".mcap"):
+        return None
+    try:
+        return Bag(path)
+    except RecordingError:
+        return None
+
+
+def _prefixes(bag: Bag) -> list[str]:
+    """What stands before ``master/measured_cp`` of each arm that has such poses."""
+    name, kind = MASTER_MEASURED_CP.name, MASTER_MEASURED_CP.kind.ros_type
+    ends = [n for n, info in bag.topics.items() if info.count and info.type == kind]
+    return [n.removesuffix(name) for n in ends if n == name or n.endswith(f"/{name}")]
+
+
+def is_sound(bag: Bag, prefix: str) -> bool:
+    """Whether an arm's poses and buttons can be taken as they are.
+
+    Poses are finite, of unit quaternions, and their stamps do not go back or stand still; buttons
+    are three, and their stamps do not go back.
+    """
+    last, first = -1, -1
+    name = prefix + MASTER_MEASURED_CP.name
+    for block in bag.blocks([name]):
+        if (series := block.get(name)) is None or not len(series):
+            continue
+        lengths = length(series.values[:, 3:])
+        first = int(series.stamp_ns[0]) if first < 0 else first
+        is_rising = series.stamp_ns[0] >= last and (np.diff(series.stamp_ns) >= 0).all()
+        is_unit = (np.abs(lengths - 1.0) <= QUATERNION_TOLERANCE).all()  # NaN is not
+        if not (is_rising and is_unit and np.isfinite(series.values[:, :3]).all()):
+            return False
+        last = int(series.stamp_ns[-1])
+    is_one = bag.topics[name].count == 1
+    return (last > first or is_one) and _are_sound(bag, prefix + MASTER_BUTTONS.name)
+
+
+def _are_sound(bag: Bag, name: str) -> bool:
+    """Whether buttons can be taken as they are; true if there are none."""
+    info = bag.topics.get(name)
+    if info is None or not info.count:
+        return True
+    if info.type != Kind.BUTTONS.ros_type:
+        return False
+    try:
+        stamps = bag.read(name).stamp_ns
+    except RecordingError:  # more or fewer buttons
+        return False
+    return not (len(stamps) > 1 and (stamps == stamps[0]).all()) and bool(
+        (np.diff(stamps) >= 0).all()
+    )

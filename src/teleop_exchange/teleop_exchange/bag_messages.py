@@ -1,0 +1,198 @@
+"""Messages of poses and buttons in bags of others, ROS 1 and 2, as rows of numbers.
+
+Messages are read by the rosbags library, which takes some 6 µs each.
+"""
+
+import struct
+from collections.abc import Iterable, Iterator
+from itertools import islice
+from typing import Any, NamedTuple, NoReturn
+
+import numpy as np
+from numpy.typing import NDArray
+
+from teleop_core.base.errors import UnknownNameError
+from teleop_core.kernels.geometry import Array
+from teleop_exchange.times import SECOND_NS, Stamps
+
+POSES = {
+    "geometry_msgs/msg/PoseStamped": ("pose", True),
+    "geometry_msgs/msg/PoseWithCovarianceStamped": ("pose.pose", True),
+    "nav_msgs/msg/Odometry": ("pose.pose", True),
+    "geometry_msgs/msg/TransformStamped": ("transform", True),
+    "geometry_msgs/msg/Pose": ("", False),
+    "geometry_msgs/msg/PoseWithCovariance": ("pose", False),
+    "geometry_msgs/msg/Transform": ("", False),
+}
+"""Messages that hold a pose: where it is in them, and whether they have a header."""
+TRANSFORMS = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
+JOY = "sensor_msgs/msg/Joy"
+BATCH = 8192
+Raw = tuple[int, bytes]
+"""Time of recording [ns] and bytes of a message."""
+Frames = tuple[str, str]
+"""Parent and child frame of a pose; empty where a message names none."""
+
+
+class Rows(NamedTuple):
+    """Poses of some messages: stamps and times of recording [ns] and rows (n, 7), w before x."""
+
+    stamp_ns: Stamps
+    log_ns: Stamps
+    poses: Array
+
+
+class PoseReader:
+    """Reader of the poses of one topic.
+
+    Args:
+        typestore: Types of the bag, from rosbags.
+        ros_type: Type of the messages.
+        is_ros2: Whether the bytes are CDR, not those of ROS 1.
+        frame: Child frame that is taken; empty for any.
+        parent: Frame in which it is taken; empty for any.
+
+    Attributes:
+        taken: Parent and child frame of the poses taken; None before the first.
+    """
+
+    def __init__(
+        self, typestore: Any, ros_type: str, *, is_ros2: bool, frame: str = "", parent: str = ""
+    ) -> None:
+        self._types, self._type, self._is_ros2 = typestore, ros_type, is_ros2
+        self._frame, self._parent = frame, parent
+        self.taken: Frames | None = None
+
+    def message(self, data: bytes) -> Any:
+        """Message with the attributes of its type."""
+        read = self._types.deserialize_cdr if self._is_ros2 else self._types.deserialize_ros1
+        return read(data, self._type)
+
+    def blocks(self, messages: Iterable[Raw]) -> Iterator[Rows]:
+        """Poses, some messages at a time.
+
+        Raises:
+            UnknownNameError: Poses of several frames, or in several, would be mixed.
+        """
+        stream = iter(messages)
+        while batch := list(islice(stream, BATCH)):
+            found = [row for row in (self._one(*raw) for raw in batch) if row is not None]
+            times = np.array([row[:2] for row in found], np.int64).reshape(-1, 2)
+            poses = np.array([row[2] for row in found], np.float64).reshape(-1, 7)
+            yield Rows(times[:, 0], times[:, 1], poses)
+
+    def _one(self, log_ns: int, data: bytes) -> tuple[int, int, tuple[float, ...]] | None:
+        """Stamp, time of recording [ns] and pose of a message; None if it lacks the frame."""
+        part = self._part(self.message(data))
+        if part is None:
+            return None
+        header, place, turn = part
+        stamp = log_ns if header is None else _stamp(header)
+        return stamp, log_ns, (place.x, place.y, place.z, turn.w, turn.x, turn.y, turn.z)
+
+    def _part(self, message: Any) -> tuple[Any, Any, Any] | None:
+        """Header or None, place and turn in a message; None if it lacks the frame.
+
+        Raises:
+            UnknownNameError: The pose is of another frame, or in another, than those before.
+        """
+        chosen = None
+        for part in self._parts(message):
+            parent, child = named = names_of(part)
+            if self._frame not in {"", child} or self._parent not in {"", parent}:
+                continue
+            if self.taken not in {None, named}:
+                self._refuse(named)
+            self.taken, chosen = named, part
+        if chosen is None:
+            return None
+        if hasattr(chosen.pose, "translation"):
+            return chosen.header, chosen.pose.translation, chosen.pose.rotation
+        return chosen.header, chosen.pose.position, chosen.pose.orientation
+
+    def _parts(self, message: Any) -> list["_Part"]:
+        """Poses in a message."""
+        if self._type in TRANSFORMS:
+            return [_Part(t.header, t.child_frame_id, t.transform) for t in message.transforms]
+        where, has_header = POSES[self._type]
+        pose = message
+        for name in filter(None, where.split(".")):
+            pose = getattr(pose, name)
+        header = message.header if has_header else None
+        return [_Part(header, getattr(message, "child_frame_id", ""), pose)]
+
+    def _refuse(self, named: Frames) -> NoReturn:
+        """Refuse a pose of other frames than those before."""
+        assert self.taken is not None
+        index = 0 if self.taken[0] != named[0] else 1
+        option = ("--parent (poses stand in several)", "--frame (poses are of several)")[index]
+        raise UnknownNameError(option, "", sorted({self.taken[index], named[index]}))
+
+
+def _stamp(header: Any) -> int:
+    """Stamp of a header [ns]."""
+    return int(header.stamp.sec) * SECOND_NS + int(header.stamp.nanosec)
+
+
+def plain(name: str) -> str:
+    """Name of a topic or frame without the slash before it."""
+    return name.removeprefix("/")
+
+
+class _Part(NamedTuple):
+    """A pose in a message, with its header or None, and its child frame or an empty text."""
+
+    header: Any
+    child: str
+    pose: Any
+
+
+def names_of(part: _Part) -> Frames:
+    """Parent and child frame of a pose."""
+    return "" if part.header is None else plain(part.header.frame_id), plain(part.child)
+
+
+def frames(message: Any) -> list[Frames]:
+    """Parent and child frames in a message of transforms."""
+    return [(plain(t.header.frame_id), plain(t.child_frame_id)) for t in message.transforms]
+
+
+class JoyReader:
+    """Reader of the buttons of a topic of Joy messages.
+
+    Args:
+        typestore: Types of the bag.
+        is_ros2: Whether the bytes are CDR.
+        numbers: Number of clutch, fixture and mode among the buttons; -1 for none.
+    """
+
+    def __init__(self, typestore: Any, *, is_ros2: bool, numbers: tuple[int, ...]) -> None:
+        self._types, self._is_ros2, self._numbers = typestore, is_ros2, numbers
+        self._known: dict[bytes, list[int]] = {}
+
+    def message(self, data: bytes) -> Any:
+        """Message with the attributes of its type."""
+        read = self._types.deserialize_cdr if self._is_ros2 else self._types.deserialize_ros1
+        return read(data, JOY)
+
+    def read(self, messages: Iterable[Raw]) -> tuple[Stamps, Stamps, NDArray[np.uint8]]:
+        """Stamps and times of recording (n,) [ns], and pressed or not (n, 3)."""
+        stamps, logs, rows = [], [], []
+        for log, data in messages:
+            # Both formats begin with four bytes and the stamp; what follows is often the same.
+            sec, nanosec = struct.unpack_from("<II", data, 4)
+            row = self._known.get(data[12:])
+            if row is None:
+                row = self._row(data)
+            stamps.append(sec * SECOND_NS + nanosec)
+            logs.append(log)
+            rows.append(row)
+        pressed = np.array(rows, np.uint8).reshape(-1, len(self._numbers))
+        return np.array(stamps, np.int64), np.array(logs, np.int64), pressed
+
+    def _row(self, data: bytes) -> list[int]:
+        buttons = self.message(data).buttons
+        row = [int(0 <= n < len(buttons) and buttons[n] != 0) for n in self._numbers]
+        if len(self._known) < 4096:
+            self._known[data[12:]] = row
+        return row

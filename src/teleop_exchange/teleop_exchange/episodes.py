@@ -1,0 +1,84 @@
+"""Episodes: a table of several recordings, of which an import takes one, as data sets have them."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from teleop_core.base.errors import ParameterError, RecordingError, UnknownNameError
+from teleop_exchange import names
+from teleop_exchange.tables import Numbers, Table
+
+_LISTED = 8
+_NEEDED = "left out: no column is called episode_index or the like"
+
+
+class Episodes:
+    """Rows of the episode that is wanted; of all if the table holds one.
+
+    Args:
+        table: The table.
+        wanted: Number of the episode; None if there is to be one alone.
+
+    Raises:
+        ParameterError: An episode is wanted, and no column says which there are.
+    """
+
+    def __init__(self, table: Table, wanted: int | None) -> None:
+        self._table, self._wanted, self._found = table, wanted, set[float]()
+        self._column = _column(table)
+        if wanted is not None and self._column is None:
+            raise ParameterError("--episode", wanted, _NEEDED)
+
+    def blocks(self, columns: list[int]) -> Iterator[list[Numbers]]:
+        """Some columns of the table, block by block.
+
+        Raises:
+            RecordingError: There are several episodes, and none is wanted; or the file is damaged.
+            UnknownNameError: There is no episode of the wanted number.
+        """
+        if self._column is None:
+            yield from self._table.blocks(columns)
+            return
+        for *block, episode in self._table.blocks([*columns, self._column]):
+            self._found |= set(np.unique(episode[np.isfinite(episode)]).tolist())
+            if self._wanted is None:
+                yield block
+            else:
+                yield [column[episode == self._wanted] for column in block]
+        self._check(self._column)
+
+    def _check(self, column: int) -> None:
+        listed = [f"{number:g}" for number in sorted(self._found)]
+        if self._wanted is not None and self._wanted not in self._found:
+            raise UnknownNameError("--episode", self._wanted, listed)
+        if self._wanted is None and len(listed) > 1:
+            few = ", ".join(listed) if len(listed) < _LISTED else f"{listed[0]} to {listed[-1]}"
+            reason = f"holds {len(listed)} episodes (column {self._table.names[column]!r}: {few})"
+            hint = "take one by --episode N, or each by --episode all"
+            raise RecordingError(self._table.path, f"{reason}; {hint}")
+
+    def told(self) -> list[str]:
+        """What was taken, in words."""
+        return [f"episode {self._wanted} of {len(self._found)}"] * (self._wanted is not None)
+
+
+def numbers_of(table: Table) -> list[int]:
+    """Numbers of the episodes of a table.
+
+    Raises:
+        ParameterError: No column says them.
+    """
+    column = _column(table)
+    if column is None:
+        raise ParameterError("--episode", "all", _NEEDED)
+    found: set[int] = set()
+    for (block,) in table.blocks([column]):
+        found |= set(np.unique(block[np.isfinite(block)]).astype(int).tolist())
+    return sorted(found)
+
+
+def _column(table: Table) -> int | None:
+    """Column of numbers that says which episode a row is of."""
+    column = names.find_episode(table.names) if table.is_named else None
+    is_number = column is not None and np.isfinite(table.sample(column)).all()
+    return column if is_number else None

@@ -1,0 +1,128 @@
+"""Every episode: a table or data set of several recordings becomes a folder with one for each."""
+
+import shutil
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from types import MappingProxyType
+
+from teleop_core.bags.finding import METADATA
+from teleop_core.base.errors import RecordingError, TeleopError
+from teleop_core.session.recording import open_recording
+from teleop_exchange.episodes import numbers_of
+from teleop_exchange.import_report import ImportReport
+from teleop_exchange.imported_motion import open_table
+from teleop_exchange.importing import command_of, import_recording
+from teleop_exchange.options import Changes, ImportOptions, Option, options_of
+
+
+@dataclass(frozen=True)
+class EpisodesReport:
+    """What an import of all episodes made.
+
+    Attributes:
+        out: Folder of the recordings.
+        made: What was found in each, by the number of the episode.
+        kept: Numbers of those whose recording was there already.
+        refused: Why the others are not there, by the number of the episode.
+    """
+
+    out: Path
+    made: Mapping[int, ImportReport]
+    kept: tuple[int, ...]
+    refused: Mapping[int, str]
+
+    def __str__(self) -> str:
+        counts = f"{len(self.made)} episodes imported, {len(self.kept)} kept"
+        return f"{self.out}: {counts}, {len(self.refused)} refused"
+
+
+def import_episodes(
+    file: Path | str,
+    out: Path | str,
+    options: ImportOptions | None = None,
+    *,
+    arms: Mapping[str, Changes] = MappingProxyType({}),
+    say: Callable[[str], object] = lambda _: None,
+    **changes: Option,
+) -> EpisodesReport:
+    """Make a recording of each episode of a table, or of a data set of LeRobot.
+
+    Recordings that are in the folder already are kept, so that an import that was interrupted goes
+    on. An episode that cannot be imported does not keep the others from it.
+
+    Args:
+        file: Table with a column ``episode_index`` or the like, or folder of the data set.
+        out: Folder of the recordings ``episode_000000`` and so on; may be there.
+        options: As of :func:`teleop_exchange.import_recording`, without ``episode``.
+        arms: As there.
+        say: Told a line after each episode.
+        **changes: As ``options``.
+
+    Raises:
+        RecordingError: The file is missing or damaged, or holds an episode twice.
+        ParameterError: No column says which episodes there are, or an option is wrong.
+    """
+    base, out = options or ImportOptions(), Path(out)
+    options_of(base, arms, changes)  # refused here, not once for each episode
+    files = files_of(Path(file), base.changed(**changes))
+    made: dict[int, ImportReport] = {}
+    kept, refused = [], dict[int, str]()
+    for count, (number, path) in enumerate(sorted(files.items()), start=1):
+        target, of_one = out / f"episode_{number:06d}", replace(base, episode=number)
+        where = f"{target.name} ({count} of {len(files)})"
+        wanted = options_of(of_one, arms, changes)
+        try:
+            if _is_there(target, command_of(path, target, wanted)):
+                kept.append(number)
+                say(f"{where}: kept")
+                continue
+            out.mkdir(parents=True, exist_ok=True)
+            made[number] = import_recording(path, target, of_one, arms=arms, **changes)
+            say(f"{where}: {made[number].duration:.1f} s imported")
+        except TeleopError as error:
+            refused[number] = str(error)
+            say(f"{where}: refused: {error}")
+    return EpisodesReport(out, made, tuple(kept), refused)
+
+
+def files_of(path: Path, options: ImportOptions) -> dict[int, Path]:
+    """File of each episode, by its number.
+
+    Args:
+        path: The only file, or the folder of a data set, whose ``data`` holds Parquet.
+        options: How text is read.
+
+    Raises:
+        RecordingError: There is no file, one is damaged, or two hold the same episode.
+        ParameterError: No column says which episodes a file holds.
+    """
+    files = sorted((path / "data").rglob("*.parquet")) if path.is_dir() else [path]
+    if not files or not path.exists():
+        reason = "holds no data/**/*.parquet" if path.exists() else "does not exist"
+        raise RecordingError(path, reason)
+    found: dict[int, Path] = {}
+    for file in files:
+        for number in numbers_of(open_table(file, options)):
+            if number in found:
+                raise RecordingError(path, f"holds episode {number} in {found[number]} and {file}")
+            found[number] = file
+    return found
+
+
+def _is_there(target: Path, command: str) -> bool:
+    """Whether a recording was made by a command before; half of one is removed.
+
+    Raises:
+        RecordingError: It was made by another.
+    """
+    if not target.exists():
+        return False
+    is_half = not (target / METADATA).exists()
+    if is_half and all(file.suffix == ".mcap" for file in target.iterdir()):
+        shutil.rmtree(target)
+        return False
+    before = open_recording(target).metadata.get("imported_by", "another command")
+    if before != command:
+        raise RecordingError(target, f"was made by {before}; choose another --out")
+    return True

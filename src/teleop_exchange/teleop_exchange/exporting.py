@@ -1,0 +1,241 @@
+"""Export: recordings become tables, CSV or Parquet, or a data set for learning."""
+
+import shutil
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.csv as pc
+import pyarrow.parquet as pq
+
+from teleop_core.base.errors import ParameterError, RecordingError, UnknownNameError
+from teleop_core.graph.topics import BY_NAME, Kind
+from teleop_core.session.recording import Recording, open_recording
+from teleop_exchange.joining import Joined, Streams
+
+_BY_COLUMN = {
+    **dict.fromkeys("xyz", "m"),
+    **dict.fromkeys(("qw", "qx", "qy", "qz"), "1"),
+    **dict.fromkeys(("vx", "vy", "vz"), "m/s"),
+    **dict.fromkeys(("wx", "wy", "wz"), "rad/s"),
+    **dict.fromkeys(("fx", "fy", "fz"), "N"),
+    **dict.fromkeys(("tx", "ty", "tz"), "Nm"),
+}
+
+
+def unit_of(topic: str, column: str) -> str:
+    """Unit of a column of a topic; empty where it has none.
+
+    Joints may turn or slide: their positions are in rad or m.
+    """
+    known = next((t for n, t in BY_NAME.items() if topic == n or topic.endswith(f"/{n}")), None)
+    if known is not None and known.columns:
+        return _of_number(column)
+    if known is not None and known.kind is Kind.JAW:
+        return {"velocity": "rad/s", "effort": "Nm"}.get(column, "rad")
+    if known is None or not known.kind.has_joints:
+        return _BY_COLUMN.get(column, "")
+    last = column.rpartition(".")[2]
+    return {"velocity": "rad/s or m/s", "effort": "Nm or N"}.get(last, "rad or m")
+
+
+def _of_number(column: str) -> str:
+    """Unit of a named number, as of a report."""
+    if column.startswith(("fixture_center", "fixture_size")):
+        return "m"
+    if column == "position_residual" or column in {"cut_x", "cut_y", "cut_z"}:
+        return "m"
+    if column in {"rotation_residual", "jaw"} or column.startswith("cut_r"):
+        return "rad"
+    return {"force": "N", "slid": "m"}.get(column, "")
+
+
+FORMATS = ("csv", "parquet", "lerobot")
+ACTIONS = ("joints", "tip")
+OneRecording = Recording | Path | str
+
+
+@dataclass(frozen=True)
+class ExportReport:
+    """What was exported.
+
+    Attributes:
+        out: File or directory made.
+        rows: Rows in it; of a data set its frames.
+        columns: Names of the columns; of a data set its features.
+        episodes: Number of recordings in it.
+    """
+
+    out: Path
+    rows: int
+    columns: tuple[str, ...]
+    episodes: int = 1
+
+    def __str__(self) -> str:
+        if self.episodes > 1 or self.out.is_dir():
+            return f"{self.out}: {self.episodes} episodes, {self.rows} frames of " + ", ".join(
+                self.columns
+            )
+        return f"{self.out}: {self.rows} rows, {len(self.columns)} columns"
+
+
+def export_recording(
+    recording: OneRecording | Sequence[OneRecording],
+    out: Path | str,
+    format: str | None = None,  # noqa: A002
+    *,
+    topics: Iterable[str] = (),
+    rate: float | None = None,
+    units: bool = False,
+    action: str = "joints",
+    task: str = "teleoperation",
+) -> ExportReport:
+    """Write recordings in a format of others.
+
+    Tables have the time [s] since the recording began in their first column and then a column for
+    each number of each topic, called as :meth:`teleop_core.Recording.frame` does:
+    ``slave/measured_cp.x``. A row stands wherever a topic has a message; what has none there is
+    empty, but the columns of reports such as ``teleop/state`` keep their values. The columns of
+    Parquet have their units as metadata.
+
+    A data set of LeRobot (version 3.0 of its format, without pictures) has one episode per
+    recording: ``observation.state``, the slave's joints and the pose of its tip; ``action``, what
+    they were told.
+
+    Args:
+        recording: A recording or where it is; several for a data set.
+        out: File to make, or directory of a data set; nothing is left there after an error.
+        format: ``csv``, ``parquet`` or ``lerobot``; None: as the name of ``out`` ends.
+        topics: Topics of a table; all if empty.
+        rate: Rows per second [Hz], each with the newest values; None for a row per message, in a
+            data set 50 Hz.
+        units: Whether names of columns end with the unit, as ``slave/measured_cp.x [m]``.
+        action: Of a data set: ``joints`` (``slave/servo_jp``) or ``tip`` (``slave/servo_cp``).
+        task: Of a data set: what is done in it, in words.
+
+    Returns:
+        What was written.
+
+    Raises:
+        RecordingError: A recording cannot be read, or ``out`` exists or cannot be written.
+        UnknownNameError: There is no such format or topic.
+        ParameterError: A value does not fit the format.
+    """
+    several = [recording] if isinstance(recording, OneRecording) else list(recording)
+    path = Path(out)
+    chosen = format or _by_name(path)
+    if chosen not in FORMATS:
+        raise UnknownNameError("--format", chosen, FORMATS)
+    if rate is not None and not 0.0 < rate <= 1e6:
+        raise ParameterError("--rate", rate, "above 0 Hz")
+    if path.exists():
+        raise RecordingError(path, "exists already; choose another --out")
+    if not several:
+        raise ParameterError("recording", [], "at least one recording")
+    opened = [one if isinstance(one, Recording) else open_recording(one) for one in several]
+    if chosen == "lerobot":
+        return _data_set(opened, path, rate, action, task)
+    if len(opened) > 1:
+        raise ParameterError("recordings", len(opened), f"one for {chosen}; lerobot takes several")
+    streams = Streams(opened[0], topics)
+    rows = streams.joined() if rate is None else streams.sampled(rate)
+    schema = _schema(streams, units=units)
+    with whole(path) as draft:
+        written = _write(streams, rows, schema, draft, chosen, is_packed=path.suffix == ".gz")
+    return ExportReport(path, written, tuple(schema.names))
+
+
+def _by_name(path: Path) -> str:
+    """Format that the end of a name says; a name without an end is a data set."""
+    name = path.name.lower().removesuffix(".gz")
+    for chosen in ("csv", "parquet"):
+        if name.endswith(f".{chosen}"):
+            return chosen
+    if not path.suffix:
+        return "lerobot"
+    raise ParameterError("--out", path.name, "a name that ends with .csv, .csv.gz or .parquet, or "
+                         "a directory for lerobot; else give --format")  # fmt: skip
+
+
+def _data_set(
+    recordings: list[Recording], path: Path, rate: float | None, action: str, task: str
+) -> ExportReport:
+    from teleop_exchange.lerobot import FPS, write_data_set
+
+    if action not in ACTIONS:
+        raise UnknownNameError("--action", action, ACTIONS)
+    fps = FPS if rate is None else rate
+    if fps != round(fps):
+        raise ParameterError("--rate", fps, "a whole number for lerobot")
+    with whole(path) as draft:
+        frames, features = write_data_set(recordings, draft, round(fps), action, task)
+    return ExportReport(path, frames, features, len(recordings))
+
+
+@contextmanager
+def whole(path: Path) -> Iterator[Path]:
+    """Draft beside a path, which takes its place when all is written, and is removed otherwise.
+
+    Raises:
+        RecordingError: It cannot be written.
+    """
+    draft = path.with_name(f".{path.name}.part")
+    try:
+        _remove(draft)
+        draft.parent.mkdir(parents=True, exist_ok=True)
+        yield draft
+        draft.rename(path)
+    except OSError as error:
+        raise RecordingError(path, f"cannot be written: {error.strerror or error}") from error
+    finally:
+        _remove(draft)
+
+
+def _remove(draft: Path) -> None:
+    if draft.is_dir():
+        shutil.rmtree(draft, ignore_errors=True)
+    else:
+        draft.unlink(missing_ok=True)
+
+
+def _schema(streams: Streams, *, units: bool) -> pa.Schema:
+    """Names of the columns, with their units as metadata."""
+    found = [("time", "s")]
+    for topic, columns in streams.columns.items():
+        found += [(f"{topic}.{column}", unit_of(topic, column)) for column in columns]
+    return pa.schema(
+        pa.field(f"{name} [{unit}]" if units and unit else name, pa.float64(),
+                 metadata={"unit": unit})
+        for name, unit in found
+    )  # fmt: skip
+
+
+def _write(
+    streams: Streams, rows: Iterable[Joined], schema: pa.Schema, draft: Path, chosen: str, *,
+    is_packed: bool,
+) -> int:  # fmt: skip
+    """Write all rows; their number."""
+    written = 0
+    packed = "gzip" if is_packed and chosen == "csv" else None
+    with pa.output_stream(str(draft), compression=packed) as file:
+        writer: Callable[..., pc.CSVWriter | pq.ParquetWriter] = pq.ParquetWriter
+        if chosen == "csv":
+            writer = pc.CSVWriter
+        with writer(file, schema) as table:
+            for piece in rows:
+                table.write_table(_table(streams, piece, schema))
+                written += len(piece.time_ns)
+    return written
+
+
+def _table(streams: Streams, piece: Joined, schema: pa.Schema) -> pa.Table:
+    columns = [(piece.time_ns - streams.start_ns) * 1e-9]
+    for topic in streams.columns:
+        columns += list(np.ascontiguousarray(piece.values[topic].T))
+    # What is NaN becomes an empty cell.
+    return pa.Table.from_arrays(
+        [pa.array(column, pa.float64(), from_pandas=True) for column in columns], schema=schema
+    )

@@ -1,0 +1,100 @@
+"""Recordings of others as a master: what ``replay`` and the operators ``bag`` and ``file`` follow.
+
+A copy in memory is made: of another topic or message of the pose, stamps that say nothing, buttons
+of another Joy, damaged rows.
+"""
+
+import csv
+import warnings
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from teleop_core.bags.memory import MemoryBag
+from teleop_core.bags.reader import Bag
+from teleop_core.bags.series import Series
+from teleop_core.base.damage import damage_told
+from teleop_core.base.errors import RecordingError, TeleopError, TeleopWarning
+from teleop_core.graph.topics import MASTER_BUTTONS, MASTER_MEASURED_CP, Kind, Topic
+from teleop_core.session.recorded_hand import COLUMNS
+from teleop_exchange.imported_motion import Motion
+from teleop_exchange.options import ImportOptions
+
+
+def master_of_others(path: Path, bag: Bag | None, prefixes: Sequence[str]) -> MemoryBag:
+    """Copy of the master's topics in memory, with the same stamps and metadata.
+
+    Args:
+        path: A recording or table.
+        bag: The same, if it is a recording as ours.
+        prefixes: What stands before ``master/measured_cp`` of each of its arms.
+
+    Raises:
+        RecordingError: It cannot be read, or holds no motion.
+        ParameterError: It has several topics of poses.
+    """
+    wanted = columns_of(path)
+    series: dict[Topic, Series] = {}
+    for prefix in prefixes or [""]:
+        chosen = wanted if bag is None else _of_arm(bag, prefix, wanted)
+        series |= _read(path, prefix.rstrip("/"), chosen)
+    return MemoryBag(str(path), series, {}, {} if bag is None else bag.metadata)
+
+
+def columns_of(path: Path) -> ImportOptions:
+    """Columns of a table that are called as an operator's file; guessed in other files."""
+    if path.suffix.lower() != ".csv" or not path.is_file():
+        return ImportOptions()
+    try:
+        with damage_told(path), path.open(newline="", encoding="utf-8") as file:
+            head = [name.strip() for name in next(csv.reader(file), [])]
+    except RecordingError:  # whoever reads all of it says what is wrong
+        return ImportOptions()
+    if not set(COLUMNS[:4]) <= set(head) <= set(COLUMNS):
+        return ImportOptions()
+    turn = COLUMNS[4:7] if set(COLUMNS[4:7]) <= set(head) else ()
+    return ImportOptions(
+        time=COLUMNS[:1], time_unit="s", position=COLUMNS[1:4], unit="m", rotation_vector=turn,
+        angles="rad", orientation="none",
+    ).changed(**{name: name for name in COLUMNS[7:] if name in head})  # fmt: skip
+
+
+def _of_arm(bag: Bag, prefix: str, options: ImportOptions) -> ImportOptions:
+    """Options that take an arm's topics, where it has them and nothing else is wanted."""
+    poses, buttons = prefix + MASTER_MEASURED_CP.name, prefix + MASTER_BUTTONS.name
+    topic = options.topic or (poses if poses in bag.topics else "")
+    known = bag.topics.get(buttons)
+    is_joy = known is not None and known.count and known.type == Kind.BUTTONS.ros_type
+    return replace(
+        options, topic=topic, buttons_topic=options.buttons_topic or (buttons if is_joy else "")
+    )
+
+
+def _read(path: Path, arm: str, options: ImportOptions) -> dict[Topic, Series]:
+    """Streams of one arm."""
+    with _options_told(path):
+        motion = Motion(path, options)
+    presses, stamps = motion.presses(), motion.stamp_ns
+    topic = MASTER_MEASURED_CP.of_arm(arm)
+    found = {topic: Series(stamps, stamps, motion.poses, (), topic.frame_id)}
+    if presses is not None:
+        topic = MASTER_BUTTONS.of_arm(arm)
+        at, pressed = presses
+        found[topic] = Series(at, at, pressed.astype(np.float64), (), topic.frame_id)
+    if notes := [*motion.told, *motion.losses()]:
+        warnings.warn(f"{path.name}: {'; '.join(notes)}", TeleopWarning, stacklevel=4)
+    return found
+
+
+@contextmanager
+def _options_told(path: Path) -> Iterator[None]:
+    """Say whose options those are that an error advises: who plays a recording takes none."""
+    try:
+        yield
+    except TeleopError as error:
+        if "--" in str(error):
+            error.args = (f"{error} (an option of `teleop import {path} --out DIR`)",)
+        raise

@@ -1,0 +1,201 @@
+"""Gathering: all rows of a source, with their times and what is missing."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from teleop_core.base.errors import RecordingError
+from teleop_core.base.ranges import check
+from teleop_core.kernels.geometry import Array
+from teleop_exchange.options import LENGTHS, ImportOptions
+from teleop_exchange.source import Presses, Source
+from teleop_exchange.times import SECOND_NS, Stamps, guessed_unit, is_constant, joined_ns
+
+SAMPLE = 1000
+"""Times of a block, and blocks, from which the unit is guessed."""
+MOST_STRANGE = 0.01
+"""Share of rows whose orientation may be none before the file is refused."""
+TOLD_LENGTH = 1e-3
+"""Difference of a quaternion's length from 1 from which on it is told."""
+_NO_TIME = np.iinfo(np.int64).min
+FARTHEST = 5.0
+"""Coordinate of a hand [m] beyond which somebody must say that it is in metres."""
+
+
+@dataclass(eq=False)
+class Gathered:
+    """A file after the first pass.
+
+    Attributes:
+        rows: Rows (N, 7): position [m] in the file's axes, quaternion w, x, y, z.
+        stamp_ns: Times (N,) [ns]; rows without one are not usable.
+        is_usable: Which rows are numbers throughout (N,).
+        buttons: Pressed or not (N, 3), in step with the rows; None without such columns.
+        presses: Buttons with times of their own; None without.
+        told: What was taken and guessed, in words.
+        bad_rows: How many rows were left out as damaged before they came here.
+        strange: How many orientations cannot be rotations.
+        order: Rows in the order in which they were recorded (N,); None if it is that of the file.
+    """
+
+    rows: Array
+    stamp_ns: Stamps
+    is_usable: NDArray[np.bool_]
+    buttons: NDArray[np.uint8] | None
+    presses: Presses | None
+    told: list[str]
+    bad_rows: int
+    strange: int
+    order: NDArray[np.int32] | None = None
+
+
+@dataclass(eq=False)
+class _Parts:
+    """What is collected block by block."""
+
+    rows: list[Array]
+    times: list[NDArray[np.float64] | Stamps]
+    logs: list[Stamps]
+    usable: list[NDArray[np.bool_]]
+    buttons: list[NDArray[np.uint8]]
+    finite: NDArray[np.float64]
+    farthest: float = 0.0
+
+
+def gather(source: Source, options: ImportOptions) -> Gathered:
+    """Read all of a source.
+
+    Raises:
+        RecordingError: It holds no rows, or a column of nothing, or its orientations are none, or
+            nobody says in which unit places far beyond a hand's reach are.
+    """
+    parts = _Parts([], [], [], [], [], np.zeros(4))
+    scale = LENGTHS[source.unit]
+    for block in source.blocks():
+        rows = np.column_stack((scale * block.position, block.quaternion))
+        parts.rows.append(rows)
+        is_number: NDArray[np.bool_] = np.isfinite(rows)
+        parts.finite += [*is_number[:, :3].sum(axis=0), is_number[:, 3:].all(axis=1).sum()]
+        sizes = np.abs(rows[:, :3][is_number[:, :3]])
+        parts.farthest = max(parts.farthest, float(sizes.max(initial=0.0)))
+        parts.usable.append(np.asarray(is_number.all(axis=1)))
+        parts.times.append(block.time)
+        if block.log_ns is not None:
+            parts.logs.append(block.log_ns)
+        if block.buttons is not None:
+            parts.buttons.append(block.buttons)
+    count = sum(map(len, parts.rows))
+    if not count:
+        raise RecordingError(source.path, "holds no rows")
+    _check(source, parts, count)
+    told = list(source.told)
+    if source.attitudes.longest > TOLD_LENGTH:
+        told.append(f"quaternions up to {source.attitudes.longest:.2g} off unit length made unit")
+    order = _recorded_order(parts.logs)
+    stamps, usable, is_log = _stamps(source, options, parts, told)
+    presses = source.presses()
+    if presses is not None and (is_log or is_constant(presses.stamp_ns)):
+        presses = Presses(presses.log_ns, presses.log_ns, presses.pressed)
+    buttons = np.concatenate(parts.buttons) if parts.buttons else None
+    strange = source.attitudes.strange
+    rows = np.concatenate(parts.rows)
+    return Gathered(rows, stamps, usable, buttons, presses, told, source.bad_rows, strange, order)
+
+
+def _recorded_order(logs: list[Stamps]) -> NDArray[np.int32] | None:
+    """Rows in the order of their times of recording (N,); None if they stand so.
+
+    Files of several writers, and splits that are listed in another order, hold them in any.
+    """
+    whole = np.concatenate(logs) if logs else np.zeros(0, np.int64)
+    if (whole[1:] >= whole[:-1]).all():
+        return None
+    return np.argsort(whole, kind="stable").astype(np.int32)
+
+
+def _check(source: Source, parts: _Parts, count: int) -> None:
+    """Refuse what is no motion.
+
+    Raises:
+        RecordingError: Says what it is.
+    """
+    attitudes = source.attitudes
+    if attitudes.strange > MOST_STRANGE * count:
+        share = 100.0 * attitudes.strange / count
+        raise RecordingError(source.path, f"{_strange(attitudes.kind)} in {share:.3g} % of the rows"
+                             f"{_hint(attitudes.kind, attitudes.mirrored)}")  # fmt: skip
+    source.check(parts.finite)
+    check("farthest place from the origin", parts.farthest, "m")
+    if parts.farthest > FARTHEST and not source.is_unit_said:
+        reason = (
+            f"places are up to {parts.farthest:,.4g} m from the origin, if they are in metres; say "
+            "their unit: --unit mm, or --unit m if they are"
+        )
+        raise RecordingError(source.path, reason)
+
+
+def _strange(kind: str) -> str:
+    if kind == "matrix":
+        return "the matrix is no rotation (off by more than 0.1, or a mirror)"
+    return "the quaternion is not of unit length (off by more than 0.1)"
+
+
+def _hint(kind: str, mirrored: int) -> str:
+    if kind == "matrix" and mirrored:
+        return ": are the columns of --matrix in order, row by row? A mirror changes handedness"
+    name = "--matrix" if kind == "matrix" else "--quaternion and their order"
+    return f": check the columns of {name}, or give --orientation none"
+
+
+def _stamps(
+    source: Source, options: ImportOptions, parts: _Parts, told: list[str]
+) -> tuple[Stamps, NDArray[np.bool_], bool]:
+    """Times [ns] of all rows, which rows are usable, and whether these are times of recording."""
+    usable = np.concatenate(parts.usable)
+    if not source.has_time:
+        assert options.rate is not None
+        told.append(f"times from the rate of {options.rate:g} Hz")
+        steps = np.arange(len(usable)) * (SECOND_NS / options.rate)
+        return np.rint(steps).astype(np.int64), usable, False
+    if parts.logs and options.stamps == "log":
+        told.append("stamps: time of recording")
+        return np.concatenate(parts.logs), usable, True
+    is_bag = bool(parts.logs)  # where a stamp of zero says that there is none
+    known = [part[np.isfinite(part) & ((part != 0) | (not is_bag))] for part in parts.times]
+    first = next((float(part[0]) for part in known if len(part)), 0.0 if is_bag else math.nan)
+    if math.isnan(first):
+        raise RecordingError(source.path, "the column of the time holds no numbers")
+    if all((part == first).all() for part in known) and len(usable) > 1:
+        return _without_stamps(source, parts, first, told), usable, True
+    unit = source.time_unit
+    if unit == "auto":
+        unit, reason = guessed_unit(_few(known))
+        told.append(f"times in {unit}" + (f" ({reason})" if reason else ""))
+    del known
+    stamps = joined_ns(parts.times, unit, _NO_TIME)
+    if (stamps == _NO_TIME).all():
+        reason = f"its times are {first:g} {unit} and so on, after 2096; give another --time-unit"
+        raise RecordingError(source.path, reason)
+    usable &= (stamps != _NO_TIME) & ((stamps != 0) | (not is_bag))
+    return stamps, usable, False
+
+
+def _without_stamps(source: Source, parts: _Parts, value: float, told: list[str]) -> Stamps:
+    """Times of recording in place of times that are all the same.
+
+    Raises:
+        RecordingError: There are none.
+    """
+    if not parts.logs:
+        reason = f"the time is {value:g} in every row; choose another --time, or give --rate HZ"
+        raise RecordingError(source.path, reason)
+    stamp = f"{value / SECOND_NS:g} s"
+    told.append(f"header stamps are all {stamp}: the time of recording is taken")
+    return np.concatenate(parts.logs)
+
+
+def _few(parts: list[NDArray[np.float64] | Stamps]) -> NDArray[np.float64]:
+    """Some of the times, in order."""
+    return np.concatenate([part[:SAMPLE] for part in parts[:SAMPLE]], dtype=np.float64)

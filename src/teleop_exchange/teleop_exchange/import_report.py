@@ -1,0 +1,160 @@
+"""Import report: what was imported, what became of it, and what looks wrong."""
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from teleop_core.kernels.geometry import Array
+from teleop_core.kernels.portable import dot, length
+from teleop_exchange.imported_motion import Counts, Motion
+from teleop_exchange.times import Stamps, spread_ms
+
+if TYPE_CHECKING:
+    from teleop_core.session.recording import Recording
+
+LARGE = 1.0
+"""Motion of a hand [m] from which on the unit is asked for."""
+FAST = 5.0
+"""Speed of a hand [m/s] from which on it is asked for."""
+SLOW_HZ = 20.0
+SPEED_HZ = 30.0
+"""Rate at which speeds are taken, so that the noise of fast devices does not count."""
+_SHOWN = 5
+
+
+@dataclass(frozen=True)
+class ImportReport:
+    """What an import found and made.
+
+    Attributes:
+        file: Name of the file, without its folder.
+        out: The recording made; None if it is in memory alone.
+        counts: What became of the rows.
+        losses: The same in words.
+        start_ns: First stamp [ns].
+        duration: From the first to the last sample [s].
+        rate: Samples per second [Hz]: one over the median period.
+        period_ms: Median, 5 % and 95 % of the periods [ms].
+        range: Extent on x, y, z in the master's axes [m].
+        rotation: Largest turn away from the first attitude [rad].
+        speed: Median and 95 % of the speed [m/s], at 30 Hz or the rate if that is lower.
+        fastest: Largest speed between two samples [m/s].
+        gaps: Begin and length [s] of each gap, the longest first.
+        told: What was taken, guessed and changed.
+        warnings: What looks wrong.
+        arm: Name of the hand; empty if there is one alone.
+        others: Reports of the further hands of the same file.
+    """
+
+    file: str
+    out: Path | None
+    counts: Counts
+    losses: tuple[str, ...]
+    start_ns: int
+    duration: float
+    rate: float
+    period_ms: tuple[float, float, float]
+    range: tuple[float, float, float]
+    rotation: float
+    speed: tuple[float, float]
+    fastest: float
+    gaps: tuple[tuple[float, float], ...]
+    told: tuple[str, ...]
+    warnings: tuple[str, ...]
+    arm: str = ""
+    others: "tuple[ImportReport, ...]" = ()
+
+    @property
+    def recording(self) -> "Recording":
+        """The recording made.
+
+        Raises:
+            RecordingError: It is gone.
+        """
+        from teleop_core.session.recording import open_recording
+
+        return open_recording(self.out or "")
+
+    def lines(self) -> list[str]:
+        """The report in a few lines."""
+        middle, low, high = self.period_ms
+        x, y, z = (f"{1e3 * value:.1f}" for value in self.range)
+        median, fast = (f"{1e3 * value:.0f}" for value in self.speed)
+        out = [f"arm       {self.arm}"] * bool(self.arm)
+        out += [f"taken     {text}" for text in self.told] + [
+            f"samples   {self._samples()}",
+            f"time      {self.duration:.3f} s at {self.rate:.4g} Hz; 90 % of the periods are "
+            f"{low:.3g} to {high:.3g} ms, median {middle:.4g} ms",
+            f"range     x {x}, y {y}, z {z} mm; rotation {math.degrees(self.rotation):.1f}°",
+            f"speed     median {median}, 95 % {fast} mm/s",
+            f"gaps      {self._gaps()}",
+        ]
+        return out + [f"warning   {text}" for text in self.warnings]
+
+    def _samples(self) -> str:
+        return ", ".join([f"{self.counts.samples} of {self.counts.rows} rows", *self.losses])
+
+    def _gaps(self) -> str:
+        if not self.gaps:
+            return "none"
+        shown = ", ".join(f"{length:.3g} s at {at:.3f} s" for at, length in self.gaps[:_SHOWN])
+        more = f", … ({len(self.gaps)} in all)" if len(self.gaps) > _SHOWN else ""
+        return f"{len(self.gaps)}: {shown}{more}" if not more else shown + more
+
+    def __str__(self) -> str:
+        return "\n".join(line for one in (self, *self.others) for line in one.lines())
+
+
+def summary(file: str, out: Path | None, motion: Motion, arm: str = "") -> ImportReport:
+    """Report of a motion."""
+    period = spread_ms(motion.stamp_ns)
+    places, turns = motion.poses[:, :3], motion.poses[:, 3:]
+    rate = 1e3 / period[0] if period[0] > 0.0 else 0.0
+    extent = places.max(axis=0) - places.min(axis=0)
+    steps = speeds(motion.stamp_ns, places)
+    every = max(1, round(rate / SPEED_HZ))
+    median, high = np.percentile(speeds(motion.stamp_ns[::every], places[::every]), (50, 95))
+    cosine = np.clip(np.abs(dot(turns, turns[0])), 0.0, 1.0).min()
+    return ImportReport(
+        file=file, out=out, counts=motion.counts, losses=tuple(motion.losses()),
+        start_ns=int(motion.stamp_ns[0]),
+        duration=float(motion.stamp_ns[-1] - motion.stamp_ns[0]) * 1e-9,
+        rate=rate, period_ms=period,
+        range=(float(extent[0]), float(extent[1]), float(extent[2])),
+        rotation=2.0 * math.acos(cosine), speed=(float(median), float(high)),
+        fastest=float(steps.max()), gaps=motion.gaps, told=tuple(motion.told),
+        warnings=tuple(_warnings(motion, steps, float(extent.max()), rate)), arm=arm,
+    )  # fmt: skip
+
+
+def speeds(stamps: Stamps, places: Array) -> Array:
+    """Speeds [m/s] between rows; one of zero for a row alone."""
+    if len(stamps) < 2:
+        return np.zeros(1)
+    return np.asarray(length(np.diff(places, axis=0)) / (np.diff(stamps) * 1e-9))
+
+
+def _warnings(motion: Motion, steps: Array, largest: float, rate: float) -> list[str]:
+    out, c = [], motion.counts
+    if largest > LARGE:
+        out.append(f"the hand moves {largest:,.4g} m: is the unit mm? (--unit mm, or --scale)")
+    elif largest < 1e-3:
+        out.append(f"the hand moves {1e6 * largest:.3g} µm at most: is the unit right? (--unit)")
+    if fast := int((steps > FAST).sum()):
+        at = float(motion.stamp_ns[steps.argmax()] - motion.stamp_ns[0]) * 1e-9
+        out.append(f"{fast} steps faster than {FAST:g} m/s, up to {steps.max():.3g} m/s at "
+                   f"{at:.3f} s: a wrong unit, or the tracking jumps")  # fmt: skip
+    if rate < SLOW_HZ:
+        out.append(f"{rate:.3g} Hz is slow for a hand (below {SLOW_HZ:g} Hz): is the unit of the "
+                   "time right? (--time-unit)")  # fmt: skip
+    if c.missing > 0.1 * c.rows:
+        out.append(f"{100.0 * c.missing / c.rows:.3g} % of the rows lack numbers")
+    if c.doubled > 0.1 * c.rows:
+        out.append(f"{100.0 * c.doubled / c.rows:.3g} % of the times are doubled: are they too "
+                   "coarse? (else --rate)")  # fmt: skip
+    if motion.strange:
+        out.append(f"{motion.strange} rows have an orientation that is none; they are left out")
+    return out

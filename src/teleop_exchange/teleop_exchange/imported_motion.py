@@ -1,0 +1,231 @@
+"""Motion: an imported hand, cleaned and in the master's axes."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from teleop_core.base.damage import damage_told
+from teleop_core.base.errors import RecordingError
+from teleop_core.kernels import geometry
+from teleop_core.kernels.portable import product
+from teleop_exchange.gathering import gather
+from teleop_exchange.options import ImportOptions
+from teleop_exchange.source import Source
+from teleop_exchange.times import SECOND_NS, Stamps, gaps, ordered, restarts
+
+if TYPE_CHECKING:
+    from teleop_exchange.tables import Table
+
+ROWS = 20_000
+"""Rows that are turned at once."""
+MOST_BACKWARDS = 0.01
+"""Share of rows whose time may go back before the file is refused."""
+MOST_DOUBLED = 0.5
+
+
+@dataclass(frozen=True)
+class Counts:
+    """What became of the rows of a file.
+
+    Attributes:
+        rows: Rows in the file.
+        samples: Rows that are left.
+        missing: Rows left out because a number is missing or NaN, or the orientation is none.
+        doubled: Rows left out because their time was there already.
+        backwards: Rows whose time went back; left out or sorted in.
+        damaged: Rows left out because they have too few or too many cells.
+    """
+
+    rows: int
+    samples: int
+    missing: int
+    doubled: int
+    backwards: int
+    damaged: int
+
+
+class Motion:
+    """Poses of a hand in the master's axes.
+
+    Args:
+        path: The file.
+        options: What is taken of it, and what becomes of that.
+
+    Attributes:
+        stamp_ns: Times (N,) [ns], rising.
+        poses: Position [m] and quaternion w, x, y, z (N, 7).
+        counts: What became of the rows.
+        told: What was taken, guessed and changed, in words.
+        strange: How many rows were left out because their orientation is none.
+        gaps: Begin and length [s] of each gap, the longest first.
+
+    Raises:
+        RecordingError: The file is missing, damaged or holds no motion; times go back too often
+            or stand still, or fewer than two rows are left.
+        ParameterError: An option does not fit the file.
+    """
+
+    def __init__(self, path: Path, options: ImportOptions) -> None:
+        gathered = gather(open_source(path, options), options)
+        self._path, self._gathered, self._options = path, gathered, options
+        self.told, self.strange = list(gathered.told), gathered.strange
+        usable: NDArray[np.integer] = np.flatnonzero(gathered.is_usable)
+        if gathered.order is not None:
+            usable = gathered.order[gathered.is_usable[gathered.order]]
+        stamps = gathered.stamp_ns[usable]
+        self._refuse_several(stamps)
+        order = ordered(stamps, is_sorted=options.backwards == "sort")
+        self._rows = usable[order.rows]
+        self.stamp_ns: Stamps = stamps[order.rows]
+        self.counts = Counts(
+            rows=len(gathered.rows) + gathered.bad_rows, samples=len(self._rows),
+            missing=len(gathered.rows) - len(usable), doubled=order.doubled,
+            backwards=order.backwards, damaged=gathered.bad_rows,
+        )  # fmt: skip
+        self._check()
+        self.gaps = gaps(self.stamp_ns, options.gap)
+        self._shift_ns = 0
+        self.poses = self._in_axes_of_master(gathered.rows)
+        gathered.rows = gathered.rows[:0]
+
+    def _refuse_several(self, stamps: Stamps) -> None:
+        """Refuse several recordings in one table: no policy makes one hand of them.
+
+        Raises:
+            RecordingError: Says where they begin.
+        """
+        if len(rows := restarts(stamps)):
+            listed = ", ".join(str(row + 1) for row in rows[:5]) + (", …" if len(rows) > 5 else "")
+            reason = f"holds {len(rows) + 1} recordings: the time begins anew in row {listed}"
+            raise RecordingError(
+                self._path, f"{reason}; give a file for each, or --stamps log for a bag"
+            )
+
+    def _check(self) -> None:
+        """Refuse what is no motion.
+
+        Raises:
+            RecordingError: Says what it is.
+        """
+        c, policy = self.counts, self._options.backwards
+        most = {"refuse": 0.0, "auto": MOST_BACKWARDS}.get(policy, 1.0)
+        timed = max(1, c.rows - c.missing - c.damaged)
+        if c.backwards > most * timed:
+            share = 100.0 * c.backwards / timed
+            hint = "is --time the right column? Else give --backwards sort or drop"
+            raise RecordingError(self._path, f"the time goes back in {c.backwards} rows "
+                                 f"({share:.3g} %): {hint}")  # fmt: skip
+        if c.doubled > MOST_DOUBLED * timed:
+            share = 100.0 * c.doubled / timed
+            hint = "it is too coarse; give --rate HZ, or --stamps log for a bag"
+            raise RecordingError(self._path, f"the time stands still in {share:.3g} % of the rows: "
+                                 f"{hint}")  # fmt: skip
+        if c.samples < 2:
+            what = f"{c.samples} usable rows of {c.rows}; a motion needs two"
+            raise RecordingError(self._path, f"holds {what}")
+
+    def begin(self, first_ns: int) -> None:
+        """Move the stamps, once, so that a time [ns] near 0 becomes 1 s; later ones stay."""
+        if first_ns >= SECOND_NS:
+            return
+        self.told.append(f"stamps begin at 1 s (in the file at {first_ns / SECOND_NS:g} s)")
+        self._shift_ns = SECOND_NS - first_ns
+        self.stamp_ns += self._shift_ns
+
+    def losses(self) -> list[str]:
+        """Rows that were left out or changed, in words."""
+        c = self.counts
+        parts = [
+            (c.missing, "with missing numbers left out"),
+            (c.doubled, "doubled left out"), (c.backwards, "going back in time"),
+            (c.damaged, "with a wrong number of cells left out"),
+        ]  # fmt: skip
+        return [f"{count} {text}" for count, text in parts if count]
+
+    def _in_axes_of_master(self, rows: geometry.Array) -> geometry.Array:
+        """Poses (N, 7) of the rows that stay, the centre brought to zero."""
+        axes, poses = self._options.axis_map(), np.empty((len(self._rows), 7))
+        for begin in range(0, len(poses), ROWS):  # an hour at 1 kHz has 200 MB
+            part = slice(begin, begin + ROWS)
+            own = rows[self._rows[part]]
+            poses[part, :3] = self._options.scale * product(own[:, :3], axes.T)
+            last = poses[begin - 1, 3:] if begin else None
+            poses[part, 3:] = geometry.continuous(self._turned(own[:, 3:], axes), last)
+        if (name := self._options.center) != "keep":
+            place = poses[:, :3]
+            low, high = place.min(axis=0), place.max(axis=0)
+            centers = {"mean": place.mean(axis=0), "middle": 0.5 * (low + high), "start": place[0]}
+            listed = ", ".join(f"{1e3 * value:z.1f}" for value in centers[name])
+            self.told.append(f"{name} of the motion at ({listed}) mm brought to zero")
+            place -= centers[name].copy()
+        return poses
+
+    def _turned(self, quaternions: geometry.Array, axes: geometry.Array) -> geometry.Array:
+        """Attitudes (n, 4) in the master's axes; a mirror turns those of the body as well."""
+        if self._options.handedness == "right":
+            turn = np.empty(4)
+            geometry.quaternion_from_rotation(np.ascontiguousarray(axes), turn)
+            return geometry.quaternion_products(turn, quaternions)
+        # A turn of the file about an axis is the opposite turn about the mirrored axis.
+        return np.column_stack((quaternions[:, 0], -product(quaternions[:, 1:], axes.T)))
+
+    def presses(self) -> tuple[Stamps, NDArray[np.uint8]] | None:
+        """Stamps (n,) [ns] and buttons (n, 3) where they change, the first time; None without."""
+        g = self._gathered
+        if g.presses is not None:
+            stamps, pressed = g.presses.stamp_ns + self._shift_ns, g.presses.pressed
+            order = ordered(stamps, is_sorted=True)
+            stamps, pressed = stamps[order.rows], pressed[order.rows]
+        elif g.buttons is not None:
+            stamps, pressed = self.stamp_ns, g.buttons[self._rows]
+        else:
+            return None
+        if not len(stamps):
+            return None
+        changes = np.ones(len(stamps), np.bool_)
+        changes[1:] = (pressed[1:] != pressed[:-1]).any(axis=1)
+        changes &= stamps >= 0
+        return (stamps[changes], pressed[changes]) if changes.any() else None
+
+
+_BAGS = {".bag", ".mcap", ".db3"}
+
+
+def is_bag(path: Path) -> bool:
+    """Whether a path is a recording of ROS: a directory of one, or a file of one."""
+    return path.is_dir() or path.suffix.lower() in _BAGS
+
+
+def open_source(path: Path, options: ImportOptions) -> Source:
+    """Source that reads a file.
+
+    Raises:
+        RecordingError: It is missing, empty, or nothing that can be read.
+        ParameterError: An option does not fit it.
+    """
+    if not path.exists():
+        raise RecordingError(path, "does not exist")
+    if is_bag(path):
+        from teleop_exchange.bag_source import BagSource
+
+        return BagSource(path, options)
+    from teleop_exchange.table_source import TableSource
+
+    return TableSource(open_table(path, options), options)
+
+
+def open_table(path: Path, options: ImportOptions) -> "Table":
+    """Table of a file: Parquet, or text.
+
+    Raises:
+        RecordingError: It cannot be read.
+    """
+    from teleop_exchange.tables import ParquetTable
+    from teleop_exchange.text_table import TextTable
+
+    with damage_told(path), path.open("rb") as file:
+        magic = file.read(4)
+    return ParquetTable(path) if magic == b"PAR1" else TextTable(path, options.skip)

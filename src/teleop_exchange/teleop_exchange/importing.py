@@ -1,0 +1,144 @@
+"""Import: a file of others becomes a recording of ours."""
+
+import hashlib
+import json
+import shlex
+import shutil
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, replace
+from pathlib import Path
+from types import MappingProxyType
+
+import numpy as np
+
+from teleop_core.bags.arms import ARMS_KEY
+from teleop_core.bags.writer import BagWriter
+from teleop_core.base.errors import RecordingError
+from teleop_core.graph.topics import MASTER_BUTTONS, MASTER_MEASURED_CP, Topic
+from teleop_core.kernels.geometry import Array
+from teleop_exchange.import_report import ImportReport, summary
+from teleop_exchange.imported_motion import Motion
+from teleop_exchange.options import Changes, ImportOptions, Option, options_of
+from teleop_exchange.times import Stamps
+
+ROWS = 20_000
+"""Rows that are written at once."""
+
+
+def import_recording(
+    file: Path | str,
+    out: Path | str,
+    options: ImportOptions | None = None,
+    *,
+    arms: Mapping[str, Changes] = MappingProxyType({}),
+    **changes: Option,
+) -> ImportReport:
+    """Make a recording of a file: CSV, TSV, Parquet, rosbag2 (MCAP, db3) or a ROS 1 bag.
+
+    The recording holds ``master/measured_cp`` with every usable sample at its own time, and
+    ``master/buttons`` where buttons were found. :func:`teleop_core.replay` runs it through the
+    graph.
+
+    Args:
+        file: What is imported.
+        out: Directory of the recording, made here; nothing is left there after an error.
+        options: What is taken of the file; what is not said is guessed and told.
+        arms: Several hands of one file, each with options beside those of all: ``{"left":
+            {"position": "1-3"}, "right": {"position": "4-6"}}``. The first is the default arm.
+        **changes: Options by name: ``position=("x", "y", "z"), unit="mm"``.
+
+    Returns:
+        What was found; ``report.recording`` is the recording, ``print(report)`` shows it. Of
+        several hands it is that of the first, and ``report.others`` has the others.
+
+    Raises:
+        RecordingError: The file is missing, damaged, empty, or no motion; or ``out`` exists.
+        ParameterError: An option is wrong.
+        UnknownNameError: A column or topic is not there; those that are there are listed.
+    """
+    path, out = Path(file), Path(out)
+    wanted = options_of(options or ImportOptions(), arms, changes)
+    if out.exists():
+        raise RecordingError(out, "exists already; choose another --out")
+    motions = {arm: Motion(path, one) for arm, one in wanted.items()}
+    first_ns = min(int(motion.stamp_ns[0]) for motion in motions.values())
+    for motion in motions.values():
+        motion.begin(first_ns)
+    found = [summary(path.name, out, motion, arm) for arm, motion in motions.items()]
+    report = replace(found[0], others=tuple(found[1:]))
+    write(motions, out, _about(path, out, wanted, report))
+    return report
+
+
+def write(motions: Mapping[str, Motion], out: Path, metadata: dict[str, str]) -> None:
+    """Record the motion of each arm, the default one first; the directory is whole or not there."""
+    streams: dict[Topic, tuple[Stamps, Array]] = {}
+    for number, (arm, motion) in enumerate(motions.items()):
+        name = arm if number else ""
+        streams[MASTER_MEASURED_CP.of_arm(name)] = (motion.stamp_ns, motion.poses)
+        if (presses := motion.presses()) is not None:
+            stamps, pressed = presses
+            streams[MASTER_BUTTONS.of_arm(name)] = (stamps, pressed.astype(np.float64))
+    try:
+        with BagWriter(out, list(streams), (), metadata=metadata) as writer:
+            for block in _blocks(streams):
+                writer.write_block(block)
+    except BaseException as error:
+        # A directory that another process made in the meantime is not ours to remove.
+        if not (isinstance(error, RecordingError) and "exists already" in error.reason):
+            shutil.rmtree(out, ignore_errors=True)
+        raise
+
+
+def _blocks(
+    streams: Mapping[Topic, tuple[Stamps, Array]],
+) -> Iterator[dict[Topic, tuple[Stamps, Array, Stamps]]]:
+    """Stretches of time, each with the samples of every stream."""
+    ends = np.sort(np.concatenate([s[ROWS - 1 :: ROWS] for s, _ in streams.values()]))
+    written = dict.fromkeys(streams, 0)
+    for end in (*ends, np.iinfo(np.int64).max):
+        block = {}
+        for topic, (stamps, values) in streams.items():
+            part = slice(written[topic], int(np.searchsorted(stamps, end, side="right")))
+            block[topic] = (stamps[part], values[part], stamps[part])
+            written[topic] = part.stop
+        yield block
+
+
+def command_of(path: Path, out: Path, options: Mapping[str, ImportOptions]) -> str:
+    """Command that makes a recording of a file, with the options of each arm."""
+    words = ["teleop", "import", path.name, "--out", out.name]
+    for arm, one in options.items():
+        own = one.as_arguments()
+        words += ["--arm", arm, shlex.join(own)] if arm else own
+    return shlex.join(words)
+
+
+def _about(
+    path: Path, out: Path, options: Mapping[str, ImportOptions], report: ImportReport
+) -> dict[str, str]:
+    """Names and texts by which an import can be repeated."""
+    from teleop_core import __version__
+
+    named = {} if "" in options else {ARMS_KEY: " ".join(options)}
+    return named | {
+        "version": __version__,
+        "imported_from": path.name,
+        "imported_sha256": checksum(path),
+        "imported_by": command_of(path, out, options),
+        "imported_mapping": "; ".join(report.told),
+        "imported_counts": json.dumps(asdict(report.counts)),
+    }
+
+
+def checksum(path: Path) -> str:
+    """SHA-256 of a file; of a directory over the files of messages in it, by name."""
+    files = [path]
+    if path.is_dir():
+        files = sorted(f for f in path.iterdir() if f.is_file() and f.suffix != ".yaml")
+    found = hashlib.sha256()
+    for file in files:
+        with file.open("rb") as stream:
+            while data := stream.read(1 << 20):
+                found.update(data)
+    return found.hexdigest()

@@ -1,0 +1,250 @@
+"""Joining: the streams of a recording side by side over the time, a stretch of it at once."""
+
+import warnings
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from teleop_core.bags.memory import MemoryBag
+from teleop_core.bags.reader import Bag
+from teleop_core.bags.series import Series, in_order, kind_of
+from teleop_core.base.errors import TeleopWarning, UnknownNameError
+from teleop_core.graph.topics import BY_NAME, Kind
+from teleop_core.kernels.geometry import Array
+from teleop_core.session.recording import Recording, Stream
+from teleop_core.session.replayed_span import LONGEST_GAP_NS
+from teleop_exchange.times import SECOND_NS, Stamps
+
+_SLACK_NS = SECOND_NS
+"""How much earlier than the last chunk of a file messages of the next one may be."""
+
+
+@dataclass(frozen=True, eq=False)
+class Joined:
+    """Rows of some topics.
+
+    Attributes:
+        time_ns: Times of recording (n,) [ns], rising.
+        values: Per topic its columns (n, width); NaN where it has no message.
+    """
+
+    time_ns: Stamps
+    values: dict[str, Array]
+
+
+class Streams:
+    """Some topics of a recording, to be read side by side.
+
+    Args:
+        recording: Where they are.
+        topics: Their names; all that hold numbers if empty.
+
+    Attributes:
+        columns: Names of the columns by topic.
+        start_ns: Where the recording begins [ns].
+
+    Raises:
+        UnknownNameError: There is no such topic.
+        RecordingError: One cannot be read as numbers.
+    """
+
+    def __init__(self, recording: Recording, topics: Iterable[str] = ()) -> None:
+        self._recording, self._bag = recording, recording.bag
+        wanted = [name.removeprefix("/") for name in topics] or numeric(recording)
+        if unknown := [name for name in wanted if name not in recording.topics]:
+            raise UnknownNameError("topic", unknown[0], recording.topics)
+        self._reports = {name: recording[name] for name in wanted if is_report(self._bag, name)}
+        self._names = [name for name in wanted if name not in self._reports]
+        first = self._first()
+        self.columns = {
+            name: self._reports[name].columns if name in self._reports else first[name]
+            for name in wanted
+        }
+        self.start_ns = self._bag.start_ns
+
+    def _first(self) -> dict[str, tuple[str, ...]]:
+        """Columns of the streams, from the first messages of each."""
+        found: dict[str, tuple[str, ...]] = {}
+        for block in self._bag.blocks(self._names) if self._names else ():
+            for name, series in block.items():
+                if name not in found:
+                    found[name] = columns_of(self._bag, name, series)
+            if len(found) == len(self._names):
+                break
+        return found
+
+    def joined(self) -> Iterator[Joined]:
+        """A row wherever a stream has a message; reports keep their values until the next one."""
+        for piece in self._pieces():
+            logs = [series.log_ns for series in piece.values()]
+            times: Stamps = np.unique(np.concatenate(logs))
+            values = {name: self._spread(name, times, piece) for name in self.columns}
+            yield Joined(times, values)
+
+    def _spread(self, name: str, times: Stamps, piece: Mapping[str, Series]) -> Array:
+        if name in self._reports:
+            return self._held_report(name, times)
+        rows = np.full((len(times), len(self.columns[name])), np.nan)
+        if name in piece:  # of equal times the last one stays
+            rows[np.searchsorted(times, piece[name].log_ns)] = piece[name].values
+        return rows
+
+    def _held_report(self, name: str, times: Stamps) -> Array:
+        stream = self._reports[name]
+        return newest(times, stream.log_ns, stream.values)
+
+    def sampled(self, rate: float) -> Iterator[Joined]:
+        """Rows at a rate [Hz] from the start on: in each the newest message of every topic.
+
+        Where nothing came for more than :data:`LONGEST_GAP_NS` there are no rows.
+        """
+        step, before = SECOND_NS / rate, np.array([self.start_ns])
+        last: dict[str, Series] = {}
+        number = 0
+        for piece in self._pieces():
+            logs = np.unique(np.concatenate([series.log_ns for series in piece.values()]))
+            numbers = _numbers(np.append(before, logs) - self.start_ns, step, number)
+            times = self.start_ns + np.rint(numbers * step).astype(np.int64)
+            number = max(number, int((int(logs[-1]) - self.start_ns) // step) + 1)
+            before = logs[-1:]
+            values = {}
+            for name in self.columns:
+                if name in self._reports:
+                    values[name] = self._held_report(name, times)
+                    continue
+                known = [s for s in (last.get(name), piece.get(name)) if s is not None]
+                values[name] = self._newest(name, times, known)
+                if known:
+                    last[name] = known[-1][-1:]
+            if len(times):
+                yield Joined(times, values)
+
+    def _newest(self, name: str, times: Stamps, known: list[Series]) -> Array:
+        if not known:
+            return np.full((len(times), len(self.columns[name])), np.nan)
+        logs = np.concatenate([series.log_ns for series in known])
+        return newest(times, logs, np.concatenate([series.values for series in known]))
+
+    def _pieces(self) -> Iterator[dict[str, Series]]:
+        """Stretches of the recording that follow each other, each with the streams that have any.
+
+        Chunks of a file need not be in order; if they are not, all of it is read at once.
+        """
+        if not self._names:
+            yield {name: _series(stream) for name, stream in self._reports.items()}
+            return
+        done = -(2**62)
+        if isinstance(self._bag, MemoryBag) or not self._is_in_order():
+            yield _sorted({name: [s] for name, s in self._bag.read_many(self._names).items()})
+            return
+        waiting: dict[str, list[Series]] = {}
+        for block in self._bag.blocks(self._names):
+            firsts = [int(series.log_ns.min()) for series in block.values() if len(series)]
+            if not firsts:
+                continue
+            for name, series in block.items():
+                waiting.setdefault(name, []).append(series)
+            cut = min(firsts) - _SLACK_NS
+            if cut > done:
+                done = cut
+                if piece := _before(waiting, cut):
+                    yield piece
+        if piece := _sorted(waiting):
+            yield piece
+
+    def _is_in_order(self) -> bool:
+        """Whether no chunk of the file begins long before the end of the one before it."""
+        if self._bag.metadata:  # our writer's are
+            return True
+        last = -(2**62)
+        for block in self._bag.blocks(self._names):
+            logs = [series.log_ns for series in block.values() if len(series)]
+            if logs and min(int(log.min()) for log in logs) < last - _SLACK_NS:
+                return False
+            last = max([last, *(int(log.min()) for log in logs)])
+        return True
+
+
+def _numbers(since_ns: Stamps, step: float, first: int) -> Stamps:
+    """Numbers of the rows from ``first`` on up to the last message, less those in a gap.
+
+    Args:
+        since_ns: Times of all messages since row 0 (N,), rising [ns].
+        step: Time between two rows [ns].
+        first: Smallest number.
+    """
+    ends = np.flatnonzero(np.diff(since_ns.astype(np.float64)) > LONGEST_GAP_NS)
+    if not len(ends):
+        return np.arange(first, int(since_ns[-1] // step) + 1)
+    warnings.warn(
+        f"no rows where no message came for more than {LONGEST_GAP_NS / SECOND_NS:g} s",
+        TeleopWarning,
+        stacklevel=4,
+    )
+    low = np.ceil(since_ns[np.append(0, ends + 1)] / step).astype(np.int64)
+    high = np.floor(since_ns[np.append(ends, len(since_ns) - 1)] / step).astype(np.int64) + 1
+    low = np.maximum(low, first)
+    counts = np.maximum(high - low, 0)
+    offsets = np.cumsum(counts) - counts
+    return np.repeat(low - offsets, counts) + np.arange(counts.sum())
+
+
+def numeric(recording: Recording) -> list[str]:
+    """Topics of a recording that can be read as numbers, as they stand in it."""
+    found = []
+    for name in recording.topics:
+        kind = kind_of(name, recording.bag.topics[name].type)
+        if kind is not None and (kind is not Kind.REPORT or has_columns(name)):
+            found.append(name)
+    return found
+
+
+def has_columns(name: str) -> bool:
+    """Whether a report has columns of numbers."""
+    columns = [topic.columns for n, topic in BY_NAME.items() if name == n or name.endswith(f"/{n}")]
+    return any(columns)
+
+
+def is_report(bag: Bag, name: str) -> bool:
+    """Whether a topic carries reports."""
+    return kind_of(name, bag.topics[name].type) is Kind.REPORT
+
+
+def columns_of(bag: Bag, name: str, series: Series) -> tuple[str, ...]:
+    """Names of the columns of a stream, as a recording calls them."""
+    kind = kind_of(name, bag.topics[name].type)
+    assert kind is not None
+    if kind.has_joints:
+        is_bare = series.values.shape[1] == len(series.names)
+        kind = Kind.JOINTS if is_bare else Kind.STATE
+    return kind.columns(series.names)
+
+
+def newest(times: Stamps, logs: Stamps, rows: Array) -> Array:
+    """The newest row at each time; NaN before the first."""
+    at = np.searchsorted(logs, times, side="right") - 1
+    found = np.full((len(times), rows.shape[1]), np.nan)
+    found[at >= 0] = rows[at[at >= 0]]
+    return found
+
+
+def _series(stream: Stream) -> Series:
+    return Series(stream.stamp_ns, stream.log_ns, stream.values)
+
+
+def _sorted(waiting: Mapping[str, list[Series]]) -> dict[str, Series]:
+    """One series of each topic that has messages, in the order of log times."""
+    whole = {name: in_order(parts) for name, parts in waiting.items()}
+    return {name: series for name, series in whole.items() if len(series)}
+
+
+def _before(waiting: dict[str, list[Series]], cut: int) -> dict[str, Series]:
+    """Take what was logged before a time [ns] out of what is waiting."""
+    out = {}
+    for name, series in _sorted(waiting).items():
+        end = int(np.searchsorted(series.log_ns, cut))
+        waiting[name] = [series[end:]]
+        if end:
+            out[name] = series[:end]
+    return out

@@ -1,0 +1,280 @@
+"""Import options: which columns or topics of a file are the hand, in which units and axes."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+from teleop_core.base.errors import ParameterError, UnknownNameError
+
+if TYPE_CHECKING:
+    from teleop_core.kernels.geometry import Array
+
+Columns = tuple[str, ...]
+"""Names of columns; or their numbers, counted from 1; ``4-12`` stands for nine of them."""
+Option = str | int | float | bool | None | tuple[str | int, ...] | list[str] | list[int]
+"""Value of one option; numbers of columns may be whole numbers."""
+Changes = Mapping[str, Option]
+"""Import options by name."""
+
+LENGTHS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "in": 0.0254}
+"""Units of length [m]."""
+TIMES_NS = {"s": 1_000_000_000, "ms": 1_000_000, "us": 1000, "ns": 1}
+"""Units of time [ns]."""
+BUTTONS = ("clutch", "fixture", "mode")
+AXES = ("+x", "-x", "+y", "-y", "+z", "-z")
+ORIENTATIONS = ("quaternion", "matrix", "euler", "rotation_vector")
+"""Options that say where the orientation is."""
+CHOICES = {
+    "time_unit": ("auto", *TIMES_NS),
+    "stamps": ("header", "log"),
+    "unit": ("auto", *LENGTHS),
+    "quaternion_order": ("auto", "wxyz", "xyzw"),
+    "matrix_order": ("row", "column"),
+    "angles": ("auto", "rad", "deg"),
+    "orientation": ("auto", "none"),
+    "center": ("keep", "mean", "middle", "start"),
+    "backwards": ("auto", "refuse", "drop", "sort"),
+    "handedness": ("right", "left"),
+}
+_COUNTS = {
+    "time": (0, 1, 2), "position": (0, 3), "quaternion": (0, 4), "matrix": (0, 9),
+    "euler": (0, 4), "rotation_vector": (0, 3),
+}  # fmt: skip
+_TUPLES = (*_COUNTS, "axes")
+
+
+@dataclass(frozen=True, kw_only=True)
+class ImportOptions:
+    """What an import takes of a file, and what becomes of it.
+
+    Columns are given by name or by number, counted from 1; ``"4-12"`` stands for nine of them. What
+    is left out is guessed from the names, and the report tells it.
+
+    Attributes:
+        time: Column of the time; or two, whole seconds and nanoseconds.
+        rate: Samples per second [Hz], for tables without a time.
+        time_unit: ``auto``, ``s``, ``ms``, ``us`` or ``ns``.
+        stamps: Time of a bag's messages: of the ``header``, or of the ``log``.
+        position: Three columns.
+        unit: Of the position: ``auto`` (as the names say, else m), ``m``, ``cm``, ``mm``, ``in``.
+        quaternion: Four columns in the order of ``quaternion_order``.
+        quaternion_order: ``wxyz`` or ``xyzw``; ``auto``: as the names say, else wxyz.
+        matrix: Nine columns of a rotation matrix.
+        matrix_order: ``row`` by row, or ``column`` by column.
+        euler: Order of the axes and three columns: ``("xyz", "roll", "pitch", "yaw")``. Small
+            letters turn about fixed axes, capital ones about those that turn along (as in SciPy).
+        rotation_vector: Three columns.
+        angles: Unit of Euler angles and rotation vectors: ``auto``, ``rad`` or ``deg``.
+        orientation: ``auto``: guessed if nothing is said; ``none``: constant.
+        clutch: Column of the button, pressed above ``threshold``; empty for none.
+        fixture: As ``clutch``.
+        mode: As ``clutch``.
+        threshold: Above it a button is pressed.
+        skip: Lines to leave out at the beginning of a text.
+        episode: Which recording of a table that holds several; None if it is one.
+        topic: Topic of the poses in a bag, or its end; empty if there is only one.
+        frame: Child frame, for a topic that has several.
+        parent: Frame in which the poses stand, for a topic that has several.
+        buttons_topic: Topic of the Joy messages, or its end; empty if there is at most one. Of
+            several with ``|`` between them the first one there is taken; an empty last one stands
+            for no buttons.
+        buttons: Which button of the Joy is which: ``"clutch=0,mode=2"``; ``none``: no buttons.
+        axes: The master's x, y and z as axes of the file: ``("+y", "-x", "+z")``.
+        handedness: Of the file's axes: ``right``; or ``left``, as in game engines: ``axes`` then
+            must mirror, and attitudes are mirrored with them.
+        scale: All positions are multiplied by it.
+        center: What comes to zero: ``mean`` of the positions, ``middle`` of their range, or their
+            ``start``; ``keep``: nothing.
+        backwards: Rows whose time goes back: ``refuse``, ``drop``, ``sort``; ``auto``: drop up to
+            1 %, refuse more.
+        gap: A gap is told that is longer than so many periods.
+    """
+
+    time: Columns = ()
+    rate: float | None = None
+    time_unit: str = "auto"
+    stamps: str = "header"
+    position: Columns = ()
+    unit: str = "auto"
+    quaternion: Columns = ()
+    quaternion_order: str = "auto"
+    matrix: Columns = ()
+    matrix_order: str = "row"
+    euler: Columns = ()
+    rotation_vector: Columns = ()
+    angles: str = "auto"
+    orientation: str = "auto"
+    clutch: str = ""
+    fixture: str = ""
+    mode: str = ""
+    threshold: float = 0.5
+    skip: int = 0
+    episode: int | None = None
+    topic: str = ""
+    frame: str = ""
+    parent: str = ""
+    buttons_topic: str = ""
+    buttons: str = ""
+    axes: Columns = ("+x", "+y", "+z")
+    handedness: str = "right"
+    scale: float = 1.0
+    center: str = "keep"
+    backwards: str = "auto"
+    gap: float = 5.0
+
+    def __post_init__(self) -> None:
+        for name in _TUPLES:
+            object.__setattr__(self, name, expanded(getattr(self, name)))
+        for name in BUTTONS:
+            object.__setattr__(self, name, str(getattr(self, name)))
+        for name, choices in CHOICES.items():
+            if getattr(self, name) not in choices:
+                raise UnknownNameError(option(name), getattr(self, name), choices)
+        self._check_columns()
+        self._check_numbers()
+        button_map(self.buttons)
+        self._check_axes()
+
+    def _check_axes(self) -> None:
+        if len(self.axes) != 3 or not set(self.signed_axes) <= set(AXES):
+            raise ParameterError("--axes", self.axes, "three of " + ", ".join(AXES))
+        self.axis_map()
+
+    def axis_map(self) -> "Array":
+        """Matrix (3, 3) from the file's axes to the master's; a mirror of left-handed axes.
+
+        Raises:
+            ParameterError: An axis is used twice, or the map is a mirror and must not, or must be.
+        """
+        import numpy as np  # and what is compiled: not for `--help`
+
+        from teleop_core.chain.mapping.parameters import axis_map
+
+        x, *others = self.signed_axes
+        if self.handedness == "right":
+            return axis_map("--axes", (x, *others))
+        mirror = np.array([[-1.0], [1.0], [1.0]])  # of the first row
+        try:
+            return np.asarray(
+                mirror * axis_map("--axes", (x.translate(str.maketrans("+-", "-+")), *others))
+            )
+        except ParameterError:
+            needed = "three axes at right angles that mirror, for --handedness left"
+            raise ParameterError("--axes", self.axes, needed) from None
+
+    def _check_columns(self) -> None:
+        for name, counts in _COUNTS.items():
+            given = getattr(self, name)
+            if len(given) not in counts:
+                needed = " or ".join(str(count) for count in counts if count)
+                what = "an order and three columns" if name == "euler" else f"{needed} columns"
+                raise ParameterError(option(name), given, what)
+        if several := [option(name) for name in ORIENTATIONS if getattr(self, name)][1:]:
+            raise ParameterError(several[0], "given", "the only one that says an orientation")
+        order = self.euler[0] if self.euler else "xyz"
+        if not is_euler_order(order):
+            needed = "three of xyz or of XYZ, no axis twice in a row, such as xyz or ZYX"
+            raise ParameterError(option("euler"), order, needed)
+
+    def _check_numbers(self) -> None:
+        if self.time and self.rate is not None:
+            raise ParameterError("--rate", self.rate, "left out: --time is given")
+        for name in ("rate", "scale", "gap"):
+            value = getattr(self, name)
+            if value is not None and not 0.0 < value < float("inf"):
+                raise ParameterError(option(name), value, "finite and above 0")
+        if self.episode is not None and not isinstance(self.episode, int):
+            raise ParameterError("--episode", self.episode, "a number; import_episodes takes all")
+        if self.skip < 0:
+            raise ParameterError("--skip", self.skip, "0 or more")
+
+    @property
+    def signed_axes(self) -> Columns:
+        """Axes with their signs."""
+        return tuple(axis.lower() if axis[:1] in {"+", "-"} else f"+{axis}" for axis in self.axes)
+
+    def changed(self, **changes: Option) -> "ImportOptions":
+        """The same with some values in place of its own.
+
+        Raises:
+            UnknownNameError: There is no such option, or a name is not in its list.
+            ParameterError: A value is not allowed.
+        """
+        known = [field.name for field in fields(self)]
+        if unknown := [name for name in changes if name not in known]:
+            raise UnknownNameError("import option", unknown[0], known)
+        return replace(self, **changes)  # type: ignore[arg-type]
+
+    def as_arguments(self) -> list[str]:
+        """The options that differ from their defaults, as arguments of ``teleop import``."""
+        words: list[str] = []
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if value != field.default:
+                words.append(option(field.name))
+                words += [str(one) for one in value] if isinstance(value, tuple) else [str(value)]
+        return words
+
+
+def options_of(
+    base: ImportOptions, arms: Mapping[str, Changes], changes: Changes
+) -> dict[str, ImportOptions]:
+    """Options of each arm, the default one first; ``{"": ...}`` if there is one without a name.
+
+    Args:
+        base: Where they start.
+        arms: What is said of each hand beside what is said of all.
+        changes: What is said of all.
+
+    Raises:
+        UnknownNameError: There is no such option.
+        ParameterError: An arm has no name that a topic can have.
+    """
+    for name in arms:
+        if not name.isidentifier() or not name.isascii():
+            raise ParameterError("--arm", name, "a name of letters, digits and _")
+    own = arms or {"": {}}
+    return {name: base.changed(**{**changes, **one}) for name, one in own.items()}
+
+
+def button_map(text: str) -> dict[str, int]:
+    """Numbers of a Joy's buttons by what they are, from ``clutch=0,mode=2``; none for ``none``.
+
+    Raises:
+        ParameterError: The text is something else.
+    """
+    found: dict[str, int] = {}
+    for entry in filter(None, text.replace(" ", "").split(",")) if text != "none" else ():
+        name, equals, number = entry.partition("=")
+        if name not in BUTTONS or not equals or not number.isdigit():
+            needed = f"as clutch=0,mode=2, with names of {', '.join(BUTTONS)}; or none"
+            raise ParameterError("--buttons", text, needed)
+        found[name] = int(number)
+    return found
+
+
+def option(name: str) -> str:
+    """Name of an option on the command line."""
+    return "--" + name.replace("_", "-")
+
+
+def expanded(value: object) -> Columns:
+    """Columns as a tuple of texts, with ``4-12`` written out."""
+    given = value if isinstance(value, tuple | list) else (value,)
+    out: list[str] = []
+    for one in map(str, given):
+        first, dash, last = one.partition("-")
+        if dash and first.isdigit() and last.isdigit() and 0 <= int(last) - int(first) < 64:
+            out += map(str, range(int(first), int(last) + 1))
+        else:
+            out.append(one)
+    return tuple(out)
+
+
+def is_euler_order(order: str) -> bool:
+    """Whether a text is an order of Euler angles as in SciPy."""
+    small = order.lower()
+    is_one_case = order in {small, order.upper()}
+    repeats = any(a == b for a, b in pairwise(small))
+    return len(order) == 3 and set(small) <= set("xyz") and is_one_case and not repeats

@@ -1,0 +1,96 @@
+"""Orientation: attitudes in any notation as unit quaternions w, x, y, z, block by block.
+
+What cannot be a rotation becomes NaN and is counted as strange, what is missing stays NaN.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from teleop_core.kernels import kernel
+from teleop_core.kernels.geometry import Array, quaternion_from_rotation
+from teleop_core.kernels.portable import dot, length, product
+
+TOLERANCE = 0.1
+"""How far a quaternion's length, or a matrix from being a rotation, may be off."""
+_MISSING = 1e-6  # shorter quaternions mean that nothing was measured
+
+
+@dataclass
+class Attitudes:
+    """Rows of one notation, one block after the other.
+
+    Attributes:
+        kind: ``quaternion``, ``matrix``, ``euler``, ``rotation_vector`` or ``none``.
+        order: ``wxyz`` or ``xyzw``; ``row`` or ``column``; or the order of Euler angles.
+        degrees: Whether angles are in degrees.
+        strange: How many rows cannot be rotations.
+        mirrored: How many of these are mirrors.
+        longest: By how much the length of a quaternion taken differed from 1, at most.
+    """
+
+    kind: str
+    order: str = ""
+    degrees: bool = False
+    strange: int = 0
+    mirrored: int = 0
+    longest: float = 0.0
+
+    @property
+    def width(self) -> int:
+        """Numbers in a row."""
+        return {"quaternion": 4, "matrix": 9, "none": 0}.get(self.kind, 3)
+
+    def quaternions(self, rows: Array) -> Array:
+        """Unit quaternions (N, 4) of the next rows (N, width); NaN where there is none."""
+        if self.kind == "none":
+            return np.tile([1.0, 0.0, 0.0, 0.0], (len(rows), 1))
+        if self.kind == "quaternion":
+            turned = rows[:, [3, 0, 1, 2]] if self.order == "xyzw" else rows
+            return self._unit(turned)
+        if self.kind == "matrix":
+            matrices = rows.reshape(-1, 3, 3)
+            return self._of_matrices(
+                matrices.transpose(0, 2, 1) if self.order == "column" else matrices
+            )
+        return self._of_angles(np.radians(rows) if self.degrees else rows)
+
+    def _of_angles(self, angles: Array) -> Array:
+        from scipy.spatial.transform import Rotation
+
+        if self.kind == "euler":
+            turns = Rotation.from_euler(self.order, angles)
+        else:
+            turns = Rotation.from_rotvec(angles)
+        return np.asarray(turns.as_quat(scalar_first=True))
+
+    def _unit(self, quaternions: Array) -> Array:
+        lengths = length(quaternions)
+        missing = lengths < _MISSING
+        strange = np.abs(lengths - 1.0) > TOLERANCE
+        self.strange += int((strange & ~missing).sum())
+        lengths[strange | missing] = math.nan
+        off = np.abs(lengths[np.isfinite(lengths)] - 1.0)
+        self.longest = max(self.longest, float(off.max(initial=0.0)))
+        unit: Array = quaternions / lengths[:, None]
+        return unit
+
+    def _of_matrices(self, matrices: Array) -> Array:
+        squares = product(matrices, matrices.transpose(0, 2, 1))
+        missing = np.abs(matrices).max(axis=(1, 2), initial=0.0) < _MISSING
+        off = np.abs(squares - np.eye(3)).max(axis=(1, 2), initial=0.0) > TOLERANCE
+        mirror = dot(np.cross(matrices[:, 0], matrices[:, 1]), matrices[:, 2]) < 0.0
+        self.strange += int(((off | mirror) & ~missing).sum())
+        self.mirrored += int((mirror & ~off).sum())
+        quaternions = np.empty((len(matrices), 4))
+        write_quaternions(np.ascontiguousarray(matrices), quaternions)
+        quaternions[off | mirror | missing] = math.nan
+        return quaternions
+
+
+@kernel
+def write_quaternions(matrices: Array, quaternions: Array) -> None:
+    """Write the unit quaternions (N, 4) of rotation matrices (N, 3, 3), which may be off a bit."""
+    for i in range(matrices.shape[0]):
+        quaternion_from_rotation(matrices[i], quaternions[i])

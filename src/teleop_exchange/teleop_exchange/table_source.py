@@ -1,0 +1,335 @@
+"""Table source: a table whose columns are the motion of a hand, named or guessed."""
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from teleop_core.base.errors import ParameterError, RecordingError
+from teleop_core.kernels.geometry import Array
+from teleop_core.kernels.portable import length
+from teleop_exchange import names
+from teleop_exchange.episodes import Episodes
+from teleop_exchange.options import BUTTONS, CHOICES, ImportOptions, option
+from teleop_exchange.orientation import TOLERANCE, Attitudes
+from teleop_exchange.source import Block, Presses
+from teleop_exchange.tables import Numbers, Table, column_of
+from teleop_exchange.times import SECOND_NS, nanoseconds
+
+_TOLD = 8  # columns that are told by name
+
+
+@dataclass(frozen=True)
+class Columns:
+    """Which columns of a table are what; empty or None where there is none."""
+
+    time: tuple[int, ...]
+    position: tuple[int, ...]
+    orientation: tuple[int, ...]
+    buttons: dict[str, int]
+
+
+class TableSource:
+    """A table as a source of an import; see :class:`~teleop_exchange.source.Source`.
+
+    Args:
+        table: The table.
+        options: What is taken of it.
+
+    Raises:
+        UnknownNameError: A column is not there.
+        RecordingError: It has no time and no rate is given, or no position.
+        ParameterError: An option does not fit a table.
+    """
+
+    def __init__(self, table: Table, options: ImportOptions) -> None:
+        self.path, self._table, self._options = table.path, table, options
+        self.told: list[str] = []
+        for name in ("topic", "buttons_topic", "frame", "parent"):
+            if given := getattr(options, name):
+                raise ParameterError(option(name), given, "left out: this file has columns")
+        position = self._position()
+        time = self._time(position)
+        self.attitudes, orientation = self._orientation({*position, *time})
+        taken = {*position, *time, *orientation}
+        self._columns = Columns(time, position, orientation, self._buttons(taken))
+        self._episodes = Episodes(table, options.episode)
+        self.has_time = bool(time)
+        self.time_unit = self._time_unit(time)
+        self.unit, self.is_unit_said = self._unit(position)
+        self._tell_unused({*taken, *self._columns.buttons.values()})
+
+    # -- which columns ---------------------------------------------------------------------------
+
+    def _given(self, name: str) -> tuple[int, ...]:
+        wanted: tuple[str, ...] = getattr(self._options, name)
+        wanted = wanted[1:] if name == "euler" else wanted
+        return tuple(column_of(self._table, one, option(name)) for one in wanted)
+
+    def _told(self, what: str, columns: Sequence[int], more: str = "") -> tuple[int, ...]:
+        listed = ", ".join(repr(self._table.names[column]) for column in columns)
+        self.told.append(f"{what} = {listed}{more}")
+        return tuple(columns)
+
+    def _position(self) -> tuple[int, ...]:
+        if given := self._given("position"):
+            return given
+        several = names.find_positions(self._table.names) if self._table.is_named else []
+        found = several[0] if several else ()
+        if not found and not self._table.is_named:
+            found = self._position_by_place()
+        if not found:
+            reason = "has no columns that look like x, y, z: give --position X Y Z; "
+            raise RecordingError(self.path, f"{reason}there are {self._listed()}")
+        others = ", ".join(repr(self._table.names[columns[0]]) for columns in several[1:])
+        more = f" (--position could also take {others}, …)" if others else ""
+        return self._told("x, y, z", found, more)
+
+    def _position_by_place(self) -> tuple[int, ...]:
+        """Columns of a table without names that is like others of its width.
+
+        Three: x, y, z. Four: a time and these. Eight: the time, x, y, z and a quaternion, as in
+        the benchmark of Sturm and others 2012. Seven: the same without time.
+        """
+        width = len(self._table.names)
+        if width in {3, 7}:
+            return (0, 1, 2)
+        return (1, 2, 3) if width in {4, 8} and self._is_rising(0) else ()
+
+    def _is_rising(self, column: int) -> bool:
+        numbers = self._table.sample(column).astype(np.float64)
+        return len(numbers) > 1 and bool((np.diff(numbers) >= 0.0).mean() > 0.95)
+
+    def _listed(self) -> str:
+        table = self._table
+        if not table.is_named:
+            return f"{len(table.names)} without names, to be given by number from 1 on"
+        return ", ".join(table.names[:40])
+
+    def _time(self, position: tuple[int, ...]) -> tuple[int, ...]:
+        if given := self._given("time"):
+            return given
+        if self._options.rate is not None:
+            return ()
+        found = names.find_time(self._table.names) if self._table.is_named else ()
+        if not found and 0 not in position and self._is_rising(0):
+            found = (0,)
+        if not found:
+            reason = (
+                "has no column that looks like a time: give --time COL, or --rate HZ; there are "
+            )
+            raise RecordingError(self.path, reason + self._listed())
+        return self._told("time", found)
+
+    def _orientation(self, taken: set[int]) -> tuple[Attitudes, tuple[int, ...]]:
+        o = self._options
+        orders = {"matrix": o.matrix_order, "euler": o.euler[0] if o.euler else "xyz"}
+        for kind in ("quaternion", "matrix", "euler", "rotation_vector"):
+            if columns := self._given(kind):
+                if kind == "quaternion":
+                    orders[kind] = self._quaternion_order(columns)
+                degrees = self._in_degrees(kind, columns)
+                return Attitudes(kind, orders.get(kind, ""), degrees), columns
+        if o.orientation == "none":
+            return Attitudes("none"), ()
+        return self._guessed_orientation(taken)
+
+    def _quaternion_order(self, columns: Sequence[int]) -> str:
+        """Order of the columns of a quaternion.
+
+        Raises:
+            ParameterError: Their names say another one than the option.
+        """
+        wanted = self._options.quaternion_order
+        letters = [names.plain(self._table.names[column])[-1:] for column in columns]
+        named = "".join(letters)
+        if named in {"wxyz", "xyzw"}:
+            if wanted not in {"auto", named}:
+                needed = f"{named}, as the names of the columns of --quaternion say"
+                raise ParameterError("--quaternion-order", wanted, needed)
+            return named
+        if wanted == "auto":
+            self.told.append("quaternion in the order wxyz (else --quaternion-order xyzw)")
+            return "wxyz"
+        return wanted
+
+    def _guessed_orientation(self, taken: set[int]) -> tuple[Attitudes, tuple[int, ...]]:
+        known = self._table.names
+        if not self._table.is_named:
+            return self._orientation_by_place()
+        finders = {
+            "quaternion": (names.find_quaternion, "wxyz", "w, x, y, z of a quaternion"),
+            "matrix": (names.find_matrix, "row", "rotation matrix, row by row,"),
+            "rotation_vector": (names.find_rotation_vector, "", "rotation vector"),
+            "euler": (names.find_euler, "xyz", "roll, pitch, yaw about fixed x, y, z"),
+        }
+        for kind, (find, order, text) in finders.items():
+            columns = find(known)
+            if columns and not taken & set(columns):
+                self._told(text, columns)
+                return Attitudes(kind, order, self._in_degrees(kind, columns)), columns
+        self.told.append("orientation: none found, constant")
+        return Attitudes("none"), ()
+
+    def _orientation_by_place(self) -> tuple[Attitudes, tuple[int, ...]]:
+        width = len(self._table.names)
+        columns = tuple(range(width - 4, width))
+        if width in {7, 8} and not self._options.position and self._are_unit(columns):
+            wanted = self._options.quaternion_order
+            order = "xyzw" if wanted == "auto" else wanted  # as in that benchmark
+            self._told(f"quaternion in the order {order}", columns)
+            return Attitudes("quaternion", order), columns
+        self.told.append("orientation: none found, constant")
+        return Attitudes("none"), ()
+
+    def _are_unit(self, columns: Sequence[int]) -> bool:
+        rows = np.column_stack([self._table.sample(c).astype(np.float64) for c in columns])
+        lengths = length(rows[np.isfinite(rows).all(axis=1)])
+        return len(lengths) > 0 and bool((np.abs(lengths - 1.0) < TOLERANCE).mean() > 0.9)
+
+    def _in_degrees(self, kind: str, columns: Sequence[int]) -> bool:
+        if kind not in {"euler", "rotation_vector"}:
+            return False
+        named = self._agreed("angles", columns)
+        if self._options.angles != "auto":
+            return named == "deg"
+        sizes = [np.abs(self._table.sample(c).astype(np.float64)) for c in columns]
+        largest = max((float(np.nanmax(s)) for s in sizes if np.isfinite(s).any()), default=0.0)
+        is_degrees = named == "deg" or (named != "rad" and largest > 2.0 * math.pi + 0.1)
+        why = "as the names say" if named else f"the largest is {largest:.3g}"
+        self.told.append(f"angles in {'degrees' if is_degrees else 'radians'} ({why})")
+        return is_degrees
+
+    def _buttons(self, taken: set[int]) -> dict[str, int]:
+        found = {}
+        for button in BUTTONS:
+            wanted = getattr(self._options, button)
+            if wanted:
+                found[button] = column_of(self._table, wanted, option(button))
+            elif self._table.is_named:
+                column = names.find_button(self._table.names, button)
+                if column is None or column in taken:
+                    continue
+                if self._is_button(column):
+                    found[button] = column
+                    self._told(f"button {button}", (column,))
+                else:
+                    name = self._table.names[column]
+                    self.told.append(
+                        f"no button {button}: {name!r} holds more than 0 and 1, true and false "
+                        f"(--{button} takes it, pressed above --threshold)"
+                    )
+        return found
+
+    def _is_button(self, column: int) -> bool:
+        return bool(np.isin(self._table.sample(column).astype(np.float64), (0.0, 1.0)).all())
+
+    def _tell_unused(self, taken: set[int]) -> None:
+        known = self._table.names
+        unused = [name for column, name in enumerate(known) if column not in taken]
+        if unused:
+            more = f" and {len(unused) - _TOLD} more" if len(unused) > _TOLD else ""
+            self.told.append(f"left unused: {', '.join(map(repr, unused[:_TOLD]))}{more}")
+
+    # -- units -----------------------------------------------------------------------------------
+
+    def _time_unit(self, time: tuple[int, ...]) -> str:
+        if time and self._table.is_clock(time[0]):
+            return "ns"
+        if len(time) == 2:
+            return "ns"
+        return self._agreed("time_unit", time) or "auto"
+
+    def _unit(self, position: tuple[int, ...]) -> tuple[str, bool]:
+        """Unit of the position, and whether anybody says it."""
+        unit = self._agreed("unit", position)
+        if self._options.unit == "auto" and unit not in {"", "m"}:
+            self.told.append(f"positions in {unit}, as the names say")
+        return unit or "m", bool(unit)
+
+    def _agreed(self, name: str, columns: Sequence[int]) -> str:
+        """Unit that an option or the names of columns say; empty if neither does.
+
+        Raises:
+            ParameterError: They differ.
+        """
+        wanted, choices = getattr(self._options, name), CHOICES[name]
+        named = names.unit_of(self._table.names, columns)
+        if named not in choices or wanted == named:
+            return "" if wanted == "auto" else str(wanted)
+        if wanted == "auto":
+            return named
+        listed = ", ".join(repr(self._table.names[column]) for column in columns)
+        raise ParameterError(option(name), wanted, f"{named}, as {listed} say; else change these")
+
+    # -- rows ------------------------------------------------------------------------------------
+
+    @property
+    def bad_rows(self) -> int:
+        """Rows with too few or too many cells."""
+        return self._table.bad_rows
+
+    def presses(self) -> Presses | None:
+        """None: buttons stand in the rows."""
+        return None
+
+    def blocks(self) -> Iterator[Block]:
+        """As of any source.
+
+        Raises:
+            RecordingError: A cell is no number, or the file is damaged.
+        """
+        c = self._columns
+        order = [*c.time, *c.position, *c.orientation, *c.buttons.values()]
+        first, second = len(c.time), len(c.time) + 3
+        for columns in self._episodes.blocks(order):
+            turned = columns[second : second + len(c.orientation)]
+            count = len(columns[first])
+            rows = np.column_stack(turned) if turned else np.empty((count, 0))
+            yield Block(
+                _time(columns[:first], count),
+                np.column_stack(columns[first:second]).astype(np.float64, copy=False),
+                self.attitudes.quaternions(rows.astype(np.float64, copy=False)),
+                self._pressed(columns[second + len(turned) :], count),
+            )
+        self.told += self._episodes.told()
+
+    def _pressed(self, columns: Sequence[Numbers], count: int) -> NDArray[np.uint8] | None:
+        if not columns:
+            return None
+        pressed = np.zeros((count, len(BUTTONS)), np.uint8)
+        for button, column in zip(self._columns.buttons, columns, strict=True):
+            # What was guessed is 0 or 1; the threshold is for columns that were named.
+            threshold = self._options.threshold if getattr(self._options, button) else 0.5
+            pressed[:, BUTTONS.index(button)] = column > threshold
+        return pressed
+
+    def check(self, finite: Array) -> None:
+        """Refuse columns that hold no number at all.
+
+        Args:
+            finite: How many numbers x, y, z and the orientation have (4,).
+
+        Raises:
+            RecordingError: Names them.
+        """
+        at = [self._table.names[column] for column in self._columns.position]
+        if empty := [name for name, count in zip(at, finite[:3], strict=True) if not count]:
+            raise RecordingError(self.path, f"column {', '.join(empty)} holds no numbers")
+        if not finite[3]:
+            turned = ", ".join(self._table.names[column] for column in self._columns.orientation)
+            reason = f"columns {turned} hold no orientation; give --orientation none"
+            raise RecordingError(self.path, reason)
+
+
+def _time(columns: Sequence[Numbers], count: int) -> Numbers:
+    """Times of one column, or [ns] of one of seconds and one of nanoseconds; of none zeros."""
+    if not columns:
+        return np.zeros(count)
+    if len(columns) == 1:
+        return columns[0]
+    if all(np.isfinite(column).all() for column in columns):
+        return nanoseconds(columns[0], "s") + nanoseconds(columns[1], "ns")
+    return np.asarray(columns[0] * SECOND_NS + columns[1])

@@ -1,0 +1,293 @@
+"""Text tables: CSV and its kin; separator, head, decimal sign and compression are recognised."""
+
+import csv
+import re
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+import pyarrow as pa
+import pyarrow.csv as pc
+
+from teleop_core.base.damage import damage_told
+from teleop_core.base.errors import RecordingError
+from teleop_exchange.tables import SAMPLE, Numbers, numbers, unique
+
+_HEAD_BYTES = 1 << 18
+_PACKED = {b"\x1f\x8b": "gzip", b"BZh": "bz2", b"\x28\xb5\x2f\xfd": "zstd"}
+_COMMENTS = ("#", "%", "//")
+_MISSING = ("", "nan", "NaN", "NAN", "-nan", "NA", "N/A", "n/a", "null", "NULL", "None", "-", "--",
+            "inf", "-inf", "Inf", "-Inf")  # fmt: skip
+_NUMBER = re.compile(r"[+-]?(\d+[.,]?\d*|[.,]\d+)([eE][+-]?\d+)?")
+_NAN = re.compile(r"[+-]?(nan|inf|infinity|null|none|n/?a)", re.I)
+_CLOCK = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d[\d:.]*\s?(Z|[+-]\d\d:?\d\d)?")
+_EXACT = 1 << 53  # whole numbers up to here are exact as floating-point numbers, too
+_BLANK = r"\s+"
+
+
+class Form(NamedTuple):
+    """How a text is to be read.
+
+    Attributes:
+        separator: One sign, or the pattern of blanks.
+        decimal: Sign before the decimals.
+        head: Lines before the first row of numbers.
+        names: Names of the columns; empty if there is no head.
+        width: Number of columns.
+        rows: The first rows as texts.
+    """
+
+    separator: str
+    decimal: str
+    head: int
+    names: tuple[str, ...]
+    width: int
+    rows: list[list[str]]
+
+
+class TextTable:
+    """A text of rows; see :class:`~teleop_exchange.tables.Table`.
+
+    Args:
+        path: The file; compressed by gzip, bzip2 or zstd too.
+        skip: Lines to leave out at the beginning.
+
+    Raises:
+        RecordingError: It is empty, or no table of text.
+    """
+
+    def __init__(self, path: Path, skip: int = 0) -> None:
+        self.path, self.bad_rows = path, 0
+        with damage_told(path):
+            with path.open("rb") as file:
+                magic = file.read(4)
+            self._packed = next((n for sign, n in _PACKED.items() if magic.startswith(sign)), None)
+            text, self._encoding = self._beginning()
+            self._form = recognised(path, text, skip)
+        self.is_named = bool(self._form.names)
+        self.names = unique(self._form.names or [""] * self._form.width)
+
+    def _stream(self) -> pa.NativeFile:
+        return pa.input_stream(str(self.path), compression=self._packed)
+
+    def _rows(self) -> pa.NativeFile:
+        """The file; with one blank between cells where blanks part them."""
+        if self._form.separator != _BLANK:
+            return self._stream()
+        with self._stream() as stream:
+            lines = stream.read().splitlines()
+        return pa.BufferReader(b"\n".join(b" ".join(line.split()) for line in lines))
+
+    def _beginning(self) -> tuple[str, str]:
+        """The first lines, and how letters are encoded."""
+        with self._stream() as stream:
+            data = stream.read(_HEAD_BYTES)
+        if not data.strip():
+            raise RecordingError(self.path, "is empty")
+        if b"\x00" in data:
+            reason = "is no text; give CSV, TSV, Parquet, a ROS 2 recording or a ROS 1 .bag"
+            raise RecordingError(self.path, reason)
+        data = data if len(data) < _HEAD_BYTES else data[: data.rfind(b"\n") + 1] or data
+        try:
+            return data.decode("utf-8-sig"), "utf8"
+        except UnicodeDecodeError:
+            return data.decode("latin-1"), "latin-1"
+
+    def sample(self, column: int) -> Numbers:
+        """As of any table."""
+        cells = [row[column] if column < len(row) else "" for row in self._form.rows]
+        if self._is_truth(column):
+            return np.array([cell.strip().lower() == "true" for cell in cells], np.int64)
+        if self.is_clock(column):
+            return _clock_ns(pd.Series(cells))
+        if cells and all(re.fullmatch(r"[+-]?\d{1,18}", cell.strip()) for cell in cells):
+            return np.array([int(cell) for cell in cells], np.int64)
+        return np.array([number(cell, self._form.decimal) for cell in cells], np.float64)
+
+    def is_clock(self, column: int) -> bool:
+        """As of any table."""
+        return self._clock(column) is not None
+
+    def _clock(self, column: int) -> re.Match[str] | None:
+        """How the first cell of a column is a date, with its zone; None if it is none."""
+        rows = self._form.rows
+        return _CLOCK.match(rows[0][column].strip()) if rows and column < len(rows[0]) else None
+
+    def _is_truth(self, column: int) -> bool:
+        """Whether a column holds ``True`` and ``False``, as pandas and Unity write them."""
+        cells = {row[column].strip().lower() for row in self._form.rows if column < len(row)}
+        return bool(cells) and cells <= {"true", "false"}
+
+    def blocks(self, columns: Sequence[int]) -> Iterator[list[Numbers]]:
+        """As of any table."""
+        self.bad_rows = 0
+        with damage_told(self.path):
+            try:
+                yield from self._read(columns)
+            except ValueError as error:
+                self._refuse_cell(error)
+                raise
+
+    def _read(self, columns: Sequence[int]) -> Iterator[list[Numbers]]:
+        form = self._form
+        names = [f"c{i}" for i in range(form.width)]
+        read = pc.ReadOptions(
+            column_names=names, skip_rows=form.head, encoding=self._encoding, block_size=1 << 20
+        )
+        separator = " " if form.separator == _BLANK else form.separator
+        parse = pc.ParseOptions(delimiter=separator, invalid_row_handler=self._bad_row)
+        wanted = list(dict.fromkeys(names[column] for column in columns))
+        convert = pc.ConvertOptions(
+            include_columns=wanted, null_values=list(_MISSING), strings_can_be_null=True,
+            quoted_strings_can_be_null=True, decimal_point=form.decimal,
+            column_types={names[c]: self._type(c) for c in columns},
+        )  # fmt: skip
+        with self._rows() as stream, pc.open_csv(stream, read, parse, convert) as reader:
+            for batch in reader:
+                yield [numbers(batch.column(names[column])) for column in columns]
+
+    def _type(self, column: int) -> pa.DataType:
+        if clock := self._clock(column):
+            return pa.timestamp("ns", tz="UTC" if clock[1] else None)
+        if self._is_truth(column):
+            return pa.bool_()
+        # Whole numbers at the beginning say nothing of the rest, unless they need all digits.
+        sample = self.sample(column)
+        is_long = sample.dtype.kind == "i" and np.abs(sample).max() > _EXACT
+        return pa.int64() if is_long else pa.float64()
+
+    def _bad_row(self, row: pc.InvalidRow) -> str:
+        self.bad_rows += 1
+        return "skip"
+
+    def _refuse_cell(self, error: ValueError) -> None:
+        """Say which column holds what, if a library's error tells it.
+
+        Raises:
+            RecordingError: It does.
+        """
+        text = " ".join(str(error).split())
+        for pattern in (r"column #(\d+).*?invalid value '([^']*)'", r"to float.*?(): '([^']*)'"):
+            if found := re.search(pattern, text):
+                name = self._name_at(found[1])
+                needed = "which is no number; choose other columns, or mark it as NaN"
+                reason = f"{name} holds {found[2]!r}, {needed}"
+                raise RecordingError(self.path, reason) from error
+
+    def _name_at(self, number: str) -> str:
+        return f"column {self.names[int(number)]!r}" if number else "a column"
+
+
+def _clock_ns(column: "pd.Series[str]") -> Numbers:
+    """Dates as times since 1970 [ns]; without a zone they are UTC."""
+    clock = pd.to_datetime(column, format="ISO8601", utc=True).dt.as_unit("ns")
+    stamps = np.asarray(clock.astype("int64"), np.int64)
+    return np.where(clock.isna(), np.nan, stamps) if clock.hasnans else stamps
+
+
+def recognised(path: Path, text: str, skip: int = 0) -> Form:
+    """How a text is to be read, from its beginning.
+
+    Raises:
+        RecordingError: It has no row of numbers.
+    """
+    lines = text.splitlines()
+    first, comment = skip, ""
+    while first < len(lines) and (
+        not lines[first].strip() or lines[first].lstrip().startswith(_COMMENTS)
+    ):
+        comment = lines[first].strip().lstrip("#%/").strip() or comment
+        first += 1
+    body = [line for line in lines[first:] if line.strip()][: SAMPLE + 2]
+    if not body:
+        raise RecordingError(path, "holds no rows of numbers")
+    separator = _separator(body)
+    rows = [cells(line, separator) for line in body]
+    with_numbers = [row for row in rows if _has_numbers(row)]
+    width = Counter(map(len, with_numbers)).most_common(1)[0][0] if with_numbers else 0
+    # Lines before the table may hold numbers too, as `NO_OF_FRAMES 720` does, but not as many.
+    begin = next((i for i, row in enumerate(rows) if len(row) == width and _has_numbers(row)), None)
+    if begin is None:
+        reason = "holds no rows of numbers" if len(rows) < 3 else "holds text, not numbers"
+        raise RecordingError(path, reason)
+    head = [comment_cells for comment_cells in [cells(comment, separator)] if not begin]
+    head = rows[:begin] or head
+    names = _head(head, width)
+    skipped = _lines_before(lines, first, begin)
+    decimal = "," if separator != "," and _has_decimal_commas(rows[begin:]) else "."
+    return Form(separator, decimal, skipped, names, width, rows[begin : begin + SAMPLE])
+
+
+def _lines_before(lines: list[str], first: int, count: int) -> int:
+    """Lines before the line that follows ``count`` further ones that are not empty."""
+    for number in range(first, len(lines)):
+        if lines[number].strip():
+            if not count:
+                return number
+            count -= 1
+    return len(lines)
+
+
+def _head(rows: list[list[str]], width: int) -> tuple[str, ...]:
+    """Names of the columns from the lines before the numbers; units of a second line behind them.
+
+    The line of names is the last one that has as many cells as there are columns, except for a
+    line of units below it.
+    """
+    padded = [[*row, ""] if len(row) == width - 1 else _cut(row, width) for row in rows]
+    fitting = [row for row in padded if len(row) == width and any(cell.strip() for cell in row)]
+    fitting = [row for row in fitting if not _has_numbers(row)]
+    if not fitting:
+        return ()
+    units = [cell.strip().strip("[]()") for cell in fitting[-1]]
+    if len(fitting) > 1 and all(len(unit) <= 4 for unit in units):
+        return tuple(
+            f"{name} [{unit}]" if unit else name
+            for name, unit in zip(fitting[-2], units, strict=True)
+        )
+    return tuple(fitting[-1])
+
+
+def _cut(row: list[str], width: int) -> list[str]:
+    """Row without empty cells beyond so many, as of a line that ends in a separator."""
+    return row if any(cell.strip() for cell in row[width:]) else row[:width]
+
+
+def cells(line: str, separator: str) -> list[str]:
+    """Cells of a line."""
+    if separator == _BLANK:
+        return line.split()
+    return next(csv.reader([line], delimiter=separator))
+
+
+def _separator(lines: list[str]) -> str:
+    tried = lines[:50]
+    for separator in ("\t", ";", ",", "|"):
+        counts = [line.count(separator) for line in tried]
+        rows = [line for line in tried if _has_numbers(cells(line, separator))]
+        if min(counts[-len(counts) // 2 :]) >= 1 and rows:
+            return separator
+    return _BLANK
+
+
+def _has_numbers(row: list[str]) -> bool:
+    """Whether a row has numbers, also missing ones, and at most some texts beside them."""
+    texts = [text for cell in row if (text := cell.strip())]
+    found = sum(bool(_NUMBER.fullmatch(text) or _NAN.fullmatch(text)) for text in texts)
+    return found >= 1 and 2 * found >= len(texts)
+
+
+def _has_decimal_commas(rows: list[list[str]]) -> bool:
+    found = [cell for row in rows[:50] for cell in row if _NUMBER.fullmatch(cell.strip())]
+    return any("," in cell for cell in found) and not any("." in cell for cell in found)
+
+
+def number(cell: str, decimal: str) -> float:
+    """Number in a cell; NaN for anything else."""
+    try:
+        return float(cell.strip().replace(decimal, "."))
+    except ValueError:
+        return float("nan")

@@ -1,0 +1,184 @@
+"""Times of an import: their unit, and which rows stay where they are doubled or go back."""
+
+from bisect import bisect_right
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import median_filter
+
+from teleop_core.base.ranges import LATEST_S
+from teleop_core.kernels.geometry import Array
+from teleop_exchange.options import TIMES_NS
+
+Stamps = NDArray[np.int64]
+SECOND_NS = 1_000_000_000
+RATES_HZ = (5.0, 3000.0)
+"""Rates that a recording of a hand may have; the unit of its times follows from them."""
+_EPOCH_S = 3e8  # 1979: later times are seconds since 1970
+_LONGEST_S = 60.0  # between two samples
+_STRETCH = 10  # rows; shorter ones are no recording of their own
+
+
+class Unit(NamedTuple):
+    """A unit of time, and why it is taken."""
+
+    name: str
+    reason: str
+
+
+def guessed_unit(raw: NDArray[np.float64] | Stamps) -> Unit:
+    """Unit of times from their size, if they are times of the clock, else from their steps.
+
+    Args:
+        raw: Times (N,) in the file's unit, finite.
+    """
+    middle = float(np.median(raw)) if len(raw) else 0.0
+    steps = np.diff(np.sort(raw))
+    steps = steps[steps > 0]
+    step = float(np.median(steps)) if len(steps) else 0.0
+    if step <= 0.0:
+        return Unit("s", "")
+    for name, nanoseconds in TIMES_NS.items():
+        seconds, period = (value * nanoseconds / SECOND_NS for value in (middle, step))
+        if _EPOCH_S < seconds < LATEST_S and period < _LONGEST_S:
+            return Unit(name, "they are times of the clock")
+    best, distance = "s", float("inf")
+    for name, nanoseconds in TIMES_NS.items():
+        rate = SECOND_NS / (step * nanoseconds)
+        low, high = RATES_HZ
+        off = max(low / rate, rate / high, 1.0)
+        if off < distance:
+            best, distance = name, off
+    rate = SECOND_NS / (step * TIMES_NS[best])
+    return Unit(best, f"that makes {rate:.4g} Hz")
+
+
+def joined_ns(parts: list[NDArray[np.float64] | Stamps], unit: str, without: int) -> Stamps:
+    """Times of all blocks [ns], with a number for those that are none; empties the list.
+
+    Times later than 2096 are none: their nanoseconds would not fit into 64 bits for long.
+    """
+    latest = LATEST_S * SECOND_NS / TIMES_NS[unit]
+    out = np.empty(sum(map(len, parts)), np.int64)
+    end = len(out)
+    while parts:
+        raw = parts.pop()
+        begin = end - len(raw)
+        known = np.abs(raw) <= latest  # NaN is not
+        out[begin:end] = nanoseconds(np.where(known, raw, 0), unit)
+        out[begin:end][~known] = without
+        end = begin
+    return out
+
+
+def nanoseconds(raw: NDArray[np.float64] | Stamps, unit: str) -> Stamps:
+    """Times in nanoseconds; whole numbers keep all digits."""
+    if raw.dtype.kind == "i":
+        return np.asarray(raw, np.int64) * TIMES_NS[unit]
+    whole = np.floor(raw)
+    rest = np.rint((raw - whole) * TIMES_NS[unit]).astype(np.int64)
+    stamps: Stamps = whole.astype(np.int64) * TIMES_NS[unit] + rest
+    return stamps
+
+
+@dataclass(frozen=True, eq=False)
+class Order:
+    """Which rows stay, in which order.
+
+    Attributes:
+        rows: Numbers of the rows that stay (M,).
+        doubled: How many were left out because their time was there already.
+        backwards: How many had a time before that of an earlier row.
+    """
+
+    rows: NDArray[np.int32]
+    doubled: int
+    backwards: int
+
+
+def ordered(stamps: Stamps, *, is_sorted: bool = False) -> Order:
+    """Rows with rising times: of equal ones the first; of the others the fewest are left out.
+
+    Args:
+        stamps: Times (N,) [ns] in the order of the file.
+        is_sorted: Whether rows that go back are sorted in.
+    """
+    if (stamps[1:] > stamps[:-1]).all():
+        return Order(np.arange(len(stamps), dtype=np.int32), 0, 0)
+    rising = _longest_rising(stamps)
+    rows = np.argsort(stamps, kind="stable") if is_sorted else rising
+    kept = stamps[rows]
+    first = np.ones(len(rows), np.bool_)
+    first[1:] = kept[1:] > kept[:-1]
+    return Order(rows[first].astype(np.int32), int((~first).sum()), len(stamps) - len(rising))
+
+
+def _longest_rising(stamps: Stamps) -> NDArray[np.int64]:
+    """Most rows of which none has a time before that of an earlier one (Fredman 1975).
+
+    So one stamp from the future costs its own row, not all rows until that time has come.
+    """
+    newest, oldest = np.maximum.accumulate(stamps), np.minimum.accumulate(stamps[::-1])[::-1]
+    is_kept = (stamps == newest) & (stamps == oldest)  # no other row contradicts these
+    others = np.flatnonzero(~is_kept)
+    before = np.empty(len(others), np.int64)
+    ends: list[int] = []  # least last time of so many rows, and which row that is
+    last: list[int] = []
+    for row, stamp in enumerate(stamps[others].tolist()):
+        count = bisect_right(ends, stamp)
+        before[row] = last[count - 1] if count else -1
+        ends[count : count + 1], last[count : count + 1] = [stamp], [row]
+    row = last[-1] if last else -1
+    while row >= 0:
+        is_kept[others[row]] = True
+        row = int(before[row])
+    return np.flatnonzero(is_kept)
+
+
+def restarts(stamps: Stamps) -> NDArray[np.int64]:
+    """Rows at which another recording begins: the time falls back to run once more.
+
+    It falls back by more than half of the stretch before, and runs on into it: rows that are only
+    stored late do not. Single rows of another time do not count.
+
+    Args:
+        stamps: Times (N,) [ns] in the order of the file.
+    """
+    if (stamps[1:] >= stamps[:-1]).all():
+        return np.zeros(0, np.int64)
+    stamps = median_filter(stamps, 3, mode="nearest")
+    begins = np.flatnonzero(np.diff(stamps, prepend=stamps[:1] + 1) < 0)
+    ends = np.append(begins[1:], len(stamps))
+    first, middle, last = stamps[begins], stamps[(begins + ends) // 2], stamps[ends - 1]
+    sizes = ends - begins
+    is_long = (sizes[1:] >= _STRETCH) & (sizes[:-1] >= _STRETCH)
+    is_anew = (first[1:] < middle[:-1]) & (last[1:] > first[:-1])
+    return begins[1:][is_long & is_anew]
+
+
+def gaps(stamps: Stamps, periods: float) -> tuple[tuple[float, float], ...]:
+    """Where nothing was recorded for more than so many median periods.
+
+    Returns:
+        Begin [s] since the first stamp and length [s], the longest first.
+    """
+    steps = np.diff(stamps)
+    if not len(steps):
+        return ()
+    at = np.flatnonzero(steps > periods * float(np.median(steps)))
+    at = at[np.argsort(-steps[at], kind="stable")]
+    return tuple(((int(stamps[i]) - int(stamps[0])) * 1e-9, int(steps[i]) * 1e-9) for i in at)
+
+
+def spread_ms(stamps: Stamps) -> tuple[float, float, float]:
+    """Median, 5 % and 95 % of the periods [ms]."""
+    steps = np.diff(stamps) * 1e-6
+    low, middle, high = np.percentile(steps, (5, 50, 95)) if len(steps) else (0.0, 0.0, 0.0)
+    return float(middle), float(low), float(high)
+
+
+def is_constant(stamps: Array | Stamps) -> bool:
+    """Whether stamps say nothing: all the same, such as zero."""
+    return len(stamps) > 1 and bool((stamps == stamps[0]).all())
