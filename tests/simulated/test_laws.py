@@ -66,6 +66,16 @@ def test_an_intruder_under_a_clock_that_was_ahead_does_not_shut_the_hand_out_for
     assert run_seed(21039, faults).broken == ()
 
 
+@pytest.mark.slow
+def test_a_session_that_began_under_a_slow_clock_stamps_by_it_and_moves_by_new_commands() -> None:
+    """Of seed 61046: the law took them for old ones."""
+    faults = (
+        Fault(4.109, "kill", "teleop_session", 1.0, 0.5),
+        Fault(4.633, "clock step", "", 1.5546, 0.5542206),
+    )  # fmt: skip
+    assert run_seed(61046, faults, None, Processes.ONE).broken == ()
+
+
 def test_each_law_has_a_mutant_that_breaks_it() -> None:
     assert {one.schedule.law for one in FOUND_BY_LAWS if one.schedule} == set(LAWS)
 

@@ -175,7 +175,10 @@ class Laws:
         if self._scheduler.now_ns - self._stepped_ns < _AFTER_STEP_NS:
             return
         self._count("age")
-        age = 1e-9 * (self._scheduler.now_ns + offset_ns - stamp_ns)
+        master: Any = self._stage.session.node("haptic_master")
+        # Who started under another clock goes on to stamp by it.
+        epoch_ns = getattr(master, "epoch_ns", offset_ns)
+        age = 1e-9 * (self._scheduler.now_ns + epoch_ns - stamp_ns)
         self._old = self._old + 1 if age > _OLD + self._late() else 0
         if self._old > _JOINING:
             self._break("age", f"moves by a command that is {age:.2f} s old")
