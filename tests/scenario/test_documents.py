@@ -188,8 +188,8 @@ def test_parts_of_the_package_in_the_documents_are_there_once_it_is_installed(
     (tmp_path / "my_teleop_parts.py").write_text(snippets(section, "python")[0])
     # What an editable installation does, without pip, which would ask an index for build tools.
     run(["-c", "import setuptools; setuptools.setup()", "-q", "egg_info"], tmp_path)
-    sim = ["sim", "--duration", "1", "--out", "bag", "--set", "fixture=fence", "fixture.fence.room=0.02",
-           "operator=still"]  # fmt: skip
+    sim = ["sim", "--duration", "1", "--out", "bag", "--set", "fixture=fence",
+           "fixture.fence.room=0.02", "operator=still"]  # fmt: skip
     run(["-m", "teleop_core.cli", *sim], tmp_path, PYTHONPATH=str(tmp_path))
 
 
