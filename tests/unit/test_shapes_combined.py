@@ -226,14 +226,16 @@ def test_a_report_of_a_union_has_its_shape_again() -> None:
     assert reported.made == made
 
 
-def test_a_union_of_meshes_holds_a_hand_and_is_replayed_and_scored_though_they_are_gone(
-    tmp_path: Path,
+@pytest.mark.parametrize("kind", ["mesh", "union"])
+def test_meshes_hold_a_hand_and_are_replayed_and_scored_though_they_are_gone(
+    kind: str, tmp_path: Path
 ) -> None:
     trimesh.creation.box((30.0, 30.0, 30.0)).export(tmp_path / "box.stl")
     trimesh.creation.icosphere(subdivisions=4, radius=8.0).export(tmp_path / "ball.stl")
     parts = [f"mesh file='{tmp_path / 'box.stl'}'",
              f"mesh file='{tmp_path / 'ball.stl'}' at=[0.0, 0.015, 0.0]"]  # fmt: skip
-    given_settings: Any = {"fixture": "union", "fixture.union.parts": parts}
+    of_kind = {"mesh.file": str(tmp_path / "box.stl"), "union.parts": parts}
+    given_settings: Any = {"fixture": kind} | {f"fixture.{n}": v for n, v in of_kind.items()}
     held = tc.run("coarse_box", duration=6.0, settings=given_settings, out=tmp_path / "bag")
     before = held.score()
     assert before.value("fixture.hand_penetration_max_mm") > 0.1
