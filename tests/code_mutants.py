@@ -173,7 +173,7 @@ CODE_MUTANTS = (
             "chain/fixtures/__init__.py", "if beyond > _ROUNDING:", "if False:", "shapes"),
     _mutant("mesh_gone", "a fixture's mesh is scored by the file of today",
             "chain/fixtures/reported_fixture.py", "repr(moved(_value(name, text), files))", "text",
-            "fixture_meshes"),
+            "shapes_combined"),
     _mutant("former_wide", "a diameter of a recording is taken for a radius",
             "graph/former_shapes.py", '0.5 * found.pop("diameter")', 'found.pop("diameter")',
             "former_shapes"),

@@ -21,7 +21,7 @@ from teleop_core.kernels import pointer
 from teleop_core.kernels.geometry import Array
 from teleop_core.kernels.parts import fenced, is_whole, numbers_of
 
-__all__ = ["SHAPES", "Shape", "files_of", "moved", "register_shape", "trial_of"]
+__all__ = ["SHAPES", "Shape", "files_of", "moved", "register_shape"]
 
 _ROW = types.float64[::1]
 DISTANCE = types.float64(_ROW, _ROW, _ROW)
@@ -87,26 +87,22 @@ _TRIED = np.array(
 """Offsets at which a shape is tried [m]."""
 
 
-def trial_of(kind: str) -> Callable[[Shape], None]:
-    """Trial of a registry of shapes, so that what cannot work is told before anything runs."""
-
-    def try_it(part: Shape) -> None:
-        needs = (
-            "one with distance(offset, numbers, out) -> float, outline(parameters) -> (N, 3) and "
-            "parameters that all have defaults"
-        )
-        with tried(kind, part.name, needs):
-            parameters = part.parameters()
-            points = np.asarray(part.outline(parameters), np.float64)
-            numbers = part.numbers(parameters)
-            faults = (_fault_at(part, numbers, offset) for offset in _TRIED)
-            fault = next(filter(None, faults), "")
-        if points.ndim != 2 or points.shape[1] != 3 or not np.isfinite(points).any():
-            fault = f"an outline (N, 3) of finite points, not {points.shape}"
-        if fault:
-            raise PartError(kind, part.name, f"one with {fault}")
-
-    return try_it
+def _try(part: Shape) -> None:
+    """Try it at some places, so that what cannot work is told before anything runs."""
+    needs = (
+        "one with distance(offset, numbers, out) -> float, outline(parameters) -> (N, 3) and "
+        "parameters that all have defaults"
+    )
+    with tried("shape", part.name, needs):
+        parameters = part.parameters()
+        points = np.asarray(part.outline(parameters), np.float64)
+        numbers = part.numbers(parameters)
+        faults = (_fault_at(part, numbers, offset) for offset in _TRIED)
+        fault = next(filter(None, faults), "")
+    if points.ndim != 2 or points.shape[1] != 3 or not np.isfinite(points).any():
+        fault = f"an outline (N, 3) of finite points, not {points.shape}"
+    if fault:
+        raise PartError("shape", part.name, f"one with {fault}")
 
 
 def _fault_at(part: Shape, numbers: Array, offset: Array) -> str:
@@ -130,7 +126,7 @@ SHAPES: Registry[Shape] = Registry(
     "shapes",
     places("teleop_core.shapes", " ".join(m.name for m in iter_modules(__path__) if not m.ispkg)),
     part_check("shape", Shape, "distance", "outline"),
-    trial_of("shape"),
+    _try,
 )
 """All shapes by name: every file of this folder holds one."""
 

@@ -6,7 +6,7 @@ objects alone. What it is made of, and how it pushes, is the same for all
 """
 
 from teleop_core.base.registry import Registry, part_check, places
-from teleop_core.shapes import SHAPES, Shape, trial_of
+from teleop_core.shapes import SHAPES, Shape
 
 __all__ = ["WORLD_OBJECTS"]
 
@@ -15,7 +15,6 @@ WORLD_OBJECTS: Registry[Shape] = Registry(
     "world_objects",
     places("teleop_core.slave.world", "empty button"),
     part_check("world object", Shape, "distance", "outline"),
-    trial_of("world object"),
     base=SHAPES,
 )
 """All objects by name: every shape, and those that are objects alone."""
