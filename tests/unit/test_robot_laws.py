@@ -59,6 +59,17 @@ def test_every_branch_reaches_the_pose_and_one_is_the_original(name: str) -> Non
         assert np.abs(same_turns(name, solutions, q)).max(axis=1).min() < 1e-8
 
 
+@robots
+def test_every_branch_of_any_robot_reaches_its_pose_and_ik_gives_one_of_them(name: str) -> None:
+    arm = ARMS[name]
+    for q in near_home(name, 20):
+        pose = arm.fk(q)
+        solutions = arm.ik_all(pose)
+        # Legs of the hybrid that agree to rounding leave the pose as the root of that.
+        assert np.abs(arm.fk(solutions) - pose).max() < (1e-6 if name == "scara_stewart" else 1e-9)
+        assert np.abs(arm.fk(arm.ik(pose, q).q) - pose).max() < 1e-6
+
+
 @arms
 def test_reachable_poses_are_solved_from_any_seed_inside_the_limits(name: str) -> None:
     arm = ARMS[name]

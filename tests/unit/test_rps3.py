@@ -157,19 +157,6 @@ def test_the_robot_reaches_height_and_tilt_and_leaves_the_rest_as_residual() -> 
         assert math.isclose(result.residual[0], gap, abs_tol=1e-12)
 
 
-def test_poses_and_legs_are_inverse_to_each_other_and_found_among_the_modes() -> None:
-    robot, rng = load_robot("rps3"), np.random.default_rng(6)
-    q = rng.uniform(1.05, 1.35, (100, 3))
-    poses = robot.fk(q)
-    result = robot.ik(poses)
-    assert np.allclose(result.q, q, atol=SOLVED)
-    assert result.residual.max() < SOLVED
-    for legs, T in zip(q[:20], poses, strict=False):
-        modes = assembly_modes(legs, b=B, a=A)
-        assert np.abs(modes.transforms - T).max(axis=(1, 2)).min() < 1e-8
-        assert np.allclose(robot.ik_all(T), [legs], atol=SOLVED)
-
-
 def test_strokes_stop_the_legs() -> None:
     robot = load_robot("rps3")
     result = robot.ik(transform(np.eye(3), np.array([0.0, 0.0, 3.0])))

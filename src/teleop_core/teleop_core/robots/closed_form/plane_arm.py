@@ -182,23 +182,29 @@ def _turn(q: Array, seed: Array, limits: Array, K: Array) -> None:
 
 
 @inner
-def _choose(T: Array, seed: Array, limits: Array, K: Array, G: Array, q: Array) -> bool:
-    """Write the branch of the smallest move; whether any reaches the place.
+def _choose(seed: Array, limits: Array, K: Array, G: Array, q: Array) -> tuple[bool, float]:
+    """Write the branch of the smallest move; whether any reaches the place, and the root.
 
-    In a path hand and roll have no say, which a stop may hold back: the elbow decides.
+    Side and elbow of the seed come first; the others are solved only if they can still win. In a
+    path hand and roll have no say, which a stop may hold back: the elbow decides.
     """
     n, H, trial, best = q.shape[0], room(3, 4), room(6), math.inf
     is_path, any_reaches = math.isfinite(limits[2, 0]), False
-    one, other, is_side, _ = _sides(G, K, seed)
+    one, other, is_side, root = _sides(G, K, seed)
     if abs(wrapped(one - _get(K, FIRST, seed))) > 0.5 * math.pi:
         one, other = other, one
+    bent = _get(K, ELBOW, seed) + K[_BEND]
     for side in range(1 if K[FIRST] < 0.0 else 2):
+        if side == 1 and abs(wrapped(other - _get(K, FIRST, seed))) >= best:
+            break
         turned, x, y = _wrist(G, K, one if side == 0 else other, seed, H, trial)
         elbow, is_arm = _elbow(x, y, K[_UPPER], K[_FORE])
-        elbow = math.copysign(elbow, _get(K, ELBOW, seed) + K[_BEND])
+        elbow = math.copysign(elbow, bent)
         is_there = is_arm and is_side
         any_reaches = any_reaches or is_there
         for branch in range(2):
+            if branch == 1 and abs(wrapped(-elbow - bent)) >= best:
+                break
             _bend(turned, x, y, K, elbow if branch == 0 else -elbow, seed, trial)
             _turn(trial, seed, limits, K)
             cost = 0.0 if is_path else cost_of(trial[:n], seed, limits, 0, n, True)
@@ -209,7 +215,7 @@ def _choose(T: Array, seed: Array, limits: Array, K: Array, G: Array, q: Array) 
                 best = cost
                 for i in range(n):
                     q[i] = trial[i]
-    return any_reaches
+    return any_reaches, root
 
 
 @inner
@@ -269,14 +275,12 @@ def ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual
         return -1
     K, G, reached = geometry[candidates.constants_at(q.shape[0]) :], room(3, 4), room(4, 4)
     _wanted(T, K, G)
-    is_reachable = _choose(T, seed, limits, K, G, q)
+    is_reachable, root = _choose(seed, limits, K, G, q)
     if not is_allowed(q, seed, limits):
         _settle(G, seed, limits, K, q)
     fk(q, geometry, reached)
-    pose_residual(reached, T, residual)
-    if not _is_met(G, reached, K, q):
+    if not (pose_residual(reached, T, residual) or _is_met(G, reached, K, q)):
         return _LIMITED if is_reachable else _UNREACHABLE
-    root = _sides(G, K, seed)[3]
     is_near = abs(math.sin(_get(K, ELBOW, q) + K[_BEND])) < _NEAR
     is_near = is_near or root < _NEAR * (K[_UPPER] + K[_FORE])
     return _NEAR_SINGULAR if is_near else _FOLLOWED
