@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from teleop_core.robots.dh import CONVENTIONS, DhTable, elementary
+from teleop_core.robots.arms.dh import CONVENTIONS, DhTable, elementary
 
 TURN = 2.0 * np.pi
 Solver = Callable[[Any, Any], Any]

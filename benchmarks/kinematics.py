@@ -28,7 +28,7 @@ import numpy as np  # noqa: E402
 
 from ik_peers import PEERS, Adapted, as_it_is  # noqa: E402
 from teleop_core.robots import IkStatus, list_robots, load_robot  # noqa: E402
-from teleop_core.robots.dh import load_table  # noqa: E402
+from teleop_core.robots.arms.dh import load_table  # noqa: E402
 
 TABLES = Path(__file__).parent.parent / "config" / "robots"
 ARMS = ("puma560", "rcrt1")

@@ -3,11 +3,8 @@
 import teleop_core as tc
 
 SHAPES: dict[str, tuple[str, ...]] = {
-    "union": ("sphere diameter=0.03", "cylinder diameter=0.01 length=0.06 at=[0, 0.02, 0]"),
-    "intersection": (
-        "box size=[0.03, 0.03, 0.03]",
-        "keep_out_sphere place=[0, 0.02, 0] diameter=0.02",
-    ),
+    "union": ("sphere radius=0.015", "cylinder radius=0.005 length=0.06 at=[0, 0.02, 0]"),
+    "intersection": ("box size=[0.03, 0.03, 0.03]", "not sphere at=[0, 0.02, 0] radius=0.01"),
 }
 
 

@@ -13,21 +13,21 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, kw_only=True)
 class PillParameters:
-    """What ``--set fixture.pill.radius=...`` sets; the depth gets the numbers in this order."""
+    """What ``--set fixture.pill.radius=...`` sets; the distance gets the numbers in this order."""
 
     radius: float = tc.parameter(0.012, unit="m", lower=1e-4, upper=0.5, doc="of sides and ends")
     height: float = tc.parameter(0.01, unit="m", lower=0.0, upper=0.5, doc="without its ends")
 
 
 @tc.kernel
-def pill_depth(offset: Array, shape: Array, depth: Array) -> float:
-    """Write the vector from the nearest point inside to the hand; return its length."""
-    y = offset[1] - min(max(offset[1], -0.5 * shape[1]), 0.5 * shape[1])
-    distance = math.sqrt(offset[0] ** 2 + y**2 + offset[2] ** 2)
-    outside = max(distance - shape[0], 0.0)
-    share = outside / max(distance, 1e-9)
-    depth[0], depth[1], depth[2] = share * offset[0], share * y, share * offset[2]
-    return float(outside)
+def pill_distance(offset: Array, numbers: Array, out: Array) -> float:
+    """Write the way from the middle line, of any length; return how far a point is outside."""
+    out[0], out[2] = offset[0], offset[2]
+    out[1] = offset[1] - min(max(offset[1], -0.5 * numbers[1]), 0.5 * numbers[1])
+    from_line = math.sqrt(out[0] ** 2 + out[1] ** 2 + out[2] ** 2)
+    if from_line == 0.0:
+        out[0] = 1.0
+    return float(from_line - numbers[0])
 
 
 def pill_outline(p: PillParameters) -> Array:
@@ -38,8 +38,8 @@ def pill_outline(p: PillParameters) -> Array:
     return np.column_stack((loop, np.zeros(len(loop))))
 
 
-PILL = tc.Fixture("pill", PillParameters, pill_depth, pill_outline)
-tc.register_fixture(PILL)
+PILL = tc.Shape("pill", PillParameters, pill_distance, pill_outline)
+tc.register_shape(PILL)
 
 
 def main() -> None:

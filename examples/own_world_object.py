@@ -20,15 +20,15 @@ class RingParameters:
 
 
 @tc.kernel
-def ring_distance(offset: Array, shape: Array, normal: Array) -> float:
+def ring_distance(offset: Array, numbers: Array, out: Array) -> float:
     """Write the way from the ring's middle line; return how far a point is outside of its wire."""
     x, y, z = offset[0], offset[1], offset[2]
     from_axis = max(math.sqrt(x * x + y * y), 1e-9)
-    aside = from_axis - shape[0]
+    aside = from_axis - numbers[0]
     away = max(math.sqrt(aside * aside + z * z), 1e-9)
     share = aside / (away * from_axis)
-    normal[0], normal[1], normal[2] = share * x, share * y, z / away
-    return float(away - 0.5 * shape[1])
+    out[0], out[1], out[2] = share * x, share * y, z / away
+    return float(away - 0.5 * numbers[1])
 
 
 def ring_outline(p: RingParameters) -> Array:
@@ -37,8 +37,8 @@ def ring_outline(p: RingParameters) -> Array:
     return p.radius * np.stack((np.cos(angle), np.sin(angle), np.zeros(41)), axis=1)
 
 
-RING = tc.WorldObject("ring", RingParameters, ring_distance, ring_outline)
-tc.register_world_object(RING)
+RING = tc.Shape("ring", RingParameters, ring_distance, ring_outline)
+tc.register_shape(RING)
 
 
 def main() -> None:

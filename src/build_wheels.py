@@ -2,7 +2,7 @@
 
 ``make wheel`` runs it. The second wheel serves one version of Python on any x86-64 processor that
 has one of the tiers; pip takes the pure one elsewhere, and kernels are compiled when they are
-first needed, as are the few of teleop_lab.
+first needed, as are those of teleop_machines and the few of teleop_lab.
 """
 
 import argparse
@@ -20,6 +20,7 @@ PLATFORM = "manylinux_2_28_x86_64"  # as numba's own
 TAG = f"cp{sys.version_info[0]}{sys.version_info[1]}"
 CORE = "teleop_core"
 OTHERS = (
+    "teleop_machines",
     "teleop_console",
     "teleop_exchange",
     "teleop_lab",

@@ -6,18 +6,18 @@ import pytest
 
 from teleop_core.chain.architectures import ARCHITECTURES
 from teleop_core.chain.filters import TREMOR_FILTERS
-from teleop_core.chain.fixtures import FIXTURES
 from teleop_core.chain.network import NETWORKS
 from teleop_core.chain.operators import OPERATORS
 from teleop_core.chain.passivity import PASSIVITIES
 from teleop_core.graph.stage import STAGES
+from teleop_core.shapes import SHAPES
 from teleop_core.slave.bridges import BRIDGES
 from teleop_core.slave.controllers import CONTROLLERS
 from teleop_core.slave.plants import PLANTS
 
 REGISTRIES = (
-    ARCHITECTURES, BRIDGES, CONTROLLERS, FIXTURES, NETWORKS, OPERATORS, PASSIVITIES, PLANTS,
-    STAGES, TREMOR_FILTERS,
+    ARCHITECTURES, BRIDGES, CONTROLLERS, NETWORKS, OPERATORS, PASSIVITIES, PLANTS,
+    SHAPES, STAGES, TREMOR_FILTERS,
 )  # fmt: skip
 
 

@@ -12,10 +12,10 @@ from teleop_core.kernels import kernel, pointer
 from teleop_core.kernels.fields import record, record_array
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots.drives import ACCELERATION
+from teleop_core.shapes.hole import HoleParameters
 from teleop_core.slave.joints import integrate
 from teleop_core.slave.simulation import SimulationNumbers, SimulationState
 from teleop_core.slave.world.contact import ContactState, add_push, touch
-from teleop_core.slave.world.hole import HoleParameters
 
 JOINTS = 6  # the tip's place along the base, and turns about the base's axes
 

@@ -44,7 +44,7 @@ def needle(name: str, parameters: Any = None, joints: int = 3) -> Needle:
     """A needle before an object, with the defaults of its parameters if there are no others."""
     part = WORLD_OBJECTS.find(name)
     return Needle(
-        pointer(straight, FK), part.distance_pointer, np.zeros(joints), np.zeros(3),
+        pointer(straight, FK), part.pointer, np.zeros(joints), np.zeros(3),
         np.zeros((4, 4)), part.numbers(parameters or part.parameters()), np.zeros(3), np.zeros(3),
         np.zeros((6, joints)),
     )  # fmt: skip

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from teleop_core.kernels.geometry import Array
-from teleop_core.robots.dh import DhTable, parse_table
+from teleop_core.robots.arms.dh import DhTable, parse_table
 
 SHOULDERS = ("skew", "1 and 2 parallel", "2 and 3 parallel", "1 and 2 meet", "2 and 3 meet")
 PARALLEL = ("5 and 6 meet", "5 and 6 apart")

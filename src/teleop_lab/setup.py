@@ -15,6 +15,7 @@ setup(
     python_requires=">=3.11",
     install_requires=[
         f"teleop_core=={VERSION}",
+        f"teleop_machines=={VERSION}",
         f"teleop_console=={VERSION}",
         f"teleop_exchange=={VERSION}",
         "lazy_loader",

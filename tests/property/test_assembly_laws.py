@@ -9,7 +9,7 @@ from scipy.optimize import fsolve
 
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots import FkStatus, load_robot
-from teleop_core.robots.stewart import PAIRED
+from teleop_machines.stewart import PAIRED
 
 # Error of a leg or of a loop equation at which scipy's answer counts as closed.
 FOUND = 1e-10

@@ -88,6 +88,7 @@ def test_teleop_of_the_workspace_finds_the_commands_of_the_other_packages(worksp
         workspace / "install" / name
         for name in (
             "teleop_core",
+            "teleop_machines",
             "teleop_console",
             "teleop_exchange",
             "teleop_lab",

@@ -23,7 +23,7 @@ LEAD = VirtualTime(configure()).lead
 TICKS = LEAD + 1500
 SHORT = ("approach_time=0.5", "operator.period=2.0", "buttons.fixture=[0.2]")
 ARMS = ("teleop.arms=[right, left]", "left/robot=scara", "left/seed=7", "left/coarse_gain=0.5",
-        "right/fixture=sphere", "right/fixture.sphere.diameter=0.01")  # fmt: skip
+        "right/fixture=sphere", "right/fixture.sphere.radius=0.005")  # fmt: skip
 
 
 def settings(*more: str) -> Configuration:
@@ -44,7 +44,7 @@ def assert_same_streams(block: NDArray[np.void], arm: str, other: NDArray[np.voi
 
 
 def test_default_arm_moves_as_alone_to_the_bit(both: NDArray[np.void]) -> None:
-    alone = VirtualTime(settings("fixture=sphere", "fixture.sphere.diameter=0.01")).run(TICKS)
+    alone = VirtualTime(settings("fixture=sphere", "fixture.sphere.radius=0.005")).run(TICKS)
     assert_same_streams(both, "", alone)
     assert np.abs(both["master_servo_cf"]).max() > 0.1
 

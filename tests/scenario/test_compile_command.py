@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from teleop_core.chain.fixtures import FIXTURES
 from teleop_core.commands.compiling import configured_job, phases_of
 from teleop_core.kernels import IS_COMPILED
 from teleop_core.session.virtual import VirtualTime
+from teleop_core.shapes import SHAPES
 
 SESSION = """
 from teleop_core.session import api
@@ -41,7 +41,9 @@ def test_every_part_that_is_compiled_ahead_is_configured_and_has_the_file_that_i
 ) -> None:
     jobs = [job for jobs in phases_of(is_all=True) for job in jobs]
     shapes = {setting.partition("=")[2] for _, setting, _ in jobs if "fixture=" in setting}
-    assert shapes == set(FIXTURES)
+    kernels = {SHAPES.find(name).distance for name in SHAPES}
+    assert {SHAPES.find(name).distance for name in shapes} == kernels
+    assert len(shapes) == len(kernels)
     for job in jobs:
         configuration = configured_job(job, tmp_path)
         if "mesh" in job[1]:

@@ -1,4 +1,4 @@
-"""Distributions: the core works alone, and the others add their commands to it."""
+"""Distributions: the core works alone; the others add their commands and robots to it."""
 
 import subprocess
 import sys
@@ -10,11 +10,12 @@ import pytest
 
 from teleop_core import cli
 from teleop_core.commands import installed
+from teleop_core.robots import ROBOTS
 
 ALONE = """
 import importlib.metadata, sys
 
-for name in ("teleop_console", "teleop_exchange", "teleop_lab", "teleop_drill"):
+for name in ("teleop_machines", "teleop_console", "teleop_exchange", "teleop_lab", "teleop_drill"):
     sys.modules[name] = None  # cannot be imported
 entries = (entry for found in importlib.metadata.distributions() for entry in found.entry_points)
 others = [entry for entry in entries if not entry.group.startswith("teleop_")]
@@ -67,6 +68,18 @@ def test_command_of_a_missing_distribution_says_what_to_install(
         cli.main([name, "--list"])
     text = f"teleop {name}: install {distribution}, which has this command\n"
     assert capsys.readouterr().err == text
+
+
+def test_robot_of_a_missing_distribution_says_what_to_install() -> None:
+    text = "robot 'stewart' must be one that is installed: install teleop_machines, which has it"
+    assert alone("robot", "stewart", code=2).stderr == f"teleop robot: {text}\n"
+    assert "stewart" not in alone("robot").stdout
+
+
+def test_robots_of_the_machines_are_those_that_the_core_knows_to_be_there() -> None:
+    found = {entry.name for entry in entry_points(group=ROBOTS.group)}
+    assert found == set(ROBOTS.elsewhere)
+    assert set(ROBOTS.elsewhere.values()) == {"teleop_machines"}
 
 
 def test_commands_of_the_other_distributions_are_where_the_advice_says() -> None:

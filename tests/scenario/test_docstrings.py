@@ -1,4 +1,4 @@
-"""Docstrings and comments of the source: sentences that are read once."""
+"""Docstrings, comments and messages of the source: sentences that are read once."""
 
 import ast
 import io
@@ -12,8 +12,12 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 STYLE = tomllib.loads((ROOT / "docs" / "words.toml").read_text(encoding="utf-8"))
-ROOMS = ("teleop_core", "teleop_console", "teleop_exchange", "teleop_lab", "teleop_drill")
+ROOMS = (
+    "teleop_core", "teleop_machines", "teleop_console", "teleop_exchange", "teleop_lab",
+    "teleop_drill",
+)  # fmt: skip
 FILES = sorted(path for room in ROOMS for path in (ROOT / "src" / room / room).rglob("*.py"))
+SHORTEST = 6  # words of a message; what has less is a name or a format
 # Where a sentence or an item of a list ends, or an entry of Args begins.
 ENDS = r"\n\s*\n|\n\s*[-*] |:\n|\n\s*\w+: "
 
@@ -23,6 +27,24 @@ def docstrings(text: str) -> Iterator[str]:
     for node in ast.walk(ast.parse(text)):
         if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant):
             yield str(node.value.value)
+
+
+def messages(text: str) -> Iterator[str]:
+    """Other texts of some words, as of errors, parameters and help; what is put in is one word."""
+    tree = ast.parse(text)
+    inside = {
+        part for node in ast.walk(tree) if isinstance(node, ast.JoinedStr) for part in node.values
+    }
+    for node in ast.walk(tree):
+        if isinstance(node, ast.JoinedStr):
+            parts = (p.value if isinstance(p, ast.Constant) else "it" for p in node.values)
+            words = "".join(map(str, parts))
+        elif isinstance(node, ast.Constant) and node not in inside:
+            words = str(node.value)
+        else:
+            continue
+        if len(words.split()) >= SHORTEST and "\n" not in words:
+            yield words
 
 
 def comments(text: str) -> Iterator[str]:
@@ -47,10 +69,13 @@ def sentences(text: str) -> Iterator[str]:
 
 
 @pytest.mark.parametrize("path", FILES, ids=[str(path.relative_to(ROOT / "src")) for path in FILES])
-def test_docstrings_and_comments_are_read_once(path: Path) -> None:
+def test_docstrings_comments_and_messages_are_read_once(path: Path) -> None:
     text = path.read_text(encoding="utf-8")
-    for words in (*docstrings(text), *comments(text)):
+    for words in (*docstrings(text), *comments(text), *messages(text)):
         for sentence in sentences(words):
             assert len(sentence.split()) <= STYLE["longest_sentence"], sentence
         for phrase in STYLE["never"]:
             assert phrase not in " ".join(words.split()), phrase
+        for avoided, better in (STYLE["instead"] | STYLE["glossary"]).items():
+            found = re.search(rf"\b(?:{avoided})", words, re.IGNORECASE)
+            assert found is None, f"{found[0]!r}: say {better}"

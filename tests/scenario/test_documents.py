@@ -15,6 +15,7 @@ import pytest
 import teleop_core
 import teleop_drill
 import teleop_lab
+import teleop_machines
 from teleop_core.cli import _parser
 from teleop_core.evaluation.score import keys
 from teleop_core.graph.layers import parse_setting
@@ -189,8 +190,8 @@ def test_parts_of_the_package_in_the_documents_are_there_once_it_is_installed(
     (tmp_path / "my_teleop_parts.py").write_text(snippets(section, "python")[0])
     # What an editable installation does, without pip, which would ask an index for build tools.
     run(["-c", "import setuptools; setuptools.setup()", "-q", "egg_info"], tmp_path)
-    sim = ["sim", "--duration", "1", "--out", "bag", "--set", "fixture=fence", "fence.room=0.02",
-           "operator=still"]  # fmt: skip
+    sim = ["sim", "--duration", "1", "--out", "bag", "--set", "fixture=fence",
+           "fixture.fence.room=0.02", "operator=still"]  # fmt: skip
     run(["-m", "teleop_core.cli", *sim], tmp_path, PYTHONPATH=str(tmp_path))
 
 
@@ -218,13 +219,11 @@ def test_pages_agree_on_how_many_distributions_and_extras_there_are() -> None:
 def test_version_is_the_same_wherever_it_stands() -> None:
     version = teleop_core.__version__
     assert version == teleop_lab.__version__ == teleop_drill.__version__
+    assert version == teleop_machines.__version__
     for package in (
-        "teleop_core",
-        "teleop_console",
-        "teleop_exchange",
-        "teleop_lab",
+        "teleop_core", "teleop_machines", "teleop_console", "teleop_exchange", "teleop_lab",
         "teleop_drill",
-    ):
+    ):  # fmt: skip
         assert ET.parse(ROOT / f"src/{package}/package.xml").findtext("version") == version
         assert f'VERSION = "{version}"' in text_of(f"src/{package}/setup.py")
     for said in (f'version = "{version}"', f"teleop_core=={version}"):

@@ -6,12 +6,18 @@ import numpy as np
 import pytest
 
 import teleop_core as tc
+from any_shape import depth_of
 from present import present
-from teleop_core.chain.fixtures import FIXTURES
+from teleop_core.chain.fixtures import Fixture
+from teleop_core.shapes import SHAPES
 
 SECONDS = 10.0
 # The simulated person of the scenario goes up from there: a ceiling holds that hand, no floor.
-SETTINGS = {"half_space": {"fixture__half_space__normal": (0.0, -1.0, 0.0)}}
+SETTINGS: dict[str, dict[str, Any]] = {
+    "half_space": {"fixture__half_space__normal": (0.0, -1.0, 0.0)},
+    "plane": {"fixture__plane__normal": (0.0, 1.0, 0.0)},
+    "hole": {"fixture__keep_out": True, "fixture__place": (0.0, 0.0, 0.015)},
+}
 # The least of what a hand without a wall goes beyond that the wall takes away.
 HELD = 0.2
 # A step of the reading to the left and one to the right, and the last bit of the limits [mm].
@@ -34,14 +40,16 @@ def ways(recording: tc.Recording, kind: Any) -> Any:
     after = hand.time >= begin
     offsets = hand[["x", "y", "z"]][after]
     offsets = np.ascontiguousarray(offsets - offsets[0])
-    part, out = FIXTURES.find(kind), np.empty((len(offsets), 3))
-    numbers = {name.rpartition("__")[2]: v for name, v in SETTINGS.get(kind, {}).items()}
-    shape = part.numbers(part.parameters(**numbers))
-    depths = np.array([part.depth(o, shape, row) for o, row in zip(offsets, out, strict=True)])
-    return depths, out, force[["fx", "fy", "fz"]][after]
+    shape, given = SHAPES.find(kind), dict(SETTINGS.get(kind, {}))
+    own = ("place", "keep_out")
+    used = {name: given.pop(f"fixture__{name}") for name in own if f"fixture__{name}" in given}
+    numbers = {name.rpartition("__")[2]: value for name, value in given.items()}
+    fixture = Fixture(shape, shape.parameters(**numbers), **used)
+    depths, out = zip(*(depth_of(fixture, offset) for offset in offsets), strict=True)
+    return np.array(depths), np.array(out), force[["fx", "fy", "fz"]][after]
 
 
-@pytest.mark.parametrize("kind", [name for name in FIXTURES if "mesh" not in name])
+@pytest.mark.parametrize("kind", sorted(set(SHAPES) - {"mesh", "height_field"}))
 def test_every_fixture_holds_the_hand_and_is_scored(kind: Any) -> None:
     recording = session(kind)
     score = recording.score()

@@ -135,7 +135,7 @@ def test_page_of_three_recordings_draws_everything_without_asking_the_network(
 ) -> None:
     bags = [
         record(tmp_path / "box", 1),
-        record(tmp_path / "sphere", 2, {"fixture": "sphere", "fixture.diameter": "0.03"}),
+        record(tmp_path / "sphere", 2, {"fixture": "sphere", "fixture.radius": "0.015"}),
         record(tmp_path / "cone", 3, {"fixture": "cone"}),  # which is not installed
     ]
     expected = sum(len(study(Bag(path)).figures()) for path in bags)

@@ -10,6 +10,8 @@ import pytest
 from drill_runs import run_drill
 from mutants import ROOT
 from teleop_drill.drill import SHORT, chosen
+from teleop_drill.nodes import drill
+from teleop_drill.simulation.drill import simulated_drill
 
 pytestmark = pytest.mark.slow
 PARTS = 4
@@ -37,6 +39,18 @@ def test_an_arm_behaves_under_every_fault_that_a_process_for_all_has_alone(tmp_p
     rows = set(rows_of(is_composed=True))
     own = sorted((rows - set(rows_of(is_composed=False))) | (rows & set(SHORT)))
     assert_it_behaves(tmp_path, own, "--composed")
+
+
+@pytest.mark.parametrize("looks", [4, 9])
+def test_drives_that_stood_still_catch_up_as_their_loop_does_wherever_on_the_circle_they_are(
+    looks: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(drill, "_STEADY", looks)
+    rows = chosen(("freeze_slave_sim",), is_composed=False)
+    (found,) = simulated_drill(rows, tmp_path, lambda _: None)
+    speed = found.measured("tip_speed_m_s")
+    assert not found.failures()
+    assert speed.value > 0.25  # of a setpoint that catches up behind its filter it is less
 
 
 @pytest.mark.soak

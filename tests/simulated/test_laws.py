@@ -38,12 +38,32 @@ def test_a_recorder_that_starts_while_its_disk_is_gone_says_so() -> None:
 
 
 @pytest.mark.slow
+def test_a_recorder_says_that_a_process_was_killed_with_what_waited_in_it() -> None:
+    """Of seed 60060: it made up for a standstill, faster than its socket took what it recorded."""
+    faults = (
+        Fault(1.8555, "standstill", "teleop_session", 0.8036, 0.7),
+        Fault(2.79, "kill", "teleop_session", 1.0, 0.5),
+    )  # fmt: skip
+    assert run_seed(60060, faults, None, Processes.ONE).broken == ()
+
+
+@pytest.mark.slow
 def test_a_slave_that_was_started_while_the_clock_was_behind_follows_once_it_is_right() -> None:
     """Of seed 10003: it refused every command as one of the future."""
     faults = (
         Fault(1.3, "kill", "slave_side", 1.0, 0.5), Fault(2.57, "clock step", "", 0.5, 0.91)
     )  # fmt: skip
     assert run_seed(10003, faults).broken == ()
+
+
+@pytest.mark.slow
+def test_an_intruder_under_a_clock_that_was_ahead_does_not_shut_the_hand_out_for_good() -> None:
+    """Of seed 21039: the slave, started anew, took the first it heard, of the future."""
+    faults = (
+        Fault(6.913, "kill", "slave_side", 1.0, 0.5), Fault(7.854, "intruder", "", 1.52, 0.0658),
+        Fault(8.179, "clock step", "", 0.595, 0.9609472),
+    )  # fmt: skip
+    assert run_seed(21039, faults).broken == ()
 
 
 def test_each_law_has_a_mutant_that_breaks_it() -> None:

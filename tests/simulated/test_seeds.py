@@ -3,6 +3,7 @@
 import json
 import subprocess
 import sys
+from collections import Counter
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,8 @@ import pytest
 
 from teleop_core.nodes.crews import Processes
 from teleop_core.nodes.operation import StopInput
+from teleop_core.slave.operation import State
+from teleop_drill.simulation import seeds
 from teleop_drill.simulation.schedules import KINDS, Fault, draw
 from teleop_drill.simulation.seeds import PROCESSES, run_seed, shrink
 
@@ -79,8 +82,23 @@ def test_many_schedules_are_told_as_a_table_of_faults_and_states(tmp_path: Path)
     found = json.loads(file.read_text(encoding="utf-8"))
     assert found["sessions"] == 2
     assert found["broken"] == {}
-    drawn = [fault.kind for seed in (10, 11) for fault in draw(seed, SIDES)]
-    assert sum(sum(met.values()) for met in found["met"].values()) == len(drawn)
+    drawn = [fault.kind for seed in (10, 13) for fault in draw(seed, SIDES)]  # nothing is known yet
+    assert sum(found["met"].values()) == len(drawn)
+    assert {name.split(" / ")[0] for name in found["under"]} <= set(drawn)
+
+
+def test_of_three_seeds_the_one_is_run_whose_faults_have_met_least(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(seeds, "_ROUND", 1)
+    ran = [found.seed for found in seeds.run_seeds(30, 3, 1)]
+    assert ran[0] == 30
+    met = Counter((one.kind, "ENABLED") for one in draw(30, SIDES))
+    assert all(33 + 3 * k <= seed < 36 + 3 * k for k, seed in enumerate(ran[1:]))
+    assert seeds._known(30, met, Processes.SIDES) == 0.0  # in other states they met nothing
+    for state in State:
+        met.update((one.kind, state.name) for one in draw(30, SIDES))
+    assert seeds._known(30, met, Processes.SIDES) >= 1.0
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,7 @@ from teleop_core.robots.bodies import Bodies, Joint, Solid, bodies_of
 from teleop_core.robots.bodies.describe import serial_bodies, unknown_bodies
 from teleop_core.robots.bodies.solids import along, capsule
 from teleop_core.robots.kinematics import FkStatus
-from teleop_core.robots.mma_models import frames, joints_of_model, loop_closure, model_table
+from teleop_machines.mma_models import frames, joints_of_model, loop_closure, model_table
 
 TABLE = {
     "name": "own", "convention": "modified", "angles": "degrees",

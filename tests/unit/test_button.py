@@ -32,7 +32,7 @@ def press(
     way = along_z(*heights) if way is None else way
     made_of = {"world_stiffness": STOP, "world_damping": damping, "puncture_force": 0.0} | numbers
     button = button or ButtonParameters()
-    above = way + np.array((0.0, 0.0, 0.5 * button.height))
+    above = way + np.array((0.0, 0.0, 0.5 * button.length))
     push, lost, s = lead(above, "button", button, **made_of)
     return -way[:-1, 2], push[:, 2], lost, s
 
@@ -90,7 +90,7 @@ def test_the_score_counts_presses_along_a_way_as_the_button_does(turn: float) ->
 @pytest.mark.parametrize("damping", [0.0, 100.0])
 def test_the_push_is_that_of_the_spring_at_least_and_with_the_stop_at_most(damping: float) -> None:
     """However fast the tip leaves the stop: its damper does not pull."""
-    tall = ButtonParameters(height=0.2, radius=0.1)
+    tall = ButtonParameters(length=0.2, radius=0.1)
     for seed in range(20):
         depth, push, _, _ = press(way=wandering(seed), button=tall, damping=damping)
         spring = np.interp(depth, (0.0, 2e-3, 3e-3), (0.0, 1.0, 0.4))
@@ -121,7 +121,7 @@ def test_no_motion_gets_energy_from_a_button(
     """In no tick: what it gave grows by what is stored, or more."""
     button = ButtonParameters(
         click_force=click, contact_force=contact * click, click_travel=travel,
-        stroke=travel + more, hysteresis=hysteresis, radius=0.1, height=0.03,
+        stroke=travel + more, hysteresis=hysteresis, radius=0.1, length=0.03,
     )  # fmt: skip
     way = wandering(seed)
     _, _, lost, _ = press(
@@ -151,6 +151,7 @@ def test_without_a_button_there_are_no_presses() -> None:
 def test_its_outline_lies_on_the_post_and_on_the_stop() -> None:
     outline = BUTTON.outline(ButtonParameters())
     post, stop = outline[:-42], outline[-41:]
+    post = post[np.isfinite(post).all(axis=1)]
     distances = [BUTTON.distance(p, BUTTON.numbers(ButtonParameters()), np.zeros(3)) for p in post]
     np.testing.assert_allclose(distances, 0.0, atol=1e-12)
     np.testing.assert_allclose(stop[:, 2], 0.015 - 3e-3)

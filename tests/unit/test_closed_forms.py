@@ -26,14 +26,16 @@ from random_arms import (
 from real_arms import urdf_of
 from teleop_core.kernels import kernel
 from teleop_core.kernels.geometry import Array
-from teleop_core.robots import IkStatus, dh_kernels, load_robot, swivel
+from teleop_core.robots import IkStatus, load_robot
+from teleop_core.robots.arms.as_chain import chain_of
 from teleop_core.robots.branches import turn
-from teleop_core.robots.chains import chain_of
-from teleop_core.robots.closed_form import constants_at
+from teleop_core.robots.chains import dh_kernels
+from teleop_core.robots.closed_form import swivel
+from teleop_core.robots.closed_form.candidates import constants_at
+from teleop_core.robots.closed_form.swivel_arcs import ARCS, MARGIN, cut_circle, swivel_of
 from teleop_core.robots.dexterity import manipulability
 from teleop_core.robots.kinematics import IkResult
 from teleop_core.robots.robot import Robot
-from teleop_core.robots.swivel_arcs import ARCS, MARGIN, cut_circle, swivel_of
 
 Case = tuple[str, Callable[[np.random.Generator, str], list[tuple[Array, Array]]], str, int]
 Load = Callable[..., Robot]

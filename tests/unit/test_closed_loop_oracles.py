@@ -17,12 +17,12 @@ from pinocchio import SE3
 
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots import IkStatus, load_robot
-from teleop_core.robots.four_bar import FourBar
-from teleop_core.robots.mobility import PLANAR, SPATIAL, degrees_of_freedom
 from teleop_core.robots.robot import Robot
-from teleop_core.robots.rps3 import assembly_modes
-from teleop_core.robots.stewart import PAIRED, Layout
-from teleop_core.robots.three_finger_hand import Grasp, Hand
+from teleop_machines.four_bar import FourBar
+from teleop_machines.mobility import PLANAR, SPATIAL, degrees_of_freedom
+from teleop_machines.rps3 import assembly_modes
+from teleop_machines.stewart import PAIRED, Layout
+from teleop_machines.three_finger_hand import Grasp, Hand
 
 # Sums of a dozen products of lengths up to some metres.
 EXACT = 1e-12

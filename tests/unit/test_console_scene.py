@@ -21,11 +21,12 @@ from teleop_console.recorded import RecordedLink
 from teleop_console.scene import Scene
 from teleop_console.server import ConsoleServer
 from teleop_console.world_nodes import object_outline
-from teleop_core.chain.fixtures import FIXTURES
+from teleop_core.chain.fixtures import Fixture
 from teleop_core.graph.topics import Limit
 from teleop_core.kernels.geometry import Array, rotations_from_quaternions
 from teleop_core.robots.bodies import Solid
 from teleop_core.robots.bodies.meshes import mesh_of
+from teleop_core.shapes import SHAPES
 
 # Poses that differ less from what is drawn are not sent.
 STILL = 3e-5
@@ -322,20 +323,23 @@ TURNED = {
     "cone": {"axis": (0.1, 1.0, 0.0), "half_angle": 0.6},
     "line": {"direction": (0.0, 0.0, 1.0), "length": 0.03},
     "path": {"points": (0.01, 0.0, 0.0, 0.01, 0.0, 0.03)},
-    "keep_out_sphere": {"place": (0.0, 0.04, 0.01)},
-    "keep_out_box": {"size": (0.01, 0.02, 0.03)},
+    "sphere": {"place": (0.0, 0.04, 0.01)},
+    "box": {"size": (0.01, 0.02, 0.03), "place": (0.0, 0.02, 0.0)},
 }
 
 
-@pytest.mark.parametrize("kind", [name for name in FIXTURES if "mesh" not in name])
+@pytest.mark.parametrize(
+    "kind", [name for name in SHAPES if not hasattr(SHAPES.find(name).parameters, "file")]
+)
 def test_outlines_are_those_of_the_fixtures_with_their_parameters(kind: str) -> None:
     part: Any
     values: Any
-    part, values, gain = FIXTURES.find(kind), TURNED.get(kind, {}), 0.2
-    parameters = part.parameters(**values)
+    part, values, gain = SHAPES.find(kind), TURNED.get(kind, {}), 0.2
     unit = unit_outline(Look(kind, tuple(values.items())))
-    points = (unit * scale_of(unit, gain * part.size(parameters), gain)).reshape(-1, 3)
-    outline = gain * part.outline(parameters)
+    own = {name: value for name, value in values.items() if name != "place"}
+    fixture = Fixture(part, part.parameters(**own), values.get("place", (0.0, 0.0, 0.0)))
+    points = (unit * scale_of(unit, gain * fixture.size(), gain)).reshape(-1, 3)
+    outline = gain * fixture.outline()
     outline = outline[np.isfinite(outline).all(axis=1)]
     near = np.linalg.norm(points[:, None] - outline, axis=2).min(axis=1)
     assert near.max() < 1e-12

@@ -13,7 +13,7 @@ from teleop_core.robots import dexterity, load_robot
 def test_manipulability_of_the_puma_is_the_closed_form_determinant() -> None:
     # Wrist and arm decouple, so |det J| = a2 |u| (forearm part of the elbow) |sin q5|.
     arm, rng = load_robot("puma560"), np.random.default_rng(1)
-    a2, a3, _, d4 = arm.geometry_row
+    a2, a3, _, d4 = arm.geometry.values()
     for q in rng.uniform(arm.lower, arm.upper, (50, 6)):
         u = a2 * math.cos(q[1]) + a3 * math.cos(q[1] + q[2]) - d4 * math.sin(q[1] + q[2])
         bend = d4 * math.cos(q[2]) + a3 * math.sin(q[2])

@@ -13,10 +13,8 @@ from ways import followed
 
 TABLES = tuple(
     f"config/robots/{name}.yaml"
-    for name in (
-        "puma560", "rcrt1", "scara", "planar_3r", "five_axis_standard", "five_axis_sheth_uicker"
-    )
-)  # fmt: skip
+    for name in ("rcrt1", "scara", "five_axis_standard", "five_axis_sheth_uicker")
+)
 TABLE = {
     "name": "my_arm",
     "convention": "modified",

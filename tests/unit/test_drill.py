@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import ArrayLike
+from scipy import signal
 
 from code_mutants import CODE_MUTANTS
 from mutants import MUTANTS, ROOT, Mutant, changed
@@ -228,6 +229,17 @@ def by_name(name: str) -> Exercise:
 
 
 NUMBERS = Numbers.of(api.configuration("free_motion"))
+
+
+def test_drives_make_up_for_a_step_as_fast_as_their_triple_pole_answers_it() -> None:
+    pole, step = NUMBERS.bandwidth, 0.01 * 0.05
+    loop = signal.TransferFunction([3 * pole**2, pole**3], np.poly([-pole] * 3))
+    times, answer = signal.step(loop, T=np.linspace(0.0, 10.0 / pole, 20_000))
+    fastest = step * float(np.max(np.gradient(answer, times)))
+    bound = 0.01 * (NUMBERS.catching_up(0.05, by_drives=True) - 1.0)
+    assert 0.99 * bound < fastest < bound
+
+
 ROBOT = NUMBERS.robot
 BEGIN: Any = 1_500 * MS
 

@@ -57,7 +57,7 @@ def test_a_gear_rings_at_the_frequency_of_two_masses_on_its_spring() -> None:
     p["gear_damping"] = 0.0
     motor = faults_of(ARM).motors[0]
     model, q = np.zeros((3, 3)), ARM.home.copy()
-    from teleop_core.robots.rcrt1_dynamics import inertia_matrix
+    from teleop_core.robots.arms.rcrt1_dynamics import inertia_matrix
 
     inertia_matrix(q, arm.dynamics, model)
     link = model[0, 0] - motor

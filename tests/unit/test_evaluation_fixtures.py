@@ -16,7 +16,6 @@ from recipes import START_NS, Recipe, state
 from teleop_core.bags.reader import Bag
 from teleop_core.base.errors import EvaluationError
 from teleop_core.base.parameters import parameter
-from teleop_core.chain.fixtures import Fixture, register_fixture
 from teleop_core.chain.fixtures.reported_fixture import ReportedFixture
 from teleop_core.chain.mapping.parameters import MotionScalingParameters, axis_map
 from teleop_core.evaluation.command import evaluate_bags
@@ -27,13 +26,14 @@ from teleop_core.evaluation.scoring import evaluate, study
 from teleop_core.graph.signals import TICK_NS
 from teleop_core.graph.topics import SLAVE_MEASURED_CP, SLAVE_SERVO_CP, TELEOP_STATE, Topic
 from teleop_core.kernels.geometry import Array
+from teleop_core.shapes import Shape, register_shape
 
 # Lengths of some hundred millimetres in doubles.
 ROUNDING_MM = 1e-9
 AXES = axis_map("axes", MotionScalingParameters().axes)
 OTHER_AXES = ("+x", "+y", "+z")
 CENTER = np.array([0.4, 0.0, -0.18])
-SPHERE = {"fixture": "sphere", "fixture.diameter": "0.03"}
+SPHERE = {"fixture": "sphere", "fixture.radius": "0.015"}
 BOX = {"fixture": "box", "fixture.size": "(0.01, 0.02, 0.03)"}
 # What each kind of fixture is called in the pictures and how far its slave's ends are apart [mm].
 SIZES = {"sphere": (30, 30, 30), "box": (30, 10, 20)}
@@ -86,7 +86,7 @@ def test_depth_of_a_slave_is_that_of_the_hand_by_the_gain(gain: float) -> None:
 
 
 def test_depth_of_what_is_no_number_is_none() -> None:
-    sphere = ReportedFixture("sphere", (("diameter", "0.03"),))
+    sphere = ReportedFixture("sphere", (("radius", "0.015"),))
     offsets = np.array([[np.nan, 0, 0], [0, np.inf, 0], [0, 0, 1.0], [0, 0, 0]])
     depth = sphere.depths(offsets, np.array([1.0, 1.0, 0.0, 1.0]), AXES)
     assert np.array_equal(depth, [np.nan, np.nan, np.nan, 0.0], equal_nan=True)
@@ -160,7 +160,7 @@ def test_map_of_axes_that_is_none_is_the_published_one(
 def test_kind_and_size_may_change_while_the_fixture_is_on(recipe: Recipe, path: Path) -> None:
     recipe.singles = [
         fixture_on(SPHERE),
-        fixture_on(SPHERE | {"fixture.diameter": "0.01"}, size=(0.01, 0.01, 0.01), at=500),
+        fixture_on(SPHERE | {"fixture.radius": "0.005"}, size=(0.01, 0.01, 0.01), at=500),
         fixture_on(BOX, size=(0.03, 0.01, 0.02), at=1000),
         (TELEOP_STATE, START_NS + 1500 * TICK_NS, state(START_NS + 1500 * TICK_NS, BOX)),
     ]
@@ -188,10 +188,9 @@ class WallParameters:
     height: float = parameter(0.01, unit="m", lower=0.0, upper=1.0, doc="above the middle")
 
 
-def wall_depth(offset: Array, shape: Array, out: Array) -> float:
-    out[:] = 0.0
-    out[1] = max(offset[1] - shape[0], 0.0)
-    return out[1]
+def wall_distance(offset: Array, numbers: Array, out: Array) -> float:
+    out[:] = 0.0, 1.0, 0.0
+    return offset[1] - numbers[0]
 
 
 def wall_outline(parameters: WallParameters) -> Array:
@@ -199,13 +198,13 @@ def wall_outline(parameters: WallParameters) -> Array:
     return 0.01 * corners + np.array([0, parameters.height, 0])
 
 
-WALL = Fixture("wall", WallParameters, wall_depth, wall_outline)
+WALL = Shape("wall", WallParameters, wall_distance, wall_outline)
 REPORTED_WALL = {"fixture": "wall", "fixture.height": "0.01"}
 
 
 @pytest.mark.usefixtures("own_parts")
 def test_plain_function_of_a_user_is_scored_and_drawn(recipe: Recipe, path: Path) -> None:
-    register_fixture(WALL)
+    register_shape(WALL)
     recipe.singles = [fixture_on(REPORTED_WALL, 0.5)]
     recipe.values(SLAVE_MEASURED_CP)[:, 2] += 0.006  # the hand's y is the slave's z
     bag = recipe.write(path)
@@ -214,17 +213,17 @@ def test_plain_function_of_a_user_is_scored_and_drawn(recipe: Recipe, path: Path
     assert np.allclose(trace["z"], 1e3 * CENTER[2] + 5.0, rtol=0, atol=ROUNDING_MM)
 
 
-def failing_depth(offset: Array, shape: Array, out: Array) -> float:
-    if 0.01 < offset[1] < 0.1:
+def failing_distance(offset: Array, numbers: Array, out: Array) -> float:
+    if 0.025 < offset[1] < 0.035:
         raise ZeroDivisionError
-    return wall_depth(offset, shape, out)
+    return wall_distance(offset, numbers, out)
 
 
 @pytest.mark.usefixtures("own_parts")
 def test_depth_that_raises_is_told_with_the_metric(recipe: Recipe, path: Path) -> None:
-    register_fixture(Fixture("wall", WallParameters, failing_depth, wall_outline))
+    register_shape(Shape("wall", WallParameters, failing_distance, wall_outline))
     recipe.singles = [fixture_on(REPORTED_WALL)]
-    recipe.values(SLAVE_MEASURED_CP)[:, 2] += 0.02
+    recipe.values(SLAVE_MEASURED_CP)[:, 2] += 0.03
     with pytest.raises(EvaluationError, match="metric 'fixture' failed with ZeroDivisionError"):
         evaluate(recipe.write(path))
 
@@ -232,9 +231,9 @@ def test_depth_that_raises_is_told_with_the_metric(recipe: Recipe, path: Path) -
 @pytest.mark.parametrize(
     ("described", "told"),
     [
-        (REPORTED_WALL, "wall: fixture is 'wall', must be one of: box, sphere"),
-        (SPHERE | {"fixture.diameter": "wide"}, "diameter is 'wide', must be a number"),
-        (SPHERE | {"fixture.radius": "0.1"}, "is 'radius', must be one of: diameter"),
+        (REPORTED_WALL, "wall: shape is 'wall', must be one of: box, capsule"),
+        (SPHERE | {"fixture.radius": "wide"}, "radius is 'wide', must be a number"),
+        (SPHERE | {"fixture.width": "0.1"}, "is 'width', must be one of: radius"),
     ],
 )
 def test_fixture_of_an_unknown_shape_leaves_the_rest_of_the_score(
@@ -316,8 +315,8 @@ def test_outline_stands_around_the_slave_in_every_picture(
 
 OPEN = {
     "half_space": ({"normal": (0.0, 1.0, 0.0), "room": 0.01}, [(2, -10.0)]),
-    "keep_out_box": ({"place": (0.0, 0.0, 0.025), "size": (0.03, 0.03, 0.03)}, [(0, -10.0)]),
-    "line": ({"direction": (1.0, 0.0, 0.0), "tolerance": 0.002, "length": 0.0},
+    "box": ({"place": (0.0, 0.0, 0.025), "keep_out": True}, [(0, -10.0)]),
+    "line": ({"direction": (1.0, 0.0, 0.0), "radius": 0.002, "length": 0.0},
              [(0, -2.0), (0, 2.0), (2, -2.0), (2, 2.0)]),
 }  # fmt: skip
 """Shapes that are open on a side, and their walls [mm] on the slave's axes."""

@@ -147,6 +147,12 @@ def test_graph_that_cannot_be_built_is_that_of_the_built_in_stages(
     assert read_origin(recipe.write(path)).graph == build_graph()
 
 
+def test_delays_of_links_in_a_row_add_up_along_the_chain(recipe: Recipe, path: Path) -> None:
+    links = ["slave/servo_cp=0.03", "slave/servo_jp=0.02", "slave/measured_cf=0.5"]
+    recipe.metadata["configuration"] = configuration(delays=links)
+    assert read_origin(recipe.write(path)).chain_delay == pytest.approx(0.05)
+
+
 def test_settings_of_the_graph_are_those_of_the_recording(recipe: Recipe, path: Path) -> None:
     recipe.metadata["configuration"] = configuration(
         arms=["right", "left"], delays=["slave/servo_jp=0.02"], former_parameter=1

@@ -24,7 +24,6 @@ from teleop_lab.experiments.accuracy import (
     moved,
     readings,
 )
-from teleop_lab.experiments.drawing import box_edges
 from teleop_lab.experiments.points24 import Visits, visits_of
 from teleop_lab.experiments.reference_filter import gain_at, step_response
 from teleop_lab.experiments.responses import response
@@ -312,11 +311,3 @@ def test_friction_that_sticks_keeps_the_tip_off_where_the_ideal_arm_rests() -> N
     }
     assert off["hardware"] > 0.05
     assert off["hardware"] > 3.0 * off["ideal"]
-
-
-def test_edges_of_a_box_are_twelve_of_its_sides() -> None:
-    edges = box_edges(np.array([1.0, 2.0, 3.0]), np.array([2.0, 4.0, 6.0])).reshape(12, 3, 3)
-    lengths = np.linalg.norm(edges[:, 1] - edges[:, 0], axis=1)
-    assert sorted(lengths.tolist()) == [2.0] * 4 + [4.0] * 4 + [6.0] * 4
-    assert np.nanmin(edges.reshape(-1, 3), axis=0).tolist() == [0.0, 0.0, 0.0]
-    assert np.nanmax(edges.reshape(-1, 3), axis=0).tolist() == [2.0, 4.0, 6.0]

@@ -129,6 +129,19 @@ def test_topics_whose_loop_ends_are_left_to_others(ends: Callable[[], Ends]) -> 
     reader.drain()
     assert takers["b/c"].came == [(b"x", 1)]
     assert takers["a"].joined[-1] is takers["b/c"].joined[-1] is False
+    assert reader.cut == 0
+
+
+def test_a_loop_that_ends_without_a_word_is_counted(ends: Callable[[], Ends]) -> None:
+    feed, reader, takers = ends()
+    feed.channels["a"].give(b"x", 1)
+    feed.flush()
+    line = feed._line
+    assert line is not None
+    line.close()  # as the system does for a process that was killed
+    reader.drain()
+    assert takers["a"].came == [(b"x", 1)]
+    assert reader.cut == 1
 
 
 def test_a_recorder_that_ends_costs_a_loop_nothing_and_the_next_one_is_found(

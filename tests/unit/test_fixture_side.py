@@ -9,16 +9,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from any_fixture import KINDS, found
+from any_shape import KINDS, depth_of, found
 from scaling_desk import MM, Desk
 from teleop_core.base.errors import ParameterError
 from teleop_core.base.parameters import build, parameter
-from teleop_core.chain.fixtures import Fixture, register_fixture
 from teleop_core.chain.mapping.motion_scaling import to_slave_axes
 from teleop_core.chain.mapping.parameters import FixtureParameters
 from teleop_core.graph.signals import TICK_NS
 from teleop_core.kernels import kernel
 from teleop_core.kernels.geometry import Array
+from teleop_core.shapes import Shape, register_shape
 
 # Sums of a few hundred steps of millimetres at half a metre [m].
 ROUNDING = 1e-12
@@ -39,9 +39,11 @@ def fixture(side: str, **values: Any) -> FixtureParameters:
 
 
 def chosen(side: str, kind: str, parameters: object) -> FixtureParameters:
-    """Parameters of a fixture of a kind."""
+    """Parameters of a fixture of a kind, around the hand or beside it."""
     named = {f"{kind}.{name}": value for name, value in vars(parameters).items()}
-    return build(FixtureParameters, {"side": side, "kind": kind} | named)
+    keep_out = found(kind, parameters, np.zeros(3))[0] > 0.0
+    values = {"side": side, "kind": kind, "keep_out": keep_out}
+    return build(FixtureParameters, values | named)
 
 
 class HeldDesk(Desk):
@@ -77,8 +79,7 @@ class HeldDesk(Desk):
 
     def outside(self) -> float:
         """How far the slave's command is outside of the fixture [m]."""
-        kind = self.scaling.present().fixture.kind
-        return self.gain() * found(kind.kind, kind.parameters, self.moved())[0]
+        return self.gain() * depth_of(self.scaling.present().fixture.made, self.moved())[0]
 
 
 @HELD
@@ -203,7 +204,7 @@ def test_put_on_while_the_hand_moves_a_fixture_holds_the_slave_from_there(side: 
         {"box__size": (0.1, 0.1, 0.1)},
         {"box__size": (0.01, 0.01, 0.01)},
         {"kind": "sphere"},
-        {"kind": "keep_out_box", "keep_out_box__place": (0.02, 0.0, 0.0)},
+        {"keep_out": True, "place": (0.025, 0.0, 0.0)},
     ],
 )
 @HELD
@@ -277,7 +278,7 @@ def test_after_a_pause_of_the_master_the_slave_stays_where_it_is(side: str) -> N
 def test_a_hand_that_goes_through_a_forbidden_body_does_not_throw_the_slave_across(
     side: str, aside: float
 ) -> None:
-    desk = HeldDesk(fixture(side, kind="keep_out_sphere", keep_out_sphere__place=(0.03, 0.0, 0.0)))
+    desk = HeldDesk(fixture(side, kind="sphere", keep_out=True, place=(0.03, 0.0, 0.0)))
     desk.go((0, aside, 0))
     for _ in range(46):
         assert desk.go((1 * MM, 0, 0)) <= ROUNDING
@@ -295,20 +296,19 @@ class WedgeParameters:
 
 
 @kernel
-def wedge_depth(offset: Any, shape: Any, out: Any) -> Any:
-    """Depth beyond the deeper of two planes: one round leads in only where one is crossed."""
-    first, second = offset[0] - 0.01, shape[0] * offset[0] + shape[1] * offset[1] - 0.01
-    depth = max(first, second, 0.0)
-    x, y = (1.0, 0.0) if first >= second else (shape[0], shape[1])
-    out[0], out[1], out[2] = depth * x, depth * y, 0.0
-    return depth
+def wedge_distance(offset: Any, numbers: Any, out: Any) -> Any:
+    """Distance from the deeper of two planes: one round leads in only where one is crossed."""
+    first, second = offset[0] - 0.01, numbers[0] * offset[0] + numbers[1] * offset[1] - 0.01
+    x, y = (1.0, 0.0) if first >= second else (numbers[0], numbers[1])
+    out[0], out[1], out[2] = x, y, 0.0
+    return max(first, second)
 
 
 @HELD
 def test_a_shape_that_does_not_lead_in_within_a_few_rounds_holds_the_slave_where_it_may_be(
     own_parts: None, side: str
 ) -> None:
-    register_fixture(Fixture("wedge", WedgeParameters, wedge_depth, lambda _: np.zeros((2, 3))))
+    register_shape(Shape("wedge", WedgeParameters, wedge_distance, lambda _: np.zeros((2, 3))))
     rng, desk = np.random.default_rng(7), HeldDesk(fixture(side, kind="wedge"))
     for move in (
         (0.0, 95 * MM, 0.0),

@@ -12,8 +12,8 @@ from teleop_core.kernels.geometry import Array, rotation, transform
 from teleop_core.robots import FkStatus, list_robots, load_robot
 from teleop_core.robots.dexterity import sample_workspace
 from teleop_core.robots.robot import Robot
-from teleop_core.robots.rps3 import assembly_modes
-from teleop_core.robots.stewart import PAIRED
+from teleop_machines.rps3 import assembly_modes
+from teleop_machines.stewart import PAIRED
 
 # Loops are solved to rounding of their lengths; a pose loses the condition of its assembly.
 CLOSED, SAME = 1e-9, 1e-6

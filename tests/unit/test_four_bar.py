@@ -11,8 +11,8 @@ import roboticstoolbox as rtb
 from teleop_core.base.errors import ParameterError, UnknownNameError
 from teleop_core.kernels.geometry import Array, rotation, transform
 from teleop_core.robots import IkStatus, list_robots, load_robot
-from teleop_core.robots.four_bar import Assembly, FourBar
-from teleop_core.robots.four_bar_loop import Closure
+from teleop_machines.four_bar import Assembly, FourBar
+from teleop_machines.four_bar_loop import Closure
 from ways import stepped
 
 # Cosines and sines of a few terms of length below 10: rounding stays far under this.

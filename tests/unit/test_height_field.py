@@ -15,9 +15,9 @@ from teleop_console.world_nodes import object_outline
 from teleop_core.base.errors import ParameterError
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot
-from teleop_core.slave.world.height_field import HEIGHT_FIELD, HeightFieldParameters
-from teleop_core.slave.world.heights import THICKNESS, read_heights
-from teleop_core.slave.world.mesh import MESH, MeshParameters
+from teleop_core.shapes.basis.heights import THICKNESS, read_heights
+from teleop_core.shapes.height_field import HEIGHT_FIELD, HeightFieldParameters
+from teleop_core.shapes.mesh import MESH, MeshParameters
 
 SPACING = 2e-3
 X, Y = np.meshgrid(
@@ -53,7 +53,7 @@ def field(folder: Path, name: str, ending: str = "csv", **more: float) -> Height
 
 
 def found(
-    group: HeightFieldParameters, places: Array, part: tc.WorldObject = HEIGHT_FIELD
+    group: HeightFieldParameters, places: Array, part: tc.Shape = HEIGHT_FIELD
 ) -> tuple[Array, Array]:
     """Distances (N,) and normals (N, 3) of an object at places (N, 3)."""
     normals, shape = np.zeros((len(places), 3)), part.numbers(group)
@@ -199,7 +199,7 @@ def test_a_file_that_is_no_table_of_heights_is_refused(
     path.write_bytes(content)
     with pytest.raises(ParameterError, match=said) as error:
         HEIGHT_FIELD.numbers(HeightFieldParameters(file=str(path)))
-    assert error.value.name == "world.height_field.file"
+    assert error.value.name == "height_field.file"
     assert "\n" not in str(error.value)
 
 
@@ -217,11 +217,11 @@ def test_a_field_that_does_not_fit_its_numbers_is_refused_by_their_name(
     name = "narrow" if parameter == "spacing" else "flat"
     with pytest.raises(ParameterError) as error:
         HEIGHT_FIELD.numbers(field(folder, name, "npy", **more))
-    assert error.value.name == f"world.height_field.{parameter}"
+    assert error.value.name == f"height_field.{parameter}"
 
 
 def test_a_file_that_is_not_there_is_refused() -> None:
     for part, group in ((HEIGHT_FIELD, HeightFieldParameters()), (MESH, MeshParameters())):
         with pytest.raises(ParameterError, match="a file with") as error:
             part.numbers(group)
-        assert error.value.name == f"world.{part.name}.file"
+        assert error.value.name == f"{part.name}.file"

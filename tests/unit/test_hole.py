@@ -1,97 +1,22 @@
-"""Hole: its distance against a library of others, a peg in it, and the scenario ``peg``."""
+"""Hole: a peg in it, and the scenario ``peg``."""
 
 import math
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import coal
 import numpy as np
 import pytest
-import trimesh
-from trimesh import Trimesh
 
 import teleop_core as tc
 from free_tool import drag, fly
 from present import present
 from teleop_console.world_nodes import object_outline
-from teleop_core.base.errors import ParameterError
 from teleop_core.evaluation.metrics.insertion import depth_in_hole
 from teleop_core.kernels.geometry import Array
-from teleop_core.kernels.parts import numbers_of
 from teleop_core.robots import load_robot
-from teleop_core.session.configuration import configure
-from teleop_core.slave.world.hole import HOLE, HoleParameters, hole_outline
+from teleop_core.shapes.hole import HoleParameters
 
 TILTED = (0.6, 0.0, 0.8)
-PLATES = {
-    "chamfered": HoleParameters(radius=0.006, thickness=0.02, plate_radius=0.02, chamfer=0.003),
-    "sharp": HoleParameters(radius=0.006, thickness=0.02, plate_radius=0.02, chamfer=0.0),
-    "tilted": HoleParameters(
-        radius=0.006, thickness=0.02, plate_radius=0.02, chamfer=0.003, axis=TILTED
-    ),
-}
-SIDES = 720
-
-
-def turned_section(p: HoleParameters) -> Trimesh:
-    """A solid of revolution from its section by trimesh, along z."""
-    section = [(p.radius + p.chamfer, 0.0), (p.radius, -p.chamfer), (p.radius, -p.thickness),
-               (p.plate_radius, -p.thickness), (p.plate_radius, 0.0),
-               (p.radius + p.chamfer, 0.0)]  # fmt: skip
-    return trimesh.creation.revolve(np.array(section), sections=SIDES)
-
-
-def to_axis(axis: Sequence[float] | Array) -> Array:
-    """Rotation (3, 3) from z to an axis in the plane x, z."""
-    x, _, z = np.array(axis) / np.linalg.norm(axis)
-    return np.array([[z, 0.0, x], [0.0, 1.0, 0.0], [-x, 0.0, z]])
-
-
-@pytest.mark.parametrize("name", PLATES)
-def test_a_library_of_others_finds_the_same_distance_and_the_same_way_out(name: str) -> None:
-    parameters = PLATES[name]
-    solid, numbers, normal = turned_section(parameters), numbers_of(parameters), np.zeros(3)
-    surface = coal.BVHModelOBBRSS()
-    surface.beginModel(len(solid.faces), len(solid.vertices))
-    surface.addVertices(solid.vertices)
-    surface.addTriangles(solid.faces)
-    surface.endModel()
-    ball, still = coal.Sphere(1e-9), coal.Transform3s()
-    R = to_axis(parameters.axis)
-    sides = set()
-    for place in np.random.default_rng(2).uniform(
-        (-0.03, -0.03, -0.03), (0.03, 0.03, 0.01), (300, 3)
-    ):
-        found = HOLE.distance(R @ place, numbers, normal)
-        there, result = coal.Transform3s(np.eye(3), place), coal.DistanceResult()
-        coal.distance(surface, still, ball, there, coal.DistanceRequest(True, True), result)
-        # A side of the polygon is this much beside the circle.
-        sagitta = parameters.plate_radius * (1.0 - math.cos(math.pi / SIDES))
-        assert abs(found) == pytest.approx(abs(result.min_distance), abs=sagitta + 1e-8)
-        out, up = np.hypot(*place[:2]), place[2]
-        is_inside = (
-            parameters.radius < out < parameters.plate_radius
-            and -parameters.thickness < up < min(0.0, out - parameters.radius - parameters.chamfer)
-        )
-        assert (found < 0.0) == is_inside
-        sides.add(is_inside)
-        assert math.hypot(*normal) == pytest.approx(1.0, abs=1e-12)
-        nearest = place - found * (R.T @ normal)
-        assert abs(HOLE.distance(R @ nearest, numbers, np.zeros(3))) < 1e-9
-    assert sides == {True, False}
-
-
-@pytest.mark.parametrize("axis", [(0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.3, -2.0, 0.7)])
-def test_on_the_axis_the_wall_is_a_radius_away_on_every_side(
-    axis: tuple[float, float, float],
-) -> None:
-    parameters, normal = HoleParameters(axis=axis), np.zeros(3)
-    unit = np.array(axis) / np.linalg.norm(axis)
-    found = HOLE.distance(-0.015 * unit, numbers_of(parameters), normal)
-    assert found == pytest.approx(parameters.radius)
-    assert math.hypot(*normal) == pytest.approx(1.0, abs=1e-12)
-    assert normal @ unit == pytest.approx(0.0, abs=1e-12)
 
 
 @pytest.mark.parametrize("clearance", [1e-4, 5e-4])
@@ -144,19 +69,6 @@ def test_depth_counts_in_the_hole_alone() -> None:
     assert depth(-0.04 * axis) == 0.0
 
 
-@pytest.mark.parametrize(
-    ("texts", "expected"),
-    [
-        (["world.hole.axis=[0.0,0.0,0.0]"], "a direction"),
-        (["world.hole.chamfer=0.03"], "less than thickness"),
-        (["world.hole.plate_radius=0.0075"], "more than radius and chamfer"),
-    ],
-)
-def test_a_hole_that_is_none_is_refused(texts: list[str], expected: str) -> None:
-    with pytest.raises(ParameterError, match=expected):
-        configure("free_motion", settings=["world=hole", *texts])
-
-
 def test_the_page_draws_its_edges() -> None:
     robot = load_robot("rcrt1")
     values: dict[str, Any] = {
@@ -167,11 +79,6 @@ def test_the_page_draws_its_edges() -> None:
     }
     drawn = object_outline(values, robot)
     assert len(drawn) == 5 * 40
-    points = hole_outline(HoleParameters(axis=TILTED))
-    points = points[np.isfinite(points).all(axis=1)]
-    numbers = numbers_of(HoleParameters(axis=TILTED))
-    distances = [HOLE.distance(point, numbers, np.zeros(3)) for point in points]
-    assert np.abs(distances).max() < 1e-12
 
 
 # The scenario.

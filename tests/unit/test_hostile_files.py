@@ -27,7 +27,7 @@ from teleop_core.base.texts import LONGEST_LINE, one_line, printable, shown
 from teleop_core.evaluation.command import evaluate_bags
 from teleop_core.graph import topics
 from teleop_core.graph.layers import load_file
-from teleop_core.robots.dh import load_table
+from teleop_core.robots.arms.dh import load_table
 from teleop_core.session.master_bag import as_master_bag
 
 MS = 1_000_000

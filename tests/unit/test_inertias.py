@@ -11,10 +11,11 @@ from hypothesis import strategies as st
 
 from present import present
 from teleop_core.base.errors import ParameterError, ShapeError
-from teleop_core.robots import list_robots, load_robot, rcrt1_dynamics
+from teleop_core.robots import list_robots, load_robot
+from teleop_core.robots.arms import rcrt1_dynamics
+from teleop_core.robots.arms.rcrt1_dynamics import LINKS, link_inertias
 from teleop_core.robots.drives import Dynamics, independent_axes
 from teleop_core.robots.inertias import LinkInertia, check_possible
-from teleop_core.robots.rcrt1_dynamics import LINKS, link_inertias
 
 points = st.lists(
     st.tuples(st.floats(0.01, 2.0), *[st.floats(-1.0, 1.0)] * 3), min_size=4, max_size=12

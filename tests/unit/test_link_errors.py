@@ -8,8 +8,9 @@ import pytest
 from present import present
 from teleop_core.base.errors import ParameterError, ShapeError, UnknownNameError
 from teleop_core.kernels.geometry import Array
-from teleop_core.robots import dh_kernels, load_robot, robot_from_table
-from teleop_core.robots.chains import chain_of, true_chain
+from teleop_core.robots import load_robot, robot_from_table
+from teleop_core.robots.arms.as_chain import chain_of, true_chain
+from teleop_core.robots.chains import dh_kernels
 from teleop_core.robots.link_errors import LinkErrors, error_names, next_axis_motion
 from teleop_core.robots.robot import Robot
 

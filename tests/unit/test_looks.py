@@ -14,7 +14,7 @@ from teleop_core.kernels.geometry import rotations_from_quaternions
 from teleop_core.robots import load_robot
 from teleop_core.robots.bodies import bodies_of
 from teleop_core.robots.bodies.looks import looks_of
-from teleop_core.robots.visuals import mesh_file
+from teleop_core.robots.files.visuals import mesh_file
 
 TEXT = (Path(__file__).parents[2] / "examples" / "any_arm.urdf").read_text(encoding="utf-8")
 CORNERS = np.array([(0, 0, 0), (30, 0, 0), (0, 20, 0), (0, 0, 10)], np.float64)  # mm

@@ -26,10 +26,11 @@ from teleop_core.kernels.store import prune, user_cache
 from teleop_core.robots import load_robot
 from teleop_core.session.configuration import configure
 from teleop_core.session.virtual import VirtualTime
-from teleop_core.slave.world import WORLD_OBJECTS, distance_grid
-from teleop_core.slave.world.distance_grid import DistanceGrid, GridRequest
-from teleop_core.slave.world.mesh import MeshParameters
-from teleop_core.slave.world.triangles import read_triangles, tree_of, write_distances
+from teleop_core.shapes.basis import distance_grid
+from teleop_core.shapes.basis.distance_grid import DistanceGrid, GridRequest
+from teleop_core.shapes.basis.triangles import read_triangles, tree_of, write_distances
+from teleop_core.shapes.mesh import MeshParameters
+from teleop_core.slave.world import WORLD_OBJECTS
 
 BOX = (60.0, 60.0, 30.0)  # as the box of the world, in mm as files are
 
@@ -72,12 +73,18 @@ def parameters(folder: Path, name: str, **more: Any) -> MeshParameters:
     return MeshParameters(**{"file": str(folder / f"{name}.stl"), "angles": angles} | more)
 
 
+def analytic(name: str) -> Any:
+    """Parameters of the shape that the mesh is one of."""
+    size = {"size": tuple(1e-3 * x for x in BOX)} if name == "box" else {}
+    return WORLD_OBJECTS.find(name).parameters(**size)
+
+
 def found(name: str, group: object, places: Array) -> tuple[Array, Array]:
     """Distances (N,) and normals (N, 3) of an object at places (N, 3)."""
     part, normals = WORLD_OBJECTS.find(name), np.zeros((len(places), 3))
     shape = part.numbers(group)
     distances = [part.distance(*row) for row in zip(places, repeat(shape), normals, strict=False)]
-    return np.array(distances), normals
+    return np.array(distances), normals / np.linalg.norm(normals, axis=1)[:, None]
 
 
 @pytest.mark.parametrize("name", BOUNDS)
@@ -85,7 +92,7 @@ def test_a_fine_mesh_has_distance_and_normal_of_its_shape_within_the_bounds(
     name: str, folder: Path
 ) -> None:
     places = np.random.default_rng(1).uniform(-0.045, 0.045, (40_000, 3))
-    wanted, outward = found(name, WORLD_OBJECTS.find(name).parameters(), places)
+    wanted, outward = found(name, analytic(name), places)
     is_compared = np.abs(wanted) < 3e-3
     if name == "box":
         over = np.sort(np.abs(places) - 0.5e-3 * np.array(BOX), axis=1)
@@ -104,7 +111,7 @@ def test_inside_is_negative_and_outside_positive_everywhere(name: str, folder: P
     """Also far beyond the grid."""
     places = np.random.default_rng(2).uniform(-1.0, 1.0, (4000, 3)) * 0.05
     places[:400] *= 20.0
-    wanted, outward = found(name, WORLD_OBJECTS.find(name).parameters(), places)
+    wanted, outward = found(name, analytic(name), places)
     is_clear = np.abs(wanted) > 1e-3
     distance, normal = found("mesh", parameters(folder, name), places)
     assert (np.sign(distance) == np.sign(wanted))[is_clear].all()
@@ -218,9 +225,9 @@ def turned() -> Trimesh:
 @pytest.mark.parametrize(
     ("make", "name", "requirement"),
     [
-        (lambda: without(solid("box"), 0), "world.mesh.file", "it has a hole at the edge"),
-        (turned, "world.mesh.file", "two triangles look to opposite sides"),
-        (flat, "world.mesh.file", "encloses a volume"),
+        (lambda: without(solid("box"), 0), "mesh.file", "it has a hole at the edge"),
+        (turned, "mesh.file", "two triangles look to opposite sides"),
+        (flat, "mesh.file", "encloses a volume"),
     ],
 )
 def test_a_mesh_that_encloses_nothing_is_refused_in_one_line(
@@ -266,7 +273,7 @@ def test_a_mesh_that_is_inside_out_is_turned(folder: Path, tmp_path: Path) -> No
 def test_what_is_no_mesh_is_refused_in_one_line(text: str, ending: str, tmp_path: Path) -> None:
     file = tmp_path / f"none.{ending}"
     file.write_text(text)
-    with pytest.raises(ParameterError, match=r"world\.mesh\.file is .*must be a mesh"):
+    with pytest.raises(ParameterError, match=r"mesh\.file is .*must be a mesh"):
         pressed(file)
 
 
@@ -297,8 +304,7 @@ def test_a_mesh_without_triangles_or_of_no_size_is_refused_in_one_line(
 ) -> None:
     file = tmp_path / f"bad.{write.__name__}"
     file.write_text(write(size, FACES[:count]))
-    kind = "mesh" if use == "world" else "keep_out_mesh"
-    texts = [f"{use}.kind={kind}", f"{use}.{kind}.file={file}"]
+    texts = [f"{use}.kind=mesh", f"{use}.mesh.file={file}"]
     with pytest.raises(ParameterError, match=said):
         VirtualTime(configure("coarse_box", settings=texts))
 
@@ -306,17 +312,17 @@ def test_a_mesh_without_triangles_or_of_no_size_is_refused_in_one_line(
 def test_a_mesh_that_does_not_fit_is_refused_with_what_would(folder: Path) -> None:
     file = folder / "box.stl"
     for settings, name, requirement in (
-        (["world.mesh.scale=1.0"], "world.mesh.scale", "now 60 m long"),
-        (["world.mesh.scale=0.000001"], "world.mesh.scale", "between 0.001 and 2 m long"),
-        (["world.mesh.step=0.00005"], "world.mesh.step", r"at least 0\.00039 m"),
-        (["world.mesh.step=0.02"], "world.mesh.step", r"at most 0\.0075 m"),
+        (["world.mesh.scale=1.0"], "mesh.scale", "now 60 m long"),
+        (["world.mesh.scale=0.000001"], "mesh.scale", "between 0.001 and 2 m long"),
+        (["world.mesh.step=0.00005"], "mesh.step", r"at least 0\.00039 m"),
+        (["world.mesh.step=0.02"], "mesh.step", r"at most 0\.0075 m"),
     ):
         with pytest.raises(ParameterError, match=requirement) as caught:
             pressed(file, *settings)
         assert caught.value.name == name
     with pytest.raises(ParameterError, match="No such file") as caught:
         pressed(folder / "none.stl")
-    assert caught.value.name == "world.mesh.file"
+    assert caught.value.name == "mesh.file"
     home = load_robot("rcrt1")
     place = home.fk(home.home)[:3, 3] - (0.0, 0.0, 0.01)
     with pytest.raises(ParameterError, match=r"which is 5\.0 mm inside"):
@@ -383,7 +389,8 @@ def test_a_session_without_a_mesh_loads_no_reader_and_compiles_no_grid() -> None
     code = (
         "import sys\n"
         "from teleop_core.session.configuration import configure\n"
-        "from teleop_core.slave.world import mesh, triangles\n"
+        "from teleop_core.shapes import mesh\n"
+        "from teleop_core.shapes.basis import triangles\n"
         "configure('palpation').group('slave_sim').world.shape\n"
         "assert not {'trimesh', 'coal'} & set(sys.modules)\n"
         "kernels = mesh.mesh_distance, triangles.write_distances\n"

@@ -9,8 +9,8 @@ import pytest
 from teleop_core.base.errors import ParameterError, ShapeError, UnknownNameError
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots import list_robots, load_robot
-from teleop_core.robots.mma import holding_torques
 from teleop_core.robots.robot import Robot
+from teleop_machines.mma import holding_torques
 
 MM = 1e-3
 

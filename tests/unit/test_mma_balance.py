@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from teleop_core.base.errors import ParameterError
-from teleop_core.robots import mma_balance
+from teleop_machines import mma_balance
 
 # Half of the last digit that the source prints.
 TENTH_OF_MILLINEWTON_METRE, TENTH_OF_MICROMETRE = 0.5e-4, 0.5e-7

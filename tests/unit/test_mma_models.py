@@ -13,7 +13,7 @@ from pinocchio import Model
 from teleop_core.base.errors import ParameterError, ShapeError, UnknownNameError
 from teleop_core.kernels.geometry import Array, rotation
 from teleop_core.robots import load_robot, mma_models
-from teleop_core.robots.dh import DhRow
+from teleop_core.robots.arms.dh import DhRow
 from teleop_core.robots.robot import Robot
 
 MM = 1e-3

@@ -7,9 +7,9 @@ import pytest
 import roboticstoolbox as rtb
 
 from teleop_core.kernels.geometry import Array
-from teleop_core.robots.dh import DhRow, DhTable
-from teleop_core.robots.mma_models import JOINTS, LINKS, joints_of_model
-from teleop_core.robots.mobility import PLANAR, degrees_of_freedom, independent_loops
+from teleop_core.robots.arms.dh import DhRow, DhTable
+from teleop_machines.mma_models import JOINTS, LINKS, joints_of_model
+from teleop_machines.mobility import PLANAR, degrees_of_freedom, independent_loops
 
 EXACT = 1e-12
 QUARTER = 0.5 * math.pi

@@ -5,7 +5,7 @@ from collections.abc import Callable
 import pytest
 
 from teleop_core.base.errors import ParameterError
-from teleop_core.robots import mobility
+from teleop_machines import mobility
 
 
 @pytest.mark.parametrize(

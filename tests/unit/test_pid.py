@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy.linalg import expm
 
 from teleop_core.kernels.geometry import Array
-from teleop_core.robots.rcrt1_dynamics import DRIVES
+from teleop_core.robots.arms.rcrt1_dynamics import DRIVES
 from teleop_core.slave.controllers.pid import critically_damped_gains, pid_step
 
 DT = 1e-3

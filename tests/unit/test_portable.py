@@ -10,20 +10,22 @@ import pytest
 from scipy.linalg import expm
 
 import teleop_core
+import teleop_machines
 from teleop_core.kernels import portable
 
 PACKAGE = Path(teleop_core.__file__).parent
+MACHINES = Path(teleop_machines.__file__).parent
 ROOMS = ("chain", "kernels", "robots", "session", "slave", "graph/signals.py")
-"""What computes the values of a session's streams, or of its drawings."""
+"""What computes the values of a session's streams, or of its drawings; all machines do too."""
 ELSEWHERE = {
     "robots/dexterity.py": "measures of dexterity, printed and plotted",
-    "robots/hand_grasp.py": "grasps, which no session solves",
+    "machines/hand_grasp.py": "grasps, which no session solves",
     "robots/inertias.py": "asks for signs alone",
-    "robots/mma_balance.py": "springs of the handle, printed and plotted",
-    "robots/mobility.py": "asks for a rank alone",
+    "machines/mma_balance.py": "springs of the handle, printed and plotted",
+    "machines/mobility.py": "asks for a rank alone",
     "robots/rank.py": "asks for ranks, and for directions that differ by more than rounding",
-    "robots/rps3_modes.py": "all ways to assemble it, which no session asks for",
-    "robots/stewart.py": "asks for ranks and signs alone",
+    "machines/rps3_modes.py": "all ways to assemble it, which no session asks for",
+    "machines/stewart.py": "asks for ranks and signs alone",
 }
 """Files of these rooms that decide no bits of a session, and why."""
 BLAS = {"linalg", "dot", "matmul", "inner", "vdot", "tensordot", "einsum", "cov", "corrcoef"}
@@ -73,6 +75,9 @@ def test_nothing_that_decides_bits_calls_blas_or_a_vectorised_function() -> None
     files = [file for room in ROOMS for file in sorted((PACKAGE / room).glob("**/*.py"))]
     files += [PACKAGE / room for room in ROOMS if room.endswith(".py")]
     names = [file.relative_to(PACKAGE).as_posix() for file in files]
+    machines = sorted(MACHINES.glob("**/*.py"))
+    files += machines
+    names += [f"machines/{file.relative_to(MACHINES).as_posix()}" for file in machines]
     assert not set(ELSEWHERE) - set(names)
     found = [
         mistake

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from teleop_core.base.errors import ParameterError
 from teleop_core.kernels.geometry import Array, roll_pitch_yaw, rotation, transform
 from teleop_core.robots import IkStatus, load_robot
-from teleop_core.robots.rcrt1_hardware import tendon_joint_angles, tendon_motor_angles
+from teleop_core.robots.arms.rcrt1_hardware import tendon_joint_angles, tendon_motor_angles
 
 ARM = load_robot("rcrt1")
 # Ten products of numbers of size one.

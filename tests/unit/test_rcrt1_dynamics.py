@@ -13,8 +13,9 @@ from numpy.typing import ArrayLike
 from pinocchio import Inertia, Model
 
 from teleop_core.kernels.geometry import Array
-from teleop_core.robots import load_robot, rcrt1_dynamics
-from teleop_core.robots.rcrt1_dynamics import DRIVES, LINKS, link_row
+from teleop_core.robots import load_robot
+from teleop_core.robots.arms import rcrt1_dynamics
+from teleop_core.robots.arms.rcrt1_dynamics import DRIVES, LINKS, link_row
 from teleop_core.slave.joints import integrate
 from teleop_core.slave.slave_sim import SlaveSim, SlaveSimParameters
 

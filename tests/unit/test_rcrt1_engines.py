@@ -15,8 +15,8 @@ from pinocchio import Model
 from scipy.integrate import solve_ivp
 
 from teleop_core.kernels.geometry import Array
-from teleop_core.robots import rcrt1_dynamics
-from teleop_core.robots.rcrt1_dynamics import LINKS, link_inertias, link_row
+from teleop_core.robots.arms import rcrt1_dynamics
+from teleop_core.robots.arms.rcrt1_dynamics import LINKS, link_inertias, link_row
 
 ROW = link_row()
 MOTORS = [LINKS["J1"], LINKS["J2"], LINKS["J3"]]

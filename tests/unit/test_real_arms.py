@@ -13,7 +13,7 @@ from present import present
 from real_arms import ARMS, urdf_of
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot
-from teleop_core.robots.chain_dynamics import inertia_matrix, inverse_dynamics
+from teleop_core.robots.chains.chain_dynamics import inertia_matrix, inverse_dynamics
 from teleop_core.session.api import run
 
 sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))

@@ -17,15 +17,15 @@ from teleop_core.bags.markers import Marker, Shape, marker_message
 from teleop_core.bags.transforms import TransformMessages
 from teleop_core.base.errors import ShapeError, UnknownNameError
 from teleop_core.base.parameters import values_of
-from teleop_core.chain.fixtures import FIXTURES
 from teleop_core.chain.mapping.parameters import axis_map
 from teleop_core.graph.signals import TICK_NS
 from teleop_core.session.markers import FORCE_SCALE, TAIL, ArmMarkers
+from teleop_core.shapes import SHAPES
 
 TYPES = get_typestore(Stores.ROS2_JAZZY)
 ROUNDING = 1e-12
 SOLID = ("box", "sphere")
-DRAWN = [name for name in FIXTURES if name not in SOLID and "mesh" not in name]
+DRAWN = sorted(set(SHAPES) - {"mesh", "height_field", "hole", *SOLID})
 
 
 def messages(path: Path, topic: str) -> list[Any]:
@@ -218,7 +218,7 @@ def test_markers_are_read_as_they_were_drawn() -> None:
 def test_a_fixture_is_drawn_where_the_state_says_and_red_while_it_is_touched() -> None:
     arm = ArmMarkers("left")
     free = arm.fixture(STATE, {})
-    touched = arm.fixture(STATE, {"fixture": "sphere", "fixture.diameter": "0.03"}, force=1.0)
+    touched = arm.fixture(STATE, {"fixture": "sphere", "fixture.radius": "0.015"}, force=1.0)
     assert free.frame == "left/slave_base"
     assert (free.pose[:3].tolist(), free.scale) == ([0.1, 0.2, 0.3], (0.02, 0.03, 0.04))
     assert (free.shape, touched.shape) == (Shape.CUBE, Shape.SPHERE)
@@ -230,7 +230,7 @@ def test_a_fixture_is_drawn_where_the_state_says_and_red_while_it_is_touched() -
 
 @pytest.mark.parametrize("kind", DRAWN)
 def test_other_fixtures_are_drawn_along_their_edges_around_the_slave(kind: str) -> None:
-    part = FIXTURES.find(kind)
+    part = SHAPES.find(kind)
     values = {f"fixture.{n}": repr(v) for n, v in values_of(part.parameters()).items()}
     axes = axis_map("axes", ("+y", "-x", "+z"))
     marker = ArmMarkers("left", axes).fixture(STATE | {"gain": 0.5}, {"fixture": kind} | values)

@@ -9,9 +9,9 @@ import pytest
 
 from teleop_core.base.errors import PartError, UnknownNameError
 from teleop_core.base.registry import Registry
-from teleop_core.chain.fixtures import FIXTURES
 from teleop_core.chain.operators import OPERATORS
 from teleop_core.graph.stage import STAGES
+from teleop_core.shapes import SHAPES
 from teleop_core.slave.controllers import CONTROLLERS
 
 BUILT_IN = {"here": "teleop_core.graph.topics:ALL", "json": "json:loads"}
@@ -131,7 +131,7 @@ def test_installed_part_that_takes_a_built_in_name_is_refused(
 
 @pytest.mark.parametrize(
     ("parts", "name"),
-    [(FIXTURES, "box"), (CONTROLLERS, "pid"), (OPERATORS, "line"), (STAGES, "slave_sim")],
+    [(SHAPES, "box"), (CONTROLLERS, "pid"), (OPERATORS, "line"), (STAGES, "slave_sim")],
 )
 def test_name_of_a_built_in_part_is_taken_on_every_seam(parts: Registry[Any], name: str) -> None:
     other = next(parts.find(found) for found in parts if found != name)
@@ -140,14 +140,14 @@ def test_name_of_a_built_in_part_is_taken_on_every_seam(parts: Registry[Any], na
     assert (error.value.kind, error.value.name) == (parts.kind, name)
 
 
-@pytest.mark.parametrize("parts", [FIXTURES, CONTROLLERS, OPERATORS, STAGES])
+@pytest.mark.parametrize("parts", [SHAPES, CONTROLLERS, OPERATORS, STAGES])
 def test_object_that_is_no_such_part_is_refused_on_every_seam(parts: Registry[Any]) -> None:
     with pytest.raises(PartError, match="int") as error:
         parts.add("mine", 5)
     assert (error.value.kind, error.value.name) == (parts.kind, "mine")
 
 
-@pytest.mark.parametrize("parts", [FIXTURES, CONTROLLERS, OPERATORS, STAGES])
+@pytest.mark.parametrize("parts", [SHAPES, CONTROLLERS, OPERATORS, STAGES])
 def test_every_built_in_part_is_one(parts: Registry[Any]) -> None:
     for name in parts:
         assert parts.find(name) is parts.find(name)

@@ -8,9 +8,10 @@ from hypothesis import strategies as st
 from present import present
 from teleop_core.kernels import pointer
 from teleop_core.kernels.geometry import Array
-from teleop_core.robots import load_robot, rcrt1_dynamics
+from teleop_core.robots import load_robot
+from teleop_core.robots.arms import rcrt1_dynamics
+from teleop_core.robots.chains.rigid_body import invert_positive, write_model
 from teleop_core.robots.drives import ACCELERATION
-from teleop_core.robots.rigid_body import invert_positive, write_model
 
 ROW = rcrt1_dynamics.link_row()
 FORWARD = pointer(rcrt1_dynamics.DYNAMICS.acceleration, ACCELERATION)

@@ -1,6 +1,7 @@
 """Laws of all robots, and of all serial arms with a closed form."""
 
 import math
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,8 +19,11 @@ ROUNDING = 1e-13  # a few hundred products of numbers of size one
 REACHED = 1e-9  # the promise of the interface [m, rad]
 ROTARY = {name: np.array([j != "d3" for j in arm.joint_names]) for name, arm in ARMS.items()}
 
+TABLES = sorted(map(str, (Path(__file__).parents[2] / "config/robots").glob("*.yaml")))
+ARMS |= {path: load_robot(path) for path in TABLES}
+
 arms = pytest.mark.parametrize("name", BRANCHES)
-robots = pytest.mark.parametrize("name", ARMS)
+robots = pytest.mark.parametrize("name", list_robots())
 
 
 def drawn(name: str, count: int, seed: int = 1) -> Array:
@@ -89,8 +93,8 @@ def test_the_original_joints_come_back_when_they_are_the_seed(name: str) -> None
 # The legs of the hybrid contradict each other by a step; pinned loops are the test of its Jacobian.
 @pytest.mark.parametrize("name", [name for name in ARMS if name != "scara_stewart"])
 def test_the_jacobian_is_the_difference_quotient_of_forward_kinematics(name: str) -> None:
-    arm, step = ARMS[name], 1e-6
-    for q in drawn(name, 50) if name in BRANCHES or name == "mma" else near_home(name, 6):
+    arm, step, is_chain = ARMS[name], 1e-6, name in {*BRANCHES, *TABLES}
+    for q in drawn(name, 50) if is_chain or name == "mma" else near_home(name, 6):
         jacobian, pose = arm.jacobian(q), arm.fk(q)
         for j in range(arm.n):
             ahead, behind = (arm.fk(q + side * step * np.eye(arm.n)[j]) for side in (1, -1))
@@ -98,7 +102,9 @@ def test_the_jacobian_is_the_difference_quotient_of_forward_kinematics(name: str
             spin = rate[:3, :3] @ pose[:3, :3].T
             numeric = [*rate[:3, 3], spin[2, 1], spin[0, 2], spin[1, 0]]
             # Rounding over the step, 1e-16 / 1e-6, and its square; loops are solved to rounding.
-            assert np.abs(jacobian[:, j] - numeric).max() < (1e-8 if name in BRANCHES else 1e-5)
+            assert np.abs(jacobian[:, j] - numeric).max() < (
+                1e-8 if name in {*BRANCHES, *TABLES} else 1e-5
+            )
 
 
 @robots

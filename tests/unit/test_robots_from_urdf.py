@@ -22,7 +22,7 @@ from teleop_core.base.errors import (
 )
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot, load_robot_set
-from teleop_core.robots.chain_dynamics import inertia_matrix, inverse_dynamics, tip_efforts
+from teleop_core.robots.chains.chain_dynamics import inertia_matrix, inverse_dynamics, tip_efforts
 from teleop_core.robots.kinematics import DIRECTIONS, IkStatus
 from teleop_core.robots.rank import directions_of
 from teleop_core.robots.robot import Robot

@@ -9,8 +9,8 @@ import roboticstoolbox as rtb
 from teleop_core.base.errors import ClosureError, ParameterError, ShapeError, UnknownNameError
 from teleop_core.kernels.geometry import Array, rotation, transform
 from teleop_core.robots import FkStatus, IkStatus, list_robots, load_robot
-from teleop_core.robots.rps3 import Assembly, assembly_modes, joint_points, leg_coordinates
-from teleop_core.robots.rps3_loop import constraints
+from teleop_machines.rps3 import Assembly, assembly_modes, joint_points, leg_coordinates
+from teleop_machines.rps3_loop import constraints
 from ways import stepped
 
 B, A = 1.0, 0.5

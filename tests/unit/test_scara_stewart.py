@@ -13,9 +13,9 @@ from present import present
 from teleop_core.base.errors import ParameterError, UnknownNameError
 from teleop_core.kernels.geometry import Array, rotation, transform
 from teleop_core.robots import IkStatus, list_robots, load_robot
-from teleop_core.robots.stewart import Layout
 from teleop_core.session.configuration import configure
 from teleop_core.session.virtual import VirtualTime
+from teleop_machines.stewart import Layout
 from ways import followed
 
 # The source prints centimetres with four decimals; its inputs are rounded likewise, and near the

@@ -446,6 +446,17 @@ def test_a_stamp_from_the_future_does_not_shut_out_the_commands_after_it() -> No
     assert np.array_equal(bench.slave.server.state["target"], goal)
 
 
+def test_stamps_of_a_clock_that_was_ahead_do_not_shut_out_those_of_the_right_one() -> None:
+    """Messages that go back come here only after a silence, or from who starts anew."""
+    bench = Bench()
+    bench.go_to(MIDDLE)
+    state = bench.slave.server.state
+    state["seen_ns"] = bench.now_ns + 3600 * 10**9
+    goal = MIDDLE + 0.05 * DRIVES.speed_limit
+    bench.tick(goal)
+    assert np.array_equal(state["target"], goal)
+
+
 def test_command_outside_the_limits_is_followed_up_to_them() -> None:
     bench = Bench()
     bench.tick(ARM.home + np.array([0, 0, 1e-3, 0, 0, 0]))

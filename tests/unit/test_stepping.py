@@ -1,4 +1,4 @@
-"""Stepping: a session that a program makes tick by tick, and begins again."""
+"""Stepping: a session that a program makes tick by tick, leads by hand, and begins again."""
 
 from typing import Any
 
@@ -7,7 +7,7 @@ import pytest
 
 import teleop_core as tc
 from present import present
-from teleop_core.base.errors import ShapeError
+from teleop_core.base.errors import ParameterError, ShapeError, TeleopError, UnknownNameError
 from teleop_core.slave.operation import State
 
 KINDS: Any = {
@@ -27,7 +27,7 @@ def session(kind: str) -> tc.VirtualTime:
 def test_a_session_of_single_steps_is_that_of_a_run_to_the_bit(kind: str) -> None:
     run, stepped = session(kind), session(kind)
     block = run.run(1500)
-    rows = np.array([stepped.step() for _ in range(1500)])
+    rows = np.array([stepped.run(1)[0] for _ in range(1500)])
     assert rows.dtype == block.dtype
     for name in present(block.dtype.names):
         np.testing.assert_array_equal(rows[name], block[name], err_msg=name)
@@ -47,12 +47,12 @@ def test_a_session_that_is_begun_again_repeats_itself_to_the_bit(kind: str) -> N
 def test_what_a_program_says_between_two_steps_holds_from_the_next_one_on() -> None:
     own: Any = tc.VirtualTime(tc.configuration("coarse_box", starts_at_home=True))
     own.run(8000)
-    moving = own.step()
-    assert np.abs(own.step()["slave_setpoint_js"] - moving["slave_setpoint_js"]).max() > 1e-6
+    moving = own.run(1)[0]
+    assert np.abs(own.run(1)[0]["slave_setpoint_js"] - moving["slave_setpoint_js"]).max() > 1e-6
     own.stages["slave"].request("stop")
-    still = own.step()
+    still = own.run(1)[0]
     assert still["slave_operation"][0] == State.FAULT
-    np.testing.assert_array_equal(own.step()["slave_setpoint_js"], still["slave_setpoint_js"])
+    np.testing.assert_array_equal(own.run(1)[0]["slave_setpoint_js"], still["slave_setpoint_js"])
 
 
 def test_rows_that_are_filled_again_hold_what_new_ones_would() -> None:
@@ -65,3 +65,64 @@ def test_rows_that_are_filled_again_hold_what_new_ones_would() -> None:
     for wrong in (again.rows(49), np.zeros(50)):
         with pytest.raises(ShapeError, match="rows of this session"):
             again.run(50, wrong)
+
+
+def test_the_tip_goes_where_a_program_leads_the_hand_by_the_axes_and_the_gain() -> None:
+    own = tc.Session("free_motion", settings={"coarse_gain": 0.5})
+    begin = own.reset()
+    assert begin.is_following
+    assert begin.state is State.ENABLED
+    assert begin.gain == pytest.approx(0.5)
+    own.command([0.0, 0.02, 0.0])  # y of the master is z of the slave
+    seen = own.step(50)
+    assert seen.time == pytest.approx(begin.time + 1.0)
+    np.testing.assert_allclose(
+        seen.measured_cp[:3] - begin.measured_cp[:3], [0, 0, 0.01], atol=5e-4
+    )
+    np.testing.assert_array_equal(seen.servo_cp, own.values("slave/servo_cp"))
+
+
+def test_a_clutch_that_a_program_presses_leaves_the_arm_where_it_is() -> None:
+    own = tc.Session("free_motion")
+    begin = own.reset()
+    own.command([0.01, 0.01, 0.01], clutch=True)
+    np.testing.assert_allclose(own.step(25).servo_cp, begin.servo_cp, atol=1e-3)
+
+
+def test_the_hand_goes_evenly_from_command_to_command() -> None:
+    own = tc.Session("free_motion", period=0.1)
+    own.reset()
+    own.command([0.01, 0.0, 0.0])
+    rows = own.runner.run(200)["hand_servo_cp"][:, 0]
+    way = np.diff(rows)[np.diff(rows) > 0.0]  # samples go out at their own rate
+    assert way.sum() == pytest.approx(0.01, rel=0.02)
+    np.testing.assert_allclose(way, way[0], rtol=1e-6)
+
+
+def test_a_program_that_leads_the_hand_gets_the_same_bits_again() -> None:
+    own, found = tc.Session("coarse_box", settings={"plant": "hardware"}), []
+    for _ in range(2):
+        own.reset()
+        for step in range(20):
+            own.command([0.0005 * step, 0.0, 0.0])
+            own.step()
+        found.append(own.runner.run(1).tobytes())
+    assert found[0] == found[1]
+
+
+@pytest.mark.parametrize(
+    ("error", "text", "do"),
+    [
+        (ParameterError, "period", lambda: tc.Session(period=0.0005)),
+        (ShapeError, "place", lambda: tc.Session().command([0.0, 0.0])),
+        (ParameterError, "-0.08 to 0.08", lambda: tc.Session().command([0.5, 0.0, 0.0])),
+        (ParameterError, "x", lambda: tc.Session().command([np.nan, 0.0, 0.0])),
+        (ParameterError, "jaw", lambda: tc.Session().command([0.0] * 3, jaw=2.0)),
+        (UnknownNameError, "one of: slave/servo_jp", lambda: tc.Session().values("slave/pose")),
+    ],
+)
+def test_a_command_that_no_hand_can_follow_is_refused_by_name(
+    error: type[TeleopError], text: str, do: Any
+) -> None:
+    with pytest.raises(error, match=text):
+        do()

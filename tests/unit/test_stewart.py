@@ -10,7 +10,7 @@ import pytest
 from teleop_core.base.errors import ClosureError, ParameterError, ShapeError, UnknownNameError
 from teleop_core.kernels.geometry import Array, rotation, transform
 from teleop_core.robots import FkStatus, IkStatus, list_robots, load_robot
-from teleop_core.robots.stewart import PAIRED, DirectStatus, Layout
+from teleop_machines.stewart import PAIRED, DirectStatus, Layout
 from ways import stepped
 
 SIXTHS = np.radians([0.0, 60.0, 120.0, 180.0, 240.0, 300.0])

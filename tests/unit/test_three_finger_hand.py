@@ -11,9 +11,9 @@ import roboticstoolbox as rtb
 from teleop_core.base.errors import ParameterError, ShapeError, UnknownNameError
 from teleop_core.kernels.geometry import Array, rotation, transform
 from teleop_core.robots import IkStatus, list_robots, load_robot
-from teleop_core.robots.hand_fingers import finger_point
 from teleop_core.robots.robot import Robot
-from teleop_core.robots.three_finger_hand import Grasp, Hand
+from teleop_machines.hand_fingers import finger_point
+from teleop_machines.three_finger_hand import Grasp, Hand
 from ways import stepped
 
 SOLVED = 1e-9

@@ -15,9 +15,9 @@ from teleop_core.robots import load_robot
 from teleop_core.robots.robot import Robot
 from teleop_core.session.configuration import configure
 from teleop_core.session.virtual import VirtualTime
+from teleop_core.shapes.box import BoxParameters
+from teleop_core.shapes.hole import HoleParameters
 from teleop_core.slave.slave_sim import SlaveSim
-from teleop_core.slave.world.box import BoxParameters
-from teleop_core.slave.world.hole import HoleParameters
 
 STILL = np.zeros((1, 6))
 
@@ -144,7 +144,7 @@ def wandering(
 
 SOLIDS = {
     "plane": ((0.0, 0.0, 0.0), (0.6, 0.0, -0.8), None, 0.0),
-    "box": ((0.0, 0.0, 0.017), (1.0, 0.0, 0.0), BoxParameters(), 0.003),
+    "box": ((0.0, 0.0, 0.017), (1.0, 0.0, 0.0), BoxParameters(size=(0.06, 0.06, 0.03)), 0.003),
     "sphere": ((0.0, 0.0, 0.015), (0.0, 0.6, -0.8), None, 0.003),
     "capsule": ((0.0, 0.0, 0.012), (1.0, 0.0, 0.0), None, 0.003),
     "hole": ((0.0, 0.0, -0.015), (0.0, 0.0, -1.0), HoleParameters(), 0.005),

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from teleop_core.base.errors import ParameterError, ShapeError
 from teleop_core.kernels.geometry import Array
-from teleop_core.robots.rcrt1_dynamics import DRIVES
+from teleop_core.robots.arms.rcrt1_dynamics import DRIVES
 from teleop_core.slave.trajectory import cubic_move, shortest_move_time
 
 # A handful of multiplications of numbers up to 100.

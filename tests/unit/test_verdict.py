@@ -14,14 +14,14 @@ from rich.console import Console
 import teleop_core as tc
 from teleop_core.base.parameters import NoParameters
 from teleop_core.base.registry import Registry
-from teleop_core.chain.fixtures import FIXTURES, register_fixture
-from teleop_core.chain.fixtures.sphere import SPHERE
 from teleop_core.evaluation.command import evaluate_bags
 from teleop_core.evaluation.rows import fixed, number
 from teleop_core.evaluation.verdict import verdict_of
 from teleop_core.graph.stage import STAGES, Stage, register_stage
 from teleop_core.graph.topics import SLAVE_MEASURED_CP, Kind, Topic, passed_on
 from teleop_core.robots import ROBOTS, load_robot, register_robot
+from teleop_core.shapes import SHAPES, register_shape
+from teleop_core.shapes.sphere import SPHERE
 from teleop_core.slave.controllers import CONTROLLERS, register_controller
 from teleop_core.slave.controllers.source_pid import SOURCE_PID
 
@@ -171,7 +171,7 @@ def test_scores_are_a_row_of_a_data_frame_each(drifting: tc.Recording) -> None:
 
 
 def slab() -> dict[str, Any]:
-    register_fixture(replace(SPHERE, name="slab"))
+    register_shape(replace(SPHERE, name="slab"))
     return {"fixture": "slab"}
 
 
@@ -198,7 +198,7 @@ def arm() -> dict[str, Any]:
 @pytest.mark.parametrize(
     ("register", "registry", "name", "told"),
     [
-        (slab, FIXTURES, "slab", "fixture 'slab'"),
+        (slab, SHAPES, "slab", "fixture 'slab'"),
         (law, CONTROLLERS, "law", "controller 'law'"),
         (mirror, STAGES, "mirror", "stage 'mirror'"),
         (arm, ROBOTS, "own_arm", "robot 'own_arm'"),

@@ -1,10 +1,7 @@
-"""World: shapes against a library of others, the push of a contact, and its energy."""
+"""World: the push of a contact, and its energy."""
 
-import math
-from collections.abc import Callable
 from typing import Any
 
-import coal
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -13,56 +10,16 @@ from numpy.typing import NDArray
 
 import teleop_core as tc
 from present import present
-from teleop_core.base.errors import ParameterError, PartError
+from teleop_core.base.errors import ParameterError
 from teleop_core.kernels.geometry import Array
-from teleop_core.kernels.parts import numbers_of
 from teleop_core.robots import load_robot
 from teleop_core.session.configuration import configure
 from teleop_core.session.virtual import VirtualTime
 from teleop_core.slave.slave_sim import SlaveSim
-from teleop_core.slave.world import WORLD_OBJECTS, WorldObject, register_world_object
-from teleop_core.slave.world.box import BoxParameters
 from teleop_core.slave.world.parameters import MATERIALS
 
 BLOCK = [0.241, -0.236, -0.087]
 """Middle of the block that the scenario ``palpation`` presses, whose top is at -0.072."""
-ALONG_Y = coal.Transform3s(np.array([[1.0, 0, 0], [0, 0, 1.0], [0, -1.0, 0]]), np.zeros(3))
-SHAPES = {
-    "plane": (lambda p: coal.Halfspace(np.array([0.0, 0.0, 1.0]), 0.0), None),
-    "sphere": (lambda p: coal.Sphere(p.radius), None),
-    "box": (lambda p: coal.Box(*p.edges), None),
-    "cylinder": (lambda p: coal.Cylinder(p.radius, p.height), None),
-    "capsule": (lambda p: coal.Capsule(p.radius, p.length), ALONG_Y),
-}
-
-
-@pytest.mark.parametrize("name", SHAPES)
-def test_a_library_of_others_finds_the_same_distance_and_the_same_way_out(name: str) -> None:
-    part = WORLD_OBJECTS.find(name)
-    parameters = part.parameters()
-    make, turned = SHAPES[name]
-    shape, numbers, normal = make(parameters), numbers_of(parameters), np.zeros(3)
-    dot, place = coal.Sphere(1e-9), turned or coal.Transform3s()
-    for offset in np.random.default_rng(1).uniform(-0.06, 0.06, (300, 3)):
-        found = part.distance(offset, numbers, normal)
-        there = coal.Transform3s(np.eye(3), offset)
-        result = coal.DistanceResult()
-        coal.distance(shape, place, dot, there, coal.DistanceRequest(True, True), result)
-        if found > 0.0 or name != "cylinder":  # inside of one it is content with a longer way out
-            assert found == pytest.approx(result.min_distance + 1e-9, abs=2e-6)
-        assert math.hypot(*normal) == pytest.approx(1.0, abs=1e-12)
-        farther = part.distance(offset + 1e-7 * normal, numbers, np.zeros(3))
-        assert farther - found == pytest.approx(1e-7, rel=1e-3)
-
-
-@pytest.mark.parametrize("name", SHAPES)
-@pytest.mark.parametrize("tiny", [1e-170, 6e-160, 1e-155, 1e-140])
-def test_the_way_out_has_length_1_however_little_a_point_is_off(name: str, tiny: float) -> None:
-    part = WORLD_OBJECTS.find(name)
-    numbers, normal = numbers_of(part.parameters()), np.zeros(3)
-    for offset in (np.array([0.0, 0.0, tiny]), np.full(3, tiny), np.array([0.03, tiny, tiny])):
-        assert math.isfinite(part.distance(offset, numbers, normal))
-        assert math.hypot(*normal) == pytest.approx(1.0, abs=1e-12)
 
 
 def pressed(*texts: str, ticks: int = 20_000, seconds: float = 12.0) -> NDArray[np.void]:
@@ -182,27 +139,6 @@ def test_an_object_that_the_tip_begins_in_is_refused_with_its_depth() -> None:
         VirtualTime(configure("free_motion", settings=["world=box", "robot=scara_stewart"]))
     with pytest.raises(ParameterError, match="a direction"):
         configure("free_motion", settings=["world=plane", "world.plane.normal=[0.0,0.0,0.0]"])
-
-
-@pytest.mark.parametrize(
-    ("distance", "expected"),
-    [
-        (lambda offset, shape, normal: 0.1, "normal of length 1"),
-        (lambda offset, shape, normal: _upwards(normal, 2.0 * offset[2]), "grows by 2 times"),
-        (lambda offset, shape, normal: 1 / 0, "raises ZeroDivisionError"),
-    ],
-)
-def test_an_object_that_is_none_is_refused_when_it_is_registered(
-    distance: Callable[..., Any], expected: str
-) -> None:
-    part = WORLD_OBJECTS.find("box")
-    with pytest.raises(PartError, match=expected):
-        register_world_object(WorldObject("bad", BoxParameters, distance, part.outline))
-
-
-def _upwards(normal: Array, length: float) -> float:
-    normal[:] = (0.0, 0.0, 1.0)
-    return length
 
 
 def test_the_hand_feels_the_push_along_its_own_axes_and_no_more_than_asked() -> None:

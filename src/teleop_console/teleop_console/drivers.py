@@ -15,7 +15,7 @@ class Drivers:
     at one arm talk to each other. A page that comes while nobody drives gets control, so that one
     which is loaded again goes on; a page that is already open never gets it without asking. Control
     is lost by leaving, and by silence while the stylus is held: a page that stands still then would
-    hold it for ever. Silence with an idle stylus harms nobody, and browsers slow hidden pages down.
+    always hold it. Silence with an idle stylus harms nobody, and browsers slow hidden pages down.
 
     Methods may be called from any thread.
 

@@ -11,9 +11,11 @@ import viser
 from teleop_console.link import Setting
 from teleop_console.look import GOOD, WRONG
 from teleop_core.base.parameters import build
-from teleop_core.chain.fixtures import FIXTURES, Fixture
-from teleop_core.chain.fixtures.box import BOX
+from teleop_core.chain.fixtures import Fixture
 from teleop_core.kernels.geometry import Array
+from teleop_core.shapes import SHAPES
+from teleop_core.shapes.basis.drawing import segments_of
+from teleop_core.shapes.box import BOX
 
 _STILL = 5e-5  # [m]
 _FLAT = 1e-9  # [m]
@@ -25,7 +27,8 @@ class Look:
 
     Attributes:
         kind: Name of its kind.
-        values: Names and values of its parameters; those that are missing have their defaults.
+        values: Names and values of its shape's parameters, and its place; those that are missing
+            have their defaults.
     """
 
     kind: str = BOX.name
@@ -39,19 +42,15 @@ def unit_outline(look: Look) -> Array:
     Along an axis on which it has no length they are in metres. A fixture that is not known here is
     drawn as the box around it.
     """
-    fixture: Fixture = BOX
-    parameters: Any = BOX.parameters()
+    fixture = Fixture(BOX, BOX.parameters())
     with suppress(Exception):  # of another's kind anything may fail, and the page goes on
-        found = FIXTURES.find(look.kind)
-        given: Any = build(found.parameters, dict(look.values))
-        found.size(given)
-        fixture, parameters = found, given
-    points = np.asarray(fixture.outline(parameters), np.float64)
-    extent = fixture.size(parameters)
-    points = points / np.where(extent > _FLAT, extent, 1.0)
-    pairs = np.stack((points[:-1], points[1:]), axis=1)
-    drawn: Array = pairs[np.isfinite(pairs).all(axis=(1, 2))]
-    return drawn
+        values: dict[str, Any] = dict(look.values)
+        place, shape = values.pop("place", fixture.place), SHAPES.find(look.kind)
+        found = Fixture(shape, build(shape.parameters, values), tuple(place))
+        found.size()
+        fixture = found
+    extent = fixture.size()
+    return segments_of(fixture.outline() / np.where(extent > _FLAT, extent, 1.0))
 
 
 def scale_of(outline: Array, size: Array, gain: float) -> Array:

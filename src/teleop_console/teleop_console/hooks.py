@@ -60,7 +60,7 @@ class Wake(asyncio.Event):
 
     viser sets its event from the drawing thread, and then asks the loop to set it too. A reader
     that has looked at the event but does not wait yet misses the first. The second does nothing,
-    since the event is set already, nor does any later one: its page shows what is old for ever.
+    since the event is set already, nor does any later one: its page shows what is old without end.
     """
 
     def set(self) -> None:

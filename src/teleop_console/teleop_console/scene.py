@@ -190,7 +190,10 @@ class Scene:
 
 def _look(parameters: Parameters, node: str, kind: str) -> Look:
     """What the fixture of a node is."""
-    return Look(kind, tuple(_values_below(parameters, node, f"fixture.{kind}.").items()))
+    values = _values_below(parameters, node, f"fixture.{kind}.")
+    if (place := parameters.get((node, "fixture.place"))) is not None:
+        values["place"] = place.value
+    return Look(kind, tuple(values.items()))
 
 
 def _values_below(parameters: Parameters, node: str, start: str) -> dict[str, Setting]:

@@ -13,7 +13,7 @@ from teleop_core.base.errors import TeleopError
 QUICK = (
     ("motion_scaling", "mode"), ("motion_scaling", "coarse_gain"), ("motion_scaling", "fine_gain"),
     ("motion_scaling", "fixture.kind"), ("motion_scaling", "fixture.box.size"),
-    ("motion_scaling", "fixture.sphere.diameter"), ("motion_scaling", "reflection.architecture"),
+    ("motion_scaling", "fixture.sphere.radius"), ("motion_scaling", "reflection.architecture"),
     ("motion_scaling", "reflection.passivity"), ("slave_sim", "world.kind"),
     ("slave_sim", "world.material"), ("network", "preset"), ("slave", "reference_filter.is_on"),
     ("slave_sim", "controller.kind"), ("slave_sim", "plant.kind"), ("teleop", "delays"),

@@ -12,6 +12,7 @@ from teleop_console.master_nodes import ForceArrow
 from teleop_core.base.parameters import build
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots.robot import Robot
+from teleop_core.shapes.basis.drawing import segments_of
 from teleop_core.slave.world import WORLD_OBJECTS
 from teleop_core.slave.world.parameters import WorldParameters
 
@@ -35,10 +36,7 @@ def object_outline(values: Mapping[str, Setting], robot: Robot) -> Array:
             return nothing
         center = np.array(world.place or world.below(robot.fk(robot.start)))
         part = WORLD_OBJECTS.find(world.kind.kind)
-        points = np.asarray(part.outline(world.kind.parameters), np.float64) + center
-        pairs = np.stack((points[:-1], points[1:]), axis=1)
-        drawn: Array = pairs[np.isfinite(pairs).all(axis=(1, 2))]
-        return drawn
+        return segments_of(np.asarray(part.outline(world.kind.parameters), np.float64) + center)
     return nothing
 
 

@@ -4,14 +4,15 @@ Folders follow the data: ``chain`` is the way from the operator's hand to the co
 ``slave`` the arm's server with its control laws and plants, ``bags`` what is recorded,
 ``evaluation`` what it is worth. ``graph`` says which stages there are and how they are linked,
 ``session`` runs them in virtual time, ``nodes`` puts them on ROS 2 topics, ``console`` shows them,
-``commands`` is the ``teleop`` of a terminal. All stand on ``robots``, ``kernels`` and ``base``.
+``commands`` is the ``teleop`` of a terminal. All stand on ``robots``, ``shapes``,
+``kernels`` and ``base``.
 
 Everything a user needs is here:
 
 - :func:`run`, :func:`replay`, :func:`open_recording`: sessions and what was recorded of them;
 - :func:`configuration`: what a session runs, checked;
 - :func:`load_robot`, :func:`list_robots`, :func:`robot_from_table`: arms;
-- :class:`Stage`, :class:`Fixture`, :class:`Controller`, :class:`Plant`, :class:`WorldObject`,
+- :class:`Stage`, :class:`Shape`, :class:`Controller`, :class:`Plant`,
   :class:`Operator`, :class:`Metric` and the ``register_...`` functions: parts of your own;
 - :func:`kernel`, :func:`parameter`, ``topics``: what parts are made of.
 

@@ -30,7 +30,6 @@ from .chain.filters import (
     TremorFilter as TremorFilter,
     register_tremor_filter as register_tremor_filter,
 )
-from .chain.fixtures import Fixture as Fixture, register_fixture as register_fixture
 from .graph.graph import Graph as Graph, build_graph as build_graph
 from .kernels import kernel as kernel
 from .kernels.fields import Fields as Fields, Vector3 as Vector3
@@ -46,7 +45,7 @@ from .chain.operators.remote import RemoteHand as RemoteHand, remote_operator as
 from .chain.tasks import Task as Task, register_task as register_task
 from .base.parameters import NoParameters as NoParameters, parameter as parameter
 from .slave.bridges import Bridge as Bridge, Command as Command, register_bridge as register_bridge
-from .slave.world import WorldObject as WorldObject, register_world_object as register_world_object
+from .shapes import Shape as Shape, register_shape as register_shape
 from .slave.plants import Physics as Physics, Plant as Plant, register_plant as register_plant
 from .session.recording import (
     Recording as Recording,
@@ -62,6 +61,7 @@ from .robots import (
 )
 from .robots.parameters import RobotParameters as RobotParameters
 from .session.configuration import Configuration as Configuration
+from .session.stepped import Observation as Observation, Session as Session, Space as Space
 from .session.virtual import VirtualTime as VirtualTime
 from .graph.row import Row as Row
 from .graph.stage import Runner as Runner, Stage as Stage, register_stage as register_stage

@@ -315,7 +315,6 @@ def _scenarios(_: argparse.Namespace) -> int:
 def _parts(_: argparse.Namespace) -> int:
     from teleop_core.chain.architectures import ARCHITECTURES
     from teleop_core.chain.filters import TREMOR_FILTERS
-    from teleop_core.chain.fixtures import FIXTURES
     from teleop_core.chain.network import NETWORKS
     from teleop_core.chain.operators import OPERATORS
     from teleop_core.chain.passivity import PASSIVITIES
@@ -323,13 +322,14 @@ def _parts(_: argparse.Namespace) -> int:
     from teleop_core.evaluation import METRICS
     from teleop_core.graph.stage import STAGES
     from teleop_core.robots import ROBOTS
+    from teleop_core.shapes import SHAPES
     from teleop_core.slave.bridges import BRIDGES
     from teleop_core.slave.controllers import CONTROLLERS
     from teleop_core.slave.plants import PLANTS
     from teleop_core.slave.world import WORLD_OBJECTS
 
     parts = (
-        OPERATORS, FIXTURES, ROBOTS, CONTROLLERS, PLANTS, WORLD_OBJECTS, ARCHITECTURES, NETWORKS,
+        OPERATORS, SHAPES, ROBOTS, CONTROLLERS, PLANTS, WORLD_OBJECTS, ARCHITECTURES, NETWORKS,
         PASSIVITIES, TREMOR_FILTERS, TASKS, BRIDGES, STAGES, METRICS,
     )  # fmt: skip
     for registry in parts:
@@ -361,7 +361,7 @@ def _robot(arguments: argparse.Namespace) -> int:
     from teleop_core.robots.description import text
 
     if arguments.table is not None:
-        from teleop_core.robots.dh import load_table
+        from teleop_core.robots.arms.dh import load_table
 
         robot = load_table(arguments.table).robot()
     elif arguments.name is not None:

@@ -21,11 +21,12 @@ from pathlib import Path
 from teleop_core.base.errors import TeleopWarning
 from teleop_core.base.texts import printable
 from teleop_core.robots import geometry_of
+from teleop_core.robots.files.visuals import kept_mesh, meshes_of
+from teleop_core.robots.files.xacro_files import EXPANDED, xml_of
 from teleop_core.robots.parts import DESCRIPTION, arguments_of, file_of
-from teleop_core.robots.visuals import kept_mesh, meshes_of
-from teleop_core.robots.xacro_files import EXPANDED, xml_of
 
 TOUCHED, FIXTURE = "mesh", "fixture_mesh"
+_PLACES = range(8)  # of a shape that is made of several: they are called mesh, mesh1, mesh2
 _ROBOT, _DRIVES, _FILE, _MESHES = "robot", "drives", "_file", "_meshes"
 _PACKED, _DIGEST = "zlib, base64: ", "sha256:"
 _LEVEL = 4  # 27 MB of meshes of an arm take 0.4 s; at 6 they take 1.5 s, and 5 % less room
@@ -46,7 +47,7 @@ class KeptFiles:
         Args:
             name: Its path.
             prefix: What stands before the names of its arm.
-            kind: Whether it is :data:`TOUCHED` or a :data:`FIXTURE`.
+            kind: :data:`TOUCHED` or :data:`FIXTURE`, with its number behind it beyond the first.
         """
         self._name(f"{prefix}{kind}", name)
 
@@ -123,7 +124,8 @@ def recorded_files(metadata: Mapping[str, str], arm: str = "") -> dict[str, str]
         recorded, which is there until the program ends.
     """
     prefix, found = f"{arm}/" if arm else "", {}
-    for kind in (TOUCHED, FIXTURE, _DRIVES):
+    meshes = (f"{kind}{place or ''}" for kind in (TOUCHED, FIXTURE) for place in _PLACES)
+    for kind in (*meshes, _DRIVES):
         name, digest = (metadata.get(f"{prefix}{kind}{end}", "") for end in ("", _FILE))
         if not (name and digest):
             continue

@@ -91,20 +91,31 @@ class Choice:
         return self.groups[self.kind]
 
 
-def choice(registry: "Registry[Any]", default: str, *, doc: str, fixed: bool = False) -> Any:
+def choice(
+    registry: "Registry[Any]",
+    default: str,
+    *,
+    doc: str,
+    fixed: bool = False,
+    usual: Mapping[str, Value] | None = None,
+) -> Any:
     """Dataclass field, to be called ``kind``, that chooses a part by name.
 
     Beside ``kind`` the group then has the parameters of every part, each below the part's name:
-    ``fixture.kind`` and ``fixture.sphere.diameter``. Parts have a group in ``parameters``.
+    ``fixture.kind`` and ``fixture.sphere.radius``. Parts have a group in ``parameters``.
 
     Args:
         registry: Where the parts are.
         default: Part when nothing else is said.
         doc: One line for tables and the ROS descriptor.
         fixed: Whether it can only be set before the stage is built.
+        usual: Dotted names of parts' parameters that have another default here.
     """
-    meta = {"registry": registry, "default": default, "doc": doc, "fixed": fixed}
-    return field(default_factory=lambda: _make_choice(registry, default, {}), metadata=meta)
+    usual = usual or {}
+    meta = {
+        "registry": registry, "default": default, "doc": doc, "fixed": fixed, "usual": usual,
+    }  # fmt: skip
+    return field(default_factory=lambda: _make_choice(registry, default, usual), metadata=meta)
 
 
 def _make_choice(registry: "Registry[Any]", kind: str, values: Mapping[str, object]) -> Choice:
@@ -237,7 +248,9 @@ def _choice_specs(entry: Any, prefix: str) -> Iterator[Spec]:
         is_part=True,
     )  # fmt: skip
     for name in names:
-        yield from specs(meta["registry"].find(name).parameters, f"{prefix}{name}.")
+        for spec in specs(meta["registry"].find(name).parameters, f"{prefix}{name}."):
+            usual = meta["usual"].get(spec.name.removeprefix(prefix), spec.default)
+            yield dataclasses.replace(spec, default=usual)
 
 
 def build(group: type[Group], values: Mapping[str, object], prefix: str = "") -> Group:
@@ -272,7 +285,8 @@ def _make(group: type[Group], values: Mapping[str, object]) -> Group:
         inner = hints[entry.name]
         if inner is Choice:
             kind = str(values.get(entry.name, entry.metadata["default"]))
-            made[entry.name] = _make_choice(entry.metadata["registry"], kind, values)
+            usual = entry.metadata["usual"]
+            made[entry.name] = _make_choice(entry.metadata["registry"], kind, {**usual, **values})
         elif dataclasses.is_dataclass(inner):
             made[entry.name] = _make(inner, _below(entry.name, values))  # type: ignore[arg-type]
         elif entry.name in values:

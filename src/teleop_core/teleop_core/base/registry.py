@@ -1,9 +1,9 @@
 """Registry: parts by name, from this package, from installed packages and from the running program.
 
-Each seam (stages, operators, fixtures, controllers, robots, metrics) has one registry. An installed
+Each seam (stages, operators, shapes, controllers, robots, metrics) has one registry. An installed
 package adds parts through a Python entry-point group of the registry's name::
 
-    [project.entry-points."teleop_core.fixtures"]
+    [project.entry-points."teleop_core.shapes"]
     my_cone = "my_package.cone:CONE"
 
 A program adds them with :meth:`Registry.add`. Nothing is imported before it is asked for.
@@ -17,6 +17,7 @@ from dataclasses import is_dataclass
 from functools import cache
 from importlib import import_module
 from importlib.metadata import EntryPoint, EntryPoints, entry_points
+from types import MappingProxyType
 from typing import Generic, TypeVar
 
 from teleop_core.base.errors import PartError, UnknownNameError
@@ -37,6 +38,8 @@ class Registry(Generic[Part]):
         trial: Tries a part that is not of the package, and raises as ``check`` does.
         package: Whose registry it is.
         others: What serves in place of a name, for messages: "FILE.urdf".
+        base: Registry whose parts are parts here too.
+        elsewhere: Names of parts that come with other distributions of this project, to these.
     """
 
     def __init__(
@@ -49,10 +52,13 @@ class Registry(Generic[Part]):
         *,
         package: str = "teleop_core",
         others: tuple[str, ...] = (),
+        base: "Registry[Part] | None" = None,
+        elsewhere: Mapping[str, str] = MappingProxyType({}),
     ) -> None:
         self.kind, self.kinds, self.group = kind, kinds, f"{package}.{kinds}"
         self._builtin, self._check, self._trial = dict(builtin), check, trial
-        self._others = others
+        self._others, self._base, self.elsewhere = others, base, dict(elsewhere)
+        self.builtin = tuple(builtin)
         self._parts: dict[str, Part] = {}
         self._own: set[str] = set()
         self._installed: dict[str, EntryPoint] | None = None
@@ -69,15 +75,19 @@ class Registry(Generic[Part]):
 
     def names(self) -> tuple[str, ...]:
         """Names of all parts: built in, installed, added."""
-        return tuple(dict.fromkeys((*self._builtin, *self._entries(), *self._parts)))
+        base = self._base or ()
+        return tuple(dict.fromkeys((*self._builtin, *base, *self._entries(), *self._parts)))
 
     def find(self, name: str) -> Part:
         """Part of a name.
 
         Raises:
             UnknownNameError: No such part; the alternatives are listed.
-            PartError: An installed part cannot be loaded, or is no such part.
+            PartError: An installed part cannot be loaded, is no such part, or comes with another
+                distribution of this project that is not installed.
         """
+        if self._base is not None and name in self._base.names():
+            return self._base.find(name)
         if name not in self._parts:
             part = self._check(name, self._load(name))
             if name not in self._builtin and self._trial is not None:
@@ -146,6 +156,9 @@ class Registry(Generic[Part]):
             module, _, attribute = place.partition(":")
             return getattr(import_module(module), attribute)
         if (entry := self._entries().get(name)) is None:
+            if (distribution := self.elsewhere.get(name)) is not None:
+                text = f"one that is installed: install {distribution}, which has it"
+                raise PartError(self.kind, name, text)
             raise UnknownNameError(self.kind, name, (*self.names(), *self._others))
         try:
             return entry.load()

@@ -55,10 +55,10 @@ def phases_of(*, is_all: bool) -> Iterator[Sequence[Job]]:
     """Jobs to be done side by side, one group after the other: later ones find what is there."""
     from importlib.util import find_spec
 
-    from teleop_core.chain.fixtures import FIXTURES
     from teleop_core.graph.graph import BUILT_IN
     from teleop_core.graph.layers import list_scenarios
     from teleop_core.robots import ROBOTS
+    from teleop_core.shapes import SHAPES
     from teleop_core.slave.controllers import CONTROLLERS
     from teleop_core.slave.plants import PLANTS
 
@@ -66,7 +66,8 @@ def phases_of(*, is_all: bool) -> Iterator[Sequence[Job]]:
     yield [(_FIRST, "", "")]
     yield [(scenario, "", "") for scenario in list_scenarios() if scenario != _FIRST]
     if is_all:
-        shapes = [name for name in FIXTURES if find_spec("trimesh") or not _reads_a_file(name)]
+        named = [name for name in SHAPES if find_spec("trimesh") or not _reads_a_file(name)]
+        shapes = {SHAPES.find(name).distance: name for name in named}.values()  # one per kernel
         for key, parts in (
             ("robot", ROBOTS), ("controller", CONTROLLERS), ("plant", PLANTS), ("fixture", shapes),
         ):  # fmt: skip
@@ -74,9 +75,9 @@ def phases_of(*, is_all: bool) -> Iterator[Sequence[Job]]:
 
 
 def _reads_a_file(shape: str) -> bool:
-    from teleop_core.chain.fixtures import FIXTURES
+    from teleop_core.shapes import SHAPES
 
-    return hasattr(FIXTURES.find(shape).parameters, "file")
+    return hasattr(SHAPES.find(shape).parameters, "file")
 
 
 def configured_job(job: Job, folder: Path) -> "Configuration":
@@ -95,6 +96,8 @@ def configured_job(job: Job, folder: Path) -> "Configuration":
         mesh = folder / "mesh.off"
         mesh.write_text(_MESH, encoding="ascii")
         texts.append(f"fixture.{name}.file={mesh}")
+    if setting == "fixture=hole":  # whose middle is not in the plate
+        texts.append("fixture.keep_out=true")
     return api.configuration(scenario, texts=["teleop.duration=0.01", *texts])
 
 

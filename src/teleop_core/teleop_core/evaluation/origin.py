@@ -15,6 +15,7 @@ from teleop_core.base.texts import shown
 from teleop_core.chain.mapping.motion_scaling import MOTION_SCALING
 from teleop_core.chain.mapping.parameters import MotionScalingParameters, axis_map, tool_maps
 from teleop_core.chain.master.operator import OPERATOR
+from teleop_core.graph.former_shapes import present_layer
 from teleop_core.graph.graph import DEVICE, HAND, Graph, build_graph
 from teleop_core.graph.layers import SESSION, Layer, SessionParameters, parse_layer
 from teleop_core.graph.stage import STAGES
@@ -141,7 +142,7 @@ def _layer(bag: Bag, content: Mapping[Any, Any]) -> Layer:
     known = {SESSION, *STAGES}
     kept = {name: said for name, said in content.items() if _stage(name) in known}
     try:
-        return parse_layer(kept, f"{bag.path}: configuration")
+        return present_layer(parse_layer(kept, f"{bag.path}: configuration"))
     except TeleopError:
         return {}
 

@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from teleop_core.chain.fixtures.box import BOX
 from teleop_core.chain.fixtures.reported_fixture import ReportedFixture
 from teleop_core.evaluation.context import Context
 from teleop_core.evaluation.figure import DRAWN_FIXTURES, FIXTURE
 from teleop_core.evaluation.state_history import States
 from teleop_core.kernels.geometry import Array
+from teleop_core.shapes.box import BOX
 
 _SECOND_NS = 1e9
 # Walls are looked for up to here at the hand [m], in so many places, closer in every round. Less

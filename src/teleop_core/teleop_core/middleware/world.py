@@ -77,7 +77,7 @@ class Lock(Protocol):
     """Lock between the threads of a process."""
 
     def acquire(self, blocking: bool = ..., timeout: float = ..., /) -> bool:
-        """Take it; whether that was possible within the timeout [s], by default for ever."""
+        """Take it; whether that was possible within the timeout [s], by default without end."""
 
     def release(self) -> None:
         """Give it back."""

@@ -17,7 +17,7 @@ from teleop_core.middleware.world import Line, Listener, World
 MOST = 16 << 20
 """Bytes that wait for a recorder that takes nothing; about 7 s of a session of one arm."""
 _HEAD = struct.Struct("<IHHIq")  # size, topic, word, number, time [ns]
-_NAMES, _MESSAGE, _JOINED, _LEFT = 0, 1, 2, 3
+_NAMES, _MESSAGE, _JOINED, _LEFT, _END = 0, 1, 2, 3, 4
 _AGAIN_NS = 1_000_000_000  # from one look for a recorder to the next
 _READ = 1 << 20  # bytes at once
 
@@ -101,6 +101,7 @@ class Feed:
     def close(self) -> None:
         """Write the rest as far as it goes, and leave the recorder."""
         if self._line is not None:
+            self.put(0, _END)
             with suppress(OSError):
                 self._line.send(self.waiting)
             self._line.close()
@@ -134,10 +135,13 @@ class FeedReader:
     Args:
         channels: Who takes the messages of each topic, by its name.
         world: Where it is; where another recorder listens already, it hears none.
+
+    Attributes:
+        cut: Feeds that ended without a word: what waited in a process that was killed is lost.
     """
 
     def __init__(self, channels: Mapping[str, Fed], world: World) -> None:
-        self._channels, self._world = channels, world
+        self._channels, self._world, self.cut = channels, world, 0
         self._loops: list[_Loop] = []
         self._opened: Listener | None = None
         with suppress(OSError):
@@ -149,6 +153,7 @@ class FeedReader:
             self._loops.append(_Loop(line, self._channels, self._world))
         for one in self._loops:
             one.drain()
+        self.cut += sum(not (one.is_open or one.has_ended) for one in self._loops)
         self._loops = [one for one in self._loops if one.is_open]
 
     def close(self) -> None:
@@ -167,7 +172,7 @@ class _Loop:
         self._line, self._known, self._world, self._came = line, channels, world, bytearray()
         self._channels: list[Fed | None] = []
         self._last: dict[int, int] = {}
-        self.is_open = True
+        self.is_open, self.has_ended = True, False
 
     def drain(self) -> None:
         """Hand on all that has come."""
@@ -210,7 +215,9 @@ class _Loop:
             if len(came) < end:
                 break
             data = bytes(came[end - size : end])
-            if word == _NAMES:
+            if word == _END:
+                self.has_ended = True
+            elif word == _NAMES:
                 self._channels = [self._known.get(name) for name in json.loads(data)]
             elif (channel := self._channels[index]) is not None:
                 if word == _MESSAGE:

@@ -365,12 +365,20 @@ class RecorderNode(CoreNode):
 
     def concerns(self) -> list[str]:
         """Topics of which messages were lost before they came here."""
-        lost = sum(channel.lost for channel in self.channels.values())
-        return [f"the middleware lost {lost} messages on the way here"] if lost else []
+        lost, cut = sum(channel.lost for channel in self.channels.values()), self._cut
+        found = [f"the middleware lost {lost} messages on the way here"] if lost else []
+        if cut:
+            found.append(f"{cut} processes ended without a word: what they had not sent on is lost")
+        return found
+
+    @property
+    def _cut(self) -> int:
+        return self._feeds.cut if self._feeds is not None else 0
 
     def values(self) -> dict[str, str]:
         """What came, what was lost, and where it is recorded."""
         values = {"out": str(self._writer.path), "is_recording": str(int(self._is_recording))}
+        values["cut_feeds"] = str(self._cut)
         for channel in self.channels.values():
             values[f"received.{channel.topic.name}"] = str(channel.received)
             values[f"lost.{channel.topic.name}"] = str(channel.lost)

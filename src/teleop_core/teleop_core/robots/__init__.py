@@ -49,7 +49,7 @@ from teleop_core.robots.parts import (
 from teleop_core.robots.robot import Robot
 
 if TYPE_CHECKING:
-    from teleop_core.robots.dh import DhTable, load_table, parse_table, robot_from_table
+    from teleop_core.robots.arms.dh import DhTable, load_table, parse_table, robot_from_table
 
 __all__ = [
     "ROBOTS",
@@ -79,7 +79,7 @@ _OF_TABLES = ("DhTable", "load_table", "parse_table", "robot_from_table")
 def __getattr__(name: str) -> object:
     """Load tables on first use, so that importing robots stays cheap."""
     if name in _OF_TABLES:
-        from teleop_core.robots import dh
+        from teleop_core.robots.arms import dh
 
         return getattr(dh, name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
@@ -98,7 +98,7 @@ def register_robot(robot: Part, name: str | None = None, *, replace: bool = Fals
     """Give a robot a name for the rest of this program.
 
     Args:
-        robot: A :class:`Robot`, a :class:`~teleop_core.robots.dh.DhTable`, or a function
+        robot: A :class:`Robot`, a :class:`~teleop_core.robots.arms.dh.DhTable`, or a function
             ``make(**geometry)`` that returns a robot and whose parameters all have defaults.
         name: What configurations call it; None for its own name.
         replace: Whether it may take the place of one that this program registered before.
@@ -122,9 +122,9 @@ def load_robot(name: str, **geometry: float | str) -> Robot:
         **geometry: Lengths and angles in place of the published ones [m, rad], by the symbols of
             the robot's file; a robot may take named options too, such as ``heading="carried"``.
             A URDF takes ``tip="tool0"`` and ``task="x y z"``
-            (:func:`teleop_core.robots.from_urdf.load_urdf`), and a xacro its own arguments, as
-            ``**{"xacro.prefix": "left_"}``. Tables and robots that were
-            registered ready-made take none.
+            (:func:`teleop_core.robots.files.from_urdf.load_urdf`), and a xacro its own arguments,
+            as ``**{"xacro.prefix": "left_"}``. Tables and robots that were registered ready-made
+            take none.
 
     Returns:
         The robot.

@@ -3,28 +3,25 @@
 import math
 from collections.abc import Iterator
 from html import escape
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from teleop_core.kernels.geometry import Array
+from teleop_core.robots.arm import Arm
 from teleop_core.robots.kinematics import DIRECTIONS
 from teleop_core.robots.rank import directions_of
 from teleop_core.robots.room import lever, room
 
-if TYPE_CHECKING:
-    from teleop_core.robots.robot import Robot
-
 _OF_CHAINS = "fixed0_00"  # a symbol of chains from tables, whose geometry is a row of matrices
 
 
-def short(robot: "Robot") -> str:
+def short(robot: Arm) -> str:
     """One line: name, number of joints, limits [rad, m] of each."""
     joints = ", ".join(f"{name} {lower:.4g}…{upper:.4g}" for name, lower, upper, _ in rows(robot))
     return f"Robot {robot.name!r}, {robot.n} joints [rad, m]: {joints}"
 
 
-def text(robot: "Robot") -> str:
+def text(robot: Arm) -> str:
     """Page: controlled directions, joints, drives, geometry, room, pose of the tip at home."""
     lines = [f"{robot.name}: {robot.n} joints [rad, m], controls {controlled(robot)} of the tip"]
     if (rank := directions_of(robot, lever(robot)).rank) < len(DIRECTIONS):
@@ -41,7 +38,7 @@ def text(robot: "Robot") -> str:
     return "\n".join([*lines, "T_base_tip at home:", tip])
 
 
-def html(robot: "Robot") -> str:
+def html(robot: Arm) -> str:
     """Small table of the joints with their limits and home [rad, m]."""
     head = "".join(f"<th>{name}</th>" for name in ("joint", "lower", "upper", "home"))
     body = "".join(
@@ -52,14 +49,14 @@ def html(robot: "Robot") -> str:
     return f"<table><caption>{caption}</caption><tr>{head}</tr>{body}</table>"
 
 
-def postures(robot: "Robot") -> dict[str, Array]:
+def postures(robot: Arm) -> dict[str, Array]:
     """Home and start by their names; one entry if they are the same."""
     if np.array_equal(robot.home, robot.start):
         return {"home and start": robot.home}
     return {"home": robot.home, "start": robot.start}
 
 
-def room_text(robot: "Robot", q: Array) -> str:
+def room_text(robot: Arm, q: Array) -> str:
     """How far the tip can go from a posture in its worst direction, in millimetres and degrees."""
     metres, radians = room(robot, q)
     ways = [f"{1e3 * metres:.0f} mm"] if math.isfinite(metres) else []
@@ -67,19 +64,19 @@ def room_text(robot: "Robot", q: Array) -> str:
     return " and ".join(ways) + " in the worst direction"
 
 
-def rows(robot: "Robot") -> Iterator[tuple[str, float, float, float]]:
+def rows(robot: Arm) -> Iterator[tuple[str, float, float, float]]:
     """Name, lower, upper and home [rad, m] of each joint."""
     columns = (robot.lower.tolist(), robot.upper.tolist(), robot.home.tolist())
     return zip(robot.joint_names, *columns, strict=True)
 
 
-def controlled(robot: "Robot") -> str:
+def controlled(robot: Arm) -> str:
     """Directions of the tip that the robot controls."""
     pairs = zip(DIRECTIONS, robot.task_mask, strict=True)
     return ", ".join(name for name, is_controlled in pairs if is_controlled)
 
 
-def drives(robot: "Robot") -> str:
+def drives(robot: Arm) -> str:
     """Whether the robot can be a slave, and which entries of its drive table are assumed."""
     if robot.drives is None:
         return "none, not a slave"

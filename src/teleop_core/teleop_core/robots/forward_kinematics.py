@@ -1,23 +1,19 @@
 """Forward kinematics of a robot with its status: the questions behind :meth:`Robot.solve_fk`."""
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from teleop_core.base.errors import ClosureError, ParameterError, ShapeError
 from teleop_core.kernels import raise_pending
 from teleop_core.kernels.geometry import Array, checked_array, is_rigid
 from teleop_core.robots import kinematics
+from teleop_core.robots.arm import Arm
 from teleop_core.robots.kinematics import MAX_ASSEMBLIES, SEARCH, FkBatch, FkOne, FkResult, FkStatus
-
-if TYPE_CHECKING:
-    from teleop_core.robots.robot import Robot
 
 _NOT_CLOSED = int(FkStatus.NOT_CLOSED)
 _STATUS = tuple(FkStatus)
 
 
-def solved_one(robot: "Robot", q: Array, seed: object, *, search: bool = True) -> FkOne:
+def solved_one(robot: Arm, q: Array, seed: object, *, search: bool = True) -> FkOne:
     """Pose of a joint vector (n,), by the rules of :meth:`Robot.solve_fk`.
 
     Raises:
@@ -36,7 +32,7 @@ def solved_one(robot: "Robot", q: Array, seed: object, *, search: bool = True) -
 
 
 def solved(
-    robot: "Robot", joints: Array, seed: object, *, search: bool = True, is_path: bool = False
+    robot: Arm, joints: Array, seed: object, *, search: bool = True, is_path: bool = False
 ) -> FkBatch:
     """Poses of joint vectors (N, n), by the rules of :meth:`Robot.solve_fk`.
 
@@ -62,7 +58,7 @@ def solved(
     return FkResult(transforms, statuses, numbers[:, 0], numbers[:, 1].astype(np.int64))
 
 
-def closed_poses(robot: "Robot", joints: Array) -> Array:
+def closed_poses(robot: Arm, joints: Array) -> Array:
     """Poses of joint vectors (n,) or (N, n) whose loops close.
 
     Raises:
@@ -82,7 +78,7 @@ def closed_poses(robot: "Robot", joints: Array) -> Array:
     return answer.T
 
 
-def all_poses(robot: "Robot", joints: Array) -> Array:
+def all_poses(robot: Arm, joints: Array) -> Array:
     """All poses (k, 4, 4) of a joint vector (n,), by the rules of :meth:`Robot.fk_all`."""
     first = robot.solve_fk(joints)
     if robot.kernels.assemblies is None:

@@ -2,8 +2,9 @@
 
 Link i of a chain is T_i = Rz(theta) Tz(d) Tx(a) Rx(alpha), the standard convention. A built arm has
 theta + its error of theta and so on; joint offsets are errors of theta on turning and of d on
-sliding joints. :func:`~teleop_core.robots.chains.true_chain` gives the geometry row of the
-arm as built, on which :func:`teleop_core.robots.dh_kernels.fk` says where its tip really is::
+sliding joints. :func:`~teleop_core.robots.arms.as_chain.true_chain` gives the geometry row of the
+arm as built, on which :func:`teleop_core.robots.chains.dh_kernels.fk` says where its tip really
+is::
 
     errors = LinkErrors.of(robot, {"d3": 5.5e-3})
     dh_kernels.fk(q, true_chain(robot, errors), T_base_tip)
@@ -23,17 +24,14 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import reduce
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from teleop_core.base.errors import ParameterError, UnknownNameError
 from teleop_core.kernels.geometry import Array, rotation, transform
 from teleop_core.kernels.portable import inverse_motion, product
+from teleop_core.robots.arm import Arm
 from teleop_core.robots.drives import read_only
-
-if TYPE_CHECKING:
-    from teleop_core.robots.robot import Robot
 
 SYMBOLS = ("a", "alpha", "d", "theta")
 """Kinds of errors, in the order of every vector of them: a1 ... an, alpha1 ... thetan."""
@@ -94,7 +92,7 @@ class LinkErrors:
         return LinkErrors.from_vector(np.zeros(4 * n))
 
     @staticmethod
-    def of(robot: "Robot", given: Mapping[str, float]) -> "LinkErrors":
+    def of(robot: Arm, given: Mapping[str, float]) -> "LinkErrors":
         """Errors by name, such as ``{"d3": 5.5e-3}``; all others are zero.
 
         Raises:
@@ -117,7 +115,7 @@ class Chain:
     """A serial arm T_base_tip = F0 J1 F1 J2 ... Jn Fn, Ji about or along the local z axis.
 
     Args:
-        kinds: Of each joint as in :mod:`~teleop_core.robots.dh_kernels`, (n,).
+        kinds: Of each joint as in :mod:`~teleop_core.robots.chains.dh_kernels`, (n,).
         fixed: Transforms F0 ... Fn, (n + 1, 4, 4).
         row: Geometry row of the kernels.
     """

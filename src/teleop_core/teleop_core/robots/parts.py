@@ -13,9 +13,11 @@ from teleop_core.base.ranges import MOST_OF_ARM, check
 from teleop_core.base.registry import Registry
 from teleop_core.robots.robot import Robot
 
-_BUILT_IN = (
-    "rcrt1", "mma", "four_bar", "parallelogram", "stewart", "rps3", "scara_stewart",
-    "three_finger_hand", "puma560", "scara", "planar_3r", "five_axis",
+_BUILT_IN = {"rcrt1": "arms.rcrt1:make"} | {
+    name: f"arms.textbook:{name}" for name in ("puma560", "scara", "planar_3r", "five_axis")
+}
+_OF_MACHINES = (
+    "four_bar", "mma", "parallelogram", "rps3", "scara_stewart", "stewart", "three_finger_hand",
 )  # fmt: skip
 _TABLE_ENDINGS = (".yaml", ".yml")
 _URDF_ENDINGS = (".urdf", ".xacro")
@@ -29,7 +31,7 @@ _MOST_CHARACTERS = 200
 
 @runtime_checkable
 class RobotSource(Protocol):
-    """What describes a robot, such as :class:`teleop_core.robots.dh.DhTable`."""
+    """What describes a robot, such as :class:`teleop_core.robots.arms.dh.DhTable`."""
 
     def robot(self) -> Robot:
         """The robot."""
@@ -71,10 +73,10 @@ def from_file(path: str, geometry: Mapping[str, float | str]) -> Robot | None:
         return None
     file, arguments = found
     if file.suffix.lower() in _TABLE_ENDINGS:
-        from teleop_core.robots.dh import load_table
+        from teleop_core.robots.arms.dh import load_table
 
         return built(path, load_table(file), geometry)
-    from teleop_core.robots.from_urdf import load_urdf
+    from teleop_core.robots.files.from_urdf import load_urdf
 
     options = {name: v for name, v in geometry.items() if not name.startswith(ARGUMENT)}
     return built(path, partial(load_urdf, file, arguments | arguments_of(geometry)), options)
@@ -84,10 +86,10 @@ def file_of(name: str) -> tuple[Path, dict[str, str]] | None:
     """File of a robot's name, and arguments that come with it for a xacro; None of other names.
 
     Raises:
-        TeleopError: As :func:`~teleop_core.robots.descriptions.description_file`.
+        TeleopError: As :func:`~teleop_core.robots.files.descriptions.description_file`.
     """
     if name.endswith(DESCRIPTION) and name not in ROBOTS.names():
-        from teleop_core.robots.descriptions import description_file
+        from teleop_core.robots.files.descriptions import description_file
 
         return description_file(name)
     is_file = name.lower().endswith((*_URDF_ENDINGS, *_TABLE_ENDINGS))
@@ -172,9 +174,10 @@ def part_name(part: RobotPart) -> str:
 ROBOTS: Registry[RobotPart] = Registry(
     "robot",
     "robots",
-    {name: f"teleop_core.robots.{name}:make" for name in _BUILT_IN},
+    {name: f"teleop_core.robots.{place}" for name, place in _BUILT_IN.items()},
     _checked,
     _try,
     others=("FILE.urdf", "FILE.xacro", "FILE.yaml"),
+    elsewhere=dict.fromkeys(_OF_MACHINES, "teleop_machines"),
 )
 """All robots by name; see :data:`RobotPart` for what can be added."""

@@ -7,16 +7,14 @@ joints, in the median of postures spread evenly over the limits.
 """
 
 from itertools import combinations
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from teleop_core.kernels.geometry import Array
+from teleop_core.robots.arm import Arm
 from teleop_core.robots.kinematics import DIRECTIONS
 from teleop_core.robots.room import samples
-
-if TYPE_CHECKING:
-    from teleop_core.robots.robot import Robot
 
 _POSTURES, _FEW = 128, 4
 _NONE = 1e-6  # singular value, over the lever, of a direction in which the tip cannot move
@@ -30,7 +28,7 @@ class Directions(NamedTuple):
     best: tuple[str, ...]
 
 
-def directions_of(robot: "Robot", lever: float) -> Directions:
+def directions_of(robot: Arm, lever: float) -> Directions:
     """Directions that a robot can control, of all six: it may control fewer.
 
     Args:
@@ -61,7 +59,7 @@ def _rank(jacobians: Array) -> int:
     return int((np.linalg.svd(jacobians, compute_uv=False) > _NONE).sum(axis=1).max())
 
 
-def _jacobians(robot: "Robot", postures: Array, lever: float) -> Array:
+def _jacobians(robot: Arm, postures: Array, lever: float) -> Array:
     """Jacobians (k, 6, n) at postures (k, n), with linear rows over the lever."""
     found, row = np.empty((len(postures), 6, robot.n)), robot.geometry_row
     for q, jacobian in zip(postures, found, strict=True):

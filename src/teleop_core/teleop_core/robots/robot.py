@@ -1,11 +1,11 @@
 """Robot: the one interface of every arm, on top of that arm's compiled kernels."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from types import MappingProxyType
-from typing import cast, overload
+from typing import TYPE_CHECKING, cast, overload
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from teleop_core.base.errors import ParameterError, ShapeError, UnknownNameError
 from teleop_core.kernels import direct, pointer, raise_pending
 from teleop_core.kernels.geometry import Array, checked_array, is_rigid
 from teleop_core.kernels.portable import product
-from teleop_core.robots import forward_kinematics, kinematics
+from teleop_core.robots import description, forward_kinematics, kinematics
 from teleop_core.robots.drives import Drives, Dynamics, independent_axes, read_only
 from teleop_core.robots.hardware import Hardware
 from teleop_core.robots.kinematics import (
@@ -33,7 +33,11 @@ from teleop_core.robots.kinematics import (
     WriteKernel,
     is_ready,
 )
-from teleop_core.robots.visuals import Visual
+from teleop_core.robots.room import start_of
+
+if TYPE_CHECKING:
+    from teleop_core.robots.bodies.body import Bodies
+    from teleop_core.robots.files.visuals import Visual
 
 
 class _Start:
@@ -47,8 +51,6 @@ class _Start:
         if robot is None:
             return None  # the field's default
         if robot.__dict__["start"] is None:
-            from teleop_core.robots.room import start_of
-
             posture = read_only("start", start_of(robot), (robot.n,))
             robot.__dict__["start"] = posture
         return cast("Array", robot.__dict__["start"])
@@ -74,8 +76,10 @@ class Robot:
         start: Joint vector (n,) at which a session starts, inside the limits; None for one with
             room in all directions (:func:`teleop_core.robots.room.start_posture`), looked for
             when it is first asked for.
-        geometry: Symbols and their values [m, rad], in the order the kernels expect.
+        geometry: Symbols and their values [m, rad], in the order the kernels expect if there is no
+            row.
         kernels: Compiled functions.
+        row: Numbers that the kernels take (k,); None for the values of the geometry.
         drives: Drive table, None for robots that are not used as slaves.
         dynamics: Rigid-body model; None for axes that do not act on each other.
         hardware: What the real arm does beside its model; None where nobody knows.
@@ -83,6 +87,8 @@ class Robot:
         solution: How inverse kinematics are solved, in words; empty for robots that do not say.
         visuals: What its links look like, if a file says so; nothing is read before it is drawn.
         notes: What was read of its file otherwise than it may be meant, in words.
+        describe: Draws its bodies (:func:`teleop_core.robots.bodies.bodies_of`), for joints that
+            are no chain; None for a chain, or where nobody knows.
 
     Raises:
         ShapeError: Limits, home, start or drives are not vectors (n,).
@@ -96,13 +102,15 @@ class Robot:
     home: Array
     geometry: Mapping[str, float]
     kernels: Kernels
+    row: Array | None = None
     drives: Drives | None = None
     dynamics: Dynamics | None = None
     hardware: Hardware | None = None
     task_mask: tuple[bool, ...] = (True,) * 6
     solution: str = ""
-    visuals: tuple[Visual, ...] = ()
+    visuals: "tuple[Visual, ...]" = ()
     notes: tuple[str, ...] = ()
+    describe: "Callable[[Robot], Bodies] | None" = None
     home_is_assumed: bool = False
     start: _Start = _Start()
     # Writable copies for the kernels, which are compiled for such arrays alone.
@@ -128,7 +136,10 @@ class Robot:
             raise ShapeError("hardware", shape, self.hardware.coulomb.shape)
         geometry = MappingProxyType(dict(self.geometry))
         object.__setattr__(self, "geometry", geometry)
-        object.__setattr__(self, "_row", np.array(list(geometry.values()), dtype=np.float64))
+        numbers = list(geometry.values()) if self.row is None else self.row
+        object.__setattr__(self, "_row", np.array(numbers, dtype=np.float64))
+        if self.row is not None:
+            object.__setattr__(self, "row", read_only("row", self.row))
         object.__setattr__(self, "_free", self.limits())
         object.__setattr__(self, "_home", self.home.copy())
 
@@ -141,14 +152,10 @@ class Robot:
             raise ParameterError("start", self.start.tolist(), "inside the limits")
 
     def __repr__(self) -> str:
-        from teleop_core.robots.description import short
-
-        return short(self)
+        return description.short(self)
 
     def _repr_html_(self) -> str:
-        from teleop_core.robots.description import html
-
-        return html(self)
+        return description.html(self)
 
     @cached_property
     def n(self) -> int:
@@ -162,7 +169,7 @@ class Robot:
 
     @property
     def geometry_row(self) -> Array:
-        """Values of the geometry, as kernels take them: a new array each time, the caller's."""
+        """Numbers that the kernels take: a new array each time, the caller's."""
         return self._row.copy()
 
     @cached_property

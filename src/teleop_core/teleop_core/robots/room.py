@@ -8,7 +8,7 @@ is left in the worst direction is the room there.
 
 import itertools
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,10 +17,8 @@ from teleop_core.kernels import raise_pending
 from teleop_core.kernels.geometry import Array, rotations_from_quaternions
 from teleop_core.kernels.portable import length, product
 from teleop_core.robots import kinematics
+from teleop_core.robots.arm import Arm
 from teleop_core.robots.kinematics import IkStatus
-
-if TYPE_CHECKING:
-    from teleop_core.robots.robot import Robot
 
 # One step of the walk turns the tool so far [rad], or takes it as far as a lever of reach/pi would.
 STEP = math.radians(2.0)
@@ -48,7 +46,7 @@ class Room(NamedTuple):
     """Turn about the tip in place; inf if no rotation is controlled."""
 
 
-def room(robot: "Robot", q: object) -> Room:
+def room(robot: Arm, q: object) -> Room:
     """How far the tip can go from a posture in every direction.
 
     Args:
@@ -67,7 +65,7 @@ def room(robot: "Robot", q: object) -> Room:
     return Room(float(moves[0]) * STEP * lever(robot), float(turns[0]) * STEP)
 
 
-def lever(robot: "Robot") -> float:
+def lever(robot: Arm) -> float:
     """Distance [m] that counts as much as a radian: reach/pi.
 
     The reach is the largest distance of the tip from the base's origin over the postures that are
@@ -76,7 +74,7 @@ def lever(robot: "Robot") -> float:
     return float(length(_poses(robot, samples(robot))[:, :3, 3]).max()) / math.pi
 
 
-def samples(robot: "Robot") -> Array:
+def samples(robot: Arm) -> Array:
     """Joint vectors (:data:`SAMPLES`, n) spread evenly inside the limits, the same every time.
 
     Source:
@@ -90,7 +88,7 @@ def samples(robot: "Robot") -> Array:
     return robot.lower + (shares % 1.0) * (robot.upper - robot.lower)
 
 
-def start_of(robot: "Robot") -> Array:
+def start_of(robot: Arm) -> Array:
     """:func:`start_posture`, looked for once per program for robots that are alike."""
     arrays = (robot.lower, robot.upper, robot.home, robot.geometry_row, np.array(robot.task_mask))
     key = (robot.kernels, *(array.tobytes() for array in arrays))
@@ -99,7 +97,7 @@ def start_of(robot: "Robot") -> Array:
     return _KNOWN[key]
 
 
-def start_posture(robot: "Robot") -> Array:
+def start_posture(robot: Arm) -> Array:
     """Posture from which the tip has room in all directions, by a rule without chance.
 
     Home, if it has room enough: a turn by 30 degrees and a move by reach/15. Else of the
@@ -130,7 +128,7 @@ def start_posture(robot: "Robot") -> Array:
     return np.asarray(good[int(away.argmin())])
 
 
-def roomy_postures(robot: "Robot", count: int) -> Array:
+def roomy_postures(robot: Arm, count: int) -> Array:
     """Postures with room all around, the start first, then those looked at with the most room.
 
     Args:
@@ -147,12 +145,12 @@ def roomy_postures(robot: "Robot", count: int) -> Array:
     return np.vstack((robot.start, wide[: count - 1]))
 
 
-def _poses(robot: "Robot", postures: Array) -> Array:
+def _poses(robot: Arm, postures: Array) -> Array:
     """Poses (N, 4, 4) next to home, of least error where joints spread evenly do not assemble."""
     return robot.solve_fk_batch(postures, search=False).T
 
 
-def _steps(robot: "Robot", postures: Array) -> tuple[Array, Array]:
+def _steps(robot: Arm, postures: Array) -> tuple[Array, Array]:
     """Steps (N,) that every posture has in its worst direction: of moving, of turning; or inf."""
     mask = np.array(robot.task_mask)
     return (
@@ -168,7 +166,7 @@ def _directions(controlled: NDArray[np.bool_]) -> Array:
     return kept / length(kept)[:, None]
 
 
-def _walk(robot: "Robot", postures: Array, directions: Array, *, is_turn: bool) -> Array:
+def _walk(robot: Arm, postures: Array, directions: Array, *, is_turn: bool) -> Array:
     """Steps (N,) that each posture has in its worst direction."""
     count, fan = len(postures), len(directions)
     if not fan:
@@ -205,7 +203,7 @@ def _moved(begin: Array, offsets: Array, is_turn: bool) -> Array:
 
 
 def _solve(
-    robot: "Robot", poses: Array, seeds: Array, limits: Array
+    robot: Arm, poses: Array, seeds: Array, limits: Array
 ) -> tuple[Array, NDArray[np.int64]]:
     q, residual = np.empty_like(seeds), np.empty((len(seeds), 2))
     status = np.zeros(len(seeds), np.int64)

@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 from teleop_core.bags.memory import MemoryBag, Message
 from teleop_core.bags.series import Series
 from teleop_core.base.errors import ParameterError, TeleopError, TeleopWarning
-from teleop_core.chain.fixtures import FIXTURES, Fixture
 from teleop_core.chain.operators import OPERATORS, Motion, Operator, following
 from teleop_core.graph.graph import DEVICE, HAND
 from teleop_core.graph.layers import (
@@ -35,13 +34,14 @@ from teleop_core.graph.stage import STAGES, Stage
 from teleop_core.graph.topics import Topic
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots import ROBOTS, Robot
-from teleop_core.robots.dh import DhTable
+from teleop_core.robots.arms.dh import DhTable
 from teleop_core.session import runner
 from teleop_core.session.configuration import Configuration
 from teleop_core.session.length import as_long_as_followed
 from teleop_core.session.notes import notes_of
 from teleop_core.session.recording import Recording, open_recording
 from teleop_core.session.virtual import VirtualTime
+from teleop_core.shapes import SHAPES, Shape
 from teleop_core.slave.controllers import CONTROLLERS, Controller
 from teleop_core.slave.plants import PLANTS, Plant
 
@@ -69,7 +69,7 @@ def configuration(
     settings: Mapping[str, Setting] | None = None,
     texts: Iterable[str] = (),
     operator: OperatorLike | None = None,
-    fixture: str | Fixture | None = None,
+    fixture: str | Shape | None = None,
     controller: str | Controller | None = None,
     plant: str | Plant | None = None,
     robot: str | Robot | DhTable | None = None,
@@ -104,7 +104,7 @@ def configuration(
     """
     named: dict[str, object] = {}
     for name, registry, part in (
-        ("fixture", FIXTURES, fixture),
+        ("fixture", SHAPES, fixture),
         ("controller", CONTROLLERS, controller),
         ("plant", PLANTS, plant),
     ):
@@ -143,7 +143,7 @@ def run(
     files: Iterable[Path | str] = (),
     settings: Mapping[str, Setting] | None = None,
     operator: OperatorLike | None = None,
-    fixture: str | Fixture | None = None,
+    fixture: str | Shape | None = None,
     controller: str | Controller | None = None,
     plant: str | Plant | None = None,
     robot: str | Robot | DhTable | None = None,

@@ -6,13 +6,14 @@ from collections.abc import Mapping
 import numpy as np
 
 from teleop_core.bags.markers import Color, Marker, Shape
-from teleop_core.chain.fixtures.box import BOX
 from teleop_core.chain.fixtures.reported_fixture import ReportedFixture, reported_fixture
-from teleop_core.chain.fixtures.sphere import SPHERE
 from teleop_core.chain.mapping.parameters import MotionScalingParameters, axis_map
 from teleop_core.kernels.geometry import Array
 from teleop_core.kernels.portable import length
 from teleop_core.session.model import MASTER, SLAVE
+from teleop_core.shapes.basis.drawing import segments_of
+from teleop_core.shapes.box import BOX
+from teleop_core.shapes.sphere import SPHERE
 
 TAIL = 200
 """Points of a path."""
@@ -79,9 +80,7 @@ class ArmMarkers:
     def _edges(self, fixture: ReportedFixture, gain: float) -> Array:
         """Ends (N, 3) [m] of segments along its edges, two by two; found anew where it changes."""
         if self._told != (fixture, gain):
-            points = fixture.outline(gain, self._axes)
-            pairs = np.stack((points[:-1], points[1:]), axis=1)
-            self._segments = pairs[np.isfinite(pairs).all(axis=(1, 2))].reshape(-1, 3)
+            self._segments = segments_of(fixture.outline(gain, self._axes)).reshape(-1, 3)
             self._told = fixture, gain
         return self._segments
 

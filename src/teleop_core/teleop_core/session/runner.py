@@ -12,6 +12,7 @@ from teleop_core.bags.arms import ARMS_KEY, PLAYED_KEY
 from teleop_core.bags.reader import Bag, Series
 from teleop_core.bags.writer import BagWriter
 from teleop_core.base.errors import RecordingError
+from teleop_core.graph.former_shapes import present_layer
 from teleop_core.graph.graph import DEVICE, RECORDER_NAME, Member
 from teleop_core.graph.layers import SESSION, Layer, parse_text
 from teleop_core.graph.signals import TICK_NS
@@ -23,6 +24,7 @@ from teleop_core.session.model import Model, ModelRecords
 from teleop_core.session.replayed_span import in_order, replayed_span, tick_times
 from teleop_core.session.reports import report_of
 from teleop_core.session.virtual import BLOCK, VirtualTime
+from teleop_core.shapes import files_of, moved
 
 Progress = Callable[[int, int], None]
 
@@ -156,7 +158,7 @@ def recorded_configuration(bag: Bag) -> tuple[Layer, str]:
         TeleopError: The stored configuration is not one.
     """
     text, arms = bag.metadata.get("configuration"), bag.metadata.get(ARMS_KEY, "").split()
-    layer = parse_text(text, f"{bag.path}: configuration") if text else {}
+    layer = present_layer(parse_text(text, f"{bag.path}: configuration")) if text else {}
     if arms and not text:  # an import of several hands
         layer = {SESSION: {"arms": tuple(arms)}}
     owners = {name: name.rpartition("/")[0] for name in layer}
@@ -164,8 +166,8 @@ def recorded_configuration(bag: Bag) -> tuple[Layer, str]:
     for name, values in layer.items():
         files = found[owners[name]]
         for key, value in values.items():
-            if (key == "robot" or key.endswith(".file")) and str(value) in files:
-                values[key] = files[str(value)]
+            if key == "robot" or key.endswith((".file", ".parts")):
+                values[key] = moved(value, files)
         if isinstance(geometry := values.get("geometry"), tuple | list):
             values["geometry"] = kept_files.recorded_geometry(map(str, geometry), files)
     _begin_at_home(layer)
@@ -246,8 +248,8 @@ def describe(configuration: Configuration) -> dict[str, str]:
     for arm, prefix in prefixes.items():  # before what only is looked at
         for name, kind in (("world", kept_files.TOUCHED), ("fixture", kept_files.FIXTURE)):
             part = configuration.value(name, arm)
-            if file := part and getattr(part.kind.parameters, "file", ""):
-                files.add_mesh(file, prefix, kind)
+            for place, file in enumerate(files_of(part.kind.parameters) if part else ()):
+                files.add_mesh(file, prefix, f"{kind}{place or ''}")
     for arm, prefix in prefixes.items():
         about |= {f"{prefix}{n}": str(configuration.value(n, arm)) for n in ("robot", "seed")}
         geometry = configuration.value("geometry", arm) or ()

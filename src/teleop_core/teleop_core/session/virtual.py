@@ -21,10 +21,10 @@ BLOCK = 1000
 
 
 class VirtualTime:
-    """A session in virtual time, to be run, or to be stepped by a program of yours.
+    """A session in virtual time, in rows of everything that happens in a tick.
 
-    Between two ticks the program may read the row of the last one, lead the hand
-    (:class:`~teleop_core.chain.operators.remote.RemoteHand`), and command or retune the stages.
+    Between two runs a program may read the rows, and command or retune the stages; to lead the
+    hand, :class:`~teleop_core.session.stepped.Session` is simpler.
 
     Args:
         configuration: What runs.
@@ -33,6 +33,7 @@ class VirtualTime:
             ``haptic_master``; see :meth:`replay`. Empty: none.
 
     Attributes:
+        configuration: As given.
         graph: What runs.
         stages: Stages at work, by the names of their members.
         joint_names: Joint names of each arm by its namespace; empty for an arm without a robot.
@@ -45,7 +46,8 @@ class VirtualTime:
     def __init__(
         self, configuration: Configuration, tick_ns: int = TICK_NS, *, played: str = ""
     ) -> None:
-        self.graph, self._tick_ns, self._last_played = configuration.graph, tick_ns, played
+        self.configuration, self.graph = configuration, configuration.graph
+        self._tick_ns, self._last_played = tick_ns, played
         groups, dt = configuration.groups, tick_ns / 1e9
         self._played = frozenset(m.name for m in self.graph.played(played))
         for member in self.graph.members:
@@ -136,11 +138,6 @@ class VirtualTime:
         elif out.shape != (ticks,) or out.dtype != self._dtype:
             raise ShapeError("out, rows of this session", (ticks,), out.shape)
         return self._run(out, None)
-
-    def step(self) -> np.void:
-        """Next tick: its row, as of :meth:`run`, to the same bits."""
-        row: np.void = self._run(self.rows(1), None)[0]
-        return row
 
     def reset(self) -> None:
         """Back to before the first tick, so that the session repeats itself to the bit.

@@ -190,6 +190,8 @@ def take_command(p: SlaveNumbers, s: SlaveState, row: SlaveRow, dt: float) -> in
     if stamp > now_ns + _FUTURE_NS:  # taken, it would make every later command an old one
         s.refused += 1
         return 2
+    if stamp < s.seen_ns - _FUTURE_NS:  # of another clock, after a silence: a new stream
+        s.seen_ns = 0
     if s.state != _ENABLED or s.is_busy or s.motion != 0 or not s.is_homed:
         return _not_followed(s, row)
     if stamp > s.seen_ns:

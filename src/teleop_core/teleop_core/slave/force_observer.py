@@ -14,7 +14,7 @@ from teleop_core.kernels import inner, kernel
 from teleop_core.kernels.fields import Fields, PerJoint
 from teleop_core.kernels.geometry import Array
 from teleop_core.kernels.room import room
-from teleop_core.robots.rigid_body import invert_positive, write_model
+from teleop_core.robots.chains.rigid_body import invert_positive, write_model
 from teleop_core.slave.arm import Arm
 from teleop_core.slave.friction import FrictionNumbers
 

@@ -8,7 +8,7 @@ from teleop_core.graph.topics import OPERATION
 from teleop_core.kernels import inner, kernel
 from teleop_core.kernels.fields import PerJoint
 from teleop_core.kernels.geometry import Array, pose_from_transform
-from teleop_core.robots.rigid_body import write_model
+from teleop_core.robots.chains.rigid_body import write_model
 from teleop_core.slave.arm import Arm
 from teleop_core.slave.elastic import ElasticNumbers, ElasticState, integrate_elastic
 from teleop_core.slave.force_observer import ObserverNumbers, ObserverState, estimate, forget

@@ -66,7 +66,7 @@ class ReferenceFilterParameters:
 
     def __post_init__(self) -> None:
         if not math.isclose(self.gain * self.zero, self.pole, rel_tol=1e-9):
-            needed = f"such that gain ({self.gain}) * zero = pole ({self.pole})"
+            needed = f"one for which gain ({self.gain}) * zero = pole ({self.pole})"
             raise ParameterError("reference_filter.zero", self.zero, needed)
 
 

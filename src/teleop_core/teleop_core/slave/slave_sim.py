@@ -12,7 +12,8 @@ from teleop_core.graph.stage import RunningStage, Stage
 from teleop_core.kernels import pointer
 from teleop_core.kernels.fields import fields_of, record, record_array
 from teleop_core.kernels.geometry import Array
-from teleop_core.robots import dh_kernels, load_robot_set
+from teleop_core.robots import load_robot_set
+from teleop_core.robots.chains import dh_kernels
 from teleop_core.robots.drives import ACCELERATION, GRAVITY
 from teleop_core.robots.kinematics import FK
 from teleop_core.robots.parameters import RobotParameters
@@ -109,7 +110,7 @@ class SlaveSim(RunningStage):
             jacobian=pointer(
                 self.robot.kernels.jacobian if is_as_drawn else dh_kernels.jacobian, FK
             ),
-            distance=touched.distance_pointer,
+            distance=touched.pointer,
             acceleration=pointer(model.acceleration, ACCELERATION),
             gravity=pointer(model.gravity, GRAVITY),
             control=self._law.control_pointer,

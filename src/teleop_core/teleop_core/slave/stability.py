@@ -182,7 +182,7 @@ def _check_large(name: str, robot: Robot, loop: Loop) -> None:
         left = _left(robot, loop, joint)
         if not left <= _LEFT:  # NaN is left as well
             needed = (
-                f"such that the arm comes back: {_LONGEST * loop.dt:g} s after a stop from full "
+                f"one that lets the arm come back: {_LONGEST * loop.dt:g} s after a stop from full "
                 f"speed joint {joint + 1} is off by {left:.2g} of its largest error on the way; "
                 "raise its gains, or bound its integral"
             )

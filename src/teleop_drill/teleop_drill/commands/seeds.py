@@ -3,14 +3,10 @@
 import argparse
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from teleop_core.base.errors import ParameterError, RecordingError
 from teleop_core.commands.arguments import ros_module
 from teleop_core.nodes.crews import Processes
-
-if TYPE_CHECKING:
-    from teleop_drill.simulation.report import Coverage
 
 
 def run_schedules(arguments: argparse.Namespace) -> int:
@@ -31,7 +27,7 @@ def run_schedules(arguments: argparse.Namespace) -> int:
     processes = Processes.ONE if arguments.composed else Processes.SIDES
     if count == 1:
         return _run_one(first, arguments.faults, out, processes)
-    return _run_many(range(first, first + count), arguments.json, processes)
+    return _run_many(first, count, arguments.json, processes)
 
 
 def _run_one(seed: int, chosen: str | None, out: Path | None, processes: Processes) -> int:
@@ -56,7 +52,7 @@ def _run_one(seed: int, chosen: str | None, out: Path | None, processes: Process
     return 1 if found.broken else 0
 
 
-def _run_many(seeds: range, json_file: Path | None, processes: Processes) -> int:
+def _run_many(first: int, count: int, json_file: Path | None, processes: Processes) -> int:
     from rich.console import Console
     from rich.progress import track
     from rich.table import Table
@@ -65,28 +61,22 @@ def _run_many(seeds: range, json_file: Path | None, processes: Processes) -> int
     from teleop_drill.simulation.seeds import run_seeds, shrink
 
     console, coverage = Console(), Coverage()
-    for found in track(run_seeds(seeds, None, processes), "schedules", len(seeds), console=console):
+    runs = run_seeds(first, count, None, processes)
+    for found in track(runs, "schedules", count, console=console):
         coverage.add(found)
+        if json_file is not None:  # after each: an hour of them may be ended
+            json_file.write_text(json.dumps(coverage.plain(), indent=2) + "\n", encoding="utf-8")
         for one in found.broken:
             for line in told(found, shrink(found, one.law), one.law):
                 console.print(line, highlight=False, markup=False, soft_wrap=True)
-    head, *rows = coverage.table()
-    table = Table(*head, title="how often a fault met a state of the arm")
-    for row in rows:
-        table.add_row(*row)
-    console.print(table)
+    for title, (head, *rows) in (
+        ("how often a fault met a state of the arm", coverage.table()),
+        ("how often a law was looked at under a fault", coverage.laws()),
+    ):
+        table = Table(*head, title=title)
+        for row in rows:
+            table.add_row(*row)
+        console.print(table)
     for line in coverage.lines():
         print(line)
-    if json_file is not None:
-        json_file.write_text(json.dumps(_plain(coverage), indent=2) + "\n", encoding="utf-8")
     return 1 if coverage.broken else 0
-
-
-def _plain(coverage: "Coverage") -> dict[str, object]:
-    met: dict[str, dict[str, int]] = {}
-    for (kind, state), count in sorted(coverage.met.items()):
-        met.setdefault(kind, {})[state] = count
-    return {
-        "sessions": coverage.sessions, "seconds": coverage.seconds, "met": met,
-        "looks": dict(coverage.looks), "broken": dict(coverage.broken),
-    }  # fmt: skip

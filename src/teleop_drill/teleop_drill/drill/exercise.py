@@ -183,6 +183,7 @@ class Exercise:
         allowed: Time for which it may go on as it moves [s], before it has to brake.
         stands: Time for which an arm that goes on may stand still all the same [s].
         gap: Time for which commands may be missing that the arm makes up for [s].
+        by_drives: Whether it is the drives that were missing, and make up for what came meanwhile.
         said: What the arm must have answered, as :meth:`Rig.note` took it; empty: anything.
         told: Time after which ``slave/operation`` tells the state or the fault [s]; None: never.
         warns: Whether a node must warn of it in ``diagnostics``.
@@ -208,6 +209,7 @@ class Exercise:
     allowed: Time = command_timeout
     stands: Time = never
     gap: Time = never
+    by_drives: bool = False
     said: str = ""
     told: Time | None = None
     warns: bool = False

@@ -233,7 +233,8 @@ def _speed(exercise: Exercise, seen: Seen, numbers: Numbers) -> Measured:
     """Speed of the tip: never above what the hand asks for."""
     moving = seen.true_cp.within(seen.begin_ns, seen.end_ns)
     gap = exercise.gap(numbers) + late(seen, numbers)
-    asked = numbers.gain * exercise.hand_speed * numbers.catching_up(gap)
+    times = numbers.catching_up(gap, by_drives=exercise.by_drives)
+    asked = numbers.gain * exercise.hand_speed * times
     most = OVERSHOOT * min(asked, exercise.tool_speed)
     text = "the tip moved at {0:.0f} mm/s, at most {1:.0f}"
     return Measured("tip_speed_m_s", text, measure.tip_speed(moving), most)

@@ -17,6 +17,8 @@ OVERSHOOT = 1.5
 them answer a step by a quarter too much
 (:func:`~teleop_core.slave.controllers.pid.critically_damped_gains`). A setpoint that turns
 round at full speed makes a step of twice its speed."""
+_STEP = 0.8
+"""Largest of (3 x - x²) exp(-x), at x = 0.70: speed of a step's answer, over bandwidth and step."""
 _COAST = 0.84
 """Way of such a loop beyond a setpoint that stops at once, in speeds over its pole: the maximum of
 :math:`(x + x^2) e^{-x}`, the answer to a ramp that ends."""
@@ -61,6 +63,7 @@ class Numbers:
         pressing_time: Time beyond a joint's limit that is told [s].
         filter_time: Time constant of the reference filter [s]; 0 without.
         coast: Time for which the arm goes on, at its speed, after a setpoint that stops [s].
+        bandwidth: Of the fastest drive [rad/s].
     """
 
     robot: Robot
@@ -78,6 +81,7 @@ class Numbers:
     pressing_time: float
     filter_time: float
     coast: float
+    bandwidth: float
     tick: float = DT
 
     @property
@@ -85,13 +89,18 @@ class Numbers:
         """Speed of the tip that follows the hand [m/s]."""
         return hand.SPEED * self.gain
 
-    def catching_up(self, gap: float) -> float:
-        """Times the hand's speed at which the setpoint makes up for a gap of commands [s].
+    def catching_up(self, gap: float, *, by_drives: bool = False) -> float:
+        """Times the hand's speed at which the arm makes up for a gap [s].
 
         What the hand went meanwhile comes at once, and the filter makes it up, at first at the
         whole of it in its time constant; after a longer pause hand and slave are aligned anew.
+        Of drives that stood still themselves the setpoint went on, and they make it up as a step:
+        with a triple pole w, and no derivative of the setpoint, by 0.8 w of it a second.
         """
-        return 1.0 + min(gap, self.longest_pause) / max(self.filter_time, self.tick)
+        rate = 1.0 / max(self.filter_time, self.tick)
+        if by_drives:
+            rate = max(rate, _STEP * self.bandwidth)
+        return 1.0 + min(gap, self.longest_pause) * rate
 
     @staticmethod
     def of(configuration: Configuration) -> "Numbers":
@@ -117,4 +126,5 @@ class Numbers:
             pressing_time=given.operation.pressing_time,
             filter_time=1.0 / lag.pole if lag.is_on else 0.0,
             coast=_COAST / float(np.min(drives.bandwidth)),
+            bandwidth=float(np.max(drives.bandwidth)),
         )

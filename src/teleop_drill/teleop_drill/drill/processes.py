@@ -155,6 +155,7 @@ PROCESSES = (
         name="freeze_slave_sim", text=f"slave_sim stopped for {FREEZE:g} s",
         inject=partial(_freeze, "slave_sim"), states=(State.FAULT,),
         faults=(Fault.FEEDBACK,), told=silence, allowed=unheard, gap=unheard,
+        by_drives=True,
         cures=(Cure.RESET,), master=Master.DEVICE, ways=(False,),
     ),
     Exercise(

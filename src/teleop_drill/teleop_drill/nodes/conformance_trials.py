@@ -175,7 +175,7 @@ class Trials:
             return Verdict.FAILED, f"{off():.2g} short of its goal after {_PATIENCE:g} s"
         self.arm.wait(lambda: tap.read(watch) > 0 and not tap.newest.is_busy and busy[0], 2.0)
         if not busy[0]:
-            return Verdict.FAILED, "is_busy never rose: who waits for the move waits for ever"
+            return Verdict.FAILED, "is_busy never rose: who waits for the move waits without end"
         return (Verdict.FAILED, "still busy at its goal") if tap.newest.is_busy else _OK
 
     def _candidates(self, known: tuple[int, float], count: int) -> list[tuple[int, float]]:

@@ -1,7 +1,8 @@
 """Laws: what must hold whatever goes wrong, judged by who sees all at once."""
 
 import re
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -80,6 +81,8 @@ class Laws:
     Attributes:
         broken: First breach of each law.
         looks: How often each law was looked at.
+        in_force: Kinds of the faults that are in force.
+        under: How often each law was looked at while a fault met a state of the arm.
     """
 
     def __init__(self, stage: Stage, numbers: Numbers) -> None:
@@ -88,7 +91,9 @@ class Laws:
         self._form = layout(SLAVE_SETPOINT_JS, stage.robot.joint_names)
         self._owner = Owner(stage.bus, numbers.command_timeout)
         self.broken: dict[str, Broken] = {}
-        self.looks: dict[str, int] = {}
+        self.looks: Counter[str] = Counter()
+        self.in_force: list[str] = []
+        self.under: Counter[tuple[str, str, str]] = Counter()
         self.begin_ns = self._scheduler.now_ns
         self._last: tuple[Array, Array, Process | None] | None = None
         """Newest setpoint: joints, the tip's place, and whose it is."""
@@ -103,7 +108,7 @@ class Laws:
         self._moved_at = 0.0
         self._press: tuple[int, float] | None = None
         self._presses = 0
-        self._sent_ns: list[int] = []
+        self._sent_ns: dict[bytes, list[int]] = {}  # of each publisher
         """When setpoints were sent, by the system's clock [ns]."""
         stage.bus.seen[f"/{SLAVE_SETPOINT_JS.name}"] = self._judge_setpoint
         self._scheduler.at(0, self._look)
@@ -113,12 +118,14 @@ class Laws:
         self.broken.setdefault(law, Broken(law, at, text))
 
     def _count(self, law: str) -> None:
-        self.looks[law] = self.looks.get(law, 0) + 1
+        self.looks[law] += 1
+        for kind in self.in_force:
+            self.under[kind, self._stage.state, law] += 1
 
     # -- at every setpoint -----------------------------------------------------------------------
 
     def _judge_setpoint(self, taken: Taken) -> None:
-        self._sent_ns.append(self._stage.world.time_ns())
+        self._sent_ns.setdefault(taken.sender, []).append(self._stage.world.time_ns())
         found = self._form.decode_one(taken.data)
         slave = self._stage.session.node("slave")
         if found is None or slave is None:
@@ -258,11 +265,12 @@ class Laws:
 
     # -- at the end ------------------------------------------------------------------------------
 
-    def judge_recording(self, path: Path) -> None:
+    def judge_recording(self, path: Path, told: Mapping[str, str]) -> None:
         """What was sent is recorded, or counted as lost; of a disk that failed, what was saved.
 
         Args:
             path: A recording whose recorder was not killed, while no clock was stepped.
+            told: What the recorder tells at the end; empty if it has ended before.
         """
         self._count("recorded")
         said = [one.text for one in self._stage.machine.log if str(path) in one.text]
@@ -271,18 +279,24 @@ class Laws:
             return
         if saved is not None:
             path, count = recover(path)
-            if count != saved:
+            if count < saved:  # a last chunk, whole but for its index, is found as well
                 self._break("recorded", f"{saved} messages were said to be safe, {count} are")
         kept_ns = Bag(path).read(SLAVE_SETPOINT_JS).log_ns
-        sent_ns = np.array(self._sent_ns)
+        parts = [np.array(times) for times in self._sent_ns.values()]
+        if self._stage.kills:
+            if told.get("cut_feeds") == "0":
+                self._break("recorded", "a process was killed, and the recorder does not say so")
+            for k, part in enumerate(parts[:-1]):  # what waited in it is lost with it
+                last_ns = np.max(kept_ns[kept_ns <= part[-1]], initial=0)
+                parts[k] = part[part <= last_ns]
+        sent_ns = np.concatenate(parts)
         begin_ns, end_ns = int(kept_ns[0]) + _FOUND_NS, int(sent_ns[-1]) - _ON_THE_WAY_NS
         if saved is not None:
             end_ns = int(kept_ns[-1]) - _ON_THE_WAY_NS
         kept, sent = (
             int(np.sum((begin_ns < times) & (times < end_ns))) for times in (kept_ns, sent_ns)
         )
-        told = self._stage.session.observer.statuses["recorder"]
-        lost = int(told.number(f"lost.{SLAVE_SETPOINT_JS.name}"))
+        lost = int(told.get(f"lost.{SLAVE_SETPOINT_JS.name}", 0))
         if sent - kept > lost + 1:
             self._break("recorded", f"{sent} setpoints were sent, {kept} recorded, {lost} counted")
 

@@ -5,10 +5,10 @@ from dataclasses import dataclass, field
 
 from teleop_core.nodes.crews import Processes
 from teleop_core.slave.operation import State
+from teleop_drill.simulation.laws import LAWS
 from teleop_drill.simulation.schedules import KINDS
 from teleop_drill.simulation.seeds import Found
-
-_NONE = "none"
+from teleop_drill.simulation.stage import NO_STATE
 
 
 @dataclass
@@ -20,6 +20,7 @@ class Coverage:
         seconds: Simulated time [s].
         met: How often each fault met each state of the arm.
         looks: How often each law was looked at.
+        under: The same while a fault met a state of the arm.
         broken: How many schedules broke each law.
     """
 
@@ -27,6 +28,7 @@ class Coverage:
     seconds: float = 0.0
     met: Counter[tuple[str, str]] = field(default_factory=Counter)
     looks: Counter[str] = field(default_factory=Counter)
+    under: Counter[tuple[str, str, str]] = field(default_factory=Counter)
     broken: Counter[str] = field(default_factory=Counter)
 
     def add(self, found: Found) -> None:
@@ -35,15 +37,35 @@ class Coverage:
         self.seconds += found.seconds
         self.met.update(found.met)
         self.looks.update(found.looks)
+        self.under.update(found.under)
         self.broken.update(one.law for one in found.broken)
 
     def table(self) -> list[list[str]]:
         """Faults and states of the arm, with how often they met; the first row is the head."""
-        states = [state.name for state in State] + [_NONE]
+        states = [state.name for state in State] + [NO_STATE]
         return [
             ["fault", *states],
             *([kind, *(str(self.met[kind, state]) for state in states)] for kind in sorted(KINDS)),
         ]
+
+    def laws(self) -> list[list[str]]:
+        """Faults and laws, with how often each was looked at meanwhile; first row: the head."""
+        counts: Counter[tuple[str, str]] = Counter()
+        for (kind, _, law), count in self.under.items():
+            counts[kind, law] += count
+        return [
+            ["fault", *LAWS],
+            *([kind, *(str(counts[kind, law]) for law in LAWS)] for kind in sorted(KINDS)),
+        ]
+
+    def plain(self) -> dict[str, object]:
+        """All counts, as for JSON; pairs and triples with `` / `` between their names."""
+        return {
+            "sessions": self.sessions, "seconds": self.seconds, "looks": dict(self.looks),
+            "broken": dict(self.broken),
+            "met": {" / ".join(key): count for key, count in sorted(self.met.items())},
+            "under": {" / ".join(key): count for key, count in sorted(self.under.items())},
+        }  # fmt: skip
 
     def lines(self) -> list[str]:
         """What was found, in a few lines."""

@@ -38,6 +38,7 @@ _CIRCLE = (
     "operator.rotation=0.0", "slave.operation.tool_speed=0.5",
     "slave.start_speed=1.0",
 )  # fmt: skip
+_ROUND = 20  # schedules that are chosen at once
 _PER_CHILD = 25  # sessions of one process of this machine: what was killed in them stays
 
 
@@ -52,6 +53,7 @@ class Found:
         broken: Laws that did not hold.
         met: How often each fault met each state of the arm.
         looks: How often each law was looked at.
+        under: The same while a fault of a kind met a state of the arm.
         seconds: Simulated time [s].
     """
 
@@ -61,6 +63,7 @@ class Found:
     broken: tuple[Broken, ...] = ()
     met: Counter[tuple[str, str]] = field(default_factory=Counter)
     looks: Counter[str] = field(default_factory=Counter)
+    under: Counter[tuple[str, str, str]] = field(default_factory=Counter)
     seconds: float = 0.0
 
 
@@ -123,25 +126,28 @@ class _Run:
         self._found.seconds = 1e-9 * (self._scheduler.now_ns - begin_ns)
         for process in self._stage.session.running.values():
             self._stage.killed.add(process)  # from now on they are told to
-        first, was_killed = self._stage.session.recordings[0], self._was("kill", "recorder")
+        (first, *more), was_killed = self._stage.session.recordings, self._was("kill", "recorder")
+        recorder = None if more else self._stage.session.node(RECORDER_NAME)
         self._stage.session.close()
         if not (was_killed or self._was("clock step") or self._was("clock drift")):
-            self._laws.judge_recording(first)
+            self._laws.judge_recording(first, {} if recorder is None else recorder.values())
         self._found.broken = tuple(self._laws.broken.values())
         self._found.looks.update(self._laws.looks)
+        self._found.under.update(self._laws.under)
         return self._found
 
     def _begin(self, fault: Fault) -> None:
-        state = self._stage.operation.get("state")
-        word = "none" if state is None else State(int(state)).name
-        self._found.met[fault.kind, word] += 1
+        self._found.met[fault.kind, self._stage.state] += 1
         process = self._stage.session.running.get(fault.where)
         if process is not None and process.is_dead:
             return
         end = KINDS[fault.kind](self._stage, fault)
+        self._laws.in_force.append(fault.kind)
+        end_ns = self._scheduler.now_ns + round(1e9 * fault.seconds)
+        self._scheduler.at(end_ns, partial(self._laws.in_force.remove, fault.kind))
         if end is not None:
             self._ends.append(end)
-            self._scheduler.at(self._scheduler.now_ns + round(1e9 * fault.seconds), end)
+            self._scheduler.at(end_ns, end)
 
     def _was(self, kind: str, where: str = "") -> bool:
         """Whether a fault of a kind was planned, for a process."""
@@ -179,16 +185,36 @@ def shrink(found: Found, law: str) -> Found:
 
 
 def run_seeds(
-    seeds: Sequence[int], workers: int | None = None, processes: Processes = Processes.SIDES
+    first: int, count: int, workers: int | None = None, processes: Processes = Processes.SIDES
 ) -> Iterator[Found]:
-    """Run schedules on all cores, in their order.
+    """Run schedules on all cores: of three seeds each the one whose faults have met least.
+
+    Which these are is decided after every :data:`_ROUND` schedules, so that the same call runs the
+    same seeds.
 
     Args:
-        seeds: Of the schedules.
+        first: Seed of the first schedule, which is run whatever it is.
+        count: How many are run.
         workers: How many at once; None: one for each core.
         processes: How the nodes are shared out.
     """
-    count = workers or os.cpu_count() or 1
+    workers = workers or os.cpu_count() or 1
+    met: Counter[tuple[str, str]] = Counter()
     context = get_context("forkserver")
-    with ProcessPoolExecutor(count, context, max_tasks_per_child=_PER_CHILD) as pool:
-        yield from pool.map(partial(run_seed, processes=processes), seeds)
+    with ProcessPoolExecutor(workers, context, max_tasks_per_child=_PER_CHILD) as pool:
+        for begin in range(0, count, _ROUND):
+            threes = (
+                range(first + 3 * k, first + 3 * k + 3)
+                for k in range(begin, min(begin + _ROUND, count))
+            )
+            seeds = [min(three, key=lambda s: _known(s, met, processes)) for three in threes]
+            for found in pool.map(partial(run_seed, processes=processes), seeds):
+                met.update(found.met)
+                yield found
+
+
+def _known(seed: int, met: Counter[tuple[str, str]], processes: Processes) -> float:
+    """How well the faults of a schedule are known: how often each met its rarest state, in mean."""
+    states = [state.name for state in State]
+    rarest = [min(met[one.kind, s] for s in states) for one in draw(seed, PROCESSES[processes])]
+    return sum(rarest) / len(rarest)

@@ -30,6 +30,7 @@ from teleop_drill.simulation.machine import Process
 from teleop_drill.simulation.session import SimulatedSession
 from teleop_drill.simulation.world import SimulatedWorld
 
+NO_STATE = "none"
 _RELEASE = "release"
 _FRESH_NS = 200_000_000
 
@@ -68,6 +69,8 @@ class Stage:
         )
         self.killed: set[Process] = set()
         """Processes that were told to end."""
+        self.kills = 0
+        """How many processes of nodes were killed."""
         self.lost_disk: set[Process] = set()
         """Processes that may end for want of a disk, if they say what they have saved."""
         self.stopped: list[tuple[Process, int]] = []
@@ -130,6 +133,7 @@ class Stage:
         """Kill a process."""
         process = self.process(name)
         self.killed.add(process)
+        self.kills += name != RECORDER_NAME
         process.end(-9, is_orderly=False)
 
     def restart(self, name: str) -> None:
@@ -189,6 +193,12 @@ class Stage:
             self.command("enable")
         elif state == State.ENABLED and not told["is_homed"] and not told["is_busy"]:
             self.command("home")
+
+    @property
+    def state(self) -> str:
+        """Name of the arm's state, as it told last; ``none`` before it told any."""
+        state = self.operation.get("state")
+        return NO_STATE if state is None else State(int(state)).name
 
     def follows(self) -> bool:
         """Whether the arm says that it goes where the hand leads."""

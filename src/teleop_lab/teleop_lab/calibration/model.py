@@ -14,7 +14,7 @@ import numpy as np
 
 from teleop_core.base.errors import ParameterError
 from teleop_core.kernels.geometry import Array, rotation, transform
-from teleop_core.robots.chains import chain_of
+from teleop_core.robots.arms.as_chain import chain_of
 from teleop_core.robots.link_errors import Chain, LinkErrors, error_names, next_axis_motion
 from teleop_core.robots.robot import Robot
 

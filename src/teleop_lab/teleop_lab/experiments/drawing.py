@@ -106,21 +106,6 @@ def scene(unit: str) -> Layout:
     return {"scene": {**axes, "domain": {"y": [0.08, 1.0]}, "aspectmode": "data", "camera": eye}}
 
 
-def box_edges(center: Numbers, size: Numbers) -> Numbers:
-    """One line (N, 3) along the edges of a box; NaN lifts the pen."""
-    low, high = np.asarray(center) - np.asarray(size) / 2, np.asarray(center) + np.asarray(size) / 2
-    corners = np.array([[i, j, k] for i in (0, 1) for j in (0, 1) for k in (0, 1)])
-    lines = []
-    for first in range(8):
-        for axis_ in range(3):
-            if corners[first, axis_] == 0:
-                end = corners[first].copy()
-                end[axis_] = 1
-                ends = np.where(np.array([corners[first], end]) == 0, low, high)
-                lines.append(np.vstack((ends, np.full(3, np.nan))))
-    return np.concatenate(lines)
-
-
 __all__ = [
     "DARK",
     "FIXTURE",
@@ -128,7 +113,6 @@ __all__ = [
     "PLANES",
     "PUBLISHED",
     "axis",
-    "box_edges",
     "in_planes",
     "in_space",
     "joined",

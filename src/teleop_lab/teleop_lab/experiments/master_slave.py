@@ -25,18 +25,10 @@ from teleop_core.evaluation.published import (
     Published,
 )
 from teleop_core.kernels.geometry import Array, roll_pitch_yaw, rotations_from_quaternions
+from teleop_core.shapes.basis.drawing import edges_of
 from teleop_lab.experiments.bench import Bench, Session, mean, pooled
 from teleop_lab.experiments.conditions import OURS, PREDICTED
-from teleop_lab.experiments.drawing import (
-    FIXTURE,
-    axis,
-    box_edges,
-    in_planes,
-    in_space,
-    level,
-    line,
-    scene,
-)
+from teleop_lab.experiments.drawing import FIXTURE, axis, in_planes, in_space, level, line, scene
 from teleop_lab.experiments.experiment import Experiment
 from teleop_lab.experiments.outcome import Findings, Row, Tolerance, absolute, factor, percent
 
@@ -212,7 +204,7 @@ def _path_figure(mode: str, found: Drawn) -> Figure:
     traces = [
         in_space(found.reference[::_PATH], "reference", REFERENCE, 4),
         in_space(found.measured[::_PATH], "measured", MEASURED, 2),
-        in_space(box_edges(found.center, found.size), "box", FIXTURE, 3),
+        in_space(found.center + edges_of(found.size), "box", FIXTURE, 3),
     ]
     sentence = f"Path of the slave in the box of {found.size[0]:.3g} mm."
     return Figure(f"Path in space, {mode}", sentence, traces, scene("mm"), 460)
@@ -222,7 +214,7 @@ def _plane_figure(mode: str, found: Drawn) -> Figure:
     groups = (
         (found.reference[::_PATH], "reference", REFERENCE, 4.0),
         (found.measured[::_PATH], "measured", MEASURED, 1.2),
-        (box_edges(found.center, found.size), "box", FIXTURE, 2.0),
+        (found.center + edges_of(found.size), "box", FIXTURE, 2.0),
     )
     traces, layout = in_planes("xyz", groups, "mm")
     return Figure(f"Path per plane, {mode}", "The same along each axis.", traces, layout, 400)
@@ -291,7 +283,7 @@ def _both_boxes(sessions: dict[str, Session]) -> Figure:
         path = found.measured[::_PATH] - found.center
         traces += [
             in_space(path, mode, color, 2),
-            in_space(box_edges(np.zeros(3), found.size), f"box, {mode}", FIXTURE, 3),
+            in_space(edges_of(found.size), f"box, {mode}", FIXTURE, 3),
         ]
     sentence = "Paths of both modes around the centres of their boxes."
     return Figure("Both boxes", sentence, traces, scene("mm"), 480)

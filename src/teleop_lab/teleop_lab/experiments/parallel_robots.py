@@ -3,12 +3,12 @@
 import numpy as np
 
 from teleop_core.evaluation.figure import FIRST, SECOND, Figure
-from teleop_core.robots import mobility
-from teleop_core.robots.four_bar_loop import FourBar
 from teleop_lab.experiments.bench import Bench
 from teleop_lab.experiments.drawing import axis, line
 from teleop_lab.experiments.experiment import Experiment
 from teleop_lab.experiments.outcome import EXACT, Findings, Row
+from teleop_machines import mobility
+from teleop_machines.four_bar_loop import FourBar
 
 # Mechanism: space, links, joints, freedoms of the joints, and the printed freedom.
 _COUNTS = {

@@ -167,9 +167,9 @@ def _measure(bench: Bench) -> Findings:
 _NOTES = (
     "Published: computed by the equations of the sources, which were not read again; no number "
     "that a source measured is here. Of the known two-port it is the exact hybrid matrix. Of the "
-    "chain without passivity it is made of the arm's row, as position_force without a round trip "
-    "showed it, of the channels and the slave's admittance, of the delays of the network, and of "
-    "2 ms for two readers; for position_force at 0 ms the tip's numbers are no test.",
+    "chain without passivity it is made of four things: the arm's row, as position_force without "
+    "a round trip showed it; the channels with the slave's admittance; the delays of the network; "
+    "and 2 ms for two readers. For position_force at 0 ms the tip's numbers are no test.",
     "Excited is the place of a firm hand: 20 lines from 0.1 to 30 Hz of 0.15 mm each, odd "
     "multiples of 0.1 Hz, over one period of 10 s, around a point 3 mm deep in the object of "
     "palpation. Gain of motion and force is 1. Ports: push of the master and place of the device, "

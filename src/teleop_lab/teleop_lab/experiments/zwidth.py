@@ -1,4 +1,4 @@
-"""Z-width: how stiff a virtual wall our device renders, by three laws and through our own stage."""
+"""Z-width: how stiff a fixture our device renders, by three laws and through our own stage."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -233,7 +233,7 @@ def _press_figure(found: Bounds, diverging: Row) -> Figure:
 
 ZWIDTH = Experiment(
     "zwidth",
-    "how stiff a virtual wall the device renders: stable, passive, and at rest",
+    "how stiff a fixture the device renders: stable, passive, and at rest",
     "laws of Gil 2009, Colgate and Schenkel 1997, Abbott and Okamura 2005",
     _measure,
 )

@@ -6,9 +6,8 @@ from typing import Annotated
 
 import numpy as np
 
-from teleop_core.base.parameters import values_of
 from teleop_core.chain.architectures import ARCHITECTURES
-from teleop_core.chain.fixtures import FIXTURES
+from teleop_core.chain.fixtures import Held, fixture_depth
 from teleop_core.chain.mapping import following, limits, plausibility, walls
 from teleop_core.chain.mapping.parameters import (
     MODES,
@@ -27,7 +26,7 @@ from teleop_core.chain.mapping.reflection import (
     make_law,
     reflect,
 )
-from teleop_core.chain.mapping.side import Shape, SideNumbers, SideState, hold_slave, let_go
+from teleop_core.chain.mapping.side import SideNumbers, SideState, Walled, hold_slave, let_go
 from teleop_core.chain.passivity import PASSIVITIES
 from teleop_core.graph.row import Row
 from teleop_core.graph.signals import DT, STATE, assign, copy
@@ -162,7 +161,7 @@ def _latch(s: ScalingState, stylus: Array) -> None:
 
 @inner
 def _move(
-    p: ScalingNumbers, s: ScalingState, fixture: Shape, gain: float, position: Array, turn: Array
+    p: ScalingNumbers, s: ScalingState, fixture: Walled, gain: float, position: Array, turn: Array
 ) -> None:
     """Add the scaled step of the hand to the command; turn the tool as the stylus."""
     step = room(3)
@@ -191,14 +190,14 @@ def _move(
 
 @inner
 def _wall(
-    p: ScalingNumbers, s: ScalingState, fixture: Shape, period: float, stylus: Array, force: Array
+    p: ScalingNumbers, s: ScalingState, fixture: Walled, period: float, stylus: Array, force: Array
 ) -> None:
     """Write the push (3,) [N] of the fixture's wall; after a pause it begins anew."""
     length = 0.0
     if s.is_fixture_on and p.holds_hand:
         for i in range(3):
             fixture.offset[i] = stylus[i] - s.center[i]
-        length = fixture.depth(fixture.offset, fixture.numbers, fixture.out)
+        length = fixture_depth(fixture.held, fixture.offset, fixture.out)
     if p.is_damped == 0:
         walls.wall_force(fixture.out, length, p.stiffness, p.max_force, force)
         return
@@ -269,7 +268,7 @@ def motion_scaling_step(
     p: ScalingNumbers,
     s: ScalingState,
     sent: Sequence[limits.Sent],
-    fixture: Shape,
+    fixture: Walled,
     law: Law,
     row: Row,
     dt: float,
@@ -280,7 +279,7 @@ def motion_scaling_step(
         p: Parameter record.
         s: State record; written.
         sent: Records of :class:`~teleop_core.chain.mapping.limits.Sent`; written.
-        fixture: :class:`Shape`.
+        fixture: :class:`Walled`.
         law: :class:`~teleop_core.chain.mapping.reflection.Law`; written.
         row: Signals.
         dt: Tick [s].
@@ -351,7 +350,8 @@ class MotionScaling(RunningStage):
         self._sent = record_array(limits.Sent, limits.SENT)
         self._values = parameters
         self.kernel = motion_scaling_step
-        self._shape = Shape(None, np.empty(0), np.zeros(3), np.zeros(3))
+        nothing = Held(None, np.empty(0), np.empty(4))
+        self._walled = Walled(nothing, np.zeros(3), np.zeros(3))
         self._law = make_law(
             ARCHITECTURES.find("unilateral"), np.empty(0), PASSIVITIES.find("none"), np.empty(0)
         )
@@ -407,19 +407,17 @@ class MotionScaling(RunningStage):
         self.parameters["reach_depth"] = depth
 
     def _take_fixture(self, fixture: FixtureParameters) -> None:
-        kind = FIXTURES.find(fixture.kind.kind)
-        numbers = kind.numbers(fixture.kind.parameters)
+        held, last = fixture.made.held, self._walled.held
         p, s = self.parameters, self.state
-        p["size"] = kind.size(fixture.kind.parameters)
+        p["size"] = fixture.made.size()
         p["holds_hand"], p["holds_slave"] = fixture.side != "slave", fixture.side != "hand"
-        if fixture.kind != self._values.fixture.kind:  # the new one begins where the slave is
+        if fixture.made != self._values.fixture.made:  # the new one begins where the slave is
             s["center"] += s["beyond"]
             s["beyond"] = 0.0
-        depth = kind.depth_pointer
-        if depth is self._shape.depth and len(numbers) == len(self._shape.numbers):
-            self._shape.numbers[:] = numbers  # the tick that is composed already goes on
+        if held.distance is last.distance and len(held.numbers) == len(last.numbers):
+            last.numbers[:], last.place[:] = held.numbers, held.place  # the composed tick goes on
             return
-        self._shape = self._shape._replace(depth=depth, numbers=numbers)
+        self._walled = self._walled._replace(held=held)
         self._compose_anew()
 
     def _take_reflection(self, reflection: ReflectionParameters) -> None:
@@ -447,7 +445,7 @@ class MotionScaling(RunningStage):
         self._compose_anew()
 
     def _compose_anew(self) -> None:
-        self.arguments = (self.parameters, self.state, self._sent, self._shape, self._law)
+        self.arguments = (self.parameters, self.state, self._sent, self._walled, self._law)
         self._bound = None
 
     def fall_silent(self) -> None:
@@ -472,9 +470,7 @@ class MotionScaling(RunningStage):
 
     def described(self) -> dict[str, str]:
         """Kind and numbers of the fixture, as teleop/state reports them beside its columns."""
-        kind = self._values.fixture.kind
-        numbers = values_of(kind.parameters)
-        return {"fixture": kind.kind} | {f"fixture.{n}": repr(v) for n, v in numbers.items()}
+        return self._values.fixture.made.described()
 
 
 MOTION_SCALING = Stage(

@@ -2,19 +2,21 @@
 
 import math
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
 from teleop_core.base.errors import ParameterError
 from teleop_core.base.parameters import Choice, choice, parameter
 from teleop_core.chain.architectures import ARCHITECTURES
-from teleop_core.chain.fixtures import FIXTURES
+from teleop_core.chain.fixtures import Fixture
 from teleop_core.chain.mapping.plausibility import PlausibilityParameters
 from teleop_core.chain.mapping.side import SIDES
 from teleop_core.chain.mapping.walls import WALLS
 from teleop_core.chain.passivity import PASSIVITIES
 from teleop_core.kernels.geometry import Array, quaternion_from_rotation, rotation
 from teleop_core.kernels.portable import product
+from teleop_core.shapes import SHAPES, files_of
 
 MODES = ("coarse", "fine")
 AXES = ("+x", "-x", "+y", "-y", "+z", "-z")
@@ -24,7 +26,14 @@ AXES = ("+x", "-x", "+y", "-y", "+z", "-z")
 class FixtureParameters:
     """What the fixture button puts around the hand."""
 
-    kind: Choice = choice(FIXTURES, "box", doc="shape of the fixture")
+    kind: Choice = choice(SHAPES, "box", doc="shape of the fixture")
+    place: tuple[float, ...] = parameter(
+        (0.0, 0.0, 0.0), unit="m", lower=-0.5, upper=0.5, length=3,
+        doc="from the middle, where the hand was, to that of the shape, in the master's base",
+    )  # fmt: skip
+    keep_out: bool = parameter(
+        False, doc="whether the hand stays outside of the shape in place of inside"
+    )
     side: str = parameter(
         "hand",
         choices=SIDES,
@@ -57,6 +66,16 @@ class FixtureParameters:
     def pushes(self) -> bool:
         """Whether the hand can feel it."""
         return self.side != "slave" and self.max_force > 0.0
+
+    @cached_property
+    def made(self) -> Fixture:
+        """The fixture; that of a shape from a file is checked when it is used first."""
+        shape = SHAPES.find(self.kind.kind)
+        return Fixture(shape, self.kind.parameters, self.place, self.keep_out)
+
+    def __post_init__(self) -> None:
+        if not files_of(self.kind.parameters):
+            self.made.check()
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -13,8 +13,9 @@ Source:
 """
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
+from teleop_core.chain.fixtures import Held, fixture_depth
 from teleop_core.kernels import inner
 from teleop_core.kernels.fields import Fields, Vector3
 from teleop_core.kernels.geometry import Array
@@ -39,11 +40,10 @@ class SideState(Fields):
     beyond: Vector3  # from the proxy to there; zero where nothing is held
 
 
-class Shape(NamedTuple):
-    """The fixture's depth, its numbers, and room to work in."""
+class Walled(NamedTuple):
+    """The fixture, and arrays to work in."""
 
-    depth: Any
-    numbers: Array
+    held: Held
     offset: Array
     out: Array
 
@@ -76,20 +76,20 @@ def _distance(a: Array, b: Array) -> float:
 
 
 @inner
-def _draw_in(fixture: Shape, place: Array) -> bool:
+def _draw_in(fixture: Walled, place: Array) -> bool:
     """Move a place (3,) to the nearest one that is allowed; whether it is allowed then."""
-    depth = fixture.depth(place, fixture.numbers, fixture.out)
+    depth = fixture_depth(fixture.held, place, fixture.out)
     for _ in range(_ROUNDS):
         if depth <= _ALLOWED:
             return True
         for i in range(3):
             place[i] -= fixture.out[i]
-        depth = fixture.depth(place, fixture.numbers, fixture.out)
+        depth = fixture_depth(fixture.held, place, fixture.out)
     return bool(depth <= _ALLOWED)
 
 
 @inner
-def _approach(fixture: Shape, last: Array, aim: Array, most: float) -> None:
+def _approach(fixture: Walled, last: Array, aim: Array, most: float) -> None:
     """Move an aim (3,) to where the proxy may be next on its way there, ``most`` [m] away.
 
     A proxy that is outside, as after a change of the shape, goes the shortest way in. One that has
@@ -110,7 +110,7 @@ def _approach(fixture: Shape, last: Array, aim: Array, most: float) -> None:
 
 
 @inner
-def hold_slave(s: SideState, fixture: Shape, step: Array) -> None:
+def hold_slave(s: SideState, fixture: Walled, step: Array) -> None:
     """Turn the hand's step (3,) [m] into that of its proxy, which is no longer.
 
     Where the hand gets to a place that is allowed, but the proxy cannot follow, as through a
@@ -118,7 +118,7 @@ def hold_slave(s: SideState, fixture: Shape, step: Array) -> None:
 
     Args:
         s: State; ``beyond`` and perhaps ``center`` are written.
-        fixture: Its shape.
+        fixture: The fixture.
         step: From the hand's last place to its present one; written.
     """
     last, aim, most = room(3), fixture.offset, 0.0
@@ -129,7 +129,7 @@ def hold_slave(s: SideState, fixture: Shape, step: Array) -> None:
     if most == 0.0:
         return
     most = math.sqrt(most)
-    is_free = fixture.depth(aim, fixture.numbers, fixture.out) <= _ALLOWED
+    is_free = fixture_depth(fixture.held, aim, fixture.out) <= _ALLOWED
     if is_free and _distance(aim, last) > most + _ROUNDING:
         let_go(s)
         for i in range(3):

@@ -91,7 +91,7 @@ def _approach(
 ) -> None:
     """Change a velocity (3,) over ``h`` [s] so that it closes a gap (3,) at critical damping.
 
-    The velocity that it goes for is such that half of the acceleration allowed can end it in time.
+    Half of the acceleration allowed can end the velocity that it goes for in time.
     """
     far = math.sqrt(gap[0] * gap[0] + gap[1] * gap[1] + gap[2] * gap[2])
     fast = min(0.5 * rate * far, fastest, math.sqrt(0.5 * hardest * far))

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from teleop_core.chain.fixtures.box import BOX
 from teleop_core.chain.fixtures.reported_fixture import ReportedFixture
 from teleop_core.evaluation.accumulators import Moments
 from teleop_core.evaluation.context import Context
@@ -17,6 +16,7 @@ from teleop_core.evaluation.state_history import States
 from teleop_core.evaluation.windows import Window
 from teleop_core.graph.topics import SLAVE_MEASURED_CP, SLAVE_SERVO_CP, Topic
 from teleop_core.kernels.geometry import Array
+from teleop_core.shapes.box import BOX
 
 
 def fixture_depth(positions: Array, states: States, axes: Array) -> Array:

@@ -9,8 +9,6 @@ Source:
     Lynch and Park 2017, chapter 4.
 """
 
-from collections.abc import Callable
-from importlib import import_module
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -21,29 +19,18 @@ from teleop_core.robots.bodies.body import HERE, Bodies, Body, Joint
 from teleop_core.robots.bodies.chain import axes_of, chain, places, tip_of
 from teleop_core.robots.bodies.frames import pose_of, tips
 from teleop_core.robots.bodies.solids import ball, cylinder
-from teleop_core.robots.followers import followers_of
+from teleop_core.robots.chains.followers import followers_of
 from teleop_core.robots.robot import Robot
 
-# Robots whose joints are no chain, by the module of their kernels, with what describes them.
-_LOOPS = {
-    "teleop_core.robots.stewart": "parallel:stewart_bodies",
-    "teleop_core.robots.rps3": "parallel:rps3_bodies",
-    "teleop_core.robots.scara_stewart": "hybrid_bodies:scara_stewart_bodies",
-    "teleop_core.robots.four_bar": "planar:four_bar_bodies",
-    "teleop_core.robots.parallelogram": "planar:parallelogram_bodies",
-    "teleop_core.robots.mma": "mma_bodies:mma_bodies",
-    "teleop_core.robots.mma_forward": "mma_bodies:mma_bodies",
-    "teleop_core.robots.three_finger_hand": "hand_bodies:hand_bodies",
-}
 _KNOWN: "WeakKeyDictionary[Robot, Bodies]" = WeakKeyDictionary()
 
 
 def bodies_of(robot: Robot) -> Bodies:
     """Bodies of a robot: the same object each time it is asked for the same robot.
 
-    Robots with loops of the registry have descriptions of their own; of every other robot whose
-    joints are a chain the axes follow from its kinematics. What is neither, such as a parallel
-    robot of somebody else, is drawn as its base, a dotted line, and its tip.
+    A robot may describe itself (``Robot.describe``), as those with loops do; of every other robot
+    whose joints are a chain the axes follow from its kinematics. What is neither is drawn as its
+    base, a dotted line, and its tip.
     """
     if robot not in _KNOWN:
         _KNOWN[robot] = _described(robot)
@@ -51,13 +38,8 @@ def bodies_of(robot: Robot) -> Bodies:
 
 
 def _described(robot: Robot) -> Bodies:
-    place = _LOOPS.get(robot.kernels.fk.__module__)
-    if place is not None:
-        module, _, name = place.partition(":")
-        describe: Callable[[Robot], Bodies] = getattr(
-            import_module(f"teleop_core.robots.bodies.{module}"), name
-        )
-        return describe(robot)
+    if robot.describe is not None:
+        return robot.describe(robot)
     return serial_bodies(robot) or unknown_bodies(robot)
 
 

@@ -12,8 +12,8 @@ from teleop_core.kernels.geometry import Array, rotations_from_quaternions, tran
 from teleop_core.kernels.portable import inverse_motion, product
 from teleop_core.robots.bodies.body import Bodies
 from teleop_core.robots.bodies.solids import Solid
-from teleop_core.robots.chain_dynamics import chain_acceleration, pseudo_inertias
-from teleop_core.robots.followers import chain_part, follower_acceleration, followers_of
+from teleop_core.robots.chains.chain_dynamics import chain_acceleration, pseudo_inertias
+from teleop_core.robots.chains.followers import chain_part, follower_acceleration, followers_of
 from teleop_core.robots.robot import Robot
 
 DENSITY = 1000.0

@@ -11,8 +11,8 @@ from teleop_core.robots.bodies.body import HERE
 from teleop_core.robots.bodies.describe import bodies_of
 from teleop_core.robots.bodies.meshes import Mesh, merged, mesh_of
 from teleop_core.robots.bodies.solids import Solid
+from teleop_core.robots.files.visuals import Visual, mesh_file
 from teleop_core.robots.robot import Robot
-from teleop_core.robots.visuals import Visual, mesh_file
 
 
 def looks_of(robot: Robot) -> dict[int, Mesh]:

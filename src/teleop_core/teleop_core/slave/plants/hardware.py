@@ -13,10 +13,10 @@ from teleop_core.base.parameters import parameter
 from teleop_core.graph.signals import DT
 from teleop_core.kernels import pointer
 from teleop_core.kernels.geometry import Array
-from teleop_core.robots.chains import true_chain
+from teleop_core.robots.arms.as_chain import true_chain
+from teleop_core.robots.chains.rigid_body import write_model
 from teleop_core.robots.drives import ACCELERATION, Drives
 from teleop_core.robots.hardware import Hardware
-from teleop_core.robots.rigid_body import write_model
 from teleop_core.robots.robot import Robot
 from teleop_core.slave.controllers import per_joint
 from teleop_core.slave.plants import Physics, Plant

@@ -14,8 +14,9 @@ from teleop_core.base.parameters import parameter
 from teleop_core.kernels import inner
 from teleop_core.kernels.fields import Fields
 from teleop_core.kernels.geometry import Array
-from teleop_core.slave.world import WorldObject
-from teleop_core.slave.world.cylinder import CylinderParameters, cylinder_distance, cylinder_outline
+from teleop_core.shapes import Shape
+from teleop_core.shapes.basis import drawing
+from teleop_core.shapes.cylinder import CylinderParameters, cylinder_distance, cylinder_outline
 
 _STIFFER = 10.0  # spring of the friction, over the steepest that the snapping one can be
 _LARGEST = 100.0  # click force [N]
@@ -42,8 +43,13 @@ class ButtonState(Fields):
 
 @dataclass(frozen=True, kw_only=True)
 class ButtonParameters(CylinderParameters):
-    """A post along the base's z that is pressed from above, or from any other side."""
+    """A post that is pressed from above, or from any other side."""
 
+    radius: float = parameter(0.02, unit="m", lower=1e-3, upper=1.0, doc="of the post")
+    length: float = parameter(0.03, unit="m", lower=1e-3, upper=2.0, doc="from end to end")
+    direction: tuple[float, ...] = parameter(
+        (0.0, 0.0, 1.0), lower=-1.0, upper=1.0, length=3, doc="upwards, of any length"
+    )
     click_force: float = parameter(
         1.0, unit="N", lower=0.01, upper=_LARGEST, doc="on the way in, where it snaps",
         source="assumed",
@@ -64,9 +70,10 @@ class ButtonParameters(CylinderParameters):
     )  # fmt: skip
 
     def __post_init__(self) -> None:
-        half = min(self.radius, 0.5 * self.height)
+        half = min(self.radius, 0.5 * self.length)
+        super().__post_init__()
         if self.stroke >= half:
-            text = f"less than the radius and half of the height ({half:g} m)"
+            text = f"less than the radius and half of the length ({half:g} m)"
             raise ParameterError("button.stroke", self.stroke, text)
         if not self.stroke > self.click_travel:
             text = f"more than click_travel ({self.click_travel:g} m)"
@@ -147,10 +154,11 @@ def count_presses(
 
 
 def button_outline(parameters: ButtonParameters) -> Array:
-    """The post, and its upper end where that is on its stop, (124, 3) [m] around the middle."""
-    post = cylinder_outline(parameters)
-    pressed = post[-len(post) // 2 :] - (0.0, 0.0, parameters.stroke)
-    return np.concatenate((post, np.full((1, 3), np.nan), pressed))
+    """The post, and its upper end where that is on its stop, (N, 3) [m] around the middle."""
+    axis = drawing.unit_vector(parameters.direction)
+    stop = (0.5 * parameters.length - parameters.stroke) * axis
+    end = drawing.ring(stop, axis, parameters.radius)
+    return drawing.with_lifts([cylinder_outline(parameters), end])
 
 
-BUTTON = WorldObject("button", ButtonParameters, cylinder_distance, button_outline)
+BUTTON = Shape("button", ButtonParameters, cylinder_distance, button_outline)

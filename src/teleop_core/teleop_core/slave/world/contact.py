@@ -18,6 +18,7 @@ from teleop_core.kernels import inner
 from teleop_core.kernels.fields import PerJoint, Vector3
 from teleop_core.kernels.geometry import Array
 from teleop_core.kernels.room import room
+from teleop_core.shapes.basis.directions import NEAR, make_unit
 from teleop_core.slave.arm import Arm
 from teleop_core.slave.world.button import ButtonNumbers, ButtonState, follow_button, push_of_button
 from teleop_core.slave.world.puncture import (
@@ -27,9 +28,6 @@ from teleop_core.slave.world.puncture import (
     puncture,
     push_in_channel,
 )
-
-NEAR = 5e-3
-"""A point that is farther outside [m] does not get there within a tick."""
 
 
 class WorldNumbers(PunctureNumbers, ButtonNumbers):
@@ -209,6 +207,7 @@ def _touch_at(
     if s.is_near:
         _slide(s, q)
     before, s.gap = s.gap, arm.distance(arm.offset, arm.shape, arm.normal) - p.tool_radius
+    make_unit(arm.normal)
     if s.punctures > 0:
         follow_channel(p, s, p.world_stiffness, before, arm.offset, arm.normal)
     if p.click_force > 0.0:

@@ -5,14 +5,13 @@ import numpy as np
 from teleop_core.base.parameters import NoParameters
 from teleop_core.kernels import kernel
 from teleop_core.kernels.geometry import Array
-from teleop_core.slave.world import WorldObject
+from teleop_core.shapes import Shape
 
 
 @kernel
-def empty_distance(offset: Array, shape: Array, normal: Array) -> float:
+def empty_distance(offset: Array, numbers: Array, out: Array) -> float:
     """As of a plane far below, which the simulator never asks for."""
-    normal[0] = normal[1] = 0.0
-    normal[2] = 1.0
+    out[0], out[1], out[2] = 0.0, 0.0, 1.0
     return offset[2] + 1e3
 
 
@@ -21,4 +20,4 @@ def empty_outline(_: NoParameters) -> Array:
     return np.empty((0, 3))
 
 
-EMPTY = WorldObject("empty", NoParameters, empty_distance, empty_outline)
+EMPTY = Shape("empty", NoParameters, empty_distance, empty_outline)

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from teleop_core.base.errors import ParameterError
-from teleop_core.base.parameters import Choice, choice, parameter
+from teleop_core.base.parameters import Choice, Value, choice, parameter
 from teleop_core.kernels.geometry import Array
 from teleop_core.slave.world import WORLD_OBJECTS
 
@@ -34,6 +34,10 @@ MATERIALS = {
     "steel": Material(50000.0, 0.5, 0.2),
 }
 """Materials by name. All numbers are assumed: what a tip meets depends on its own size as well."""
+_USUAL: dict[str, Value] = {
+    "box.size": (0.06, 0.06, 0.03), "cylinder.radius": 0.02, "cylinder.direction": (0.0, 0.0, 1.0),
+}  # fmt: skip
+"""Parameters of objects that are something else where nothing is said than for a fixture."""
 _FARTHEST = 3.0  # below a tip, where an object is looked for [m]
 
 
@@ -41,7 +45,9 @@ _FARTHEST = 3.0  # below a tip, where an object is looked for [m]
 class WorldParameters:
     """What the tip can touch."""
 
-    kind: Choice = choice(WORLD_OBJECTS, "empty", fixed=True, doc="what the tip can touch")
+    kind: Choice = choice(
+        WORLD_OBJECTS, "empty", fixed=True, doc="what the tip can touch", usual=_USUAL
+    )
     place: tuple[float, ...] = parameter(
         (), unit="m", lower=-10.0, upper=10.0, fixed=True,
         doc="middle of the object in the slave's base; empty: straight below the tip of the "

@@ -1,0 +1,220 @@
+"""Denavit-Hartenberg chains as values: rows in one convention, and the robot they make."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from types import MappingProxyType
+
+import numpy as np
+
+from teleop_core.base.errors import ShapeError
+from teleop_core.kernels.geometry import Array, checked_array, rotation, transform
+from teleop_core.kernels.portable import product
+from teleop_core.robots.arms.dh_drives import drives_of
+from teleop_core.robots.chains.followers import Followers
+from teleop_core.robots.closed_form.decomposition import SEARCH, Solution, solution_of
+from teleop_core.robots.drives import Drives
+from teleop_core.robots.kinematics import DIRECTIONS
+from teleop_core.robots.robot import Robot
+
+# Elementary motions of one row, left to right: what, along or about which axis, by which symbol.
+CONVENTIONS = {
+    "standard": (("turn", "z", "theta"), ("slide", "z", "d"),
+                 ("slide", "x", "a"), ("turn", "x", "alpha")),
+    "modified": (("turn", "x", "alpha"), ("slide", "x", "a"),
+                 ("turn", "z", "theta"), ("slide", "z", "d")),
+    "sheth_uicker": (("turn", "z", "gamma"), ("slide", "z", "c"),
+                     ("turn", "x", "alpha"), ("slide", "x", "a"),
+                     ("turn", "z", "beta"), ("slide", "z", "b")),
+}  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True)
+class DhJoint:
+    """Joint of a row: its symbol is ``sign * q`` plus the row's constant; limits [rad or m]."""
+
+    name: str
+    symbol: str
+    sign: float
+    lower: float
+    upper: float
+    home: float
+    start: float | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class DhRow:
+    """One row: constants by symbol [rad, m], and the joint if it has one."""
+
+    constants: Mapping[str, float]
+    joint: DhJoint | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class DhTable:
+    """A chain: rows in one convention, from the base to the tip.
+
+    ``task`` names the directions that the arm is to control, in base axes, of
+    :data:`DIRECTIONS`; the others are left to the residual. ``drives`` holds, for each joint, the
+    entries of its drive that are stated [SI]; empty means for none.
+    """
+
+    name: str
+    convention: str
+    rows: tuple[DhRow, ...]
+    task: tuple[str, ...] = DIRECTIONS
+    drives: tuple[Mapping[str, float], ...] = ()
+
+    @property
+    def joints(self) -> tuple[DhJoint, ...]:
+        """Joints from the base to the tip; their number is the chain's degrees of freedom."""
+        return tuple(row.joint for row in self.rows if row.joint)
+
+    @property
+    def kinds(self) -> tuple[str, ...]:
+        """For each joint "turn" or "slide"."""
+        return tuple(kinds_of(self.convention)[joint.symbol] for joint in self.joints)
+
+    def link_transforms(self, q: object) -> Array:
+        """Transform of each row, frame i in frame i-1.
+
+        Args:
+            q: Joint vector (n,) [rad, m].
+
+        Returns:
+            (rows, 4, 4); their product from left to right is ``T_base_tip``.
+
+        Raises:
+            ShapeError: Another shape.
+            ParameterError: NaN or infinity.
+        """
+        values = checked_array("q", q, (len(self.joints),))
+        if values.ndim != 1:
+            raise ShapeError("q", (len(self.joints),), values.shape)
+        moves, out = iter(values), np.empty((len(self.rows), 4, 4))
+        for i, row in enumerate(self.rows):
+            out[i] = np.eye(4)
+            value = next(moves) * row.joint.sign if row.joint else 0.0
+            for kind, axis, symbol in CONVENTIONS[self.convention]:
+                amount = row.constants.get(symbol, 0.0)
+                if row.joint and symbol == row.joint.symbol:
+                    amount += value
+                out[i] = product(out[i], elementary(kind, axis, amount))
+        return out
+
+    def robot(
+        self, geometry: Mapping[str, float] = MappingProxyType({}), drives: Drives | None = None
+    ) -> Robot:
+        """The chain as a robot, which can be a slave; in closed form if its axes allow it.
+
+        Args:
+            geometry: Symbols and values that the robot is to show; none for those of its row.
+            drives: Drive table in place of the table's own.
+        """
+        kinds, fixed, reach = self._frames()
+        stated = self.drives or ({},) * len(self.joints)
+        return chain_robot(
+            name=self.name,
+            joints=self.joints,
+            kinds=kinds,
+            fixed=fixed,
+            reach=reach,
+            task=self.task,
+            drives=drives or drives_of(self.kinds, stated),
+            solution=solution_of(kinds, fixed, reach, self.task),
+            geometry=geometry,
+        )
+
+    def _frames(self) -> tuple[list[float], list[Array], float]:
+        """Kind of each joint, constant transforms between them, reach [m], for chain_robot."""
+        kinds, reach, fixed = [], 0.0, [np.eye(4)]
+        for row in self.rows:
+            for kind, axis, symbol in CONVENTIONS[self.convention]:
+                amount = row.constants.get(symbol, 0.0)
+                fixed[-1] = product(fixed[-1], elementary(kind, axis, amount))
+                reach += abs(amount) if kind == "slide" else 0.0
+                if row.joint and symbol == row.joint.symbol:
+                    kinds.append(row.joint.sign * (1.0 if kind == "turn" else 2.0))
+                    fixed.append(np.eye(4))
+                    if kind == "slide":
+                        reach += max(abs(row.joint.lower), abs(row.joint.upper))
+        return kinds, fixed, reach
+
+
+def chain_robot(
+    *,
+    name: str,
+    joints: Sequence[DhJoint],
+    kinds: Sequence[float],
+    fixed: Sequence[Array],
+    reach: float,
+    task: Sequence[str],
+    drives: Drives,
+    solution: Solution = SEARCH,
+    followers: Followers | None = None,
+    geometry: Mapping[str, float] = MappingProxyType({}),
+) -> Robot:
+    """Robot whose joints move about or along z, with constant transforms between them.
+
+    Args:
+        name: Name of the robot.
+        joints: From the base to the tip; names, limits, home and start count.
+        kinds: For each motion 1 for a turn, 2 for a slide; negative against its axis.
+        fixed: Transforms (4, 4) before, between and after the motions, one more than motions.
+        reach: Length [m] by which distances count against angles; 1 m where it is 0.
+        task: Directions that the arm is to control, of :data:`DIRECTIONS`.
+        drives: Drive table.
+        solution: How its inverse kinematics are solved.
+        followers: What the motions do; None where they are the joints.
+        geometry: Symbols and values [m, rad] that the robot is to show; none for those of its row.
+    """
+    weights = {
+        "reach": reach if reach > 0.0 else 1.0,
+        **{f"controls_{direction}": float(direction in task) for direction in DIRECTIONS},
+    }
+    chain = {**{f"kind{i + 1}": kind for i, kind in enumerate(kinds)}, **weights}
+    if followers is not None:
+        chain = {
+            **{f"joint{i + 1}": kind for i, kind in enumerate(followers.kinds)},
+            **{f"joints_{key}": value for key, value in weights.items()},
+            "motions": len(kinds) + 1.0,
+            **{f"follower{i}": value for i, value in enumerate(followers.row)},
+            **chain,
+        }
+    numbers = {
+        f"fixed{i}_{r}{c}": float(matrix[r, c])
+        for i, matrix in enumerate(fixed)
+        for r in range(3)
+        for c in range(4)
+    }
+    row = {
+        **chain,
+        **numbers,
+        **{f"solution{i}": value for i, value in enumerate(solution.constants)},
+    }
+    starts = [joint.home if joint.start is None else joint.start for joint in joints]
+    return Robot(
+        name=name,
+        joint_names=tuple(joint.name for joint in joints),
+        lower=np.array([joint.lower for joint in joints]),
+        upper=np.array([joint.upper for joint in joints]),
+        home=np.array([joint.home for joint in joints]),
+        start=None if all(joint.start is None for joint in joints) else np.array(starts),
+        geometry=geometry or row,
+        row=np.array(list(row.values())) if geometry else None,
+        kernels=solution.kernels,
+        solution=solution.text,
+        drives=drives,
+        task_mask=tuple(direction in task for direction in DIRECTIONS),
+    )
+
+
+def elementary(kind: str, axis: str, amount: float) -> Array:
+    """Transform (4, 4) of a "turn" [rad] about or a "slide" [m] along a coordinate axis."""
+    if kind == "turn":
+        return transform(rotation(axis, amount), np.zeros(3))
+    return transform(np.eye(3), amount * np.eye(3)["xyz".index(axis)])
+
+
+def kinds_of(convention: str) -> dict[str, str]:
+    """Symbols of a row, and whether each is a "turn" or a "slide"."""
+    return {symbol: kind for kind, _, symbol in CONVENTIONS[convention]}

@@ -1,0 +1,383 @@
+"""Robots from URDF: the chain from the root link to a tip, with what the file says of its drives.
+
+What moves the tip are the joints between root and tip; all others stay at zero, and weigh. A joint
+between them that mimics another moves with it (:mod:`teleop_core.robots.chains.followers`). The
+kinematics are those of Denavit-Hartenberg chains (:mod:`teleop_core.robots.chains.dh_kernels`), the
+dynamics those of rigid bodies (:mod:`teleop_core.robots.chains.chain_dynamics`). Effort and
+velocity limits, damping and friction are the drives' where they stand in the file and are above
+zero. The inertia of a drive is that of the links at home; that of its motor is in no URDF. A file
+of drives may state it, and what else a URDF leaves out. Whatever is left out there too is assumed
+as for tables (:mod:`teleop_core.robots.arms.dh_drives`), and ``Robot.drives.assumed`` names it.
+Meshes are read where they are drawn (:mod:`teleop_core.robots.bodies.looks`).
+
+Source:
+    The XML specification of URDF, pages joint and link.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import partial
+from itertools import combinations
+from pathlib import Path
+from xml.etree import ElementTree as Xml
+
+import numpy as np
+
+from teleop_core.base.errors import ParameterError, UnknownNameError
+from teleop_core.kernels.geometry import Array
+from teleop_core.kernels.portable import dot, length, product
+from teleop_core.robots.arms.dh_chain import DhJoint, chain_robot
+from teleop_core.robots.arms.dh_drives import drives_of, least_inertia, parse_drives, read_drives
+from teleop_core.robots.chains.chain_dynamics import body_row, chain_dynamics, chain_row
+from teleop_core.robots.chains.followers import (
+    Follower,
+    Followers,
+    dynamics_row,
+    follower_dynamics,
+    follower_inertia,
+)
+from teleop_core.robots.closed_form.decomposition import SEARCH, solution_of
+from teleop_core.robots.drives import ENTRIES, Drives, Dynamics
+from teleop_core.robots.files.urdf_notes import notes_on
+from teleop_core.robots.files.urdf_tree import (
+    KINDS,
+    UNITS,
+    Links,
+    UrdfJoint,
+    chain_to,
+    elements_of,
+    is_endless,
+    joint_of,
+    joints_by_child,
+    limits_of,
+    numbers_of,
+    origin_of,
+    root_link,
+    root_of,
+    tip_of,
+    turn_of_z,
+)
+from teleop_core.robots.files.visuals import visuals_of
+from teleop_core.robots.files.xacro_files import xml_of
+from teleop_core.robots.kinematics import DIRECTIONS
+from teleop_core.robots.rank import directions_of
+from teleop_core.robots.robot import Robot
+
+MODELS = ("independent", "links")
+"""How the arm of a file may move: see :func:`load_urdf`."""
+_ROUNDING = 1e-6  # of an inertia, over its trace: files are written with few digits
+_NO_MASS = 1e-6  # [kg, kg·m²]; simulators want some of every link
+_NO_INERTIA = 1e-9  # [kg·m² or kg]; below it is rounding of bodies on the axis, and unknown
+_POWERS = {"viscous": 2, "coulomb": 1}  # of a factor, by which friction of a follower counts
+
+
+def load_urdf(
+    path: Path | str,
+    arguments: Mapping[str, str] | None = None,
+    *,
+    tip: str = "",
+    task: str = "",
+    dynamics: str = "independent",
+    drives: str = "",
+) -> Robot:
+    """Robot whose joints are those between the root of a URDF and a tip.
+
+    Args:
+        path: The file; one that ends in ``.xacro`` is expanded by the package ``xacro``.
+        arguments: Texts for the ``<xacro:arg>`` of a xacro, by their names.
+        tip: Link whose frame is the tip; empty for the only link without a child.
+        task: Directions that the arm is to control, of :data:`DIRECTIONS`, with blanks or commas
+            between them; empty for all, or of an arm that cannot move in all of them at once for
+            those of :func:`~teleop_core.robots.rank.directions_of`.
+        dynamics: Of :data:`MODELS`. independent: axes that do not act on each other, gravity
+            balanced. links: the bodies of the file, which weigh and act on each other; the
+            controller feeds their gravity forward.
+        drives: YAML file of what the drives of the joints are, by their names, in the entries of
+            :class:`~teleop_core.robots.drives.Drives`; it stands above the URDF. Inertia is that
+            of the motor, to which that of the links is added.
+
+    Returns:
+        The robot, its base the root link, with inverse kinematics in closed form if it is of a
+        class of :mod:`~teleop_core.robots.closed_form.decomposition`, else by search. Home is zero,
+        or the middle of limits without zero; continuous joints turn two rounds (assumed: ±2π).
+
+    Raises:
+        RecordingError: The file cannot be read, or is not XML.
+        ParameterError: An element that is missing or not possible; the message names it. With
+            dynamics of links also a joint beside the way to the tip that moves with one on it.
+        UnknownNameError: A tip, direction, dynamics, link, type of joint, argument of a xacro, or
+            joint or entry of the drives that does not exist.
+        TeleopError: The package ``xacro`` is needed and not installed.
+    """
+    if dynamics not in MODELS:
+        raise UnknownNameError("dynamics", dynamics, MODELS)
+    root = root_of(Path(path), xml_of(Path(path), arguments or {}))
+    links = elements_of(root, "link")
+    joints = [
+        joint_of(name, element, links) for name, element in elements_of(root, "joint").items()
+    ]
+    by_child = joints_by_child(joints)
+    base = root_link(links, by_child)
+    chain = chain_to(tip_of(tip, links, joints), by_child)
+    moving = [joint for joint in chain if joint.axis is not None]
+    if not moving:
+        raise ParameterError(
+            "tip", tip or chain, "a link that some joint between it and the root moves"
+        )
+    trains, followers = _trains(moving, {joint.name: joint for joint in joints})
+    leaders = [train[0].joint for train in trains]
+    limits = [_narrowed(train) for train in trains]
+    fixed, kinds = _frames(chain)
+    reach = sum(float(length(joint.origin[:3, 3])) for joint in chain)
+    reach += sum(max(map(abs, limits_of(j))) for j in moving if j.kind == "prismatic")
+    home, n = np.array([limit.home for limit in limits]), len(limits)
+    may_be_any = dynamics == "independent"  # whose inertia counts as assumed
+    bodies, inertia = _bodies(moving, base, links, joints, may_be_any), np.zeros((n, n))
+    chain_numbers = chain_row(kinds, fixed, bodies, np.zeros(len(moving)))
+    follower_inertia(home, dynamics_row(followers, chain_numbers, np.zeros(n)), inertia)
+    table = _drives(trains, np.diag(inertia).tolist(), str(drives))
+    make = partial(
+        chain_robot,
+        name=root.get("name") or Path(path).stem,
+        joints=limits,
+        kinds=kinds,
+        fixed=fixed,
+        reach=reach,
+        drives=table,
+        followers=None if followers.is_plain else followers,
+    )
+    controlled = _task(task) or directions_of(make(task=DIRECTIONS), reach / math.pi).best
+    solution = solution_of(kinds, fixed, reach, controlled) if followers.is_plain else SEARCH
+    robot = make(task=controlled, solution=solution)
+    coordinates = dict(zip((j.name for j in moving), followers.of(home).tolist(), strict=True))
+    visuals = tuple(visuals_of(coordinates, links, by_child, Path(path)))
+    # Without its start, for which a second's search would begin here: who needs it asks for it.
+    notes = tuple(notes_on(chain, links))
+    robot = replace(robot, visuals=visuals, notes=notes, home_is_assumed=True, start=None)
+    if dynamics == "independent":
+        return robot
+    motors = np.maximum(table.inertia - np.diag(inertia), 0.0)
+    if followers.is_plain:
+        model = chain_dynamics(chain_row(kinds, fixed, bodies, motors))
+    else:
+        _refuse_beside(leaders, moving, joints)
+        model = follower_dynamics(dynamics_row(followers, chain_numbers, motors), n)
+    _refuse_weak(leaders, table, home, model)
+    return replace(robot, dynamics=model, start=None)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Geared:
+    """A joint that turns or slides by ``factor`` times what its leader does, plus ``offset``."""
+
+    joint: UrdfJoint
+    factor: float = 1.0
+    offset: float = 0.0
+
+
+def _trains(
+    moving: list[UrdfJoint], named: Mapping[str, UrdfJoint]
+) -> tuple[list[list[_Geared]], Followers]:
+    """For each joint of the robot itself and all that follow it to the tip; and the motions."""
+    trains: dict[str, list[_Geared]] = {}
+    motions = []
+    for joint in moving:
+        leader, factor, offset = _leader(joint, named)
+        train = trains.setdefault(leader.name, [_Geared(joint=leader)])
+        if joint is not leader:
+            train.append(_Geared(joint=joint, factor=factor, offset=offset))
+        place = list(trains).index(leader.name)
+        motions.append(Follower(leader=place, factor=factor, offset=offset))
+    kinds = tuple(1.0 if KINDS[t[0].joint.kind] == "turn" else 2.0 for t in trains.values())
+    return list(trains.values()), Followers(motions=tuple(motions), kinds=kinds)
+
+
+def _leader(joint: UrdfJoint, named: Mapping[str, UrdfJoint]) -> tuple[UrdfJoint, float, float]:
+    """Joint that a joint follows in the end, itself if none, with factor and offset."""
+    factor, offset, passed = 1.0, 0.0, [joint.name]
+    while (mimic := joint.element.find("mimic")) is not None:
+        where = f"mimic of joint {joint.name}"
+        own = float(numbers_of(where, mimic, "multiplier", (1.0,))[0])
+        if own == 0.0:
+            raise ParameterError(f"multiplier of {where}", own, "not 0: what never moves is fixed")
+        unit = UNITS[KINDS[joint.kind]]
+        offset += factor * float(numbers_of(where, mimic, "offset", (0.0,), unit)[0])
+        factor, name = factor * own, mimic.get("joint", "")
+        movable = [other for other in named if named[other].axis is not None]
+        if name not in movable:
+            raise UnknownNameError(where, name, movable)
+        if name in passed:
+            raise ParameterError(where, name, "a joint that does not follow it in turn")
+        joint = named[name]
+        passed.append(name)
+    return joint, factor, offset
+
+
+def _refuse_beside(
+    leaders: list[UrdfJoint], moving: list[UrdfJoint], joints: list[UrdfJoint]
+) -> None:
+    """Refuse what moves with a joint of the robot, but not between root and tip: it would weigh."""
+    named = {joint.name: joint for joint in joints}
+    for joint in joints:
+        if joint.axis is not None and joint not in moving and _leader(joint, named)[0] in leaders:
+            needed = f"independent: joint {joint.name} is not on the way to the tip, and moves too"
+            raise ParameterError("dynamics", "links", needed)
+
+
+def _refuse_weak(leaders: list[UrdfJoint], drives: Drives, home: Array, model: Dynamics) -> None:
+    """Refuse drives that cannot hold the arm at home."""
+    weight = np.zeros(len(leaders))
+    model.gravity(home, model.parameters.copy(), weight)
+    for joint, most, needed in zip(leaders, drives.effort_limit, abs(weight), strict=True):
+        if most <= needed:
+            name = f"effort of joint {joint.name}"
+            raise ParameterError(name, float(most), f"above {needed:.3g}, its load at home")
+
+
+def _task(task: str) -> tuple[str, ...]:
+    names = tuple(str(task).replace(",", " ").split())
+    for name in names:
+        if name not in DIRECTIONS:
+            raise UnknownNameError("task", name, DIRECTIONS)
+    return names
+
+
+def _narrowed(train: list[_Geared]) -> DhJoint:
+    """Joint with the limits in which it and all that follow it are within theirs."""
+    leader = train[0].joint
+    lower, upper = limits_of(leader)
+    for geared in train[1:]:
+        if not is_endless(geared.joint):
+            ends = sorted((x - geared.offset) / geared.factor for x in limits_of(geared.joint))
+            lower, upper = max(lower, ends[0]), min(upper, ends[1])
+    if not lower < upper:
+        names = ", ".join(geared.joint.name for geared in train[1:])
+        needed = f"lower < upper within the limits of {names}, by which it is followed"
+        raise ParameterError(f"limits of joint {leader.name}", (lower, upper), needed)
+    home = 0.0 if lower <= 0.0 <= upper else 0.5 * (lower + upper)
+    return DhJoint(name=leader.name, symbol="", sign=1.0, lower=lower, upper=upper, home=home)
+
+
+def _frames(chain: list[UrdfJoint]) -> tuple[list[Array], list[float]]:
+    """Constant transforms between the joints, whose axes become z, and the kind of each joint."""
+    fixed, kinds, last = [], [], np.eye(4)
+    for joint in chain:
+        last = product(last, joint.origin)
+        if joint.axis is not None:
+            sign, align = turn_of_z(joint.axis)
+            fixed.append(product(last, align))
+            kinds.append(sign * (1.0 if KINDS[joint.kind] == "turn" else 2.0))
+            last = np.ascontiguousarray(align.T)
+    return [*fixed, last], kinds
+
+
+def _drives(trains: list[list[_Geared]], inertias: list[float], file: str) -> Drives:
+    """Drives of the leaders, which bear friction and keep speed limits of what follows them."""
+    kinds, stated = [KINDS[train[0].joint.kind] for train in trains], {}
+    names = [train[0].joint.name for train in trains]
+    given = read_drives(Path(file).expanduser(), names, kinds) if file else [{}] * len(trains)
+    for train, kind, inertia, drive in zip(trains, kinds, inertias, given, strict=True):
+        own: dict[str, float] = {}
+        for geared in train:
+            factor = abs(geared.factor)
+            for entry, value in _drive_entries(geared.joint).items():
+                if entry == "speed_limit":
+                    own[entry] = min(own.get(entry, math.inf), value / factor)
+                elif entry != "effort_limit":
+                    own[entry] = own.get(entry, 0.0) + value * math.pow(factor, _POWERS[entry])
+                elif geared is train[0]:
+                    own[entry] = value
+        own |= drive
+        least = least_inertia(kind, own.get("viscous", 0.0), own.get("coulomb", 0.0))
+        if "inertia" in drive:
+            own["inertia"] = inertia + drive["inertia"]
+        elif max(inertia, least) > _NO_INERTIA:
+            own["inertia"] = max(inertia, least)
+        stated[train[0].joint.name] = own
+    drives = drives_of(kinds, parse_drives(stated, names, kinds, 1.0))
+    motors = ("inertia",) * any("inertia" not in drive for drive in given)
+    assumed = tuple(name for name in ENTRIES if name in (*motors, *drives.assumed))
+    return replace(drives, assumed=assumed)
+
+
+def _drive_entries(joint: UrdfJoint) -> dict[str, float]:
+    where, found, is_turn = f"joint {joint.name}", {}, KINDS[joint.kind] == "turn"
+    for tag, key, entry, units in (
+        ("limit", "effort", "effort_limit", ("N·m", "N")),
+        ("limit", "velocity", "speed_limit", ("rad/s", "m/s")),
+        ("dynamics", "damping", "viscous", ("N·m·s/rad", "N·s/m")),
+        ("dynamics", "friction", "coulomb", ("N·m", "N")),
+    ):
+        element, unit = joint.element.find(tag), units[0 if is_turn else 1]
+        value = float(numbers_of(where, element, key, (0.0,), unit)[0])
+        if value < 0.0:
+            raise ParameterError(f"{key} of {where}", value, ">= 0")
+        if value > 0.0:  # a limit of 0 is what files say that do not know it
+            found[entry] = value
+    return found
+
+
+def _bodies(
+    moving: list[UrdfJoint], base: str, links: Links, joints: list[UrdfJoint], may_be_any: bool
+) -> Array:
+    """What each joint moves up to the next, (n, 13), see :func:`body_row`; other joints at zero.
+
+    Files give many an inertia that no body has. It does no harm where nothing moves it, and where
+    ``may_be_any``.
+    """
+    carried: dict[str, list[UrdfJoint]] = {}
+    for joint in joints:
+        carried.setdefault(joint.parent, []).append(joint)
+    places = {joint.name: i for i, joint in enumerate(moving)}
+    sums = np.zeros((len(moving), 13))
+    stack: list[tuple[str, Array, int]] = [(base, np.eye(4), -1)]
+    while stack:
+        link, T, mover = stack.pop()
+        if mover >= 0:
+            mass, inertia, place = _mass(link, links[link], may_be_any)
+            centre = product(T, place)
+            turned = product(product(centre[:3, :3], inertia), centre[:3, :3].T)
+            sums[mover] += body_row(mass, centre[:3, 3], turned)
+        for joint in carried.get(link, ()):
+            if joint.name in places and joint.axis is not None:
+                stack.append((joint.child, turn_of_z(joint.axis)[1].T, places[joint.name]))
+            else:
+                stack.append((joint.child, product(T, joint.origin), mover))
+    return sums
+
+
+def _mass(name: str, link: Xml.Element, may_be_any: bool) -> tuple[float, Array, Array]:
+    """Mass [kg], inertia (3, 3) [kg·m²] at its centre, and where that is in the link (4, 4)."""
+    element, where = link.find("inertial"), f"link {name}"
+    if element is None:
+        return 0.0, np.zeros((3, 3)), np.eye(4)
+    mass = float(numbers_of(where, element.find("mass"), "value", (0.0,), "kg")[0])
+    tensor = element.find("inertia")
+    xx, xy, xz, yy, yz, zz = (
+        float(numbers_of(where, tensor, key, (0.0,), "kg·m²")[0])
+        for key in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+    )
+    inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    if 0.0 <= mass < _NO_MASS and abs(inertia).max() < _NO_MASS:  # a frame that has to weigh
+        return 0.0, np.zeros((3, 3)), np.eye(4)
+    if mass < 0.0 or not (may_be_any or _is_possible(inertia)):
+        needed = "that of a body; dynamics=independent takes any"
+        raise ParameterError(f"inertial of {where}", (mass, inertia.tolist()), needed)
+    return mass, inertia, origin_of(where, element)
+
+
+def _is_possible(inertia: Array) -> bool:
+    """Whether some body has this inertia: no principal moment exceeds the sum of the others.
+
+    That is so where half the trace less the inertia has no negative eigenvalue, and so no negative
+    principal minor.
+    """
+    spread = 0.5 * float(np.trace(inertia))
+    if spread == 0.0:
+        return not inertia.any()
+    M = (np.eye(3) * spread - inertia) / abs(spread)
+    minors = [M[i, i] for i in range(3)]
+    minors += [M[i, i] * M[j, j] - M[i, j] ** 2 for i, j in combinations(range(3), 2)]
+    minors.append(float(dot(M[0], np.cross(M[1], M[2]))))
+    return spread > 0.0 and min(minors) >= -_ROUNDING

@@ -1,0 +1,189 @@
+"""Visuals: what the links of an arm look like, as its file says, and where the meshes are."""
+
+import hashlib
+import os
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+from xml.etree import ElementTree as Xml
+
+import numpy as np
+
+from teleop_core.base.errors import ParameterError
+from teleop_core.kernels.geometry import Array, rotation, transform
+from teleop_core.kernels.portable import product
+from teleop_core.robots.files.urdf_tree import (
+    Links,
+    UrdfJoint,
+    chain_to,
+    numbers_of,
+    origin_of,
+    tree_of,
+    turn_of_z,
+)
+
+VisualKind = Literal["mesh", "box", "cylinder", "sphere"]
+_ENDINGS = (".stl", ".dae", ".obj", ".ply", ".glb", ".gltf", ".off")
+_UP = 4  # folders above that of a URDF in which its meshes may be
+_PACKAGE = "package://"
+_SHAPES: dict[VisualKind, tuple[tuple[str, tuple[float, ...]], ...]] = {
+    "mesh": (("scale", (1.0, 1.0, 1.0)),), "box": (("size", (0.0, 0.0, 0.0)),),
+    "cylinder": (("radius", (0.0,)), ("length", (0.0,))), "sphere": (("radius", (0.0,)),),
+}  # fmt: skip
+"""Attributes of each shape of a visual [m], which are those of :class:`Visual` in this order."""
+
+
+@dataclass(frozen=True, eq=False)
+class Visual:
+    """A shape of a link.
+
+    Attributes:
+        link: Name of the link.
+        joints: Number of joints that move between the base and it.
+        place: Its pose (4, 4) in the base, with the arm at home [m].
+        kind: What it is.
+        size: Scales along x, y and z of a mesh; of a box x, y, z, of a cylinder radius and length,
+            of a sphere its radius [m].
+        file: Name of a mesh as the file gives it; empty for other kinds.
+        urdf: The file.
+    """
+
+    link: str
+    joints: int
+    place: Array
+    kind: VisualKind
+    size: tuple[float, ...]
+    file: str
+    urdf: Path
+
+
+def mesh_file(name: str, urdf: Path) -> Path:
+    """File of a mesh that a URDF names; :func:`kept_mesh` comes first.
+
+    ``package://NAME/REST`` is looked for in folders called NAME beside and above that of the URDF,
+    in the packages of ``AMENT_PREFIX_PATH`` and ``ROS_PACKAGE_PATH``, and without NAME in the
+    folders above. Any other name starts from the folder of the URDF.
+
+    Raises:
+        ParameterError: It is nowhere there, is no mesh, or leads elsewhere: out of the package, or
+            out of the fourth folder above the URDF.
+    """
+    if not name.lower().endswith(_ENDINGS):
+        raise ParameterError("mesh", name, f"a file with one of the endings {', '.join(_ENDINGS)}")
+    for root, path in _candidates(name, urdf.resolve().parent):
+        real = path.resolve()
+        if real.is_file():
+            if not real.is_relative_to(root.resolve()):
+                raise ParameterError("mesh", name, f"a file below {root}")
+            return real
+    raise ParameterError("mesh", name, f"a file in a package, or near {urdf}")
+
+
+def kept_mesh(name: str, urdf: Path) -> Path:
+    """Where the copy of a URDF out of a recording has a mesh, whatever name it gives it."""
+    file = hashlib.sha256(name.encode()).hexdigest()[:16] + Path(name).suffix
+    return urdf.parent / "kept_meshes" / file
+
+
+def meshes_of(text: str, urdf: Path) -> dict[str, Path]:
+    """Files of the meshes that the visuals of a URDF name, by these names.
+
+    Args:
+        text: Its XML; what is none names no meshes.
+        urdf: The file, for what starts from its folder.
+
+    Returns:
+        Those that :func:`mesh_file` finds.
+    """
+    found: dict[str, Path] = {}
+    with suppress(Xml.ParseError, ParameterError):
+        for element in tree_of(text.encode()).iterfind("link/visual/geometry/mesh"):
+            name = element.get("filename", "")
+            with suppress(ParameterError, OSError):
+                found[name] = mesh_file(name, urdf)
+    return found
+
+
+def package_folder(name: str, urdf: Path) -> Path:
+    """Folder of a package, looked for as :func:`mesh_file` does.
+
+    Raises:
+        ParameterError: It is nowhere there, or is no plain name.
+    """
+    if name not in {"", ".", ".."} and name == Path(name).name:
+        for _, place in _packages(name, urdf.resolve().parent):
+            if place.is_dir():
+                return place
+    needed = f"a folder near {urdf}, or below AMENT_PREFIX_PATH or ROS_PACKAGE_PATH"
+    raise ParameterError("package", name, needed)
+
+
+def _candidates(name: str, folder: Path) -> Iterator[tuple[Path, Path]]:
+    """Where a mesh may be, each with the folder that it must be below."""
+    above = _above(folder)
+    kept = kept_mesh(name, folder / "urdf")
+    yield kept.parent, kept
+    if not name.startswith(_PACKAGE):
+        yield above[-1], folder / name.removeprefix("file://")
+        return
+    package, _, rest = name.removeprefix(_PACKAGE).partition("/")
+    yield from ((root, place / rest) for root, place in _packages(package, folder))
+    yield from ((each, each / rest) for each in above)
+
+
+def _packages(name: str, folder: Path) -> Iterator[tuple[Path, Path]]:
+    """Where a package may be, each with the folder that its files must be below."""
+    yield from ((each, each / name) for each in _above(folder))
+    for variable, below in (("AMENT_PREFIX_PATH", "share"), ("ROS_PACKAGE_PATH", "")):
+        for place in filter(None, os.environ.get(variable, "").split(os.pathsep)):
+            yield Path(place) / below / name, Path(place) / below / name
+
+
+def _above(folder: Path) -> list[Path]:
+    return [each for each in (folder, *folder.parents)[: _UP + 1] if each != each.parent]
+
+
+def visuals_of(
+    home: Mapping[str, float], links: Links, by_child: Mapping[str, UrdfJoint], urdf: Path
+) -> Iterator[Visual]:
+    """Shapes of all links, in the order of the file.
+
+    Args:
+        home: Coordinate at home of each joint on the way to the tip that moves [rad, m], by its
+            name; all other joints stay at 0.
+        links: Elements of the links by their names.
+        by_child: The joint that carries each link.
+        urdf: The file.
+
+    Raises:
+        ParameterError: A place or a size is no number.
+    """
+    for link, element in links.items():
+        T, moved = np.eye(4), 0
+        shapes = element.findall("visual")
+        for joint in chain_to(link, by_child) if shapes else ():
+            T = product(T, joint.origin)
+            if joint.name in home and joint.axis is not None:
+                T, moved = product(T, _motion(joint, home[joint.name])), moved + 1
+        for shape in shapes:
+            place, where = product(T, origin_of(f"visual of link {link}", shape)), f"link {link}"
+            for kind, keys in _SHAPES.items():
+                found = shape.find(f"geometry/{kind}")
+                if found is not None:
+                    unit = "" if kind == "mesh" else "m"
+                    sizes = (numbers_of(where, found, key, one, unit) for key, one in keys)
+                    size = [float(x) for each in sizes for x in each]
+                    file = found.get("filename", "")
+                    yield Visual(link, moved, place, kind, tuple(size), file, urdf)
+
+
+def _motion(joint: UrdfJoint, value: float) -> Array:
+    """What a joint does (4, 4) at a value [rad, m] about or along its axis."""
+    axis = np.asarray(joint.axis)
+    if joint.kind == "prismatic":
+        return transform(np.eye(3), value * axis)
+    sign, up = turn_of_z(axis)
+    turn = transform(rotation("z", sign * value), np.zeros(3))
+    return product(product(up, turn), up.T)

@@ -1,0 +1,107 @@
+"""Xacro: a macro file of an arm, expanded to its URDF by the package ``xacro``.
+
+Expanding evaluates the expressions of the file and of all that it includes: a xacro is a program
+(docs/security.md).
+"""
+
+import re
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+
+from teleop_core.base.damage import damage_told
+from teleop_core.base.errors import ParameterError, TeleopError, UnknownNameError
+from teleop_core.robots.files.urdf_tree import tree_of
+from teleop_core.robots.files.visuals import package_folder
+
+EXPANDED = ".expanded.urdf"
+"""Ending of the URDF that a recording keeps of a xacro; arguments may stand, and do nothing."""
+_DECLARED = re.compile(r"<xacro:arg\s[^>]*?name=[\"']([^\"']+)")
+_MOST_CHARACTERS = 300  # of what the package says, which may be pages long
+
+
+def xml_of(path: Path, arguments: Mapping[str, str]) -> bytes:
+    """XML of a URDF, expanded if the name of the file ends in ``.xacro``.
+
+    Args:
+        path: The file.
+        arguments: Texts for its ``<xacro:arg>``, by their names.
+
+    Raises:
+        RecordingError: The file cannot be read.
+        ParameterError: It cannot be expanded, or is no xacro and there are arguments.
+        UnknownNameError: Neither the file nor what it includes declares such an argument.
+        TeleopError: The package ``xacro`` is not installed.
+    """
+    with damage_told(path):
+        data = path.read_bytes()
+    if path.suffix.lower() != ".xacro":
+        if arguments and not path.name.endswith(EXPANDED):
+            needed = f"left out: {path} is no .xacro"
+            raise ParameterError("arguments of xacro", list(arguments), needed)
+        return data
+    return _expanded(path.resolve(), dict(arguments))
+
+
+def _expanded(path: Path, arguments: dict[str, str]) -> bytes:
+    try:
+        import xacro
+    except ImportError as error:
+        text = f"{path} needs xacro: pip install 'teleop_core[urdf]'"
+        raise TeleopError(text) from error
+    before = len(xacro.all_includes)
+    try:
+        with _our_files(path):
+            document = xacro.process_file(str(path), mappings=dict(arguments), verbosity=0)
+        expanded: str = document.documentElement.toxml()
+    except Exception as error:  # whatever the expressions of a file raise, one line names the file
+        if ours := _wrapped(error):
+            raise ours from None
+        reason = " ".join(f"{type(error).__name__}: {error}".split())[:_MOST_CHARACTERS]
+        file = (xacro.filestack or [path])[-1]
+        raise ParameterError("xacro", str(file), f"one that can be expanded ({reason})") from error
+    _refuse_unknown(arguments, [path, *map(Path, xacro.all_includes[before:])])
+    return expanded.encode()
+
+
+def _wrapped(error: BaseException | None) -> TeleopError | None:
+    """Error of ours, as of ``$(find NAME)``, in what the package makes of it; None without."""
+    while error is not None and not isinstance(error, TeleopError):
+        error = getattr(error, "exc", None) or error.__cause__ or error.__context__
+    return error
+
+
+def _refuse_unknown(arguments: Mapping[str, str], files: list[Path]) -> None:
+    """Refuse arguments that no file declares, which the package takes without a word."""
+    if arguments:
+        texts = [file.read_text(encoding="utf-8", errors="replace") for file in files]
+        known = sorted({name for text in texts for name in _DECLARED.findall(text)})
+        for name in arguments:
+            if name not in known:
+                raise UnknownNameError("argument of xacro", name, known)
+
+
+@contextmanager
+def _our_files(path: Path) -> Iterator[None]:
+    """Let ``$(find NAME)`` find what ``package://NAME`` does, and refuse types of document.
+
+    The package has no setting for either, so its functions are replaced meanwhile.
+    """
+    import xacro
+    from xacro import substitution_args
+
+    def find(name: str) -> str:
+        return str(package_folder(name, path))
+
+    def parse(source: object, filename: str) -> object:
+        tree_of(Path(filename).read_bytes())
+        return theirs(source, filename)
+
+    theirs, found = xacro.parse, substitution_args._eval_find
+    xacro.parse = parse
+    substitution_args._eval_find = substitution_args._eval_dict["find"] = find
+    try:
+        yield
+    finally:
+        xacro.parse = theirs
+        substitution_args._eval_find = substitution_args._eval_dict["find"] = found

@@ -1,0 +1,138 @@
+"""Shapes: how far a point is from a body, whether it is inside, and how the body is drawn.
+
+One file per shape, in this folder. A virtual fixture holds the hand inside or outside of a shape
+(:mod:`teleop_core.chain.fixtures`); the slave's tool touches one (:mod:`teleop_core.slave.world`).
+"""
+
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pkgutil import iter_modules
+from typing import Any
+
+import numpy as np
+from numba import types
+
+from teleop_core.base.errors import PartError
+from teleop_core.base.parameters import values_of
+from teleop_core.base.registry import Registry, part_check, places, tried
+from teleop_core.kernels import pointer
+from teleop_core.kernels.geometry import Array
+from teleop_core.kernels.parts import fenced, is_whole, numbers_of
+
+__all__ = ["SHAPES", "Shape", "files_of", "moved", "register_shape", "trial_of"]
+
+_ROW = types.float64[::1]
+DISTANCE = types.float64(_ROW, _ROW, _ROW)
+"""Signature of a distance kernel, so that one compiled stage serves every shape."""
+
+
+@dataclass(frozen=True)
+class Shape:
+    """A body in space.
+
+    Attributes:
+        name: What ``--set fixture=`` and ``--set world=`` call it.
+        parameters: Its parameter group: real numbers and tuples of them. What a text ``file`` among
+            them names is kept with recordings.
+        distance: ``distance(offset, numbers, out)``, a kernel or a plain function. ``offset`` (3,)
+            [m] runs from the middle of the shape to a point; ``numbers`` holds the parameters in
+            their order; ``out`` (3,) gets a vector of any length but 0 that points out of the shape
+            where its surface is nearest. Returns how far the point is outside [m], negative inside.
+        outline: ``outline(parameters)`` gives points (N, 3) [m] of one line along its edges around
+            its middle; a row of NaN lifts the pen.
+        numbers: ``numbers(parameters)`` gives ``numbers``, if that is something else.
+    """
+
+    name: str
+    parameters: type
+    distance: Callable[[Array, Array, Array], float]
+    outline: Callable[[Any], Array]
+    numbers: Callable[[Any], Array] = numbers_of
+
+    pointer = cached_property(lambda self: pointer(self.distance, DISTANCE))
+    """The distance as an argument for kernels."""
+
+
+_FILE = re.compile(r"""\bfile\s*=\s*['"]([^'"]*)['"]""")  # in the text of a part
+
+
+def files_of(parameters: object) -> list[str]:
+    """Names of the files that a shape's parameters tell of, its parts included."""
+    found: list[str] = []
+    for name, value in values_of(parameters).items():
+        if name == "file":
+            found.append(str(value))
+        for text in value if isinstance(value, tuple) else ():
+            found += _FILE.findall(str(text))
+    return found
+
+
+def moved(value: Any, files: Mapping[str, str]) -> Any:
+    """Value of a parameter with files where they are now, by the path that it tells."""
+    if isinstance(value, list | tuple):
+        return type(value)(moved(element, files) for element in value)
+    if not isinstance(value, str):
+        return value
+    return files.get(value) or _FILE.sub(
+        lambda said: said[0].replace(said[1], files.get(said[1], said[1])), value
+    )
+
+
+_STEP = 1e-6  # along the way out, over which the distance must grow by as much [m]
+_TRIED = np.array(
+    [(0.31, 0.02, 0.05), (0.01, 0.43, -0.03), (-0.02, 0.04, 0.37), (-0.29, 0.23, -0.41)]
+)
+"""Offsets at which a shape is tried [m]."""
+
+
+def trial_of(kind: str) -> Callable[[Shape], None]:
+    """Trial of a registry of shapes, so that what cannot work is told before anything runs."""
+
+    def try_it(part: Shape) -> None:
+        needs = (
+            "one with distance(offset, numbers, out) -> float, outline(parameters) -> (N, 3) and "
+            "parameters that all have defaults"
+        )
+        with tried(kind, part.name, needs):
+            parameters = part.parameters()
+            points = np.asarray(part.outline(parameters), np.float64)
+            numbers = part.numbers(parameters)
+            faults = (_fault_at(part, numbers, offset) for offset in _TRIED)
+            fault = next(filter(None, faults), "")
+        if points.ndim != 2 or points.shape[1] != 3 or not np.isfinite(points).any():
+            fault = f"an outline (N, 3) of finite points, not {points.shape}"
+        if fault:
+            raise PartError(kind, part.name, f"one with {fault}")
+
+    return try_it
+
+
+def _fault_at(part: Shape, numbers: Array, offset: Array) -> str:
+    """What a shape must have that it has not at one place; empty if it has all."""
+    (given, _), (out, fence) = fenced(numbers), fenced(np.zeros(3))
+    distance = float(part.distance(offset, given, out))
+    size, place = float(np.linalg.norm(out)), f"at {offset.tolist()} m from its middle"
+    if not is_whole(fence):
+        return f"a distance that writes three numbers to out; {place} it writes more"
+    if not np.isfinite([distance, *out]).all() or size == 0.0:
+        return f"a finite distance and an out other than 0; {place} {distance!r}, {out.tolist()}"
+    farther = float(part.distance(offset + _STEP / size * out, given, np.zeros(3)))
+    if not abs(farther - distance - _STEP) <= 1e-2 * _STEP:
+        growth = (farther - distance) / _STEP
+        return f"a distance that grows as one goes along out; {place} by {growth:.3g} times that"
+    return ""
+
+
+SHAPES: Registry[Shape] = Registry(
+    "shape",
+    "shapes",
+    places("teleop_core.shapes", " ".join(m.name for m in iter_modules(__path__) if not m.ispkg)),
+    part_check("shape", Shape, "distance", "outline"),
+    trial_of("shape"),
+)
+"""All shapes by name: every file of this folder holds one."""
+
+register_shape = SHAPES.register
+"""Adds one of yours under its own name; see :meth:`Registry.register`."""

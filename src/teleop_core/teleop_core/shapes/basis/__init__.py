@@ -1,0 +1,1 @@
+"""Basis: what shapes are computed and drawn with."""

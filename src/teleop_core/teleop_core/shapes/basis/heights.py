@@ -1,0 +1,100 @@
+"""Heights: the surface of a block, read from a table, as triangles.
+
+Between the heights of the table the surface is a cubic spline. It is cut into triangles that are
+half a step of the distance grid wide, so that their edges are not felt.
+"""
+
+import io
+import math
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from teleop_core.base.errors import ParameterError
+from teleop_core.kernels.geometry import Array
+from teleop_core.shapes.basis.spline import write_between, write_spline
+from teleop_core.shapes.basis.triangles import Triangles
+
+FIELD = "height_field"
+THICKNESS = 0.02
+"""Of the block below the lowest height [m]."""
+_LEAST = 4  # heights along x and along y
+_MOST = 400_000  # places of the surface
+
+
+def read_heights(path: Path, data: bytes, spacing: float, step: float) -> Triangles:
+    """Read a table of heights and close it to a block, whose middle is at height 0.
+
+    Args:
+        path: Its name, for what is said, and for the format: ``.npy``, or else CSV.
+        data: What the file holds: heights [m], a row for each x, a column for each y.
+        spacing: Between heights [m].
+        step: Of the distance grid [m].
+
+    Raises:
+        ParameterError: It is no table of finite heights, or too large for the step.
+    """
+    heights = _table(path, data)
+    parts = math.ceil(2.0 * spacing / step)
+    nodes = tuple(parts * (n - 1) + 1 for n in heights.shape)
+    if math.prod(nodes) > _MOST:
+        fits = 2.0 * spacing * math.sqrt(heights.size / _MOST)
+        text = f"some {max(fits, 1.2 * step):.2g} m at least for a field of so many heights"
+        raise ParameterError(f"{FIELD}.step", step, text)
+    for axis in range(2):
+        lines = np.ascontiguousarray(np.moveaxis(heights, axis, 0))[None]
+        write_spline(lines)
+        between = np.empty((1, nodes[axis], lines.shape[2]))
+        write_between(lines, between)
+        heights = np.moveaxis(between[0], 0, axis)
+    return _block(np.ascontiguousarray(heights), spacing / parts)
+
+
+def _table(path: Path, data: bytes) -> Array:
+    """Heights (N, M) [m] of a file.
+
+    Raises:
+        ParameterError: There are none.
+    """
+    try:
+        if path.suffix.lower() == ".npy":
+            table = np.load(io.BytesIO(data), allow_pickle=False)
+        else:
+            table = np.loadtxt(io.StringIO(data.decode()), delimiter=",", ndmin=2)
+        heights = np.array(table, np.float64)
+    except Exception as error:  # of a foreign reader, of a file that anybody wrote
+        reason = str(error).partition("\n")[0]
+        text = f"a table of heights [m], CSV or .npy ({type(error).__name__}: {reason})"
+        raise ParameterError(f"{FIELD}.file", str(path), text) from error
+    if heights.ndim != 2 or min(heights.shape) < _LEAST or not np.isfinite(heights).all():
+        text = f"a table of {_LEAST} x {_LEAST} finite heights at least; its shape is "
+        raise ParameterError(f"{FIELD}.file", str(path), f"{text}{heights.shape}")
+    return heights
+
+
+def _block(heights: Array, width: float) -> Triangles:
+    """Block below heights (N, M) [m] that are ``width`` [m] apart, with a flat bottom."""
+    rows, columns = heights.shape
+    x = width * (np.arange(rows) - 0.5 * (rows - 1))
+    y = width * (np.arange(columns) - 0.5 * (columns - 1))
+    top = np.stack((*np.meshgrid(x, y, indexing="ij"), heights), axis=2).reshape(-1, 3)
+    index = np.arange(rows * columns).reshape(rows, columns)
+    a, b, c, d = (
+        part.ravel() for part in (index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:])
+    )
+    rim: NDArray[np.int64] = np.concatenate(
+        (index[:-1, 0], index[-1, :-1], index[:0:-1, -1], index[0, :0:-1])
+    )  # counterclockwise seen from above
+    floor = float(heights.min()) - THICKNESS
+    below = top[rim]
+    below[:, 2] = floor
+    low = rows * columns + np.arange(len(rim))
+    middle = np.full(len(rim), rows * columns + len(rim))
+    after, low_after = np.roll(rim, -1), np.roll(low, -1)
+    faces = ((a, b, c), (a, c, d), (rim, low, low_after), (rim, low_after, after),
+             (low, middle, low_after))  # fmt: skip
+    return Triangles(
+        np.vstack((top, below, (0.0, 0.0, floor))),
+        np.concatenate([np.stack(corners, axis=1) for corners in faces]),
+    )

@@ -1,0 +1,51 @@
+"""Box: a cuboid along the axes, as the RCRT-1 source has it for the hand."""
+
+import math
+from dataclasses import dataclass
+
+from teleop_core.base.parameters import parameter
+from teleop_core.kernels import kernel
+from teleop_core.kernels.geometry import Array
+from teleop_core.shapes import Shape
+from teleop_core.shapes.basis.drawing import edges_of
+
+
+@dataclass(frozen=True, kw_only=True)
+class BoxParameters:
+    """A cuboid."""
+
+    size: tuple[float, ...] = parameter(
+        (0.03, 0.03, 0.03), unit="m", lower=1e-4, upper=2.0, length=3,
+        doc="wall to wall along x, y, z",
+        source="published: Vongbunyong 2008, section 6.3: 30 mm on the slave at gain 1",
+    )  # fmt: skip
+
+
+@kernel
+def box_distance(offset: Array, size: Array, out: Array) -> float:
+    """Write the way out of a box (3,); returns how far a point (3,) [m] is outside.
+
+    Outside it runs from the nearest point, so around an edge it turns. Inside it is that of the
+    nearest face; x comes before y before z where faces are equally near.
+    """
+    square, face, depth = 0.0, 0, -math.inf
+    for i in range(3):
+        half = 0.5 * size[i]
+        out[i] = offset[i] - min(max(offset[i], -half), half)
+        square += out[i] * out[i]
+        over = abs(offset[i]) - half
+        if over > depth:
+            face, depth = i, over
+    if square > 0.0:
+        return math.sqrt(square)
+    for i in range(3):
+        out[i] = math.copysign(1.0, offset[i]) if i == face else 0.0
+    return depth
+
+
+def box_outline(parameters: BoxParameters) -> Array:
+    """All edges of the box, (16, 3) [m] around its middle."""
+    return edges_of(parameters.size)
+
+
+BOX = Shape("box", BoxParameters, box_distance, box_outline)

@@ -1,0 +1,40 @@
+"""Capsule: a rod with round ends, such as a vessel or a finger."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from teleop_core.base.parameters import parameter
+from teleop_core.kernels.geometry import Array
+from teleop_core.shapes import Shape
+from teleop_core.shapes.basis import directions, drawing
+from teleop_core.shapes.line import rod_distance
+
+
+@dataclass(frozen=True, kw_only=True)
+class CapsuleParameters:
+    """A rod with round ends."""
+
+    radius: float = parameter(0.01, unit="m", lower=5e-5, upper=1.0, doc="of rod and ends")
+    length: float = parameter(0.06, unit="m", lower=0.0, upper=2.0, doc="between the ends' middles")
+    direction: tuple[float, ...] = parameter(
+        (0.0, 1.0, 0.0), lower=-1.0, upper=1.0, length=3, doc="of the rod, of any length"
+    )
+
+    def __post_init__(self) -> None:
+        directions.require_direction("capsule.direction", self.direction)
+
+
+def capsule_outline(parameters: CapsuleParameters) -> Array:
+    """Its silhouette from two sides, (N, 3) [m] around the middle."""
+    axis, angle = drawing.unit_vector(parameters.direction), np.linspace(0.0, math.pi, 21)[:, None]
+    end = 0.5 * parameters.length * axis
+    loops = []
+    for aside in drawing.across(axis):
+        cap = end + parameters.radius * (np.cos(angle) * aside + np.sin(angle) * axis)
+        loops.append(np.concatenate((cap, -cap, cap[:1])))
+    return drawing.with_lifts(loops)
+
+
+CAPSULE = Shape("capsule", CapsuleParameters, rod_distance, capsule_outline)

@@ -1,0 +1,74 @@
+"""Cone: a funnel that leads to its tip, such as to a port."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from teleop_core.base.parameters import parameter
+from teleop_core.kernels import kernel
+from teleop_core.kernels.geometry import Array
+from teleop_core.kernels.portable import dot
+from teleop_core.shapes import Shape
+from teleop_core.shapes.basis import directions, drawing
+
+_LEAST = 0.01  # half of the height that is drawn of a cone whose tip is at the middle [m]
+
+
+@dataclass(frozen=True, kw_only=True)
+class ConeParameters:
+    """A cone, open without end on the side away from its tip."""
+
+    apex: tuple[float, ...] = parameter(
+        (0.0, -0.03, 0.0), unit="m", lower=-0.5, upper=0.5, length=3,
+        doc="from the middle to the tip",
+        source="assumed: as far as the published box is wide",
+    )  # fmt: skip
+    axis: tuple[float, ...] = parameter(
+        (0.0, 1.0, 0.0), lower=-1.0, upper=1.0, length=3,
+        doc="from the tip into the cone, of any length",
+    )  # fmt: skip
+    half_angle: float = parameter(
+        0.4, unit="rad", lower=0.01, upper=1.5, doc="from the axis to the wall",
+        source="assumed: so that the funnel is nearly as wide as the published box at the middle",
+    )  # fmt: skip
+
+    def __post_init__(self) -> None:
+        directions.require_direction("cone.axis", self.axis)
+
+
+@kernel
+def cone_distance(offset: Array, numbers: Array, out: Array) -> float:
+    """Write the way out of a cone (3,); returns how far a point (3,) [m] is outside.
+
+    The nearest point is on the wall, or the tip for points beyond it.
+    """
+    axis = directions.unit(numbers[3], numbers[4], numbers[5])
+    cosine, sine = math.cos(numbers[6]), math.sin(numbers[6])
+    for i in range(3):
+        out[i] = offset[i] - numbers[i]
+    from_tip = directions.length_of(out)
+    along = directions.part_along(out, axis)
+    aside = directions.take_along(out, along, axis)
+    distance = aside * cosine - along * sine
+    if along * cosine + aside * sine <= 0.0 and from_tip > directions.MIDDLE:
+        for i in range(3):
+            out[i] = offset[i] - numbers[i]
+        return from_tip
+    if aside <= directions.ON_AXIS:
+        aside = directions.look_across(axis, out)
+    for i in range(3):
+        out[i] = cosine / aside * out[i] - sine * axis[i]
+    return distance
+
+
+def cone_outline(parameters: ConeParameters) -> Array:
+    """A rim as far behind the middle as the tip is before it, and four lines from it to the tip."""
+    axis, tip = drawing.unit_vector(parameters.axis), np.array(parameters.apex)
+    height = 2.0 * max(-float(dot(axis, tip)), _LEAST)
+    rim = drawing.ring(tip + height * axis, axis, height * math.tan(parameters.half_angle))
+    sides = [np.stack((rim[i], tip, rim[i + 20])) for i in (0, 10)]
+    return drawing.with_lifts([rim, *sides])
+
+
+CONE = Shape("cone", ConeParameters, cone_distance, cone_outline)

@@ -1,0 +1,71 @@
+"""Cylinder: a tube or post with flat ends, along any direction."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from teleop_core.base.parameters import parameter
+from teleop_core.kernels import kernel
+from teleop_core.kernels.geometry import Array
+from teleop_core.shapes import Shape
+from teleop_core.shapes.basis import directions, drawing
+from teleop_core.shapes.line import endless_if_zero
+
+
+@dataclass(frozen=True, kw_only=True)
+class CylinderParameters:
+    """A tube or a post."""
+
+    radius: float = parameter(
+        0.015, unit="m", lower=5e-5, upper=1.0, doc="from the axis to the wall",
+        source="assumed: as wide as the published box",
+    )  # fmt: skip
+    length: float = parameter(
+        0.03, unit="m", lower=0.0, upper=2.0, doc="from end to end; 0: without ends",
+        source="assumed: as long as the published box",
+    )  # fmt: skip
+    direction: tuple[float, ...] = parameter(
+        (0.0, 1.0, 0.0), lower=-1.0, upper=1.0, length=3, doc="of its axis, of any length"
+    )
+
+    def __post_init__(self) -> None:
+        directions.require_direction("cylinder.direction", self.direction)
+
+
+@kernel
+def cylinder_distance(offset: Array, numbers: Array, out: Array) -> float:
+    """Write the way out of a tube (3,); returns how far a point (3,) [m] is outside."""
+    axis = directions.unit(numbers[2], numbers[3], numbers[4])
+    along = directions.part_along(offset, axis)
+    for i in range(3):
+        out[i] = offset[i]
+    from_axis = directions.take_along(out, along, axis)
+    aside, above = from_axis - numbers[0], abs(along) - 0.5 * numbers[1]
+    if aside <= 0.0 and above <= 0.0 and above > aside:
+        for i in range(3):
+            out[i] = math.copysign(1.0, along) * axis[i]
+        return above
+    if from_axis <= directions.ON_AXIS:
+        from_axis = directions.look_across(axis, out)
+    if above <= 0.0:
+        return aside
+    beyond, share = math.copysign(above, along), max(aside, 0.0) / from_axis
+    for i in range(3):
+        out[i] = share * out[i] + beyond * axis[i]
+    aside = max(aside, 0.0)
+    return math.sqrt(aside * aside + above * above)
+
+
+def cylinder_outline(parameters: CylinderParameters) -> Array:
+    """Both ends and four lines between them, (N, 3) [m] around the middle."""
+    axis = drawing.unit_vector(parameters.direction)
+    half = 0.5 * (parameters.length or drawing.DRAWN) * axis
+    ends = [drawing.ring(end, axis, parameters.radius) for end in (-half, half)]
+    sides = [np.stack((ends[0][i], ends[1][i])) for i in (0, 10, 20, 30)]
+    return drawing.with_lifts([*ends, *sides])
+
+
+CYLINDER = Shape(
+    "cylinder", CylinderParameters, cylinder_distance, cylinder_outline, endless_if_zero
+)

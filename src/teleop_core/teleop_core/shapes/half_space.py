@@ -1,0 +1,45 @@
+"""Half-space: everything in front of a plane, such as the room above a floor under the hand."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from teleop_core.base.parameters import parameter
+from teleop_core.kernels.geometry import Array
+from teleop_core.shapes import Shape
+from teleop_core.shapes.basis import directions, drawing
+from teleop_core.shapes.plane import plane_distance
+
+
+@dataclass(frozen=True, kw_only=True)
+class HalfSpaceParameters:
+    """What is in front of a plane."""
+
+    normal: tuple[float, ...] = parameter(
+        (0.0, 1.0, 0.0), lower=-1.0, upper=1.0, length=3,
+        doc="from the plane into the half-space, of any length",
+    )  # fmt: skip
+    room: float = parameter(
+        0.01, unit="m", lower=0.0, upper=0.5, doc="from the middle down to the plane",
+        source="assumed: less than half of the published box",
+    )  # fmt: skip
+
+    def __post_init__(self) -> None:
+        directions.require_direction("half_space.normal", self.normal)
+
+
+def half_space_numbers(parameters: HalfSpaceParameters) -> Array:
+    """Numbers of its plane, whose normal looks out of it."""
+    return np.array((*(-x for x in parameters.normal), parameters.room))
+
+
+def half_space_outline(parameters: HalfSpaceParameters) -> Array:
+    """A square of 100 mm of the plane, (5, 3) [m], around the point of it below the middle."""
+    normal = drawing.unit_vector(parameters.normal)
+    drawn: Array = drawing.square(normal) - parameters.room * normal
+    return drawn
+
+
+HALF_SPACE = Shape(
+    "half_space", HalfSpaceParameters, plane_distance, half_space_outline, half_space_numbers
+)

@@ -1,0 +1,44 @@
+"""Height field: a block whose surface is given by a table of heights."""
+
+from dataclasses import dataclass
+
+from teleop_core.base.parameters import parameter
+from teleop_core.kernels.geometry import Array
+from teleop_core.shapes import Shape
+from teleop_core.shapes.basis.distance_grid import DistanceGrid, GridRequest, distance_grid
+from teleop_core.shapes.mesh import mesh_distance
+
+
+@dataclass(frozen=True, kw_only=True)
+class HeightFieldParameters:
+    """A table of heights above the middle."""
+
+    file: str = parameter(
+        "", fixed=True, doc="CSV or .npy: heights [m], a row for each x, a column for each y"
+    )
+    spacing: float = parameter(
+        2e-3, unit="m", lower=1e-5, upper=0.1, fixed=True, doc="between heights"
+    )
+    step: float = parameter(
+        1e-3, unit="m", lower=5e-5, upper=5e-3, fixed=True,
+        doc="between nodes of the grid of distances: what is smaller than that is rounded off",
+    )  # fmt: skip
+
+
+def _grid(p: HeightFieldParameters) -> DistanceGrid:
+    return distance_grid(GridRequest(p.file, p.spacing, (), p.step, "height_field"))
+
+
+def height_field_numbers(parameters: HeightFieldParameters) -> Array:
+    """Numbers of the grid, as :func:`mesh_distance` takes them; raises as :func:`distance_grid`."""
+    return _grid(parameters).numbers
+
+
+def height_field_outline(parameters: HeightFieldParameters) -> Array:
+    """Its edges and three sections through its middle, (N, 3) [m]; raises as the numbers."""
+    return _grid(parameters).outline
+
+
+HEIGHT_FIELD = Shape(
+    "height_field", HeightFieldParameters, mesh_distance, height_field_outline, height_field_numbers
+)

@@ -1,0 +1,128 @@
+"""Hole: a round hole through the middle of a round plate, with a chamfer around its mouth."""
+
+import math
+from dataclasses import dataclass
+
+from teleop_core.base.errors import ParameterError
+from teleop_core.base.parameters import parameter
+from teleop_core.kernels import inner, kernel
+from teleop_core.kernels.geometry import Array
+from teleop_core.shapes import Shape
+from teleop_core.shapes.basis import directions, drawing
+
+
+@dataclass(frozen=True, kw_only=True)
+class HoleParameters:
+    """A round plate and a hole through it; its middle is that of the hole's mouth."""
+
+    radius: float = parameter(0.0055, unit="m", lower=1e-4, upper=1.0, doc="of the hole")
+    thickness: float = parameter(0.03, unit="m", lower=1e-3, upper=1.0, doc="of the plate")
+    plate_radius: float = parameter(0.025, unit="m", lower=1e-3, upper=2.0, doc="of the plate")
+    chamfer: float = parameter(
+        0.002, unit="m", lower=0.0, upper=0.5,
+        doc="width and depth of the chamfer of 45° around the mouth",
+    )  # fmt: skip
+    axis: tuple[float, ...] = parameter(
+        (0.0, 0.0, 1.0), lower=-1.0, upper=1.0, length=3,
+        doc="of the hole, out of its mouth, of any length",
+    )  # fmt: skip
+
+    def __post_init__(self) -> None:
+        directions.require_direction("hole.axis", self.axis)
+        if not self.chamfer < self.thickness:
+            text = f"less than thickness ({self.thickness:g} m)"
+            raise ParameterError("hole.chamfer", self.chamfer, text)
+        if not self.radius + self.chamfer < self.plate_radius:
+            text = f"more than radius and chamfer ({self.radius + self.chamfer:g} m)"
+            raise ParameterError("hole.plate_radius", self.plate_radius, text)
+
+
+@inner
+def _section_depth(out: float, up: float, shape: Array) -> tuple[float, float, float]:
+    """How far the plane of the nearest face is from a place; above 0 where that is outside.
+
+    Arguments and results as of :func:`_section_distance`.
+    """
+    radius, thickness, rim, chamfer = shape[0], shape[1], shape[2], shape[3]
+    diagonal = math.sqrt(0.5)
+    sloping = diagonal * (up - out + radius + chamfer)
+    distance, way_out, way_up = up, 0.0, 1.0
+    if sloping > distance:
+        distance, way_out, way_up = sloping, -diagonal, diagonal
+    if radius - out > distance:
+        distance, way_out, way_up = radius - out, -1.0, 0.0
+    if -thickness - up > distance:
+        distance, way_out, way_up = -thickness - up, 0.0, -1.0
+    if out - rim > distance:
+        distance, way_out, way_up = out - rim, 1.0, 0.0
+    return distance, way_out, way_up
+
+
+@inner
+def _section_distance(out: float, up: float, shape: Array) -> tuple[float, float, float]:
+    """How far a place in the section through the axis is outside of the plate.
+
+    The section is convex: its faces are top, chamfer, wall of the hole, bottom and rim. Inside the
+    nearest face counts, outside the nearest of the nearest points of all faces.
+
+    Args:
+        out: From the axis [m].
+        up: Above the mouth [m].
+        shape: Radius of the hole, thickness and radius of the plate, width of the chamfer [m].
+
+    Returns:
+        The distance [m], negative inside; and the way out, along ``out`` and along ``up``.
+    """
+    distance, way_out, way_up = _section_depth(out, up, shape)
+    if distance <= 0.0:
+        return distance, way_out, way_up
+    radius, thickness, rim, chamfer = shape[0], shape[1], shape[2], shape[3]
+    along = min(max(0.5 * (out - radius + up + chamfer), 0.0), chamfer)
+    distance = math.inf
+    for face in range(5):
+        if face == 0:
+            x, z = out - min(max(out, radius + chamfer), rim), up
+        elif face == 1:
+            x, z = out - radius - along, up + chamfer - along
+        elif face == 2:
+            x, z = out - radius, up - min(max(up, -thickness), -chamfer)
+        elif face == 3:
+            x, z = out - min(max(out, radius), rim), up + thickness
+        else:
+            x, z = out - rim, up - min(max(up, -thickness), 0.0)
+        beyond = math.sqrt(x * x + z * z)
+        if beyond <= directions.MIDDLE:  # on a face, but for rounding
+            return _section_depth(out, up, shape)
+        if beyond < distance:
+            distance, way_out, way_up = beyond, x / beyond, z / beyond
+    return distance, way_out, way_up
+
+
+@kernel
+def hole_distance(offset: Array, numbers: Array, out: Array) -> float:
+    """Write the way out of the plate (3,); returns how far a point (3,) [m] is outside.
+
+    On the axis, where all ways to the wall are as long, one of them is taken.
+    """
+    axis = directions.unit(numbers[4], numbers[5], numbers[6])
+    up = directions.part_along(offset, axis)
+    for i in range(3):
+        out[i] = offset[i]
+    aside = long = directions.take_along(out, up, axis)
+    if aside <= directions.ON_AXIS:
+        long = directions.look_across(axis, out)
+    distance, way_out, way_up = _section_distance(aside, up, numbers)
+    for i in range(3):
+        out[i] = way_out * out[i] / long + way_up * axis[i]
+    return distance
+
+
+def hole_outline(parameters: HoleParameters) -> Array:
+    """Both ends of the chamfer, of the hole and of the plate, (N, 3) [m] around the middle."""
+    p, axis = parameters, drawing.unit_vector(parameters.axis)
+    rings = ((p.radius + p.chamfer, 0.0), (p.radius, p.chamfer), (p.radius, p.thickness),
+             (p.plate_radius, 0.0), (p.plate_radius, p.thickness))  # fmt: skip
+    return drawing.with_lifts([drawing.ring(-deep * axis, axis, wide) for wide, deep in rings])
+
+
+HOLE = Shape("hole", HoleParameters, hole_distance, hole_outline)

@@ -1,0 +1,88 @@
+"""Intersection: what is in all of several shapes, such as a box without a ball."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from teleop_core.kernels import inner, kernel
+from teleop_core.kernels.geometry import Array
+from teleop_core.shapes import Shape
+from teleop_core.shapes.basis import combined
+from teleop_core.shapes.basis.directions import MIDDLE, length_of, scale_to
+
+_ROUNDS = 200  # at most
+_STILL = 1e-12  # moves that count [m]
+_INSIDE = 1e-8  # distance that is none [m]
+
+
+@dataclass(frozen=True, kw_only=True)
+class IntersectionParameters:
+    """Shapes that share it."""
+
+    parts: tuple[str, ...] = combined.parts_parameter(
+        ("box size=[0.03, 0.03, 0.03]", "not sphere radius=0.01 at=[0.0, 0.02, 0.0]"),
+        "shapes whose common part it is",
+    )
+
+    def __post_init__(self) -> None:
+        combined.parts_of(self.parts, "intersection.parts")
+
+
+@inner
+def _project(numbers: Array, place: Array) -> None:
+    """Move a place (3,) [m] to the nearest one in all parts, if they are convex.
+
+    Goes to the parts in turn and takes back at each what that part moved in the round before.
+
+    Source:
+        Boyle and Dykstra 1986.
+    """
+    kept, here, way = np.zeros((combined.MOST, 3)), np.empty(3), np.empty(3)
+    for _ in range(_ROUNDS):
+        moved, first = 0.0, 1
+        for part in range(int(numbers[0])):
+            for i in range(3):
+                here[i] = place[i] + kept[part, i]
+            scale_to(way, max(combined.part_distance(here, numbers, first, way), 0.0))
+            for i in range(3):
+                moved = max(moved, abs(way[i] - kept[part, i]))
+                kept[part, i] = way[i]
+                place[i] = here[i] - way[i]
+            first = combined.next_part(numbers, first)
+        if moved <= _STILL:
+            return
+
+
+@kernel
+def intersection_distance(offset: Array, numbers: Array, out: Array) -> float:
+    """Write the way out (3,); returns how far a point (3,) [m] is outside.
+
+    Outside the way comes from the nearest place inside, where all parts are convex. Beside parts
+    that are not (paths, the outside of a shape) it comes from some place inside near by. Where none
+    is found, and inside, it is the way out of the part that the point is farthest outside of.
+    """
+    farthest = combined.extreme_part(offset, numbers, 1.0, out)
+    if farthest <= 0.0:
+        return farthest
+    place, way = np.empty(3), np.empty(3)
+    for i in range(3):
+        place[i] = offset[i]
+    _project(numbers, place)
+    is_inside = combined.extreme_part(place, numbers, 1.0, way) <= _INSIDE
+    for i in range(3):
+        way[i] = offset[i] - place[i]
+    distance = length_of(way)
+    if not is_inside or distance <= MIDDLE:
+        return farthest
+    for i in range(3):
+        out[i] = way[i]
+    return distance
+
+
+INTERSECTION = Shape(
+    "intersection",
+    IntersectionParameters,
+    intersection_distance,
+    combined.outline_of_parts,
+    combined.numbers_of_parts,
+)

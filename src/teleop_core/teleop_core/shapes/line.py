@@ -1,0 +1,66 @@
+"""Line: what is within a radius of a straight line, such as guidance along it, or a wire."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from teleop_core.base.parameters import parameter
+from teleop_core.kernels import kernel
+from teleop_core.kernels.geometry import Array
+from teleop_core.kernels.parts import numbers_of
+from teleop_core.shapes import Shape
+from teleop_core.shapes.basis import directions, drawing
+
+
+@dataclass(frozen=True, kw_only=True)
+class LineParameters:
+    """A line."""
+
+    radius: float = parameter(
+        0.001, unit="m", lower=0.0, upper=0.1, doc="distance from the line that is inside",
+        source="assumed: what a hand at ease strays without a push",
+    )  # fmt: skip
+    length: float = parameter(
+        0.0, unit="m", lower=0.0, upper=2.0,
+        doc="from end to end, the middle halfway; 0: without ends",
+    )  # fmt: skip
+    direction: tuple[float, ...] = parameter(
+        (1.0, 0.0, 0.0), lower=-1.0, upper=1.0, length=3, doc="of the line, of any length"
+    )
+
+    def __post_init__(self) -> None:
+        directions.require_direction("line.direction", self.direction)
+
+
+@kernel
+def rod_distance(offset: Array, numbers: Array, out: Array) -> float:
+    """Write the way from a line's nearest point (3,); returns how far a point (3,) [m] is outside.
+
+    ``numbers``: radius, length of the line, its direction.
+    """
+    axis = directions.unit(numbers[2], numbers[3], numbers[4])
+    along = directions.between_ends(directions.part_along(offset, axis), numbers[1])
+    for i in range(3):
+        out[i] = offset[i]
+    distance = directions.take_along(out, along, axis)
+    if distance <= directions.ON_AXIS:
+        directions.look_across(axis, out)
+    return distance - numbers[0]
+
+
+def endless_if_zero(parameters: object) -> Array:
+    """Numbers of a shape whose second is a length, infinite in place of 0."""
+    numbers = numbers_of(parameters)
+    numbers[1] = numbers[1] or math.inf
+    return numbers
+
+
+def line_outline(parameters: LineParameters) -> Array:
+    """The line itself, (2, 3) [m] around the middle."""
+    length = parameters.length or drawing.DRAWN
+    half = 0.5 * length * drawing.unit_vector(parameters.direction)
+    return np.stack((-half, half))
+
+
+LINE = Shape("line", LineParameters, rod_distance, line_outline, endless_if_zero)

@@ -1,0 +1,126 @@
+"""Mesh: a closed surface of triangles from a file, read from a grid of distances.
+
+The distances are made once, see :mod:`teleop_core.shapes.basis.distance_grid`. Between the nodes
+they are a cubic spline, so that the normal, which is its gradient, turns without a kink.
+"""
+
+import math
+from dataclasses import dataclass
+
+from teleop_core.base.parameters import parameter
+from teleop_core.kernels import inner, kernel
+from teleop_core.kernels.geometry import Array
+from teleop_core.shapes import Shape
+from teleop_core.shapes.basis.directions import length_of, make_unit
+from teleop_core.shapes.basis.distance_grid import (
+    EDGE,
+    HEADER,
+    DistanceGrid,
+    GridRequest,
+    distance_grid,
+)
+from teleop_core.shapes.basis.spline import slopes, weights
+
+
+@dataclass(frozen=True, kw_only=True)
+class MeshParameters:
+    """A mesh from a file."""
+
+    file: str = parameter("", fixed=True, doc="STL, OBJ, PLY, OFF, or what else trimesh reads")
+    scale: float = parameter(
+        1e-3, unit="m", lower=1e-6, upper=1e3, fixed=True, doc="length of the file's unit"
+    )
+    angles: tuple[float, ...] = parameter(
+        (0.0, 0.0, 0.0), unit="rad", lower=-2.0 * math.pi, upper=2.0 * math.pi, length=3,
+        fixed=True, doc="turns of the mesh about its middle: about x, then y, then z of the base",
+    )  # fmt: skip
+    step: float = parameter(
+        1e-3, unit="m", lower=5e-5, upper=0.05, fixed=True,
+        doc="between nodes of the grid of distances: what is smaller than that is rounded off",
+    )  # fmt: skip
+
+
+@inner
+def _cell(offset: float, shape: Array, axis: int) -> tuple[int, float, float]:
+    """Where a place is in the grid along an axis, or where the grid ends before it.
+
+    Returns:
+        Second of the four nodes around it; share of a step behind that; how far it is beyond [m].
+    """
+    wanted = (offset - shape[4 + axis]) / shape[3]
+    last = shape[axis] - 1.0 - EDGE
+    at = min(max(wanted, float(EDGE)), last)
+    node = min(int(at), int(last) - 1)
+    return node, at - node, (wanted - at) * shape[3]
+
+
+@inner
+def _gradient(
+    shape: Array, at: tuple[int, int, int], share: tuple[float, float, float], gradient: Array
+) -> float:
+    """Write the gradient (3,) of the spline behind a node; returns its value [m]."""
+    wx, wy, wz = weights(share[0]), weights(share[1]), weights(share[2])
+    sx, sy, sz = slopes(share[0]), slopes(share[1]), slopes(share[2])
+    rows, columns = int(shape[1]), int(shape[2])
+    value = along_x = along_y = along_z = 0.0
+    for i in range(4):
+        plane = across = upwards = 0.0
+        for j in range(4):
+            first = HEADER + ((at[0] - 1 + i) * rows + at[1] - 1 + j) * columns + at[2] - 1
+            a, b, c, d = shape[first], shape[first + 1], shape[first + 2], shape[first + 3]
+            line = wz[0] * a + wz[1] * b + wz[2] * c + wz[3] * d
+            slope = sz[0] * a + sz[1] * b + sz[2] * c + sz[3] * d
+            plane += wy[j] * line
+            across += sy[j] * line
+            upwards += wy[j] * slope
+        value += wx[i] * plane
+        along_x += sx[i] * plane
+        along_y += wx[i] * across
+        along_z += wx[i] * upwards
+    gradient[0], gradient[1], gradient[2] = (
+        along_x / shape[3], along_y / shape[3], along_z / shape[3]
+    )  # fmt: skip
+    return value
+
+
+@kernel
+def mesh_distance(offset: Array, numbers: Array, out: Array) -> float:
+    """Write the way out of a mesh (3,), of length 1; returns how far a point (3,) [m] is outside.
+
+    Where the distance ``f`` has a ridge (behind an edge, in the middle of the mesh) its spline has
+    a slope below 1. What is returned is ``f |∇f|``, for then a spring along the way out pushes with
+    the gradient of ``f²``, and no way around the ridge gains energy. Beyond the grid it is the
+    distance from the place of the surface that is nearest to where the grid ends.
+    """
+    i, u, x = _cell(offset[0], numbers, 0)
+    j, v, y = _cell(offset[1], numbers, 1)
+    k, w, z = _cell(offset[2], numbers, 2)
+    value = _gradient(numbers, (i, j, k), (u, v, w), out)
+    slope = length_of(out)
+    if slope > 0.0:
+        make_unit(out)
+    else:
+        out[2] = 1.0
+    if x == 0.0 and y == 0.0 and z == 0.0:
+        return value * slope
+    out[0], out[1], out[2] = x + value * out[0], y + value * out[1], z + value * out[2]
+    distance = length_of(out)
+    make_unit(out)
+    return distance
+
+
+def _grid(p: MeshParameters) -> DistanceGrid:
+    return distance_grid(GridRequest(p.file, p.scale, p.angles, p.step))
+
+
+def mesh_numbers(parameters: MeshParameters) -> Array:
+    """Numbers of the grid, as :func:`mesh_distance` takes them; raises as :func:`distance_grid`."""
+    return _grid(parameters).numbers
+
+
+def mesh_outline(parameters: MeshParameters) -> Array:
+    """Its sharp edges and three sections through its middle, (N, 3) [m]; raises as the numbers."""
+    return _grid(parameters).outline
+
+
+MESH = Shape("mesh", MeshParameters, mesh_distance, mesh_outline, mesh_numbers)

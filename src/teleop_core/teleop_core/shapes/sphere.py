@@ -1,0 +1,40 @@
+"""Sphere: the same distance from the middle in all directions."""
+
+import math
+from dataclasses import dataclass
+
+from teleop_core.base.parameters import parameter
+from teleop_core.kernels import kernel
+from teleop_core.kernels.geometry import Array
+from teleop_core.shapes import Shape
+from teleop_core.shapes.basis.directions import MIDDLE
+from teleop_core.shapes.basis.drawing import great_circles
+
+
+@dataclass(frozen=True, kw_only=True)
+class SphereParameters:
+    """A ball."""
+
+    radius: float = parameter(
+        0.015, unit="m", lower=5e-5, upper=1.0, doc="from the middle to the surface",
+        source="assumed: as wide as the published box",
+    )  # fmt: skip
+
+
+@kernel
+def sphere_distance(offset: Array, numbers: Array, out: Array) -> float:
+    """Write the way from the middle (3,), z at the middle; returns how far a point is outside."""
+    x, y, z = offset[0], offset[1], offset[2]
+    distance = math.sqrt(x * x + y * y + z * z)  # products, for powers round otherwise in Python
+    out[0], out[1], out[2] = x, y, z
+    if distance <= MIDDLE:
+        out[2] = 1.0
+    return distance - numbers[0]
+
+
+def sphere_outline(parameters: SphereParameters) -> Array:
+    """Three great circles, (N, 3) [m] around the middle."""
+    return great_circles(parameters.radius)
+
+
+SPHERE = Shape("sphere", SphereParameters, sphere_distance, sphere_outline)

@@ -1,0 +1,32 @@
+"""Union: what is in any of several shapes, such as a ball with a channel that leads out of it."""
+
+from dataclasses import dataclass
+
+from teleop_core.kernels import kernel
+from teleop_core.kernels.geometry import Array
+from teleop_core.shapes import Shape
+from teleop_core.shapes.basis import combined
+
+
+@dataclass(frozen=True, kw_only=True)
+class UnionParameters:
+    """Shapes, each of which belongs to it."""
+
+    parts: tuple[str, ...] = combined.parts_parameter(
+        ("sphere radius=0.015", "cylinder radius=0.005 length=0.05 direction=[1.0, 0.0, 0.0]"),
+        "shapes that belong to it",
+    )
+
+    def __post_init__(self) -> None:
+        combined.parts_of(self.parts, "union.parts")
+
+
+@kernel
+def union_distance(offset: Array, numbers: Array, out: Array) -> float:
+    """Write the way out of the nearest part (3,); returns how far a point (3,) [m] is outside."""
+    return combined.extreme_part(offset, numbers, -1.0, out)
+
+
+UNION = Shape(
+    "union", UnionParameters, union_distance, combined.outline_of_parts, combined.numbers_of_parts
+)

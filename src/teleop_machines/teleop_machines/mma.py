@@ -1,0 +1,114 @@
+"""MMA: the seven-joint hybrid handle, open chain plus one parallelogram, that a surgeon moves.
+
+Joint readings q = (θ1, θ2, θ3, θ3', θ6, θ8, θ10). Links 3, 3a, 3b and 4 form the parallelogram:
+θ3 and θ3' both count from link 2, and link 4 stays parallel to link 3a. Three ways to describe it:
+
+- ``model="C"``: with the loop; ``model="B"``: as a serial arm with dummy frames. They are one and
+  the same for joint readings, and the default.
+- ``model="A"``: the conventional table, kept for comparison. It loses four offsets (the tool is
+  127 mm off at home) and turns the tool frame by 90°.
+
+The source gives no joint limits, sensors, drives or rates: one turn about home and the drive
+table are *assumed*. As a master it needs only :meth:`Robot.fk`; :func:`holding_torques` is for
+force feedback.
+
+Source:
+    Singh 2014, Kinematic study of a spatial hybrid manipulator for robot-assisted surgery.
+"""
+
+import math
+
+import numpy as np
+
+from teleop_core.base.errors import ParameterError, UnknownNameError
+from teleop_core.kernels.geometry import Array
+from teleop_core.kernels.portable import product
+from teleop_core.robots.drives import ENTRIES, Drives
+from teleop_core.robots.kinematics import Kernels
+from teleop_core.robots.robot import Robot, geometry_of
+from teleop_machines.bodies.mma_bodies import mma_bodies
+from teleop_machines.mma_balance import ShoulderSpring, shoulder_load
+from teleop_machines.mma_forward import GEOMETRY, MODEL_A, fk, jacobian
+from teleop_machines.mma_ik import ik, ik_all
+from teleop_machines.mma_models import MODELS, vector
+
+JOINTS = ("theta1", "theta2", "theta3", "theta3_prime", "theta6", "theta8", "theta10")
+HOME = np.radians([0.0, -90.0, 0.0, 90.0, 90.0, 0.0, 0.0])
+# Answer of :func:`teleop_core.robots.room.start_posture` for the published lengths, rounded.
+START = np.array([1.2611, -0.5588, -1.012, 1.6884, 0.3097, 0.0, 0.0])
+
+# All assumed. Inertia: 0.3 kg spread over the arm's 0.2 m, and small motors at the wrist.
+DRIVES = Drives(
+    inertia=np.array([0.02, 0.02, 0.01, 0.01, 2e-3, 2e-3, 1e-3]),
+    viscous=np.array([0.1, 0.1, 0.05, 0.05, 0.004, 0.004, 0.002]),
+    coulomb=np.array([0.05, 0.05, 0.02, 0.02, 0.005, 0.005, 0.005]),
+    friction_speed=np.array([2e-3, 2e-3, 2e-3, 2e-3, 2e-2, 2e-2, 2e-2]),
+    effort_limit=np.array([5.0, 5.0, 3.0, 3.0, 0.5, 0.5, 0.3]),
+    speed_limit=np.array([3.0, 3.0, 3.0, 3.0, 8.0, 8.0, 8.0]),
+    encoder_step=np.full(7, 2.0 * math.pi / (90 * 4000)),
+    bandwidth=np.array([60.0, 60.0, 60.0, 60.0, 80.0, 80.0, 80.0]),
+    assumed=ENTRIES,
+)
+
+
+def make(model: str = "C", **geometry: float) -> Robot:
+    """MMA with published lengths.
+
+    Args:
+        model: "C" or "B", the whole handle, or "A", the conventional description.
+        **geometry: Symbols of table 4.4 [m]; ``theta12`` turns the tool about its z axis [rad].
+
+    Returns:
+        The robot; its tip is the end of link 7.
+
+    Raises:
+        UnknownNameError: No such model or symbol.
+        ParameterError: A length is not possible.
+    """
+    if model not in MODELS:
+        raise UnknownNameError("model", model, MODELS)
+    row = geometry_of(GEOMETRY, (MODEL_A if model == "A" else {}) | geometry)
+    for symbol, value in row.items():
+        smallest = 1e-3 if symbol in {"a2", "a3"} else 0.0
+        if symbol != "theta12" and not smallest <= value <= 1.0:
+            raise ParameterError(symbol, value, f"between {smallest} and 1 m")
+    return Robot(
+        name="mma",
+        joint_names=JOINTS,
+        lower=HOME - math.pi,
+        upper=HOME + math.pi,
+        home=HOME,
+        start=START if row == GEOMETRY else None,
+        geometry=row,
+        kernels=Kernels(fk=fk, jacobian=jacobian, ik=ik, ik_all=ik_all),
+        drives=DRIVES,
+        describe=mma_bodies,
+    )
+
+
+def holding_torques(
+    robot: Robot, q: object, wrench: object, spring: ShoulderSpring | None = None
+) -> Array:
+    """Joint torques with which the handle stands still and pushes on the hand.
+
+    Gravity is known for joint 2 only (the source weighs the links but prints no mass centres), in
+    poses whose links beyond the shoulder keep the attitude of home; all other joints count as
+    balanced.
+
+    Args:
+        robot: The MMA.
+        q: Joint readings (7,) [rad].
+        wrench: Force on the hand [N], then moment about the tip [N·m], (6,) in base axes.
+        spring: Spring at joint 2; None for the published one.
+
+    Returns:
+        Torques (7,) [N·m].
+
+    Raises:
+        ShapeError: Another shape.
+        ParameterError: NaN or infinity.
+    """
+    push, joints = vector("wrench", wrench, 6), vector("q", q, 7)
+    torques = product(robot.jacobian(joints).T, push)
+    torques[1] -= shoulder_load(joints[1], spring).residual
+    return torques

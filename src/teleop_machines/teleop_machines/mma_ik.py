@@ -1,0 +1,247 @@
+"""Inverse kinematics of the MMA: seven joints for six directions, on the branch next to the seed.
+
+Locally the redundancy is resolved by damped least squares inside the joint limits: of all joint
+moves that bring the tool to the pose, the smallest. The closed-form family then finds branches
+that lie nearer, and the poses that a local search misses.
+
+Source:
+    The thesis gives none; least squares on (position / 100 mm, rotation vector) as in the notes
+    that check Singh 2014. The search over branches is ours.
+"""
+
+import math
+
+import numpy as np
+
+from teleop_core.kernels import inner, kernel
+from teleop_core.kernels.geometry import Array
+from teleop_core.robots.branches import bounded
+from teleop_core.robots.chains import damped
+from teleop_core.robots.kinematics import IkStatus, is_askable, pose_residual
+from teleop_machines.mma_branches import BRANCHES, branch, least_miss, nearest_branch, unwrapped
+from teleop_machines.mma_forward import fk, groups, jacobian_at
+
+LENGTH = 0.1  # distance [m] that weighs as much as one radian
+_ROUNDS, _PATH_ROUNDS = 60, 12  # of the local search
+_STALLED = 1e-5  # share of the squared error that a round must take off
+# Damping per squared error: at the start, at least, and where no step helps any more.
+_DAMPING, _LEAST_DAMPING, _HOPELESS = 1e-2, 1e-6, 1e10
+_KICK = 0.02  # joint move that leaves a singular stand-still [rad]
+_STEP = math.radians(5.0)  # of θ10 between two looks at the branches
+_NEAR = 0.02  # singular value under which one radian of tool takes more than 50 of joints
+_FOLLOWED, _LIMITED = int(IkStatus.FOLLOWED), int(IkStatus.LIMITED)
+_NEAR_SINGULAR, _UNREACHABLE = int(IkStatus.NEAR_SINGULAR), int(IkStatus.UNREACHABLE)
+
+
+@inner
+def _descend(T: Array, box: Array, geometry: Array, rounds: int, q: Array) -> float:
+    """Lower the pose error from ``q`` (7,), inside a box, until it is zero or least.
+
+    Args:
+        T: Wanted ``T_base_tip`` (4, 4).
+        box: Lower and upper joint positions, then rows that do not matter (2 or more, 7).
+        geometry: Row of the robot.
+        rounds: Most evaluations.
+        q: Start inside the box (7,), then the result.
+
+    Returns:
+        Squared weighted error that is left.
+    """
+    J, reached, is_free = np.empty((6, 7)), np.empty((4, 4)), np.empty(7)
+    error, left, trial = np.empty(6), np.empty(6), np.empty(7)
+    damped.assign(trial, q)
+    square, damping = math.inf, _DAMPING
+    for _ in range(rounds):
+        fk(trial, geometry, reached)
+        trial_square = damped.pose_error(reached, T, LENGTH, left)
+        if trial_square < square:
+            is_stalled = trial_square > (1.0 - _STALLED) * square
+            square, damping = trial_square, max(0.2 * damping, _LEAST_DAMPING)
+            damped.assign(error, left)
+            damped.assign(q, trial)
+            if square <= damped.ZERO or is_stalled:
+                break
+            jacobian_at(q, geometry, reached, J)
+            damped.weigh(J, LENGTH)
+            if damped.free_joints(J, error, q, box, is_free) <= 1e-9 * math.sqrt(square):
+                break
+        else:
+            damping *= 10.0
+            if damping > _HOPELESS:
+                break
+        damped.damped_move(J, error, damping * square, is_free, box, q, trial)
+    return float(square)
+
+
+@inner
+def _approach(T: Array, box: Array, geometry: Array, rounds: int, q: Array) -> float:
+    """Move ``q`` (7,) inside a box to the pose T, or as near as a neighbourhood allows.
+
+    Where the error points along a direction that the arm has just lost, no step lowers it at
+    first order; a small move of all joints then leaves the stand-still, and is kept only if the
+    error becomes less.
+
+    Returns:
+        Squared weighted error that is left.
+    """
+    trial, square = np.empty(7), math.inf
+    for kick in (0.0, _KICK):
+        for i in range(7):
+            move = kick if i % 2 == 0 else -kick
+            trial[i] = min(max(q[i] + move, box[0, i]), box[1, i])
+        left = _descend(T, box, geometry, rounds, trial)
+        if left < 0.99 * square:
+            square = left
+            damped.assign(q, trial)
+        if square <= damped.ZERO:
+            break
+    return float(square)
+
+
+@inner
+def _cost(
+    T: Array, turn: float, choice: int, seed: Array, limits: Array, geometry: Array, q: Array
+) -> float:
+    """Write one branch; its largest joint move, infinity when it does not reach or is outside."""
+    if branch(T, turn, choice, geometry, seed, q) > 0.0:
+        return math.inf
+    return float(unwrapped(q, seed, limits))
+
+
+@kernel
+def _scan(
+    T: Array, seed: Array, limits: Array, geometry: Array, bound: float, found: Array
+) -> float:
+    """Look for branches nearer to the seed than ``bound``, in steps of θ10 away from it.
+
+    No joint moves less than θ10, so the search ends where θ10 alone has moved by the best so far.
+
+    Returns:
+        Largest joint move of the branch written as (θ10, choice) to ``found``; else ``bound``.
+    """
+    best = bound
+    for k in range(73):
+        turn = _STEP * ((k + 1) // 2) * (1.0 if k % 2 == 0 else -1.0)
+        if abs(turn) >= best:
+            break
+        best = nearest_branch(T, seed[6] + turn, seed, limits, geometry, best, found)
+    return float(best)
+
+
+@inner
+def _refine(T: Array, seed: Array, limits: Array, geometry: Array, found: Array, q: Array) -> float:
+    """Write the joints at the θ10 within one step where the largest joint move is least."""
+    choice, turn, width = int(found[1]), found[0], 0.5 * _STEP
+    trial = np.empty(7)
+    best = _cost(T, turn, choice, seed, limits, geometry, q)
+    while width > 1e-4:
+        centre = turn
+        for side in range(2):
+            place = centre + (width if side == 0 else -width)
+            cost = _cost(T, place, choice, seed, limits, geometry, trial)
+            if cost < best:
+                best, turn = cost, place
+                damped.assign(q, trial)
+        width *= 0.5
+    return float(best)
+
+
+@inner
+def _nearest_miss(T: Array, seed: Array, geometry: Array, q: Array) -> float:
+    """Write the branch whose wrist stays away least over a full turn of θ10; that distance [m]."""
+    found, least, width = np.empty(2), math.inf, 2.0 * _STEP
+    found[0], found[1] = seed[6], 0.0
+    for k in range(36):
+        least = least_miss(T, seed[6] + width * k, seed, geometry, least, found)
+        if least == 0.0:
+            break
+    while least > 0.0 and width > 1e-3:
+        width *= 0.5
+        centre = found[0]
+        least = least_miss(T, centre + width, seed, geometry, least, found)
+        least = least_miss(T, centre - width, seed, geometry, least, found)
+    branch(T, found[0], int(found[1]), geometry, seed, q)
+    return float(least)
+
+
+@inner
+def _can_reach(T: Array, q: Array, geometry: Array) -> bool:
+    """Whether any joint vector reaches a pose, limits or not, searched from θ10 of ``q``."""
+    H, S, F, G = groups(geometry)
+    arm = math.hypot(geometry[1] + geometry[2] + H, geometry[4]) + math.hypot(F, S + G)
+    square = T[0, 3] * T[0, 3] + T[1, 3] * T[1, 3] + (T[2, 3] - geometry[0]) ** 2
+    if square > arm * arm:
+        return False
+    return bool(_nearest_miss(T, q, geometry, np.empty(7)) == 0.0)
+
+
+@inner
+def _search_branches(
+    T: Array, seed: Array, limits: Array, geometry: Array, left: float, q: Array
+) -> None:
+    """Replace ``q`` by joints that reach the pose and lie nearer to the seed, where there are any.
+
+    Args:
+        T: Wanted ``T_base_tip`` (4, 4).
+        seed: Joints (7,) to stay next to.
+        limits: Rows lower, upper and more (3, 7).
+        geometry: Row of the robot.
+        left: Squared weighted error of ``q``; while it is not zero, any solution is nearer.
+        q: Result (7,) of the local search, then of this one.
+    """
+    found, trial, bound = np.empty(2), np.empty(7), math.inf
+    if left <= damped.ZERO:
+        bound = unwrapped(q, seed, limits)
+    if _scan(T, seed, limits, geometry, bound, found) < bound:
+        _refine(T, seed, limits, geometry, found, q)
+    elif left > damped.ZERO:
+        _nearest_miss(T, seed, geometry, trial)
+        unwrapped(trial, seed, limits)
+        if _approach(T, limits, geometry, _ROUNDS, trial) < left:
+            damped.assign(q, trial)
+
+
+@kernel
+def ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual: Array) -> int:
+    """Write joints (7,) for ``T_base_tip``; see :class:`teleop_core.robots.robot.Kernels`.
+
+    Along a path (finite steps) only the local search is used, inside one step around the seed:
+    the branch cannot change, and at a singularity the arm lags and goes on.
+    """
+    if not is_askable(T, seed):
+        return -1
+    is_path = math.isfinite(limits[2, 0])
+    box, J, reached = np.empty((2, 7)), np.empty((6, 7)), np.empty((4, 4))
+    for i in range(7):
+        box[0, i] = bounded(-math.inf, seed[i], limits[0, i], limits[1, i], limits[2, i])
+        box[1, i] = bounded(math.inf, seed[i], limits[0, i], limits[1, i], limits[2, i])
+    damped.assign(q, seed)
+    left = _approach(T, box, geometry, _PATH_ROUNDS if is_path else _ROUNDS, q)
+    if not is_path:
+        _search_branches(T, seed, limits, geometry, left, q)
+    fk(q, geometry, reached)
+    if not pose_residual(reached, T, residual):
+        return _LIMITED if _can_reach(T, q, geometry) else _UNREACHABLE
+    jacobian_at(q, geometry, reached, J)
+    return _NEAR_SINGULAR if damped.is_near_singular(J, LENGTH, _NEAR) else _FOLLOWED
+
+
+@kernel
+def ik_all(T: Array, geometry: Array, solutions: Array) -> int:
+    """Write one joint vector per branch (up to 8, 7), with θ10 as near to zero as it can be.
+
+    The arm has one joint more than a pose needs, so each branch stands for a curve of joint
+    vectors; :func:`branch` gives the others. Angles lie within half a turn of home.
+    """
+    count, home, free = 0, np.zeros(7), np.empty((2, 7))
+    home[1], home[3], home[4] = -0.5 * math.pi, 0.5 * math.pi, 0.5 * math.pi
+    for i in range(7):
+        free[0, i], free[1, i] = -math.inf, math.inf
+    for choice in range(BRANCHES):
+        for k in range(73):
+            turn = _STEP * ((k + 1) // 2) * (1.0 if k % 2 == 0 else -1.0)
+            if branch(T, turn, choice, geometry, home, solutions[count]) == 0.0:
+                unwrapped(solutions[count], home, free)
+                count += 1
+                break
+    return count

@@ -1,0 +1,398 @@
+"""Textbook arms: numbers of lecture and thesis, singular paths, answers of their former kernels.
+
+What holds for every arm with a closed form stands in ``test_robot_laws``.
+"""
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+import roboticstoolbox as rtb
+from scipy.spatial.transform import Rotation
+
+from random_arms import table
+from teleop_core.base.errors import ParameterError
+from teleop_core.kernels.geometry import Array, rotation, transform
+from teleop_core.robots import IkStatus, load_robot
+from teleop_core.robots.arms.dh import load_table
+from teleop_core.robots.closed_form.decomposition import SEARCH
+from ways import followed
+
+ANSWERS = json.loads(
+    (Path(__file__).parents[1] / "data" / "textbook_answers.json").read_text(encoding="utf-8")
+)
+"""Poses, Jacobians and branches of the kernels that each arm had, by its name."""
+PUMA, SCARA, PLANAR, FIVE = (load_robot(name) for name in ANSWERS)
+A2, A3, D3, D4 = PUMA.geometry.values()
+ROUNDING, DEGREE, DT = 1e-14, math.pi / 180.0, 1e-3
+PRINTED = 5e-7  # half of the last digit of the spec's numbers
+
+
+def drawn(arm: object, count: int = 100, seed: int = 1) -> Array:
+    rng = np.random.default_rng(seed)
+    return rng.uniform(arm.lower, arm.upper, (count, arm.n))  # type: ignore[attr-defined]
+
+
+def apart(a: Array, b: Array) -> Array:
+    """Largest difference of joint vectors with whole turns taken out."""
+    off: Array = np.abs((a - b + math.pi) % (2.0 * math.pi) - math.pi).max(axis=-1)
+    return off
+
+
+@pytest.mark.parametrize("name", ANSWERS)
+def test_table_answers_as_the_former_kernels_did(name: str) -> None:
+    arm = load_robot(name)
+    for said in ANSWERS[name]:
+        q, branches = np.array(said["q"]), np.array(said["branches"])
+        pose = np.vstack((np.reshape(said["pose"], (3, 4)), [0.0, 0.0, 0.0, 1.0]))
+        assert np.abs(arm.fk(q) - pose).max() < ROUNDING
+        assert np.abs(arm.jacobian(q).ravel() - said["jacobian"]).max() < ROUNDING
+        assert np.abs(arm.ik(pose, q).q - q).max() < 1e-12
+        found = arm.ik_all(pose)
+        assert len(found) == len(branches)
+        assert max(apart(branches, row).min() for row in found) < 1e-12
+
+
+def test_only_lengths_of_links_that_are_none_make_an_arm_that_is_searched() -> None:
+    for name in ANSWERS:
+        assert "closed form" in load_robot(name).solution
+        symbol = next(iter(load_robot(name).geometry))
+        with pytest.raises(ParameterError, match="between -10 and 10 m"):
+            load_robot(name, **{symbol: 11.0})
+    assert load_robot("scara", a1=0.0).solution == SEARCH.text
+
+
+def test_slides_and_first_joints_that_do_not_fit_the_plane_are_searched() -> None:
+    turns = [{"theta": "q"}, {"a": 0.4, "theta": "q"}, {"a": 0.3, "theta": "q"}]
+    leaning = {"alpha": 30, "a": 0.1, "d": "q", "lower": 0, "upper": 1}
+    for rows, task in (
+        ([*turns, leaning], ["x", "y", "z", "rz"]),
+        ([{"theta": "q"}, {**turns[0], "alpha": 60}, *turns[1:]], ["x", "y", "z", "rz"]),
+        (turns, ["x", "y", "z"]),
+    ):
+        assert table(rows, task=task).robot().solution == SEARCH.text
+
+
+# PUMA 560.
+
+
+def puma_links(q: Array) -> Array:
+    """D4: the six link matrices of the lecture, row 2 of 5_6T repaired; their product."""
+    (c1, c2, c3, c4, c5, c6), (s1, s2, s3, s4, s5, s6) = np.cos(q), np.sin(q)
+    last, out = [0, 0, 0, 1], np.eye(4)
+    for link in (
+        [[c1, -s1, 0, 0], [s1, c1, 0, 0], [0, 0, 1, 0], last],
+        [[c2, -s2, 0, 0], [0, 0, 1, 0], [-s2, -c2, 0, 0], last],
+        [[c3, -s3, 0, A2], [s3, c3, 0, 0], [0, 0, 1, D3], last],
+        [[c4, -s4, 0, A3], [0, 0, 1, D4], [-s4, -c4, 0, 0], last],
+        [[c5, -s5, 0, 0], [0, 0, -1, 0], [s5, c5, 0, 0], last],
+        [[c6, -s6, 0, 0], [0, 0, 1, 0], [-s6, -c6, 0, 0], last],
+    ):
+        out = out @ np.array(link)
+    return out
+
+
+def test_d4_d5_product_of_the_pumas_links_is_the_lectures_with_its_repair() -> None:
+    for q in drawn(PUMA):
+        assert np.abs(PUMA.fk(q) - puma_links(q)).max() < ROUNDING
+
+
+def test_d6_zero_pose_with_round_lengths() -> None:
+    pose = load_robot("puma560", a2=0.43, a3=0.02, d3=0.15, d4=0.43).fk(np.zeros(6))
+    assert np.abs(pose[:3, 3] - (0.45, 0.15, -0.43)).max() < ROUNDING
+    assert np.abs(pose[:3, :3] - np.diag([1.0, -1.0, -1.0])).max() < ROUNDING
+
+
+def test_lengths_ranges_and_wrist_centre_are_those_of_roboticstoolbox() -> None:
+    # Its zeros differ (standard table, joints 1 and 2 half a turn on), its base is on the floor.
+    peer = rtb.models.DH.Puma560()
+    assert (peer.links[1].a, peer.links[2].a, peer.links[2].d, peer.links[3].d) == (A2, A3, D3, D4)
+    shift = np.array([0.0, math.pi, 0.0, 0.0, 0.0, 0.0])
+    assert np.abs(PUMA.lower - (peer.qlim[0] - shift)).max() < ROUNDING
+    assert np.abs(PUMA.upper - (peer.qlim[1] - shift)).max() < ROUNDING
+    for q in drawn(PUMA):
+        theirs = peer.fkine([q[0] + math.pi, q[1] + math.pi, *q[2:]]).A[:3, 3]
+        theirs[2] -= 26.45 * 0.0254
+        assert np.abs(PUMA.fk(q)[:3, 3] - theirs).max() < 1e-12
+
+
+def test_a_straight_wrist_has_valid_branches_and_keeps_the_seed_of_joint_4() -> None:
+    rng = np.random.default_rng(3)
+    for q in drawn(PUMA, 300):
+        q[4] = 0.0
+        # Room for the seed, and for joint 6 to take over what joint 4 keeps.
+        q[:] = 0.8 * q
+        # Far from the other singularities, whose rounding would bend the wrist by 1e-8.
+        q[1:3] = PUMA.home[1:3]
+        pose = PUMA.fk(q)
+        assert np.abs(PUMA.fk(PUMA.ik_all(pose)) - pose).max() < 1e-9
+        seed = q + rng.uniform(-0.1, 0.1, 6)
+        result = PUMA.ik(pose, seed)
+        assert result.status is IkStatus.NEAR_SINGULAR
+        assert result.q[3] == pytest.approx(seed[3], abs=1e-12)
+        assert result.residual.max() < 1e-9
+
+
+def test_the_cylinder_around_axis_1_and_a_folded_arm_cannot_be_reached() -> None:
+    for place in ((0.1, 0.0, 0.3), (0.0, D3, 0.0)):
+        pose = transform(np.eye(3), np.array(place))
+        assert len(PUMA.ik_all(pose)) == 0
+        assert PUMA.ik(pose).status is IkStatus.UNREACHABLE
+
+
+def swung(tilt: float, most: float, count: int) -> Array:
+    """Poses of the PUMA's tool swung about its y axis through a straight wrist, tilted about x."""
+    straight = PUMA.home.copy()
+    straight[4] = 0.0
+    pose, tilted = PUMA.fk(straight), rotation("x", tilt)
+    turns = [pose[:3, :3] @ rotation("y", a) @ tilted for a in np.linspace(most, -most, count)]
+    return np.array([transform(turn, pose[:3, 3]) for turn in turns])
+
+
+@pytest.mark.parametrize("tilt", [0.0, 1e-12, 1e-9, 1e-6, 1e-4, 1e-3, 1e-2, -0.1])
+def test_the_wrist_passes_through_and_beside_its_singularity_without_a_halt(tilt: float) -> None:
+    path = swung(tilt, 0.4, 2000)
+    result = followed(PUMA, path, PUMA.ik(path[0], PUMA.home).q)
+    assert result.residual[-1].max() < 1e-9
+    assert not (result.status == IkStatus.UNREACHABLE).any()
+    assert result.residual[:, 1].max() < 0.05
+    assert (result.residual[:, 1] > 1e-9).sum() < 400
+    # Lagging costs little position: the wrist axes pass through the tip.
+    assert result.residual[:, 0].max() < 0.01
+
+
+def test_a_slow_path_through_the_straight_wrist_has_no_error_at_all() -> None:
+    path = swung(0.0, 0.2, 2001)
+    result = PUMA.follow(path, PUMA.ik(path[0], PUMA.home).q, DT)
+    assert result.residual.max() < 1e-9
+    assert np.abs(np.diff(result.q, axis=0)).max() < 1e-3
+
+
+def test_a_joint_of_the_wrist_on_its_stop_costs_no_place() -> None:
+    start = np.array([10.0, -45.0, -45.0, 150.0, 45.0, 20.0]) * DEGREE
+    path = np.tile(start, (2000, 1))
+    path[:, 3] += np.linspace(0.0, 1.0, 2000)
+    result = PUMA.follow(PUMA.fk(path), start, DT)
+    assert result.q[-1, 3] == PUMA.upper[3]
+    assert result.residual[:, 0].max() < 1e-12
+
+
+@pytest.mark.parametrize("beyond", [1.001, 1.05, 1.4])
+def test_reaching_out_beyond_the_stretched_arm_and_back_keeps_the_elbow(beyond: float) -> None:
+    q = np.array([0.1, -0.5, -1.3, 0.2, 0.7, 0.1])
+    pose = PUMA.fk(q)
+    reach = math.hypot(A2 + math.hypot(A3, D4), D3)
+    far = pose[:3, 3] * beyond * reach / np.linalg.norm(pose[:3, 3])
+    result = followed(PUMA, out_and_back(pose, far), q)
+    assert (result.status == IkStatus.UNREACHABLE).any()
+    assert result.residual[-1].max() < 1e-9
+
+
+def out_and_back(pose: Array, far: Array) -> Array:
+    way = np.linspace(pose[:3, 3], far, 3000)
+    points = np.concatenate((way, way[::-1], way[:1].repeat(1000, axis=0)))
+    return np.array([transform(pose[:3, :3], p) for p in points])
+
+
+@pytest.mark.parametrize("offset", [0.0, 0.05, D3 - 1e-3, D3, D3 + 1e-6, D3 + 1e-3, 0.2, 0.3])
+def test_a_path_over_axis_1_keeps_its_speeds_and_goes_on_behind(offset: float) -> None:
+    x = np.concatenate((np.linspace(0.4, -0.4, 3000), np.full(3000, -0.4)))
+    down = rotation("y", math.pi)
+    path = np.array([transform(down, np.array([value, offset, 0.5])) for value in x])
+    result = followed(PUMA, path, PUMA.ik(path[0]).q)
+    if offset > D3:
+        # No branch flips, and no limit is in the way on this side.
+        assert result.residual[-1, 0] < 1e-9
+
+
+# SCARA.
+
+
+def test_d9_numbers_and_the_other_elbow() -> None:
+    q = np.array([25.0 * DEGREE, 50.0 * DEGREE, 0.12, -30.0 * DEGREE])
+    pose = SCARA.fk(q)
+    assert np.abs(pose[:3, 3] - (0.440169, 0.458825, -0.12)).max() < PRINTED
+    assert math.atan2(pose[1, 0], pose[0, 0]) == pytest.approx(45.0 * DEGREE, abs=ROUNDING)
+    first, second = SCARA.ik_all(pose)
+    assert np.abs(first - q).max() < 1e-12
+    scale = np.array([DEGREE, DEGREE, 1.0, DEGREE])
+    assert np.abs(second / scale - (67.377701, -50.0, 0.12, 27.622299)).max() < PRINTED
+
+
+def test_h11_proximal_and_distal_tables_of_the_thesis_are_one_arm() -> None:
+    # Singh 2014, tables 3.1 and 3.3: theta2 and d3 change sign, d2 = d5 = 0.
+    slide = {"lower": -1, "upper": 1}
+    distal = [
+        {"a": 0.4, "alpha": 180, "d": 0.3, "theta": "q"}, {"a": 0.3, "theta": "q"},
+        {"d": "q", **slide}, {"d": 0.05, "theta": "q"},
+    ]  # fmt: skip
+    proximal = [
+        {"d": 0.3, "theta": "q"}, {"a": 0.4, "theta": "q"}, {"a": 0.3, "d": "q", **slide},
+        {"alpha": 180, "d": 0.05, "theta": "q"},
+    ]  # fmt: skip
+    sheth_uicker = [
+        {"a": 0.4, "alpha": 180, "c": 0.3, "gamma": "q"}, {"a": 0.3, "gamma": "q"},
+        {"c": "q", **slide}, {"c": 0.05, "gamma": "q"},
+    ]  # fmt: skip
+    task = ["x", "y", "z", "rz"]
+    one, two = table(distal, "standard", task=task).robot(), table(proximal, task=task).robot()
+    three = table(sheth_uicker, "sheth_uicker", task=task).robot()
+    for q in np.random.default_rng(2).uniform(-1.0, 1.0, (50, 4)):
+        assert np.abs(one.fk(q) - two.fk(q * (1, -1, -1, 1))).max() < ROUNDING
+        assert np.abs(one.fk(q) - three.fk(q)).max() < ROUNDING
+        for arm in (one, two, three):
+            assert "closed form, 2" in arm.solution
+            assert apart(arm.ik_all(arm.fk(q)), q).min() < 1e-9
+
+
+def test_tilt_and_height_that_an_arm_lacks_are_left_as_residual_and_the_rest_is_followed() -> None:
+    for arm, q, axis, height in (
+        (SCARA, [0.3, 0.8, 0.1, -0.4], "x", 0.0), (PLANAR, [0.4, 0.9, -0.5], "y", 0.25),
+        (FIVE, FIVE.home, "x", 0.0),
+    ):  # fmt: skip
+        for tilt, lift in ((0.3, 0.0), (0.0, height)):
+            pose = arm.fk(q)
+            pose[2, 3] += lift
+            pose[:3, :3] = pose[:3, :3] @ rotation(axis, tilt)
+            result = arm.ik(pose, q)
+            assert result.status is IkStatus.FOLLOWED
+            assert np.abs(result.q - q).max() < 1e-12
+            assert result.residual == pytest.approx((lift, tilt), abs=1e-12)
+            assert (len(arm.ik_all(pose)) == 0) == (tilt + lift > 0.0)
+    masks = [[int(is_held) for is_held in arm.task_mask] for arm in (SCARA, PLANAR, FIVE)]
+    assert masks == [[1, 1, 1, 0, 0, 1], [1, 1, 0, 0, 0, 1], [1, 1, 1, 0, 1, 1]]
+
+
+def test_a_height_beyond_the_slide_is_limited_not_unreachable() -> None:
+    pose = SCARA.fk([0.3, 0.8, 0.2, 0.0])
+    pose[2, 3] = -0.25
+    result = SCARA.ik(pose)
+    assert result.status is IkStatus.LIMITED
+    assert result.residual[0] == pytest.approx(0.05)
+    assert result.q[2] == 0.2
+
+
+def test_the_tool_turns_on_over_a_whole_turn_without_unwinding() -> None:
+    q, turns = SCARA.home, np.linspace(-math.pi, math.pi, 4001)
+    poses = np.array([transform(rotation("z", a), SCARA.fk(q)[:3, 3]) for a in turns])
+    seed = SCARA.ik(poses[0], q - (0.0, 0.0, 0.0, 3.0)).q
+    result = SCARA.follow(poses, seed, DT)
+    assert result.residual.max() < 1e-9
+    assert result.q[-1, 3] - result.q[0, 3] == pytest.approx(2.0 * math.pi, abs=1e-9)
+
+
+@pytest.mark.parametrize("y", [0.0, 1e-9, 1e-3, 0.1, 0.3])
+def test_lines_beside_the_column_keep_speeds_and_go_on(y: float) -> None:
+    x = np.concatenate((np.linspace(0.5, -0.5, 4000), np.full(2000, -0.5)))
+    poses = np.array([transform(np.eye(3), np.array([value, y, -0.1])) for value in x])
+    followed(SCARA, poses, SCARA.ik(poses[0]).q)
+
+
+# Planar 3R.
+
+
+def test_d3_numbers_and_the_other_elbow() -> None:
+    q = np.array([30.0, 45.0, -60.0]) * DEGREE
+    pose = PLANAR.fk(q)
+    assert np.abs(pose[:2, 3] - (1.556044, 1.402150)).max() < PRINTED
+    assert math.atan2(pose[1, 0], pose[0, 0]) == pytest.approx(15.0 * DEGREE, abs=ROUNDING)
+    wrist = load_robot("planar_3r", l3=0.0).fk(q)
+    assert np.abs(wrist[:2, 3] - (1.073081, 1.272741)).max() < PRINTED
+    solutions = PLANAR.ik_all(pose)
+    assert np.abs(solutions[0] - q).max() < 1e-12
+    assert np.abs(solutions[1] / DEGREE - (69.7298, -45.0, -9.7298)).max() < 5e-5
+
+
+def test_points_outside_the_ring_have_no_branch() -> None:
+    for x, count in ((2.3 + 1e-6, 0), (0.7 - 1e-6, 0), (2.3 - 1e-6, 2), (0.7 + 1e-6, 2)):
+        pose = transform(np.eye(3), np.array([x, 0.0, 0.0]))
+        assert len(PLANAR.ik_all(pose)) == count
+        assert (PLANAR.ik(pose).status is IkStatus.UNREACHABLE) == (count == 0)
+
+
+@pytest.mark.parametrize("lateral", [0.0, 1e-9, 1e-3, 0.05])
+def test_stretching_out_and_back_keeps_speeds_and_ends_on_the_path(lateral: float) -> None:
+    start = transform(np.eye(3), np.array([1.6, lateral, 0.0]))
+    poses = out_and_back(start, np.array([2.5, lateral, 0.0]))
+    result = followed(PLANAR, poses, PLANAR.ik(poses[0]).q)
+    assert result.residual[-1].max() < 1e-9
+    # Beyond reach the nearest point of the ring is held.
+    assert result.residual[2999, 0] == pytest.approx(math.hypot(2.0, lateral) - 1.8, abs=1e-6)
+
+
+@pytest.mark.parametrize("lateral", [0.0, 1e-9, 1e-3, 0.1, 0.19, 0.21])
+def test_crossing_the_hole_in_the_middle_keeps_speeds_and_goes_on(lateral: float) -> None:
+    wrist_x = np.concatenate((np.linspace(0.6, -0.6, 4000), np.full(3000, -0.6)))
+    poses = np.array([transform(np.eye(3), np.array([x + 0.5, lateral, 0.0])) for x in wrist_x])
+    followed(PLANAR, poses, PLANAR.ik(poses[0], [0.0, 2.0, 0.0]).q)
+
+
+def test_equal_links_folded_onto_the_axis_keep_the_seed_of_joint_1() -> None:
+    arm = load_robot("planar_3r", l1=0.5, l2=0.5, l3=0.0)
+    result = arm.ik(np.eye(4), [0.7, 2.5, 0.0])
+    assert result.q[0] == pytest.approx(0.7)
+    assert np.isfinite(result.q).all()
+
+
+# Five-axis arm.
+
+
+def test_h12_the_thesis_tables_of_two_conventions_are_this_arm() -> None:
+    distal = load_table("config/robots/five_axis_standard.yaml").robot()
+    rolled = load_table("config/robots/five_axis_sheth_uicker.yaml").robot()
+    roll = transform(rotation("z", -math.pi / 2.0), np.zeros(3))
+    for q in drawn(FIVE):
+        assert np.abs(distal.fk(q) - FIVE.fk(q)).max() < ROUNDING
+        ours = FIVE.fk(q - (0.0, 0.0, 0.0, math.pi / 2.0, 0.0)) @ roll
+        assert np.abs(rolled.fk(q) - ours).max() < ROUNDING
+    assert all("closed form, 4 solutions" in arm.solution for arm in (distal, rolled))
+
+
+def test_at_home_the_tool_points_straight_down_and_at_zero_of_joint_4_forward() -> None:
+    assert np.abs(FIVE.fk(FIVE.home)[:3, 2] - (0.0, 0.0, -1.0)).max() < ROUNDING
+    forward = FIVE.fk([0.0, 0.0, 0.0, -math.pi / 2.0, 0.0])
+    assert np.abs(forward[:3, 2] - (1.0, 0.0, 0.0)).max() < ROUNDING
+    d1, a2, a3, d5 = FIVE.geometry.values()
+    assert np.abs(forward[:3, 3] - (a2 + a3 + d5, 0.0, d1)).max() < ROUNDING
+
+
+def test_no_other_attitude_of_the_arm_is_nearer_than_the_one_it_takes() -> None:
+    arm, rng, count = load_robot("five_axis", d5=0.0), np.random.default_rng(5), 0
+    grid = np.linspace(-math.pi, math.pi, 61)
+    for _ in range(40):
+        wanted = arm.fk(arm.home)  # any pitch leaves the tip where it is
+        wanted[:3, :3] = Rotation.random(random_state=rng).as_matrix()
+        q, status, _ = arm.ik(wanted)
+        if status is not IkStatus.FOLLOWED:
+            continue  # a limit has a say
+
+        def miss(pitch: float, roll: float, q: Array = q, wanted: Array = wanted) -> float:
+            turn = arm.fk(q + np.array([0.0, 0.0, 0.0, pitch, roll]))[:3, :3]
+            return float(Rotation.from_matrix(turn.T @ wanted[:3, :3]).magnitude())
+
+        best, count = miss(0.0, 0.0), count + 1
+        assert best <= min(miss(a, b) for a in grid for b in grid) + 1e-12
+        # And it is a stationary point: small moves never help.
+        for a, b in rng.uniform(-1e-4, 1e-4, (20, 2)):
+            assert best <= miss(a, b) + 1e-12
+    assert count > 10
+
+
+@pytest.mark.parametrize("y", [0.0, 1e-9, 1e-4, 1e-2])
+def test_lines_over_the_base_axis_keep_speeds_and_go_on(y: float) -> None:
+    x = np.concatenate((np.linspace(0.2, -0.2, 3000), np.full(4000, -0.2)))
+    down = FIVE.fk(FIVE.home)[:3, :3]
+    poses = np.array([transform(down, np.array([value, y, 0.3])) for value in x])
+    followed(FIVE, poses, FIVE.ik(poses[0]).q)
+
+
+@pytest.mark.parametrize("reach", [1.001, 1.2])
+def test_stretching_beyond_reach_and_back_ends_on_the_path(reach: float) -> None:
+    q = np.array([0.2, -0.6, 1.0, -0.4, 0.3])
+    pose = FIVE.fk(q)
+    far = pose[:3, 3].copy()
+    far[:2] *= reach * (FIVE.geometry["a2"] + FIVE.geometry["a3"]) / np.linalg.norm(far[:2])
+    result = followed(FIVE, out_and_back(pose, far), q)
+    assert result.residual[-1].max() < 1e-9
