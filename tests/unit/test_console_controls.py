@@ -5,8 +5,7 @@ from typing import Any
 
 import pytest
 
-import teleop_console
-from teleop_console.controls import CONTROLS, commands, register_control
+from teleop_console.controls import CONTROLS, Control, commands, register_control
 from teleop_core.base.errors import PartError
 from teleop_core.slave.operation.states import AT_REST_ONLY, STILL_PRESSED
 
@@ -54,20 +53,15 @@ def test_buttons_of_the_stylus_are_those_of_the_device() -> None:
     assert session.buttons == [("", "mode"), ("", "fixture")]
 
 
-@pytest.mark.parametrize(
-    "part",
-    [len, teleop_console.Control("x", "", None), teleop_console.Control("x", "", len, "", 3)],
-)  # type: ignore[arg-type]
-def test_what_is_no_control_is_refused(
-    part: Callable[..., object] | teleop_console.Control,
-) -> None:
+@pytest.mark.parametrize("part", [len, Control("x", "", None), Control("x", "", len, "", 3)])  # type: ignore[arg-type]
+def test_what_is_no_control_is_refused(part: Callable[..., object] | Control) -> None:
     with pytest.raises(PartError) as told:
         CONTROLS.add("x", part)
     assert told.value.kind == "control"
 
 
 def test_a_control_of_ones_own_stands_behind_those_that_are_there() -> None:
-    mine = register_control(teleop_console.Control("Mine", "does nothing", lambda link, arm: ()))
+    mine = register_control(Control("Mine", "does nothing", lambda link, arm: ()))
     try:
         assert CONTROLS.names()[-1] == mine.name
     finally:

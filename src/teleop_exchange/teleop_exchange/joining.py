@@ -8,16 +8,14 @@ import numpy as np
 
 from teleop_core.bags.memory import MemoryBag
 from teleop_core.bags.reader import Bag
-from teleop_core.bags.series import Series, in_order, kind_of
+from teleop_core.bags.series import Series, kind_of
 from teleop_core.base.errors import TeleopWarning, UnknownNameError
+from teleop_core.evaluation.windows import CONTEXT_NS, whole, windows
 from teleop_core.graph.topics import BY_NAME, Kind
 from teleop_core.kernels.geometry import Array
 from teleop_core.session.recording import Recording, Stream
 from teleop_core.session.replayed_span import LONGEST_GAP_NS
 from teleop_exchange.times import SECOND_NS, Stamps
-
-_SLACK_NS = SECOND_NS
-"""How much earlier than the last chunk of a file messages of the next one may be."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,43 +125,25 @@ class Streams:
         return newest(times, logs, np.concatenate([series.values for series in known]))
 
     def _pieces(self) -> Iterator[dict[str, Series]]:
-        """Stretches of the recording that follow each other, each with the streams that have any.
-
-        Chunks of a file need not be in order; if they are not, all of it is read at once.
-        """
+        """Stretches that follow each other, each with the streams that have messages in it."""
         if not self._names:
             yield {name: _series(stream) for name, stream in self._reports.items()}
             return
-        done = -(2**62)
-        if isinstance(self._bag, MemoryBag) or not self._is_in_order():
-            yield _sorted({name: [s] for name, s in self._bag.read_many(self._names).items()})
-            return
-        waiting: dict[str, list[Series]] = {}
-        for block in self._bag.blocks(self._names):
-            firsts = [int(series.log_ns.min()) for series in block.values() if len(series)]
-            if not firsts:
-                continue
-            for name, series in block.items():
-                waiting.setdefault(name, []).append(series)
-            cut = min(firsts) - _SLACK_NS
-            if cut > done:
-                done = cut
-                if piece := _before(waiting, cut):
-                    yield piece
-        if piece := _sorted(waiting):
-            yield piece
+        read = windows if self._is_in_order() else whole
+        for window in read(self._bag, self._names):
+            piece = {name: series[window.own(name)] for name, series in window.series.items()}
+            if piece := {name: series for name, series in piece.items() if len(series)}:
+                yield piece
 
     def _is_in_order(self) -> bool:
         """Whether no chunk of the file begins long before the end of the one before it."""
-        if self._bag.metadata:  # our writer's are
-            return True
-        last = -(2**62)
-        for block in self._bag.blocks(self._names):
+        newest = -(2**62)
+        for block in () if isinstance(self._bag, MemoryBag) else self._bag.blocks(self._names):
             logs = [series.log_ns for series in block.values() if len(series)]
-            if logs and min(int(log.min()) for log in logs) < last - _SLACK_NS:
+            if logs and min(int(log.min()) for log in logs) <= newest - CONTEXT_NS:
                 return False
-            last = max([last, *(int(log.min()) for log in logs)])
-        return True
+            newest = max([newest, *(int(log.max()) for log in logs)])
+        return not isinstance(self._bag, MemoryBag)
 
 
 def _numbers(since_ns: Stamps, step: float, first: int) -> Stamps:
@@ -231,20 +211,3 @@ def newest(times: Stamps, logs: Stamps, rows: Array) -> Array:
 
 def _series(stream: Stream) -> Series:
     return Series(stream.stamp_ns, stream.log_ns, stream.values)
-
-
-def _sorted(waiting: Mapping[str, list[Series]]) -> dict[str, Series]:
-    """One series of each topic that has messages, in the order of log times."""
-    whole = {name: in_order(parts) for name, parts in waiting.items()}
-    return {name: series for name, series in whole.items() if len(series)}
-
-
-def _before(waiting: dict[str, list[Series]], cut: int) -> dict[str, Series]:
-    """Take what was logged before a time [ns] out of what is waiting."""
-    out = {}
-    for name, series in _sorted(waiting).items():
-        end = int(np.searchsorted(series.log_ns, cut))
-        waiting[name] = [series[end:]]
-        if end:
-            out[name] = series[:end]
-    return out

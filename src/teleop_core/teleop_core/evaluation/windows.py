@@ -68,9 +68,9 @@ class Window:
             self._known[name] = compute()
         return cast(Found, self._known[name])
 
-    def own(self, topic: Topic) -> slice:
+    def own(self, topic: Topic | str) -> slice:
         """Samples of a topic inside of the window; the rest is context."""
-        series = self.series.get(topic.name)
+        series = self.series.get(topic if isinstance(topic, str) else topic.name)
         if series is None:
             return slice(0, 0)
         first, last = np.searchsorted(series.log_ns, (self.after_ns, self.until_ns), side="right")
@@ -82,14 +82,14 @@ class DisorderError(Exception):
 
 
 def whole(
-    bag: Bag, topics: Iterable[Topic], history: StateHistory = NO_HISTORY, lag: int = 0
+    bag: Bag, topics: Iterable[Topic | str], history: StateHistory = NO_HISTORY, lag: int = 0
 ) -> Iterator[Window]:
     """The recording as one window, whatever the order in its file."""
     yield Window(-_FOREVER, _FOREVER, bag.read_many(topics), history, lag)
 
 
 def windows(
-    bag: Bag, topics: Iterable[Topic], history: StateHistory = NO_HISTORY, lag: int = 0
+    bag: Bag, topics: Iterable[Topic | str], history: StateHistory = NO_HISTORY, lag: int = 0
 ) -> Iterator[Window]:
     """Windows of a recording in the order of time; memory does not grow with its length.
 
