@@ -12,9 +12,10 @@ from pinocchio import Model
 
 from teleop_core.base.errors import ParameterError, ShapeError, UnknownNameError
 from teleop_core.kernels.geometry import Array, rotation
-from teleop_core.robots import load_robot, mma_models
+from teleop_core.robots import load_robot
 from teleop_core.robots.arms.dh import DhRow
 from teleop_core.robots.robot import Robot
+from teleop_machines import mma_models
 
 MM = 1e-3
 # The spec gives derived values to 0.01 mm and asks for 0.05 mm and 1e-4.

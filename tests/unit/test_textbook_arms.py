@@ -6,6 +6,7 @@ What holds for every arm with a closed form stands in ``test_robot_laws``.
 import json
 import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -65,7 +66,11 @@ def test_only_lengths_of_links_that_are_none_make_an_arm_that_is_searched() -> N
 
 
 def test_slides_and_first_joints_that_do_not_fit_the_plane_are_searched() -> None:
-    turns = [{"theta": "q"}, {"a": 0.4, "theta": "q"}, {"a": 0.3, "theta": "q"}]
+    turns: list[dict[str, Any]] = [
+        {"theta": "q"},
+        {"a": 0.4, "theta": "q"},
+        {"a": 0.3, "theta": "q"},
+    ]
     leaning = {"alpha": 30, "a": 0.1, "d": "q", "lower": 0, "upper": 1}
     for rows, task in (
         ([*turns, leaning], ["x", "y", "z", "rz"]),
