@@ -57,7 +57,7 @@ def limit_text(limit: int, joint: int, joint_names: tuple[str, ...] = ()) -> str
 
 
 class Kind(Enum):
-    """What the values of a topic are; the value is the message's ROS type.
+    """What the values of a topic are, and by which ROS message they go.
 
     Columns of a value row, in the order used inside the package:
 
@@ -74,21 +74,19 @@ class Kind(Enum):
     ======== ==================================================================
     """
 
-    POSE = "geometry_msgs/msg/PoseStamped"
-    TWIST = "geometry_msgs/msg/TwistStamped"
-    WRENCH = "geometry_msgs/msg/WrenchStamped"
-    BUTTONS = "sensor_msgs/msg/Joy"
-    # Blanks keep those of one message type apart; see ros_type. Unknown topics get the last.
-    JAW = "sensor_msgs/msg/JointState   "
-    NUMBERS = "sensor_msgs/msg/JointState  "
-    JOINTS = "sensor_msgs/msg/JointState"
-    STATE = "sensor_msgs/msg/JointState "
-    REPORT = "diagnostic_msgs/msg/DiagnosticArray"
+    POSE = "pose", "geometry_msgs/msg/PoseStamped"
+    TWIST = "twist", "geometry_msgs/msg/TwistStamped"
+    WRENCH = "wrench", "geometry_msgs/msg/WrenchStamped"
+    BUTTONS = "buttons", "sensor_msgs/msg/Joy"
+    JAW = "jaw", "sensor_msgs/msg/JointState"
+    NUMBERS = "numbers", "sensor_msgs/msg/JointState"
+    JOINTS = "joints", "sensor_msgs/msg/JointState"
+    STATE = "state", "sensor_msgs/msg/JointState"  # unknown topics of its type are read so
+    REPORT = "report", "diagnostic_msgs/msg/DiagnosticArray"
 
-    @property
-    def ros_type(self) -> str:
+    def __init__(self, _: str, ros_type: str) -> None:
+        self.ros_type = ros_type
         """Name of the ROS message type."""
-        return self.value.strip()
 
     @property
     def has_joints(self) -> bool:

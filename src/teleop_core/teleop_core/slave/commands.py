@@ -76,6 +76,9 @@ class SlaveState(ServerState, WayState):
     asked_ns: int
 
 
+_FRESH, _STALE, _REFUSED, _MOVING, _CLOSED = (
+    int(CommandStatus[name]) for name in ("FRESH", "STALE", "REFUSED", "MOVING", "CLOSED")
+)
 # Stamps this far ahead of the slave's clock are an error, not a clock that is a little ahead.
 _FUTURE_NS = 1_000_000_000
 # Commands that are further apart than this are no stream [ns].
@@ -163,7 +166,7 @@ def _not_followed(s: SlaveState, row: SlaveRow) -> int:
     """Status of an arm that follows nothing; what comes meanwhile is seen, and old later."""
     s.seen_ns = max(s.seen_ns, row.slave_servo_jp_ns)
     s.arrival_ns, s.in_row, s.is_stream = 0, 0, 0
-    return 3 if s.is_busy or s.motion != 0 else 4
+    return _MOVING if s.is_busy or s.motion != 0 else _CLOSED
 
 
 @inner
@@ -171,11 +174,11 @@ def _age_of_command(p: SlaveNumbers, s: SlaveState, now_ns: int) -> int:
     """FRESH or STALE; a stream of commands that was silent for too long pauses the arm."""
     silence_ns = now_ns - s.arrival_ns
     if silence_ns <= p.timeout_ns:
-        return 0
+        return _FRESH
     if s.is_stream and 0 < p.outage_ns < silence_ns:
         fault = _JUMP if s.refused > s.refused_before else _SILENCE
         fail(p, s, fault, -1, 1e-9 * silence_ns, 1e-9 * p.outage_ns)
-    return 1
+    return _STALE
 
 
 @inner
@@ -189,7 +192,7 @@ def take_command(p: SlaveNumbers, s: SlaveState, row: SlaveRow, dt: float) -> in
     stamp, now_ns = row.slave_servo_jp_ns, row.now_ns
     if stamp > now_ns + _FUTURE_NS:  # taken, it would make every later command an old one
         s.refused += 1
-        return 2
+        return _REFUSED
     if stamp < s.seen_ns - _FUTURE_NS:  # of another clock, after a silence: a new stream
         s.seen_ns = 0
     if s.state != _ENABLED or s.is_busy or s.motion != 0 or not s.is_homed:
@@ -203,7 +206,7 @@ def take_command(p: SlaveNumbers, s: SlaveState, row: SlaveRow, dt: float) -> in
             if not near:  # NaN is not near either
                 s.refused += 1
                 _age_of_command(p, s, now_ns)
-                return 2
+                return _REFUSED
         # Commands whose stamps run ahead of the clock that they come by are as near as they come.
         period_ns = 0 if is_first else min(period_ns, now_ns - s.arrival_ns)
         begin_way(p, s, row.slave_servo_jp, period_ns, dt)
