@@ -7,8 +7,11 @@ import pytest
 
 import teleop_core as tc
 from teleop_core.chain.master.display import DisplayParameters
+from teleop_core.chain.tasks import MEMORY, SCENE
+from teleop_core.chain.tasks.follow import FOLLOW, FollowParameters
 from teleop_core.graph.stage import STAGES
 from teleop_core.graph.topics import SLAVE_MEASURED_CP, TASK_STATE
+from teleop_core.kernels.parts import numbers_of
 
 COLUMN = {name: i for i, name in enumerate(TASK_STATE.columns)}
 
@@ -120,11 +123,30 @@ def test_a_session_with_a_task_repeats_itself_to_the_bit(point: tc.Recording) ->
         assert np.array_equal(again[topic].values, point[topic].values)
 
 
-def test_a_moving_goal_is_followed_by_looks_and_steps() -> None:
-    recording = tc.run("point", duration=15.0, task="trace", settings={"operator.seed": 1})
+@pytest.mark.parametrize("task", ["follow", "trace"])
+def test_a_moving_goal_is_followed_by_looks_and_steps(task: str) -> None:
+    recording = tc.run("point", duration=15.0, task=task, settings={"operator.seed": 1})
     score = recording.score()
     assert (score.value("task.attempts") or 0) > 20
     assert (score.value("task.error_share") or 0.0) < 0.5
+
+
+def test_a_goal_that_nobody_foresees_stays_in_its_bounds_and_comes_again_after_its_period() -> None:
+    goals = [place_of(FollowParameters(size=0.02, period=30.0), time) for time in range(61)]
+    ways = np.array(goals) - goals[0]
+    assert np.abs(ways).max() < 0.02
+    assert np.abs(ways).max(axis=0)[1:] == pytest.approx([0.0125, 0.0125], abs=0.0075)
+    np.testing.assert_allclose(ways[30:61], ways[:31], atol=1e-9)
+    assert len({round(float(y), 6) for _, y, _ in ways[:30]}) > 25
+
+
+def place_of(p: FollowParameters, time: float) -> np.ndarray:
+    """Where its goal is at a time [s], for a task that began at the origin at 0."""
+    memory, state, scene = np.zeros(MEMORY), np.zeros(len(TASK_STATE.columns)), np.zeros(len(SCENE))
+    FOLLOW.judge(numbers_of(p), memory, scene, state)
+    scene[0] = time
+    FOLLOW.judge(numbers_of(p), memory, scene, state)
+    return np.array(state[2:5])
 
 
 def test_a_predictive_display_hides_the_network() -> None:

@@ -87,7 +87,7 @@ def _try(part: Task) -> None:
 TASKS: Registry[Task] = Registry(
     "task",
     "tasks",
-    places("teleop_core.chain.tasks", "point reach trace"),
+    places("teleop_core.chain.tasks", "follow point reach trace"),
     part_check("task", Task, "judge"),
     _try,
 )

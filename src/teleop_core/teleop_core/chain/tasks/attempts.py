@@ -11,6 +11,7 @@ from teleop_core.kernels import inner
 from teleop_core.kernels.geometry import Array
 
 KEPT = 59
+_PASS = 1  # Act.PASS, which imports this
 _SINCE, _CLOSED = KEPT + 3, KEPT + 4
 _OPENS, _CLOSES = 0.4, 0.6  # closing at which a hand counts as open and closed again
 (_NUMBER, _ACT, _GOAL, _, _, _WIDTH, _ATTEMPTS, _SUCCESSES, _ERRORS, _WAY, _OFF, _TIME) = range(
@@ -59,3 +60,30 @@ def tell_attempt(memory: Array, scene: Array, state: Array) -> bool:
     state[_WAY], state[_OFF] = way, along / max(way, 1e-12)
     state[_TIME] = scene[0] - memory[_SINCE]
     return is_there
+
+
+@inner
+def lead_on(
+    memory: Array, scene: Array, state: Array, y: float, z: float, width: float, step: float
+) -> None:
+    """Move a goal that is followed by (y, z) [m] from where the task began, and judge each step.
+
+    Args:
+        memory: Of the task; holds the place where it began (3,), and the time of the next step [s].
+        scene: What the task sees.
+        state: Of the task; written.
+        y: Where the goal is now, from the place where the task began [m].
+        z: The same along z [m].
+        width: Twice the distance that is near [m].
+        step: Time from step to step [s].
+    """
+    if state[_NUMBER] == 0.0:
+        for i in range(3):
+            memory[i] = scene[1 + i]
+    x, y, z = memory[0], memory[1] + y, memory[2] + z
+    if state[_NUMBER] == 0.0 or scene[0] >= memory[3]:
+        if state[_NUMBER] > 0.0:
+            tell_attempt(memory, scene, state)
+        memory[3] = scene[0] + step
+        begin_goal(memory, scene, state, _PASS, x, y, z, width)
+    state[_GOAL], state[_GOAL + 1], state[_GOAL + 2] = x, y, z

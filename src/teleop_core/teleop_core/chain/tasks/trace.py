@@ -4,12 +4,10 @@ import math
 from dataclasses import dataclass
 
 from teleop_core.base.parameters import parameter
-from teleop_core.chain.tasks import Act, Task
-from teleop_core.chain.tasks.attempts import begin_goal, tell_attempt
+from teleop_core.chain.tasks import Task
+from teleop_core.chain.tasks.attempts import lead_on
 from teleop_core.kernels import kernel
 from teleop_core.kernels.geometry import Array
-
-_PASS = int(Act.PASS)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,21 +29,10 @@ class TraceParameters:
 
 @kernel
 def trace_judge(numbers: Array, memory: Array, scene: Array, state: Array) -> None:
-    """Move the goal on, and count at each step whether the tip is near it.
-
-    ``memory`` holds the place where it began (3,), and the time of the next step [s].
-    """
-    if state[0] == 0.0:
-        for i in range(3):
-            memory[i] = scene[1 + i]
+    """Move the goal on, and count at each step whether the tip is near it."""
     radius, angle = 0.5 * numbers[0], 2.0 * math.pi * scene[0] / numbers[1]
-    y, z = memory[1] + radius * math.sin(angle), memory[2] + radius * (1.0 - math.cos(angle))
-    if state[0] == 0.0 or scene[0] >= memory[3]:
-        if state[0] > 0.0:
-            tell_attempt(memory, scene, state)
-        memory[3] = scene[0] + numbers[3]
-        begin_goal(memory, scene, state, _PASS, memory[0], y, z, numbers[2])
-    state[2], state[3], state[4] = memory[0], y, z
+    y, z = radius * math.sin(angle), radius * (1.0 - math.cos(angle))
+    lead_on(memory, scene, state, y, z, numbers[2], numbers[3])
 
 
 TRACE = Task("trace", TraceParameters, trace_judge)
