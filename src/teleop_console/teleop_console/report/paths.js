@@ -11,7 +11,8 @@ function pathWithin(curve, range) {
   for (const [begin, end] of curve.during || [range]) {
     const part = [Math.max(begin, range[0]), Math.min(end, range[1])];
     if (part[0] > part[1]) continue;
-    const bounds = [firstNotBefore(times, part[0]), firstNotBefore(times, part[1] + 1e-9)];
+    // Times are float32: the last one may be rounded beyond the end.
+    const bounds = [firstNotBefore(times, Math.fround(part[0])), firstNotBefore(times, Math.fround(part[1]) + 1e-9)];
     parts.push(bounds);
     count += bounds[1] - bounds[0];
   }
