@@ -38,6 +38,15 @@ def test_a_recorder_that_starts_while_its_disk_is_gone_says_so() -> None:
 
 
 @pytest.mark.slow
+def test_a_disk_that_fails_between_a_chunk_and_its_index_keeps_more_than_was_said() -> None:
+    """Of seed 40113: the law wanted no more."""
+    faults = (
+        Fault(1.858, "slow disk", "", 3.0, 0.98551), Fault(4.1117, "read-only disk", "", 0.27, 0.5)
+    )  # fmt: skip
+    assert run_seed(40113, faults).broken == ()
+
+
+@pytest.mark.slow
 def test_a_recorder_says_that_a_process_was_killed_with_what_waited_in_it() -> None:
     """Of seed 60060: it made up for a standstill, faster than its socket took what it recorded."""
     faults = (
