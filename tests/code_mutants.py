@@ -44,6 +44,13 @@ _PARALLEL_AXES = "robots/closed_form/parallel_axes.py"
 _CANDIDATES = "robots/closed_form/candidates.py"
 _SEEING = "chain/operators/observer.py"
 CODE_MUTANTS = (
+    _mutant("cut_untold", "who was killed with what it held back is not told", "nodes/feed.py",
+            "self.cut += sum(", "self.cut += 0 * sum(", "feed"),
+    _mutant("old_clock", "stamps of a clock that was ahead shut out all later ones",
+            "slave/commands.py", "    if stamp < s.seen_ns - _FUTURE_NS:", "    if False:",
+            "slave_sim"),
+    _mutant("jumping_hand", "a hand that a program leads jumps to its command",
+            "session/stepped.py", "np.minimum(share, 1.0)", "1.0", "stepping"),
     _mutant("blind", "an operator who sees does not wait for what it sees", _SEEING,
             "        if move is None:\n            return -math.inf",
             "        if True:\n            return -math.inf", "observer"),
