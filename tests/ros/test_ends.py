@@ -142,6 +142,7 @@ def domain_said_first(session: LiveProcess) -> str:
     return domain
 
 
+@pytest.mark.soak
 def test_a_second_session_in_a_domain_is_refused_and_the_first_ends_in_order_whoever_asks(
     start: Callable[..., Any], tmp_path: Path
 ) -> None:
