@@ -44,6 +44,9 @@ _PARALLEL_AXES = "robots/closed_form/parallel_axes.py"
 _CANDIDATES = "robots/closed_form/candidates.py"
 _SEEING = "chain/operators/observer.py"
 CODE_MUTANTS = (
+    _mutant("signal_breaks", "a signal breaks off what runs", "nodes/interrupt.py",
+            "        if number == signal.SIGHUP:",
+            "        raise KeyboardInterrupt\n        if number == signal.SIGHUP:", "interrupt"),
     _mutant("cut_untold", "who was killed with what it held back is not told", "nodes/feed.py",
             "self.cut += sum(", "self.cut += 0 * sum(", "feed"),
     _mutant("old_clock", "stamps of a clock that was ahead shut out all later ones",

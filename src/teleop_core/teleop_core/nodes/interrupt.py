@@ -1,4 +1,4 @@
-"""Interrupt: signals that end a live session in order, wherever its main thread is."""
+"""Interrupt: signals that end a live session in order, where its main thread looks for them."""
 
 import os
 import signal
@@ -11,33 +11,31 @@ from teleop_core.nodes.watch import ENDS
 
 
 class Interrupt:
-    """Whether Ctrl-C or another such signal came; a KeyboardInterrupt alone is lost in a finaliser.
+    """Whether Ctrl-C or another such signal came; what runs goes on until it looks.
 
     SIGTERM ends a session like Ctrl-C does, and so do SIGHUP, of a terminal that is closed, and
-    SIGQUIT.
+    SIGQUIT. An exception that came out of nowhere could leave a lock of the middleware taken, for
+    which the end of the session would then wait.
 
     Attributes:
         has_come: Whether one did.
-        is_deaf: Whether further signals are noted only, as while the session is being ended.
     """
 
     def __init__(self) -> None:
-        self.has_come = self.is_deaf = False
+        self.has_come = False
 
     def __call__(self, number: int, _: object) -> None:
-        """Note a signal, and interrupt what runs now."""
+        """Note a signal."""
         self.has_come = True
         if number == signal.SIGHUP:
             _leave_terminal()
-        if not self.is_deaf:
-            raise KeyboardInterrupt
 
     def ask(self) -> None:
-        """Interrupt from another thread: what runs ends where it looks next."""
+        """Do as a signal does, from another thread."""
         self.has_come = True
 
     def check(self) -> None:
-        """Interrupt what runs now, if a signal came.
+        """End what runs now, if a signal came.
 
         Raises:
             KeyboardInterrupt: It did.

@@ -318,7 +318,6 @@ class _Session:
 
     def _stop(self) -> list[str]:
         """End all nodes in order, whatever signals come; returns what is to be told of it."""
-        self._interrupt.is_deaf = True
         recorder = self._children.pop(RECORDER_NAME, None)
         failures = end_all(self._children.values())
         return failures + end_all([recorder] if recorder else [])

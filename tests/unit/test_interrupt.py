@@ -1,0 +1,28 @@
+"""Interrupt: a signal ends a session where it looks, and breaks nothing off."""
+
+import os
+import signal
+import threading
+
+import pytest
+
+from teleop_core.nodes.interrupt import Interrupt
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGQUIT])
+def test_a_signal_leaves_no_lock_taken_and_is_found_by_who_looks(number: int) -> None:
+    interrupt, condition = Interrupt(), threading.Condition()
+    with interrupt.caught():
+        for _ in range(2000):
+            with condition:  # its __enter__ is Python, in which a signal may come
+                os.kill(os.getpid(), number)
+        with pytest.raises(KeyboardInterrupt):
+            interrupt.check()
+    assert condition.acquire(timeout=1.0)
+
+
+def test_handlers_are_what_they_were_afterwards() -> None:
+    before = signal.getsignal(signal.SIGTERM)
+    with Interrupt().caught():
+        assert signal.getsignal(signal.SIGTERM) is not before
+    assert signal.getsignal(signal.SIGTERM) is before
