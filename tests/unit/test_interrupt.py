@@ -13,9 +13,12 @@ from teleop_core.nodes.interrupt import Interrupt
 def test_a_signal_leaves_no_lock_taken_and_is_found_by_who_looks(number: int) -> None:
     interrupt, condition = Interrupt(), threading.Condition()
     with interrupt.caught():
-        for _ in range(2000):
-            with condition:  # its __enter__ is Python, in which a signal may come
-                os.kill(os.getpid(), number)
+        try:
+            for _ in range(2000):
+                with condition:  # its __enter__ is Python, in which a signal may come
+                    os.kill(os.getpid(), number)
+        except KeyboardInterrupt:
+            pytest.fail("the signal broke off what was running")
         with pytest.raises(KeyboardInterrupt):
             interrupt.check()
     assert condition.acquire(timeout=1.0)
