@@ -55,7 +55,7 @@ def _run_one(seed: int, chosen: str | None, out: Path | None, processes: Process
 def _run_many(first: int, count: int, json_file: Path | None, processes: Processes) -> int:
     from rich.console import Console
     from rich.progress import track
-    from rich.table import Table
+    from rich.table import Column, Table
 
     from teleop_drill.simulation.report import Coverage, told
     from teleop_drill.simulation.seeds import run_seeds, shrink
@@ -73,10 +73,17 @@ def _run_many(first: int, count: int, json_file: Path | None, processes: Process
         ("how often a fault met a state of the arm", coverage.table()),
         ("how often a law was looked at under a fault", coverage.laws()),
     ):
-        table = Table(*head, title=title)
-        for row in rows:
-            table.add_row(*row)
+        columns = [Column(name, overflow="fold", justify="right") for name in head[1:]]
+        faults = Column(head[0], no_wrap=True)
+        table = Table(faults, *columns, title=title, box=None, padding=(0, 2, 0, 0))
+        for kind, *counts in rows:
+            table.add_row(kind, *map(_short, counts))
         console.print(table)
     for line in coverage.lines():
         print(line)
     return 1 if coverage.broken else 0
+
+
+def _short(count: str) -> str:
+    """A count that fits into a narrow column: thousands as k."""
+    return count if len(count) < 4 else f"{int(count) // 1000}k"
