@@ -59,6 +59,7 @@ def test_a_move_without_names_arrives_busy_on_the_way_and_not_afterwards(peer: "
     client.wait(lambda: np.allclose(client.newest["goal_js"].position, goal), "goal_js")
 
 
+@pytest.mark.soak
 def test_a_single_servo_jp_without_names_is_gone_to_all_the_way(client: StockClient) -> None:
     goal = [a + 0.02 for a in MIDDLE]
     goal[2] = 0.36
