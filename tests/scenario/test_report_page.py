@@ -45,7 +45,7 @@ FLAGS = (
 BROWSER_ITSELF = "not an origin"
 # What Chromium says about the speed of software rendering; nothing is wrong then.
 ADVICE = ("GL Driver Message", "Canvas2D: Multiple readback")
-LARGEST_PAGE = 12_000_000
+LARGEST_PAGE = 4_000_000
 JOINTS = tuple(f"joint_{i}" for i in range(1, 7))
 START_NS = 1_700_000_000 * 1_000_000_000
 # A fixture of 30 mm around the middle of the path.

@@ -22,7 +22,7 @@ pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 LONG, SHORT = 600_000, 20_000
-LARGEST_PAGE = 40_000_000
+LARGEST_PAGE = 20_000_000
 # Curves are rounded to less than this.
 ROUNDING_MM, ROUNDING_N = 1e-3, 1e-3
 LIMITED = (

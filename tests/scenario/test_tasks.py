@@ -135,7 +135,7 @@ def test_a_goal_that_nobody_foresees_stays_in_its_bounds_and_comes_again_after_i
     goals = [place_of(FollowParameters(size=0.02, period=30.0), time) for time in range(61)]
     ways = np.array(goals) - goals[0]
     assert np.abs(ways).max() < 0.02
-    assert np.abs(ways).max(axis=0)[1:] == pytest.approx([0.0125, 0.0125], abs=0.0075)
+    assert np.abs(ways).max(axis=0)[1:].min() > 0.25 * 0.02  # half of the first sine alone
     np.testing.assert_allclose(ways[30:61], ways[:31], atol=1e-9)
     assert len({round(float(y), 6) for _, y, _ in ways[:30]}) > 25
 

@@ -5,7 +5,9 @@ time then [s], and whether the hand was closed.
 """
 
 import math
+from dataclasses import dataclass
 
+from teleop_core.base.parameters import parameter
 from teleop_core.graph.topics import TASK_STATE
 from teleop_core.kernels import inner
 from teleop_core.kernels.geometry import Array
@@ -62,20 +64,30 @@ def tell_attempt(memory: Array, scene: Array, state: Array) -> bool:
     return is_there
 
 
+@dataclass(frozen=True, kw_only=True)
+class LedParameters:
+    """How a goal that is followed is judged; first of the numbers of a task that leads."""
+
+    width: float = parameter(
+        0.006, unit="m", lower=1e-4, upper=0.1, doc="twice the distance from it that is near"
+    )
+    step: float = parameter(
+        0.5, unit="s", lower=0.01, upper=60.0,
+        doc="after which the tip is judged each time, and the next place counts as a goal",
+    )  # fmt: skip
+
+
 @inner
-def lead_on(
-    memory: Array, scene: Array, state: Array, y: float, z: float, width: float, step: float
-) -> None:
+def lead_on(numbers: Array, memory: Array, scene: Array, state: Array, y: float, z: float) -> None:
     """Move a goal that is followed by (y, z) [m] from where the task began, and judge each step.
 
     Args:
+        numbers: Of the task, those of :class:`LedParameters` first.
         memory: Of the task; holds the place where it began (3,), and the time of the next step [s].
         scene: What the task sees.
         state: Of the task; written.
         y: Where the goal is now, from the place where the task began [m].
         z: The same along z [m].
-        width: Twice the distance that is near [m].
-        step: Time from step to step [s].
     """
     if state[_NUMBER] == 0.0:
         for i in range(3):
@@ -84,6 +96,6 @@ def lead_on(
     if state[_NUMBER] == 0.0 or scene[0] >= memory[3]:
         if state[_NUMBER] > 0.0:
             tell_attempt(memory, scene, state)
-        memory[3] = scene[0] + step
-        begin_goal(memory, scene, state, _PASS, x, y, z, width)
+        memory[3] = scene[0] + numbers[1]
+        begin_goal(memory, scene, state, _PASS, x, y, z, numbers[0])
     state[_GOAL], state[_GOAL + 1], state[_GOAL + 2] = x, y, z

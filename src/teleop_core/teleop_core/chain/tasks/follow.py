@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from teleop_core.base.parameters import parameter
 from teleop_core.chain.tasks import Task
-from teleop_core.chain.tasks.attempts import lead_on
+from teleop_core.chain.tasks.attempts import LedParameters, lead_on
 from teleop_core.kernels import kernel
 from teleop_core.kernels.geometry import Array
 
@@ -14,7 +14,7 @@ _ROUNDS = (2, 5, 11, 3, 7, 13)
 
 
 @dataclass(frozen=True, kw_only=True)
-class FollowParameters:
+class FollowParameters(LedParameters):
     """A point that wanders in the slave's y-z plane, from where the task begins.
 
     Source:
@@ -27,13 +27,6 @@ class FollowParameters:
     period: float = parameter(
         60.0, unit="s", lower=1.0, upper=3600.0, doc="after which its way repeats itself"
     )
-    width: float = parameter(
-        0.006, unit="m", lower=1e-4, upper=0.1, doc="twice the distance from it that is near"
-    )
-    step: float = parameter(
-        0.5, unit="s", lower=0.01, upper=60.0,
-        doc="after which the tip is judged each time, and the next place counts as a goal",
-    )  # fmt: skip
 
 
 @kernel
@@ -42,12 +35,12 @@ def follow_judge(numbers: Array, memory: Array, scene: Array, state: Array) -> N
 
     Of the three sines of an axis a faster one is smaller.
     """
-    angle, y, z = 2.0 * math.pi * scene[0] / numbers[1], 0.0, 0.0
+    angle, y, z = 2.0 * math.pi * scene[0] / numbers[3], 0.0, 0.0
     for i in range(3):
-        share = numbers[0] * (0.5, 0.3, 0.2)[i]
+        share = numbers[2] * (0.5, 0.3, 0.2)[i]
         y += share * math.sin(_ROUNDS[i] * angle)
         z += share * math.sin(_ROUNDS[3 + i] * angle)
-    lead_on(memory, scene, state, y, z, numbers[2], numbers[3])
+    lead_on(numbers, memory, scene, state, y, z)
 
 
 FOLLOW = Task("follow", FollowParameters, follow_judge)
