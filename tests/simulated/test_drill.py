@@ -1,5 +1,6 @@
 """The drill on a simulated machine: every row, in both ways, and safeties that are broken."""
 
+import signal
 import subprocess
 import sys
 from collections.abc import Sequence
@@ -51,6 +52,20 @@ def test_drives_that_stood_still_catch_up_as_their_loop_does_wherever_on_the_cir
     speed = found.measured("tip_speed_m_s")
     assert not found.failures()
     assert speed.value > 0.25  # of a setpoint that catches up behind its filter it is less
+
+
+def test_a_signal_ends_a_drill_where_it_waits_and_what_was_measured_is_kept(tmp_path: Path) -> None:
+    rows, said = chosen(("stop_topic", "flood"), is_composed=False), list[str]()
+
+    def say(line: str) -> None:
+        said.append(line)
+        if len(said) == 3:  # after the first row
+            signal.raise_signal(signal.SIGTERM)
+            said.append("goes on until it waits")
+
+    found = simulated_drill(rows, tmp_path, say)
+    assert [one.exercise.name for one in found] == [rows[0].name], said
+    assert said[3:] == ["goes on until it waits", "stopped: interrupted; what was measured until now:"]
 
 
 @pytest.mark.soak

@@ -22,6 +22,7 @@ from teleop_core.middleware.ros_messages import write_message
 from teleop_core.middleware.world import Qos
 from teleop_core.nodes.discovery import choose_transport
 from teleop_core.nodes.guest import Guest
+from teleop_core.nodes.interrupt import Interrupt
 from teleop_core.nodes.quality import profile
 from teleop_core.nodes.streams import message_type
 
@@ -36,7 +37,6 @@ def play(
     topics: Iterable[str] | None,
     rate: float,
     console: Console,
-    loop: bool = False,
     clock: float = 0.0,
 ) -> int:
     """Publish a recording with its own bytes and spacing, until its end or Ctrl-C.
@@ -46,8 +46,6 @@ def play(
         topics: Topics to publish; None for all, without ``/tf`` where its type is not installed.
         rate: Times real time, > 0.
         console: Where the progress is shown, if it is a terminal.
-        loop: Whether to begin again at the end. Nodes take the older stamps then as those of a
-            new sender, which they accept after two seconds of silence.
         clock: How often the recording's time is published on ``/clock``, [1/s] of that time; 0 for
             never. A recorded ``/clock`` is left out then.
 
@@ -69,35 +67,39 @@ def play(
     clock_ns = round(1e9 / clock) if clock else 0
     if clock_ns:
         names = [name for name in names if name != CLOCK]
-    sent = 0
+    sent, interrupt = 0, Interrupt()
     with (
+        interrupt.caught(),
         _publishers(bag, names, has_clock=clock > 0.0) as publishers,
         _progress(bag, console) as show,
     ):
-        time.sleep(DISCOVERY_TIME)
         try:
-            while True:
-                for name, log_ns, data in _paced(bag, names, rate, clock_ns):
-                    publishers[name].publish(data)
-                    sent += name != CLOCK or not clock_ns
-                    show(log_ns)
-                if not loop:
-                    break
+            _sleep_until(time.monotonic() + DISCOVERY_TIME, interrupt)
+            for name, log_ns, data in _paced(bag, names, rate, clock_ns, interrupt):
+                publishers[name].publish(data)
+                sent += name != CLOCK or not clock_ns
+                show(log_ns)
         except KeyboardInterrupt:
             console.print(f"stopped after {sent} messages", highlight=False)
     return sent
 
 
+def _sleep_until(deadline: float, interrupt: Interrupt) -> None:
+    """Sleep until a time of the monotonic clock [s], unless a signal comes."""
+    interrupt.check()
+    while (ahead := deadline - time.monotonic()) > 1e-4:
+        time.sleep(min(ahead, 0.1))
+        interrupt.check()
+
+
 def _paced(
-    bag: Bag, names: list[str], rate: float, clock_ns: int
+    bag: Bag, names: list[str], rate: float, clock_ns: int, interrupt: Interrupt
 ) -> Iterator[tuple[str, int, bytes]]:
     """Messages in the order of their log times, each when its time has come, and the time."""
     begin, told_ns = time.monotonic(), bag.start_ns
 
     def wait(log_ns: int) -> None:
-        ahead = begin + (log_ns - bag.start_ns) * 1e-9 / rate - time.monotonic()
-        if ahead > 1e-4:
-            time.sleep(ahead)
+        _sleep_until(begin + (log_ns - bag.start_ns) * 1e-9 / rate, interrupt)
 
     for name, _, log_ns, data in bag.raw(names):
         while clock_ns and told_ns <= log_ns:

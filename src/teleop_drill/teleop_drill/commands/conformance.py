@@ -55,22 +55,26 @@ def _run(arguments: argparse.Namespace) -> int:
 
     ros_module("conformance", "teleop_drill.nodes")
     from teleop_core.nodes.children import environment
+    from teleop_core.nodes.interrupt import Interrupt
     from teleop_drill.nodes.conformance import examine, left_behind
     from teleop_drill.nodes.conformance_arm import Arm
 
     robot = None if arguments.robot is None else load_robot(arguments.robot)
     environment()
     with Arm(arguments.namespace, arguments.domain) as arm:
-        if not arm.is_there(arguments.wait):
+        with arm.interrupt.caught():
+            is_there = arm.is_there(arguments.wait)
+        if not is_there:
             where = f"{arm.namespace}/… within {arguments.wait:g} s"
             hint = "is it on this ROS domain? `ros2 topic list`, or another --domain"
             raise SessionError(f"no CRTK topic at {where}; {hint}")
         may_move = not arguments.read_only and (arguments.yes or _agreed(arm.namespace))
         progress = Console(stderr=True)
         try:
-            with progress.status("looking") as status:
+            with arm.interrupt.caught(), progress.status("looking") as status:
                 findings = examine(arm, may_move=may_move, report=status.update, robot=robot)
         except KeyboardInterrupt:
+            arm.interrupt = Interrupt()  # for the look at what is left
             left = left_behind(arm, may_move=may_move)
             print(f"teleop conformance: interrupted; {left}", file=sys.stderr)
             return 130

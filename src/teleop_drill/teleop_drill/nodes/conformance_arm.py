@@ -12,6 +12,7 @@ from rclpy.serialization import deserialize_message
 from teleop_core.bags.messages import SECOND_NS
 from teleop_core.middleware.ros_taking import RosTaker
 from teleop_core.nodes.guest import Guest
+from teleop_core.nodes.interrupt import Interrupt
 from teleop_core.nodes.streams import message_type
 from teleop_drill.conformance.rows import ROWS
 
@@ -72,6 +73,9 @@ class Arm(Guest):
         namespace: Where its topics are, such as ``/PSM1`` or ``slave``.
         domain: ROS domain; None for that of the environment.
 
+    Attributes:
+        interrupt: What ends a wait with KeyboardInterrupt.
+
     Raises:
         MessageTypeError: A package of messages is not installed, such as crtk_msgs.
     """
@@ -83,6 +87,7 @@ class Arm(Guest):
         ros: Any = self.ros
         self.node = ros.own  # of rclpy: stock clients know no other
         self.namespace = "/" + namespace.strip("/")
+        self.interrupt = Interrupt()
         self._taps: dict[str, Tap] = {}
         self._keeping: dict[str, Tap] = {}
         self._publishers: dict[str, Any] = {}
@@ -191,6 +196,7 @@ class Arm(Guest):
         """Whether something becomes true within a time [s]."""
         end = time.monotonic() + timeout
         while not condition():
+            self.interrupt.check()
             for tap in self._keeping.values():
                 tap.drain()
             if time.monotonic() > end:

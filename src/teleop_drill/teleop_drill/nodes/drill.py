@@ -10,6 +10,7 @@ import numpy as np
 from teleop_core.base.errors import SessionError
 from teleop_core.base.own_parts import load_own_parts
 from teleop_core.middleware.real_time import is_priority_granted
+from teleop_core.nodes.interrupt import Interrupt
 from teleop_core.session import api
 from teleop_core.session.configuration import Configuration
 from teleop_drill.drill import hand, inside
@@ -74,15 +75,15 @@ def drill(
     sys.setswitchinterval(2e-4)  # the drill's own hand must not wait 5 ms for its turn
     foreign = {SIMULATOR: drives, ARM: arm}
 
-    def site(master: Master, made: Configuration, place: Path) -> Site:
-        return LiveSite(made, place, master, is_composed=is_composed, foreign=foreign)
+    def site(master: Master, made: Configuration, place: Path, interrupt: Interrupt) -> Site:
+        return LiveSite(made, place, master, interrupt, is_composed=is_composed, foreign=foreign)
 
     own = [one for one in exercises if not (drives and one.breaks_simulator)]
     return drill_at(site, own, folder, say, files, texts)
 
 
-Sites = Callable[[Master, Configuration, Path], Site]
-"""Where a session is drilled, by who moves the hand, what runs, and where its files go."""
+Sites = Callable[[Master, Configuration, Path, Interrupt], Site]
+"""Where a session is drilled, by who moves the hand, what runs, where files go, what ends it."""
 
 
 def drill_at(
@@ -110,7 +111,8 @@ def drill_at(
             place = folder / master.name.lower()
             place.mkdir(parents=True)
             part = _Drill(site, master, _configuration(master, files, texts), place, say)
-            outcomes += part.run(own)
+            with part.interrupt.caught():
+                outcomes += part.run(own)
             if part.is_over:
                 break
     order = [one.name for one in exercises]
@@ -132,6 +134,8 @@ class _Drill:
         self._killed: dict[Path, int] = {}
         self._counted: dict[Path, Counted] = {}
         self._sessions_of: dict[Path, Session] = {}
+        self.interrupt = Interrupt()
+        """What ends a wait of this drill with KeyboardInterrupt."""
         self.is_over = False
         """Whether it was stopped before its end."""
 
@@ -150,7 +154,7 @@ class _Drill:
         except (KeyboardInterrupt, SessionError) as error:
             if not outcomes:
                 raise
-            self._say(f"stopped: {error or 'interrupted'}; what was measured until now:")
+            self._say(f"stopped: {str(error) or 'interrupted'}; what was measured until now:")
             self.is_over = True
         finally:
             self._close()
@@ -180,7 +184,7 @@ class _Drill:
             self._sessions += 1
             folder = self._folder / f"session_{self._sessions}"
             folder.mkdir()
-            site = self._site(self._master, self._configuration, folder)
+            site = self._site(self._master, self._configuration, folder, self.interrupt)
             self._rig = LiveRig(site, self._configuration, self._numbers.robot)
             way = "one process" if site.is_composed else "a process for each node"
             self._say(f"starts a session: {way}, the hand is that of {_who(self._master)}")

@@ -128,6 +128,7 @@ class LiveRig:
         """Let time pass [s]; warnings of nodes are noted with their time."""
         deadline = self.now() + seconds
         while (left := deadline - self.now()) > 0.0:
+            self.site.interrupt.check()
             self.observer.listen(min(left, 0.02))
             for name, text in self._warnings().items():
                 arrival = self.observer.statuses[name].arrival

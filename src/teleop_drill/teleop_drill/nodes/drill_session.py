@@ -20,6 +20,7 @@ from teleop_core.graph.graph import RECORDER_NAME
 from teleop_core.middleware.ros import ROS
 from teleop_core.middleware.world import World
 from teleop_core.nodes.children import Child, end_all, environment, free_domain
+from teleop_core.nodes.interrupt import Interrupt
 from teleop_core.nodes.live import parameter_file
 from teleop_core.nodes.observer import Observer
 from teleop_core.nodes.start import SESSION as SESSION_NODE
@@ -60,9 +61,10 @@ class DrillSession:
     def __init__(
         self, configuration: Configuration, folder: Path, env: dict[str, str], observer: Observer,
         *, is_composed: bool, master: Master, foreign: Mapping[str, Sequence[str]],
+        interrupt: Interrupt,
     ) -> None:  # fmt: skip
         self._configuration, self._folder, self._env = configuration, folder, env
-        self._observer, self._is_composed = observer, is_composed
+        self._observer, self._is_composed, self._interrupt = observer, is_composed, interrupt
         self._has_device = master is Master.DEVICE
         self._foreign = {name: command for name, command in foreign.items() if command}
         self._starter = Starter("" if is_composed else configuration.text(), env)
@@ -125,6 +127,7 @@ class DrillSession:
             self._observer.statuses.pop(name, None)
         deadline = time.monotonic() + START_TIMEOUT
         while not all(self._observer.is_active(name) for name in nodes):
+            self._interrupt.check()
             self._observer.listen(0.05)
             self.check()
             if time.monotonic() > deadline:
@@ -236,6 +239,7 @@ class LiveSite:
         configuration: What runs.
         folder: Where recordings and the drill's own file go.
         master: Who moves the hand.
+        interrupt: What ends a wait of the drill with KeyboardInterrupt.
         is_composed: Whether all nodes share one process.
         foreign: Commands of processes that are none of ours, by name.
     """
@@ -243,10 +247,11 @@ class LiveSite:
     world: World = ROS
 
     def __init__(
-        self, configuration: Configuration, folder: Path, master: Master, *, is_composed: bool,
-        foreign: Mapping[str, Sequence[str]],
+        self, configuration: Configuration, folder: Path, master: Master, interrupt: Interrupt,
+        *, is_composed: bool, foreign: Mapping[str, Sequence[str]],
     ) -> None:  # fmt: skip
         self.is_composed, self.master = is_composed, master
+        self.interrupt = interrupt
         self._configuration, self._folder, self._foreign = configuration, folder, foreign
         self._env = environment() | {"ROS_DOMAIN_ID": free_domain()}
         if master is Master.DEVICE:
@@ -264,5 +269,5 @@ class LiveSite:
         """Processes of a session, of which an observer hears."""
         return DrillSession(
             self._configuration, self._folder, self._env, observer, is_composed=self.is_composed,
-            master=self.master, foreign=self._foreign,
+            master=self.master, foreign=self._foreign, interrupt=self.interrupt,
         )  # fmt: skip

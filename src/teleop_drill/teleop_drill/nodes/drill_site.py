@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import Protocol
 
 from teleop_core.middleware.world import World
+from teleop_core.nodes.interrupt import Interrupt
 from teleop_core.nodes.observer import Observer
 from teleop_drill.drill import inside
 from teleop_drill.drill.exercise import Master
@@ -74,6 +75,7 @@ class Site(Protocol):
         is_composed: Whether all nodes share one process.
         master: Who moves the hand.
         control: What breaks inside of processes.
+        interrupt: What ends a wait of the drill with KeyboardInterrupt.
     """
 
     world: World
@@ -81,6 +83,7 @@ class Site(Protocol):
     is_composed: bool
     master: Master
     control: Steering
+    interrupt: Interrupt
 
     def session(self, observer: Observer) -> Session:
         """Processes of a session, of which an observer hears."""

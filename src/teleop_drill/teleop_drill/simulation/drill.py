@@ -7,6 +7,7 @@ from teleop_core.base.errors import ParameterError
 from teleop_core.graph.graph import RECORDER_NAME
 from teleop_core.middleware.world import World
 from teleop_core.nodes.crews import Processes, crews
+from teleop_core.nodes.interrupt import Interrupt
 from teleop_core.nodes.observer import Observer
 from teleop_core.nodes.start import SESSION
 from teleop_core.session.configuration import Configuration
@@ -32,6 +33,7 @@ class SimulatedSite:
         configuration: What runs.
         folder: Where recordings go.
         master: Who moves the hand.
+        interrupt: What ends a wait of the drill with KeyboardInterrupt.
         processes: How the nodes are shared out.
         foreign: Processes that are none of ours, by name.
     """
@@ -40,10 +42,11 @@ class SimulatedSite:
 
     def __init__(
         self, bus: Bus, owner: Process, configuration: Configuration, folder: Path,
-        master: Master, processes: Processes, foreign: Mapping[str, Work],
+        master: Master, interrupt: Interrupt, processes: Processes, foreign: Mapping[str, Work],
     ) -> None:  # fmt: skip
         self.is_composed = processes is Processes.ONE
-        self.master, self._configuration, self._folder = master, configuration, folder
+        self.master, self.interrupt = master, interrupt
+        self._configuration, self._folder = configuration, folder
         self._bus, self._owner, self._processes = bus, owner, processes
         self._foreign = foreign
         self.world: World = SimulatedWorld(bus, owner)
@@ -113,8 +116,8 @@ def simulated_drill(
     def work(owner: Process) -> list[Outcome]:
         bus.watch(owner)
 
-        def site(master: Master, made: Configuration, place: Path) -> Site:
-            return SimulatedSite(bus, owner, made, place, master, processes, foreign)
+        def site(master: Master, made: Configuration, place: Path, interrupt: Interrupt) -> Site:
+            return SimulatedSite(bus, owner, made, place, master, interrupt, processes, foreign)
 
         given = ("real_time.priority=30", *texts)
         with SimulatedSteering.installed(machine):
