@@ -33,11 +33,7 @@ DISCOVERY_TIME = 1.0
 
 
 def play(
-    bag: Bag,
-    topics: Iterable[str] | None,
-    rate: float,
-    console: Console,
-    clock: float = 0.0,
+    bag: Bag, topics: Iterable[str] | None, rate: float, console: Console, clock: float = 0.0
 ) -> int:
     """Publish a recording with its own bytes and spacing, until its end or Ctrl-C.
 

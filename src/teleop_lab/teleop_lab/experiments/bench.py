@@ -106,7 +106,7 @@ class Bench:
     ) -> None:
         if seed < 0:
             raise ParameterError("seed", seed, "0 or more")
-        self.seed, self.progress, self._workers = seed, progress, workers
+        self.seed, self.progress, self.workers = seed, progress, workers
         self._settings = dict(settings or {})
         self._known: dict[object, Session] = {}
         self._streams: dict[object, Mapping[str, Stream]] = {}  # of the last sessions
@@ -205,9 +205,9 @@ class Bench:
             jobs: Values that can be sent to another process.
         """
         do = partial(_work, work, self.seed, self._settings)
-        if self._workers == 1:
+        if self.workers == 1:
             return list(self._counted(map(do, jobs), len(jobs)))
-        with ProcessPoolExecutor(self._workers, get_context("spawn")) as pool:
+        with ProcessPoolExecutor(self.workers, get_context("spawn")) as pool:
             return list(self._counted(pool.map(do, jobs), len(jobs)))
 
     def _counted(self, results: Iterable[Result], total: int) -> Iterator[Result]:

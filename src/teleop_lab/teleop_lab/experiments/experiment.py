@@ -76,6 +76,8 @@ EXPERIMENTS: Registry[Experiment] = Registry(
         "drift": f"{_PLACE}.drift:DRIFT",
         "puncture": f"{_PLACE}.puncture:PUNCTURE",
         "fitts": f"{_PLACE}.fitts:FITTS",
+        "delay": f"{_PLACE}.delay:DELAY",
+        "scaling_under_delay": f"{_PLACE}.delay:SCALING_UNDER_DELAY",
         "uva": f"{_PLACE}.uva:UVA",
         "mma_frames": f"{_PLACE}.mma_frames:MMA_FRAMES",
         "mma_balance": f"{_PLACE}.mma_spring:MMA_BALANCE",

@@ -25,7 +25,11 @@ class TaskScore:
     attempts: int | None = figure("1", "attempts at a goal")
     successes: int | None = figure("1", "attempts that ended within the goal's width")
     error_share: float | None = figure("1", "share of the attempts that ended outside of it")
-    time_s: float | None = figure("s", "mean time of an attempt, from when the goal was set")
+    time_s: float | None = figure(
+        "s",
+        "mean time of an attempt, from when its goal was set; of four or more, without the first, "
+        "which begins while the arm is led in",
+    )
     throughput: float | None = figure(
         "bit/s",
         "log2(mean way / effective width + 1) over the mean time, without the first attempt",
@@ -68,16 +72,17 @@ class TaskMetric(Metric):
         if not self._tried:
             return TaskScore(0, 0, None, None, None, None)
         tried = np.array(self._tried)
-        count, time = len(tried), float(tried[:, _TIME].mean())
+        count = len(tried)
+        later = tried[1:] if count >= 4 else tried
+        time = float(later[:, _TIME].mean())
         successes = int(tried[-1, _SUCCESSES] - self._before)
         errors = 1.0 - successes / count
         if count < 4:
             return TaskScore(count, successes, errors, time, None, None)
-        later = tried[1:]
         width = EFFECTIVE * float(later[:, _OFF].std(ddof=1))
-        way, lasted = float(later[:, _WAY].mean()), float(later[:, _TIME].mean())
+        way = float(later[:, _WAY].mean())
         bits = float(np.log2(way / width + 1.0)) if width > 0.0 else None
-        rate = None if bits is None else bits / lasted
+        rate = None if bits is None else bits / time
         return TaskScore(count, successes, errors, time, rate, 1e3 * width)
 
     def rows(self) -> list[Row]:
