@@ -60,6 +60,7 @@ setup(
             "coverage",
             "distributed",
             "gymnasium",
+            "optuna",
             "pytest",
             "pytest-rerunfailures",
             "pytest-xdist",

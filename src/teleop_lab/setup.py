@@ -2,7 +2,7 @@
 
 from setuptools import find_packages, setup
 
-COMMANDS = ("calibrate", "experiment", "fit", "grade", "reach", "study")
+COMMANDS = ("calibrate", "experiment", "fit", "grade", "reach", "study", "tune")
 VERSION = "0.6.0"  # released together with teleop_core
 
 setup(
@@ -27,7 +27,7 @@ setup(
         "scipy",
         "xarray",
     ],
-    extras_require={"dask": ["distributed"], "gym": ["gymnasium"]},
+    extras_require={"dask": ["distributed"], "gym": ["gymnasium"], "tune": ["optuna"]},
     data_files=[
         ("share/ament_index/resource_index/packages", ["resource/teleop_lab"]),
         ("share/teleop_lab", ["package.xml"]),

@@ -10,6 +10,12 @@ from .experiments import (
 from .fitting import FitError as FitError, FitResult as FitResult, fit_plant as fit_plant
 from .grading import grade as grade
 from .planning.reach import Reach as Reach, reach as reach
-from .studies import Study as Study, read_study as read_study, sweep as sweep
+from .studies import (
+    Study as Study,
+    Tuning as Tuning,
+    read_study as read_study,
+    read_tuning as read_tuning,
+    sweep as sweep,
+)
 
 __version__: str

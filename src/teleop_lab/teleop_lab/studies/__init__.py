@@ -8,5 +8,9 @@
 
 from teleop_lab.studies.dataset import dataset_of
 from teleop_lab.studies.study import Explained, Study, read_study, sweep
+from teleop_lab.studies.tuning import Range, Trial, Tuned, Tuning, read_tuning
 
-__all__ = ["Explained", "Study", "dataset_of", "read_study", "sweep"]
+__all__ = [
+    "Explained", "Range", "Study", "Trial", "Tuned", "Tuning", "dataset_of", "read_study",
+    "read_tuning", "sweep",
+]  # fmt: skip

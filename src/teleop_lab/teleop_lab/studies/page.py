@@ -9,11 +9,13 @@ from teleop_core.evaluation.figure import FIRST, FIXTURE, SECOND, THIRD
 from teleop_lab.experiments.drawing import axis
 from teleop_lab.studies.study import SEED, is_number
 from teleop_lab.studies.summary import conditions, differences, mean_of
+from teleop_lab.studies.tuning import Range
 
 if TYPE_CHECKING:
     import xarray
 
     from teleop_lab.studies.study import Study
+    from teleop_lab.studies.tuning import Tuned, Tuning
 
 _COLORS = (FIRST, SECOND, THIRD, FIXTURE, "#7f7f7f", "#17becf", "#bcbd22", "#8c564b")
 _STYLE = """body{font-family:system-ui,sans-serif;max-width:60rem;margin:2rem auto;padding:0 1rem}
@@ -24,28 +26,61 @@ border-bottom:1px solid #ddd;white-space:nowrap}
 
 def study_page(study: "Study", found: "xarray.Dataset", title: str) -> str:
     """HTML page of a study; it works offline, with plotly.js inside."""
-    import plotly.graph_objects as go
-    from plotly.offline import get_plotlyjs
-
     parts = [_table(study, found)]
     for metric in study.metrics:
         parts.append(f"<h2>{escape(metric)}</h2>")
         for figure in (_lines(study, found, metric), _heat(study, found, metric)):
             if figure is not None:
-                drawn = go.Figure(*figure)
-                drawn.update_layout(margin={"t": 10, "b": 50, "l": 70, "r": 20})
-                bar = {"displayModeBar": False}
-                parts.append(drawn.to_html(bar, full_html=False, include_plotlyjs=False))
+                parts.append(_drawn(*figure))
         parts.append(_changes(study, found, metric))
     errors = sorted({str(error) for error in found["error"].values.ravel() if error})
     parts += [f"<p>failed: {escape(error)}</p>" for error in errors]
     facts = ", ".join(f"{name} {value}" for name, value in found.attrs.items() if value)
+    return _page(
+        title, f"{facts}. Means over the seeds, with 95 % intervals by the bootstrap.", parts
+    )
+
+
+def tuning_page(tuning: "Tuning", tuned: "Tuned", title: str) -> str:
+    """HTML page of a search: the score by trial, and by each parameter; it works offline."""
+    numbers = [str(n) for n in range(1, len(tuned.trials) + 1)]
+    columns: dict[str, list[Any]] = {"trial": [int(n) for n in numbers]}
+    columns |= {name: [trial.values[name] for trial in tuned.trials] for name in tuning.searched}
+    parts = []
+    for name, values in columns.items():
+        trace = {
+            "type": "scatter", "mode": "markers", "marker": {"color": FIRST}, "text": numbers,
+            "x": [x if is_number(x) else str(x) for x in values],
+            "y": [trial.score for trial in tuned.trials],
+            "hovertemplate": "trial %{text}: %{y:.4g}<extra></extra>",
+        }  # fmt: skip
+        where = tuning.searched.get(name)
+        kind = {"type": "log"} if isinstance(where, Range) and where.is_log else {}
+        layout = {"xaxis": axis(name, **kind), "yaxis": axis(tuning.metric), "height": 300}
+        parts += [f"<h2>{escape(name)}</h2>", _drawn([trace], layout)]
+    best = ", ".join(
+        f"{name}={value:.4g}" if isinstance(value, float) else f"{name}={value}"
+        for name, value in tuned.best.values.items()
+    )
+    return _page(title, f"Best: {best}, with {tuning.metric} {tuned.best.score:.4g}.", parts)
+
+
+def _drawn(traces: Any, layout: Any) -> str:
+    import plotly.graph_objects as go
+
+    drawn = go.Figure(traces, layout)
+    drawn.update_layout(margin={"t": 10, "b": 50, "l": 70, "r": 20})
+    text: str = drawn.to_html({"displayModeBar": False}, full_html=False, include_plotlyjs=False)
+    return text
+
+
+def _page(title: str, sentence: str, parts: list[str]) -> str:
+    from plotly.offline import get_plotlyjs
+
     return (
         f'<!doctype html><html lang="en"><meta charset="utf-8"><title>{escape(title)}</title>'
         f"<style>{_STYLE}</style><script>{get_plotlyjs()}</script><h1>{escape(title)}</h1>"
-        f"<p>{escape(facts)}. Means over the seeds, with 95 % intervals by the bootstrap.</p>"
-        + "".join(parts)
-        + "</html>"
+        f"<p>{escape(sentence)}</p>" + "".join(parts) + "</html>"
     )
 
 

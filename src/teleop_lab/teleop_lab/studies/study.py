@@ -115,16 +115,25 @@ class Study:
         Raises:
             TeleopError: One of them cannot run; the text names the value.
         """
-        found, code = [], code_digest()
+        found = []
         for values in product(*self.swept.values()):
-            chosen = dict(zip(self.swept, values, strict=True))
-            given = {**self.settings, **chosen}
-            made = configuration(self.scenario, settings=given)
-            recipe, length = recipe_of(made), float(made.groups[SESSION].duration)
-            for seed in self.seeds:
-                place = {**chosen, SEED: int(seed)}
-                key = point_key(recipe, int(seed), self.metrics, code)
-                found.append(Point(place, self.scenario, given, int(seed), length, key))
+            found += self.points_at(dict(zip(self.swept, values, strict=True)))
+        return found
+
+    def points_at(self, chosen: Mapping[str, Setting]) -> list[Point]:
+        """Points of all seeds at a value for each swept parameter, be it one of the study or not.
+
+        Raises:
+            TeleopError: They cannot run; the text names the value.
+        """
+        found, code = [], code_digest()
+        given = {**self.settings, **chosen}
+        made = configuration(self.scenario, settings=given)
+        recipe, length = recipe_of(made), float(made.groups[SESSION].duration)
+        for seed in self.seeds:
+            place = {**chosen, SEED: int(seed)}
+            key = point_key(recipe, int(seed), self.metrics, code)
+            found.append(Point(place, self.scenario, given, int(seed), length, key))
         return found
 
     def explain(self, store: Path | str | None = None, jobs: int | None = None) -> Explained:
@@ -256,41 +265,57 @@ def read_study(path: Path | str) -> Study:
     Raises:
         TeleopError: The file cannot be read, or says something else.
     """
-    path = Path(path)
-    content = _read(path)
-    seeds = content.get("seeds", 1)
-    is_count = isinstance(seeds, int) and seeds > 0
-    if not is_count and not (isinstance(seeds, list) and all(isinstance(s, int) for s in seeds)):
-        raise ParameterError("seeds", seeds, "how many there are, or a list of whole numbers")
-    fixed, swept = _named(content, "set"), _named(content, "sweep")
+    content = read_entries(path, _KEYS)
+    swept = named(content, "sweep")
     for name, values in swept.items():
         if not isinstance(values, list):
             raise ParameterError(f"sweep of {name}", values, "a list of values")
-    for name in ("metrics", "parts"):
-        if not isinstance(content.get(name, []), list):
-            raise ParameterError(name, content[name], "a list")
-    if "duration" in content:
-        fixed = {f"{SESSION}.duration": content["duration"], **fixed}
     return Study(
-        content.get("scenario"), {name: tuple(values) for name, values in swept.items()},
-        tuple(range(1, seeds + 1)) if is_count else tuple(seeds),
-        tuple(map(str, content.get("metrics", []))), fixed,
-        tuple(path.parent / str(part) for part in content.get("parts", [])),
+        swept={name: tuple(values) for name, values in swept.items()},
+        metrics=tuple(map(str, listed(content, "metrics"))), **common(content, Path(path)),
     )  # fmt: skip
 
 
-def _read(path: Path) -> dict[str, Any]:
-    """Entries of a study's file."""
-    content = load(path)
+def read_entries(path: Path | str, known: Sequence[str]) -> dict[str, Any]:
+    """Entries of a YAML file of a study.
+
+    Raises:
+        TeleopError: The file cannot be read, or has another entry.
+    """
+    content = load(Path(path))
     if not isinstance(content, dict):
-        raise ParameterError("study", str(path), f"a YAML file with {', '.join(_KEYS)}")
+        raise ParameterError("study", str(path), f"a YAML file with {', '.join(known)}")
     for key in content:
-        if key not in _KEYS:
-            raise UnknownNameError(f"entry of {path.name}", str(key), _KEYS)
+        if key not in known:
+            raise UnknownNameError(f"entry of {Path(path).name}", str(key), known)
     return content
 
 
-def _named(content: Mapping[str, Any], name: str) -> dict[str, Any]:
+def common(content: Mapping[str, Any], path: Path) -> dict[str, Any]:
+    """Scenario, seeds, settings and parts that a file at a path says."""
+    seeds, fixed = content.get("seeds", 1), named(content, "set")
+    is_count = isinstance(seeds, int) and seeds > 0
+    if not is_count and not (isinstance(seeds, list) and all(isinstance(s, int) for s in seeds)):
+        raise ParameterError("seeds", seeds, "how many there are, or a list of whole numbers")
+    if "duration" in content:
+        fixed = {f"{SESSION}.duration": content["duration"], **fixed}
+    return {
+        "scenario": content.get("scenario"), "settings": fixed,
+        "seeds": tuple(range(1, seeds + 1)) if is_count else tuple(seeds),
+        "parts": tuple(path.parent / str(part) for part in listed(content, "parts")),
+    }  # fmt: skip
+
+
+def listed(content: Mapping[str, Any], name: str) -> list[Any]:
+    """Entry that is a list."""
+    found = content.get(name, [])
+    if not isinstance(found, list):
+        raise ParameterError(name, found, "a list")
+    return found
+
+
+def named(content: Mapping[str, Any], name: str) -> dict[str, Any]:
+    """Entry that has values by name."""
     found = content.get(name) or {}
     if not isinstance(found, dict):
         raise ParameterError(name, found, "parameters by name, each with its value")

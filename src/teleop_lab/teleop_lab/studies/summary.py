@@ -1,6 +1,6 @@
 """Summary: means over the seeds with intervals, and what each value changes, pair by pair."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import product
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -70,20 +70,27 @@ def differences(study: "Study", found: "xarray.Dataset", metric: str) -> dict[st
 
 def study_table(study: "Study", found: "xarray.Dataset") -> str:
     """Means over the seeds with 95 % intervals, as text."""
+    heads, rows = [], []
+    for name in (*study.swept, *study.metrics):
+        unit = found[name].attrs.get("units", "1") if name in study.metrics else "1"
+        heads.append(name if unit == "1" else f"{name} [{unit}]")
+    for values, part in conditions(study, found):
+        cells = [str(value) for value in values.values()]
+        rows.append([*cells, *(str(mean_of(part[metric].values)) for metric in study.metrics)])
+    return table_text(heads, rows)
+
+
+def table_text(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """A table as text."""
     from io import StringIO
 
     from rich import box
     from rich.console import Console
     from rich.table import Table
 
-    table = Table(box=box.SIMPLE)
-    for name in (*study.swept, *study.metrics):
-        unit = found[name].attrs.get("units", "1") if name in study.metrics else "1"
-        table.add_column(name if unit == "1" else f"{name} [{unit}]")
-    for values, part in conditions(study, found):
-        cells = [str(value) for value in values.values()]
-        cells += [str(mean_of(part[metric].values)) for metric in study.metrics]
-        table.add_row(*cells)
+    table = Table(*heads, box=box.SIMPLE)
+    for row in rows:
+        table.add_row(*row)
     text = StringIO()
-    Console(file=text, width=max(100, 26 * (len(study.swept) + len(study.metrics)))).print(table)
+    Console(file=text, width=max(100, 26 * len(heads))).print(table)
     return text.getvalue().rstrip()

@@ -1,0 +1,96 @@
+"""``teleop tune``: the values of some parameters with which a score is best."""
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from teleop_core.commands.arguments import command
+
+if TYPE_CHECKING:
+    from teleop_lab.studies.tuning import Tuned, Tuning
+
+_EPILOG = """\
+a search is a YAML file:
+  scenario: point
+  seeds: 3                                        the score is the mean over them
+  set: {display.latency: 0.3}                     the same in all sessions
+  tune:                                           a range, or a list of choices
+    coarse_gain: {low: 0.1, high: 1.0, log: true}
+    tremor.kind: [none, low_pass]
+  minimize: task.time_s                           or maximize: a key of a score
+then:
+  teleop tune config/studies/scale.yaml --store best           killed and called again, it goes on
+  teleop tune config/studies/scale.yaml --store best --trials 60 --html best.html
+"""
+_SHOWN = 5
+
+
+def add(commands: Any) -> None:
+    """Add the command's parser."""
+    text = "search the values of parameters with which a score is best"
+    parser = command(commands, "tune", _run, text, _EPILOG)
+    parser.add_argument("file", type=Path, metavar="FILE.yaml", help="what is searched")
+    parser.add_argument(
+        "--store", type=Path, metavar="DIR", help="keep results there, and run only what is not"
+    )
+    parser.add_argument("--trials", type=int, default=30, metavar="N", help="values (default: 30)")
+    parser.add_argument("--jobs", type=int, metavar="N", help="processes (default: processors)")
+    parser.add_argument("--html", type=Path, metavar="FILE", help="write a page with plots")
+    parser.add_argument("--csv", type=Path, metavar="FILE", help="write a line for each trial")
+
+
+def _run(arguments: argparse.Namespace) -> int:
+    from teleop_core.commands.progress import shown_progress
+    from teleop_core.evaluation.command import check_places, write_whole
+    from teleop_lab.studies.tuning import read_tuning
+
+    tuning = read_tuning(arguments.file)
+    check_places(arguments.html, arguments.csv)
+    with shown_progress(arguments.file.stem) as progress:
+        tuned = tuning.run(
+            arguments.store, trials=arguments.trials, jobs=arguments.jobs, progress=progress
+        )
+    print(_table(tuning, tuned))
+    failed = [trial.error for trial in tuned.trials if trial.error]
+    if failed:
+        print(f"{len(failed)} of {len(tuned.trials)} trials failed; first: {failed[0]}")
+    print("best: --set " + " ".join(f"{n}={_text(v)}" for n, v in tuned.best.values.items()))
+    if arguments.csv is not None:
+        write_whole(arguments.csv, _csv(tuning, tuned))
+        print(f"numbers: {arguments.csv}")
+    if arguments.html is not None:
+        from teleop_lab.studies.page import tuning_page
+
+        write_whole(arguments.html, tuning_page(tuning, tuned, arguments.file.stem))
+        print(f"page: {arguments.html}")
+    return 0
+
+
+def _text(value: object) -> str:
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
+
+
+def _table(tuning: "Tuning", tuned: "Tuned") -> str:
+    """The best trials, the best one first."""
+    from teleop_lab.studies.summary import table_text
+
+    scored = [(n, trial) for n, trial in enumerate(tuned.trials, 1) if trial.score is not None]
+    sign = -1.0 if tuning.is_largest else 1.0
+    scored.sort(key=lambda pair: sign * (pair[1].score or 0.0))
+    rows = [
+        [str(n), *(_text(value) for value in trial.values.values()), _text(trial.score)]
+        for n, trial in scored[:_SHOWN]
+    ]
+    return table_text(["trial", *tuning.searched, tuning.metric], rows)
+
+
+def _csv(tuning: "Tuning", tuned: "Tuned") -> str:
+    import csv
+    from io import StringIO
+
+    text = StringIO()
+    lines = csv.writer(text, lineterminator="\n")
+    lines.writerow(["trial", *tuning.searched, tuning.metric, "error"])
+    for n, trial in enumerate(tuned.trials, 1):
+        lines.writerow([n, *trial.values.values(), trial.score, trial.error])
+    return text.getvalue()

@@ -1,0 +1,247 @@
+"""Tuning: the values of some parameters with which a score is best, found by Optuna."""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from teleop_core.base.errors import ParameterError, SessionError, TeleopError
+from teleop_core.session.api import Setting
+from teleop_core.session.runner import silent
+from teleop_lab.studies.point import Result
+from teleop_lab.studies.store import Store
+from teleop_lab.studies.study import Study, common, named, read_entries
+from teleop_lab.studies.workers import in_processes
+
+_KEYS = ("scenario", "seeds", "set", "tune", "minimize", "maximize", "parts", "duration")
+_TOGETHER = 5
+"""Trials whose values are chosen before the first of them has run, so that processes share them.
+It is no option: what is found must not depend on the machine."""
+
+
+class Range(NamedTuple):
+    """From where to where a parameter is searched; of whole numbers only such are tried.
+
+    Attributes:
+        low: Least value.
+        high: Greatest value.
+        is_log: Whether equal ratios are searched alike, not equal differences.
+    """
+
+    low: float
+    high: float
+    is_log: bool = False
+
+
+class Trial(NamedTuple):
+    """What came of some values.
+
+    Attributes:
+        values: By parameter.
+        score: Mean over the seeds; None where a session failed or does not have it.
+        error: Why there is none.
+    """
+
+    values: Mapping[str, Setting]
+    score: float | None
+    error: str
+
+
+@dataclass(frozen=True)
+class Tuned:
+    """What a search found.
+
+    Attributes:
+        trials: All of them, in their order.
+        best: The best of them.
+    """
+
+    trials: tuple[Trial, ...]
+    best: Trial
+
+
+@dataclass(frozen=True)
+class Tuning:
+    """Search for the values of some parameters with which a score is best.
+
+    Attributes:
+        scenario: One of ``teleop scenarios``; None for the defaults.
+        searched: A :class:`Range` or a list of choices for each parameter, named as on the command
+            line.
+        seeds: Hands over which a score is averaged: values that suit one alone are no use.
+        metric: Key of the score, such as ``task.time_s``.
+        is_largest: Whether the largest score is the best one.
+        settings: Parameters that are the same in all sessions.
+        parts: Files that register parts of your own.
+
+    Raises:
+        TeleopError: A range, parameter, key of a score or part is wrong; nothing was run.
+    """
+
+    scenario: str | None
+    searched: Mapping[str, Range | Sequence[Setting]]
+    seeds: Sequence[int]
+    metric: str
+    is_largest: bool = False
+    settings: Mapping[str, Setting] = field(default_factory=dict)
+    parts: Sequence[Path] = ()
+
+    def __post_init__(self) -> None:
+        if not self.searched:
+            raise ParameterError("tune", {}, "at least one parameter")
+        for name, where in self.searched.items():
+            if isinstance(where, Range) and not (
+                math.isfinite(where.high - where.low) and where.low < where.high
+            ):
+                raise ParameterError(f"tune of {name}", tuple(where[:2]), "low below high")
+            if isinstance(where, Range) and where.is_log and where.low <= 0.0:
+                raise ParameterError(f"low of {name}", where.low, "above 0 with log")
+        study = self._study()
+        for name, values in study.swept.items():  # each end by itself: a parameter names its own
+            for value in values:
+                first = {other: ends[0] for other, ends in study.swept.items()}
+                study.points_at({**first, name: value})
+
+    def _study(self) -> Study:
+        """Study of the ends of all ranges, whose store is this search's."""
+        ends = {
+            name: where[:2] if isinstance(where, Range) else tuple(where)
+            for name, where in self.searched.items()
+        }
+        return Study(
+            self.scenario, ends, self.seeds, (self.metric,), self.settings, self.parts
+        )  # fmt: skip
+
+    def run(
+        self,
+        store: Path | str | None = None,
+        *,
+        trials: int = 30,
+        jobs: int | None = None,
+        progress: Callable[[int, int], None] = silent,
+    ) -> Tuned:
+        """Try values, each chosen by what those before it were worth.
+
+        With a store, a search that was killed goes on to the same values as if it had not been,
+        and one with more trials goes on from those that are there.
+
+        Args:
+            store: Directory of the results, made if it is missing; None keeps them in memory.
+            trials: How many values are tried.
+            jobs: Processes; None: as many as processors.
+            progress: Told how many trials are done, and how many there are.
+
+        Raises:
+            SessionError: No trial has a score, Optuna is missing, or the store is another's.
+            ParameterError: There is no trial.
+        """
+        if trials < 1:
+            raise ParameterError("trials", trials, "1 or more")
+        optuna = _optuna()
+        study = self._study()
+        kept = Store.open(store, study)
+        # Its numbers are drawn anew in each call: with the same results it asks for the same.
+        search = optuna.create_study(
+            direction="maximize" if self.is_largest else "minimize",
+            sampler=optuna.samplers.TPESampler(seed=0),
+        )
+        done: list[Trial] = []
+        while len(done) < trials:
+            progress(len(done), trials)
+            asked = [search.ask() for _ in range(min(_TOGETHER, trials - len(done)))]
+            chosen = [self._values(trial) for trial in asked]
+            for trial, found in zip(asked, self._scores(study, chosen, kept, jobs), strict=True):
+                fail = optuna.trial.TrialState.FAIL if found.score is None else None
+                search.tell(trial, found.score, state=fail)
+                done.append(found)
+        progress(trials, trials)
+        scored = [trial for trial in done if trial.score is not None]
+        if not scored:
+            raise SessionError(f"no trial has {self.metric}; first: {done[0].error}")
+        sign = -1.0 if self.is_largest else 1.0
+        return Tuned(tuple(done), min(scored, key=lambda trial: sign * (trial.score or 0.0)))
+
+    def _values(self, trial: Any) -> dict[str, Setting]:
+        """Values of a trial of Optuna."""
+        found: dict[str, Setting] = {}
+        for name, where in self.searched.items():
+            if not isinstance(where, Range):
+                # Optuna knows plain values alone: a list is chosen by its place.
+                found[name] = where[trial.suggest_categorical(name, list(range(len(where))))]
+            elif isinstance(where.low, int) and isinstance(where.high, int):
+                found[name] = trial.suggest_int(name, where.low, where.high, log=where.is_log)
+            else:
+                found[name] = trial.suggest_float(name, where.low, where.high, log=where.is_log)
+        return found
+
+    def _scores(
+        self, study: Study, chosen: list[dict[str, Setting]], kept: Store, jobs: int | None
+    ) -> list[Trial]:
+        """What some values are worth; sessions that the store does not have are run."""
+        points, refused = [], []
+        for values in chosen:
+            try:
+                points.append(study.points_at(values))
+                refused.append("")
+            except TeleopError as error:
+                points.append([])
+                refused.append(" ".join(str(error).split()))
+        to_run = {point.name: point for own in points for point in own if kept.reason(point)}
+        for result in in_processes(study, list(to_run.values()), jobs, kept.folder, None):
+            kept.take(result)
+        found = []
+        for values, own, why in zip(chosen, points, refused, strict=True):
+            results = [kept.result(point) for point in own]
+            found.append(self._trial(values, [one for one in results if one is not None], why))
+        return found
+
+    def _trial(self, values: dict[str, Setting], results: list[Result], error: str) -> Trial:
+        scores = [one.scores.get(self.metric) for one in results]
+        error = error or next((one.error for one in results if one.error), "")
+        if error or None in scores:
+            return Trial(values, None, error or f"a recording without {self.metric}")
+        return Trial(values, sum(map(float, scores)) / len(scores), "")  # type: ignore[arg-type]
+
+
+def _optuna() -> Any:
+    try:
+        import optuna
+    except ImportError as error:
+        raise SessionError("tuning needs Optuna: pip install teleop_lab[tune]") from error
+    optuna.logging.set_verbosity(optuna.logging.WARNING)
+    return optuna
+
+
+def read_tuning(path: Path | str) -> Tuning:
+    """Search of a YAML file: scenario, set, tune, minimize or maximize, seeds, parts, duration.
+
+    A parameter below ``tune`` has a list of choices, or ``{low: 0.1, high: 1.0, log: true}``.
+
+    Raises:
+        TeleopError: The file cannot be read, or says something else.
+    """
+    content = read_entries(path, _KEYS)
+    metrics = [(word, content[word]) for word in ("minimize", "maximize") if word in content]
+    if len(metrics) != 1:
+        raise ParameterError("minimize, maximize", dict(metrics), "one of them: key of a score")
+    searched: dict[str, Range | Sequence[Setting]] = {}
+    for name, where in named(content, "tune").items():
+        searched[name] = _range(name, where)
+    ((word, metric),) = metrics
+    return Tuning(
+        searched=searched, metric=str(metric), is_largest=word == "maximize",
+        **common(content, Path(path)),
+    )  # fmt: skip
+
+
+def _range(name: str, where: object) -> Range | Sequence[Setting]:
+    if isinstance(where, list):
+        return where
+    hint = "a list of choices, or {low: 0.1, high: 1.0}, with log: true for equal ratios"
+    if not isinstance(where, dict) or not {"low", "high"} <= set(where) <= {"low", "high", "log"}:
+        raise ParameterError(f"tune of {name}", where, hint)
+    low, high = where["low"], where["high"]
+    if not all(isinstance(x, int | float) and not isinstance(x, bool) for x in (low, high)):
+        raise ParameterError(f"tune of {name}", where, hint)
+    return Range(low, high, bool(where.get("log", False)))

@@ -1,0 +1,135 @@
+"""Tuning: it finds the best values, goes on where it was, and tells what cannot be."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import teleop_core as tc
+from teleop_lab import Tuning, read_tuning
+from teleop_lab.studies import Range
+
+METRIC = "position_error_mm.rms"
+
+
+def tuning(**changes: Any) -> Tuning:
+    whole = Tuning(
+        "coarse_box", {"coarse_gain": Range(0.2, 1.0)}, (1,), METRIC,
+        settings={"teleop.duration": 0.5},
+    )  # fmt: skip
+    return replace(whole, **changes)
+
+
+def file_of(folder: Path, text: str) -> Path:
+    file = folder / "tune.yaml"
+    file.write_text(text, "utf-8")
+    return file
+
+
+def test_the_best_trial_has_the_score_of_the_same_session_alone() -> None:
+    tuned = tuning().run(trials=6, jobs=1)
+    scores = [trial.score for trial in tuned.trials]
+    assert tuned.best.score == min(score for score in scores if score is not None)
+    name, value = next(iter(tuned.best.values.items()))
+    alone = tc.run("coarse_box", duration=0.5, seed=1, settings={name: value}).score()
+    assert tuned.best.score == alone.value(METRIC)
+
+
+def test_the_largest_score_is_the_best_where_it_is_asked_for() -> None:
+    tuned = tuning(is_largest=True).run(trials=3, jobs=1)
+    assert tuned.best.score == max(trial.score or 0.0 for trial in tuned.trials)
+
+
+def test_a_search_that_was_broken_off_goes_on_to_the_same_values(tmp_path: Path) -> None:
+    whole = tuning().run(tmp_path / "whole", trials=8, jobs=1)
+    calls = 0
+
+    def killed(done: int, _: int) -> None:
+        nonlocal calls
+        calls += 1
+        if done:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        tuning().run(tmp_path / "one", trials=8, jobs=1, progress=killed)
+    assert calls == 2
+    before = len(list((tmp_path / "one").glob("*/*.json")))
+    assert 0 < before < 8
+    assert tuning().run(tmp_path / "one", trials=8, jobs=1) == whole
+
+
+def test_a_score_that_no_session_has_is_told_and_not_taken_for_a_bad_one() -> None:
+    with pytest.raises(tc.SessionError, match=r"no trial has transfer\.time_s"):
+        tuning(metric="transfer.time_s").run(trials=1, jobs=1)
+
+
+def test_choices_and_whole_numbers_are_kept_as_they_are() -> None:
+    searched = {"controller": ["pid", "disturbance_observer"], "integration_steps": Range(1, 4)}
+    tuned = tuning(searched=searched).run(trials=4, jobs=1)
+    for trial in tuned.trials:
+        assert trial.values["controller"] in searched["controller"]
+        assert isinstance(trial.values["integration_steps"], int)
+        assert not trial.error
+
+
+@pytest.mark.parametrize(
+    ("changes", "text"),
+    [
+        ({"searched": {}}, "at least one parameter"),
+        ({"searched": {"coarse_gian": Range(0.1, 1.0)}}, "coarse_gain"),
+        ({"searched": {"coarse_gain": Range(1.0, 0.1)}}, "low below high"),
+        ({"searched": {"coarse_gain": Range(0.0, 1.0, is_log=True)}}, "above 0 with log"),
+        ({"searched": {"coarse_gain": Range(0.1, 1000.0)}}, "10"),
+        ({"metric": "task.tim"}, "task.time_s"),
+    ],
+)
+def test_what_cannot_be_searched_is_told_before_the_first_session(
+    changes: dict[str, Any], text: str
+) -> None:
+    with pytest.raises(tc.TeleopError, match=text):
+        tuning(**changes)
+
+
+def test_a_file_says_the_same_as_python(tmp_path: Path) -> None:
+    text = (
+        "scenario: coarse_box\nseeds: [1]\nduration: 0.5\n"
+        f"tune:\n  coarse_gain: {{low: 0.2, high: 1.0}}\nminimize: {METRIC}\n"
+    )
+    assert read_tuning(file_of(tmp_path, text)).run(trials=2, jobs=1) == tuning().run(
+        trials=2, jobs=1
+    )
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("tune: {coarse_gain: 1.0}\nminimize: task.time_s", "a list of choices, or"),
+        ("tune: {coarse_gain: {low: 0.1}}\nminimize: task.time_s", "a list of choices, or"),
+        ("tune: {coarse_gain: {low: 0.1, high: 1.0}}", "key of a score"),
+        ("sweep: {coarse_gain: [0.1]}", "tune"),
+        ("[", "YAML"),
+    ],
+)
+def test_a_wrong_file_is_refused_with_what_must_be_there(
+    text: str, words: str, tmp_path: Path
+) -> None:
+    with pytest.raises(tc.TeleopError, match=words):
+        read_tuning(file_of(tmp_path, text))
+
+
+def test_the_command_prints_the_best_values_and_writes_page_and_numbers(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from teleop_core.cli import main
+
+    text = (
+        "scenario: coarse_box\nduration: 0.3\n"
+        f"tune:\n  coarse_gain: {{low: 0.5, high: 1.0, log: true}}\nminimize: {METRIC}\n"
+    )
+    page, numbers = tmp_path / "page.html", tmp_path / "numbers.csv"
+    given = ["--trials", "2", "--jobs", "1", "--html", str(page), "--csv", str(numbers)]
+    assert main(["tune", str(file_of(tmp_path, text)), *given]) == 0
+    assert "best: --set coarse_gain=" in capsys.readouterr().out
+    assert "coarse_gain" in page.read_text("utf-8")
+    assert len(numbers.read_text("utf-8").splitlines()) == 3
