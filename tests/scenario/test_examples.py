@@ -6,6 +6,7 @@ import re
 import subprocess
 import sys
 import tempfile
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -205,6 +206,18 @@ def test_sweep_tells_what_a_late_display_costs_and_runs_nothing_twice(tmp_path: 
     assert "again: 8 sessions, 0 to run" in text
     _, soon, _, late = numbers(r"([\d.]+) s at gain", text)
     assert late > soon + 0.1
+
+
+def test_the_sink_for_mlflow_logs_a_run_for_each_session_or_says_what_it_needs(
+    tmp_path: Path,
+) -> None:
+    command = [sys.executable, str(EXAMPLES.parent / "examples/mlflow_sink.py")]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    if find_spec("mlflow") is None:
+        assert done.returncode == 1
+        assert done.stderr == "this example needs MLflow: pip install mlflow-skinny\n"
+    else:
+        assert re.fullmatch(r"4 runs logged to sqlite.*\n", done.stdout)
 
 
 def test_own_task_takes_longer_the_later_the_slave_is_seen(tmp_path: Path) -> None:
