@@ -78,7 +78,6 @@ setup(
             "types-PyYAML",
             "types-greenlet",
             "psutil",
-            "sympy",
             "colcon-common-extensions",
             "colcon-ros",
         ],

@@ -95,12 +95,6 @@ def test_the_chosen_branch_is_the_nearest_to_the_seed_that_limits_allow(name: st
         assert np.abs(result.q - seed).max() == pytest.approx(nearest, abs=1e-8)
 
 
-@arms
-def test_the_original_joints_come_back_when_they_are_the_seed(name: str) -> None:
-    arm, q = ARMS[name], drawn(name, 2000)
-    assert np.abs(arm.ik(arm.fk(q), q).q - q).max() < 1e-8
-
-
 # The legs of the hybrid contradict each other by a step; pinned loops are the test of its Jacobian.
 @pytest.mark.parametrize("name", [name for name in ARMS if name != "scara_stewart"])
 def test_the_jacobian_is_the_difference_quotient_of_forward_kinematics(name: str) -> None:
