@@ -89,6 +89,24 @@ def test_nothing_that_decides_bits_calls_blas_or_a_vectorised_function() -> None
 
 
 @pytest.mark.parametrize(
+    ("text", "what"),
+    [
+        ("a = b @ c", "@"),
+        ("a @= c", "@"),
+        ("n = np.linalg.norm(v)", "np.linalg"),
+        ("n = np.einsum('i,i', v, v)", "np.einsum"),
+        ("from scipy.linalg import solve", "scipy"),
+        ("n = v.dot(v)", ".dot()"),
+        ("y = np.exp(x)", "np.exp"),
+        ("y = x**3", "**"),
+        ("@kernel\ndef f(x):\n    return np.dot(x, x)", "np.dot"),
+    ],
+)
+def test_the_rule_finds_what_it_is_for(text: str, what: str) -> None:
+    assert any(what in mistake for mistake in mistakes(text))
+
+
+@pytest.mark.parametrize(
     ("a", "b"),
     [((3,), (3,)), ((4, 3), (3,)), ((3,), (3, 5)), ((7, 2, 3), (7, 3, 4)), ((2, 3), (7, 3, 3))],
 )
