@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import roboticstoolbox as rtb
 
 from random_arms import table
 from teleop_core.base import errors
@@ -45,6 +44,8 @@ def test_d1_a_modified_row_is_equation_10() -> None:
     ("convention", "link"), [("standard", "RevoluteDH"), ("modified", "RevoluteMDH")]
 )
 def test_roboticstoolbox_builds_the_same_chain(convention: str, link: str) -> None:
+    import roboticstoolbox as rtb  # takes seconds
+
     rng = np.random.default_rng(2)
     numbers = rng.uniform(-1.5, 1.5, (6, 3))
     rows = [{"alpha": k, "a": a, "d": d, "theta": "q"} for k, a, d in numbers]

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-import roboticstoolbox as rtb
 from scipy.spatial.transform import Rotation
 
 from random_arms import table
@@ -86,6 +85,8 @@ def test_d4_d5_product_of_the_pumas_links_is_the_lectures_with_its_repair() -> N
 
 
 def test_lengths_ranges_and_wrist_centre_are_those_of_roboticstoolbox() -> None:
+    import roboticstoolbox as rtb  # takes seconds
+
     # Its zeros differ (standard table, joints 1 and 2 half a turn on), its base is on the floor.
     peer = rtb.models.DH.Puma560()
     assert (peer.links[1].a, peer.links[2].a, peer.links[2].d, peer.links[3].d) == (A2, A3, D3, D4)
