@@ -79,7 +79,6 @@ setup(
             "types-PyYAML",
             "types-greenlet",
             "psutil",
-            "sympy",
             "colcon-common-extensions",
             "colcon-ros",
         ],

@@ -125,24 +125,14 @@ events = st.lists(
 def test_no_event_moves_the_command_further_than_gain_times_the_hand(
     happened: list[tuple[str, float, Array, Array]],
 ) -> None:
-    desk = Desk()
-    for action, value, step, turn in happened:
+    """And not at all while the hand rests."""
+    desk, rest = Desk(), np.zeros(3)
+    for k, (action, value, *moved) in enumerate(happened):
+        step, turn = moved if k % 2 else (rest, rest)
         done = desk.sample(step, turn, desk.act(action, value))
         allowed = done.gain * np.linalg.norm(done.hand_step)
         assert np.linalg.norm(done.moved) <= allowed + ROUNDING, action
         assert done.turned <= done.hand_turn + ANGLE_ROUNDING, action
-
-
-@given(events)
-def test_no_event_moves_the_command_while_the_hand_rests(
-    happened: list[tuple[str, float, Array, Array]],
-) -> None:
-    desk = Desk()
-    for action, value, step, turn in happened:
-        desk.sample(step, turn)
-        done = desk.sample(np.zeros(3), np.zeros(3), desk.act(action, value))
-        assert np.abs(done.moved).max() <= ROUNDING, action
-        assert done.turned <= ANGLE_ROUNDING, action
 
 
 @given(events)

@@ -18,8 +18,8 @@ from teleop_core.session.configuration import Configuration, configure
 from teleop_core.session.runner import replay, simulate
 from teleop_core.session.virtual import VirtualTime
 
-# So long moves the rcrt1 to where it starts, at half of its speed; its hand moves from then on.
-LEAD = VirtualTime(configure()).lead
+# Ticks in which the rcrt1 moves to where it starts, at half of its speed; then its hand moves.
+LEAD = 3702
 TICKS = LEAD + 1500
 SHORT = ("approach_time=0.5", "operator.period=2.0", "buttons.fixture=[0.2]")
 ARMS = ("teleop.arms=[right, left]", "left/robot=scara", "left/seed=7", "left/coarse_gain=0.5",

@@ -136,14 +136,6 @@ def test_evaluate_prints_a_table_and_writes_json_and_page(
     assert "<html" in page.read_text()[:500].lower()
 
 
-def test_a_process_that_has_loaded_tells_wrong_use_as_a_fresh_one_does(
-    teleop: "Run", teleop_again: "Run", tmp_path: Path
-) -> None:
-    wrong = ("sim", "--set", "robot=r2d2", "--out", tmp_path / "bag")
-    fresh, copied = (one_line(run(*wrong, code=2)) for run in (teleop, teleop_again))
-    assert copied == fresh
-
-
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
@@ -167,27 +159,6 @@ def test_sim_refuses_wrong_input_in_one_line(
     for word in words:
         assert word in line
     assert not (tmp_path / "bag").exists()
-
-
-@pytest.mark.parametrize(
-    ("text", "word"),
-    [
-        ("a: [", "not YAML"),
-        ("[]", "stages"),
-        ("nobody: {ros__parameters: {}}", "nobody"),
-        ("slave_sim: 3", "ros__parameters"),
-        ("slave_sim: {ros__parameters: {speed: 1.0}}", "speed"),
-        ("slave: {ros__parameters: {command_timeout: 1}}", "float"),
-    ],
-)
-def test_sim_refuses_wrong_parameter_files_in_one_line(
-    teleop_again: "Run", tmp_path: Path, text: str, word: str
-) -> None:
-    file = tmp_path / "wrong.yaml"
-    file.write_text(text)
-    assert word in one_line(
-        teleop_again("sim", "--config", file, "--out", tmp_path / "bag", code=2)
-    )
 
 
 @pytest.mark.slow
@@ -214,20 +185,6 @@ def test_replay_and_evaluate_name_what_a_bag_lacks(teleop_again: "Run", tmp_path
         assert lacking in line
         assert "master/buttons" in line
     assert not (tmp_path / "out").exists()
-
-
-def test_a_missing_a_truncated_and_an_empty_bag_are_told_apart(
-    teleop_again: "Run", recording: Path, tmp_path: Path
-) -> None:
-    assert "does not exist" in one_line(teleop_again("evaluate", tmp_path / "none", code=2))
-    cut = tmp_path / "cut"
-    shutil.copytree(recording, cut)
-    file = next(cut.glob("*.mcap"))
-    os.truncate(file, file.stat().st_size // 2)
-    assert "recover" in one_line(teleop_again("evaluate", cut, code=2))
-    with BagWriter(tmp_path / "empty", [topics.MASTER_BUTTONS], ()):
-        pass
-    assert "no messages" in one_line(teleop_again("evaluate", tmp_path / "empty", code=2))
 
 
 def test_recover_saves_what_a_truncated_bag_holds(

@@ -1,7 +1,7 @@
 """Own parts in sessions: delays, stages, fixtures, controllers, operators, compiled and plain."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -31,11 +31,6 @@ from teleop_core.robots import load_robot
 from teleop_core.session.configuration import configure
 from teleop_core.session.runner import simulate
 from teleop_core.session.virtual import VirtualTime
-from teleop_core.shapes import register_shape
-from teleop_core.shapes.box import BOX
-from teleop_core.shapes.sphere import SPHERE
-from teleop_core.slave.controllers import register_controller
-from teleop_core.slave.controllers.source_pid import SOURCE_PID, source_pid_control
 
 TICKS = 1500
 MS = 1e-3
@@ -168,6 +163,9 @@ def limit_step(p: Any, s: Any, row: Any, dt: float) -> None:
     s.is_begun = 1
 
 
+LIMIT = kernel(limit_step)
+
+
 def limit(name: str, step: Callable[[object, object, object, float], None]) -> Stage:
     return Stage(
         name, LimitParameters, (SLAVE_SERVO_CP,), (LIMITED,), step=step,
@@ -178,7 +176,7 @@ def limit(name: str, step: Callable[[object, object, object, float], None]) -> S
 
 @pytest.mark.slow
 def test_plain_stage_gives_the_same_bits_as_the_same_function_compiled(own_parts: None) -> None:
-    register_stage(limit("limit", kernel(limit_step)))
+    register_stage(limit("limit", LIMIT))
     register_stage(limit("plain_limit", limit_step))
     compiled = session("teleop.stages=[limit]")
     interpreted = session("teleop.stages=[plain_limit]")
@@ -190,14 +188,14 @@ def test_plain_stage_gives_the_same_bits_as_the_same_function_compiled(own_parts
 
 
 def test_parameters_of_an_own_stage_are_set_like_others(own_parts: None) -> None:
-    register_stage(limit("limit", kernel(limit_step)))
+    register_stage(limit("limit", LIMIT))
     block = session("teleop.stages=[limit]", "limit.speed=0.01")
     steps = np.abs(np.diff(block["slave_limited_cp"][:, :3], axis=0))
     assert steps.max() < 0.01 * MS + 1e-15
 
 
 def test_own_stage_is_recorded_with_its_topic_and_stamp(own_parts: None, tmp_path: Path) -> None:
-    register_stage(limit("limit", kernel(limit_step)))
+    register_stage(limit("limit", LIMIT))
     settings = [*AT_ONCE, "teleop.stages=[limit]", "duration=0.2"]
     simulate(configure(settings=settings), tmp_path / "bag")
     series = Bag(tmp_path / "bag").read(LIMITED)
@@ -235,12 +233,10 @@ class PushParameters:
     newton: float = parameter(1.0, unit="N", doc="along the master's x")
 
 
-@pytest.mark.parametrize("is_compiled", [True, False])
 def test_second_source_of_force_is_added_and_pushes_the_hand(
-    own_parts: None, plain: NDArray[np.void], is_compiled: bool
+    own_parts: None, plain: NDArray[np.void]
 ) -> None:
-    step = kernel(push_step) if is_compiled else push_step
-    register_stage(Stage("contact", PushParameters, (MASTER_MEASURED_CP,), (PUSH,), step=step))
+    register_stage(Stage("contact", PushParameters, (MASTER_MEASURED_CP,), (PUSH,), step=push_step))
     block = session("teleop.stages=[contact]", "contact.newton=1.5", "fixture.max_force=1.5")
     applied, walls = block["master_measured_cf"][1:, :3], block["master_servo_cf"][:-1, :3]
     assert np.array_equal(applied, walls + np.array((1.5, 0.0, 0.0)))
@@ -251,21 +247,6 @@ def test_second_source_of_force_is_added_and_pushes_the_hand(
 
 
 # Fixtures, controllers and operators.
-
-
-@pytest.mark.parametrize("shape", [BOX, SPHERE], ids=["box", "sphere"])
-def test_plain_shape_gives_the_same_bits_as_the_same_distance_compiled(
-    own_parts: None, shape: Any
-) -> None:
-    register_shape(replace(shape, name="plain", distance=shape.distance.py_func))
-    sizes = {"box": "box.size=[0.01, 0.01, 0.01]", "sphere": "sphere.radius=0.005"}
-    size = sizes[shape.name]
-    compiled = session(f"fixture={shape.name}", f"fixture.{size}")
-    plain_size = f"fixture.plain.{size.partition('.')[2]}"
-    interpreted = session("fixture=plain", plain_size)
-    assert_same_streams(compiled, interpreted)
-    assert np.array_equal(compiled["teleop_state"], interpreted["teleop_state"])
-    assert np.abs(compiled["master_servo_cf"]).max() > 0.1
 
 
 def test_sphere_holds_the_hand_at_the_same_distance_in_all_directions() -> None:
@@ -284,14 +265,6 @@ def test_sphere_holds_the_hand_at_the_same_distance_in_all_directions() -> None:
     depth = np.linalg.norm(offset, axis=1) - 5 * MS
     expected = np.minimum(1000.0 * depth, 3.3)
     assert np.allclose(np.linalg.norm(push, axis=1), expected, rtol=0, atol=1e-9)
-
-
-def test_plain_controller_gives_the_same_bits_as_the_same_law_compiled(
-    own_parts: None, plain: NDArray[np.void]
-) -> None:
-    law = source_pid_control.py_func
-    register_controller(replace(SOURCE_PID, name="plain", control=law))
-    assert_same_streams(session("controller=plain", ticks=300), plain[:300])
 
 
 # Axis maps.

@@ -236,13 +236,6 @@ def test_a_table_of_others_is_taken_as_it_is(tmp_path: Path) -> None:
     assert abs(from_file.share - direct.share) <= AGREE
 
 
-def test_unknown_sources_are_told_with_the_alternatives() -> None:
-    with pytest.raises(tc.UnknownNameError, match="coarse_box"):
-        lab.reach("coarse_bax")
-    with pytest.raises(tc.ParameterError, match=r"share is 1\.5"):
-        lab.reach(person("pen", 1.0), share=1.5)
-
-
 @pytest.mark.slow
 def test_what_the_command_prints_and_writes_is_what_replay_takes(
     tmp_path: Path, teleop: "Run"

@@ -122,14 +122,6 @@ def requested(log: Any) -> set[Any]:
 
 @pytest.mark.browser
 @pytest.mark.slow
-def test_request_of_a_page_does_not_go_unnoticed(browser: str, tmp_path: Path) -> None:
-    page = tmp_path / "page.html"
-    page.write_text('<body data-drawn="0"><img src="http://example.com/x.png"></body>')
-    assert opened(browser, page, tmp_path)[2] == {"http://example.com/x.png"}
-
-
-@pytest.mark.browser
-@pytest.mark.slow
 def test_page_of_three_recordings_draws_everything_without_asking_the_network(
     browser: str, tmp_path: Path
 ) -> None:

@@ -29,7 +29,6 @@ from teleop_core.kernels.geometry import Array
 from teleop_core.robots import IkStatus, load_robot
 from teleop_core.robots.arms.as_chain import chain_of
 from teleop_core.robots.branches import turn
-from teleop_core.robots.chains import dh_kernels
 from teleop_core.robots.closed_form import swivel
 from teleop_core.robots.closed_form.candidates import constants_at
 from teleop_core.robots.closed_form.swivel_arcs import ARCS, MARGIN, cut_circle, swivel_of
@@ -96,20 +95,6 @@ def test_every_legal_pose_is_found_with_all_its_solutions(case: Case, load: Load
             np.testing.assert_allclose(
                 arm.fk(branches), np.tile(wanted, (len(branches), 1, 1)), atol=1e-9
             )
-
-
-@pytest.mark.parametrize("case", EACH, ids=NAMES)
-def test_a_search_from_200_starts_finds_no_further_solution(case: Case, load: Load) -> None:
-    kind, make, _word, side = case
-    rng, found = np.random.default_rng(3), np.empty((64, 6))
-    arm = load(make(rng, kind)[::side])
-    for q in rng.uniform(arm.lower, arm.upper, (4, 6)):
-        wanted = arm.fk(q)
-        count = dh_kernels.ik_all(wanted, arm.geometry_row, found)
-        branches = arm.ik_all(wanted)
-        assert len(branches) >= count
-        assert max(apart(other, branches) for other in found[:count]) < 1e-5
-        assert min(apart(b, np.delete(branches, i, 0)) for i, b in enumerate(branches)) > 1e-6
 
 
 TWO_ROUNDS = [WIDE, WIDE, (-1.0, 5.5), WIDE, (-6.0, 0.5), WIDE]

@@ -371,18 +371,6 @@ def test_legs_and_leg_jacobian_are_those_of_a_platform_pinned_to_slides(name: st
         assert np.abs(layout.leg_jacobian(T.homogeneous) - slides).max() < SOLVED
 
 
-def test_legs_meet_the_platform_where_direct_kinematics_puts_it_in_other_assemblies_too() -> None:
-    robot, drawn = case("stewart")
-    others = 0
-    for T in platform_poses(3, 40, tilt=0.9):
-        q = drawn.q(drawn.closed(drawn.put(drawn.start, drawn.body, T), drawn.legs))
-        found = SE3(robot.fk(q))
-        x = drawn.closed(drawn.put(drawn.start, drawn.body, found), drawn.legs)
-        assert np.abs(drawn.q(x) - q).max() < SOLVED
-        others += np.abs((found.inverse() * T).homogeneous - np.eye(4)).max() > 0.01
-    assert others > 0
-
-
 def test_only_the_published_hexagons_move_with_all_slides_locked() -> None:
     for name, layout in LAYOUTS.items():
         drawn = stewart(layout, 0.2)
@@ -390,21 +378,6 @@ def test_only_the_published_hexagons_move_with_all_slides_locked() -> None:
             x = drawn.closed(drawn.put(drawn.start, drawn.body, T), drawn.legs)
             still_moves = drawn.freedoms(x, drawn.columns(*drawn.motors))
             assert still_moves == (1 if name == "hexagons" else 0) == 6 - layout.rank(T.homogeneous)
-
-
-def test_locked_hexagons_move_on_and_no_leg_changes() -> None:
-    drawn = stewart(HEXAGONS, 0.2)
-    T = SE3(pinocchio.exp3(math.pi / 6.0 * X), 0.2 * Z)
-    x = drawn.closed(drawn.put(drawn.start, drawn.body, T), drawn.legs)
-    lengths, way = HEXAGONS.legs(T.homogeneous), np.ones(len(drawn.free))
-    for _ in range(40):
-        null = np.linalg.svd(drawn.slopes(x)[:, drawn.free])[2][-1]
-        way, move = null * np.sign(null @ way), np.zeros(drawn.model.nv)
-        move[drawn.free] = 0.05 * way
-        x = drawn.closed(pinocchio.integrate(drawn.model, x, move))
-        assert np.abs(HEXAGONS.legs(drawn.tip(x)) - lengths).max() < EXACT
-    turned = drawn.tip(x)[:3, :3] @ T.rotation.T
-    assert np.linalg.norm(pinocchio.log3(turned)) > 0.5
 
 
 # -- hybrid --------------------------------------------------------------------------------------
@@ -515,15 +488,6 @@ def test_closure_angles_close_a_chain_of_three_joints_pinned_to_the_ground() -> 
             assert np.abs(rocker + link).max() < SOLVED
             closed += 1
     assert closed > 200
-
-
-@pytest.mark.parametrize("name", ["four_bar", "four_bar_crossed"])
-def test_crank_leads_the_coupler_all_around_and_back_in_one_mode(name: str) -> None:
-    robot, drawn = case(name)
-    for theta in (-2.0 * math.pi, 2.0 * math.pi):
-        x = drawn.led(np.array([theta]))
-        assert np.abs(drawn.tip(x) - drawn.tip(drawn.start)).max() < SOLVED
-        assert np.abs(robot.fk([theta]) - drawn.tip(x)).max() < SOLVED
 
 
 def parallelogram(theta: float) -> tuple[Robot, Mechanism, Array]:

@@ -494,20 +494,6 @@ def test_missing_topic_is_named_with_what_there_is(
     assert "\n" not in str(caught.value)
 
 
-def test_missing_empty_and_foreign_recordings_are_refused(path: Path, tmp_path: Path) -> None:
-    with pytest.raises(RecordingError, match="does not exist"):
-        evaluate_bags([path], None, None, console())
-    with BagWriter(path, ALL, JOINTS):
-        pass
-    with pytest.raises(RecordingError, match="no messages"):
-        evaluate_bags([path], None, None, console())
-    foreign = tmp_path / "foreign"
-    with BagWriter(foreign, [DIAGNOSTICS], ()) as writer:
-        writer.write(DIAGNOSTICS, 1, report(1, "lidar", 0, "", {}))
-    with pytest.raises(RecordingError, match=r"lacks slave/measured_cp.*it has diagnostics"):
-        evaluate_bags([foreign], None, None, console())
-
-
 def test_poses_that_never_meet_their_reference_are_refused(recipe: Recipe, path: Path) -> None:
     recipe.delay(SLAVE_SETPOINT_CP, 10_000 * TICK_NS)
     with pytest.raises(EvaluationError, match="must be recorded together"):

@@ -287,12 +287,11 @@ print(sum(module.factor.stats.cache_hits.values()))
     assert [run(folder), run(folder)] == [([6.0], 0), ([6.0], 1)]
 
 
-@pytest.mark.parametrize("left", [0, 0.5])
-def test_broken_files_of_the_cache_are_made_again(calls: Path, left: float) -> None:
-    files = list((calls / "c").rglob("*.nb?"))
-    assert files
-    for file in files:
-        file.write_bytes(file.read_bytes()[: int(left * file.stat().st_size)])
+def test_broken_files_of_the_cache_are_made_again(calls: Path) -> None:
+    files = sorted((calls / "c").rglob("*.nb?"))
+    assert len(files) > 3
+    for k, file in enumerate(files):  # empty, or cut in half
+        file.write_bytes(file.read_bytes()[: (k % 2) * file.stat().st_size // 2])
     assert run(calls) == ([70.0, 7.0], 0)
     assert run(calls) == ([70.0, 7.0], 1)
 

@@ -132,31 +132,6 @@ def test_the_push_grows_with_the_hand_beyond_the_wall_up_to_its_bound(gain: floa
     assert not arm.row["master_servo_cf"].any()
 
 
-def test_the_limit_is_told_while_the_hand_stands_against_it_and_a_moment_longer() -> None:
-    arm = Arm()
-    for _ in range(70):
-        arm.step(1)
-    for _ in range(500):
-        arm.step(0)
-    assert (arm.state("limit"), arm.state("limited_joint")) == (Limit.JOINT, 2)
-    for _ in range(30):
-        arm.step(-1)
-    for _ in range(110):
-        arm.step(0)
-    assert (arm.state("limit"), arm.state("limited_joint")) == (Limit.NONE, -1)
-
-
-def test_the_clutch_leaves_the_limit() -> None:
-    arm = Arm()
-    for _ in range(70):
-        arm.step(1)
-    arm.row["master_buttons"][0] = 1.0
-    arm.step(0)
-    arm.step(0)
-    assert arm.state("limit") == Limit.NONE
-    assert not arm.row["master_servo_cf"].any()
-
-
 @pytest.mark.parametrize("delay", [1, 20])
 @pytest.mark.parametrize("side", ["slave", "both"])
 @pytest.mark.parametrize("half", [4e-3, 6e-3])

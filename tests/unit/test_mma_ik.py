@@ -88,18 +88,6 @@ def test_seed_that_already_reaches_the_pose_is_kept(mma: Robot) -> None:
         assert np.abs(mma.ik(mma.fk(q), q).q - q).max() < EXACT
 
 
-def test_closed_form_reaches_the_pose_on_all_eight_branches_for_any_turn(mma: Robot) -> None:
-    q, seen = np.empty(7), set()
-    for n, true in enumerate(readings(mma, 300, seed=6)):
-        T = mma.fk(true)
-        for choice in range(8):
-            turn = true[6] + 0.01 * (n % 3)
-            if branch(T, turn, choice, mma.geometry_row, true, q) == 0.0:
-                assert np.abs(mma.fk(q) - T).max() < EXACT
-                seen.add(choice)
-    assert seen == set(range(8))
-
-
 def test_one_of_the_closed_form_branches_is_the_joint_vector_that_made_the_pose(mma: Robot) -> None:
     q, free = np.empty(7), np.array([[-np.inf] * 7, [np.inf] * 7])
     for true in readings(mma, 100, seed=7):

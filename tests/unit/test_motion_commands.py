@@ -3,6 +3,7 @@
 import math
 import re
 from collections.abc import Callable
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -423,12 +424,18 @@ COMMANDS = st.lists(
 )  # fmt: skip
 
 
+@cache
+def shared() -> Bench:
+    """Bench of all examples: each begins it anew."""
+    return Bench(**dict[str, Any]({"operation.longest_outage": 0.0}))
+
+
 @settings(max_examples=60, deadline=None)
 @given(commands=COMMANDS)
 def test_whatever_is_commanded_no_step_exceeds_the_limits_of_the_drives(
     commands: list[tuple[str, list[float], int]],
 ) -> None:
-    bench, path = SHARED, []
+    bench, path = shared(), []
     bench.slave.reset()
     path.append(bench.run(3))
     for name, numbers, ticks in commands:
@@ -459,9 +466,6 @@ def test_whatever_is_commanded_no_step_exceeds_the_limits_of_the_drives(
     most = bench.slave.server.parameters["tool_speed"] * 10 * DT
     assert (np.linalg.norm(np.diff(tips, axis=0), axis=1) <= most * (1 + 1e-6)).all()
     assert math.isfinite(np.abs(joined).sum())
-
-
-SHARED = Bench(**dict[str, Any]({"operation.longest_outage": 0.0}))
 
 
 def test_the_parameters_that_bound_motion_are_those_of_the_operation() -> None:

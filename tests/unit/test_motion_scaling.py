@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from scaling_desk import ANY_HAND, HOME, MM, Desk
-from teleop_core.base.errors import ParameterError
 from teleop_core.base.parameters import build
 from teleop_core.chain.mapping import motion_scaling
 from teleop_core.chain.mapping.parameters import FixtureParameters, MotionScalingParameters
@@ -67,11 +66,6 @@ def slave_axes(master: tuple[float, float, float], **values: Any) -> Array:
     return out
 
 
-def test_identity_stylus_maps_to_the_published_rotation() -> None:  # case 17
-    published = [[0, 0, 1], [-1, 0, 0], [0, -1, 0]]
-    assert np.allclose(mapped(np.eye(3), 0.0), published, rtol=0, atol=ROUNDING)
-
-
 def test_place_maps_to_the_published_axes() -> None:  # case 17
     assert np.array_equal(slave_axes((1.0, 2.0, 3.0)), (-3.0, -1.0, 2.0))
 
@@ -90,17 +84,6 @@ def test_stylus_in_the_inkwell_points_the_tool_as_at_home() -> None:  # case 18
     assert np.allclose(tool, HOME[:3, :3], rtol=0, atol=ROUNDING)
     out = slave_axes((0.0, -194.414, -416.901))
     assert np.allclose(out, (416.901, 0.0, -194.414), rtol=0, atol=ROUNDING)
-
-
-def test_without_the_tool_roll_the_tool_is_turned_by_a_right_angle_at_home() -> None:  # case 18
-    tool = mapped(rotation("x", -23.4 * DEGREE), 0.0)
-    between = HOME[:3, :3].T @ tool
-    assert np.allclose(between, rotation("z", -math.pi / 2), rtol=0, atol=ROUNDING)
-
-
-def test_other_sign_of_the_inkwell_tilt_points_the_tool_elsewhere() -> None:  # case 18
-    approach = mapped(rotation("x", 23.4 * DEGREE), math.pi / 2)[:, 2]
-    assert math.isclose(math.acos(approach[2]) / DEGREE, 66.6, abs_tol=1e-9)
 
 
 def test_home_offset_is_the_published_one_and_its_corrected_form() -> None:  # case 19
@@ -134,23 +117,6 @@ def test_gains_ratchet_the_slave_as_published() -> None:  # case 20
     assert np.allclose(end - start, (0, -1 * MM, 0), rtol=0, atol=ROUNDING)
 
 
-@pytest.mark.parametrize("gain", [0.001, 0.3, 1.0, 10.0])
-def test_gain_scales_the_motion_of_the_hand(gain: float) -> None:
-    desk = Desk(coarse_gain=gain, fine_gain=0.001)
-    start = desk.step()
-    end = desk.step((1 * MM, 2 * MM, 3 * MM))
-    assert np.allclose(end - start, gain * np.array([-3, -1, 2]) * MM, rtol=0, atol=ROUNDING)
-
-
-def test_change_of_gain_at_run_time_moves_nothing() -> None:
-    desk = Desk()
-    desk.step()
-    before = desk.step((5 * MM, 0, 0))
-    desk.scaling.retune(MotionScalingParameters(plausible=ANY_HAND, coarse_gain=3.0, fine_gain=0.2))
-    assert np.array_equal(desk.step(), before)
-    assert np.allclose(desk.step((MM, 0, 0)) - before, (0, -3 * MM, 0), rtol=0, atol=ROUNDING)
-
-
 def test_mode_parameter_switches_the_mode_at_run_time() -> None:
     desk = Desk()
     desk.step()
@@ -166,37 +132,6 @@ def test_retuning_something_else_leaves_the_mode_of_the_button() -> None:
     desk.scaling.retune(MotionScalingParameters(plausible=ANY_HAND, coarse_gain=2.0))
     desk.step()
     assert desk.state("is_fine") == 1.0
-
-
-def test_clutched_hand_moves_nothing_and_motion_goes_on_from_there() -> None:
-    desk = Desk()
-    desk.step()
-    before = desk.step((4 * MM, 0, 0))
-    desk.hold("clutch")
-    for _ in range(10):
-        assert np.array_equal(desk.step((-2 * MM, 1 * MM, 0), rotation("y", 0.05)), before)
-    assert desk.state("is_clutched") == 1.0
-    desk.hold("clutch", is_held=False)
-    assert np.array_equal(desk.step((-2 * MM, 0, 0)), before)
-    after = desk.step((1 * MM, 0, 0))
-    assert np.allclose(after - before, (0, -1 * MM, 0), rtol=0, atol=ROUNDING)
-
-
-def test_clutched_turning_moves_nothing_and_turning_goes_on_from_there() -> None:
-    desk = Desk()
-    desk.step()
-    desk.step(turn=rotation("x", 0.2))
-    before = desk.attitude()
-    desk.hold("clutch")
-    desk.step(turn=rotation("z", 0.7))
-    desk.hold("clutch", is_held=False)
-    desk.step(turn=rotation("y", -0.1))
-    assert np.array_equal(desk.attitude(), before)
-    # A further turn in the stylus' own frame is one in the tool's own frame.
-    desk.step(turn=desk.turn @ rotation("x", 0.3) @ desk.turn.T)
-    stylus_tool = np.diag([1, -1, -1]) @ rotation("z", math.pi / 2)
-    expected = before @ stylus_tool.T @ rotation("x", 0.3) @ stylus_tool
-    assert np.allclose(desk.attitude(), expected, rtol=0, atol=1e-13)
 
 
 def test_a_command_of_many_scaled_turns_stays_a_turn() -> None:
@@ -230,16 +165,6 @@ def test_slave_that_does_not_follow_holds_the_command_at_its_setpoint() -> None:
     assert desk.state("is_following") == 0.0
     assert np.array_equal(command, stuck[:3])
     assert np.array_equal(desk.step(), stuck[:3])
-
-
-def test_hand_that_comes_back_after_a_pause_starts_from_where_the_slave_is() -> None:
-    desk = Desk()
-    desk.step()
-    before = desk.step((5 * MM, 0, 0))
-    after = desk.step((40 * MM, 0, 0), rotation("z", 0.5), stamp_step_ns=400_000_000)
-    assert np.array_equal(after, before)
-    moved = desk.step((1 * MM, 0, 0))
-    assert np.allclose(moved - before, (0, -1 * MM, 0), rtol=0, atol=ROUNDING)
 
 
 def test_pause_within_the_timeout_is_bridged() -> None:
@@ -297,15 +222,6 @@ def test_reset_starts_again_at_the_setpoint_with_the_box_off_and_the_mode_of_the
     desk.scaling.reset()
     assert np.array_equal(desk.step((30 * MM, 0, 0), rotation("z", 1.0)), before)
     assert (desk.state("is_fixture_on"), desk.state("is_fine")) == (0.0, 0.0)
-
-
-def test_change_of_the_tool_roll_turns_nothing() -> None:
-    desk = Desk()
-    desk.step(turn=rotation("x", 0.2))
-    before = desk.attitude()
-    desk.scaling.retune(MotionScalingParameters(plausible=ANY_HAND, tool_roll=0.0))
-    desk.step()
-    assert np.allclose(desk.attitude(), before, rtol=0, atol=ROUNDING)
 
 
 @pytest.mark.parametrize("button", ["fixture", "mode"])
@@ -405,12 +321,6 @@ def test_wall_pushes_the_hand_back(wall: str, mm: float, newton: float) -> None:
     desk.step((mm * MM, 0, 0))
     expected = (newton, 0, 0, 0, 0, 0)
     assert np.allclose(desk.row["master_servo_cf"], expected, rtol=0, atol=1e-9)
-
-
-def test_fine_gain_above_the_coarse_one_is_refused() -> None:
-    with pytest.raises(ParameterError) as error:
-        MotionScalingParameters(coarse_gain=0.5, fine_gain=0.6)
-    assert (error.value.name, error.value.value) == ("fine_gain", 0.6)
 
 
 def test_a_slave_that_does_not_follow_for_long_is_aligned_anew_once() -> None:

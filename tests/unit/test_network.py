@@ -135,6 +135,12 @@ def test_where_order_is_kept_the_reader_gets_older_commands() -> None:
         assert own == pytest.approx(76 if order == "newest" else 213, rel=0.1)
 
 
+@kernel
+def draw_all(draw: Any, numbers: Any, memory: Any, chances: Any, period: float, found: Any) -> None:
+    for i in range(found.shape[0]):
+        found[i] = draw(numbers, memory, chances[i], i * period)
+
+
 def drawn(
     name: str,
     values: Mapping[str, str | float | tuple[float, float]],
@@ -143,10 +149,11 @@ def drawn(
     period: float = 1e-3,
 ) -> Array:
     """What a kind says of packets sent in a row (packets,)."""
-    part = NETWORKS.find(name)
+    part, found = NETWORKS.find(name), np.empty(packets)
     numbers, memory = part.numbers(build(part.parameters, values)), np.zeros(4)
     chances = np.random.default_rng(seed).random((packets, 3))
-    return np.array([part.draw(numbers, memory, c, i * period) for i, c in enumerate(chances)])
+    draw_all(part.draw_pointer, numbers, memory, chances, period, found)
+    return found
 
 
 def of_level(level: str) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""RCRT-1 dynamics: closed form against a Lagrangian, pinocchio and energy; the drive table."""
+"""RCRT-1 dynamics: closed form against pinocchio; the drive table."""
 
 import math
 from collections.abc import Sequence
@@ -16,8 +16,6 @@ from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot
 from teleop_core.robots.arms import rcrt1_dynamics
 from teleop_core.robots.arms.rcrt1_dynamics import DRIVES, LINKS, link_row
-from teleop_core.slave.joints import integrate
-from teleop_core.slave.slave_sim import SlaveSim, SlaveSimParameters
 
 # Entries are sums of a few products of numbers up to ten.
 ROUNDING = 1e-13
@@ -25,116 +23,14 @@ DEGREE = math.pi / 180.0
 MOTORS = np.diag([LINKS["J1"], LINKS["J2"], LINKS["J3"]])
 ROW = link_row()
 
-# Derivatives of a standard Denavit-Hartenberg matrix by its joint (spec A.3.6, A.3.7).
-Q_REVOLUTE = np.zeros((4, 4))
-Q_REVOLUTE[0, 1], Q_REVOLUTE[1, 0] = -1.0, 1.0
-Q_PRISMATIC = np.zeros((4, 4))
-Q_PRISMATIC[2, 3] = 1.0
-Q = (Q_REVOLUTE, Q_REVOLUTE, Q_PRISMATIC)
-
 states = st.tuples(
     st.floats(-1.4, 1.4), st.floats(0.9, 2.8), st.floats(0.1, 0.42), *[st.floats(-3.0, 3.0)] * 3
 )
 
 
-def pseudo_inertia(
-    mass: float,
-    center: tuple[float, float, float],
-    ixx: float,
-    iyy: float,
-    izz: float,
-    ixy: float,
-    ixz: float,
-    iyz: float,
-) -> Array:
-    """Pseudo-inertia (4, 4) about the link frame's origin, products as +∫xy dm."""
-    out = np.diag([(-ixx + iyy + izz) / 2, (ixx - iyy + izz) / 2, (ixx + iyy - izz) / 2, mass])
-    out[0, 1] = out[1, 0] = ixy
-    out[0, 2] = out[2, 0] = ixz
-    out[1, 2] = out[2, 1] = iyz
-    out[:3, 3] = out[3, :3] = mass * np.asarray(center)
-    return out
-
-
-# Link 1 turns about its own y axis only, so its other entries do not act.
-PSEUDO = (
-    pseudo_inertia(0.0, (0.0, 0.0, 0.0), 0.0, LINKS["I1yy"], 0.0, 0.0, 0.0, 0.0),
-    pseudo_inertia(
-        LINKS["m2"], (LINKS["G2x"], 0.0, LINKS["G2z"]),
-        LINKS["I2xx"], LINKS["I2yy"], LINKS["I2zz"], LINKS["I2xy"], LINKS["I2xz"], LINKS["I2yz"],
-    ),
-    pseudo_inertia(
-        LINKS["m3"], (LINKS["G3x"], 0.0, LINKS["G3z"]),
-        LINKS["I3xx"], LINKS["I3yy"], LINKS["I3zz"], 0.0, LINKS["I3xz"], 0.0,
-    ),
-)  # fmt: skip
-
-
-def links(q: Sequence[float] | Array) -> tuple[Array, Array, Array]:
-    """Link matrices A1, A2, A3; also of complex joints."""
-    c1, s1, c2, s2 = np.cos(q[0]), np.sin(q[0]), np.cos(q[1]), np.sin(q[1])
-    zero, one = 0.0 * q[0], 1.0 + 0.0 * q[0]
-    a1 = np.array([[c1, 0, -s1, 0], [s1, 0, c1, 0], [0, -1, 0, 0], [zero, 0, 0, one]])
-    a2 = np.array([[c2, 0, s2, 0], [s2, 0, -c2, 0], [0, 1, 0, 0], [zero, 0, 0, one]])
-    a3 = np.array([[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, q[2]], [zero, 0, 0, one]])
-    return a1, a2, a3
-
-
-def derivative(q: Sequence[float] | Array, link: int, joint: int) -> Array:
-    """U: derivative of the pose of frame ``link`` by ``joint``, both from 0."""
-    out = np.eye(4)
-    for i, a in enumerate(links(q)[: link + 1]):
-        out = out @ Q[i] @ a if i == joint else out @ a
-    return out if joint <= link else 0.0 * out
-
-
-def lagrangian_inertia(q: Any) -> Any:
-    """D of the recipe A.3.1, motors left out; also of complex joints."""
-    out = np.zeros((3, 3), dtype=np.asarray(q).dtype)
-    for i in range(3):
-        for k in range(3):
-            for j in range(max(i, k), 3):
-                inner = derivative(q, j, k) @ PSEUDO[j] @ derivative(q, j, i).T
-                out[i, k] += np.trace(inner)
-    return out
-
-
-def lagrangian_velocity_effort(q: Array, dq: Array) -> Array:
-    """Christoffel form of h; the slopes of D by complex steps, exact to rounding."""
-    slopes = np.empty((3, 3, 3))
-    for m in range(3):
-        step = np.array(q, dtype=complex)
-        step[m] += 1e-30j
-        slopes[m] = lagrangian_inertia(step).imag / 1e-30
-    rate = np.tensordot(dq, slopes, axes=1)
-    return rate @ dq - 0.5 * np.array([dq @ slopes[m] @ dq for m in range(3)])
-
-
-def potential(q: Any) -> Any:
-    """Potential energy of links 2 and 3; also of complex joints."""
-    a1, a2, a3 = links(q)
-    height = (a1 @ a2 @ PSEUDO[1])[2, 3] + (a1 @ a2 @ a3 @ PSEUDO[2])[2, 3]
-    return LINKS["g"] * height
-
-
-def lagrangian_gravity(q: Array) -> Array:
-    out = np.empty(3)
-    for m in range(3):
-        step = np.array(q, dtype=complex)
-        step[m] += 1e-30j
-        out[m] = potential(step).imag / 1e-30
-    return out
-
-
 def inertia(q: Sequence[float] | Array, row: Array = ROW) -> Array:
     out = np.empty((3, 3))
     rcrt1_dynamics.inertia_matrix(np.asarray(q, dtype=float), row, out)
-    return out
-
-
-def velocity_effort(q: Array, dq: Array) -> Array:
-    out = np.empty(3)
-    rcrt1_dynamics.velocity_effort(np.asarray(q), np.asarray(dq), ROW, out)
     return out
 
 
@@ -149,41 +45,6 @@ def acceleration(q: Array, dq: Array, effort: Array) -> Array:
     out = np.empty(6)
     rcrt1_dynamics.acceleration(q, dq, effort, ROW, out)
     return out
-
-
-@given(states)
-def test_inertia_is_that_of_the_lagrangian(state: tuple[float, ...]) -> None:  # case 27
-    q = np.array(state[:3])
-    assert np.allclose(inertia(q), lagrangian_inertia(q) + MOTORS, rtol=0, atol=ROUNDING)
-
-
-@given(states)
-def test_velocity_effort_is_that_of_the_lagrangian(state: tuple[float, ...]) -> None:  # case 27
-    q, dq = np.array(state[:3]), np.array(state[3:])
-    expected = lagrangian_velocity_effort(q, dq)
-    assert np.allclose(velocity_effort(q, dq), expected, rtol=0, atol=ROUNDING)
-
-
-@given(states)
-def test_gravity_is_the_slope_of_the_potential_energy(state: tuple[float, ...]) -> None:  # case 27
-    q = np.array(state[:3])
-    # Torques up to 10 N·m.
-    assert np.allclose(gravity(q)[:3], lagrangian_gravity(q), rtol=0, atol=10 * ROUNDING)
-
-
-def test_printed_inertia_and_velocity_terms_are_not_those_of_the_lagrangian() -> (
-    None
-):  # misprints 9-11
-    q, dq = np.array([0.3, 1.2, 0.3]), np.array([0.5, -0.7, 0.4])
-    s2, c2, d3 = math.sin(q[1]), math.cos(q[1]), q[2]
-    reach = LINKS["I3xx"] + LINKS["m3"] * d3 * (d3 + 2 * LINKS["G3z"])
-    printed_d12 = reach * s2**2 + LINKS["m3"] * d3 * LINKS["G3x"] * 2 * s2 * c2
-    assert abs(printed_d12 - lagrangian_inertia(q)[0, 1]) > 5e-3
-    # D11 without I3xz sin(2 q2) and I3zz cos²(q2).
-    printed_d11 = inertia(q)[0, 0] - LINKS["I3xz"] * 2 * s2 * c2 - LINKS["I3zz"] * c2**2
-    assert abs(printed_d11 - (lagrangian_inertia(q) + MOTORS)[0, 0]) > 1e-3
-    # h3 with its printed sign.
-    assert abs(-velocity_effort(q, dq)[2] - lagrangian_velocity_effort(q, dq)[2]) > 0.01
 
 
 @pytest.mark.parametrize(
@@ -273,49 +134,6 @@ def test_gravity_is_pinocchios(state: tuple[float, ...]) -> None:
 
 
 @given(states)
-def test_effort_and_acceleration_are_inverse_to_each_other(state: tuple[float, ...]) -> None:
-    q, dq = np.zeros(6), np.zeros(6)
-    q[:3], dq[:3] = state[:3], state[3:]
-    wanted = np.array([1.0, -2.0, 0.5, 3.0, -4.0, 5.0])
-    effort = gravity(q[:3])
-    effort[:3] += inertia(q) @ wanted[:3] + velocity_effort(q, dq)
-    effort[3:] = wanted[3:] * [LINKS["J4"], LINKS["J5"], LINKS["J6"]]
-    assert np.allclose(acceleration(q, dq, effort), wanted, rtol=0, atol=1e-11)
-
-
-def energy(q: Array, dq: Array) -> float:
-    return 0.5 * dq[:3] @ inertia(q) @ dq[:3] + potential(q)
-
-
-def swing(steps: int, ticks: int = 400) -> tuple[Array, Array]:
-    """Joints and speeds after free motion from a tilted posture, without any friction."""
-    q, dq = np.array([0.0, 1.2, 0.3, 0, 0, 0]), np.array([1.5, -1.0, 0.05, 0, 0, 0])
-    slave = SlaveSim(SlaveSimParameters())
-    p, s, none = slave.parameters, slave.state, np.zeros(6)
-    for name in ("viscous", "coulomb", "bristle"):
-        p[name] = 0.0
-    for _ in range(ticks):
-        integrate(slave.arm.acceleration, ROW, p, s, slave.arm.contacts, steps, none, q, dq, 1e-3)
-    return q, dq
-
-
-def test_free_motion_without_friction_keeps_its_energy() -> None:
-    start = energy(np.array([0.0, 1.2, 0.3]), np.array([1.5, -1.0, 0.05]))
-    q, dq = swing(2)
-    kinetic = energy(q, dq) - potential(q)
-    # The arm swings for real: a good part of the energy changes its kind.
-    assert abs(kinetic - (start - potential(np.array([0.0, 1.2, 0.3])))) > 0.05
-    # Fourth order at 0.5 ms against motions of about 1 s: (5e-4)^4 = 6e-14 in each of 800 steps.
-    assert math.isclose(energy(q, dq), start, abs_tol=1e-10)
-
-
-def test_axis_1_keeps_its_momentum_without_friction() -> None:
-    before = inertia([0.0, 1.2, 0.3])[0] @ [1.5, -1.0, 0.05]
-    q, dq = swing(2)
-    assert math.isclose(inertia(q)[0] @ dq[:3], before, abs_tol=1e-10)
-
-
-@given(states)
 def test_inertia_is_positive_definite_over_the_whole_workspace(state: Any) -> None:
     assert np.linalg.eigvalsh(inertia(state[:3]))[0] > 0.05
 
@@ -335,24 +153,11 @@ def test_encoder_steps_are_the_published_resolutions() -> None:  # case 15
     assert math.isclose(DRIVES.encoder_step[2] / 1e-3, 1.316e-4, abs_tol=5e-8)
 
 
-def test_printed_resolutions_of_axis_3_are_a_hundred_and_ten_times_off() -> None:  # misprint 14
-    micrometres = DRIVES.encoder_step[2] / 1e-6
-    screw_degrees = 360.0 / (3.71 * 2048)
-    assert math.isclose(13.161 / micrometres, 100.0, rel_tol=1e-3)
-    assert math.isclose(screw_degrees / 4.738e-3, 10.0, rel_tol=1e-3)
-
-
 def test_tip_resolution_at_full_reach_is_the_published_one() -> None:  # case 15
     turning = 460.0 * DRIVES.encoder_step[:2]
     combined = math.sqrt(turning @ turning + (DRIVES.encoder_step[2] / 1e-3) ** 2)
     assert np.allclose(turning, 8.029e-3, rtol=0, atol=5e-7)
     assert math.isclose(combined, 11.355e-3, abs_tol=5e-7)
-
-
-def test_encoder_steps_are_those_of_the_published_logs() -> None:
-    # θ5 and θ6 of tables 7.1-7.6 step by 4.04e-5 rad, θ1 and θ2 by 1.745e-5 rad.
-    assert np.allclose(DRIVES.encoder_step[4:], 4.04e-5, rtol=0, atol=5e-8)
-    assert np.allclose(DRIVES.encoder_step[:2], 1.745e-5, rtol=0, atol=5e-9)
 
 
 def test_speed_limits_are_those_of_the_motors() -> None:

@@ -1,18 +1,16 @@
-"""The RCRT-1 of table A.1, mended, in engines by others: sympy's Lagrangian, MuJoCo, pinocchio."""
+"""The RCRT-1 of table A.1, mended, in engines by others: MuJoCo, pinocchio."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import mujoco
 import numpy as np
 import pinocchio
 import pytest
-import sympy
 from hypothesis import given
 from hypothesis import strategies as st
 from pinocchio import Model
-from scipy.integrate import solve_ivp
 
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots.arms import rcrt1_dynamics
@@ -144,59 +142,6 @@ def test_accelerations_are_pinocchios_in_the_frames_of_the_source(state: tuple[f
     assert np.allclose(ours(state), expected, rtol=0, atol=AGREE)
 
 
-# --- sympy -----------------------------------------------------------------------------------
-
-
-def symbolic_lagrangian() -> Callable[..., object]:
-    """D, h and c (3 entries) of the kinetic and potential energy of three rigid bodies."""
-    q = sympy.symbols("q1:4")
-    dq = sympy.symbols("v1:4")
-    c1, s1, c2, s2 = sympy.cos(q[0]), sympy.sin(q[0]), sympy.cos(q[1]), sympy.sin(q[1])
-    rz = sympy.Matrix([[c1, -s1, 0], [s1, c1, 0], [0, 0, 1]])
-    ry = sympy.Matrix([[c2, 0, s2], [0, 1, 0], [-s2, 0, c2]])
-    side = sympy.Matrix([[1, 0, 0], [0, 0, 1], [0, -1, 0]])
-    poses = (
-        (rz * side, sympy.zeros(3, 1)),
-        (rz * ry, sympy.zeros(3, 1)),
-        (rz * ry, rz * ry * sympy.Matrix([0, 0, q[2]])),
-    )
-    kinetic = sum(J * v**2 for J, v in zip(map(sympy.Rational, MOTORS), dq, strict=True)) / 2
-    height = sympy.Integer(0)
-    for (R, origin), (mass, center, *rest) in zip(poses, TABLE, strict=True):
-        p = origin + R * sympy.Matrix(list(map(sympy.Rational, center)))
-        rate = sum((p.diff(x) * v for x, v in zip(q, dq, strict=True)), sympy.zeros(3, 1))
-        spin = R.T * sum((R.diff(x) * v for x, v in zip(q, dq, strict=True)), sympy.zeros(3, 3))
-        w = sympy.Matrix([spin[2, 1], spin[0, 2], spin[1, 0]])
-        tensor = sympy.Matrix(central(mass, center, *rest)).applyfunc(sympy.Rational)
-        kinetic += (sympy.Rational(mass) * rate.dot(rate) + w.dot(tensor * w)) / 2
-        height += sympy.Rational(mass) * p[2]
-    D = sympy.hessian(kinetic, dq)
-    momentum = D * sympy.Matrix(dq)
-    h = momentum.jacobian(q) * sympy.Matrix(dq) - sympy.Matrix([kinetic.diff(x) for x in q])
-    c = sympy.Matrix([sympy.Rational(LINKS["g"]) * height.diff(x) for x in q])
-    return sympy.lambdify((q, dq), (D, h, c), "numpy", cse=True)
-
-
-LAGRANGIAN: Any = symbolic_lagrangian()
-
-
-@given(states)
-def test_closed_form_is_the_lagrangian_of_three_rigid_bodies(state: Any) -> None:
-    D: Any
-    h: Any
-    c: Any
-    D, h, c = LAGRANGIAN(state[:3], state[3:6])
-    joints, speed = np.array([*state[:3], 0.0, 0.0, 0.0]), np.array([*state[3:6], 0.0, 0.0, 0.0])
-    inertia, velocity, gravity = np.empty((3, 3)), np.empty(3), np.empty(6)
-    rcrt1_dynamics.inertia_matrix(joints, ROW, inertia)
-    rcrt1_dynamics.velocity_effort(joints, speed, ROW, velocity)
-    rcrt1_dynamics.gravity_effort(joints, ROW, gravity)
-    # Sums of some tens of products of numbers up to 27 (inertia of axis 3) and 10.
-    assert np.allclose(inertia, D, rtol=0, atol=2e-14)
-    assert np.allclose(velocity, np.ravel(h), rtol=0, atol=1e-13)
-    assert np.allclose(gravity[:3], np.ravel(c), rtol=0, atol=1e-13)
-
-
 # --- laws ------------------------------------------------------------------------------------
 
 
@@ -216,29 +161,6 @@ def test_the_mended_sign_raises_the_inertia_of_axis_1_at_home() -> None:
     mended = D[0, 0]
     rcrt1_dynamics.inertia_matrix(home, link_row(I3xz=3.0e-3), D)
     assert math.isclose(mended / D[0, 0] - 1.0, 0.037, abs_tol=5e-4)
-
-
-def test_free_motion_keeps_energy_and_the_momentum_of_axis_1() -> None:
-    def rate(_: float, y: Array) -> Array:
-        return np.concatenate((y[3:], ours([*y, 0.0, 0.0, 0.0])))
-
-    def conserved(y: Array) -> tuple[float, float]:
-        D: Any
-        D, _, _ = LAGRANGIAN(y[:3], y[3:])
-        height = TABLE[1][0] * potential_height(y[1], TABLE[1][1])
-        height += TABLE[2][0] * potential_height(y[1], np.add(TABLE[2][1], (0, 0, y[2])))
-        return 0.5 * y[3:] @ D @ y[3:] + LINKS["g"] * height, (D @ y[3:])[0]
-
-    start = np.array([0.0, 1.2, 0.3, 1.5, -1.0, 0.05])
-    path = solve_ivp(rate, (0.0, 0.4), start, method="DOP853", rtol=1e-12, atol=1e-13)
-    end = path.y[:, -1]
-    assert np.allclose(conserved(end), conserved(start), rtol=0, atol=1e-10)
-    # The arm swings for real.
-    assert abs(end[4] - start[4]) > 0.1
-
-
-def potential_height(angle: float, point: Sequence[float] | Array) -> Any:
-    return -math.sin(angle) * point[0] + math.cos(angle) * point[2]
 
 
 def test_links_of_the_robot_are_those_of_the_table() -> None:

@@ -5,15 +5,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pinocchio
 import pytest
-from pinocchio import Data, Model
 
 from present import present
 from real_arms import ARMS, urdf_of
-from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot
-from teleop_core.robots.chains.chain_dynamics import inertia_matrix, inverse_dynamics
 from teleop_core.session.api import run
 
 sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))
@@ -21,7 +17,6 @@ from sold_arms import lines, load, solved, wrists
 
 TWELVE = ("ur5e", "fr3", "iiwa14", "gen3", "xarm6", "xarm7", "irb120", "fanuc_crx10ia", "kr6_r900",
           "so101", "pr2_right", "j2s6s200")  # fmt: skip
-WEIGHED = [name for name in ARMS if "bodies" in ARMS[name]]
 # Ours for each class of ssik. Its other classes have no closed form here.
 OURS = {
     "ikgeo.three_parallel": "three parallel axes",
@@ -39,67 +34,12 @@ ROUNDED = {
 }
 
 
-def model_of(text: str, q: Array) -> tuple[Model, Data, Array]:
-    """Model, data and configuration of pinocchio; joints that turn without end have limits."""
-    model = pinocchio.buildModelFromXML(text.replace('type="continuous"', 'type="revolute"'))
-    return model, model.createData(), q
-
-
-@pytest.mark.parametrize("name", ARMS)
-def test_pose_and_jacobian_are_those_of_pinocchio(name: str, tmp_path: Path) -> None:
-    robot, rng = load(name, tmp_path), np.random.default_rng(1)
-    for q in rng.uniform(robot.lower, robot.upper, (20, robot.n)):
-        model, data, theirs = model_of(urdf_of(name), q)
-        frame = model.getFrameId("tip")
-        pinocchio.framesForwardKinematics(model, data, theirs)
-        np.testing.assert_allclose(robot.fk(q), data.oMf[frame].homogeneous, atol=1e-10)
-        axes = pinocchio.LOCAL_WORLD_ALIGNED
-        J = pinocchio.computeFrameJacobian(model, data, theirs, frame, axes)
-        np.testing.assert_allclose(robot.jacobian(q), J, atol=1e-10)
-
-
-@pytest.mark.parametrize("name", WEIGHED)
-def test_efforts_weights_and_inertias_are_those_of_pinocchio(name: str, tmp_path: Path) -> None:
-    path, rng = tmp_path / "arm.urdf", np.random.default_rng(2)
-    path.write_text(urdf_of(name, effort=1e4))
-    task = "x y z rx ry" if name == "so101" else ""
-    robot = load_robot(str(path), tip="tip", task=task, dynamics="links")
-    row, effort, M = (
-        present(robot.dynamics).parameters.copy(),
-        np.empty(robot.n),
-        np.empty((robot.n,) * 2),
-    )
-    for q in rng.uniform(robot.lower, robot.upper, (10, robot.n)):
-        model, data, theirs = model_of(urdf_of(name), q)
-        dq, ddq, given = rng.normal(size=(3, robot.n))
-        inverse_dynamics(q, dq, ddq, row, effort)
-        expected = pinocchio.rnea(model, data, theirs, dq, ddq)
-        np.testing.assert_allclose(effort, expected, rtol=0.0, atol=1e-10 * abs(expected).max())
-        present(robot.dynamics).gravity(q, row, effort)
-        expected = pinocchio.computeGeneralizedGravity(model, data, theirs)
-        np.testing.assert_allclose(
-            effort, expected, rtol=0.0, atol=1e-10 * (1 + abs(expected).max())
-        )
-        inertia_matrix(q, row, M)
-        expected = pinocchio.crba(model, data, theirs)
-        np.testing.assert_allclose(M, expected, rtol=0.0, atol=1e-10 * expected.max())
-        present(robot.dynamics).acceleration(q, dq, given, row, effort)
-        expected = pinocchio.aba(model, data, theirs, dq, given)
-        np.testing.assert_allclose(effort, expected, rtol=0.0, atol=1e-10 * abs(expected).max())
-
-
 @pytest.mark.parametrize("name", [name for name in ARMS if "class" in ARMS[name]])
 def test_the_class_is_that_of_ssik_wherever_we_have_a_closed_form(
     name: str, tmp_path: Path
 ) -> None:
     ours = ROUNDED.get(name, OURS.get(ARMS[name]["class"], "search"))
     assert load(name, tmp_path).solution.startswith(ours)
-
-
-def test_there_are_72_arms_of_ssik_and_twelve_others() -> None:
-    assert sum("class" in arm for arm in ARMS.values()) == 72
-    assert set(TWELVE) <= set(ARMS)
-    assert all(arm["source"] for arm in ARMS.values())
 
 
 @pytest.mark.slow

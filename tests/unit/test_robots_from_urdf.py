@@ -50,13 +50,13 @@ def model_and_q(
     return model, model.createData(), out, columns
 
 
-@pytest.mark.parametrize("seed", range(36))
+@pytest.mark.parametrize("seed", range(12))
 def test_pose_jacobian_and_home_inertia_are_those_of_pinocchio(seed: int, tmp_path: Path) -> None:
-    text, tip = random_urdf(seed, 1 + seed % 12)
+    text, tip = random_urdf(seed, 1 + seed)
     path = tmp_path / "arm.urdf"
     path.write_text(text)
     robot = load_robot(str(path), tip=tip)
-    assert robot.n == 1 + seed % 12
+    assert robot.n == 1 + seed
     q = np.random.default_rng(seed).uniform(robot.lower, robot.upper)
     model, data, theirs, columns = model_and_q(text, robot, q)
     frame = model.getFrameId(tip)
@@ -71,11 +71,11 @@ def test_pose_jacobian_and_home_inertia_are_those_of_pinocchio(seed: int, tmp_pa
     np.testing.assert_allclose(present(robot.drives).inertia, inertia, rtol=1e-10)
 
 
-@pytest.mark.parametrize("seed", range(36))
+@pytest.mark.parametrize("seed", range(12))
 def test_efforts_and_accelerations_of_the_links_are_those_of_pinocchio(
     seed: int, tmp_path: Path
 ) -> None:
-    text, tip = random_urdf(seed, 1 + seed % 12)
+    text, tip = random_urdf(seed, 1 + seed)
     path = tmp_path / "arm.urdf"
     path.write_text(text.replace('effort="20"', 'effort="1e4"'))
     robot = load_robot(str(path), tip=tip, dynamics="links")

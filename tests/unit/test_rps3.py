@@ -4,13 +4,11 @@ import math
 
 import numpy as np
 import pytest
-import roboticstoolbox as rtb
 
 from teleop_core.base.errors import ClosureError, ParameterError, ShapeError, UnknownNameError
 from teleop_core.kernels.geometry import Array, rotation, transform
 from teleop_core.robots import FkStatus, IkStatus, list_robots, load_robot
 from teleop_machines.rps3 import Assembly, assembly_modes, joint_points, leg_coordinates
-from teleop_machines.rps3_loop import constraints
 from ways import stepped
 
 B, A = 1.0, 0.5
@@ -27,32 +25,6 @@ def tilted(rng: np.random.Generator, most: float = 0.6) -> Array:
     return transform(R, np.array([0.0, 0.0, rng.uniform(0.9, 1.3)]))
 
 
-def test_loop_equations_have_rank_three_over_angles_and_lengths() -> None:
-    gap, G, H = np.empty(3), np.empty((3, 3)), np.empty((3, 3))
-    constraints(np.array([1.2, 1.0, 0.9]), np.radians([60.0, 70.0, 80.0]), B, A, gap, G, H)
-    assert np.linalg.matrix_rank(np.hstack((G, H))) == 3
-
-
-def test_loop_equations_are_the_distances_of_the_ball_joints_with_their_slopes() -> None:
-    rng, step = np.random.default_rng(1), 1e-6
-    gap, G, H = np.empty(3), np.empty((3, 3)), np.empty((3, 3))
-    ahead, behind, unused = np.empty(3), np.empty(3), np.empty((3, 3))
-    for _ in range(20):
-        lengths, theta = rng.uniform(0.5, 1.5, 3), rng.uniform(-3.0, 3.0, 3)
-        constraints(lengths, theta, B, A, gap, G, H)
-        S = joint_points(lengths, theta, b=B)
-        sides = [np.sum((S[i] - S[(i + 1) % 3]) ** 2) for i in range(3)]
-        assert np.allclose(gap, np.array(sides) - 3.0 * A**2, atol=1e-13)
-        for i in range(3):
-            change = step * np.eye(3)[i]
-            constraints(lengths, theta + change, B, A, ahead, unused, unused.copy())
-            constraints(lengths, theta - change, B, A, behind, unused, unused.copy())
-            assert np.allclose(G[:, i], (ahead - behind) / (2.0 * step), atol=1e-8)
-            constraints(lengths + change, theta, B, A, ahead, unused, unused.copy())
-            constraints(lengths - change, theta, B, A, behind, unused, unused.copy())
-            assert np.allclose(H[:, i], (ahead - behind) / (2.0 * step), atol=1e-8)
-
-
 def test_ball_joints_are_those_of_the_specification_and_give_the_legs_back() -> None:
     lengths, angles = [1.2, 1.0, 0.9], np.radians([60.0, 70.0, 80.0])
     S = joint_points(lengths, angles, b=B)
@@ -67,21 +39,6 @@ def test_ball_joints_are_those_of_the_specification_and_give_the_legs_back() -> 
     assert np.allclose(back[1], angles, atol=1e-14)
 
 
-def test_leg_chain_of_the_denavit_hartenberg_table_ends_at_the_ball_joint() -> None:
-    chain = rtb.DHRobot([rtb.RevoluteMDH(), rtb.PrismaticMDH(alpha=-math.pi / 2)])
-    rng = np.random.default_rng(2)
-    for _ in range(10):
-        lengths, angles = rng.uniform(0.5, 1.5, 3), rng.uniform(0.2, 2.9, 3)
-        S = joint_points(lengths, angles, b=B)
-        for i in range(3):
-            hinge = transform(rotation("z", 2.0 * math.pi * i / 3.0), np.zeros(3))
-            hinge = hinge @ transform(rotation("x", math.pi / 2), np.array([B, 0.0, 0.0]))
-            tip = hinge @ chain.fkine([math.pi / 2 - angles[i], lengths[i]]).A
-            assert np.allclose(tip[:3, 3], S[i], atol=1e-14)
-            spoken = hinge @ chain.fkine([math.pi - angles[i], lengths[i]]).A
-            assert not np.allclose(spoken[:3, 3], S[i], atol=1e-3)
-
-
 def test_equal_legs_lift_the_platform_level_as_the_specification_says() -> None:
     modes = assembly_modes([1.2, 1.2, 1.2], b=B, a=A)
     level = np.abs(np.degrees(modes.angles) - 65.375682).max(axis=1)
@@ -90,41 +47,6 @@ def test_equal_legs_lift_the_platform_level_as_the_specification_says() -> None:
     assert np.allclose(modes.transforms[k][:3, 3], [0.0, 0.0, 1.090871], atol=PRINTED)
     assert np.allclose(modes.transforms[k][:3, :3], np.eye(3), atol=SOLVED)
     assert np.allclose(load_robot("rps3").fk([1.2] * 3), modes.transforms[k], atol=SOLVED)
-
-
-def test_assembly_modes_close_the_loop_come_in_mirrored_pairs_and_are_at_most_sixteen() -> None:
-    rng, counts = np.random.default_rng(3), set()
-    for _ in range(60):
-        lengths = rng.uniform(0.5, 1.8, 3)
-        modes = assembly_modes(lengths, b=B, a=A)
-        counts.add(len(modes.angles))
-        for theta, T in zip(modes.angles, modes.transforms, strict=True):
-            S = joint_points(lengths, theta, b=B)
-            platform = A * np.array([[1, 0, 0], [-0.5, 0.75**0.5, 0], [-0.5, -(0.75**0.5), 0]])
-            assert np.allclose(platform @ T[:3, :3].T + T[:3, 3], S, atol=1e-8)
-            mirrored = np.abs(np.exp(1j * modes.angles) - np.exp(-1j * theta)).max(axis=1)
-            assert mirrored.min() < 1e-6
-    assert max(counts) <= 16
-    assert len(counts) > 2
-
-
-@pytest.mark.parametrize("lengths", [(1.2, 1.2, 1.2), (1.2, 1.0, 0.9), (0.7, 0.9, 1.5)])
-def test_no_assembly_mode_is_missed(lengths: tuple[float, float, float]) -> None:
-    # Independent search: Newton steps of plain NumPy from many random leg angles.
-    rng = np.random.default_rng(4)
-    legs = np.array(lengths)
-    modes = np.exp(1j * assembly_modes(legs, b=B, a=A).angles)
-    gap, G, H = np.empty(3), np.empty((3, 3)), np.empty((3, 3))
-    reached = 0
-    for start in rng.uniform(-math.pi, math.pi, (400, 3)):
-        theta = start.copy()
-        for _ in range(40):
-            constraints(legs, theta, B, A, gap, G, H)
-            theta -= np.clip(np.linalg.lstsq(G, gap, rcond=1e-12)[0], -0.5, 0.5)
-        if np.abs(gap).max() < 1e-13:
-            assert np.abs(modes - np.exp(1j * theta)).max(axis=1).min() < 1e-5
-            reached += 1
-    assert reached > 100
 
 
 def test_legs_that_cannot_meet_are_a_status_with_a_finite_pose_and_no_pose_of_fk() -> None:

@@ -6,16 +6,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-import roboticstoolbox as rtb
 from scipy.spatial.transform import Rotation
 
 from present import present
 from teleop_core.base.errors import ParameterError, UnknownNameError
 from teleop_core.kernels.geometry import Array, rotation, transform
-from teleop_core.robots import IkStatus, list_robots, load_robot
-from teleop_core.session.configuration import configure
-from teleop_core.session.virtual import VirtualTime
-from teleop_machines.stewart import Layout
+from teleop_core.robots import IkStatus, load_robot
 from ways import followed
 
 # The source prints centimetres with four decimals; its inputs are rounded likewise, and near the
@@ -58,82 +54,12 @@ def test_published_example_has_the_published_legs_and_joints() -> None:
     assert math.isclose(q[2], 0.15, abs_tol=PRINTED_M)
 
 
-def test_the_other_elbow_of_the_published_example() -> None:
-    q = load_robot("scara_stewart").ik_all(EXAMPLE)
-    assert len(q) == 2
-    assert np.allclose(np.degrees(q[1, :2]), [30.0, -30.0], atol=PRINTED_DEG)
-    assert np.allclose(q[1, 2:], q[0, 2:], atol=1e-15)
-
-
 def test_forward_kinematics_of_the_published_joints_is_the_published_tip() -> None:
     robot = load_robot("scara_stewart")
     legs = robot.ik_all(EXAMPLE)[0, 3:]
     T = robot.fk([0.0, math.radians(30.0), 0.15, *legs])
     assert np.allclose(T[:3, 3], [0.933013, 0.20, 0.436603], atol=PRINTED_M)
     assert np.allclose(T[:3, :3], attitude(30.0, 0.0, 0.0), atol=SOLVED)
-
-
-def test_tool_offset_uses_the_printed_product_and_not_the_printed_name() -> None:
-    robot = load_robot("scara_stewart", l1=0.5, l2=0.5)
-    R = attitude(10.0, 20.0, -15.0)
-    T = transform(R, np.array([0.8, 0.0, 0.5]))
-    q = robot.ik_all(T)[0]
-    s = [
-        0.5 * (math.cos(q[0]) + math.cos(q[0] + q[1])),
-        0.5 * (math.sin(q[0]) + math.sin(q[0] + q[1])),
-        q[2] + 0.2,
-    ]
-    assert np.allclose(T[:3, 3] - s, [0.03420201, -0.01631759, 0.09254166], atol=1e-8)
-    fixed_axes = rotation("z", math.radians(-15.0)) @ rotation("y", math.radians(20.0))
-    fixed_axes = fixed_axes @ rotation("x", math.radians(10.0))
-    assert np.allclose(0.1 * fixed_axes[:, 2], [0.02804036, -0.02549077, 0.09254166], atol=1e-8)
-
-
-def test_tool_offset_and_scara_tip_of_the_published_example() -> None:
-    # K2 and K3: P_STWR and what is left to the SCARA.
-    offset = np.array([0.0, 0.0, 0.2]) + 0.1 * EXAMPLE[:3, 2]
-    assert np.allclose(offset, [0.0, -0.05, 0.286603], atol=PRINTED_M)
-    assert np.allclose(EXAMPLE[:3, 3] - offset, [0.933013, 0.25, 0.15], atol=PRINTED_M)
-
-
-def test_level_platform_has_equal_legs() -> None:
-    q = load_robot("scara_stewart").ik_all(transform(np.eye(3), np.array([0.7, 0.0, 0.5])))[0]
-    assert np.allclose(q[3:], 0.2236068, atol=5e-8)
-
-
-def test_legs_numbered_from_sixty_degrees_would_not_be_the_published_ones() -> None:
-    angles = np.radians([60.0, 120.0, 180.0, 240.0, 300.0, 360.0])
-    layout = Layout.circular(0.2, angles, 0.1, angles)
-    legs = layout.legs(transform(attitude(30.0, 0.0, 0.0), np.array([0.0, 0.0, 0.2])))
-    assert np.allclose(legs, [0.2671, 0.2671, 0.2236, 0.1916, 0.1916, 0.2236], atol=5e-5)
-
-
-def test_rejected_sign_of_equation_fifteen_ends_elsewhere() -> None:
-    robot = load_robot("scara_stewart")
-    q = robot.ik_all(EXAMPLE)[0]
-    q[0] = math.radians(-150.0)
-    tip = robot.fk(q)[:3, 3] - EXAMPLE[:3, 3] + [0.933013, 0.25, 0.15]
-    assert np.allclose(tip[:2], [-0.6830, -0.6830], atol=5e-5)
-
-
-def test_base_bolted_to_link_two_moves_the_published_tip() -> None:
-    carried = load_robot("scara_stewart", heading="carried")
-    legs = load_robot("scara_stewart").ik_all(EXAMPLE)[0, 3:]
-    T = carried.fk([0.0, math.radians(30.0), 0.15, *legs])
-    assert np.allclose(T[:3, 3], [0.95801270, 0.20669873, 0.43660254], atol=PRINTED_M)
-
-
-def test_scara_part_is_the_chain_of_its_denavit_hartenberg_rows() -> None:
-    # Unequal links tell the printed l2 of equation 3 from the l1 that is meant.
-    robot = load_robot("scara_stewart", l1=0.6, l2=0.35, h1=0.1, heading="carried")
-    chain = rtb.DHRobot(
-        [rtb.RevoluteMDH(d=0.1), rtb.RevoluteMDH(a=0.6), rtb.PrismaticMDH(a=0.35, qlim=[0, 1])]
-    )
-    for joints in np.random.default_rng(8).uniform([-2.0, -2.0, 0.0], [2.0, 2.0, 0.5], (10, 3)):
-        tool = transform(attitude(30.0, 0.0, 0.0), np.array([0.0, 0.0, 0.2]))
-        tool[:3, 3] += 0.1 * tool[:3, 2]
-        q = np.concatenate((joints, robot.home[3:]))
-        assert np.allclose(robot.fk(q), chain.fkine(joints).A @ tool, atol=SOLVED)
 
 
 @pytest.mark.parametrize("options", ROBOTS)
@@ -198,15 +124,6 @@ def test_a_platform_tilted_too_far_is_limited_to_the_nearest_tilt() -> None:
         assert result.status == IkStatus.LIMITED
         angle = Rotation.from_matrix(robot.fk(result.q)[:3, :3].T @ R).magnitude()
         assert math.isclose(math.degrees(angle), missing, abs_tol=1e-6)
-
-
-def test_a_platform_upside_down_is_limited_and_finite() -> None:
-    robot = load_robot("scara_stewart")
-    for R in (attitude(180.0, 0.0, 0.0), attitude(180.0, 0.0, 40.0)):
-        result = robot.ik(transform(R, np.array([0.6, 0.0, 0.3])))
-        assert result.status == IkStatus.LIMITED
-        assert np.isfinite(result.residual).all()
-        assert robot.fk(result.q)[2, 2] < 0.3
 
 
 def test_similar_hexagons_hide_the_turn_of_a_level_platform_and_say_so() -> None:
@@ -313,37 +230,6 @@ def test_legs_that_are_held_back_slow_down_together() -> None:
     assert result.status[0] == IkStatus.LIMITED
     assert math.isclose(np.abs(moved[3:]).max(), present(robot.drives).speed_limit[3] * 1e-3)
     assert np.allclose(moved[3:] / wanted[3:], moved[3] / wanted[3])
-
-
-def test_it_is_a_slave_with_nine_actuators_and_a_home_it_can_hold() -> None:
-    robot = load_robot("scara_stewart")
-    assert "scara_stewart" in list_robots()
-    assert robot.n == 9
-    assert robot.drives is not None
-    assert robot.dynamics is not None
-    assert all(np.shape(table) == (9,) for table in robot.drives.entries().values())
-    for options in ROBOTS:
-        arm = load_robot("scara_stewart", **options)
-        result = arm.ik(arm.fk(arm.home), seed=arm.home)
-        assert result.status == IkStatus.FOLLOWED
-        assert np.allclose(result.q, arm.home, atol=SOLVED)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("options", ["", "heading=carried", "sigma_b=0.26, sigma_m=0.26"])
-def test_nine_simulated_actuators_follow_the_master_in_the_graph(options: str) -> None:
-    settings = ["robot=scara_stewart", f"geometry=[{options}]"]
-    session = VirtualTime(configure(settings=settings))
-    session.run(session.lead + 500)  # to where the slave starts, and half a second of rest
-    signals = session.run(3000)
-    measured, setpoint = signals["slave_measured_cp"], signals["slave_setpoint_cp"]
-    assert signals["slave_measured_js"].shape[1] >= 9
-    assert np.isfinite(measured).all()
-    assert np.abs(np.diff(setpoint[:, :3], axis=0)).sum() > 1e-3  # it was led somewhere
-    # Lag of the assumed drives and, on similar hexagons, what encoders see of the turn.
-    assert np.linalg.norm(measured[:, :3] - setpoint[:, :3], axis=1).max() < 5e-4
-    between = np.abs(np.sum(measured[:, 3:] * setpoint[:, 3:], axis=1))
-    assert 2.0 * np.arccos(np.minimum(between, 1.0)).max() < math.radians(0.5)
 
 
 def test_bad_options_and_lengths_are_refused() -> None:

@@ -115,12 +115,11 @@ def test_kernels_that_were_compiled_here_come_before_shipped_ones(tree: Path) ->
     assert (count, read) == ("0", ["False", "False"])
 
 
-@pytest.mark.parametrize("content", [b"", b"no kernel"])
 def test_kernels_are_compiled_where_shipped_ones_are_broken(
-    shipped: tuple[Path, str], tree: Path, content: bytes
+    shipped: tuple[Path, str], tree: Path
 ) -> None:
-    for file in (tree / "teleop_core/kernels" / FOLDER.name).rglob("*.nbc"):
-        file.write_bytes(content)
+    for k, file in enumerate((tree / "teleop_core/kernels" / FOLDER.name).rglob("*.nbc")):
+        file.write_bytes(b"no kernel" if k % 2 else b"")
     count, bits = wheels.run(tree, None, SCRIPT).split()
     assert int(count) >= 3
     assert bits == shipped[1]

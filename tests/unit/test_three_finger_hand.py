@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-import roboticstoolbox as rtb
 
 from teleop_core.base.errors import ParameterError, ShapeError, UnknownNameError
 from teleop_core.kernels.geometry import Array, rotation, transform
@@ -41,45 +40,9 @@ def moves(
         yield transform(R, T[:3, 3] + rng.uniform(-shift, shift, 3))
 
 
-def test_three_distances_between_contacts_leave_six_freedoms(robot: Robot, hand: Hand) -> None:
-    slopes = np.array(
-        [
-            (hand.slip(robot.home + change) - hand.slip(robot.home - change)) / 2e-6
-            for change in 1e-6 * np.eye(9)
-        ]
-    )
-    assert 9 - np.linalg.matrix_rank(slopes, tol=1e-6) == 6
-
-
 def test_finger_of_the_specification() -> None:
     point = finger_point(np.radians(20.0), np.radians(35.0), np.radians(-50.0), (1.0, 0.6, 0.4))
     assert np.allclose(point, [1.764613, 0.642266, 0.240618], atol=6e-7)
-
-
-def test_finger_is_the_chain_of_its_denavit_hartenberg_table() -> None:
-    rng = np.random.default_rng(1)
-    for _ in range(20):
-        links, q = rng.uniform(0.2, 1.0, 3), rng.uniform(-3.0, 3.0, 3)
-        chain = rtb.DHRobot(
-            [
-                rtb.RevoluteMDH(),
-                rtb.RevoluteMDH(alpha=math.pi / 2, a=links[0]),
-                rtb.RevoluteMDH(a=links[1]),
-            ]
-        )
-        point = finger_point(q[0], q[1], q[2], tuple(links))
-        assert np.allclose(point, (chain.fkine(q).A @ [links[2], 0.0, 0.0, 1.0])[:3], atol=1e-14)
-
-
-def test_fingers_stand_where_the_lecture_puts_them(robot: Any, hand: Any) -> None:
-    q: Any = np.array([0.2, 0.3, -0.4] * 3)
-    g: Any
-    points, g = hand.contact_points(q), robot.geometry
-    local: Any
-    local = np.array(finger_point(q[0], q[1], q[2], (g["l11"], g["l12"], g["l13"])))
-    assert np.allclose(points[0], local + np.array([0.0, -g["d"], g["h"]]), atol=1e-15)
-    assert np.allclose(points[1], local + np.array([0.0, g["d"], g["h"]]), atol=1e-15)
-    assert np.allclose(points[2], rotation("y", g["gamma"]) @ local, atol=1e-15)
 
 
 @pytest.mark.parametrize("finger", [1, 2, 3])
@@ -134,16 +97,6 @@ def test_inverse_follows_the_object_next_to_the_seed(robot: Robot, hand: Hand) -
         ]
         nearest = min(np.abs(q - robot.home).max() for q in inside)
         assert math.isclose(np.abs(result.q - robot.home).max(), nearest, abs_tol=SOLVED)
-
-
-def test_six_actuated_joints_fix_the_other_three(robot: Robot, hand: Hand) -> None:
-    rng = np.random.default_rng(7)
-    for T in moves(robot, rng, 50):
-        q = robot.ik(T).q.reshape(3, 3)
-        result = hand.hold(q[:, :2], q[:, 2] + rng.uniform(-0.05, 0.05, 3))
-        assert result.status == Grasp.HELD
-        assert np.allclose(result.q, q.ravel(), atol=1e-7)
-        assert np.allclose(hand.object_pose(hand.contact_points(result.q)), T, atol=1e-8)
 
 
 def test_fingers_spread_too_far_cannot_hold_and_say_so(robot: Robot, hand: Hand) -> None:

@@ -336,18 +336,3 @@ def test_what_is_not_linear_is_told_in_place_of_its_numbers(
     assert present(told["off the lines, tissue, 100 ms"].predicted) > 100.0 * STRAY
     assert not any("tissue, share" in quantity or "Llewellyn" in quantity for quantity in told)
     assert not any("-3 dB" in quantity for quantity in told)  # the slave goes as far as is paid for
-
-
-def test_figures_of_transparency_have_numbers_and_words(
-    known: Cell,
-    forces: dict[tuple[tuple[str, str], float], Cell],
-    others: dict[tuple[tuple[str, str], float], Cell],
-) -> None:
-    figures = report({**forces, **others}, known).figures
-    assert len(figures) == len(SOME) + 2
-    for figure in figures:
-        assert figure.sentence.endswith(".")
-        assert figure.traces or "air" in figure.title
-        assert all(
-            len(trace["x"]) == len(trace["y"]) == len(two_port.LINES) for trace in figure.traces
-        )

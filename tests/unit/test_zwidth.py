@@ -142,10 +142,3 @@ def test_the_law_of_our_own_device_is_the_one_that_the_walls_know(outcome: Outco
     assert row.published == pytest.approx(9454.5)
     assert row.agrees
     assert any("assumed" in note for note in outcome.notes)
-
-
-def test_figures_of_zwidth_have_numbers_and_words(outcome: Outcome) -> None:
-    assert len(outcome.figures) == 2
-    for figure in outcome.figures:
-        assert figure.sentence.endswith(".")
-        assert all(len(trace["x"]) == len(trace["y"]) > 0 for trace in figure.traces)

@@ -212,7 +212,7 @@ class TableSource:
                 column = names.find_button(self._table.names, button)
                 if column is None or column in taken:
                     continue
-                if self._is_button(column):
+                if bool(np.isin(self._table.sample(column).astype(np.float64), (0.0, 1.0)).all()):
                     found[button] = column
                     self._told(f"button {button}", (column,))
                 else:
@@ -222,9 +222,6 @@ class TableSource:
                         f"(--{button} takes it, pressed above --threshold)"
                     )
         return found
-
-    def _is_button(self, column: int) -> bool:
-        return bool(np.isin(self._table.sample(column).astype(np.float64), (0.0, 1.0)).all())
 
     def _tell_unused(self, taken: set[int]) -> None:
         known = self._table.names

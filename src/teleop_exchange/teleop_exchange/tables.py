@@ -153,12 +153,8 @@ def _parts(name: str, column: pa.Array) -> Iterator[tuple[str, pa.Array]]:
         values = column.flatten()
         if width and len(values) == width * len(column):
             for i in range(width):
-                yield f"{name}.{i}", values.take(_every(i, width, len(values)))
+                yield f"{name}.{i}", values.take(pa.array(np.arange(i, len(values), width)))
         else:
             yield name, pa.nulls(len(column), pa.float64())
     else:
         yield name, column
-
-
-def _every(first: int, step: int, length: int) -> pa.Array:
-    return pa.array(np.arange(first, length, step))

@@ -172,13 +172,10 @@ class TextTable:
         text = " ".join(str(error).split())
         for pattern in (r"column #(\d+).*?invalid value '([^']*)'", r"to float.*?(): '([^']*)'"):
             if found := re.search(pattern, text):
-                name = self._name_at(found[1])
+                name = f"column {self.names[int(found[1])]!r}" if found[1] else "a column"
                 needed = "which is no number; choose other columns, or mark it as NaN"
                 reason = f"{name} holds {found[2]!r}, {needed}"
                 raise RecordingError(self.path, reason) from error
-
-    def _name_at(self, number: str) -> str:
-        return f"column {self.names[int(number)]!r}" if number else "a column"
 
 
 def _clock_ns(column: "pd.Series[str]") -> Numbers:

@@ -8,7 +8,7 @@ from typing import Any
 import yaml
 
 from teleop_core.base.errors import ParameterError, PartError, UnknownNameError
-from teleop_core.base.parameters import Value, build, specs, values_of
+from teleop_core.base.parameters import build, specs, values_of
 from teleop_core.chain.architectures import ARCHITECTURES
 from teleop_core.chain.architectures.impedance import IMPEDANCE
 from teleop_core.chain.operators import OPERATORS
@@ -62,7 +62,7 @@ class Configuration:
         graph = build_graph(session.arms, session.stages, session.delays)
         _check_names(merged, graph)
         groups: dict[str, Any] = {SESSION: session}
-        for member in _ordered(graph):
+        for member in [Member(stage, arm) for arm in graph.namespaces for stage in graph.stages]:
             values = _values_for(member, merged, graph)
             groups[member.name] = build(member.stage.parameters, values, f"{member.name}.")
         recorder = STAGES.find(RECORDER_NAME)
@@ -92,15 +92,14 @@ class Configuration:
     def text(self) -> str:
         """All values as a ROS 2 parameter file, which :func:`parse_layer` reads back."""
         plain = {
-            name: {"ros__parameters": {k: _plain(v) for k, v in values_of(group).items()}}
+            name: {
+                "ros__parameters": {
+                    k: (list(v) if isinstance(v, tuple) else v) for k, v in values_of(group).items()
+                }
+            }
             for name, group in self.groups.items()
         }
         return yaml.safe_dump(plain, sort_keys=False, allow_unicode=True)
-
-
-def _ordered(graph: Graph) -> list[Member]:
-    """Members arm by arm, in the order in which stages are named."""
-    return [Member(stage, arm) for arm in graph.namespaces for stage in graph.stages]
 
 
 _SHARED = ("seed", "device.workspace", "device.start")
@@ -217,10 +216,6 @@ def _check_order(stages: Iterable[str]) -> None:
     if IMPEDANCE.name in order and order != wanted:
         text = f"named in the order teleop.stages=[{', '.join(wanted)}], not {', '.join(order)}"
         raise PartError("stage", IMPEDANCE.name, text)
-
-
-def _plain(value: Value) -> object:
-    return list(value) if isinstance(value, tuple) else value
 
 
 def configure(
