@@ -26,6 +26,7 @@ from teleop_core.graph.topics import (
     OPERATOR_BUTTONS,
     OPERATOR_SERVO_CP,
     PASSIVITY_TOPICS,
+    PORTS_BETWEEN_ARMS,
     Kind,
     Topic,
 )
@@ -225,7 +226,7 @@ class Row(Fields):
 
 def row_module() -> str:
     """Module with the class that names the fields of stages' records."""
-    topics = [topic for topic in BY_NAME.values() if topic.width(1)]
+    topics = [topic for topic in (*BY_NAME.values(), *PORTS_BETWEEN_ARMS) if topic.width(1)]
     lines = [f"    {topic.field}: Array\n    {topic.field}_ns: int\n" for topic in topics]
     return ROW_HEAD + "".join(lines)
 

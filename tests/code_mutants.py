@@ -35,6 +35,7 @@ _CENTRE_SCORE, _TOUCH = "evaluation/metrics/remote_centre.py", "evaluation/metri
 _JAW, _JAW_SCORE = "slave/jaw/jaw.py", "evaluation/metrics/jaw.py"
 _GRIP, _TRANSFER = "slave/jaw/grip.py", "evaluation/metrics/transfer.py"
 _GRIPPER = "slave/bridges/jaw_bridge.py"
+_SHARING = "slave/jaw/sharing.py"
 _YIELD = "chain/architectures/impedance.py"
 _PID, _WAY = "slave/controllers/pid.py", "slave/interpolation.py"
 _HAND, _OBSERVER = "chain/master/hand_mechanics.py", "slave/force_observer.py"
@@ -65,6 +66,20 @@ CODE_MUTANTS = (
             "EFFECTIVE = 4.133", "EFFECTIVE = 3.133", "tests/scenario/test_tasks.py"),
     _mutant("frame_age", "a frame does not age on the screen", "evaluation/metrics/task.py",
             "[first:] + 0.5 * until", "[first:]", "tests/scenario/test_tasks.py"),
+    _mutant("lone_jaw", "of two jaws that hold a block the second has no hold", _GRIP,
+            "s.forces[1] = row.second_slave_jaw_grip[0] if is_there else 0.0", "s.forces[1] = 0.0",
+            "two_jaws"),
+    _mutant("weaker_wins", "of two jaws that part the weaker one keeps the block", _SHARING,
+            "if _sticks(motion, tip, most, other, against):",
+            "if _sticks(motion, tip, against, other, most):", "two_jaws"),
+    _mutant("one_base", "both arms stand at the same place", _GRIP,
+            "room.tips[1, i] += p.second_base[i]", "room.tips[1, i] += 0.0", "two_jaws"),
+    _mutant("soft_finger", "no force is too large for a task", "chain/tasks/attempts.py",
+            "if math.sqrt(square) > numbers[1]:", "if False:", "touching_tasks"),
+    _mutant("short_hold", "a force need not be held", "chain/tasks/palpate.py",
+            "scene[0] - memory[4] < numbers[7]", "scene[0] < memory[4]", "touching_tasks"),
+    _mutant("way_out_counts", "the way out of a hole counts as a way in", "chain/tasks/insert.py",
+            "        if was_inside:\n", "        if True:\n", "touching_tasks"),
     _mutant("wide_target", "a press beside the target counts", "chain/tasks/attempts.py",
             "<= 0.5 * state[_WIDTH]", "<= state[_WIDTH]", "tests/scenario/test_tasks.py"),
     _mutant("reports_meet", "all nodes report at once", "nodes/rate.py",

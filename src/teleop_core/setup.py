@@ -94,6 +94,8 @@ setup(
         files("config/robots", "*.yaml"),
         files("config/arms", "*.yaml"),
         files("config/masters", "*.yaml"),
+        files("config/studies", "*.yaml"),
+        files("config/worlds", "*.yaml"),
         files("launch", "*.launch.py"),
     ],
     entry_points={

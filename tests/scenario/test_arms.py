@@ -8,6 +8,7 @@ import pytest
 import yaml
 from numpy.typing import NDArray
 
+import teleop_core as tc
 from teleop_core.bags.reader import Bag
 from teleop_core.base.errors import TeleopError
 from teleop_core.chain.operators import register_operator
@@ -141,3 +142,35 @@ def test_one_recording_holds_and_replays_both_arms_to_the_bit(
         for topic in (topic.of_arm(arm) for topic in STREAMS):
             assert np.array_equal(bag.read(topic).values, both[topic.field]), topic.name
             assert np.array_equal(bag.read(topic).values, again.read(topic).values), topic.name
+
+
+HAND_OVER: dict[str, Any] = {
+    "jaw_sim.second_base": (0.0, -0.03, 0.0),
+    "left/operator.tour.points": (0.0, 0.0, 0.02, 0.0, -0.03, 0.02, *(0.0, 0.0, 0.02) * 4),
+    "left/operator.buttons.jaw": (5.3, 9.5),
+    "right/operator.tour.points": (
+        *(0.0, 0.0, 0.0), *(-0.03, 0.0, 0.0), *(-0.03, 0.0, 0.02) * 2, *(0.0, 0.0, 0.02) * 2,
+    ),
+    "right/operator.buttons.jaw": (8.5, 14.0),
+}  # fmt: skip
+"""The left arm lifts a block, the right one takes it from its jaw, carries it 30 mm and lets go."""
+
+
+def test_a_block_is_handed_from_arm_to_arm_and_each_arm_tells_where_it_is() -> None:
+    recording = tc.run("pick", duration=20.0, arms=["left", "right"], settings=HAND_OVER)
+    left, right = recording.scores()
+    for score in (left, right):
+        assert [score.value(f"jaw.{key}") for key in ("grips", "slips", "drops")] == [1, 0, 0]
+    told, also = recording["slave/jaw/board"], recording["right/slave/jaw/board"]
+    assert told.values[-1, 3:6] == pytest.approx([0.261, -0.2657, -0.0911], abs=2e-3)
+    assert also.values[-1, 3:6] == pytest.approx(told.values[-1, 3:6] - [0.0, -0.03, 0.0])
+
+
+def test_two_arms_with_one_board_repeat_and_replay_to_the_bit(tmp_path: Path) -> None:
+    given: dict[str, Any] = {"arms": ["left", "right"], "settings": HAND_OVER}
+    first = tc.run("pick", duration=9.0, out=tmp_path / "first", **given)
+    again = tc.run("pick", duration=9.0, **given)
+    replayed = tc.replay(first)
+    for topic in ("slave/jaw/board", "right/slave/jaw/board", "right/slave/jaw/grip"):
+        assert np.array_equal(first[topic].values, again[topic].values)
+        assert np.array_equal(first[topic].values, replayed[topic].values)

@@ -31,6 +31,7 @@ BUILT_IN = (
 HAND, DEVICE = BUILT_IN[:2]
 """Stages with whose recorded output a replay may begin."""
 RECORDER_NAME = "recorder"
+_WAYS = {"first": 0, "second": 1}  # beginnings of ports between arms, to the arm that writes
 
 
 @dataclass(frozen=True)
@@ -204,7 +205,11 @@ class Graph:
 
     @cached_property
     def links(self) -> tuple[Link, ...]:
-        """All links, reader by reader; at one port the link that others add to comes first."""
+        """All links, reader by reader; at one port the link that others add to comes first.
+
+        A port ``first/topic`` of the second arm is fed by the first one's ``topic``, and a port
+        ``second/topic`` of the first by the second's; of other arms nothing feeds them.
+        """
         return tuple(
             link
             for member in self._all()
@@ -213,6 +218,12 @@ class Graph:
         )
 
     def _links_to(self, reader: Member, port: Topic) -> Iterator[Link]:
+        way, _, plain = port.name.partition("/")
+        if way in _WAYS:
+            to, of = (self.namespaces.index(reader.arm), _WAYS[way])
+            if {to, of} == {0, 1} and len(self.arms) > 1:
+                yield from self._link_between(reader, port, plain, self.namespaces[of])
+            return
         source = self._source(reader.stage, port)
         feeds = [(*source, False)] if source is not None else []
         feeds += [(*found, bool(feeds) or i > 0) for i, found in enumerate(self._adding(port))]
@@ -221,6 +232,15 @@ class Graph:
             own = topic.of_arm(reader.arm)
             delay = self._delay(own, reader.stage)
             yield Link(own, Member(stage, reader.arm), reader, port, delay, is_late, adds)
+
+    def _link_between(self, reader: Member, port: Topic, plain: str, arm: str) -> Iterator[Link]:
+        """Link from a stage of another arm, if one writes the topic of this plain name."""
+        for stage in self.stages:
+            for topic in stage.writes:
+                if topic.name == plain:
+                    own, is_late = topic.of_arm(arm), port in reader.stage.late
+                    delay = self._delay(own, reader.stage)
+                    yield Link(own, Member(stage, arm), reader, port, delay, is_late)
 
     def _source(self, reader: Stage, port: Topic) -> tuple[Stage, Topic] | None:
         """Who writes what a stage reads at a port: the topic itself, or what replaces it."""

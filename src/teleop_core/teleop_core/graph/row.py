@@ -113,3 +113,9 @@ class Row(Fields):
     display_measured_cp_ns: int
     task_state: Array
     task_state_ns: int
+    first_slave_jaw_board: Array
+    first_slave_jaw_board_ns: int
+    second_slave_true_cp: Array
+    second_slave_true_cp_ns: int
+    second_slave_jaw_grip: Array
+    second_slave_jaw_grip_ns: int

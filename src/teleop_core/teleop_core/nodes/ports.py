@@ -12,7 +12,7 @@ from teleop_core.base.parameters import NoParameters
 from teleop_core.graph.graph import BUILT_IN
 from teleop_core.graph.signals import make_signals
 from teleop_core.graph.stage import Stage
-from teleop_core.graph.topics import SELDOM_NS, Kind, Topic
+from teleop_core.graph.topics import PORTS_BETWEEN_ARMS, SELDOM_NS, Kind, Topic
 from teleop_core.kernels.fields import Cells
 from teleop_core.kernels.geometry import Array
 from teleop_core.middleware.world import Publisher
@@ -66,8 +66,8 @@ class Ports:
             self.inputs[port.name] = [
                 Input(
                     owner,
-                    replace(port, name=name).of_arm(arm),
-                    name,
+                    _heard(port, name, arm),
+                    _name_for(owner, name),
                     joint_names,
                     target,
                     delay,
@@ -166,6 +166,22 @@ class Ports:
         """Stop listening."""
         for entry in self.all_inputs():
             entry.close()
+
+
+def _heard(port: Topic, name: str, arm: str) -> Topic:
+    """Topic that feeds a port, in the namespace of its own arm."""
+    way, _, plain = port.name.partition("/")
+    if port not in PORTS_BETWEEN_ARMS or not name.endswith(plain) or name.startswith(way):
+        return replace(port, name=name).of_arm(arm)
+    return replace(port, name=plain).of_arm(name.removesuffix(plain).strip("./"))
+
+
+def _name_for(owner: Any, name: str) -> str:
+    """Name of a topic for the middleware; ``../`` leaves the node's namespace."""
+    if not name.startswith("../"):
+        return name
+    parent = owner.ros.resolve_topic_name("x").rpartition("/")[0].rpartition("/")[0]
+    return f"{parent}/{name.removeprefix('../')}"
 
 
 def _nothing(*_: object) -> Any:

@@ -21,7 +21,7 @@ from teleop_core.kernels import pointer
 from teleop_core.kernels.geometry import Array
 from teleop_core.kernels.parts import fenced, is_whole, numbers_of
 
-__all__ = ["MEMORY", "SCENE", "TASKS", "Act", "Task", "register_task"]
+__all__ = ["MEMORY", "SCENE", "TASKS", "Act", "Miss", "Task", "register_task"]
 
 _ROW = types.float64[::1]
 JUDGE = types.void(_ROW, _ROW, _ROW, _ROW)
@@ -38,6 +38,17 @@ class Act(IntEnum):
 
     PRESS = 0  # close the hand there, as a mouse is clicked
     PASS = 1  # be there
+
+
+class Miss(IntEnum):
+    """What was wrong with an attempt at a task."""
+
+    NONE = 0  # nothing
+    BESIDE = 1  # it ended beside the goal
+    LATE = 2  # it took too long
+    FORCE = 3  # it pressed too hard
+    DROP = 4  # what was carried came to rest beside its goal
+    WRONG = 5  # what was carried came to rest on a goal of another one
 
 
 @dataclass(frozen=True)
@@ -87,7 +98,7 @@ def _try(part: Task) -> None:
 TASKS: Registry[Task] = Registry(
     "task",
     "tasks",
-    places("teleop_core.chain.tasks", "follow point reach trace"),
+    places("teleop_core.chain.tasks", "follow insert palpate point reach trace"),
     part_check("task", Task, "judge"),
     _try,
 )

@@ -8,17 +8,20 @@ import math
 from dataclasses import dataclass
 
 from teleop_core.base.parameters import parameter
+from teleop_core.chain.tasks import SCENE, Act, Miss
 from teleop_core.graph.topics import TASK_STATE
 from teleop_core.kernels import inner
 from teleop_core.kernels.geometry import Array
 
 KEPT = 59
-_PASS = 1  # Act.PASS, which imports this
+_PASS = int(Act.PASS)
 _SINCE, _CLOSED = KEPT + 3, KEPT + 4
 _OPENS, _CLOSES = 0.4, 0.6  # closing at which a hand counts as open and closed again
-(_NUMBER, _ACT, _GOAL, _, _, _WIDTH, _ATTEMPTS, _SUCCESSES, _ERRORS, _WAY, _OFF, _TIME) = range(
-    len(TASK_STATE.columns)
-)
+(
+    _NUMBER, _ACT, _GOAL, _, _, _WIDTH, _ATTEMPTS, _SUCCESSES, _ERRORS, _WAY, _OFF, _TIME, _MISS
+) = range(len(TASK_STATE.columns))  # fmt: skip
+_NONE, _BESIDE, _LATE, _FORCE = (int(m) for m in (Miss.NONE, Miss.BESIDE, Miss.LATE, Miss.FORCE))
+_PUSH = SCENE.index("fx")
 
 
 @inner
@@ -46,22 +49,57 @@ def begin_goal(
 
 
 @inner
-def tell_attempt(memory: Array, scene: Array, state: Array) -> bool:
-    """Count an attempt at the goal where the tip is now; returns whether it succeeded."""
-    way, along, off = 0.0, 0.0, 0.0
+def is_at_goal(scene: Array, state: Array) -> bool:
+    """Whether the tip is within the goal, a ball as wide as the goal is."""
+    off = 0.0
+    for i in range(3):
+        off += (scene[1 + i] - state[_GOAL + i]) * (scene[1 + i] - state[_GOAL + i])
+    return math.sqrt(off) <= 0.5 * state[_WIDTH]
+
+
+@inner
+def end_attempt(memory: Array, scene: Array, state: Array, miss: int) -> None:
+    """Count an attempt that ended where the tip is now, with a :class:`Miss` or without one."""
+    way, along = 0.0, 0.0
     for i in range(3):
         to_goal = state[_GOAL + i] - memory[KEPT + i]
-        beyond = scene[1 + i] - state[_GOAL + i]
         way += to_goal * to_goal
-        along += to_goal * beyond
-        off += beyond * beyond
+        along += to_goal * (scene[1 + i] - state[_GOAL + i])
     way = math.sqrt(way)
-    is_there = math.sqrt(off) <= 0.5 * state[_WIDTH]
     state[_ATTEMPTS] += 1.0
-    state[_SUCCESSES if is_there else _ERRORS] += 1.0
+    state[_SUCCESSES if miss == _NONE else _ERRORS] += 1.0
     state[_WAY], state[_OFF] = way, along / max(way, 1e-12)
-    state[_TIME] = scene[0] - memory[_SINCE]
-    return is_there
+    state[_TIME], state[_MISS] = scene[0] - memory[_SINCE], float(miss)
+
+
+@dataclass(frozen=True, kw_only=True)
+class PressedParameters:
+    """What is an error where things are touched; first of the numbers of such a task."""
+
+    width: float = parameter(0.004, unit="m", lower=1e-4, upper=0.1, doc="of a goal, a ball")
+    most: float = parameter(
+        2.0, unit="N", lower=0.01, upper=500.0, doc="a larger force is an error"
+    )
+    longest: float = parameter(
+        20.0, unit="s", lower=0.1, upper=600.0, doc="an attempt that takes longer is an error"
+    )
+
+
+@inner
+def failed(numbers: Array, memory: Array, scene: Array) -> int:
+    """:class:`Miss` of an attempt by :class:`PressedParameters`, FORCE or LATE; NONE so far."""
+    square = 0.0
+    for i in range(3):
+        square += scene[_PUSH + i] * scene[_PUSH + i]
+    if math.sqrt(square) > numbers[1]:
+        return _FORCE
+    return _LATE if scene[0] - memory[_SINCE] > numbers[2] else _NONE
+
+
+@inner
+def tell_attempt(memory: Array, scene: Array, state: Array) -> None:
+    """Count an attempt that succeeds where the tip is within the goal now."""
+    end_attempt(memory, scene, state, _NONE if is_at_goal(scene, state) else _BESIDE)
 
 
 @dataclass(frozen=True, kw_only=True)

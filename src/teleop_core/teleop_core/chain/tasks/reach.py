@@ -1,15 +1,14 @@
 """Reach: be at one place after another, anywhere in a box, as soon as it can be."""
 
-import math
 from dataclasses import dataclass
 
 from teleop_core.base.parameters import parameter
-from teleop_core.chain.tasks import Act, Task
-from teleop_core.chain.tasks.attempts import begin_goal, tell_attempt
+from teleop_core.chain.tasks import Act, Miss, Task
+from teleop_core.chain.tasks.attempts import begin_goal, end_attempt, is_at_goal, tell_attempt
 from teleop_core.kernels import kernel
 from teleop_core.kernels.geometry import Array
 
-_PASS = int(Act.PASS)
+_PASS, _LATE = int(Act.PASS), int(Miss.LATE)
 # Powers of the inverse of the plastic number's relative in three dimensions, 1.2207440846…
 _STEPS = (0.8191725133961645, 0.6710436067037893, 0.5497004779019703)
 
@@ -41,13 +40,12 @@ def reach_judge(numbers: Array, memory: Array, scene: Array, state: Array) -> No
     if state[0] == 0.0:
         for i in range(3):
             memory[i] = scene[1 + i]
-    else:
-        off = 0.0
-        for i in range(3):
-            off += (scene[1 + i] - state[2 + i]) * (scene[1 + i] - state[2 + i])
-        if math.sqrt(off) > 0.5 * state[5] and scene[0] - memory[3] < numbers[4]:
-            return
+    elif is_at_goal(scene, state):
         tell_attempt(memory, scene, state)
+    elif scene[0] - memory[3] >= numbers[4]:
+        end_attempt(memory, scene, state, _LATE)
+    else:
+        return
     at = state[0] + numbers[5] + 1.0
     goal_x = memory[0] + numbers[0] * ((0.5 + at * _STEPS[0]) % 1.0 - 0.5)
     goal_y = memory[1] + numbers[1] * ((0.5 + at * _STEPS[1]) % 1.0 - 0.5)

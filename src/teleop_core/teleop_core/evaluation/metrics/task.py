@@ -11,9 +11,11 @@ from teleop_core.evaluation.windows import Window
 from teleop_core.graph.topics import DISPLAY_MEASURED_CP, NO_COMMAND_NS, TASK_STATE
 
 GROUP = "task"
-_ATTEMPTS, _SUCCESSES, _WAY, _OFF, _TIME = (
-    TASK_STATE.columns.index(name) for name in ("attempts", "successes", "way", "off", "time")
+_ATTEMPTS, _SUCCESSES, _WAY, _OFF, _TIME, _MISS = (
+    TASK_STATE.columns.index(name)
+    for name in ("attempts", "successes", "way", "off", "time", "miss")
 )
+_KINDS = ("beside", "late", "forced", "dropped", "wrong")  # of Miss, from 1 on
 EFFECTIVE = 4.133
 """Effective width in standard deviations of the end points: 96 % of a normal distribution."""
 
@@ -37,6 +39,11 @@ class TaskScore:
     effective_width_mm: float | None = figure(
         "mm", "4.133 standard deviations of the end points along their ways"
     )
+    beside: int | None = figure("1", "errors: it ended beside the goal")
+    late: int | None = figure("1", "errors: it took too long")
+    forced: int | None = figure("1", "errors: it pressed too hard")
+    dropped: int | None = figure("1", "errors: what was carried came to rest beside its goal")
+    wrong: int | None = figure("1", "errors: what was carried came to rest on another one's goal")
 
 
 class TaskMetric(Metric):
@@ -68,25 +75,26 @@ class TaskMetric(Metric):
     def values(self) -> TaskScore:
         """Score of everything so far."""
         if np.isnan(self._count):
-            return TaskScore(None, None, None, None, None, None)
+            return TaskScore(*[None] * 11)
         if not self._tried:
-            return TaskScore(0, 0, None, None, None, None)
+            return TaskScore(0, 0, *[None] * 4, *[0] * len(_KINDS))
         tried = np.array(self._tried)
         count = len(tried)
         later = tried[1:] if count >= 4 else tried
         time = float(later[:, _TIME].mean())
         successes = int(tried[-1, _SUCCESSES] - self._before)
         errors = 1.0 - successes / count
+        kinds = [int((tried[:, _MISS] == kind + 1.0).sum()) for kind in range(len(_KINDS))]
         if count < 4:
-            return TaskScore(count, successes, errors, time, None, None)
+            return TaskScore(count, successes, errors, time, None, None, *kinds)
         width = EFFECTIVE * float(later[:, _OFF].std(ddof=1))
         way = float(later[:, _WAY].mean())
         bits = float(np.log2(way / width + 1.0)) if width > 0.0 else None
         rate = None if bits is None else bits / time
-        return TaskScore(count, successes, errors, time, rate, 1e3 * width)
+        return TaskScore(count, successes, errors, time, rate, 1e3 * width, *kinds)
 
     def rows(self) -> list[Row]:
-        """All six; nothing without a task."""
+        """Counts, times and rates, and the kinds of error that occurred; nothing without a task."""
         score = self.values()
         if score.attempts is None:
             return []
@@ -99,6 +107,11 @@ class TaskMetric(Metric):
             row(GROUP, "time of an attempt, mean", "s", score.time_s),
             row(GROUP, "throughput", "bit/s", score.throughput),
             row(GROUP, "effective width", "mm", score.effective_width_mm),
+            *(
+                Row(GROUP, f"errors: {kind}", "", str(n))
+                for kind in _KINDS
+                if (n := getattr(score, kind))
+            ),
         ]
 
 

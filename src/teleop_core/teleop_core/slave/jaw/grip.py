@@ -1,8 +1,11 @@
-"""Grip: objects that the fingers hold by dry friction, one at a time, over a table with pegs.
+"""Grip: objects that the fingers hold by dry friction, over a table with pegs.
 
-The object is one mass. Friction of both pads brings it to the motion of the tip as far as it can;
+An object is one mass. Friction of both pads brings it to the motion of the tip as far as it can;
 what is missing, it slides (Coulomb). Time-stepping in speeds makes both one rule, after Moreau
 1988: the change of speed that sticking needs, or the largest that friction gives in the tick.
+
+Two arms share the objects. The first one's simulator keeps them, and is told tip and push of the
+second jaw; that of the second is told where they are.
 """
 
 import math
@@ -14,8 +17,9 @@ from teleop_core.graph.row import Row
 from teleop_core.graph.signals import copy
 from teleop_core.graph.topics import JAW_OBJECTS
 from teleop_core.kernels import geometry, inner, kernel
-from teleop_core.kernels.fields import Integers, PoseRow, Vector3
+from teleop_core.kernels.fields import Integers, Vector3
 from teleop_core.slave.jaw.drive import DriveNumbers, DriveState, width
+from teleop_core.slave.jaw.sharing import far_from, share_speed
 
 WEIGHT = 9.81
 """Standard weight per mass [m/s²], along -z of the slave's base."""
@@ -41,22 +45,22 @@ class GripNumbers(DriveNumbers):
     clearance: float  # of a peg in an object, on each side [m]
     mass: float  # [kg]
     pad_friction: float
+    second_base: Vector3  # of the second arm, in the first one's [m]
 
 
 class GripState(DriveState):
-    """State record of the jaw."""
+    """State record of the jaw; hands are the own one, and the second arm's."""
 
     tip_ns: int
-    tip: PoseRow
-    object: PoseRow  # the one that moves, or moved last
-    number: int  # of that object
-    objects: Annotated[
-        geometry.Array, 7 * JAW_OBJECTS
-    ]  # poses of all, of the moving one an old one
-    motion: Vector3  # of the object [m/s]
-    peg: int  # the object is on it; _NONE without
-    pull: float  # of the peg on the object, across [N]
+    tips: Annotated[geometry.Array, 14]  # pose of each hand's tip; of the second arm: own last two
+    held: Vector3  # of the second arm: the object's middle in the tip's frame as the grip began [m]
+    forces: Annotated[geometry.Array, 2]  # of each hand's fingers on its object [N]
+    numbers: Annotated[Integers, 2]  # of the object that each hand moves, or moved last
+    objects: Annotated[geometry.Array, 7 * JAW_OBJECTS]  # poses
+    motions: Annotated[geometry.Array, 3 * JAW_OBJECTS]  # [m/s]
+    pegs: Annotated[Integers, JAW_OBJECTS]  # that each is on; _NONE without
     homes: Annotated[Integers, JAW_OBJECTS]  # peg where each rested last; _NONE: it dropped
+    pull: float  # of a peg on a gripped object, across [N]
     transferred: int
     dropped: int
     is_gripped: int
@@ -75,42 +79,54 @@ class GripRoom(NamedTuple):
     turned: geometry.Array  # (4,)
     R: geometry.Array  # (3, 3)
     motion: geometry.Array  # (3,)
+    second: geometry.Array  # (3,)
+    tips: geometry.Array  # (2, 7)
 
 
 def make_room() -> GripRoom:
-    """Room for :func:`move_object`."""
-    return GripRoom(np.empty(4), np.empty(4), np.empty(4), np.empty((3, 3)), np.empty(3))
+    """Room for :func:`move_objects`."""
+    rows = np.empty(4), np.empty(4), np.empty(4)
+    return GripRoom(*rows, np.empty((3, 3)), np.empty(3), np.empty(3), np.empty((2, 7)))
 
 
 @inner
-def _tip_motion(s: GripState, room: GripRoom, tip: geometry.Array, dt: float) -> None:
-    """Write the tip's turn since its last sample, and its speed (3,) at the object's middle."""
-    geometry.invert_quaternion(s.tip[3:7], room.back)
-    geometry.multiply_quaternions(tip[3:7], room.back, room.turn)
+def _tip_motion(
+    s: GripState, room: GripRoom, hand: int, pose: geometry.Array, motion: geometry.Array,
+    dt: float,
+) -> None:  # fmt: skip
+    """Write a tip's turn since its last sample, and its speed (3,) at the object's middle."""
+    before, now = s.tips[7 * hand : 7 * hand + 7], room.tips[hand]
+    geometry.invert_quaternion(before[3:7], room.back)
+    geometry.multiply_quaternions(now[3:7], room.back, room.turn)
     geometry.rotation_from_quaternion(room.turn, room.R)
     for i in range(3):
-        place = tip[i]
+        place = now[i]
         for k in range(3):
-            place += room.R[i, k] * (s.object[k] - s.tip[k])
-        room.motion[i] = (place - s.object[i]) / dt
+            place += room.R[i, k] * (pose[k] - before[k])
+        motion[i] = (place - pose[i]) / dt
 
 
 @inner
-def _rub(p: GripNumbers, s: GripState, room: GripRoom, cut: float, dt: float) -> float:
-    """Bring the object's speed (3,) to that of the fingers, as far as friction of both can.
+def _most(p: GripNumbers, force: float, dt: float) -> float:
+    """Largest change of an object's speed that friction of both pads gives in a tick [m/s]."""
+    return 2.0 * p.pad_friction * force * dt / p.mass
 
-    Where a peg stops the object, the fingers slide on by ``cut`` [m/s] across it, and friction has
+
+@inner
+def _rub(
+    p: GripNumbers, s: GripState, motion: geometry.Array, tip: geometry.Array, force: float,
+    cut: float, dt: float,
+) -> float:  # fmt: skip
+    """Bring an object's speed (3,) to that of the fingers, as far as friction of both can.
+
+    Where a peg stops the pose, the fingers slide on by ``cut`` [m/s] across it, and friction has
     its largest value, against the whole way of sliding: what is left for the way that is free is
     less. The speed that is left solves ``left² = cut² + (apart left / (left + most))²``.
 
     Returns:
         The speed that is left between them [m/s]; 0 where it sticks.
     """
-    square = 0.0
-    for i in range(3):
-        square += (s.motion[i] - room.motion[i]) ** 2
-    apart = math.sqrt(square)
-    most = 2.0 * p.pad_friction * s.force * dt / p.mass
+    apart, most = far_from(motion, tip), _most(p, force, dt)
     share = most / apart if apart > most else 1.0
     left = (1.0 - share) * apart
     if cut > 0.0:
@@ -118,9 +134,9 @@ def _rub(p: GripNumbers, s: GripState, room: GripRoom, cut: float, dt: float) ->
         for _ in range(_ROUNDS):
             left = math.hypot(cut, apart * left / (left + most))
         share = most / (left + most)
-        s.pull = 2.0 * p.pad_friction * s.force * cut / left
+        s.pull = max(s.pull, 2.0 * p.pad_friction * force * cut / left)
     for i in range(3):
-        s.motion[i] += share * (room.motion[i] - s.motion[i])
+        motion[i] += share * (tip[i] - motion[i])
     return left
 
 
@@ -131,14 +147,15 @@ def _is_opened(s: GripState) -> bool:
 
 
 @inner
-def _count(p: GripNumbers, s: GripState, is_lost: bool) -> None:
-    """Begin and end a grip; it ends where the fingers are wider than the object, or it is lost."""
+def _count(p: GripNumbers, s: GripState, table: float, is_lost: bool) -> None:
+    """Begin and end a grip; it ends where the fingers are wider than the pose, or it is lost."""
     if s.force > 0.0 and s.is_gripped == 0:
         s.is_gripped, s.slid, s.tightest = 1, 0.0, s.setpoint
         s.grips += 1
     elif s.is_gripped and (is_lost or width(p, s.angle) > p.size + _OPEN):
         s.is_gripped = 0
-        if is_lost and not _is_opened(s) and s.object[2] - p.place[2] > _LOST:
+        height = s.objects[7 * s.numbers[0] + 2] - table
+        if is_lost and not _is_opened(s) and height > _LOST:
             s.drops += 1
     s.tightest = min(s.tightest, s.setpoint)
 
@@ -153,16 +170,21 @@ def _slide(s: GripState, way: float) -> None:
 
 
 @inner
+def _is_near(p: GripNumbers, s: GripState, number: int, tip: geometry.Array) -> bool:
+    """Whether an object's middle is no farther from a tip than half of its size."""
+    square = 0.0
+    for k in range(3):
+        square += (s.objects[7 * number + k] - tip[k]) ** 2
+    return square <= 0.25 * p.size * p.size
+
+
+@inner
 def _find(p: GripNumbers, s: GripState, tip: geometry.Array) -> bool:
     """Whether the object has just left the fingers; says whether it is between them.
 
-    It comes between them where they are wider than it, and stays as long as its middle is no
-    farther from the tip than half of its size.
+    It comes between them where they are wider than it, and stays as long as it is near.
     """
-    square = 0.0
-    for i in range(3):
-        square += (s.object[i] - tip[i]) ** 2
-    is_near = square <= 0.25 * p.size * p.size
+    is_near = _is_near(p, s, s.numbers[0], tip)
     is_lost = bool(s.is_between > 0 and not is_near)
     if is_lost:
         s.is_between = 0
@@ -172,8 +194,11 @@ def _find(p: GripNumbers, s: GripState, tip: geometry.Array) -> bool:
 
 
 @inner
-def _meet_peg(p: GripNumbers, s: GripState, room: GripRoom, dt: float) -> float:
-    """Stop a motion in ``room`` where the peg is that the object is on, and the object with it.
+def _meet_peg(
+    p: GripNumbers, peg: int, pose: geometry.Array, motion: geometry.Array, wanted: geometry.Array,
+    dt: float,
+) -> float:  # fmt: skip
+    """Stop a wanted motion (3,) where the peg is that an object is on, and the object with it.
 
     The peg is rigid, has no friction, and gives nothing back. It holds the object across its axis
     alone, no farther away from it than the clearance.
@@ -181,20 +206,19 @@ def _meet_peg(p: GripNumbers, s: GripState, room: GripRoom, dt: float) -> float:
     Returns:
         The speed that it takes from the motion [m/s]; 0 without a peg or a touch.
     """
-    s.pull = 0.0
-    if s.peg == _NONE:
+    if peg == _NONE:
         return 0.0
-    x = s.object[0] + room.motion[0] * dt - p.axes[2 * s.peg]
-    y = s.object[1] + room.motion[1] * dt - p.axes[2 * s.peg + 1]
+    x = pose[0] + wanted[0] * dt - p.axes[2 * peg]
+    y = pose[1] + wanted[1] * dt - p.axes[2 * peg + 1]
     far = math.hypot(x, y)
     if far <= p.clearance:
         return 0.0
     x, y, cut = x / far, y / far, (far - p.clearance) / dt
-    room.motion[0] -= cut * x
-    room.motion[1] -= cut * y
-    across = (room.motion[0] - s.motion[0]) * x + (room.motion[1] - s.motion[1]) * y
-    s.motion[0] += across * x
-    s.motion[1] += across * y
+    wanted[0] -= cut * x
+    wanted[1] -= cut * y
+    across = (wanted[0] - motion[0]) * x + (wanted[1] - motion[1]) * y
+    motion[0] += across * x
+    motion[1] += across * y
     return cut
 
 
@@ -208,54 +232,43 @@ def _peg_at(p: GripNumbers, x: float, y: float) -> int:
 
 
 @inner
-def _keep_on(p: GripNumbers, s: GripState) -> None:
-    """Bring the object back by what a tick along the peg's tangent took it off the clearance."""
-    x, y = s.object[0] - p.axes[2 * s.peg], s.object[1] - p.axes[2 * s.peg + 1]
-    far = math.hypot(x, y)
-    if far > p.clearance:
-        s.object[0] = p.axes[2 * s.peg] + x / far * p.clearance
-        s.object[1] = p.axes[2 * s.peg + 1] + y / far * p.clearance
+def _thread(p: GripNumbers, s: GripState, number: int, before: float, is_held: bool) -> None:
+    """Take an object onto a peg or off it, as it passes the peg's top, and count where it rests.
 
-
-@inner
-def _thread(p: GripNumbers, s: GripState, before: float) -> None:
-    """Take the object onto a peg or off it, as it passes the peg's top, and count where it rests.
+    A tick along the peg's tangent takes it off the clearance; it is brought back.
 
     Args:
         p: Parameters.
         s: State; written.
+        number: Of the object.
         before: Its height before this tick [m].
+        is_held: Whether fingers press on it.
     """
-    top = p.place[2] + p.peg_height
-    if s.object[2] >= top:
-        s.peg = _NONE
-    elif before >= top:
-        s.peg = _peg_at(p, s.object[0], s.object[1])
-    elif s.peg != _NONE:
-        _keep_on(p, s)
-    rests = s.object[2] <= p.place[2] and not (s.is_between and s.force > 0.0)
-    if p.pegs and rests and s.peg != s.homes[s.number]:
-        s.homes[s.number] = s.peg
-        if s.peg == _NONE:
+    pose, top, peg = s.objects[7 * number : 7 * number + 7], p.place[2] + p.peg_height, _NONE
+    if pose[2] < top:
+        peg = _peg_at(p, pose[0], pose[1]) if before >= top else int(s.pegs[number])
+    if peg != _NONE and before < top:
+        x, y = pose[0] - p.axes[2 * peg], pose[1] - p.axes[2 * peg + 1]
+        far = math.hypot(x, y)
+        if far > p.clearance:
+            pose[0] = p.axes[2 * peg] + x / far * p.clearance
+            pose[1] = p.axes[2 * peg + 1] + y / far * p.clearance
+    s.pegs[number] = peg
+    rests = pose[2] <= p.place[2] and not is_held
+    if p.pegs and rests and peg != s.homes[number]:
+        s.homes[number] = peg
+        if peg == _NONE:
             s.dropped += 1
         else:
             s.transferred += 1
 
 
 @inner
-def _choose(p: GripNumbers, s: GripState, tip: geometry.Array) -> None:
-    """Where the object rests and no finger is at it, take the one that the tip has come to."""
-    if s.is_between or s.is_gripped or s.object[2] > p.place[2]:
-        return
+def _choose(p: GripNumbers, s: GripState, hand: int, tip: geometry.Array) -> None:
+    """Let a hand that holds nothing take the object that its tip has come to."""
     for i in range(p.objects):
-        square = 0.0
-        for k in range(3):
-            square += (s.objects[7 * i + k] - tip[k]) ** 2
-        if i != s.number and square <= 0.25 * p.size * p.size:
-            copy(s.object, s.objects[7 * s.number : 7 * s.number + 7])
-            copy(s.objects[7 * i : 7 * i + 7], s.object)
-            s.number, s.peg = i, s.homes[i]
-            s.motion[0] = s.motion[1] = s.motion[2] = 0.0
+        if i != s.numbers[hand] and _is_near(p, s, i, tip):
+            s.numbers[hand] = i
             return
 
 
@@ -265,7 +278,7 @@ def tell_board(p: GripNumbers, s: GripState, board: geometry.Array) -> None:
     board[0], board[1], board[2] = s.transferred, s.dropped, s.pull
     for i in range(p.objects):
         for k in range(3):
-            board[3 + 3 * i + k] = s.object[k] if i == s.number else s.objects[7 * i + k]
+            board[3 + 3 * i + k] = s.objects[7 * i + k]
 
 
 @kernel
@@ -281,14 +294,92 @@ def put_objects(p: GripNumbers, s: GripState, places: geometry.Array) -> None:
         pose = s.objects[7 * i : 7 * i + 7]
         copy(places[i], pose[:3])
         pose[3] = 1.0
-        s.homes[i] = _peg_at(p, pose[0], pose[1])
-    copy(s.objects[:7], s.object)
-    s.peg = s.homes[0]
+        s.pegs[i] = s.homes[i] = _peg_at(p, pose[0], pose[1])
 
 
 @inner
-def move_object(p: GripNumbers, s: GripState, room: GripRoom, row: Row) -> None:
-    """Move the object on to the stamp of the newest slave_true_cp, and write where it is.
+def _hold(p: GripNumbers, s: GripState, room: GripRoom, number: int, hands: int, dt: float) -> None:
+    """Give an object the speed that fingers make of its own; it turns with those it sticks to.
+
+    Args:
+        p: Parameters.
+        s: State; written.
+        room: Room; written.
+        number: Of the object.
+        hands: Who holds it: 1 the own jaw, 2 the second arm's, 3 both.
+        dt: Tick [s].
+    """
+    pose, motion = s.objects[7 * number : 7 * number + 7], s.motions[3 * number : 3 * number + 3]
+    first = 1 if hands == 2 else 0
+    if hands == 3:
+        _tip_motion(s, room, 1, pose, room.second, dt)
+    _tip_motion(s, room, first, pose, room.motion, dt)
+    if hands == 3:
+        most, against = _most(p, s.forces[0], dt), _most(p, s.forces[1], dt)
+        share_speed(motion, room.motion, most, room.second, against)
+        left = far_from(motion, room.motion)
+        is_stuck = left == 0.0
+        copy(motion, room.second)
+        _meet_peg(p, int(s.pegs[number]), pose, motion, room.second, dt)
+    else:
+        cut = _meet_peg(p, int(s.pegs[number]), pose, motion, room.motion, dt)
+        left = _rub(p, s, motion, room.motion, s.forces[first], cut, dt)
+        is_stuck = left == 0.0
+    if first == 0:
+        _slide(s, left * dt)
+    if is_stuck:
+        geometry.multiply_quaternions(room.turn, pose[3:7], room.turned)
+        copy(room.turned, pose[3:7])
+
+
+@inner
+def _move(p: GripNumbers, s: GripState, room: GripRoom, number: int, dt: float) -> None:
+    """Move an object on by a tick: fingers, weight, table and peg."""
+    pose, motion = s.objects[7 * number : 7 * number + 7], s.motions[3 * number : 3 * number + 3]
+    hands = 0
+    for hand in range(2):
+        if s.forces[hand] > 0.0 and s.numbers[hand] == number:
+            hands += hand + 1
+    motion[2] -= WEIGHT * dt
+    is_on_table = pose[2] <= p.place[2]
+    if is_on_table:
+        motion[2] = max(motion[2], 0.0)
+    if hands:
+        _hold(p, s, room, number, hands, dt)
+    elif is_on_table:
+        motion[0] = motion[1] = 0.0
+    else:
+        copy(motion, room.motion)
+        _meet_peg(p, int(s.pegs[number]), pose, motion, room.motion, dt)
+    before = pose[2]
+    for i in range(3):
+        pose[i] += motion[i] * dt
+    if pose[2] < p.place[2]:
+        pose[2], motion[2] = p.place[2], 0.0
+    _thread(p, s, number, before, hands > 0)
+
+
+@inner
+def _take_hands(p: GripNumbers, s: GripState, room: GripRoom, row: Row) -> None:
+    """Take where both tips are, how hard their jaws press, and on what."""
+    copy(row.slave_true_cp, room.tips[0])
+    copy(row.second_slave_true_cp, room.tips[1])
+    for i in range(3):
+        room.tips[1, i] += p.second_base[i]
+    at = 7 * s.numbers[0]
+    rests = s.objects[at + 2] <= p.place[2] or row.second_slave_true_cp_ns > 0
+    if not (s.is_between or s.is_gripped) and rests:
+        _choose(p, s, 0, room.tips[0])
+    if s.forces[1] == 0.0:
+        _choose(p, s, 1, room.tips[1])
+    s.forces[0] = s.force
+    is_there = _is_near(p, s, int(s.numbers[1]), room.tips[1])
+    s.forces[1] = row.second_slave_jaw_grip[0] if is_there else 0.0
+
+
+@inner
+def move_objects(p: GripNumbers, s: GripState, room: GripRoom, row: Row) -> None:
+    """Move the objects on to the stamp of the newest slave_true_cp.
 
     Args:
         p: Parameters.
@@ -296,35 +387,45 @@ def move_object(p: GripNumbers, s: GripState, room: GripRoom, row: Row) -> None:
         room: :class:`GripRoom`; written.
         row: Signals.
     """
-    tip, elapsed_ns = row.slave_true_cp, row.slave_true_cp_ns - s.tip_ns
+    elapsed_ns = row.slave_true_cp_ns - s.tip_ns
     if elapsed_ns <= 0:  # no tip is known yet, or no newer one
         return
-    is_first, dt = s.tip_ns == 0, 1e-9 * elapsed_ns
-    s.tip_ns = row.slave_true_cp_ns
-    if is_first:
-        copy(tip, s.tip)
-    _choose(p, s, tip)
-    _tip_motion(s, room, tip, dt)
-    s.motion[2] -= WEIGHT * dt
-    is_on_table = s.object[2] <= p.place[2]
-    if is_on_table:
-        s.motion[2] = max(s.motion[2], 0.0)
-    if s.is_between and s.force > 0.0:
-        left = _rub(p, s, room, _meet_peg(p, s, room, dt), dt)
-        _slide(s, left * dt)
-        if left == 0.0:
-            geometry.multiply_quaternions(room.turn, s.object[3:7], room.turned)
-            copy(room.turned, s.object[3:7])
-    elif is_on_table:
-        s.motion[0] = s.motion[1] = s.pull = 0.0
-    else:
-        copy(s.motion, room.motion)
-        _meet_peg(p, s, room, dt)
-    before = s.object[2]
+    _take_hands(p, s, room, row)
+    s.tip_ns, dt = row.slave_true_cp_ns, 1e-9 * elapsed_ns
+    s.pull = 0.0
+    for i in range(p.objects):
+        _move(p, s, room, i, dt)
+    copy(room.tips[0], s.tips[0:7])
+    copy(room.tips[1], s.tips[7:14])
+    _count(p, s, p.place[2], _find(p, s, room.tips[0]))
+
+
+@inner
+def see_objects(p: GripNumbers, s: GripState, room: GripRoom, row: Row) -> None:
+    """Take where the first arm's simulator says that the objects are, and count own grips of them.
+
+    Args:
+        p: Parameters.
+        s: State, with the force of the fingers; written.
+        room: :class:`GripRoom`; written.
+        row: Signals.
+    """
+    board, n = row.first_slave_jaw_board, s.numbers[0]
+    s.transferred, s.dropped, s.pull = int(board[0]), int(board[1]), board[2]
+    for i in range(p.objects):
+        for k in range(3):
+            s.objects[7 * i + k] = board[3 + 3 * i + k] - p.second_base[k]
+    # The board is a tick old, and tells what the tip did a tick before that.
+    geometry.rotation_from_quaternion(s.tips[10:14], room.R)
     for i in range(3):
-        s.object[i] += s.motion[i] * dt
-    if s.object[2] < p.place[2]:
-        s.object[2], s.motion[2] = p.place[2], 0.0
-    copy(tip, s.tip)
-    _count(p, s, _find(p, s, tip))
-    _thread(p, s, before)
+        room.motion[i] = 0.0
+        for k in range(3):
+            room.motion[i] += room.R[k, i] * (s.objects[7 * n + k] - s.tips[7 + k])
+    copy(s.tips[0:7], s.tips[7:14])
+    copy(row.slave_true_cp, s.tips[0:7])
+    if s.is_gripped:
+        _slide(s, max(far_from(room.motion, s.held) - s.slid, 0.0))
+    else:
+        copy(room.motion, s.held)
+        _choose(p, s, 0, s.tips[0:7])
+    _count(p, s, p.place[2] - p.second_base[2], _find(p, s, s.tips[0:7]))

@@ -20,8 +20,9 @@ from teleop_core.slave.jaw.grip import (
     GripRoom,
     GripState,
     make_room,
-    move_object,
+    move_objects,
     put_objects,
+    see_objects,
     tell_board,
 )
 
@@ -32,7 +33,7 @@ class GripObjectParameters:
 
     place: tuple[float, ...] = parameter(
         (), unit="m", lower=-10.0, upper=10.0, fixed=True,
-        doc="its middle in the slave's base at first, half its size above the table; those of "
+        doc="its middle at first, half its size above the table; those of "
         "several one after the other, with the same z; empty: none",
     )  # fmt: skip
     size: float = parameter(0.02, unit="m", lower=1e-3, upper=0.2, doc="thickness")
@@ -60,7 +61,7 @@ class PegParameters:
 
     place: tuple[float, ...] = parameter(
         (), unit="m", lower=-10.0, upper=10.0, fixed=True,
-        doc="x, y of the axis of each in the slave's base, one after the other; empty: none",
+        doc="x, y of the axis of each, one after the other; empty: none",
     )  # fmt: skip
     height: float = parameter(
         0.015, unit="m", lower=1e-3, upper=0.5, source="assumed",
@@ -105,6 +106,14 @@ class JawSimParameters:
     finger_length: float = parameter(
         0.04, unit="m", lower=1e-3, upper=0.5, doc="from the pivot to the pads", source="assumed"
     )
+    origin: tuple[float, ...] = parameter(
+        (0.0, 0.0, 0.0), unit="m", lower=-10.0, upper=10.0, length=3, fixed=True,
+        doc="of the board, in the base of the first arm; objects and pegs are placed from there",
+    )  # fmt: skip
+    second_base: tuple[float, ...] = parameter(
+        (0.0, 0.0, 0.0), unit="m", lower=-10.0, upper=10.0, length=3, fixed=True,
+        doc="where the base of the second arm is in that of the first, axes parallel",
+    )  # fmt: skip
     object: GripObjectParameters = field(default_factory=GripObjectParameters)
     pegs: PegParameters = field(default_factory=PegParameters)
 
@@ -127,9 +136,12 @@ def jaw_sim_step(p: GripNumbers, s: GripState, room: GripRoom, row: Row, dt: flo
     drive(p, s, (s.setpoint - before) / dt, dt)
     row.slave_jaw_measured_js[2] = s.effort
     if p.objects:
-        move_object(p, s, room, row)
+        if row.first_slave_jaw_board_ns > 0:
+            see_objects(p, s, room, row)
+        else:
+            move_objects(p, s, room, row)
         tell_board(p, s, row.slave_jaw_board)
-    copy(s.object, row.slave_jaw_object_cp)
+    copy(s.objects[7 * s.numbers[0] : 7 * s.numbers[0] + 7], row.slave_jaw_object_cp)
     grip = row.slave_jaw_grip
     grip[0], grip[1], grip[2] = s.force, s.is_gripped, s.slid
     grip[3], grip[4], grip[5] = s.grips, s.slips, s.drops
@@ -163,10 +175,13 @@ class JawSim(RunningStage):
         p["length"] = parameters.finger_length
         p["stiffness"] = parameters.inertia * parameters.bandwidth**2
         p["damping"] = 2.0 * parameters.inertia * parameters.bandwidth
-        self._places = np.reshape(np.array(thing.place, dtype=np.float64), (-1, 3))
-        p["objects"], p["place"] = len(self._places), thing.place[:3] or (0.0, 0.0, 0.0)
+        origin = np.array(parameters.origin)
+        self._places = np.reshape(np.array(thing.place, dtype=np.float64), (-1, 3)) + origin
+        p["objects"], p["place"] = len(self._places), [*self._places, origin][0]
+        p["second_base"] = parameters.second_base
         pegs = parameters.pegs
-        p["pegs"], p["axes"][: len(pegs.place)] = len(pegs.place) // 2, pegs.place
+        axes = np.reshape(np.array(pegs.place, dtype=np.float64), (-1, 2)) + origin[:2]
+        p["pegs"], p["axes"][: axes.size] = len(axes), axes.ravel()
         p["peg_height"], p["clearance"] = pegs.height, pegs.clearance
         p["size"], p["mass"], p["pad_friction"] = thing.size, thing.mass, thing.friction
         p["pad_stiffness"], p["pad_damping"] = thing.stiffness, thing.damping
@@ -175,13 +190,14 @@ class JawSim(RunningStage):
 JAW_SIM = Stage(
     "jaw_sim",
     JawSimParameters,
-    reads=(topics.SLAVE_JAW_SETPOINT_JS, topics.SLAVE_TRUE_CP),
+    reads=(topics.SLAVE_JAW_SETPOINT_JS, topics.SLAVE_TRUE_CP, *topics.PORTS_BETWEEN_ARMS),
+    late=topics.PORTS_BETWEEN_ARMS,
     writes=(
         topics.SLAVE_JAW_MEASURED_JS,
         topics.SLAVE_JAW_GRIP,
         topics.SLAVE_JAW_OBJECT_CP,
         topics.SLAVE_JAW_BOARD,
     ),
-    optional=(topics.SLAVE_TRUE_CP,),
+    optional=(topics.SLAVE_TRUE_CP, *topics.PORTS_BETWEEN_ARMS),
     make=JawSim,
 )
