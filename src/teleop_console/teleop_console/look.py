@@ -7,6 +7,7 @@ colours that mean nothing but their number.
 """
 
 from collections.abc import Mapping
+from pathlib import Path
 from types import MappingProxyType
 from typing import NamedTuple
 
@@ -58,12 +59,26 @@ CURVES = ("#0072b2", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#8c6d46")
 """Of plots, in the order of their series; told apart without seeing red or green (Okabe and Ito
 2008)."""
 
-_LIGHT = {"ground": "#ffffff", "text": "#1c2126", "muted": "#5c6670", "line": "#d9dee3"}
-_DARK = {"ground": "#1f2328", "text": "#e6e9ec", "muted": "#9aa5b1", "line": "#343b42"}
+_LIGHT = {
+    "ground": "#ffffff",
+    "text": "#1c2126",
+    "muted": "#5c6670",
+    "line": "#d9dee3",
+    "field": "#7d8790",
+}
+_DARK = {
+    "ground": "#1f2328",
+    "text": "#e6e9ec",
+    "muted": "#9aa5b1",
+    "line": "#343b42",
+    "field": "#7f8a95",
+}
 
 _STYLE = """\
-:root { VARIABLES; --t-stop: STOP; --t-small: 12px; --t-text: 13px; --t-head: 16px; }
+:root { VARIABLES; --t-stop: STOP; --t-next: NEXT;
+  --t-small: 12px; --t-text: 13px; --t-head: 16px; }
 :root[data-mantine-color-scheme="dark"] { DARK_VARIABLES; }
+@media (prefers-color-scheme: dark) { :root.t-choosing { DARK_VARIABLES; color-scheme: dark; } }
 body { font: var(--t-text)/1.45 system-ui, -apple-system, "Segoe UI", Roboto, sans-serif; }
 .t-status { padding: 4px 14px; color: var(--t-color-text); font-size: var(--t-small);
   box-sizing: border-box; height: 140px; overflow-y: auto; overflow-wrap: anywhere;
@@ -76,7 +91,7 @@ body { font: var(--t-text)/1.45 system-ui, -apple-system, "Segoe UI", Roboto, sa
 .t-wrong { color: var(--t-color-wrong); } .t-idle { color: var(--t-color-idle); }
 #t-safety { position: fixed; left: 12px; bottom: 12px; z-index: 10000; width: 230px;
   display: flex; flex-direction: column; gap: 8px; font: inherit; }
-#t-safety[hidden] { display: none; }
+#t-stop[hidden], #t-end[hidden] { display: none; }
 #t-stop { height: 56px; border: 0; border-radius: 6px; background: var(--t-stop); color: #fff;
   font-family: inherit; font-size: 18px; font-weight: 700; letter-spacing: 0.02em; cursor: pointer;
   box-shadow: 0 1px 4px rgba(0,0,0,.3); touch-action: manipulation; user-select: none; }
@@ -101,13 +116,18 @@ body { font: var(--t-text)/1.45 system-ui, -apple-system, "Segoe UI", Roboto, sa
 """
 
 
+_FORM = Path(__file__).with_name("start.css")
+
+
 def style() -> str:
-    """Style sheet that is added to the page."""
+    """Style sheet that is added to the page, with that of the form on it."""
     light = _LIGHT | {name: one.light for name, one in MEANINGS.items()}
     dark = _DARK | {name: one.dark for name, one in MEANINGS.items()}
     stop = MEANINGS["wrong"].light  # on any ground, under white letters
     return (
-        _STYLE.replace("STOP", stop)
+        (_STYLE + _FORM.read_text(encoding="utf-8"))
+        .replace("STOP", stop)
+        .replace("NEXT", MEANINGS["wanted"].light)
         .replace("DARK_VARIABLES", _variables(dark))
         .replace("VARIABLES", _variables(light))
     )
