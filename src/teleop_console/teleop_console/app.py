@@ -86,7 +86,7 @@ class Console:
         if self._link.is_live:
             shown = replace(situation(view), can_end=self._can_end)
             self._server.answers.situation = shown
-            self.stylus.show(is_shown=not shown.is_stopped)
+            self.stylus.show(is_shown=not shown.is_stopped and self.panel.is_led_here)
         self.scene.draw(view)
         self.stylus.draw(view)
         self.panel.draw(view)

@@ -26,8 +26,8 @@ class Meaning(NamedTuple):
 
 MEANINGS: Mapping[str, Meaning] = MappingProxyType({
     "good": Meaning((43, 138, 62), "#247a36", "#51cf66"),  # goes, is free
-    "held": Meaning((154, 87, 0), "#9a5700", "#ffb84d"),  # holds, waits, warns
-    "wrong": Meaning((214, 0, 28), "#d6001c", "#ff7b83"),  # stopped, touches, at a limit; the stop
+    "held": Meaning((154, 87, 0), "#9a5700", "#ffb84d"),  # holds, waits, warns, is at a limit
+    "wrong": Meaning((214, 0, 28), "#d6001c", "#ff7b83"),  # stopped, touches; the stop
     "idle": Meaning((92, 102, 112), "#5c6670", "#9aa5b1"),  # there, and no more
     "measured": Meaning((217, 95, 2), "#b34d00", "#ff9f4d"),  # paths that were measured
     "wanted": Meaning((28, 109, 208), "#1c6dd0", "#74a9f2"),  # what shall be; what to press next
@@ -36,9 +36,9 @@ MEANINGS: Mapping[str, Meaning] = MappingProxyType({
     "target": Meaning((12, 133, 153), "#0b7285", "#3bc9db"),  # points and objects of a task
 })  # fmt: skip
 """All colours that mean something, texts with at least 4.5 to 1 on their ground."""
-GOOD, WRONG, MEASURED, WANTED, HAND, FORCE, TARGET = (
+GOOD, HELD, WRONG, MEASURED, WANTED, HAND, FORCE, TARGET = (
     MEANINGS[name].scene
-    for name in ("good", "wrong", "measured", "wanted", "hand", "force", "target")
+    for name in ("good", "held", "wrong", "measured", "wanted", "hand", "force", "target")
 )
 
 ROLES: Mapping[Role, Color] = MappingProxyType({
@@ -88,6 +88,7 @@ body { font: var(--t-text)/1.45 system-ui, -apple-system, "Segoe UI", Roboto, sa
 .t-status b { font-size: var(--t-head); font-weight: 600; line-height: 24px; }
 .t-status p { margin: 0; } .t-muted { color: var(--t-color-muted); }
 .t-good { color: var(--t-color-good); } .t-held { color: var(--t-color-held); }
+.t-next { color: var(--t-color-wanted); }
 .t-wrong { color: var(--t-color-wrong); } .t-idle { color: var(--t-color-idle); }
 #t-safety { position: fixed; left: 12px; bottom: 12px; z-index: 10000; width: 230px;
   display: flex; flex-direction: column; gap: 8px; font: inherit; }
@@ -112,6 +113,10 @@ body { font: var(--t-text)/1.45 system-ui, -apple-system, "Segoe UI", Roboto, sa
   #t-safety { left: 0; right: 0; top: 0; bottom: auto; width: auto; }
   #t-stop { border-radius: 0; width: 100%; }
   #t-banner { top: 56px; font-size: var(--t-text); }
+  #root .mantine-Paper-root[style*="position: fixed"] { max-height: 46% !important; }
+  #root .mantine-Paper-root[style*="position: fixed"], #root [style*="width: 20em"] {
+    width: 100% !important; }
+  .t-status { height: auto; max-height: 140px; }
 }
 """
 
