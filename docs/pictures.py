@@ -76,6 +76,16 @@ def served(folder: Path, *arguments: object) -> Iterator[ConsoleProcess]:
     assert code == 0, console.text
 
 
+def start(folder: Path) -> None:
+    """Take the form on which a session is chosen, beside two recordings."""
+    for name, scenario in (("fine", "fine_box"), ("push", "wall")):
+        tc.run(scenario, duration=8.0, out=folder / "bags" / name)
+    with served(folder) as console, Tab(folder / "start", 1400, 900) as tab:
+        tab.visit(console.url)
+        tab.until("document.querySelectorAll('.t-list :is(.t-good, .t-held)').length === 2", 120)
+        keep(tab, "console_start.png")
+
+
 def live(folder: Path) -> None:
     """Take the page of a session: wide and light at a wall, wide and dark, narrow with plots."""
     arguments = ("--scenario", SCENARIO, "--out", folder / "session", "--set", "operator=human")
@@ -148,5 +158,6 @@ if __name__ == "__main__":
     with tempfile.TemporaryDirectory() as place:
         moving(Path(place))
         if "--moving" not in sys.argv:
+            start(Path(place))
             live(Path(place))
             replay(Path(place))

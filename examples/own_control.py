@@ -1,6 +1,6 @@
 """Add a button of your own to the console's page: gentle limits for the arm, and back.
 
-teleop console --parts examples/own_control.py
+teleop console --parts examples/own_control.py --set operator=remote
 """
 
 import teleop_console

@@ -11,7 +11,14 @@ setup(
     license="Apache-2.0",
     packages=find_packages(include=["teleop_console", "teleop_console.*"]),
     package_data={
-        "teleop_console": ["py.typed", "*.pyi", "page.js", "report/*.js", "report/*.css"]
+        "teleop_console": [
+            "py.typed",
+            "*.pyi",
+            "page.js",
+            "start.js",
+            "report/*.js",
+            "report/*.css",
+        ]
     },
     python_requires=">=3.11",
     install_requires=[

@@ -16,7 +16,7 @@ from teleop_console.fixture_outlines import Look, scale_of, unit_outline
 from teleop_console.hooks import Server
 from teleop_console.jaw_nodes import finger_poses
 from teleop_console.link import Arm, ArmView, View
-from teleop_console.look import GOOD, ROLES, WRONG
+from teleop_console.look import GOOD, HELD, ROLES, WRONG
 from teleop_console.recorded import RecordedLink
 from teleop_console.scene import Scene
 from teleop_console.server import ConsoleServer
@@ -218,30 +218,30 @@ def test_a_link_with_a_visual_is_drawn_as_it_looks_and_the_others_plainly(
         assert server.scene.get_handle_by_name(f"{place}/link2/joint") is not None
 
 
-def test_a_joint_at_its_limit_is_drawn_in_another_colour(server: Server) -> None:
+def test_a_joint_at_its_limit_has_a_halo_and_its_body_keeps_its_colour(server: Server) -> None:
     server.scene.reset()
     robot = tc.load_robot("rcrt1")
     scene = Scene(server, [Arm("", robot)])
     bodies = scene.arms[""].bodies
+    place = f"/arm/robot/{bodies.bodies[bodies.joint_body[1]].name}"
 
-    def colours(joints: Array) -> set[tuple[int, int, int]]:
+    def drawn(joints: Array) -> tuple[bool, set[tuple[int, int, int]]]:
         state = np.concatenate((joints, np.zeros(2 * robot.n)))
         scene.draw(View(arms={"": ArmView({"slave/measured_js": state})}))
-        name = bodies.bodies[bodies.joint_body[1]].name
-        return {
-            cast(Any, mesh).color
-            for role in ROLES
-            if (mesh := server.scene.get_handle_by_name(f"/arm/robot/{name}/{role}")) is not None
-        }
+        halo = server.scene.get_handle_by_name(f"{place}/limit")
+        found = (server.scene.get_handle_by_name(f"{place}/{role}") for role in ROLES)
+        return halo is not None and halo.visible, {cast(Any, mesh).color for mesh in found if mesh}
 
     at_limit = robot.start.copy()
     at_limit[1] = robot.upper[1]
-    assert WRONG not in colours(robot.start)
-    assert colours(at_limit) == {WRONG}
-    assert WRONG not in colours(robot.start)
+    _, greys = drawn(robot.start)
+    for joints, is_marked in ((robot.start, False), (at_limit, True), (robot.start, False)):
+        assert drawn(joints) == (is_marked, greys)
+    halo = cast(Any, server.scene.get_handle_by_name(f"{place}/limit"))
+    assert halo.color == HELD
 
 
-def test_no_joint_is_red_at_home_unless_the_session_says_that_it_is_in_the_way(
+def test_no_joint_is_marked_at_home_unless_the_session_says_that_it_is_in_the_way(
     server: Server,
 ) -> None:
     server.scene.reset()

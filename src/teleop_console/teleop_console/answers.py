@@ -14,7 +14,7 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from urllib.parse import urlsplit
+from urllib.parse import parse_qs, urlsplit
 
 from websockets.datastructures import Headers
 from websockets.http11 import Response
@@ -22,12 +22,14 @@ from websockets.http11 import Response
 from teleop_console.drivers import Drivers
 from teleop_console.guard import Request
 from teleop_console.look import style
+from teleop_console.start import StartPage
 
 OWN_PAGE = "Teleop-Page"
 """Header of our page's requests; to a page of another origin browsers do not allow it."""
 PRESS = "Teleop-Press"
 """Header with the name of a press: one that is said again, unanswered, is the same."""
-_SCRIPT = Path(__file__).with_name("page.js")
+_SCRIPTS = tuple(Path(__file__).with_name(name) for name in ("page.js", "start.js"))
+_FIELDS = 100  # of an address
 _FURNITURE = b'<head><link rel="stylesheet" href="teleop.css"><script src="teleop.js"></script>'
 
 
@@ -40,12 +42,16 @@ class Situation:
         is_stopped: Whether an emergency stop is in force.
         text: What has happened, and what to do next; empty if nothing has.
         doing: What is going on before there is a session to see; empty once there is.
+        chooses: Whether a session is being chosen: the form is shown.
+        can_end: Whether what is shown can be ended, which leads back to the form.
     """
 
     can_stop: bool = True
     is_stopped: bool = False
     text: str = ""
     doing: str = ""
+    chooses: bool = False
+    can_end: bool = False
 
 
 class Answers:
@@ -57,6 +63,7 @@ class Answers:
     Attributes:
         situation: What pages show; whoever knows it writes it.
         stop: Presses the emergency stop; it must not block.
+        start: The form on which sessions are chosen.
     """
 
     def __init__(self, drivers: Drivers) -> None:
@@ -65,8 +72,11 @@ class Answers:
         self._drivers = drivers
         self._pages: dict[str, int] = {}  # by names that no other page can guess
         self._heard: deque[str | None] = deque(maxlen=100)  # presses, by their names
-        self._paths = {
-            "/alive": self._alive, "/stop": self._stop, "/teleop.js": _script, "/teleop.css": _style
+        self.start = StartPage(drivers)
+        self._paths: dict[str, Callable[[Request], Response]] = {
+            "/alive": self._alive, "/stop": self._stop,
+            "/teleop.js": _script, "/teleop.css": _style,
+            **dict.fromkeys(self.start.paths, self._start),
         }  # fmt: skip
 
     def name(self, page: int) -> str:
@@ -83,6 +93,11 @@ class Answers:
     def paths(self) -> frozenset[str]:
         """Paths of the requests that are ours to answer."""
         return frozenset(self._paths)
+
+    @property
+    def slow_paths(self) -> frozenset[str]:
+        """Those of :attr:`paths` whose answers may take a while."""
+        return self.start.paths
 
     def to(self, request: Request) -> Response:
         """Answer to a request for one of :attr:`paths`; from any thread."""
@@ -108,6 +123,16 @@ class Answers:
         told = {**asdict(self.situation), "drives": self._drivers.may_drive(page)}
         return answer_of(http.HTTPStatus.OK, json.dumps(told).encode(), "application/json")
 
+    def _start(self, request: Request) -> Response:
+        names = request.header(OWN_PAGE)
+        if len(names) != 1:
+            return answer_of(http.HTTPStatus.FORBIDDEN)
+        address = urlsplit(request.path)
+        query = parse_qs(address.query, max_num_fields=_FIELDS)
+        page = self._pages.get(names[0], -1)
+        status, told = self.start.answer(address.path, query, page, request.body)
+        return answer_of(status, json.dumps(told).encode(), "application/json")
+
     def _stop(self, request: Request) -> Response:
         if len(request.header(OWN_PAGE)) != 1:
             return answer_of(http.HTTPStatus.FORBIDDEN)
@@ -121,7 +146,8 @@ class Answers:
 
 
 def _script(_: Request) -> Response:
-    return answer_of(http.HTTPStatus.OK, _SCRIPT.read_bytes(), "text/javascript; charset=utf-8")
+    script = b"".join(file.read_bytes() for file in _SCRIPTS)
+    return answer_of(http.HTTPStatus.OK, script, "text/javascript; charset=utf-8")
 
 
 def _style(_: Request) -> Response:

@@ -6,6 +6,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from dataclasses import replace
 from pathlib import Path
 
 from teleop_console.answers import Situation
@@ -15,6 +16,7 @@ from teleop_console.recorded import RecordedLink
 from teleop_console.scene import Scene
 from teleop_console.server import ConsoleServer
 from teleop_console.settings import Renew
+from teleop_console.start import Wish
 from teleop_console.status import situation
 from teleop_console.stylus import Steps, Stylus
 from teleop_console.view_tab import Insets, ViewTab, Visitors, theme
@@ -34,14 +36,18 @@ class Console:
         renew: Begins a new session with other settings, and returns why it does not, empty if it
             does; None where the session is not ours.
         of_session: Parameters of the session as a whole, which no node has.
+        can_end: Whether the page can end what it shows.
     """
 
     def __init__(
         self, server: ConsoleServer, link: Link,
         renew: Renew | None = None,
         of_session: Parameters | None = None,
+        *,
+        can_end: bool = False,
     ) -> None:  # fmt: skip
         self._server, self._link, drivers = server, link, server.drivers
+        self._can_end = can_end
         theme(server.viser, is_dark=False)
         self.scene = Scene(server.viser, link.arms)
         self.stylus = Stylus(
@@ -56,7 +62,7 @@ class Console:
         if link.is_live:
             server.answers.stop = self._stop
         else:
-            server.answers.situation = Situation(can_stop=False)
+            server.answers.situation = Situation(can_stop=False, can_end=can_end)
         if link.is_live:
             with self.panel.stylus_folder:
                 arms = tuple(arm.name for arm in link.arms)
@@ -78,8 +84,9 @@ class Console:
         """Show what is known now."""
         view = self._link.view()
         if self._link.is_live:
-            shown = self._server.answers.situation = situation(view)
-            self.stylus.show(is_shown=not shown.is_stopped)
+            shown = replace(situation(view), can_end=self._can_end)
+            self._server.answers.situation = shown
+            self.stylus.show(is_shown=not shown.is_stopped and self.panel.is_led_here)
         self.scene.draw(view)
         self.stylus.draw(view)
         self.panel.draw(view)
@@ -116,7 +123,13 @@ class Console:
             self.try_to_draw()
             due = max(due + 1.0 / RATE, time.monotonic())
             time.sleep(max(0.0, due - time.monotonic()))
-        self._server.answers.stop, self._server.answers.situation = None, Situation()
+        self.close()
+
+    def close(self) -> None:
+        """Leave the page to what comes next."""
+        answers = self._server.answers
+        answers.stop, answers.situation = None, Situation(doing="closing …")
+        self._server.drivers.is_for_all = False
         self._visitors.close()
 
 
@@ -127,12 +140,27 @@ def give_way() -> None:
             os.setpriority(os.PRIO_PROCESS, int(thread), _NICE)
 
 
+def choose(server: ConsoleServer) -> Wish:
+    """Show the form on which a session is chosen, until somebody wants one."""
+    answers = server.answers
+    _empty(server)
+    answers.situation = Situation(chooses=True)
+    try:
+        return answers.start.wait()
+    finally:
+        answers.situation = Situation(doing="starting …")
+
+
+def _empty(server: ConsoleServer) -> None:
+    """Take away what the page shows."""
+    server.viser.gui.reset()
+    server.viser.scene.reset()
+
+
 @contextmanager
 def splash(server: ConsoleServer) -> Iterator[Callable[[str], None]]:
     """Show on an empty page what is going on until there is something to show."""
-    gui = server.viser.gui
-    gui.reset()
-    server.viser.scene.reset()
+    _empty(server)
     answers = server.answers
 
     def say(line: str) -> None:
@@ -147,7 +175,7 @@ def splash(server: ConsoleServer) -> Iterator[Callable[[str], None]]:
 
 
 def replay(server: ConsoleServer, path: Path) -> None:
-    """Show a recording until Ctrl-C.
+    """Show a recording until the page ends it, or Ctrl-C.
 
     Raises:
         RecordingError: It cannot be read, or is one of another system.
@@ -155,16 +183,18 @@ def replay(server: ConsoleServer, path: Path) -> None:
     from teleop_console.replay_controls import ReplayControls
 
     link = RecordedLink(path)
-    console = Console(server, link)
+    _empty(server)
+    console = Console(server, link, can_end=True)
     controls = ReplayControls(server.viser, link)
     console.panel.settings.refresh()
     console.scene.remember(link.path)
     console.panel.remember(link.view)
     console.stylus.show(is_shown=False)
     before = time.monotonic()
-    while True:
+    while not server.answers.start.is_ended:
         now = time.monotonic()
         link.advance(now - before)
         before = now
         console.try_to_draw(controls.draw)
         time.sleep(max(0.0, now + 1.0 / RATE - time.monotonic()))
+    console.close()

@@ -5,11 +5,14 @@ from collections.abc import Mapping
 import numpy as np
 import viser
 
-from teleop_console.look import ROLES, WANTED, WRONG
+from teleop_console.look import HELD, ROLES, WANTED
 from teleop_console.poses import moved, set_pose
 from teleop_core.kernels.geometry import Array, rotations_from_quaternions
 from teleop_core.robots.bodies import Bodies, Role, Solid
 from teleop_core.robots.bodies.meshes import Mesh, merged, mesh_of
+
+_HALO = 0.05
+"""Radius of a halo, as a share of the length to which a robot reaches."""
 
 
 class BodyNodes:
@@ -33,7 +36,7 @@ class BodyNodes:
         is_ghost: bool = False,
     ) -> None:
         axis = 0.08 * bodies.size
-        self._bodies = bodies
+        self._server, self._path, self._bodies = server, path, bodies
         self.frames = {
             body.name: server.scene.add_frame(
                 f"{path}/{body.name}", show_axes=False, axes_length=axis, axes_radius=0.04 * axis
@@ -41,15 +44,14 @@ class BodyNodes:
             for body in bodies.bodies
         }
         self._list = list(self.frames.values())
-        self._meshes: list[dict[Role, viser.MeshHandle]] = []
+        self._halos: dict[int, viser.IcosphereHandle] = {}
         for i, body in enumerate(bodies.bodies):
             place = f"{path}/{body.name}"
             if i in looks:
                 role: Role = "link" if i else "base"
-                node = _add_mesh(server, place, role, looks[i], is_ghost=is_ghost, is_flat=True)
-                self._meshes.append({role: node})
+                _add_mesh(server, place, role, looks[i], is_ghost=is_ghost, is_flat=True)
             else:
-                self._meshes.append(add_solids(server, place, body.solids, is_ghost=is_ghost))
+                add_solids(server, place, body.solids, is_ghost=is_ghost)
         self._drawn = np.tile(np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]), (len(self._list), 1))
         self._marked: frozenset[int] = frozenset()
 
@@ -65,11 +67,16 @@ class BodyNodes:
         return self._drawn.copy()
 
     def mark(self, joints: frozenset[int]) -> None:
-        """Draw the bodies that these joints move first in another colour, and no others."""
+        """Show a halo around these joints, and around no others; the bodies keep their colour."""
         bodies = frozenset(self._bodies.joint_body[joint] for joint in joints)
         for body in bodies ^ self._marked:
-            for role, mesh in self._meshes[body].items():
-                mesh.color = WRONG if body in bodies else ROLES[role]
+            if body not in self._halos:
+                self._halos[body] = self._server.scene.add_icosphere(
+                    f"{self._path}/{self._bodies.bodies[body].name}/limit",
+                    radius=_HALO * self._bodies.size, color=HELD, opacity=0.35,
+                    cast_shadow=False, receive_shadow=False,
+                )  # fmt: skip
+            self._halos[body].visible = body in bodies
         self._marked = bodies
 
     def show_axes(self, *, is_shown: bool) -> None:

@@ -3,11 +3,12 @@
 import argparse
 import time
 import webbrowser
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from teleop_console.start import BAGS
 from teleop_core.base.errors import ParameterError, TeleopError
 from teleop_core.base.texts import printable
 from teleop_core.commands.arguments import command, ros_module, setting_arguments, without_argument
@@ -16,8 +17,9 @@ if TYPE_CHECKING:
     from teleop_console.server import ConsoleServer
 
 _EPILOG = """\
-starts a session and opens the page; drag the stylus with the mouse and the arm follows:
+opens the page, on which a session is chosen; drag the stylus and the arm follows:
   teleop console
+  teleop console --set operator=remote         starts one at once
   teleop console --scenario fine_box --set slave_sim.plant=hardware
   teleop console --set operator=human          watch a simulated hand
   teleop console --attach                      a session that runs already
@@ -25,8 +27,6 @@ starts a session and opens the page; drag the stylus with the mouse and the arm 
 The page is served to this machine alone. With --host others reach it, who need the token that is
 printed with the address. One browser drives at a time; anybody may press the emergency stop.
 """
-_OWN = ("operator=remote", "teleop.duration=86400.0")
-"""What a session behind a page is beside its scenario: a person is the hand, until Ctrl-C."""
 
 
 def add(commands: Any) -> None:
@@ -55,7 +55,8 @@ def _run(arguments: argparse.Namespace) -> int:
     from teleop_console.server import ConsoleServer
 
     with ConsoleServer(arguments.port, arguments.host, arguments.token) as server:
-        server.answers.situation = Situation(doing="starting …")
+        is_told = arguments.attach or arguments.bag is not None or _is_told(arguments)
+        server.answers.situation = Situation(doing="starting …" if is_told else "")
         print(f"console at {server.url}; Ctrl-C ends it", flush=True)
         if not arguments.no_browser and not webbrowser.open(server.url):
             print("there is no browser here: open this address in one", flush=True)
@@ -66,15 +67,35 @@ def _run(arguments: argparse.Namespace) -> int:
 
 
 def _show(arguments: argparse.Namespace, server: "ConsoleServer") -> int:
-    if arguments.bag is not None:
-        from teleop_console.app import replay
-
-        replay(server, arguments.bag)
-    elif arguments.attach:
+    if arguments.attach:
         _attach(arguments, server)
-    else:
-        _drive(arguments, server)
-    return 0
+        return 0
+    from teleop_console.app import choose, replay
+    from teleop_console.choices import texts
+
+    if arguments.bag is not None:
+        replay(server, arguments.bag)
+    elif _is_told(arguments) and not _drive(arguments, server, arguments.settings):
+        return 0
+    start = server.answers.start
+    while True:
+        wish = choose(server)
+        try:
+            if wish.recording is not None:
+                replay(server, wish.recording)
+            else:
+                arguments.scenario = wish.chosen.get("scenario")
+                arguments.out, arguments.config, arguments.without = None, [], []
+                _drive(arguments, server, texts(wish.chosen))
+        except TeleopError as error:
+            start.told = f"It ended: {error}"
+            print(printable(start.told), flush=True)
+
+
+def _is_told(arguments: argparse.Namespace) -> bool:
+    """Whether the command line says which session to start."""
+    given = (arguments.scenario, arguments.settings, arguments.config, arguments.out)
+    return any(given) or bool(arguments.without)
 
 
 def _attach(arguments: argparse.Namespace, server: "ConsoleServer") -> None:
@@ -103,17 +124,19 @@ def _attach(arguments: argparse.Namespace, server: "ConsoleServer") -> None:
             Console(server, link).run(lambda: False)
 
 
-def _drive(arguments: argparse.Namespace, server: "ConsoleServer") -> None:
-    """Start sessions one after the other, each with the page, until Ctrl-C."""
+def _drive(arguments: argparse.Namespace, server: "ConsoleServer", settings: Sequence[str]) -> bool:
+    """Start sessions one after the other, each with the page; whether the page ended the last."""
     from teleop_console.app import Console, splash
+    from teleop_console.choices import OWN
     from teleop_console.recorded_arms import parameters_of
     from teleop_core.graph.layers import SESSION
 
     ros_module("guest")
     from teleop_console.console_session import ConsoleSession
 
-    first = arguments.out or Path("bags") / time.strftime("console_%Y%m%d_%H%M%S")
-    texts, number, wanted = [*_OWN, *arguments.settings], 0, list[str]()
+    first = arguments.out or BAGS / time.strftime("console_%Y%m%d_%H%M%S")
+    texts, number, wanted = [*OWN, *settings], 0, list[str]()
+    start = server.answers.start
 
     def renew(more: tuple[str, ...]) -> str:
         try:
@@ -137,12 +160,12 @@ def _drive(arguments: argparse.Namespace, server: "ConsoleServer") -> None:
         wanted.clear()
         with session, link:
             of_session = parameters_of(configuration, (SESSION,))
-            console = Console(server, link, renew, of_session)
-            console.run(lambda session=session: session.is_over or bool(wanted))  # type: ignore[misc]
+            console = Console(server, link, renew, of_session, can_end=True)
+            console.run(lambda session=session: bool(session.is_over or wanted or start.is_ended))  # type: ignore[misc]
         session.check()
         print(f"{out}: recorded; next: teleop evaluate {out}", flush=True)
         if not wanted:
-            return
+            return start.is_ended
         texts, number = [*texts, *wanted], number + 1
 
 

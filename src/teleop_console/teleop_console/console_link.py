@@ -207,7 +207,8 @@ class LiveLink(Observer):
                 self._hear(arm, view.arms[arm.name])
             self._insist(view)
             self._hear_nodes(view)
-            view.time, view.is_fresh = now - self._begun, now - self._heard < _SILENCE
+            view.time, view.age = now - self._begun, now - self._heard
+            view.is_fresh = view.age < _SILENCE
             return view
 
     def _hear(self, arm: Arm, view: ArmView) -> None:
@@ -238,6 +239,7 @@ class LiveLink(Observer):
             unknown = "delay_ms.median" not in slave.values
             median, worst = (slave.number(f"delay_ms.{w}") * 1e-3 for w in ("median", "p99"))
             view.delay = (math.nan, math.nan) if unknown else (median, worst)
+            view.rate = slave.number("rate_hz") or math.nan
 
     # -- commanding ------------------------------------------------------------------------------
 

@@ -2,9 +2,13 @@
 
 Messages of pages are worked off by one event loop, in which a stop would wait behind all of them.
 So a thread of its own accepts the connections. Requests for the stop and signs of life it answers
-at once; every other connection goes on to the event loop as it came.
+at once. What may take a while another thread answers, one after the other. Every other connection
+goes on to the event loop as it came.
 """
 
+import logging
+import queue
+import re
 import selectors
 import socket
 import threading
@@ -12,6 +16,7 @@ import time
 from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
+from functools import partial
 from typing import Any
 from urllib.parse import urlsplit
 
@@ -28,9 +33,13 @@ _LARGEST = 16 * 1024  # bytes of a request's head
 _LOOK = 0.5  # s, between looks at those that say nothing
 _SOON = 0.02  # s, between looks at a request that has begun
 _BACKLOG = 64
+_LINE = 32  # requests that wait for an answer that may take a while; one more is not answered
+_LENGTH = re.compile(rb"\r\nContent-Length: *([0-9]{1,9})(?=\r\n|$)", re.IGNORECASE)
 _MALFORMED = (EOFError, SecurityError, ValueError, NotImplementedError)
 
-Answer = Callable[[Head], Response]
+Body = Callable[[int], bytes]
+"""Body of a request, taken when it is asked for; of at most so many bytes, else a ValueError."""
+Answer = Callable[[Head, Body], Response]
 
 
 class Front:
@@ -39,14 +48,20 @@ class Front:
     Args:
         opened: Socket that listens; it is closed at the end.
         paths: Paths of requests that are answered here.
-        answer: Answers one of these requests; called in the thread of this object.
+        answer: Answers one of these requests; called in a thread of this object.
+        slow: Those of the paths whose answers may take a while: they keep no other waiting.
 
     Attributes:
         passed_on: Socket for an event loop: it accepts the connections that are passed on.
     """
 
-    def __init__(self, opened: socket.socket, paths: frozenset[str], answer: Answer) -> None:
-        self._opened, self._paths, self._answer = opened, paths, answer
+    def __init__(
+        self, opened: socket.socket, paths: frozenset[str], answer: Answer,
+        slow: frozenset[str] = frozenset(),
+    ) -> None:  # fmt: skip
+        self._opened, self._paths, self._answer, self._slow = opened, paths, answer, slow
+        self._line: queue.Queue[tuple[socket.socket, bytes] | None] = queue.Queue(_LINE)
+        threading.Thread(target=self._work, name="console start", daemon=True).start()
         self._waiting: dict[socket.socket, float] = {}  # until when
         self._partial: set[socket.socket] = set()  # of these, those that have begun to say it
         inner, self._told = socket.socketpair()
@@ -62,6 +77,8 @@ class Front:
         """Accept nobody any more."""
         self._is_closed = True
         self._thread.join()
+        with suppress(queue.Full):  # its thread is no worse where nobody tells it to end
+            self._line.put_nowait(None)
         for one in (self._opened, self._told, *self._waiting):
             one.close()
         self._selector.close()
@@ -110,15 +127,34 @@ class Front:
                 self._partial.add(one)
         elif is_ours:
             self._forget(one)
-            self._reply(one, data)
+            (self._later if _path(line) in self._slow else self._reply)(one, data)
         else:
             self._forget(one)
             self._pass_on(one)
 
+    def _later(self, one: socket.socket, data: bytes) -> None:
+        try:
+            self._line.put_nowait((one, data))
+        except queue.Full:
+            one.close()
+
+    def _work(self) -> None:
+        while (waiting := self._line.get()) is not None:
+            try:
+                waiting[0].settimeout(PATIENCE)
+                self._reply(*waiting)
+            except Exception:  # of whatever answers: the next one is answered
+                logging.getLogger("teleop_console").exception("a request was not answered")
+
     def _reply(self, one: socket.socket, data: bytes) -> None:
         with one, suppress(OSError, *_MALFORMED):
-            one.recv(_LARGEST)
-            response = self._answer(_parsed(data))
+            head, end, _ = data.partition(b"\r\n\r\n")
+            one.recv(len(head + end))  # it is there
+            body: Body = _none
+            if _path(head.partition(b"\r\n")[0]) in self._slow:
+                head, length = _without_body(head)
+                body = partial(_body, one, length)
+            response = self._answer(_parsed(head + end), body)
             response.headers["Connection"] = "close"
             one.sendall(response.serialize())
 
@@ -182,6 +218,36 @@ class PassedOn(socket.socket):
         while self.waiting:
             self.waiting.popleft().close()
         super().close()
+
+
+def _none(most: int) -> bytes:
+    del most
+    return b""
+
+
+def _without_body(head: bytes) -> tuple[bytes, int]:
+    """Head of a request as of one without a body, and the length of its body [bytes]."""
+    if not head.startswith(b"POST "):
+        return head, 0
+    found = _LENGTH.findall(head)
+    if len(found) != 1:
+        raise ValueError
+    return b"GET " + _LENGTH.sub(b"", head).removeprefix(b"POST "), int(found[0])
+
+
+def _body(one: socket.socket, length: int, most: int) -> bytes:
+    """Body of a request, as long as the other side sends it without delay."""
+    if length > most:
+        raise ValueError
+    end, found = time.monotonic() + PATIENCE, bytearray()
+    while len(found) < length and (left := end - time.monotonic()) > 0.0:
+        one.settimeout(left)
+        more = one.recv(length - len(found))
+        if not more:
+            raise EOFError
+        found += more
+    one.settimeout(PATIENCE)
+    return bytes(found)
 
 
 def _parsed(data: bytes) -> Head:

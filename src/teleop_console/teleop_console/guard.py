@@ -52,11 +52,13 @@ class Request:
         path: Path with its query.
         is_socket: Whether it asks for a WebSocket.
         header: All values of a header by its name.
+        body: Its body, of at most so many bytes; read when it is asked for.
     """
 
     path: str
     is_socket: bool
     header: Callable[[str], Sequence[str]]
+    body: Callable[[int], bytes] = bytes
 
 
 class Guard:

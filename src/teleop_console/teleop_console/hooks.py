@@ -33,7 +33,7 @@ from teleop_console.answers import Answers, answer_of
 from teleop_console.connection import Connection, Crowd, Gate
 from teleop_console.drivers import Drivers
 from teleop_console.filter import FLOOD, LARGEST, NO_VALUE, WATCHES, Filter, Sets, decode
-from teleop_console.front import Front
+from teleop_console.front import Body, Front
 from teleop_console.guard import HEADERS, Guard
 from teleop_console.guard import Request as Asked
 from teleop_core.base.errors import SessionError
@@ -99,7 +99,8 @@ class Server(viser.ViserServer):
         self, opened: socket, guard: Guard, drivers: Drivers, answers: Answers, label: str
     ) -> None:
         host, port = opened.getsockname()[:2]
-        self._front = Front(opened, answers.paths, partial(_answered, guard, answers))
+        answer = partial(_answered, guard, answers)
+        self._front = Front(opened, answers.paths, answer, answers.slow_paths)
         self._drivers, self._public = drivers, set[str]()
         self.filter = Filter(self, drivers.may_drive, _logger().warning)
         rich.get_console().quiet = True  # which viser alone writes to here
@@ -288,9 +289,9 @@ class _Serving(ws.serve):
         await super().__aexit__(exc_type, exc_value, traceback)
 
 
-def _answered(guard: Guard, answers: Answers, request: Request) -> Response:
+def _answered(guard: Guard, answers: Answers, request: Request, body: Body) -> Response:
     """Our own answer to a request, or a refusal."""
-    asked = Asked(request.path, False, request.headers.get_all)
+    asked = Asked(request.path, False, request.headers.get_all, body)
     if reason := guard.refusal(asked):
         return answer_of(http.HTTPStatus.FORBIDDEN, f"{reason}\n".encode())
     response = answers.to(asked)

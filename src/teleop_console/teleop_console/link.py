@@ -67,6 +67,8 @@ class View:
         is_fresh: Whether streams come; false when the session is silent or gone.
         news: Warnings of the nodes, a line each.
         delay: Median and 99th percentile from master sample to slave command [s]; NaN if unknown.
+        rate: Ticks of the slave in a second; NaN if unknown.
+        age: Time since the newest sample that is shown came [s]; NaN if unknown.
         recording: Where it is being recorded; None if it is not.
         run: Number of recordings that were saved in this session.
     """
@@ -76,6 +78,8 @@ class View:
     is_fresh: bool = False
     news: tuple[str, ...] = ()
     delay: tuple[float, float] = (float("nan"), float("nan"))
+    rate: float = float("nan")
+    age: float = float("nan")
     recording: Path | None = None
     run: int = 0
 

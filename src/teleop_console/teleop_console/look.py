@@ -7,6 +7,7 @@ colours that mean nothing but their number.
 """
 
 from collections.abc import Mapping
+from pathlib import Path
 from types import MappingProxyType
 from typing import NamedTuple
 
@@ -25,8 +26,8 @@ class Meaning(NamedTuple):
 
 MEANINGS: Mapping[str, Meaning] = MappingProxyType({
     "good": Meaning((43, 138, 62), "#247a36", "#51cf66"),  # goes, is free
-    "held": Meaning((154, 87, 0), "#9a5700", "#ffb84d"),  # holds, waits, warns
-    "wrong": Meaning((214, 0, 28), "#d6001c", "#ff7b83"),  # stopped, touches, at a limit; the stop
+    "held": Meaning((154, 87, 0), "#9a5700", "#ffb84d"),  # holds, waits, warns, is at a limit
+    "wrong": Meaning((214, 0, 28), "#d6001c", "#ff7b83"),  # stopped, touches; the stop
     "idle": Meaning((92, 102, 112), "#5c6670", "#9aa5b1"),  # there, and no more
     "measured": Meaning((217, 95, 2), "#b34d00", "#ff9f4d"),  # paths that were measured
     "wanted": Meaning((28, 109, 208), "#1c6dd0", "#74a9f2"),  # what shall be; what to press next
@@ -35,9 +36,9 @@ MEANINGS: Mapping[str, Meaning] = MappingProxyType({
     "target": Meaning((12, 133, 153), "#0b7285", "#3bc9db"),  # points and objects of a task
 })  # fmt: skip
 """All colours that mean something, texts with at least 4.5 to 1 on their ground."""
-GOOD, WRONG, MEASURED, WANTED, HAND, FORCE, TARGET = (
+GOOD, HELD, WRONG, MEASURED, WANTED, HAND, FORCE, TARGET = (
     MEANINGS[name].scene
-    for name in ("good", "wrong", "measured", "wanted", "hand", "force", "target")
+    for name in ("good", "held", "wrong", "measured", "wanted", "hand", "force", "target")
 )
 
 ROLES: Mapping[Role, Color] = MappingProxyType({
@@ -58,12 +59,26 @@ CURVES = ("#0072b2", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#8c6d46")
 """Of plots, in the order of their series; told apart without seeing red or green (Okabe and Ito
 2008)."""
 
-_LIGHT = {"ground": "#ffffff", "text": "#1c2126", "muted": "#5c6670", "line": "#d9dee3"}
-_DARK = {"ground": "#1f2328", "text": "#e6e9ec", "muted": "#9aa5b1", "line": "#343b42"}
+_LIGHT = {
+    "ground": "#ffffff",
+    "text": "#1c2126",
+    "muted": "#5c6670",
+    "line": "#d9dee3",
+    "field": "#7d8790",
+}
+_DARK = {
+    "ground": "#1f2328",
+    "text": "#e6e9ec",
+    "muted": "#9aa5b1",
+    "line": "#343b42",
+    "field": "#7f8a95",
+}
 
 _STYLE = """\
-:root { VARIABLES; --t-stop: STOP; --t-small: 12px; --t-text: 13px; --t-head: 16px; }
+:root { VARIABLES; --t-stop: STOP; --t-next: NEXT;
+  --t-small: 12px; --t-text: 13px; --t-head: 16px; }
 :root[data-mantine-color-scheme="dark"] { DARK_VARIABLES; }
+@media (prefers-color-scheme: dark) { :root.t-choosing { DARK_VARIABLES; color-scheme: dark; } }
 body { font: var(--t-text)/1.45 system-ui, -apple-system, "Segoe UI", Roboto, sans-serif; }
 .t-status { padding: 4px 14px; color: var(--t-color-text); font-size: var(--t-small);
   box-sizing: border-box; height: 140px; overflow-y: auto; overflow-wrap: anywhere;
@@ -73,10 +88,11 @@ body { font: var(--t-text)/1.45 system-ui, -apple-system, "Segoe UI", Roboto, sa
 .t-status b { font-size: var(--t-head); font-weight: 600; line-height: 24px; }
 .t-status p { margin: 0; } .t-muted { color: var(--t-color-muted); }
 .t-good { color: var(--t-color-good); } .t-held { color: var(--t-color-held); }
+.t-next { color: var(--t-color-wanted); }
 .t-wrong { color: var(--t-color-wrong); } .t-idle { color: var(--t-color-idle); }
 #t-safety { position: fixed; left: 12px; bottom: 12px; z-index: 10000; width: 230px;
   display: flex; flex-direction: column; gap: 8px; font: inherit; }
-#t-safety[hidden] { display: none; }
+#t-stop[hidden], #t-end[hidden] { display: none; }
 #t-stop { height: 56px; border: 0; border-radius: 6px; background: var(--t-stop); color: #fff;
   font-family: inherit; font-size: 18px; font-weight: 700; letter-spacing: 0.02em; cursor: pointer;
   box-shadow: 0 1px 4px rgba(0,0,0,.3); touch-action: manipulation; user-select: none; }
@@ -97,17 +113,26 @@ body { font: var(--t-text)/1.45 system-ui, -apple-system, "Segoe UI", Roboto, sa
   #t-safety { left: 0; right: 0; top: 0; bottom: auto; width: auto; }
   #t-stop { border-radius: 0; width: 100%; }
   #t-banner { top: 56px; font-size: var(--t-text); }
+  #root .mantine-Paper-root[style*="position: fixed"] { max-height: 46% !important; }
+  #root .mantine-Paper-root[style*="position: fixed"], #root [style*="width: 20em"] {
+    width: 100% !important; }
+  .t-status { height: auto; max-height: 140px; }
 }
 """
 
 
+_FORM = Path(__file__).with_name("start.css")
+
+
 def style() -> str:
-    """Style sheet that is added to the page."""
+    """Style sheet that is added to the page, with that of the form on it."""
     light = _LIGHT | {name: one.light for name, one in MEANINGS.items()}
     dark = _DARK | {name: one.dark for name, one in MEANINGS.items()}
     stop = MEANINGS["wrong"].light  # on any ground, under white letters
     return (
-        _STYLE.replace("STOP", stop)
+        (_STYLE + _FORM.read_text(encoding="utf-8"))
+        .replace("STOP", stop)
+        .replace("NEXT", MEANINGS["wanted"].light)
         .replace("DARK_VARIABLES", _variables(dark))
         .replace("VARIABLES", _variables(light))
     )

@@ -32,6 +32,7 @@
       : shown.is_stopped || pressed ? ['EMERGENCY STOP', shown.text || 'All arms are being stopped.']
       : ['', ''];
     const root = document.documentElement.classList;
+    dispatchEvent(new CustomEvent('teleop', { detail: shown })); // the form hears of it
     root.toggle('t-stopped', Boolean(shown.is_stopped || pressed));
     root.toggle('t-says', head !== '');
     root.toggle('t-watches', shown.drives === false);
@@ -41,7 +42,7 @@
       strong.textContent = head;
       banner.replaceChildren(strong, text);
     }
-    safety.hidden = !shown.can_stop;
+    stop.hidden = !shown.can_stop;
     starting.textContent = shown.doing;
     starting.hidden = !shown.doing;
     const seen = document.querySelector('canvas')?.getBoundingClientRect();

@@ -20,7 +20,7 @@ from teleop_console.hooks import Server
 from teleop_console.link import Link, Parameters, View
 from teleop_console.plots import Plots
 from teleop_console.settings import Renew, SettingsPanel
-from teleop_console.status import alive, next_button, status_html
+from teleop_console.status import alive, leader, next_button, next_step, status_html
 from teleop_console.tails import is_jump
 from teleop_core.base.errors import TeleopError
 
@@ -205,8 +205,11 @@ class Panel:
         if now - self._drawn < _PERIOD:
             return
         self._drawn = now
-        doing = self._doing(view) if self._link.is_live else "replay"
-        self._set(self._status, status_html(view, self._link.title, doing))
+        doing, step = "replay", ""
+        if self._link.is_live:
+            doing = self._doing(view)
+            step = next_step(view, is_led_here=self.is_led_here)
+        self._set(self._status, status_html(view, self._link.title, doing, step))
         if self._link.is_live:
             self._draw_buttons(view)
         tables = [
@@ -235,7 +238,19 @@ class Panel:
         where = view.recording.name if view.recording else "not recording"
         driver = self._drivers.driver
         who = "nobody drives" if driver is None else f"browser {driver + 1} drives"
-        return f"run {view.run + 1} · {where} · {who}"
+        return " · ".join(filter(None, (f"run {view.run + 1}", where, who, leader(self._kind))))
+
+    @property
+    def _kind(self) -> str:
+        """Operator of the first arm; empty before it is known."""
+        name = next(iter(self.histories))
+        info = self.settings.known.get((f"{name}/operator" if name else "operator", "kind"))
+        return "" if info is None else str(info.value)
+
+    @property
+    def is_led_here(self) -> bool:
+        """Whether a person at the page moves the hand, as long as nothing else is known."""
+        return not leader(self._kind)
 
     @staticmethod
     def _set(handle: viser.GuiHtmlHandle, text: str) -> None:

@@ -1,6 +1,7 @@
 """Status: what the page says of a session, which buttons are alive then, and which comes next."""
 
 import html
+import math
 
 from teleop_console.answers import Situation
 from teleop_console.link import ArmView, View
@@ -54,6 +55,44 @@ def next_button(view: View) -> str:
     return "Start" if State.PAUSED in states else ""
 
 
+_LEADERS = {
+    "human": "a simulated person leads", "observer": "a simulated person leads",
+    "gamepad": "the gamepad leads", "spacemouse": "the 3-D mouse leads",
+    "bag": "a recording leads", "file": "a recording leads",
+}  # fmt: skip
+
+
+def leader(kind: str) -> str:
+    """Who moves the hand, by the kind of its operator; empty if it is the person at the page."""
+    return "" if kind in {"", "remote"} else _LEADERS.get(kind, f"operator {kind} leads, simulated")
+
+
+def next_step(view: View, *, is_led_here: bool) -> str:
+    """What an operator does next; empty where nothing is to be done.
+
+    Args:
+        view: What is known.
+        is_led_here: Whether a person at the page moves the hand.
+    """
+    button = next_button(view)
+    if button:
+        return {"Initialize": "Initialize: reset, enable and home", "Start": "Start: follow again"}[
+            button
+        ]
+    rests = any(arm.state.get("is_clutched") for arm in view.arms.values())
+    return "drag the stylus by its arrows; to let go is the clutch" if is_led_here and rests else ""
+
+
+def facts(view: View) -> str:
+    """Rate of the slave, and ages of command and picture; what is not known is left out."""
+    told = (
+        (view.rate, f"{view.rate:.0f} ticks/s"),
+        (view.delay[0], f"command {1e3 * view.delay[0]:.1f} ms old"),
+        (view.age, f"picture {1e3 * view.age:.0f} ms old"),
+    )
+    return " · ".join(text for value, text in told if math.isfinite(value))
+
+
 def mode_text(arm: ArmView) -> str:
     """Mode and gain of an arm in words; empty before it has said them."""
     if not arm.state:
@@ -66,9 +105,13 @@ def fixture_text(arm: ArmView) -> str:
     return ("on" if arm.state["is_fixture_on"] else "off") if arm.state else ""
 
 
-def status_html(view: View, title: str, doing: str) -> str:
-    """State of every arm, mode, what is being done, and warnings."""
+def status_html(view: View, title: str, doing: str, step: str = "") -> str:
+    """State of every arm, mode, the next step, what is being done, and warnings."""
     lines = [line for name, arm in view.arms.items() for line in _arm_lines(view, name, arm)]
+    if step:
+        lines.append(f'<span class="t-next">Next: {html.escape(step)}</span>')
+    if told := facts(view):
+        lines.append(html.escape(told))
     lines.append(f'<span class="t-muted">{html.escape(title)} · {html.escape(doing)}</span>')
     said = [arm.operation_text for arm in view.arms.values() if arm.operation_text]
     news = [text for text in view.news if not any(known in text for known in said)]

@@ -1,0 +1,250 @@
+"""Choices: what a session can be started with, what does not go together, and its command line.
+
+A choice is a word for each of :data:`FIELDS`; an empty word is what the scenario says. Whether
+words go together is asked of the configuration itself, so a part of your own is offered, and
+refused, like any other.
+"""
+
+import math
+import shlex
+import time
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+
+from teleop_core.base.errors import ParameterError, TeleopError
+from teleop_core.base.parameters import specs
+from teleop_core.chain.operators import OPERATORS
+from teleop_core.chain.tasks import TASKS
+from teleop_core.graph.layers import (
+    SESSION,
+    Layer,
+    config_folder,
+    declared_groups,
+    list_scenarios,
+    load_file,
+    parse_setting,
+)
+from teleop_core.robots import ROBOTS
+from teleop_core.session.configuration import Configuration
+from teleop_core.session.length import as_long_as_followed
+from teleop_core.slave.controllers import CONTROLLERS
+from teleop_core.slave.plants import PLANTS
+
+Chosen = Mapping[str, str]
+"""Words by the names of their fields; a field that is missing is empty."""
+PERSON = "remote"
+"""Operator that is a person at the page."""
+_PERSON = f"operator={PERSON}"
+_FOR_EVER = f"{SESSION}.duration=86400.0"
+OWN = (_PERSON, _FOR_EVER)
+"""What a session behind a page is beside its scenario: a person is the hand, until it is ended."""
+
+
+@dataclass(frozen=True)
+class Field:
+    """One thing to choose.
+
+    Attributes:
+        name: Its name.
+        label: What stands before it on the page.
+        unsaid: What an empty word stands for.
+        key: Parameter that a word sets; empty for the scenario, which is a file.
+        options: Words that may be chosen, with what each is; any other text may be a file.
+        stage: Stage that a word needs; empty for none.
+    """
+
+    name: str
+    label: str
+    unsaid: str
+    key: str
+    options: Callable[[], Mapping[str, str]]
+    stage: str = ""
+
+
+def _named(names: Iterable[str]) -> Callable[[], Mapping[str, str]]:
+    return lambda: dict.fromkeys(names, "")
+
+
+def _declared(stage: str, name: str) -> Callable[[], Mapping[str, str]]:
+    """Words that a parameter may have."""
+
+    def found() -> Mapping[str, str]:
+        spec = next(one for one in specs(declared_groups()[stage]) if one.name == name)
+        return dict.fromkeys(spec.choices, "")
+
+    return found
+
+
+def _operators() -> Mapping[str, str]:
+    told = {PERSON: "you, with the mouse on this page", "human": "a simulated person"}
+    return {**told, **{name: told.get(name, "") for name in OPERATORS}}
+
+
+_OF_SCENARIO = "as the scenario says"
+FIELDS = (
+    Field("scenario", "Scenario", "none: the defaults", "", list_scenarios),
+    Field("operator", "Operator", "the scenario's own, simulated", "operator", _operators),
+    Field("robot", "Robot", _OF_SCENARIO, "robot", _named(ROBOTS)),
+    Field("task", "Task", _OF_SCENARIO, "task.kind", _named(TASKS), "task"),
+    Field("network", "Network", _OF_SCENARIO, "network.preset",
+          _declared("network", "preset"), "network"),
+    Field("passivity", "Passivity", _OF_SCENARIO, "reflection.passivity",
+          _declared("motion_scaling", "reflection.passivity"), "passivity"),
+    Field("controller", "Control law", _OF_SCENARIO, "controller.kind", _named(CONTROLLERS)),
+    Field("plant", "Plant", _OF_SCENARIO, "plant.kind", _named(PLANTS)),
+)  # fmt: skip
+"""All that is chosen, in the order of the page."""
+FOLLOWED, TIP = "followed", "tip"
+"""Further words: the file that an operator ``bag`` or ``file`` follows; the tip of a URDF."""
+_PATHS = {"bag": "operator.bag", "file": "operator.file.path"}  # by operator, where its file goes
+START: Chosen = {"operator": PERSON}
+"""What is chosen at first."""
+_LONGEST = 500  # characters of a word
+_NOTHING = "none"  # word of a field with a stage that does not need the stage
+
+
+def checked(words: Chosen) -> dict[str, str]:
+    """Words of known fields that say something.
+
+    Raises:
+        ParameterError: A field is unknown, or a word too long.
+    """
+    known = {field.name for field in FIELDS} | {FOLLOWED, TIP}
+    for name, word in words.items():
+        if name not in known:
+            raise ParameterError("field", name, f"one of {', '.join(sorted(known))}")
+        if len(word) > _LONGEST or not word.isprintable():
+            raise ParameterError(name, word, f"one line of at most {_LONGEST} characters")
+    return {name: word for name, word in words.items() if word}
+
+
+def texts(chosen: Chosen) -> tuple[str, ...]:
+    """Settings ``key=value`` over the scenario and :data:`OWN` that make what is chosen.
+
+    Raises:
+        TeleopError: The scenario is unknown.
+    """
+    said = _said(chosen)
+    if _PERSON in said:
+        return tuple(text for text in said if text != _PERSON)
+    try:
+        made = _made(chosen.get("scenario", ""), said)
+    except TeleopError:
+        return said
+    known = () if chosen.get("operator") else (f"operator={made.groups['operator'].kind.kind}",)
+    return (*said, *known, f"{SESSION}.duration={made.groups[SESSION].duration!r}")
+
+
+def _said(chosen: Chosen) -> tuple[str, ...]:
+    """Settings over the scenario alone."""
+    said = [f"{f.key}={word}" for f in FIELDS if f.key and (word := chosen.get(f.name))]
+    stages = before = _stages(chosen.get("scenario", ""))
+    for field in FIELDS:
+        word = chosen.get(field.name, "")
+        if field.stage and word not in {"", _NOTHING} and field.stage not in stages:
+            stages = (*stages, field.stage)
+    if stages != before:
+        said.insert(0, f"{SESSION}.stages=[{','.join(stages)}]")
+    if (path := _PATHS.get(chosen.get("operator", ""))) is not None:
+        said.append(f"{path}={chosen.get(FOLLOWED) or repr('')}")
+    if tip := chosen.get(TIP):
+        said.append(f"geometry=[tip={tip}]")
+    return tuple(said)
+
+
+def command_line(chosen: Chosen) -> str:
+    """Command that starts the same."""
+    scenario, said = chosen.get("scenario"), texts(chosen)
+    words = ["teleop", "console", *(("--scenario", scenario) if scenario else ())]
+    words += ["--set", *said] if said else [] if scenario else ["--set", _PERSON]
+    return shlex.join(words)
+
+
+def refusal(chosen: Chosen) -> str:
+    """Why this cannot be started; empty if it can."""
+    key = tuple(sorted((name, word) for name, word in chosen.items() if word))
+    if key not in _REFUSALS:
+        try:
+            _made(chosen.get("scenario", ""), _said(chosen))
+            reason = ""
+        except TeleopError as error:
+            reason = str(error)
+        if len(_REFUSALS) >= _MOST:
+            _REFUSALS.clear()
+        _REFUSALS[key] = reason
+    return _REFUSALS[key]
+
+
+_REFUSALS: dict[tuple[tuple[str, str], ...], str] = {}
+_MOST = 4096  # choices whose refusals are remembered
+
+
+@dataclass(frozen=True)
+class Option:
+    """A word that may be chosen.
+
+    Attributes:
+        word: The word.
+        text: What it is; empty where the word says it.
+        reason: Why it may not be chosen now; empty if it may, None before that is known.
+    """
+
+    word: str
+    text: str
+    reason: str | None
+
+
+def options(field: Field, chosen: Chosen, until: float = math.inf) -> tuple[Option, ...]:
+    """All words of a field, with what speaks against each beside the other words.
+
+    What speaks against the present choice as a whole speaks against no single word.
+
+    Args:
+        field: The field.
+        chosen: Words of all fields.
+        until: Monotonic time [s] after which nothing more is tried; what is not known then is
+            told as such.
+    """
+    now = refusal(chosen)
+    known = {"": field.unsaid, **field.options()}
+    if (own := chosen.get(field.name, "")) not in known:
+        known[own] = "a file"
+    found = []
+    for word, text in known.items():
+        reason = None
+        if time.monotonic() < until:
+            reason = refusal({**chosen, field.name: word})
+        found.append(Option(word, text, "" if reason == now else reason))
+    return tuple(found)
+
+
+def _made(scenario: str, said: tuple[str, ...]) -> Configuration:
+    layers = [_base(), *([_scenario(scenario)] if scenario else [])]
+    given = [_setting(text) for text in said]
+    return as_long_as_followed(Configuration.from_layers([*layers, *given], scenario), given)
+
+
+_setting = lru_cache(1024)(parse_setting)
+
+
+@lru_cache(1)
+def _base() -> Layer:
+    return load_file(config_folder() / "teleop.yaml")
+
+
+@lru_cache(64)
+def _scenario(name: str) -> Layer:
+    scenarios = list_scenarios()
+    if name not in scenarios:
+        raise ParameterError("scenario", name, f"one of {', '.join(scenarios)}")
+    return load_file(config_folder() / f"{name}.yaml")
+
+
+def _stages(scenario: str) -> tuple[str, ...]:
+    """Further stages of a scenario."""
+    layers = [_base(), *([_scenario(scenario)] if scenario else [])]
+    found: object = ()
+    for layer in layers:
+        found = layer.get(SESSION, {}).get("stages", found)
+    return tuple(found) if isinstance(found, list | tuple) else ()

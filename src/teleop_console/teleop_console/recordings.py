@@ -1,0 +1,137 @@
+"""Recordings: those of a folder, the newest first, with their verdicts as these become known."""
+
+import json
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from teleop_core.base.errors import ParameterError
+
+_MOST = 50
+"""Recordings that are listed."""
+_FILE = "metadata.yaml"
+_KIND = {"score": "evaluate", "export": "export"}
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A recording in the list.
+
+    Attributes:
+        name: Its name in the folder.
+        made: When it was closed [s since 1970].
+        about: Scenario, robot and length, a line; empty before they are known.
+        verdict: Line that names the worst first; empty before it is known.
+        is_good: Whether nothing is beyond what is fine; None before that is known.
+    """
+
+    name: str
+    made: float
+    about: str = ""
+    verdict: str = ""
+    is_good: bool | None = None
+
+
+class Recordings:
+    """Recordings of a folder.
+
+    Args:
+        folder: Where they are.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        self._known: dict[tuple[str, float], Entry] = {}
+        self._judging: tuple[Entry, subprocess.Popen[bytes], Path] | None = None
+
+    def entries(self) -> list[Entry]:
+        """The newest recordings, the newest first; each with what is known of it by now."""
+        found = []
+        for file in self._folder.glob(f"*/{_FILE}"):
+            name, made = file.parent.name, file.stat().st_mtime
+            found.append(self._known.get((name, made), Entry(name, made)))
+        return sorted(found, key=lambda entry: -entry.made)[:_MOST]
+
+    def path(self, name: str) -> Path:
+        """Place of a recording.
+
+        Raises:
+            ParameterError: There is no such recording in the folder.
+        """
+        if name not in {entry.name for entry in self.entries()}:
+            raise ParameterError("recording", name, f"one of those in {self._folder}")
+        return self._folder / name
+
+    def words(self, kind: str, names: Sequence[str]) -> list[str]:
+        """Command that scores, compares or exports recordings, without its program.
+
+        Args:
+            kind: ``score`` or ``export``.
+            names: Of the recordings, at least one; several are compared.
+
+        Raises:
+            ParameterError: A name is that of no recording, or the kind is another.
+        """
+        if kind not in _KIND or not names:
+            raise ParameterError("action", kind, f"one of {', '.join(_KIND)}, with a recording")
+        paths = [str(self.path(name)) for name in names]
+        out = ["--out", f"{paths[0]}.csv"] if kind == "export" else []
+        return [_KIND[kind], *(paths[:1] if kind == "export" else paths), *out]
+
+    def run(self, kind: str, names: Sequence[str]) -> str:
+        """Run such a command with what is left of the processors; what it says."""
+        done = subprocess.run(
+            [*_program(), *self.words(kind, names)], capture_output=True, text=True, check=False
+        )
+        return done.stdout or done.stderr
+
+    def judge(self) -> None:
+        """Go on with the verdict on the newest recording that has none; never waits."""
+        if self._judging is not None:
+            self._take()
+            return
+        waiting = next((entry for entry in self.entries() if entry.is_good is None), None)
+        if waiting is None:
+            return
+        out = Path(tempfile.mkdtemp(prefix="teleop_console_"), "score.json")
+        words = [*_program(), "evaluate", str(self._folder / waiting.name), "--json", str(out)]
+        nothing = subprocess.DEVNULL
+        self._judging = waiting, subprocess.Popen(words, stdout=nothing, stderr=nothing), out
+
+    def rest(self) -> None:
+        """Give up the verdict that is being worked at: a session has the processors now."""
+        if self._judging is not None:
+            _, process, out = self._judging
+            self._judging = None
+            process.kill()
+            process.wait()
+            shutil.rmtree(out.parent)
+
+    def _take(self) -> None:
+        assert self._judging is not None
+        entry, process, out = self._judging
+        if process.poll() is None:
+            return
+        self._judging = None
+        self._known[entry.name, entry.made] = _judged(entry, out)
+        shutil.rmtree(out.parent)
+
+
+def _program() -> list[str]:
+    return ["nice", "-n", "15", sys.executable, "-m", "teleop_core.cli"]
+
+
+def _judged(entry: Entry, out: Path) -> Entry:
+    """Entry with what a score says; one that could not be scored says so."""
+    if not out.is_file():
+        return Entry(entry.name, entry.made, "", "could not be scored: teleop evaluate", False)
+    score = json.loads(out.read_text(encoding="utf-8"))[0]
+    session, verdict = score["session"], score["verdict"]
+    told = [str(session[key]) for key in ("scenario", "robot", "operator") if session.get(key)]
+    return Entry(
+        entry.name, entry.made, " · ".join(told), verdict["text"], verdict["worst"] is None
+    )

@@ -1,0 +1,198 @@
+"""Start page: where a session is chosen, begun and ended, and recordings are replayed and scored.
+
+It is a form of our own, and all that it can say is one request of these few, with words that are
+checked here. The requests are answered by a thread of their own, beside the one of the stop.
+"""
+
+import http
+import queue
+import re
+import threading
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+
+from teleop_console.drivers import Drivers
+from teleop_console.recordings import Recordings
+from teleop_core.base.errors import ParameterError, TeleopError
+
+BAGS = Path("bags")
+"""Folder of the recordings that are listed, and of new ones."""
+ROBOTS = Path("robots")
+"""Folder of the robots that were dropped on the form."""
+_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}\.urdf")
+_LARGEST = 4 * 1024 * 1024  # bytes of a robot's file
+_TRY = 0.25  # for which options are tried before the page is answered [s]
+_LOOK = 0.2  # between looks at verdicts [s]
+Query = Mapping[str, Sequence[str]]
+Body = Callable[[int], bytes]
+Told = tuple[http.HTTPStatus, object]
+"""Status of an answer, and what it says as JSON."""
+
+
+@dataclass(frozen=True)
+class Wish:
+    """What a person at the page wants next.
+
+    Attributes:
+        chosen: Words of a session, see :mod:`~teleop_console.choices`.
+        recording: Recording to replay, in place of a session; None for a session.
+    """
+
+    chosen: Mapping[str, str] = field(default_factory=dict)
+    recording: Path | None = None
+
+
+class StartPage:
+    """What the form shows, and what was asked of it; methods may be called from any thread.
+
+    Args:
+        drivers: Who may begin and end.
+        folder: Where recordings are.
+
+    Attributes:
+        is_open: Whether the form is shown: nothing runs.
+        told: What a person is told: why the last session ended, what a command said.
+    """
+
+    def __init__(self, drivers: Drivers, folder: Path = BAGS) -> None:
+        self.is_open, self.told = False, ""
+        self.recordings = Recordings(folder)
+        self._folder, self._drivers = folder, drivers
+        self._wishes: queue.SimpleQueue[Wish] = queue.SimpleQueue()
+        self._ends = threading.Event()
+        self._runs = threading.Lock()
+        self._last: Mapping[str, str] | None = None
+        self._acts: Mapping[str, Callable[[Query], str]] = {
+            "/begin": self._begin, "/show": self._show, "/run": self._run, "/end": self._end,
+        }  # fmt: skip
+
+    @property
+    def paths(self) -> frozenset[str]:
+        """Paths of its requests."""
+        return frozenset({"/start", "/take", "/robot", *self._acts})
+
+    def wait(self) -> Wish:
+        """Show the form until somebody wants something."""
+        self._ends.clear()
+        self.is_open = True
+        try:
+            self._shown({})  # the first answer is the slowest: before anybody asks
+            while True:
+                try:
+                    return self._wishes.get(timeout=_LOOK)
+                except queue.Empty:
+                    self.recordings.judge()
+        finally:
+            self.is_open = False
+            self.recordings.rest()
+
+    @property
+    def is_ended(self) -> bool:
+        """Whether what runs shall end, and the form come back."""
+        return self._ends.is_set()
+
+    def answer(self, path: str, query: Query, page: int, body: Body = bytes) -> Told:
+        """Answer to a request.
+
+        Args:
+            path: One of :attr:`paths`.
+            query: Its words.
+            page: Page that asks.
+            body: Its body of at most so many bytes; only who may send one is listened to.
+        """
+        try:
+            if path == "/start":
+                return http.HTTPStatus.OK, self._shown(query)
+            if path == "/take":
+                self._drivers.take(page)
+                return http.HTTPStatus.OK, ""
+            if not self._drivers.may_drive(page):
+                return http.HTTPStatus.CONFLICT, "You watch. Take control first."
+            if path == "/robot":
+                return http.HTTPStatus.OK, self._keep(_words(query).get("name", ""), body)
+            return http.HTTPStatus.OK, self._acts[path](query)
+        except (TeleopError, OSError) as error:
+            return http.HTTPStatus.CONFLICT, str(error)
+
+    def _shown(self, query: Query) -> Mapping[str, object]:
+        """All that the form shows for a choice; nothing while something runs: it is costly."""
+        from teleop_console import choices
+
+        if not self.is_open:
+            return {}
+        chosen = choices.checked(_words(query)) or dict(self._last or choices.START)
+        until = time.monotonic() + _TRY
+        fields = [
+            {"name": f.name, "label": f.label,
+             "options": [asdict(option) for option in choices.options(f, chosen, until)]}
+            for f in choices.FIELDS
+        ]  # fmt: skip
+        return {
+            "chosen": chosen, "fields": fields, "refusal": choices.refusal(chosen),
+            "command": choices.command_line(chosen), "is_repeat": chosen == self._last,
+            "recordings": [asdict(entry) for entry in self.recordings.entries()],
+            "folder": str(self._folder), "told": self.told, "is_busy": self._runs.locked(),
+        }  # fmt: skip
+
+    def _begin(self, query: Query) -> str:
+        from teleop_console import choices
+
+        self._insist_open()
+        chosen = choices.checked(_words(query))
+        if reason := choices.refusal(chosen):
+            raise ParameterError("choice", choices.command_line(chosen), f"another: {reason}")
+        self._last, self.told = chosen, ""
+        self._wishes.put(Wish(chosen))
+        return ""
+
+    def _show(self, query: Query) -> str:
+        self._insist_open()
+        self.told = ""
+        self._wishes.put(Wish(recording=self.recordings.path(_words(query).get("name", ""))))
+        return ""
+
+    def _run(self, query: Query) -> str:
+        """Score, compare or export, in a thread; the form shows what came of it."""
+        self._insist_open()
+        kind, names = _words(query).get("kind", ""), tuple(query.get("name", ()))
+        words = self.recordings.words(kind, names)
+        if not self._runs.acquire(blocking=False):
+            raise ParameterError("action", kind, "asked for when the one before has ended")
+        self.told = "$ teleop " + " ".join(words) + "\n…"
+        threading.Thread(target=self._do, args=(kind, names), daemon=True).start()
+        return ""
+
+    def _do(self, kind: str, names: Sequence[str]) -> None:
+        try:
+            said = self.recordings.run(kind, names)
+            self.told = self.told.removesuffix("…") + said
+        finally:
+            self._runs.release()
+
+    def _keep(self, name: str, body: Body) -> str:
+        """Keep the file of a robot under its name; one that is there is not replaced."""
+        self._insist_open()
+        if not _NAME.fullmatch(name):
+            raise ParameterError("name", name, "letters, digits, '.', '_' and '-', then .urdf")
+        data, file = body(_LARGEST), ROBOTS / name
+        if file.exists() and file.read_bytes() != data:
+            raise ParameterError("name", name, f"a new one: {file} is another robot")
+        ROBOTS.mkdir(exist_ok=True)
+        file.write_bytes(data)
+        return str(file)
+
+    def _end(self, query: Query) -> str:
+        del query
+        self._ends.set()
+        return ""
+
+    def _insist_open(self) -> None:
+        if not self.is_open:
+            raise ParameterError("session", "one that runs", "ended before another is begun")
+
+
+def _words(query: Query) -> dict[str, str]:
+    """First value of each word."""
+    return {name: values[0] for name, values in query.items() if values}

@@ -1,0 +1,58 @@
+"""Status: who leads, what to do next, and how old what is seen is."""
+
+import math
+
+import pytest
+
+from teleop_console.link import ArmView, View
+from teleop_console.status import facts, leader, next_step, status_html
+from teleop_core.chain.operators import OPERATORS
+from teleop_core.slave.operation import State
+
+
+def view_of(state: State, *, is_clutched: bool = False) -> View:
+    operation = {"state": float(state), "fault": 0.0}
+    told = {"is_clutched": float(is_clutched), "is_fine": 0.0, "gain": 1.0, "is_fixture_on": 0.0}
+    arm = ArmView(state=told, operation=operation)
+    return View(arms={"": arm}, is_fresh=True)
+
+
+@pytest.mark.parametrize(
+    ("state", "is_clutched", "is_led_here", "told"),
+    [
+        (State.FAULT, False, True, "Initialize"),
+        (State.DISABLED, False, False, "Initialize"),
+        (State.PAUSED, True, True, "Start"),
+        (State.ENABLED, True, True, "drag the stylus"),
+        (State.ENABLED, False, True, ""),
+        (State.ENABLED, True, False, ""),
+    ],
+)
+def test_next_step_is_the_button_that_is_blue_or_the_stylus_or_nothing(
+    state: State, is_clutched: bool, is_led_here: bool, told: str
+) -> None:
+    step = next_step(view_of(state, is_clutched=is_clutched), is_led_here=is_led_here)
+    assert step.startswith(told)
+    assert bool(step) == bool(told)
+
+
+@pytest.mark.parametrize("kind", list(OPERATORS))
+def test_whoever_is_not_the_person_at_the_page_is_said_to_lead(kind: str) -> None:
+    assert bool(leader(kind)) == (kind != "remote")
+
+
+def test_ages_and_rate_are_told_as_far_as_they_are_known() -> None:
+    assert facts(View()) == ""
+    known = View(rate=1000.2, delay=(0.0013, 0.004), age=0.033)
+    assert facts(known) == "1000 ticks/s · command 1.3 ms old · picture 33 ms old"
+    known.delay = (math.nan, math.nan)
+    assert facts(known) == "1000 ticks/s · picture 33 ms old"
+
+
+def test_nothing_is_red_that_is_not_wrong() -> None:
+    for state in State:
+        shown = status_html(view_of(state, is_clutched=True), "wall", "run 1", "next")
+        assert ("t-wrong" in shown) == (state is State.FAULT)
+    silent = view_of(State.ENABLED)
+    silent.is_fresh = False
+    assert "t-wrong" in status_html(silent, "wall", "run 1")
