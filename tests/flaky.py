@@ -30,8 +30,11 @@ def run(arguments: list[str], report: Path) -> dict[str, str]:
     found = {}
     for case in ElementTree.parse(report).iter("testcase"):
         name = f"{case.get('classname', '').replace('.', '/')}.py::{case.get('name')}"
-        bad = [part.tag for part in case if part.tag in {"failure", "error", "skipped"}]
-        found[name] = bad[0] if bad else "passed"
+        bad = [part for part in case if part.tag in {"failure", "error", "skipped"}]
+        found[name] = bad[0].tag if bad else "passed"
+        for part in bad:
+            if part.tag != "skipped":  # a race that was lost is not seen again soon
+                print(f"--- {name}\n{part.text}", flush=True)
     if not found:
         raise SystemExit(f"no test was chosen by: {' '.join(command)}")
     return found

@@ -47,6 +47,7 @@ def client(peer: "Peer") -> StockClient:
     return StockClient.of_slave(peer)
 
 
+@pytest.mark.soak
 def test_a_move_without_names_arrives_busy_on_the_way_and_not_afterwards(peer: "Peer") -> None:
     client = StockClient.of_slave(peer)
     goal = [a + 0.05 for a in MIDDLE]

@@ -12,9 +12,9 @@ from teleop_core.kernels.geometry import Array, rotation, transform
 from teleop_core.robots import Robot, load_robot
 from teleop_core.slave.pair import ArmParameters
 from teleop_lab.calibration.appendix_e import ESCAPE, OFFSET_OF_D3, READ, STEP
+from teleop_lab.drawing import axis, joined, published_points
 from teleop_lab.experiments.bench import Bench
 from teleop_lab.experiments.conditions import RESTING
-from teleop_lab.experiments.drawing import axis, joined, published_points
 from teleop_lab.experiments.experiment import Experiment
 from teleop_lab.experiments.outcome import Findings, Row, absolute
 from teleop_lab.fitting.rests import Mover

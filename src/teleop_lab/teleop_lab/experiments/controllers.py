@@ -18,8 +18,8 @@ from teleop_core.evaluation.figure import (
 from teleop_core.evaluation.published import COARSE, FINE
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot
+from teleop_lab.drawing import DARK, Trace, axis, level, line, points
 from teleop_lab.experiments.bench import Bench, Session, Settings, mean, pooled
-from teleop_lab.experiments.drawing import DARK, Trace, axis, level, line, points
 from teleop_lab.experiments.experiment import Experiment
 from teleop_lab.experiments.joint_steps import StepAnswer, answer_to_steps
 from teleop_lab.experiments.outcome import Findings, Row, percent

@@ -9,8 +9,8 @@ from teleop_core.chain.operators.shapes import minimum_jerk
 from teleop_core.chain.passivity.port import IN, OUT
 from teleop_core.evaluation.figure import FIRST, FIXTURE, SECOND, THIRD, Figure
 from teleop_core.kernels.geometry import Array
+from teleop_lab.drawing import axis, joined, level
 from teleop_lab.experiments.bench import Bench
-from teleop_lab.experiments.drawing import axis, joined, level
 from teleop_lab.experiments.experiment import Experiment
 from teleop_lab.experiments.outcome import Findings, Row, absolute
 from teleop_lab.experiments.transmission import far_settings

@@ -4,9 +4,9 @@ import numpy as np
 
 from teleop_core.evaluation.figure import COMMAND, MEASURED, Figure, time_axis
 from teleop_core.robots import load_robot
+from teleop_lab.drawing import axis, line
 from teleop_lab.experiments.bench import Bench, Session, pooled
 from teleop_lab.experiments.conditions import OURS, PREDICTED
-from teleop_lab.experiments.drawing import axis, line
 from teleop_lab.experiments.experiment import Experiment
 from teleop_lab.experiments.master_slave import MODES, drawn_of
 from teleop_lab.experiments.outcome import Findings, Row, percent

@@ -26,9 +26,9 @@ from teleop_core.evaluation.published import (
 )
 from teleop_core.kernels.geometry import Array, roll_pitch_yaw, rotations_from_quaternions
 from teleop_core.shapes.basis.drawing import edges_of
+from teleop_lab.drawing import FIXTURE, axis, in_planes, in_space, level, line, scene
 from teleop_lab.experiments.bench import Bench, Session, mean, pooled
 from teleop_lab.experiments.conditions import OURS, PREDICTED
-from teleop_lab.experiments.drawing import FIXTURE, axis, in_planes, in_space, level, line, scene
 from teleop_lab.experiments.experiment import Experiment
 from teleop_lab.experiments.outcome import Findings, Row, Tolerance, absolute, factor, percent
 

@@ -4,8 +4,8 @@ import numpy as np
 
 from teleop_core.evaluation.figure import FIRST, THIRD, Figure
 from teleop_core.robots import load_robot
+from teleop_lab.drawing import PUBLISHED, in_space, scene
 from teleop_lab.experiments.bench import Bench
-from teleop_lab.experiments.drawing import PUBLISHED, in_space, scene
 from teleop_lab.experiments.experiment import Experiment
 from teleop_lab.experiments.outcome import EXACT, Findings, Row, absolute
 from teleop_machines.mma_models import JOINTS, LINKS, frames, model_table

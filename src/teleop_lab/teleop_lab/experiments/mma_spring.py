@@ -5,8 +5,8 @@ import math
 import numpy as np
 
 from teleop_core.evaluation.figure import DARK, SECOND, THIRD, Figure
+from teleop_lab.drawing import axis, line, published_points
 from teleop_lab.experiments.bench import Bench
-from teleop_lab.experiments.drawing import axis, line, published_points
 from teleop_lab.experiments.experiment import Experiment
 from teleop_lab.experiments.outcome import EXACT, Findings, Row, absolute, percent
 from teleop_machines import mma_balance

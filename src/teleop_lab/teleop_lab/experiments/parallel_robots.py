@@ -3,8 +3,8 @@
 import numpy as np
 
 from teleop_core.evaluation.figure import FIRST, SECOND, Figure
+from teleop_lab.drawing import axis, line
 from teleop_lab.experiments.bench import Bench
-from teleop_lab.experiments.drawing import axis, line
 from teleop_lab.experiments.experiment import Experiment
 from teleop_lab.experiments.outcome import EXACT, Findings, Row
 from teleop_machines import mobility

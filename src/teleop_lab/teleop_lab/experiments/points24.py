@@ -11,9 +11,9 @@ from teleop_core.chain.operators.tour import TourParameters
 from teleop_core.evaluation.figure import COMMAND, FIRST, MEASURED, Figure
 from teleop_core.graph.signals import DT
 from teleop_core.kernels.geometry import Array
+from teleop_lab.drawing import axis, line
 from teleop_lab.experiments.bench import Bench, Session, Settings, mean
 from teleop_lab.experiments.conditions import OURS, PREDICTED
-from teleop_lab.experiments.drawing import axis, line
 from teleop_lab.experiments.experiment import Experiment
 from teleop_lab.experiments.outcome import EXACT, Findings, Row
 

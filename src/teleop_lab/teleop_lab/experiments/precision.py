@@ -10,9 +10,9 @@ from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot
 from teleop_core.session.configuration import configure
 from teleop_core.slave.pair import ArmParameters
+from teleop_lab.drawing import axis, points, published_points
 from teleop_lab.experiments.bench import Bench, Settings
 from teleop_lab.experiments.conditions import OURS, PREDICTED
-from teleop_lab.experiments.drawing import axis, points, published_points
 from teleop_lab.experiments.experiment import Experiment
 from teleop_lab.experiments.outcome import Findings, Row, factor, percent
 from teleop_lab.fitting.rest_table import PUBLISHED, RestTable, read_rests

@@ -11,8 +11,8 @@ from teleop_core.chain.operators.human import HumanParameters
 from teleop_core.chain.operators.shapes import minimum_jerk
 from teleop_core.evaluation.figure import FIRST, FIXTURE, MEASURED, SECOND, THIRD, Figure
 from teleop_core.kernels.geometry import Array
+from teleop_lab.drawing import PUBLISHED, axis, joined
 from teleop_lab.experiments.bench import Bench, Settings
-from teleop_lab.experiments.drawing import PUBLISHED, axis, joined
 from teleop_lab.experiments.experiment import Experiment
 from teleop_lab.experiments.outcome import Findings, Row, absolute
 from teleop_lab.experiments.transmission import CHANNELS, Way, far_settings

@@ -9,8 +9,8 @@ from teleop_core.graph.signals import DT
 from teleop_core.kernels.filters import lag_step
 from teleop_core.kernels.geometry import Array
 from teleop_core.slave.slave import ReferenceFilterParameters
+from teleop_lab.drawing import axis, level, line, points
 from teleop_lab.experiments.bench import Bench, Session, Settings
-from teleop_lab.experiments.drawing import axis, level, line, points
 from teleop_lab.experiments.experiment import Experiment
 from teleop_lab.experiments.outcome import EXACT, Findings, Row, absolute, factor
 

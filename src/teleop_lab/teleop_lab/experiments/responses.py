@@ -22,9 +22,9 @@ from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot
 from teleop_core.slave.pair import ArmParameters, SimulatedArm
 from teleop_core.slave.trajectory import cubic_move, shortest_move_time
+from teleop_lab.drawing import axis, level, line
 from teleop_lab.experiments.bench import Bench, Settings
 from teleop_lab.experiments.conditions import OURS, PREDICTED
-from teleop_lab.experiments.drawing import axis, level, line
 from teleop_lab.experiments.experiment import Experiment
 from teleop_lab.experiments.outcome import Findings, Row, factor
 from teleop_lab.fitting.rest_table import PUBLISHED, read_rests

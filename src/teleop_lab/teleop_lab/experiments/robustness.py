@@ -9,9 +9,9 @@ from teleop_core.evaluation.figure import COMMAND, FIRST, FIXTURE, MEASURED, SEC
 from teleop_core.robots import load_robot
 from teleop_core.slave.pair import SimulatedArm
 from teleop_core.slave.plants.hardware import faults_of
+from teleop_lab.drawing import DARK, axis
 from teleop_lab.experiments.bench import Bench, Settings
 from teleop_lab.experiments.controllers import tracking_of
-from teleop_lab.experiments.drawing import DARK, axis
 from teleop_lab.experiments.experiment import Experiment
 from teleop_lab.experiments.outcome import Findings, Row
 

@@ -4,9 +4,9 @@ import numpy as np
 
 from teleop_core.evaluation.figure import FIRST, SECOND, Figure
 from teleop_core.slave.plants.hardware import FAULTS
+from teleop_lab.drawing import axis
 from teleop_lab.experiments.bench import Bench, Session, Settings
 from teleop_lab.experiments.conditions import PREDICTED
-from teleop_lab.experiments.drawing import axis
 from teleop_lab.experiments.experiment import Experiment
 from teleop_lab.experiments.outcome import Findings, Row
 

@@ -8,8 +8,8 @@ import numpy as np
 from teleop_core.chain.master.device import DeviceParameters
 from teleop_core.evaluation.figure import DARK, FIRST, FIXTURE, SECOND, THIRD, Figure
 from teleop_core.graph.signals import DT
+from teleop_lab.drawing import PUBLISHED, axis, joined, line
 from teleop_lab.experiments.bench import Bench, Settings
-from teleop_lab.experiments.drawing import PUBLISHED, axis, joined, line
 from teleop_lab.experiments.experiment import Experiment
 from teleop_lab.experiments.one_axis import Grip, exact_boundary, found_boundary
 from teleop_lab.experiments.outcome import Findings, Row, percent

@@ -7,8 +7,8 @@ import numpy as np
 from teleop_core.evaluation.figure import FIRST, SECOND, Figure
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots.arms.rcrt1_hardware import tendon_joint_angles, tendon_motor_angles
+from teleop_lab.drawing import axis, line
 from teleop_lab.experiments.bench import Bench
-from teleop_lab.experiments.drawing import axis, line
 from teleop_lab.experiments.experiment import Experiment
 from teleop_lab.experiments.outcome import EXACT, Findings, Row, percent
 

@@ -8,8 +8,8 @@ import numpy as np
 
 from teleop_core.evaluation.figure import FIRST, FIXTURE, MEASURED, SECOND, THIRD, Figure
 from teleop_core.kernels.geometry import Array
+from teleop_lab.drawing import PUBLISHED, Trace, axis, level, line, points
 from teleop_lab.experiments.bench import Bench
-from teleop_lab.experiments.drawing import PUBLISHED, Trace, axis, level, line, points
 from teleop_lab.experiments.experiment import Experiment
 from teleop_lab.experiments.outcome import Findings, Row, absolute, percent
 from teleop_lab.experiments.transmission import AIR, Cell, Way, measure_cells, predicted_hybrid

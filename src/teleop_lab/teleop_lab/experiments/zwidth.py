@@ -9,8 +9,8 @@ import numpy as np
 from teleop_core.chain.master.device import DeviceParameters
 from teleop_core.evaluation.figure import FIRST, FIXTURE, SECOND, Figure
 from teleop_core.graph.signals import DT
+from teleop_lab.drawing import Trace, axis, level, line, points
 from teleop_lab.experiments.bench import Bench
-from teleop_lab.experiments.drawing import Trace, axis, level, line, points
 from teleop_lab.experiments.experiment import Experiment
 from teleop_lab.experiments.one_axis import Grip, sampled_boundary
 from teleop_lab.experiments.outcome import Findings, Row, absolute, percent

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from teleop_core.evaluation.figure import FIRST, FIXTURE, SECOND, THIRD
-from teleop_lab.experiments.drawing import axis
+from teleop_lab.drawing import axis
 from teleop_lab.studies.study import SEED, is_number
 from teleop_lab.studies.summary import conditions, differences, mean_of
 from teleop_lab.studies.tuning import Range

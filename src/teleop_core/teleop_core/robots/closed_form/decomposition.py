@@ -51,9 +51,13 @@ def _closed(ik: object, ik_all: object) -> Kernels:
     return Kernels(fk=dh_kernels.fk, jacobian=dh_kernels.jacobian, ik=ik, ik_all=ik_all)  # type: ignore[arg-type]
 
 
+def _searched() -> Kernels:  # a function: mypy cannot tell the kernels' type while it reads modules
+    return _closed(dh_kernels.ik, dh_kernels.ik_all)
+
+
 SEARCH = Solution(
     text="search: damped least squares from the seed, then from 24 starts or more",
-    kernels=_closed(dh_kernels.ik, dh_kernels.ik_all),
+    kernels=_searched(),
 )
 
 
