@@ -95,7 +95,6 @@ setup(
         files("config/arms", "*.yaml"),
         files("config/masters", "*.yaml"),
         files("config/studies", "*.yaml"),
-        files("config/worlds", "*.yaml"),
         files("launch", "*.launch.py"),
     ],
     entry_points={

@@ -145,10 +145,14 @@ def test_a_person_who_sees_palpates_tissue_as_its_force_says() -> None:
 
 
 def test_a_person_who_sees_leads_a_peg_into_its_hole_and_hard_walls_are_felt() -> None:
+    hole: dict[str, Any] = {
+        **SEEING,
+        "task": "insert",
+        "task.insert.place": (0.258, -0.2749, -0.0512),
+        "task.insert.axis": (-0.9178, 0.0, 0.3971),
+    }
     easy, hard = (
-        tc.run(
-            "peg", duration=12.0, settings={**SEEING, "task": "insert", "task.insert.most": most}
-        )
+        tc.run("peg", duration=12.0, settings={**hole, "task.insert.most": most})
         for most in (3.0, 0.05)
     )
     depth = (easy["slave/true_cp"].values[:, :3] - [0.258, -0.2749, -0.0512]) @ [

@@ -101,6 +101,7 @@ METRICS: Registry[type[Metric]] = Registry(
         "remote_centre": f"{_FOLDER}.remote_centre:RemoteCentreMetric",
         "jaw": f"{_FOLDER}.jaw:JawMetric",
         "transfer": f"{_FOLDER}.transfer:TransferMetric",
+        "step_s": f"{_FOLDER}.steps:StepsMetric",
         "task": f"{_FOLDER}.task:TaskMetric",
         "display": f"{_FOLDER}.task:DisplayMetric",
         "force_sensing": f"{_FOLDER}.force_sensing:ForceSensingMetric",

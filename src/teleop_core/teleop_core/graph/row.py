@@ -115,6 +115,8 @@ class Row(Fields):
     task_state_ns: int
     first_slave_jaw_board: Array
     first_slave_jaw_board_ns: int
+    first_slave_jaw_grip: Array
+    first_slave_jaw_grip_ns: int
     second_slave_true_cp: Array
     second_slave_true_cp_ns: int
     second_slave_jaw_grip: Array

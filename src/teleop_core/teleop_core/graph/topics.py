@@ -405,6 +405,7 @@ none, and the pull of a peg on the gripped one, across [N]. Then the middle of e
 zeros for one that is not there."""
 FIRST_JAW_BOARD = replace(SLAVE_JAW_BOARD, name=f"first/{SLAVE_JAW_BOARD.name}")
 """Port of the second arm at which the first one's topic arrives; see :meth:`Graph.links`."""
+FIRST_JAW_GRIP = replace(SLAVE_JAW_GRIP, name=f"first/{SLAVE_JAW_GRIP.name}")
 SECOND_TRUE_CP = replace(SLAVE_TRUE_CP, name=f"second/{SLAVE_TRUE_CP.name}")
 """Port of the first arm at which the second one's topic arrives; so is the next one."""
 SECOND_JAW_GRIP = replace(SLAVE_JAW_GRIP, name=f"second/{SLAVE_JAW_GRIP.name}")
@@ -437,14 +438,14 @@ TASK_STATE = Topic(
     "task/state", Kind.NUMBERS, SAMPLED, "slave_base", is_seldom=True,
     columns=(
         "number", "act", "goal_x", "goal_y", "goal_z", "width", "attempts", "successes", "errors",
-        "way", "off", "time", "miss",
+        "way", "off", "time", "miss", "step",
     ),
 )  # fmt: skip
 """What a task asks for now, and what came of it: how many goals there were, what to do at this one
 (:class:`~teleop_core.chain.tasks.Act`), where it is and how wide [m]; attempts, successes and
 errors so far; of the last attempt: the way to its goal [m], how far the tip was beyond the goal
 along it [m], the time it took [s], and what was wrong with it
-(:class:`~teleop_core.chain.tasks.Miss`)."""
+(:class:`~teleop_core.chain.tasks.Miss`); the step of the present one, where a task has several."""
 OPERATOR_SERVO_CP = Topic("operator/servo_cp", Kind.POSE, SAMPLED, "master_base")
 """Where a person who is elsewhere wants the stylus, at any rate: ``operator=remote`` leads the hand
 there. Silence lets go. As ``operator/buttons`` it comes from outside: no stage writes it, and it is
@@ -481,7 +482,7 @@ JAW_TOPICS = (
     SLAVE_JAW_MEASURED_JS, SLAVE_JAW_GRIP, SLAVE_JAW_OBJECT_CP, SLAVE_JAW_BOARD,
 )  # fmt: skip
 """Topics of a session with a jaw, the third with a network too."""
-PORTS_BETWEEN_ARMS = (FIRST_JAW_BOARD, SECOND_TRUE_CP, SECOND_JAW_GRIP)
+PORTS_BETWEEN_ARMS = (FIRST_JAW_BOARD, FIRST_JAW_GRIP, SECOND_TRUE_CP, SECOND_JAW_GRIP)
 """Ports of one arm for topics of another; no stage writes topics of these names."""
 TASK_TOPICS = (DISPLAY_MEASURED_CP, TASK_STATE)
 """Topics of a session with a display, and of one with a task."""

@@ -127,6 +127,7 @@ class Observer:
         self._half_seen = math.inf  # when half of the last way was seen [s]
         self._is_still = False  # whether its end was seen
         self._close = -math.inf  # when the hand closes, and for a moment [s]
+        self._holds, self._turn = False, -math.inf  # whether the hand stays closed, and since when
         self._lag = -1.0  # how late the last motion was seen, beside the eye [s]; < 0: not known
 
     def __call__(self, times: Array) -> Array:
@@ -137,7 +138,8 @@ class Observer:
         self._draw(times, rows)
         if self._seen.task[_NUMBER] > 0.0 and self._glances and self._decide(now, until):
             self._draw(times, rows)
-        rows[:, 12] = (times >= self._close) & (times < self._close + _PRESS_TIME)
+        is_pressing = (times >= self._close) & (times < self._close + _PRESS_TIME)
+        rows[:, 12] = is_pressing | np.where(times >= self._turn, self._holds, not self._holds)
         return rows
 
     def _draw(self, times: Array, rows: Array) -> None:
@@ -174,7 +176,7 @@ class Observer:
         """
         p, task = self._p, self._seen.task
         width, act = float(task[_WIDTH]), int(task[_ACT])
-        if task[_NUMBER] != self._number and act == Act.PRESS:
+        if task[_NUMBER] != self._number and act != Act.PASS:
             self._number = float(task[_NUMBER])
             self._next = now + p.reaction
         when = max(self._next, self._seen_at(until), now)
@@ -186,8 +188,8 @@ class Observer:
         if act == Act.PASS:
             way = way + self._speed_of_goal() * (p.eye + p.least_time)
         distance = float(length(way))
-        if act == Act.PRESS and distance <= 0.5 * width:
-            self._press(when)
+        if act != Act.PASS and distance <= 0.5 * width:
+            self._press(when, act)
         elif distance > _SHORTEST * width:
             self._begin(when, glance.tip, way, distance, width, act)
             return True
@@ -267,11 +269,14 @@ class Observer:
             and missed * p.error_cost < max(self._lag, 0.0) + p.eye
             and p.error_cost > 0.0
         ):
-            self._press(now + duration)
+            self._press(now + duration, act)
 
-    def _press(self, when: float) -> None:
-        """Close the hand at a time [s], and do nothing else until there is another goal."""
-        self._close, self._next = when, math.inf
+    def _press(self, when: float, act: int) -> None:
+        """Close or open the hand at a time [s]; a press waits for another goal."""
+        if act == Act.PRESS:
+            self._close, self._next = when, math.inf
+        elif self._holds != (act == Act.GRIP):
+            self._holds, self._turn = act == Act.GRIP, when
 
     def _speed_of_goal(self) -> Array:
         """Velocity of the goal (3,) [m/s] as it is seen."""

@@ -16,7 +16,7 @@ from numba import types
 
 from teleop_core.base.errors import PartError
 from teleop_core.base.registry import Registry, part_check, places, tried
-from teleop_core.graph.topics import TASK_STATE
+from teleop_core.graph.topics import JAW_OBJECTS, TASK_STATE
 from teleop_core.kernels import pointer
 from teleop_core.kernels.geometry import Array
 from teleop_core.kernels.parts import fenced, is_whole, numbers_of
@@ -28,9 +28,15 @@ JUDGE = types.void(_ROW, _ROW, _ROW, _ROW)
 """Signature of a task's kernel, so that one compiled stage serves every task."""
 MEMORY = 64
 """Numbers that a task remembers."""
-SCENE = ("time", "x", "y", "z", "qw", "qx", "qy", "qz", "closing", "fx", "fy", "fz")
+SCENE = (
+    "time", "x", "y", "z", "qw", "qx", "qy", "qz", "closing", "fx", "fy", "fz", "is_second",
+    "grips", "other_grips", "transferred", "dropped",
+    *(f"{axis}{i}" for i in range(JAW_OBJECTS) for axis in "xyz"),
+)  # fmt: skip
 """What a task sees: time since it began [s]; the tip's true pose in slave_base [m]; how far the
-hand closes, 0 to 1; the world's force on the tip [N]."""
+hand closes, 0 to 1; the world's force on the tip [N]; whether the arm is the second one; whether
+its jaw grips, and that of the other arm; how many blocks came onto another peg, and onto none; the
+middle of each block [m], zero for one that is not there."""
 
 
 class Act(IntEnum):
@@ -38,6 +44,8 @@ class Act(IntEnum):
 
     PRESS = 0  # close the hand there, as a mouse is clicked
     PASS = 1  # be there
+    GRIP = 2  # be there, and have the hand closed from then on
+    LET_GO = 3  # be there, and have it open from then on
 
 
 class Miss(IntEnum):
@@ -98,7 +106,7 @@ def _try(part: Task) -> None:
 TASKS: Registry[Task] = Registry(
     "task",
     "tasks",
-    places("teleop_core.chain.tasks", "follow insert palpate point reach trace"),
+    places("teleop_core.chain.tasks", "follow insert palpate peg_transfer point reach trace"),
     part_check("task", Task, "judge"),
     _try,
 )

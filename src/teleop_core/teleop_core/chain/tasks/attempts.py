@@ -18,7 +18,7 @@ _PASS = int(Act.PASS)
 _SINCE, _CLOSED = KEPT + 3, KEPT + 4
 _OPENS, _CLOSES = 0.4, 0.6  # closing at which a hand counts as open and closed again
 (
-    _NUMBER, _ACT, _GOAL, _, _, _WIDTH, _ATTEMPTS, _SUCCESSES, _ERRORS, _WAY, _OFF, _TIME, _MISS
+    _NUMBER, _ACT, _GOAL, _, _, _WIDTH, _ATTEMPTS, _SUCCESSES, _ERRORS, _WAY, _OFF, _TIME, _MISS, _
 ) = range(len(TASK_STATE.columns))  # fmt: skip
 _NONE, _BESIDE, _LATE, _FORCE = (int(m) for m in (Miss.NONE, Miss.BESIDE, Miss.LATE, Miss.FORCE))
 _PUSH = SCENE.index("fx")
@@ -36,13 +36,19 @@ def was_pressed(memory: Array, closing: float) -> bool:
 
 
 @inner
-def begin_goal(
-    memory: Array, scene: Array, state: Array, act: int, x: float, y: float, z: float, width: float
-) -> None:
-    """Set the next goal at a place [m], as wide as it is [m]."""
+def move_goal(state: Array, act: int, x: float, y: float, z: float, width: float) -> None:
+    """Set the next goal of the same attempt at a place [m], as wide as it is [m]."""
     state[_NUMBER] += 1.0
     state[_ACT], state[_WIDTH] = float(act), width
     state[_GOAL], state[_GOAL + 1], state[_GOAL + 2] = x, y, z
+
+
+@inner
+def begin_goal(
+    memory: Array, scene: Array, state: Array, act: int, x: float, y: float, z: float, width: float
+) -> None:
+    """Set the goal of the next attempt at a place [m], as wide as it is [m]."""
+    move_goal(state, act, x, y, z, width)
     for i in range(3):
         memory[KEPT + i] = scene[1 + i]
     memory[_SINCE] = scene[0]
@@ -58,6 +64,12 @@ def is_at_goal(scene: Array, state: Array) -> bool:
 
 
 @inner
+def waited(memory: Array, scene: Array) -> float:
+    """Time since the attempt began [s]."""
+    return float(scene[0] - memory[_SINCE])
+
+
+@inner
 def end_attempt(memory: Array, scene: Array, state: Array, miss: int) -> None:
     """Count an attempt that ended where the tip is now, with a :class:`Miss` or without one."""
     way, along = 0.0, 0.0
@@ -69,7 +81,7 @@ def end_attempt(memory: Array, scene: Array, state: Array, miss: int) -> None:
     state[_ATTEMPTS] += 1.0
     state[_SUCCESSES if miss == _NONE else _ERRORS] += 1.0
     state[_WAY], state[_OFF] = way, along / max(way, 1e-12)
-    state[_TIME], state[_MISS] = scene[0] - memory[_SINCE], float(miss)
+    state[_TIME], state[_MISS] = waited(memory, scene), float(miss)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -93,7 +105,7 @@ def failed(numbers: Array, memory: Array, scene: Array) -> int:
         square += scene[_PUSH + i] * scene[_PUSH + i]
     if math.sqrt(square) > numbers[1]:
         return _FORCE
-    return _LATE if scene[0] - memory[_SINCE] > numbers[2] else _NONE
+    return _LATE if waited(memory, scene) > numbers[2] else _NONE
 
 
 @inner

@@ -4,7 +4,13 @@ from dataclasses import dataclass
 
 from teleop_core.base.parameters import parameter
 from teleop_core.chain.tasks import Act, Miss, Task
-from teleop_core.chain.tasks.attempts import begin_goal, end_attempt, is_at_goal, tell_attempt
+from teleop_core.chain.tasks.attempts import (
+    begin_goal,
+    end_attempt,
+    is_at_goal,
+    tell_attempt,
+    waited,
+)
 from teleop_core.kernels import kernel
 from teleop_core.kernels.geometry import Array
 
@@ -35,14 +41,14 @@ def reach_judge(numbers: Array, memory: Array, scene: Array, state: Array) -> No
 
     Goals fill the box evenly, as the additive recurrence of Roberts 2018 does.
 
-    ``memory`` holds the middle of the box (3,) and when the goal was set [s].
+    ``memory`` holds the middle of the box (3,).
     """
     if state[0] == 0.0:
         for i in range(3):
             memory[i] = scene[1 + i]
     elif is_at_goal(scene, state):
         tell_attempt(memory, scene, state)
-    elif scene[0] - memory[3] >= numbers[4]:
+    elif waited(memory, scene) >= numbers[4]:
         end_attempt(memory, scene, state, _LATE)
     else:
         return
@@ -50,7 +56,6 @@ def reach_judge(numbers: Array, memory: Array, scene: Array, state: Array) -> No
     goal_x = memory[0] + numbers[0] * ((0.5 + at * _STEPS[0]) % 1.0 - 0.5)
     goal_y = memory[1] + numbers[1] * ((0.5 + at * _STEPS[1]) % 1.0 - 0.5)
     goal_z = memory[2] + numbers[2] * ((0.5 + at * _STEPS[2]) % 1.0 - 0.5)
-    memory[3] = scene[0]
     begin_goal(memory, scene, state, _PASS, goal_x, goal_y, goal_z, numbers[3])
 
 

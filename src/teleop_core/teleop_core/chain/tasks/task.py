@@ -11,7 +11,11 @@ from teleop_core.graph.row import Row
 from teleop_core.graph.signals import DT, STATE, assign
 from teleop_core.graph.stage import RunningStage, Stage
 from teleop_core.graph.topics import (
+    FIRST_JAW_GRIP,
     HAND_JAW,
+    SECOND_JAW_GRIP,
+    SLAVE_JAW_BOARD,
+    SLAVE_JAW_GRIP,
     SLAVE_TRUE_CF,
     SLAVE_TRUE_CP,
     TASK_STATE,
@@ -22,6 +26,9 @@ from teleop_core.kernels.fields import Fields, record
 from teleop_core.kernels.geometry import Array
 
 _IS_FOLLOWING = STATE["is_following"]
+_JAWS = (SLAVE_JAW_GRIP, FIRST_JAW_GRIP, SECOND_JAW_GRIP, SLAVE_JAW_BOARD)
+_GRIPS, _BOARD = SLAVE_JAW_GRIP.columns.index("is_gripped"), SLAVE_JAW_BOARD.columns.index("x0")
+_SECOND, _FIRST_BLOCK = SCENE.index("is_second"), SCENE.index("x0")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -68,6 +75,13 @@ def task_step(p: TaskState, s: TaskState, part: Part, row: Row, dt: float) -> No
     scene[8] = row.hand_jaw[0]
     for i in range(3):
         scene[9 + i] = row.slave_true_cf[i]
+    is_second = row.first_slave_jaw_grip_ns > 0
+    others = row.first_slave_jaw_grip if is_second else row.second_slave_jaw_grip
+    scene[_SECOND] = 1.0 if is_second else 0.0
+    scene[_SECOND + 1], scene[_SECOND + 2] = row.slave_jaw_grip[_GRIPS], others[_GRIPS]
+    scene[_SECOND + 3], scene[_SECOND + 4] = row.slave_jaw_board[0], row.slave_jaw_board[1]
+    for i in range(scene.shape[0] - _FIRST_BLOCK):
+        scene[_FIRST_BLOCK + i] = row.slave_jaw_board[_BOARD + i]
     part.judge(part.numbers, part.memory, scene, row.task_state)
 
 
@@ -99,9 +113,9 @@ class RunningTask(RunningStage):
 TASK = Stage(
     "task",
     TaskParameters,
-    reads=(SLAVE_TRUE_CP, HAND_JAW, TELEOP_STATE, SLAVE_TRUE_CF),
+    reads=(SLAVE_TRUE_CP, HAND_JAW, TELEOP_STATE, SLAVE_TRUE_CF, *_JAWS),
     writes=(TASK_STATE,),
-    late=(HAND_JAW, TELEOP_STATE),
-    optional=(SLAVE_TRUE_CF,),
+    late=(HAND_JAW, TELEOP_STATE, FIRST_JAW_GRIP, SECOND_JAW_GRIP),
+    optional=(SLAVE_TRUE_CF, *_JAWS),
     make=RunningTask,
 )

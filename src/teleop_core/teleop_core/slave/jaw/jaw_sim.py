@@ -26,6 +26,8 @@ from teleop_core.slave.jaw.grip import (
     tell_board,
 )
 
+_OTHERS = (topics.FIRST_JAW_BOARD, topics.SECOND_TRUE_CP, topics.SECOND_JAW_GRIP)
+
 
 @dataclass(frozen=True, kw_only=True)
 class GripObjectParameters:
@@ -190,14 +192,14 @@ class JawSim(RunningStage):
 JAW_SIM = Stage(
     "jaw_sim",
     JawSimParameters,
-    reads=(topics.SLAVE_JAW_SETPOINT_JS, topics.SLAVE_TRUE_CP, *topics.PORTS_BETWEEN_ARMS),
-    late=topics.PORTS_BETWEEN_ARMS,
+    reads=(topics.SLAVE_JAW_SETPOINT_JS, topics.SLAVE_TRUE_CP, *_OTHERS),
+    late=_OTHERS,
     writes=(
         topics.SLAVE_JAW_MEASURED_JS,
         topics.SLAVE_JAW_GRIP,
         topics.SLAVE_JAW_OBJECT_CP,
         topics.SLAVE_JAW_BOARD,
     ),
-    optional=(topics.SLAVE_TRUE_CP, *topics.PORTS_BETWEEN_ARMS),
+    optional=(topics.SLAVE_TRUE_CP, *_OTHERS),
     make=JawSim,
 )

@@ -1,0 +1,36 @@
+"""Steps: how long each step of a transfer took."""
+
+import numpy as np
+
+from teleop_core.chain.tasks.peg_transfer import STEPS
+from teleop_core.evaluation.context import Context
+from teleop_core.evaluation.metric import Key, Metric
+from teleop_core.evaluation.windows import Window
+from teleop_core.graph.topics import TASK_STATE
+
+_ATTEMPTS, _STEP = (TASK_STATE.columns.index(name) for name in ("attempts", "step"))
+
+
+class StepsMetric(Metric):
+    """Mean time of each step over the attempts at a task that has steps, [s]."""
+
+    name = "step_s"
+    keys = (Key(f"step_s.{'|'.join(STEPS[1:])}", "s", "mean time of this step of a transfer"),)
+    topics = (TASK_STATE,)
+
+    def __init__(self, _: Context) -> None:
+        self._times, self._last, self._tried = np.zeros(len(STEPS)), (0, 0), 0.0
+
+    def add(self, window: Window) -> None:
+        """Take one window; a step lasts until the sample that tells another one."""
+        told, (log_ns, step) = window.samples(TASK_STATE), self._last
+        for ns, row in zip(told.log_ns.tolist(), told.values, strict=True):
+            self._times[step] += 1e-9 * (ns - (log_ns or ns))
+            log_ns, step, self._tried = ns, int(row[_STEP]), row[_ATTEMPTS]
+        self._last = log_ns, step
+
+    def values(self) -> dict[str, float | None]:
+        """What ``keys`` name; None without a step, or before the end of the first transfer."""
+        count = self._tried if self._times[1:].any() else 0.0
+        means = [float(time) / count if count else None for time in self._times[1:]]
+        return dict(zip(STEPS[1:], means, strict=True))
