@@ -220,6 +220,16 @@ def test_the_sink_for_mlflow_logs_a_run_for_each_session_or_says_what_it_needs(
         assert re.fullmatch(r"4 runs logged to sqlite.*\n", done.stdout)
 
 
+def test_learning_needs_its_library_and_says_so_or_gets_better(tmp_path: Path) -> None:
+    command = [sys.executable, str(EXAMPLES.parent / "examples/learn_reach.py"), "1500"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    if find_spec("stable_baselines3") is None:
+        assert done.returncode == 1
+        assert "pip install stable-baselines3" in done.stderr
+    else:
+        assert re.search(r"after 1500 steps: \d+ %", done.stdout), done.stderr
+
+
 def test_own_task_takes_longer_the_later_the_slave_is_seen(tmp_path: Path) -> None:
     soon, late = numbers(r"([\d.]+) s each", run("own_task", tmp_path))
     assert late > soon + 0.1

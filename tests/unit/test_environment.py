@@ -8,6 +8,7 @@ import pytest
 
 gymnasium = pytest.importorskip("gymnasium", reason="Gymnasium is not installed")
 NAME = "teleop_lab.environment:teleop_core/Reach-v0"
+TRANSFER = "teleop_lab.environment:teleop_core/PegTransfer-v0"
 
 
 def led(env: Any, seed: int) -> tuple[bool, int, list[float]]:
@@ -22,10 +23,11 @@ def led(env: Any, seed: int) -> tuple[bool, int, list[float]]:
     return False, 500, rewards
 
 
-def test_gymnasium_finds_no_fault_with_it() -> None:
+@pytest.mark.parametrize("name", [NAME, TRANSFER])
+def test_gymnasium_finds_no_fault_with_it(name: str) -> None:
     from gymnasium.utils.env_checker import check_env
 
-    env = gymnasium.make(NAME)
+    env = gymnasium.make(name)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         warnings.filterwarnings("ignore", message=".*infinity.*")
@@ -54,3 +56,28 @@ def test_a_late_display_makes_it_slower() -> None:
     late = gymnasium.make(NAME, settings={"display.latency": 0.3})
     soon = gymnasium.make(NAME, settings={"display.latency": 0.0})
     assert sum(led(late, s)[1] for s in range(3)) > sum(led(soon, s)[1] for s in range(3))
+
+
+def test_a_hand_that_goes_where_each_step_says_brings_all_blocks_to_their_pegs() -> None:
+    env = gymnasium.make(TRANSFER)
+    seen, _ = env.reset(seed=1)
+    is_over = is_late = False
+    rewards, info = [], {}
+    while not (is_over or is_late):
+        jaw = 1.0 if seen[11] > 0.0 else -1.0
+        action = np.append(np.clip(3.0 * seen[:3], -1.0, 1.0), jaw).astype(np.float32)
+        seen, reward, is_over, is_late, info = env.step(action)
+        rewards.append(reward)
+    assert (info["is_success"], info["successes"], is_late) == (True, 3, False)
+    assert sum(reward > 15.0 for reward in rewards) == 3
+
+
+def test_a_jaw_that_never_closes_transfers_nothing_and_runs_out_of_time() -> None:
+    env = gymnasium.make(TRANSFER, settings={"task.peg_transfer.longest": 2.0})
+    seen, _ = env.reset(seed=1)
+    is_over, info = False, {}
+    while not is_over:
+        action = np.append(np.clip(3.0 * seen[:3], -1.0, 1.0), -1.0).astype(np.float32)
+        seen, _, is_over, is_late, info = env.step(action)
+        assert not is_late
+    assert (info["is_success"], info["successes"]) == (False, 0)

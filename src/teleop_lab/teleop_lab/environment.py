@@ -1,4 +1,4 @@
-"""Environment: a session as a Gymnasium environment, ``teleop_core/Reach-v0``.
+"""Environments: tasks as Gymnasium environments, ``teleop_core/Reach-v0`` and ``PegTransfer-v0``.
 
 >>> import gymnasium
 >>> env = gymnasium.make("teleop_lab.environment:teleop_core/Reach-v0")
@@ -16,18 +16,86 @@ from numpy.typing import NDArray
 import teleop_core as tc
 from teleop_core.base.parameters import build, values_of
 from teleop_core.chain.mapping.parameters import axis_map
+from teleop_core.chain.tasks import Act
 from teleop_core.chain.tasks.task import TaskParameters
 from teleop_core.graph.topics import TASK_STATE
 from teleop_core.session.api import Setting
 
 Observed = NDArray[np.float32]
-_GOAL, _SUCCESSES = (TASK_STATE.columns.index(name) for name in ("goal_x", "successes"))
+_ACT, _GOAL, _ATTEMPTS, _SUCCESSES, _STEP = (
+    TASK_STATE.columns.index(name) for name in ("act", "goal_x", "attempts", "successes", "step")
+)
 _PERIOD = 0.02  # of a step [s]
 _SCALE = 0.02
 """Length that is 1 in an observation [m]."""
+_BLOCKS = 3
 
 
-class ReachEnv(gymnasium.Env[Observed, Observed]):
+class _TaskEnv(gymnasium.Env[Observed, Observed]):
+    """A task with a hand that actions lead, and a jaw if there is one."""
+
+    metadata = {"render_modes": []}  # noqa: RUF012 - gymnasium's own declaration
+
+    def __init__(
+        self, scenario: str, given: Mapping[str, Setting], reach: float, *, has_jaw: bool
+    ) -> None:
+        self._session = tc.Session(scenario, settings=given)
+        made, self._reach, self._has_jaw = self._session.runner.configuration, reach, has_jaw
+        self._task = values_of(made.group("task"))
+        self._gain, self._hand = 1.0, np.zeros(3)
+        self._hand_of_slave = axis_map("axes", made.value("axes")).T
+        self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (3 + has_jaw,), np.float32)
+        shape = (9 + 3 * has_jaw,)
+        self.observation_space = gymnasium.spaces.Box(-np.inf, np.inf, shape, np.float32)
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Observed, dict[str, Any]]:
+        """Begin anew, with another goal if the task has some; see :meth:`gymnasium.Env.reset`."""
+        super().reset(seed=seed)
+        session = self._session
+        chosen = self._task | {"reach.first": int(self.np_random.integers(10**6))}
+        session.runner.stages["task"].retune(build(TaskParameters, chosen))
+        found, self._hand = session.reset(), np.zeros(3)
+        while session.values("task/state")[0] < 1.0:
+            found = session.step()
+        self._gain = found.gain
+        self._last = session.values("display/measured_cp")[:3]
+        return self._observed(found, session.values("task/state")), {}
+
+    def step(self, action: Observed) -> tuple[Observed, float, bool, bool, dict[str, Any]]:
+        """Move the hand for 20 ms; see :meth:`gymnasium.Env.step`."""
+        moved = np.clip(np.asarray(action, np.float64), -1.0, 1.0)
+        space, session = self._session.command_space, self._session
+        before = session.values("task/state")
+        hand = self._hand + self._hand_of_slave @ (self._reach * moved[:3]) / self._gain
+        self._hand = np.clip(hand, space.low[:3], space.high[:3])
+        session.command(self._hand, jaw=float(self._has_jaw and moved[3] > 0.0))
+        found, now = session.step(), session.values("task/state")
+        observed = self._observed(found, now)
+        reward, is_over, is_success = self._judged(observed, before, now)
+        info = {"is_success": is_success, "successes": int(now[_SUCCESSES])}
+        return observed, reward, is_over, False, info
+
+    def _judged(
+        self, observed: Observed, before: NDArray[np.float64], now: NDArray[np.float64]
+    ) -> tuple[float, bool, bool]:
+        """Reward, whether the episode is over, and whether all is done that was asked for."""
+        raise NotImplementedError
+
+    def _observed(self, found: tc.Observation, task: NDArray[np.float64]) -> Observed:
+        session = self._session
+        tip = session.values("display/measured_cp")[:3]
+        speed, self._last = (tip - self._last) / _PERIOD, tip
+        ways = (task[_GOAL : _GOAL + 3] - tip, speed, found.servo_cp[:3] - tip)
+        seen = [np.concatenate(ways) / _SCALE]
+        if self._has_jaw:
+            jaw, grip = session.values("slave/jaw/measured_js"), session.values("slave/jaw/grip")
+            seen.append(np.array([jaw[0], grip[0] > 0.0, task[_ACT] == Act.GRIP]))
+        return np.concatenate(seen).astype(np.float32)
+
+
+class ReachEnv(_TaskEnv):
     """Lead the slave's tip to a goal.
 
     An action (3,) in -1 to 1 moves the hand by up to ``reach`` along the axes of the slave, over a
@@ -45,56 +113,61 @@ class ReachEnv(gymnasium.Env[Observed, Observed]):
         TeleopError: A setting is wrong.
     """
 
-    metadata = {"render_modes": []}  # noqa: RUF012 - gymnasium's own declaration
-
     def __init__(self, settings: Mapping[str, Setting] | None = None, reach: float = 0.001) -> None:
         given: dict[str, Setting] = {"teleop.stages": ["display", "task"], "task.kind": "reach"}
-        self._session = tc.Session("free_motion", settings=given | dict(settings or {}))
-        made, self._reach = self._session.runner.configuration, reach
-        self._task = values_of(made.group("task"))
-        self._gain, self._hand = 1.0, np.zeros(3)
-        self._hand_of_slave = axis_map("axes", made.value("axes")).T
-        self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (3,), np.float32)
-        self.observation_space = gymnasium.spaces.Box(-np.inf, np.inf, (9,), np.float32)
+        super().__init__("free_motion", given | dict(settings or {}), reach, has_jaw=False)
 
-    def reset(
-        self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[Observed, dict[str, Any]]:
-        """Begin anew with another goal; see :meth:`gymnasium.Env.reset`."""
-        super().reset(seed=seed)
-        session = self._session
-        chosen = self._task | {"reach.first": int(self.np_random.integers(10**6))}
-        session.runner.stages["task"].retune(build(TaskParameters, chosen))
-        found, self._hand = session.reset(), np.zeros(3)
-        while session.values("task/state")[0] < 1.0:
-            found = session.step()
-        self._gain = found.gain
-        self._last = session.values("display/measured_cp")[:3]
-        self._goal = session.values("task/state")[_GOAL : _GOAL + 3]
-        return self._observed(found), {}
-
-    def step(self, action: Observed) -> tuple[Observed, float, bool, bool, dict[str, Any]]:
-        """Move the hand for 20 ms; see :meth:`gymnasium.Env.step`."""
-        wanted = self._reach * np.clip(np.asarray(action, np.float64), -1.0, 1.0)
-        space = self._session.command_space
-        hand = self._hand + self._hand_of_slave @ wanted / self._gain
-        self._hand = np.clip(hand, space.low[:3], space.high[:3])
-        self._session.command(self._hand)
-        observed = self._observed(self._session.step())
-        is_there = bool(self._session.values("task/state")[_SUCCESSES] > 0.0)
-        reward = 10.0 if is_there else -float(np.linalg.norm(observed[:3]))
-        return observed, reward, is_there, False, {"is_success": is_there}
-
-    def _observed(self, found: tc.Observation) -> Observed:
-        tip = self._session.values("display/measured_cp")[:3]
-        speed = (tip - self._last) / _PERIOD
-        self._last = tip
-        seen = np.concatenate((self._goal - tip, speed, found.servo_cp[:3] - tip)) / _SCALE
-        return seen.astype(np.float32)
+    def _judged(
+        self, observed: Observed, before: NDArray[np.float64], now: NDArray[np.float64]
+    ) -> tuple[float, bool, bool]:
+        is_there = bool(now[_SUCCESSES] > 0.0)
+        return 10.0 if is_there else -float(np.linalg.norm(observed[:3])), is_there, is_there
 
 
-NAME = "teleop_core/Reach-v0"
-if NAME not in gymnasium.registry:
-    gymnasium.register(
-        id=NAME, entry_point="teleop_lab.environment:ReachEnv", max_episode_steps=500
-    )
+class PegTransferEnv(_TaskEnv):
+    """Bring three blocks with the slave's jaw from their pegs to those of their colours.
+
+    An action (4,) moves the hand as in :class:`ReachEnv`; a fourth number above 0 closes the jaw.
+    The observation (12,) has those of ``ReachEnv``, the jaw's angle [rad], whether it grips a
+    block, and whether the task asks for a closed jaw. The goal is that of the present step of the
+    task: reach, grasp, lift, carry, place. The reward is minus the distance in 20 mm, 5 for each
+    step that is done, 20 for each block on its peg and -20 for one that is elsewhere. The episode
+    ends with the third block, and is truncated after 90 s.
+
+    Args:
+        settings: As of :class:`ReachEnv`.
+        reach: Largest way of the hand in a step [m].
+
+    Raises:
+        TeleopError: A setting is wrong.
+    """
+
+    def __init__(self, settings: Mapping[str, Setting] | None = None, reach: float = 0.001) -> None:
+        stages = ["jaw_command", "jaw", "jaw_sim", "display", "task"]
+        given: dict[str, Setting] = {
+            "teleop.stages": stages, "task.kind": "peg_transfer",
+            "coarse_gain": 2.0,  # the board is wider than the device's room
+            # The nearest block first: on its way to another one the jaw would push it over.
+            "jaw_sim.object.place": [
+                0.281, -0.2357, -0.0911, 0.256, -0.2357, -0.0911, 0.231, -0.2357, -0.0911,
+            ],
+        }  # fmt: skip
+        super().__init__("peg_transfer", given | dict(settings or {}), reach, has_jaw=True)
+
+    def _judged(
+        self, observed: Observed, before: NDArray[np.float64], now: NDArray[np.float64]
+    ) -> tuple[float, bool, bool]:
+        tried, done = now[_ATTEMPTS] - before[_ATTEMPTS], now[_SUCCESSES] - before[_SUCCESSES]
+        stepped = tried == 0.0 and now[_STEP] != before[_STEP]
+        reward = 5.0 * stepped + 20.0 * (2.0 * done - tried) - float(np.linalg.norm(observed[:3]))
+        is_over = bool(now[_ATTEMPTS] >= _BLOCKS)
+        return float(reward), is_over, bool(is_over and now[_SUCCESSES] >= _BLOCKS)
+
+
+for _name, _class, _seconds in (("Reach", ReachEnv, 10.0), ("PegTransfer", PegTransferEnv, 90.0)):
+    if f"teleop_core/{_name}-v0" not in gymnasium.registry:
+        gymnasium.register(
+            id=f"teleop_core/{_name}-v0",
+            entry_point=f"{__name__}:{_class.__name__}",
+            max_episode_steps=round(_seconds / _PERIOD),
+        )
