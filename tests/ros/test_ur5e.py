@@ -127,6 +127,7 @@ def goes_home_and_follows(recording: tc.Recording, first: Any, largest: Any) -> 
     assert went.max() > 0.8 * asked.max()
 
 
+@pytest.mark.soak
 def test_a_session_leads_it_home_and_after_the_hand_without_a_jump(
     tmp_path: Path, bridge: list[Any]
 ) -> None:
