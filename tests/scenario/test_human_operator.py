@@ -1,4 +1,4 @@
-"""The operator ``human`` moves as people do, and ``random`` does not: figures of whole sessions."""
+"""The operator ``human`` moves as people do: figures of whole sessions."""
 
 import runpy
 from functools import cache
