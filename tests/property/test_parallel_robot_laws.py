@@ -1,14 +1,10 @@
 """Laws that every parallel and hybrid robot keeps, whatever it is asked."""
 
-from typing import Any
-
 import numpy as np
 import pytest
 
 from teleop_core.kernels.geometry import Array, rotation, transform
 from teleop_core.robots import IkStatus, load_robot_set
-from teleop_core.session.configuration import configure
-from teleop_core.session.virtual import VirtualTime
 
 ROBOTS = [
     ("four_bar", ""),
@@ -66,22 +62,3 @@ def test_residual_is_what_forward_kinematics_leaves(name: str, geometry: str) ->
         gap = np.linalg.norm(reached[:3, 3] - T[:3, 3])
         # Legs that hide the turn of a level platform put the tip of the tool elsewhere.
         assert abs(gap - result.residual[0]) < 1e-6
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("name", "geometry"), ROBOTS)
-def test_every_robot_is_led_through_the_graph_with_all_its_actuators(
-    name: str, geometry: str
-) -> None:
-    session: Any = VirtualTime(configure(settings=[f"robot={name}", f"geometry=[{geometry}]"]))
-    signals, robot = session.run(6000), session.stages["slave_sim"].robot
-    measured = signals["slave_measured_cp"]
-    assert np.isfinite(measured).all()
-    servo = signals["slave_servo_jp"][:, : robot.n]
-    assert np.ptp(servo, axis=0).min() > 0.0
-    steps = np.abs(np.diff(servo, axis=0))
-    assert (steps <= robot.drives.speed_limit * 1e-3 + ROUNDING).all()
-    joints = signals["slave_measured_js"][:, : robot.n]
-    overshoot = 0.02 * (robot.upper - robot.lower)
-    assert (joints >= robot.lower - overshoot).all()
-    assert (joints <= robot.upper + overshoot).all()

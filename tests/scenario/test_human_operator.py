@@ -1,4 +1,4 @@
-"""The operator ``human`` moves as people do, and ``random`` does not: figures of whole sessions."""
+"""The operator ``human`` moves as people do: figures of whole sessions."""
 
 import runpy
 from functools import cache
@@ -45,12 +45,6 @@ def test_median_speed_is_no_more_than_that_of_the_hand_of_the_uva_study() -> Non
     assert np.mean(figures("speed_median_mm_s")) <= 20.0
 
 
-@pytest.mark.parametrize("name", ["frequency_50_hz", "power_1_3", "peaks_per_s", "sparc"])
-def test_smooth_operator_is_no_human(name: str) -> None:
-    low, high = PEOPLE[name]
-    assert all(value < low or value > high for value in figures(name, operator="random"))
-
-
 def test_strokes_of_the_clutch_part_the_motion_into_segments() -> None:
     for score in scores():
         assert score.value("motion.clutch.count") == 2
@@ -59,9 +53,3 @@ def test_strokes_of_the_clutch_part_the_motion_into_segments() -> None:
         begins = [score.value(f"motion.segments.{n}.begin_s") for n in (1, 2, 3)]
         ends = [score.value(f"motion.segments.{n}.end_s") for n in (1, 2, 3)]
         assert begins[0] < ends[0] < begins[1] < ends[1] < begins[2] < ends[2]
-
-
-def test_same_seed_gives_the_same_bits() -> None:
-    first, again = (tc.run("human", seed=5, duration=6.0) for _ in range(2))
-    for name in ("master/measured_cp", "slave/measured_js"):
-        assert np.array_equal(first[name].values, again[name].values)
