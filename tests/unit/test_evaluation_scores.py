@@ -41,6 +41,7 @@ from teleop_core.graph.topics import (
     SLAVE_SERVO_JP,
     SLAVE_SETPOINT_CP,
     SLAVE_SETPOINT_JS,
+    SLAVE_TRUE_CF,
     TELEOP_STATE,
     Topic,
 )
@@ -279,6 +280,32 @@ def test_a_transfer_takes_from_the_last_grip_to_rest_and_what_was_before_does_no
     names = ("transferred", "dropped", "peak_pull_n")
     assert [score.value(f"transfer.{name}") for name in names] == [2, 1, 1.25]
     assert score.value("transfer.time_s") == pytest.approx(0.15, abs=1e-9)
+
+
+def test_a_hand_waits_where_it_rests_for_longer_than_three_tenths_of_a_second(
+    recipe: Recipe, path: Path
+) -> None:
+    stamps = recipe.stamps[0] // 10**9 * 10**9 + np.arange(4000) * 1_000_000
+    poses = pose_rows(len(stamps))
+    speed = np.full(len(stamps), 0.02)  # 2 mm in a tenth of a second
+    speed[1000:2000] = speed[2500:2700] = 0.0  # rests of 1.0 s and of 0.2 s
+    poses[:, 0] = np.cumsum(speed) * 1e-3
+    recipe.rows[MASTER_MEASURED_CP] = (stamps, poses, stamps)
+    score = evaluate(recipe.write(path))
+    assert score.value("waits.count") == 1
+    assert score.value("waits.share") == pytest.approx((10 - 3) / 40, abs=1 / 40)
+
+
+def test_peaks_of_a_force_count_where_it_rises_and_falls_by_a_tenth_of_a_newton(
+    recipe: Recipe, path: Path
+) -> None:
+    force = np.zeros((len(recipe.stamps), 6))
+    for begin, height in ((100, 0.5), (300, 1.0), (500, 0.09), (700, 0.2)):
+        force[begin : begin + 100, 2] = height * np.sin(np.linspace(0.0, np.pi, 100))
+    force[340:360, 2] += 0.05  # a bump on a peak
+    recipe.topics.append(SLAVE_TRUE_CF)
+    recipe.rows[SLAVE_TRUE_CF] = (recipe.stamps, force, recipe.stamps)
+    assert evaluate(recipe.write(path)).value("force_peaks.count") == 3
 
 
 # -- latency, ticks, gaps --------------------------------------------------------------------------

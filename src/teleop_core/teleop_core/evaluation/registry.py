@@ -101,6 +101,8 @@ METRICS: Registry[type[Metric]] = Registry(
         "remote_centre": f"{_FOLDER}.remote_centre:RemoteCentreMetric",
         "jaw": f"{_FOLDER}.jaw:JawMetric",
         "transfer": f"{_FOLDER}.transfer:TransferMetric",
+        "waits": f"{_FOLDER}.waits:WaitsMetric",
+        "force_peaks": f"{_FOLDER}.force_peaks:ForcePeaksMetric",
         "step_s": f"{_FOLDER}.steps:StepsMetric",
         "task": f"{_FOLDER}.task:TaskMetric",
         "display": f"{_FOLDER}.task:DisplayMetric",

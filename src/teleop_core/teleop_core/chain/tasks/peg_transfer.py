@@ -169,9 +169,9 @@ def _next_block(numbers: Array, memory: Array, scene: Array, state: Array) -> No
 def peg_transfer_judge(numbers: Array, memory: Array, scene: Array, state: Array) -> None:
     """Lead each hand from step to step, and judge each block where it comes to rest.
 
-    ``memory`` holds the number of the block (-1: all are done), the height above where it stood
-    that it is brought to next, how many were on another peg and on none when the attempt began,
-    and from the fifth on the first places of all.
+    ``memory`` holds the number of the block, -1 once all are done; the height above where it stood
+    to bring it to; and from the beginning of the attempt, how many were on another peg and on none.
+    From the fifth on it holds the first places of all.
     """
     if state[0] == 0.0:
         for i in range(3 * JAW_OBJECTS):

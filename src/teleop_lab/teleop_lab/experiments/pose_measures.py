@@ -1,0 +1,40 @@
+"""Pose measures: position accuracy and repeatability of an arm that goes to a place repeatedly."""
+
+import numpy as np
+
+from teleop_core.kernels.geometry import Array
+
+
+def accuracy(attained: Array, commanded: Array) -> Array:
+    """How far the mean of the places that an arm came to is from the place it was sent to.
+
+    Args:
+        attained: Places (..., N, 3) after N moves to the same place.
+        commanded: That place (..., 3).
+
+    Returns:
+        AP (...), in their unit.
+
+    Source:
+        ISO 9283:1998, 7.2.1.
+    """
+    off: Array = np.linalg.norm(attained.mean(axis=-2) - commanded, axis=-1)
+    return off
+
+
+def repeatability(attained: Array) -> Array:
+    """Radius around the mean of the places that an arm came to: mean distance plus three S.D.
+
+    Args:
+        attained: Places (..., N, 3) after N moves to the same place, N >= 2.
+
+    Returns:
+        RP (...), in their unit.
+
+    Source:
+        ISO 9283:1998, 7.2.2.
+    """
+    middle = attained.mean(axis=-2, keepdims=True)
+    far: Array = np.linalg.norm(attained - middle, axis=-1)
+    spread: Array = far.mean(axis=-1) + 3.0 * far.std(axis=-1, ddof=1)
+    return spread
