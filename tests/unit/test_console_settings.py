@@ -91,7 +91,8 @@ def test_search_finds_words_of_stage_name_and_meaning_and_changed_only_what_is_n
     with ConsoleServer(0) as server:
         settings = SettingsPanel(server.viser, desk, lambda _: True)
         settings.refresh()
-        shown = {one.label: one for one in server.viser.gui._gui_input_handle_from_uuid.values()}
+        inputs: Any = server.viser.gui._gui_input_handle_from_uuid.values()
+        shown = {one.label: one for one in inputs}
         for text, found in (
             ("", [MODE, GAIN, filtered]), ("SCALING gain", [MODE, GAIN]), ("m/m", [GAIN]),
             ("smoothed", [filtered]), ("nothing like it", []),
