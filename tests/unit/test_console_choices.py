@@ -3,6 +3,7 @@
 import math
 import shlex
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
@@ -13,6 +14,7 @@ from teleop_core.cli import _parsed
 from teleop_core.session.api import configuration
 from teleop_core.session.configuration import Configuration
 
+URDF = Path(__file__).parents[2] / "examples" / "any_arm.urdf"
 CHOICES: tuple[Chosen, ...] = (
     START,
     {"scenario": "coarse_box", "operator": "remote", "robot": "puma560"},
@@ -75,6 +77,13 @@ def test_operator_that_needs_a_task_is_free_as_soon_as_there_is_one() -> None:
     ]
     assert "task" in str(reasons[0])
     assert reasons[1] == ""
+
+
+def test_robot_that_cannot_be_loaded_is_refused_before_anything_starts() -> None:
+    urdf = {"operator": "remote", "robot": str(URDF)}
+    assert "tool0" in choices.refusal(urdf)  # the links to choose from
+    assert not choices.refusal({**urdf, "tip": "tool0"})
+    assert choices.refusal({**urdf, "robot": "nowhere.urdf"})
 
 
 def test_choice_that_is_wrong_as_a_whole_greys_nothing_so_that_one_finds_out_of_it() -> None:

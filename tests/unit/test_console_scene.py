@@ -291,6 +291,24 @@ def test_the_first_camera_sees_all_of_every_robot_in_a_square_window(server: Ser
         assert (np.abs(right) < 1.06 * half * depth).all(), name
 
 
+@pytest.mark.parametrize("name", ["rcrt1", "puma560", "planar_3r"])
+@pytest.mark.parametrize("aspect", [0.46, 1.2, 2.4])
+def test_camera_of_the_work_sees_tip_and_stylus_and_no_more_than_it_must(
+    server: Server, name: str, aspect: float
+) -> None:
+    server.scene.reset()
+    scene = Scene(server, [Arm("", tc.load_robot(name))])
+    camera, points = scene.work(aspect), scene.arms[""].work()
+    turn = rotations_from_quaternions(camera.quaternion[None])[0]
+    right, down, depth = ((points - camera.position) @ turn).T
+    half = np.tan(0.5 * server.initial_camera.fov)
+    across, upwards = np.abs(right / depth) / (half * aspect), np.abs(down / depth) / half
+    assert max(across.max(), upwards.max()) < 1.0
+    assert across.max() > 0.75 or upwards.max() > 0.6  # of half the picture
+    if aspect < 0.75:  # a panel covers the lower part
+        assert (down < 0.15 * half * depth).all()
+
+
 SOLIDS = {
     "box": ((0.1, 0.2, 0.3), 0.006),
     "sphere": ((0.1,), 4 / 3 * np.pi * 1e-3),

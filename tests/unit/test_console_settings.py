@@ -78,3 +78,42 @@ def test_value_that_a_button_of_the_stylus_changed_is_shown_as_it_is_and_can_be_
         assert shown["mode"].value == settings.known[MODE].value == "fine"
         assert shown["fine_gain"].value == 0.1
         assert heard == [settings.known]
+
+
+def test_search_finds_words_of_stage_name_and_meaning_and_changed_only_what_is_no_default() -> None:
+    desk: Any = Desk()
+    filtered = ("slave", "reference_filter.is_on")
+    desk.known = {
+        MODE: ParameterInfo(*MODE, "coarse", "which gain holds", choices=("coarse", "fine")),
+        GAIN: ParameterInfo(*GAIN, 0.25, "ratio of the fine mode [m/m]"),
+        filtered: ParameterInfo(*filtered, True, "whether setpoints are smoothed"),
+    }
+    with ConsoleServer(0) as server:
+        settings = SettingsPanel(server.viser, desk, lambda _: True)
+        settings.refresh()
+        inputs: Any = server.viser.gui._gui_input_handle_from_uuid.values()
+        shown = {one.label: one for one in inputs}
+        for text, found in (
+            ("", [MODE, GAIN, filtered]), ("SCALING gain", [MODE, GAIN]), ("m/m", [GAIN]),
+            ("smoothed", [filtered]), ("nothing like it", []),
+        ):  # fmt: skip
+            shown["search"].value = text
+            assert settings.keys() == found, text
+        shown["search"].value = ""
+        shown["changed only"].value = True
+        assert settings.keys() == [GAIN]  # 0.1 by default
+        settings._reset(0)
+        assert desk.asked == ["fine_gain"]
+        assert settings.known[GAIN].value == 0.1
+        assert settings.keys() == []
+
+
+def test_who_watches_resets_nothing() -> None:
+    desk: Any = Desk()
+    desk.known = {GAIN: ParameterInfo(*GAIN, 0.25)}
+    with ConsoleServer(0) as server:
+        settings = SettingsPanel(server.viser, desk, lambda _: False)
+        settings.refresh()
+        settings._reset(1)
+        assert desk.asked == []
+        assert settings.known[GAIN].value == 0.25

@@ -7,6 +7,7 @@ import numpy as np
 import viser
 
 from teleop_console.body_nodes import BodyNodes, extent
+from teleop_console.cameras import corners
 from teleop_console.fixture_outlines import Look, OutlineNode, scale_of, unit_outline
 from teleop_console.jaw_nodes import JawNodes
 from teleop_console.link import Arm, ArmView, box_of
@@ -106,12 +107,12 @@ class ArmNodes:
         points = np.concatenate((points, self._own_low[None], self._own_high[None]))
         return points.min(axis=0), points.max(axis=0)
 
-    def work(self) -> tuple[Array, Array]:
-        """Lowest and highest corner (3,) [m] of where tip and stylus work, in the page's axes."""
+    def work(self) -> Array:
+        """Corners (16, 3) [m] of where tip and stylus work, in the axes of the page."""
         hand = self._stand.axes @ REST[:3] + self._stand.origin + np.array([0.0, self._side, 0.0])
         tip, room = self.begin(), max(_WORK, 0.08 * self.bodies.size)
-        points = np.stack((hand - _GRIP, hand + _GRIP, tip - room, tip + room))
-        return points.min(axis=0), points.max(axis=0)
+        grip = corners(hand - _GRIP, hand + _GRIP)
+        return np.concatenate((grip, corners(tip - room, tip + room)))
 
     def tip(self) -> Array:
         """Pose (7,) of the tip as it is drawn, in the axes of the page."""

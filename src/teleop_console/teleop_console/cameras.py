@@ -16,7 +16,7 @@ _WIDE, _HIGH = 0.875, 0.8  # parts of a picture that may be filled across and up
 ASPECT = 1.2
 """Width over height of a wide window with the panel beside it."""
 _PHONE = 0.75  # width over height below which a panel may cover the lower part, as on phones
-_CLEAR = (0.35, 0.6)  # middle and half height of what is used then, of half the picture, upwards
+_CLEAR = (0.4, 0.55)  # middle and half height of what is free then, of half the picture, upwards
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,24 +52,28 @@ class Camera:
             client.camera.look_at = self.look_at
 
 
-def around(low: Array, high: Array, aspect: float = ASPECT) -> Camera:
-    """Camera that sees a box as a whole, beside the panel or, on a phone, above it.
+def corners(low: Array, high: Array) -> Array:
+    """Corners (8, 3) [m] of the box between its lowest and its highest one (3,)."""
+    return np.array(list(product(*zip(low, high, strict=True))))
+
+
+def around(points: Array, aspect: float = ASPECT) -> Camera:
+    """Camera that sees all of some points, beside the panel or, on a phone, above it.
 
     Args:
-        low: Lowest corner of the box (3,) [m].
-        high: Highest corner (3,) [m].
+        points: What it shall see (N, 3) [m], in the axes of the page.
         aspect: Width over height of the picture.
     """
-    middle, up = 0.5 * (low + high), np.array([0.0, 0.0, 1.0])
-    direction = _FROM / np.linalg.norm(_FROM)
-    turn = rotations_from_quaternions(Camera(middle + direction, middle, up).quaternion[None])[0]
-    corners = np.array(list(product(*zip(low, high, strict=True)))) - middle
-    right, down, into = (corners @ turn).T
+    up, direction = np.array([0.0, 0.0, 1.0]), _FROM / np.linalg.norm(_FROM)
+    turn = rotations_from_quaternions(Camera(direction, np.zeros(3), up).quaternion[None])[0]
+    seen = points @ turn
+    centre = 0.5 * (seen.min(axis=0) + seen.max(axis=0))
+    right, down, into = (seen - centre).T
     half = np.tan(0.5 * FIELD)
     shift, clear = _CLEAR if aspect < _PHONE else (0.0, 1.0)
     across, upwards = _WIDE * aspect * half, _HIGH * clear * half
     distance = float((np.maximum(np.abs(right) / across, np.abs(down) / upwards) - into).max())
-    middle = middle + shift * half * distance * turn[:, 1]
+    middle = turn @ centre + shift * half * distance * turn[:, 1]
     return Camera(middle + distance * direction, middle, up)
 
 

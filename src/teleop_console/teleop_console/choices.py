@@ -25,7 +25,7 @@ from teleop_core.graph.layers import (
     load_file,
     parse_setting,
 )
-from teleop_core.robots import ROBOTS
+from teleop_core.robots import ROBOTS, load_robot_set
 from teleop_core.session.configuration import Configuration
 from teleop_core.session.length import as_long_as_followed
 from teleop_core.slave.controllers import CONTROLLERS
@@ -166,14 +166,24 @@ def refusal(chosen: Chosen) -> str:
     key = tuple(sorted((name, word) for name, word in chosen.items() if word))
     if key not in _REFUSALS:
         try:
-            _made(chosen.get("scenario", ""), _said(chosen))
-            reason = ""
+            slave = _made(chosen.get("scenario", ""), _said(chosen)).groups["slave"]
+            reason = _no_robot(slave.robot, slave.geometry)
         except TeleopError as error:
             reason = str(error)
         if len(_REFUSALS) >= _MOST:
             _REFUSALS.clear()
         _REFUSALS[key] = reason
     return _REFUSALS[key]
+
+
+@lru_cache(64)
+def _no_robot(name: str, geometry: tuple[str, ...]) -> str:
+    """Why a robot cannot be loaded, which no configuration does; empty if it can."""
+    try:
+        load_robot_set(name, geometry)
+    except TeleopError as error:
+        return str(error)
+    return ""
 
 
 _REFUSALS: dict[tuple[tuple[str, str], ...], str] = {}

@@ -6,7 +6,7 @@ import numpy as np
 import viser
 
 from teleop_console.arm_nodes import ArmNodes, Path
-from teleop_console.cameras import ASPECT, FIELD, Camera, around, from_tool, microscope
+from teleop_console.cameras import ASPECT, FIELD, Camera, around, corners, from_tool, microscope
 from teleop_console.fixture_outlines import Look
 from teleop_console.link import Arm, Parameters, Setting, View
 from teleop_console.look import DARK, GRID, GRID_DARK, LIGHT, TARGET
@@ -136,17 +136,12 @@ class Scene:
 
     def work(self, aspect: float = ASPECT) -> Camera:
         """Camera that sees the work: all tips and styli with the room that they need."""
-        boxes = [nodes.work() for nodes in self.arms.values()]
-        low = np.min([low for low, _ in boxes], axis=0)
-        high = np.max([high for _, high in boxes], axis=0)
-        return around(low, high, aspect)
+        return around(np.concatenate([nodes.work() for nodes in self.arms.values()]), aspect)
 
     def whole(self, aspect: float = ASPECT) -> Camera:
         """Camera that sees all arms and their masters; ``aspect``: width over height."""
-        boxes = [nodes.room() for nodes in self.arms.values()]
-        low = np.min([low for low, _ in boxes], axis=0)
-        high = np.max([high for _, high in boxes], axis=0)
-        return around(low, high, aspect)
+        rooms = [corners(*nodes.room()) for nodes in self.arms.values()]
+        return around(np.concatenate(rooms), aspect)
 
     def tool(self, arm: str = "") -> Camera:
         """Camera on the tool of an arm, as it is now; of the first arm if there is no such arm."""

@@ -3,12 +3,15 @@
 import ast
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import cache
 from typing import Any
 
 import viser
 
 from teleop_console.link import Link, ParameterInfo, Parameters, Setting
 from teleop_core.base.errors import TeleopError
+from teleop_core.base.parameters import specs
+from teleop_core.graph.layers import declared_groups
 
 QUICK = (
     ("motion_scaling", "mode"), ("motion_scaling", "coarse_gain"), ("motion_scaling", "fine_gain"),
@@ -19,6 +22,8 @@ QUICK = (
     ("slave_sim", "controller.kind"), ("slave_sim", "plant.kind"), ("teleop", "delays"),
 )  # fmt: skip
 """What people change most, by stage and name."""
+_USED = "most used"
+_MOST = 40  # parameters that are shown at once
 Renew = Callable[[tuple[str, ...]], str]
 """Begins a new session with other settings; why it does not, empty if it does."""
 Guard = Callable[[int | None], bool]
@@ -52,14 +57,20 @@ class SettingsPanel:
         self._listeners: list[Callable[[Parameters], None]] = []
         self._wanted: dict[tuple[str, str], Setting] = {}
         self._told = self._gui.add_markdown("parameters are being asked for …")
-        self._choice = self._gui.add_dropdown("show", ("most used",), hint="stage and group")
+        self._search = self._gui.add_text("search", "", hint="words of names, stages and meanings")
+        self._choice = self._gui.add_dropdown("show", (_USED,), hint="stage and group")
+        self._only = self._gui.add_checkbox("changed only", False, hint="other than the defaults")
         self._folder = self._gui.add_folder("values")
+        reset = self._gui.add_button("Reset these", hint="to the defaults", color="gray")
+        self._failed = self._gui.add_markdown("", visible=False)
         self._by_key: dict[tuple[str, str], Any] = {}
         self._controls: list[viser.GuiInputHandle | viser.GuiMarkdownHandle] = []  # type: ignore[type-arg]
         with self._gui.add_folder("fixed while it runs", visible=False) as self._pending:
             self._list = self._gui.add_markdown("")
             begin = self._gui.add_button("New session with these", color="blue")
-        self._choice.on_update(lambda _: self._show())
+        for choice in (self._search, self._choice, self._only):
+            choice.on_update(lambda _: self._show())
+        reset.on_click(lambda event: self._reset(event.client_id))
         begin.on_click(lambda event: self._begin(event.client_id))
 
     def on_change(self, listener: Callable[[Parameters], None]) -> None:
@@ -81,8 +92,10 @@ class SettingsPanel:
         if self.known.keys() == before:
             return len(before) > len(self._of_session)
         groups = sorted({_group(*key) for key in self.known})
-        self._choice.options = ("most used", *groups)
-        self._told.content = f"{len(self.known)} parameters; hover over a name for its meaning"
+        self._choice.options = (_USED, *groups)
+        self._told.content = (
+            f"{len(self.known)} parameters; hover over one for its meaning, bounds and default"
+        )
         self._show()
         return False
 
@@ -102,20 +115,44 @@ class SettingsPanel:
         for listener in self._listeners:
             listener(known)
 
-    def _show(self) -> None:
-        chosen = self._choice.value
-        keys = [key for key in self.known if chosen == _group(*key)]
-        if chosen == "most used":
+    def keys(self) -> list[tuple[str, str]]:
+        """Parameters that are asked for: by search or choice, all or those that were changed."""
+        chosen, words = self._choice.value, self._search.value.lower().split()
+        keys = list(self.known)
+        if words:
+            texts = {key: f"{' '.join(key)} {self.known[key].doc}".lower() for key in keys}
+            keys = [key for key in keys if all(word in texts[key] for word in words)]
+        elif chosen != _USED:
+            keys = [key for key in keys if chosen == _group(*key)]
+        elif not self._only.value:
             stages = {key: (key[0].rpartition("/")[2], key[1]) for key in self.known}
             keys = [key for wanted in QUICK for key, known in stages.items() if known == wanted]
+        return [key for key in keys if self._is_changed(key)] if self._only.value else keys
+
+    def _is_changed(self, key: tuple[str, str]) -> bool:
+        default = _default(*key)
+        return default is not None and default != self._wanted.get(key, self.known[key].value)
+
+    def _show(self) -> None:
+        keys, is_group = self.keys(), not self._search.value.strip() and not self._only.value
         for control in self._controls:
             control.remove()
         self._controls.clear()
         self._by_key.clear()
-        self._folder.label = chosen
+        count = f"{_MOST} of {len(keys)}" if len(keys) > _MOST else f"{len(keys)}"
+        self._folder.label = self._choice.value if is_group else f"found: {count}"
         with self._folder:
-            for key in keys:
-                self._add(self.known[key], with_node=chosen == "most used")
+            for key in keys[:_MOST]:
+                self._add(self.known[key], with_node=not is_group or self._choice.value == _USED)
+
+    def _reset(self, client: int | None) -> None:
+        """Set what is shown to the defaults, as far as the nodes take them."""
+        failed = [] if self._may(client) else ["you watch; take control first"]
+        for key in () if failed else [key for key in self._by_key if self._is_changed(key)]:
+            if refusal := self._set(self.known[key], _default(*key)):  # type: ignore[arg-type]
+                failed.append(f"{'.'.join(key)}: {refusal}")
+        self._failed.content, self._failed.visible = "⚠ " + "; ".join(failed), bool(failed)
+        self._show()
 
     def _add(self, info: ParameterInfo, *, with_node: bool) -> None:
         """Control of one parameter, and under it, when needed, why a value was refused."""
@@ -167,6 +204,20 @@ class SettingsPanel:
         texts = tuple(f"{n}.{p}={_text(v)}" for (n, p), v in self._wanted.items())
         is_allowed = self._may(client)
         self._tell_pending(self._renew(texts) if is_allowed else "you watch; take control first")
+
+
+@cache
+def _defaults() -> Mapping[tuple[str, str], Any]:
+    return {
+        (stage, spec.name): spec.default
+        for stage, group in declared_groups().items()
+        for spec in specs(group)
+    }
+
+
+def _default(node: str, name: str) -> Setting | None:
+    """Default of a parameter of a known stage; None of others, and where there is none."""
+    return _defaults().get((node.rpartition("/")[2], name))
 
 
 def _group(node: str, name: str) -> str:
@@ -233,6 +284,8 @@ def _control(gui: viser.GuiApi, label: str, info: ParameterInfo) -> Any:
     if info.lower is not None or info.upper is not None:
         low = "−∞" if info.lower is None else f"{info.lower:g}"
         bounds = f" ({low} to {'∞' if info.upper is None else f'{info.upper:g}'})"
+    default = _default(info.node, info.name)
+    bounds += "" if default is None else f"; default {_shown(default)}"
     hint = f"{info.doc}{bounds}" + (" — takes effect in a new session" if info.is_fixed else "")
     value, label = _shown(info.value), f"{label}{_unit(info.doc)}"
     if isinstance(value, bool):

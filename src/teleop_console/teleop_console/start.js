@@ -77,7 +77,7 @@
       known.select.disabled = !drives;
     }
     followed ||= text('followed', 'Follows', 'recording or CSV file on this machine');
-    tip ||= text('tip', 'Tip', 'link of the URDF at its tip; empty: its last');
+    tip ||= text('tip', 'Tip', 'link of the URDF at its tip');
     followed.row.hidden = !['bag', 'file'].includes(chosen.operator);
     tip.row.hidden = !/[./]/.test(chosen.robot || '');
     one('.t-command').textContent = told.command;
