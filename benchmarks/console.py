@@ -43,9 +43,7 @@ def alone(seconds: float, folder: Path, *settings: str) -> dict[str, float]:
     return {"cpu": share, **score(bag, *window_ns)}
 
 
-def shown(
-    seconds: float, folder: Path, *settings: str, has_browser: bool = True
-) -> dict[str, float]:
+def shown(seconds: float, folder: Path, *settings: str, has_browser: bool = True) -> dict[str, float]:
     """The same behind a page, which a browser shows."""
     bag = folder / "shown"
     command = ["console", "--no-browser", "--port", str(PORT), "--out", str(bag), *SETTINGS]
@@ -54,13 +52,9 @@ def shown(
     return {"cpu": share, **score(bag, *window_ns)}
 
 
-def _watched(
-    command: list[str], seconds: float, *, has_browser: bool = False
-) -> tuple[float, tuple[int, int]]:
+def _watched(command: list[str], seconds: float, *, has_browser: bool = False) -> tuple[float, tuple[int, int]]:
     """Run a command; processor share [%] of its processes in the middle of it, and when [ns]."""
-    process = subprocess.Popen(
-        [sys.executable, "-m", "teleop_core.cli", *command], stdout=subprocess.PIPE, text=True
-    )
+    process = subprocess.Popen([sys.executable, "-m", "teleop_core.cli", *command], stdout=subprocess.PIPE, text=True)
     assert process.stdout is not None
     for line in process.stdout:
         if "operator is ready" in line:

@@ -50,9 +50,7 @@ TAKE = "(() => { const all = [moved, drawn]; moved = []; drawn = []; return all;
 
 def pull(tab: Tab, way: float) -> tuple[Array, Array]:
     """Pull an arrow along itself and let it go; times and places of mouse and drawn tip."""
-    begin, end = (
-        np.array(tab.seen_at(GRIP, [at, 0.0, 0.0]), dtype=float) for at in (ARROW, ARROW + way)
-    )
+    begin, end = (np.array(tab.seen_at(GRIP, [at, 0.0, 0.0]), dtype=float) for at in (ARROW, ARROW + way))
     tab.mouse("mouseMoved", *begin)
     tab.value("new Promise((done) => setTimeout(done, 300))")
     tab.value(TAKE)
@@ -104,9 +102,7 @@ def memory(tab: Tab, console: ConsoleProcess) -> dict[str, float]:
 Pulls = list[tuple[Array, Array]]
 
 
-def drive(
-    tab: Tab, console: ConsoleProcess, minutes: float
-) -> tuple[Pulls, list[dict[str, float]]]:
+def drive(tab: Tab, console: ConsoleProcess, minutes: float) -> tuple[Pulls, list[dict[str, float]]]:
     """Pull to and fro for a time; all pulls, and the memory once a minute."""
     pulls: Pulls = []
     begin = time.monotonic()

@@ -106,9 +106,7 @@ def _table(ends: list[End]) -> str:
         own = [end for end in ends if end.kind == kind]
         well = sum(not end.wrong for end in own)
         seconds = np.array([end.seconds for end in own])
-        lines.append(
-            f"| {kind} | {len(own)} | {well} | {np.median(seconds):.1f} s | {seconds.max():.1f} s |"
-        )
+        lines.append(f"| {kind} | {len(own)} | {well} | {np.median(seconds):.1f} s | {seconds.max():.1f} s |")
     return "\n".join(lines)
 
 
@@ -130,9 +128,7 @@ def main() -> int:
         ThreadPoolExecutor(given.jobs) as pool,
     ):
         runs = [
-            pool.submit(
-                run_session, kinds[number % len(kinds)], Path(folder) / str(number), given.seconds
-            )
+            pool.submit(run_session, kinds[number % len(kinds)], Path(folder) / str(number), given.seconds)
             for number in range(total)
         ]
         for run in as_completed(runs):

@@ -157,9 +157,7 @@ def pinocchio(table: DhTable, robot: Any) -> Adapted:
             error = pin.log6((data.oMi[parent] * end).actInv(wanted))
             if np.linalg.norm(error.vector) < 1e-9:
                 break
-            jacobian = end.inverse().action @ pin.getJointJacobian(
-                model, data, parent, pin.ReferenceFrame.LOCAL
-            )
+            jacobian = end.inverse().action @ pin.getJointJacobian(model, data, parent, pin.ReferenceFrame.LOCAL)
             square = jacobian @ jacobian.T + 1e-12 * np.eye(6)
             q = q + jacobian.T @ np.linalg.solve(square, error.vector)
         return whole_turns(q, robot, turning)
@@ -190,9 +188,7 @@ def ikpy(table: DhTable, robot: Any) -> Adapted:
 
     def solve(pose: Any, seed: Any) -> Any:
         start = np.array([0.0, *np.clip(seed, robot.lower, robot.upper), 0.0])
-        return chain.inverse_kinematics_frame(pose, initial_position=start, orientation_mode="all")[
-            1:-1
-        ]
+        return chain.inverse_kinematics_frame(pose, initial_position=start, orientation_mode="all")[1:-1]
 
     return as_it_is, solve
 

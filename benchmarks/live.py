@@ -28,13 +28,8 @@ def chain(seconds: float, style: str) -> dict[str, float]:
     """Run a bare relay chain; latency [ms], loss [%] and processor share [%] of all its parts."""
     start = [sys.executable, __file__, "--style", style, "--role"]
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
-    relays = [
-        subprocess.Popen([*start, "relay", "--position", str(i)], env=os.environ)
-        for i in range(RELAYS)
-    ]
-    sink = subprocess.Popen(
-        [*start, "sink", "--seconds", str(seconds)], stdout=subprocess.PIPE, text=True
-    )
+    relays = [subprocess.Popen([*start, "relay", "--position", str(i)], env=os.environ) for i in range(RELAYS)]
+    sink = subprocess.Popen([*start, "sink", "--seconds", str(seconds)], stdout=subprocess.PIPE, text=True)
     others = [*relays, subprocess.Popen([*start, "source"])]
     begin = time.monotonic()
     out, _ = sink.communicate(timeout=seconds + 60)

@@ -36,9 +36,7 @@ def measure(folder: Path, minutes: float) -> dict[str, float]:
     """Simulate, record and score coarse_box for some minutes."""
     bag = folder / f"m{minutes:g}"
     seconds = 60.0 * minutes
-    sim, sim_memory = run(
-        "sim", "--scenario", "coarse_box", "--duration", str(seconds), "--out", str(bag)
-    )
+    sim, sim_memory = run("sim", "--scenario", "coarse_box", "--duration", str(seconds), "--out", str(bag))
     score, score_memory = run("evaluate", str(bag), "--json", str(folder / "score.json"))
     size = sum(file.stat().st_size for file in bag.iterdir()) / 2**20
     return {

@@ -110,9 +110,7 @@ def followed(robot: Robot, paths: Sequence[tuple[Any, Any]]) -> Paths:
         late += not reached.all()
         if not reached[-1]:
             unexplained += room > 1e-3 and least_singular_value(robot, answer.q) > 0.02
-    return Paths(
-        count=len(paths), too_fast=too_fast, late=late, unexplained=unexplained, arrived=arrived
-    )
+    return Paths(count=len(paths), too_fast=too_fast, late=late, unexplained=unexplained, arrived=arrived)
 
 
 def lines(robot: Robot, count: int) -> Paths:
@@ -183,9 +181,7 @@ def row(name: str, poses: int, paths: int, folder: Path) -> tuple[str, list[floa
 
 def cells(numbers: Iterable[float | None]) -> str:
     """Numbers of a row: two digits, counts without, none where there is nothing."""
-    words = (
-        "none" if x is None else f"{x:.2f}" if isinstance(x, float) else f"{x}" for x in numbers
-    )
+    words = ("none" if x is None else f"{x:.2f}" if isinstance(x, float) else f"{x}" for x in numbers)
     return " | ".join(words)
 
 

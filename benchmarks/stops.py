@@ -113,11 +113,7 @@ def session(folder: Path, domain: str, priority: int, processes: str) -> subproc
     """Start a session in which the hand never rests."""
     command = [sys.executable, "-m", "teleop_core.cli", "live", "--out", str(folder / "bag")]
     command += ["--scenario", "free_motion", "--duration", "3600"]
-    for setting in (
-        f"real_time.priority={priority}",
-        "operator.approach_time=1.0",
-        "operator.patience=0.0",
-    ):
+    for setting in (f"real_time.priority={priority}", "operator.approach_time=1.0", "operator.patience=0.0"):
         command += ["--set", setting]
     return subprocess.Popen(
         [*command, "--processes", processes], stdin=subprocess.DEVNULL,
@@ -149,16 +145,9 @@ def measure(count: int, priority: int, processes: str) -> list[float]:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--count", type=int, default=100, help="stops of each kind")
-    parser.add_argument(
-        "--priority",
-        type=int,
-        default=-1,
-        help="SCHED_FIFO of the session; 0: none; -1: its default",
-    )
+    parser.add_argument("--priority", type=int, default=-1, help="SCHED_FIFO of the session; 0: none; -1: its default")
     parser.add_argument("--load", type=int, default=0, help="busy processes beside the session")
-    parser.add_argument(
-        "--kinds", nargs="+", default=["sides", "one"], choices=("sides", "one", "nodes")
-    )
+    parser.add_argument("--kinds", nargs="+", default=["sides", "one"], choices=("sides", "one", "nodes"))
     given = parser.parse_args()
     busy = [subprocess.Popen([sys.executable, "-c", "while 1: pass"]) for _ in range(given.load)]
     try:

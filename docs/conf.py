@@ -22,13 +22,7 @@ project = "teleop_core"
 author = "teleop_core maintainers"
 version = release = teleop_core.__version__
 
-extensions = [
-    "myst_nb",
-    "sphinx.ext.autodoc",
-    "sphinx.ext.napoleon",
-    "sphinx.ext.viewcode",
-    "sphinxcontrib.mermaid",
-]
+extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx.ext.viewcode", "sphinxcontrib.mermaid"]
 html_theme = "furo"
 html_title = f"teleop_core {version}"
 html_copy_source = False
@@ -56,11 +50,7 @@ napoleon_use_ivar = True  # what a docstring tells of attributes stands once
 napoleon_custom_sections = ["Source"]
 
 # Pages of the site for what lies outside of this folder.
-OUTSIDE = {
-    "../README.md": "index.md",
-    "../CHANGELOG.md": "changelog.md",
-    "../examples": "examples.md",
-}
+OUTSIDE = {"../README.md": "index.md", "../CHANGELOG.md": "changelog.md", "../examples": "examples.md"}
 
 
 def read(app: object, name: str, source: list[str]) -> None:
@@ -77,9 +67,7 @@ def menu(text: str) -> str:
     for section in re.split(r"^## ", text, flags=re.MULTILINE)[1:]:
         caption, _, body = section.partition("\n")
         pages = [name for name in re.findall(r"\]\(([\w/]+)\.md\)", body) if name != "index"]
-        parts.append(
-            "\n".join(["", "```{toctree}", ":hidden:", f":caption: {caption}", *pages, "```"])
-        )
+        parts.append("\n".join(["", "```{toctree}", ":hidden:", f":caption: {caption}", *pages, "```"]))
     return "\n".join(parts) + "\n"
 
 
@@ -88,10 +76,7 @@ def versions() -> dict[str, Any]:
     text = (HERE.parent / "CHANGELOG.md").read_text(encoding="utf-8")
     newest = re.findall(r"^## (\d\S*)", text, re.MULTILINE)
     older = sorted((path.stem for path in (HERE / "changes").glob("*.md")), reverse=True)
-    pages = [
-        *((name, "changelog") for name in newest),
-        *((name, f"changes/{name}") for name in older),
-    ]
+    pages = [*((name, "changelog") for name in newest), *((name, f"changes/{name}") for name in older)]
     unreleased = text.partition("## Unreleased")[2].partition("\n## ")[0]
     return {"versions": pages, "is_ahead": bool(unreleased.strip())}
 

@@ -75,10 +75,7 @@ def parameters_page() -> str:
 
 def topics_page(graph: Graph) -> str:
     """All topics of an arm with their writers and readers."""
-    rows = [
-        "| topic | message | values | written by | read by | stamp |",
-        "|---|---|---|---|---|---|",
-    ]
+    rows = ["| topic | message | values | written by | read by | stamp |", "|---|---|---|---|---|---|"]
     for member in graph.members:
         for topic in member.writes:
             rows.append(topic_row(topic, member.name, graph))
@@ -91,10 +88,7 @@ def topics_page(graph: Graph) -> str:
     rows += [topic_row(topic, writer, with_network) for topic in NETWORK_TOPICS]
     with_ports = build_graph(stages=["network", "passivity"])
     writers = {t: member.name for member in with_ports.members for t in member.writes}
-    rows += [
-        topic_row(t, f"{writers[t]}, with [passivity](passivity.md)", with_ports)
-        for t in PASSIVITY_TOPICS
-    ]
+    rows += [topic_row(t, f"{writers[t]}, with [passivity](passivity.md)", with_ports) for t in PASSIVITY_TOPICS]
     with_yield = build_graph(stages=["network", "impedance"])
     writers = {t: member.name for member in with_yield.members for t in member.writes}
     rows += [
@@ -165,9 +159,7 @@ def diagram(graph: Graph) -> str:
     for member in graph.members:
         unread = [t for t in member.writes if all(link.topic != t for link in graph.links)]
         if unread:
-            lines.append(
-                f'  {member.name} -- "{"<br/>".join(t.name for t in unread)}" --> recorder'
-            )
+            lines.append(f'  {member.name} -- "{"<br/>".join(t.name for t in unread)}" --> recorder')
     lines += ["  recorder[(recorder)] --> evaluate", "  recorder --> replay", "```"]
     return "\n".join(lines)
 
@@ -182,8 +174,7 @@ def plant_numbers(robot: Robot) -> str:
     values = {name: per_joint(getattr(known, name)) for name in NUMBERS}
     pairs = zip(*known.coupling.nonzero(), strict=True)
     values["coupling"] = ", ".join(
-        f"{joints[i]} moves by {known.coupling[i, j]:.3g} of the lag of {joints[j]}"
-        for i, j in pairs
+        f"{joints[i]} moves by {known.coupling[i, j]:.3g} of the lag of {joints[j]}" for i, j in pairs
     )
     values["links"] = f"d3 {1e3 * links['d3']:+.1f} mm, and {len(links) - 1} small ones"
     values["dynamics"] = ", ".join(
@@ -192,9 +183,7 @@ def plant_numbers(robot: Robot) -> str:
     rows = [f"| `{name}` | {text} | {known.sources[name]} |" for name, text in values.items()]
     for spec in specs(HardwareParameters):
         if spec.source:
-            rows.append(
-                f"| `{spec.name}` | {f'{spec.default} {spec.unit}'.strip()} | {spec.source} |"
-            )
+            rows.append(f"| `{spec.name}` | {f'{spec.default} {spec.unit}'.strip()} | {spec.source} |")
     head = [f"| number | {', '.join(joints)} [SI] | how it is known |", "|---|---|---|"]
     return "\n".join([*head, *rows])
 
@@ -284,9 +273,7 @@ def main() -> int:
             if not is_check:
                 path.write_text(text, encoding="utf-8")
     for name in stale:
-        print(
-            f"{name}: {'is not what the code says; run docs/generate.py' * is_check or 'written'}"
-        )
+        print(f"{name}: {'is not what the code says; run docs/generate.py' * is_check or 'written'}")
     return int(is_check and bool(stale))
 
 

@@ -76,9 +76,7 @@ def created(rows: Any) -> float:
     At the hand the force that the device applied times the reading's way, at the slave true force
     and torque times true way and turn of the tip.
     """
-    place, force, pose = (
-        rows[name] for name in ("master_measured_cp", "slave_true_cf", "slave_true_cp")
-    )
+    place, force, pose = (rows[name] for name in ("master_measured_cp", "slave_true_cf", "slave_true_cp"))
     given = np.einsum("ij,ij->i", rows["master_measured_cf"][1:, :3], np.diff(place[:, :3], axis=0))
     turn = Rotation.from_quat(pose[:, 3:], scalar_first=True)
     ways = np.hstack((np.diff(pose[:, :3], axis=0), (turn[1:] * turn[:-1].inv()).as_rotvec()))

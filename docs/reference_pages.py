@@ -34,9 +34,7 @@ def commands_page() -> list[str]:
     return parts
 
 
-def commands(
-    parser: argparse.ArgumentParser, before: str = ""
-) -> Iterator[tuple[str, argparse.ArgumentParser, str]]:
+def commands(parser: argparse.ArgumentParser, before: str = "") -> Iterator[tuple[str, argparse.ArgumentParser, str]]:
     """Name, parser and help of every command, those inside of commands too."""
     for action in parser._actions:
         if isinstance(action, argparse._SubParsersAction):
@@ -122,7 +120,6 @@ def examples_page() -> list[str]:
         rows.append(f"| [{path.name}](../examples/{path.name}) | {cell(first)} |")
     return [
         "# Examples",
-        "Short scripts in `examples`. Each runs as it is, and the tests check the numbers that it "
-        "prints.",
+        "Short scripts in `examples`. Each runs as it is, and the tests check the numbers that it prints.",
         "\n".join(rows),
     ]

@@ -25,9 +25,7 @@ CALM: dict[str, float | str | bool] = {
 
 def press(kind: str, round_trip: float) -> tuple[float, ...]:
     """Fastest hand [m/s], most force on hand and tip [N], way from the command to the tip [m]."""
-    late = dict.fromkeys(
-        ("network.there.least_delay", "network.back.least_delay"), 0.5 * round_trip
-    )
+    late = dict.fromkeys(("network.there.least_delay", "network.back.least_delay"), 0.5 * round_trip)
     settings = CALM | late | {"reflection.architecture": kind.partition(",")[0]}
     session = tc.run("palpation", duration=14.0, stages=CHANNELS[kind], settings=settings)
     hand = session["master/measured_cp"].values[5000:, :3]

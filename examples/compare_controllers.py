@@ -27,10 +27,7 @@ def main(duration: float = 46.0) -> None:
     for law, what in LAWS.items():
         recording = tc.run("coarse_box", duration=duration, plant="hardware", controller=law)
         # A measured pose is told a tick after the setpoint that it was sampled with.
-        wanted, seen = (
-            recording["slave/setpoint_cp"].part(slice(-1)),
-            recording["slave/measured_cp"],
-        )
+        wanted, seen = (recording["slave/setpoint_cp"].part(slice(-1)), recording["slave/measured_cp"])
         follows = wanted.stamp_ns > 1
         places = ["x", "y", "z"]
         error = 1e6 * np.linalg.norm(seen[places][1:] - wanted[places], axis=1)[follows]

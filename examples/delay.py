@@ -7,10 +7,7 @@ import teleop_core as tc
 
 def main() -> None:
     """Print how much later the slave's references come, and what that costs."""
-    recordings = [
-        tc.run("coarse_box", duration=15.0, delays=delays)
-        for delays in ({}, {"slave/servo_jp": 0.02})
-    ]
+    recordings = [tc.run("coarse_box", duration=15.0, delays=delays) for delays in ({}, {"slave/servo_jp": 0.02})]
     stamps = [recording["slave/setpoint_js"].stamp_ns for recording in recordings]
     behind = (recordings[0]["slave/setpoint_js"].log_ns - stamps[1]) * 1e-6
     print(f"the reference in force is {np.median(behind):.0f} ms old, in place of 0")

@@ -31,9 +31,7 @@ def main() -> None:
     row = outcome.row("tip, all axes")
     print(f"{row.quantity}: published {row.published} {row.unit}, predicted {row.predicted:.3f}")
     print(f"{outcome.agreeing} of {outcome.judged} agree")
-    mine = lab.Experiment(
-        "pd", "PD on the plant of the source", "Vongbunyong 2008, table 8.2", measure
-    )
+    mine = lab.Experiment("pd", "PD on the plant of the source", "Vongbunyong 2008, table 8.2", measure)
     lab.register_experiment("pd", mine, replace=True)
     print(experiments.run("pd", seed=2))
 

@@ -15,9 +15,7 @@ QUIET = {"feedback_timeout": 1.0, "reach_force.is_on": False, "gimbal_noise": 0.
 
 def touch(passivity: str, round_trip: float, material: str = "tissue") -> tuple[float, ...]:
     """Fastest hand [m/s], root mean square of its push, and most and RMS of the tip's force [N]."""
-    late = dict.fromkeys(
-        ("network.there.least_delay", "network.back.least_delay"), 0.5 * round_trip
-    )
+    late = dict.fromkeys(("network.there.least_delay", "network.back.least_delay"), 0.5 * round_trip)
     settings = QUIET | late | {"reflection.passivity": passivity, "world.material": material}
     session = tc.run("palpation", duration=20.0, stages=["network", "passivity"], settings=settings)
     hand = session["master/measured_cp"].values[5000:, :3]

@@ -9,11 +9,7 @@ from teleop_core.slave.operation import State
 def main() -> None:
     """Print the states of a session that is stopped, and how far the setpoint moved in them."""
     events = ("stop@3.0", "reset@4.0", "enable@4.1", "pause@6.0", "resume@6.5")
-    recording = tc.run(
-        "free_motion",
-        duration=8.0,
-        settings={"operation.events": events, "slave.starts_at_home": True},
-    )
+    recording = tc.run("free_motion", duration=8.0, settings={"operation.events": events, "slave.starts_at_home": True})
     setpoint = recording["slave/setpoint_cp"]
     times = 1e-9 * setpoint.log_ns
     for begin, end in ((2.5, 3.0), (3.002, 4.0), (4.2, 6.0), (6.2, 6.5), (7.0, 8.0)):

@@ -19,9 +19,7 @@ class BothParameters:
 
 
 @tc.kernel
-def both_push(
-    numbers: Array, memory: Array, felt: Array, away: Array, period: float, out: Array
-) -> None:
+def both_push(numbers: Array, memory: Array, felt: Array, away: Array, period: float, out: Array) -> None:
     """Push by the force on the tip, and by a spring where the tip lags by more than the slack."""
     length = (away[0] ** 2 + away[1] ** 2 + away[2] ** 2) ** 0.5
     share = max(length - numbers[1], 0.0) / length if length > 0.0 else 0.0

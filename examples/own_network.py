@@ -32,16 +32,11 @@ tc.register_network(tc.Network("fading", FadingParameters, fading_draw))
 def main() -> None:
     """Print the age of what the slave gets, and how much never arrives."""
     for worst in (0.0, 0.5, 0.99):
-        settings: dict[str, str | float] = {
-            "network.there.kind": "fading",
-            "network.there.fading.worst": worst,
-        }
+        settings: dict[str, str | float] = {"network.there.kind": "fading", "network.there.fading.worst": worst}
         recording = tc.run("free_motion", duration=6.0, stages="network", settings=settings)
         score = recording.score()
         age, lost = (score.value(f"network.there.{key}") for key in ("age_p99_ms", "lost_share"))
-        print(
-            f"worst {worst:.2f}: {100.0 * (lost or 0.0):.0f} % lost, 99 % younger than {age:.0f} ms"
-        )
+        print(f"worst {worst:.2f}: {100.0 * (lost or 0.0):.0f} % lost, 99 % younger than {age:.0f} ms")
 
 
 if __name__ == "__main__":

@@ -41,9 +41,7 @@ SEEING = tc.Operator("seeing", make, ahead=1)  # asked for one tick at a time
 def reached(delay: float) -> float:
     """Time [s] to the goal, to stay, if the tip is seen so late [s]."""
     delays = [f"slave/measured_cp@operator={delay}"] if delay else []
-    recording = tc.run(
-        operator=SEEING, duration=9.0, settings={"tremor_amplitude": 0.0, "teleop.delays": delays}
-    )
+    recording = tc.run(operator=SEEING, duration=9.0, settings={"tremor_amplitude": 0.0, "teleop.delays": delays})
     state = recording["teleop/state"]
     begin = state.time[state["is_following"] > 0.0][0] + LOOKS
     tip = recording["slave/measured_cp"]

@@ -17,10 +17,7 @@ TABLE = {
         {"alpha": -90, "theta": "q", "lower": -80, "upper": 80, "name": "yaw"},
         {"a": 0.05},
     ],
-    "drives": {
-        "up": {"inertia": 6.0, "speed_limit": 0.5},
-        "side": {"inertia": 4.0, "speed_limit": 0.5},
-    },
+    "drives": {"up": {"inertia": 6.0, "speed_limit": 0.5}, "side": {"inertia": 4.0, "speed_limit": 0.5}},
 }
 
 

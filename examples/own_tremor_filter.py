@@ -33,9 +33,7 @@ tc.register_tremor_filter(tc.TremorFilter("low_pass", LowPassParameters, low_pas
 def main() -> None:
     """Print for this filter and the built-in ones how much tremor they leave, and their delay."""
     for kind in ("low_pass", "notch", "band_stop", "kalman", "wflc"):
-        recording = tc.run(
-            "human", duration=12.0, stages="tremor_filter", settings={"tremor_filter.kind": kind}
-        )
+        recording = tc.run("human", duration=12.0, stages="tremor_filter", settings={"tremor_filter.kind": kind})
         score = recording.score()
         left, delay = (score.value(f"tremor_filter.{key}") for key in ("left_share", "delay_ms"))
         print(f"{kind}: {100.0 * (left or 0.0):.0f} % left, {delay or 0.0:.1f} ms late")

@@ -29,9 +29,7 @@ class Dragging:
 def main() -> None:
     """Print how far stylus and slave went while held, let go, and held again."""
     settings = {"haptic_master.device.friction": 0.0, "slave.starts_at_home": True}
-    recording = tc.run(
-        operator=tc.remote_operator("dragging", Dragging()), duration=6.5, settings=settings
-    )
+    recording = tc.run(operator=tc.remote_operator("dragging", Dragging()), duration=6.5, settings=settings)
     state = recording["teleop/state"]
     begin = state.time[state["is_following"] > 0.0][0]
     for text, first, last in (("held", 0.0, 2.0), ("let go", 2.3, 4.0), ("held", 4.0, 6.5)):

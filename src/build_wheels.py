@@ -70,10 +70,7 @@ def build(tree: Path, out: Path, *options: str) -> None:
     """Build one wheel."""
     settings = [f"--config-settings=--build-option={option}" for option in options]
     pip = (sys.executable, "-m", "pip", "--quiet", "--disable-pip-version-check", "wheel")
-    subprocess.run(
-        [*pip, "--use-pep517", "--no-deps", "--wheel-dir", str(out), *settings, str(tree)],
-        check=True,
-    )
+    subprocess.run([*pip, "--use-pep517", "--no-deps", "--wheel-dir", str(out), *settings, str(tree)], check=True)
 
 
 def compile_kernels(tree: Path, tier: str, script: str = COMPILE) -> None:
@@ -100,9 +97,7 @@ def run(tree: Path, tier: str | None, script: str) -> str:
     if tier is not None:
         kept |= {"NUMBA_CPU_NAME": tier, "NUMBA_CPU_FEATURES": ""}
     command = [sys.executable, "-c", script]
-    done = subprocess.run(
-        command, env=kept, cwd=tree, check=True, stdout=subprocess.PIPE, text=True
-    )
+    done = subprocess.run(command, env=kept, cwd=tree, check=True, stdout=subprocess.PIPE, text=True)
     return done.stdout
 
 

@@ -54,20 +54,25 @@ KINDS = {
         lambda axis, far, half: ConeParameters(
             axis=axis, half_angle=half, apex=tuple(-far * x / math.hypot(*axis) for x in axis)
         ),
-        directions, lengths, st.floats(0.05, 1.5),
+        directions,
+        lengths,
+        st.floats(0.05, 1.5),
     ),
-    "line": valid(
-        LineParameters, direction=directions, radius=st.floats(0.0, 0.02), length=endings
-    ),
+    "line": valid(LineParameters, direction=directions, radius=st.floats(0.0, 0.02), length=endings),
     "path": valid(
-        PathParameters, radius=st.floats(0.0, 0.02),
+        PathParameters,
+        radius=st.floats(0.0, 0.02),
         points=st.lists(places, min_size=1, max_size=5).map(lambda rows: sum(rows, ())),
     ),
     "hole": valid(
-        HoleParameters, radius=lengths, thickness=lengths, plate_radius=lengths,
-        chamfer=st.floats(0.0, 0.02), axis=directions,
+        HoleParameters,
+        radius=lengths,
+        thickness=lengths,
+        plate_radius=lengths,
+        chamfer=st.floats(0.0, 0.02),
+        axis=directions,
     ),
-}  # fmt: skip
+}
 THIN = {"line", "path"}
 """Those that may be too thin for points around a place to meet them."""
 
@@ -121,8 +126,7 @@ def beyond_path(p: PathParameters, points: Array) -> Any:
 def beyond_hole(p: HoleParameters, points: Array) -> Any:
     x, y, up = np.moveaxis(turned(p.axis, points), -1, 0)
     out = np.hypot(x, y)
-    faces = (up, -p.thickness - up, out - p.plate_radius, p.radius - out,
-             up - out + p.radius + p.chamfer)  # fmt: skip
+    faces = (up, -p.thickness - up, out - p.plate_radius, p.radius - out, up - out + p.radius + p.chamfer)
     return np.max(faces, axis=0)
 
 

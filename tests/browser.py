@@ -134,8 +134,7 @@ class Tab(Headless):
         code, number = KEYS.get(name, (f"Key{name.upper()}", ord(name.upper()[0])))
         text = {"text": name} if len(name) == 1 else {}
         for kind in ("keyDown", "keyUp"):
-            self.call("Input.dispatchKeyEvent", type=kind, key=name, code=code,
-                      windowsVirtualKeyCode=number, **text)  # fmt: skip
+            self.call("Input.dispatchKeyEvent", type=kind, key=name, code=code, windowsVirtualKeyCode=number, **text)
             text = {}
 
     def pull(self, begin: Any, end: Any, steps: int = 20) -> None:
@@ -214,9 +213,12 @@ def handshake(port: int, path: str = "/", **headers: Any) -> Any:
     """First line of the answer to the opening of a WebSocket, and the socket it came on."""
     opened = socket.create_connection(("127.0.0.1", port), timeout=20)
     told = {
-        "Host": f"127.0.0.1:{port}", "Upgrade": "websocket", "Connection": "Upgrade",
-        "Sec-WebSocket-Key": "dGhlIHNhbXBsZSBub25jZQ==", "Sec-WebSocket-Version": "13",
-    }  # fmt: skip
+        "Host": f"127.0.0.1:{port}",
+        "Upgrade": "websocket",
+        "Connection": "Upgrade",
+        "Sec-WebSocket-Key": "dGhlIHNhbXBsZSBub25jZQ==",
+        "Sec-WebSocket-Version": "13",
+    }
     told |= {name.replace("_", "-"): value for name, value in headers.items()}
     lines = [f"GET {path} HTTP/1.1", *(f"{n}: {v}" for n, v in told.items() if v), "", ""]
     opened.sendall("\r\n".join(lines).encode())

@@ -411,7 +411,7 @@ CODE_MUTANTS = (
     _mutant("resume_early", "resume is taken while the arm moves", "slave/operation/states.py",
             "and s.is_moving:", "and s.is_moving > 1:", "operation_states"),
     _mutant("part_untold", "a verdict does not name a part that is not known",
-            "evaluation/verdict.py", "    _missing, _drift, _following,", "    _drift, _following,",
+            "evaluation/verdict.py", "    _missing,\n    _drift,", "    _drift,",
             "verdict"),
     _mutant("loss_untold", "a verdict does not name lost messages", "evaluation/verdict.py",
             'for name in ("gaps", "count", "lost")', 'for name in ("lost", "count", "gaps")',

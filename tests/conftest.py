@@ -115,9 +115,11 @@ def recording(teleop: Run, tmp_path_factory: pytest.TempPathFactory) -> Path:
     Before them the slave moves to where it starts, and the hand rests.
     """
     out = tmp_path_factory.mktemp("bags") / "session"
-    settings = ("path.approach_time=1.0", "buttons.clutch=[4.0, 5.0]", "buttons.mode=[6.0, 9.0]",
-                "buttons.fixture=[2.0, 11.0]")  # fmt: skip
-    teleop(
-        "sim", "--scenario", "mode_switching", "--duration", 12, "--out", out, "--set", *settings
+    settings = (
+        "path.approach_time=1.0",
+        "buttons.clutch=[4.0, 5.0]",
+        "buttons.mode=[6.0, 9.0]",
+        "buttons.fixture=[2.0, 11.0]",
     )
+    teleop("sim", "--scenario", "mode_switching", "--duration", 12, "--out", out, "--set", *settings)
     return out

@@ -21,9 +21,14 @@ NAMES = sorted(path.stem for path in EXAMPLES.glob("*.py"))
 def run(name: str, folder: Path, **env: str) -> str:
     """What an example prints; run in a folder of its own, in which it must leave nothing."""
     done = subprocess.run(
-        [sys.executable, str(EXAMPLES / f"{name}.py")], cwd=folder, capture_output=True, text=True,
-        timeout=300, check=False, env=os.environ | env,
-    )  # fmt: skip
+        [sys.executable, str(EXAMPLES / f"{name}.py")],
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        timeout=300,
+        check=False,
+        env=os.environ | env,
+    )
     assert done.returncode == 0, done.stdout + done.stderr
     assert not list(folder.iterdir())
     return done.stdout

@@ -58,8 +58,10 @@ def main() -> int:
                 ran.update(found)
                 failed.update(bad)
                 took = time.monotonic() - begin
-                print(f"{number + 1}/{given.count}: {len(bad)} of {len(found)} failed, "
-                      f"{took:.0f} s {'; '.join(bad)}", flush=True)  # fmt: skip
+                print(
+                    f"{number + 1}/{given.count}: {len(bad)} of {len(found)} failed, {took:.0f} s {'; '.join(bad)}",
+                    flush=True,
+                )
     except KeyboardInterrupt:
         print("ended early")
     finally:

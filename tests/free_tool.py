@@ -45,11 +45,7 @@ def _turn(axis: Array, by: Array) -> None:
     for k in range(3):
         i, j = (k + 1) % 3, (k + 2) % 3
         across = u[i] * a[j] - u[j] * a[i]
-        axis[k] = (
-            math.cos(angle) * a[k]
-            + math.sin(angle) * across
-            + (1.0 - math.cos(angle)) * along * u[k]
-        )
+        axis[k] = math.cos(angle) * a[k] + math.sin(angle) * across + (1.0 - math.cos(angle)) * along * u[k]
 
 
 @kernel
@@ -74,14 +70,7 @@ def stored(p: Any, contacts: NDArray[np.void]) -> float:
 
 @kernel
 def _drag(
-    p: Any,
-    contacts: NDArray[np.void],
-    arm: Any,
-    q: Array,
-    axis: Array,
-    steps: Array,
-    felt: Array,
-    account: Array,
+    p: Any, contacts: NDArray[np.void], arm: Any, q: Array, axis: Array, steps: Array, felt: Array, account: Array
 ) -> None:
     push, speed, middle, energy, turned = np.empty(6), np.empty(6), np.empty(6), 0.0, 0.0
     for tick in range(len(steps)):
@@ -206,7 +195,11 @@ def fly(
     state = record(SimulationState, JOINTS)
     _fly(p, state, contacts, thing, FREE, body, q, dq, np.array(axis, float), found)
     keys: dict[str, Any] = {
-        "place": slice(3), "turn": slice(3, 6), "speed": slice(6, 12), "felt": slice(12, 18),
-        "stored": 18, "axis": slice(19, 22),
-    }  # fmt: skip
+        "place": slice(3),
+        "turn": slice(3, 6),
+        "speed": slice(6, 12),
+        "felt": slice(12, 18),
+        "stored": 18,
+        "axis": slice(19, 22),
+    }
     return {key: found[:, part] for key, part in keys.items()} | {"time": DT * np.arange(ticks)}

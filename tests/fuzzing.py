@@ -93,10 +93,14 @@ def fuzz(
                 test(*arguments, **drawn)
 
         chosen = settings(
-            max_examples=cases(target, parts), deadline=None, database=None, print_blob=True,
-            derandomize=CASES == USUAL, phases=(Phase.explicit, Phase.generate, Phase.shrink),
+            max_examples=cases(target, parts),
+            deadline=None,
+            database=None,
+            print_blob=True,
+            derandomize=CASES == USUAL,
+            phases=(Phase.explicit, Phase.generate, Phase.shrink),
             suppress_health_check=list(HealthCheck),
-        )  # fmt: skip
+        )
         tried = chosen(given(**strategies)(case))
 
         def counted(**fixtures: object) -> None:

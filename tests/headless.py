@@ -22,9 +22,7 @@ SILENCE = 200.0
 class Headless:
     """One tab; everything it says on the console is in ``said``."""
 
-    def __init__(
-        self, browser: str, folder: Path, width: int = 1200, height: int = 900, flags: Any = FLAGS
-    ) -> None:
+    def __init__(self, browser: str, folder: Path, width: int = 1200, height: int = 900, flags: Any = FLAGS) -> None:
         (read_here, write_there), (read_there, write_here) = os.pipe(), os.pipe()
 
         def connect() -> None:  # Chromium reads descriptor 3 and writes descriptor 4
@@ -96,23 +94,18 @@ class Headless:
 
     def resize(self, width: int, height: int) -> None:
         """Size of the window, [px]."""
-        self.call("Emulation.setDeviceMetricsOverride", width=width, height=height,
-                  deviceScaleFactor=1, mobile=False)  # fmt: skip
+        self.call("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=False)
 
     def value(self, script: str) -> Any:
         """Value of an expression in the page; promises are waited for."""
-        answer = self.call(
-            "Runtime.evaluate", expression=script, returnByValue=True, awaitPromise=True
-        )
+        answer = self.call("Runtime.evaluate", expression=script, returnByValue=True, awaitPromise=True)
         assert "exceptionDetails" not in answer, answer["exceptionDetails"]
         return answer["result"].get("value")
 
     def open(self, file: Any) -> None:
         """Open a report page and wait until it has drawn everything."""
         self.call("Page.navigate", url=file.as_uri())
-        self.until(
-            "document.body && (document.body.dataset.finished || document.body.dataset.errors)"
-        )
+        self.until("document.body && (document.body.dataset.finished || document.body.dataset.errors)")
 
     def until(self, condition: object, seconds: float = 60) -> None:
         """Wait until an expression is true, but not for ever."""

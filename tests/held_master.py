@@ -13,13 +13,8 @@ _HAND = [topic.field for topic in (HAND_SERVO_CP, HAND_BUTTONS, HAND_TREMOR)]
 class HeldMaster:
     """Operator and device; ``signals`` and ``state`` are those of the device."""
 
-    def __init__(
-        self, operator: OperatorParameters, master: HapticMasterParameters | None = None
-    ) -> None:
-        self.operator, self.device = (
-            RunningOperator(operator),
-            HapticMaster(master or HapticMasterParameters()),
-        )
+    def __init__(self, operator: OperatorParameters, master: HapticMasterParameters | None = None) -> None:
+        self.operator, self.device = (RunningOperator(operator), HapticMaster(master or HapticMasterParameters()))
         self.signals, self.state = self.device.signals, self.device.state
 
     def prepare(self, ticks: int) -> None:

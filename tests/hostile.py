@@ -94,8 +94,7 @@ def updates_what_does_not_exist(watcher: PageClient, driver: PageClient) -> None
     for uuid in ("", "nothing", "x" * 10_000, "../..", None, 7):
         watcher.set(uuid, value=True)
         driver.say({"type": "CommandTriggerMessage", "uuid": uuid})
-        driver.say({"type": "TransformControlsUpdateMessage", "name": uuid, "position": HERE,
-                    "wxyz": LEVEL})  # fmt: skip
+        driver.say({"type": "TransformControlsUpdateMessage", "name": uuid, "position": HERE, "wxyz": LEVEL})
 
 
 def uploads_files(watcher: PageClient, driver: PageClient) -> None:
@@ -110,12 +109,14 @@ def uploads_files(watcher: PageClient, driver: PageClient) -> None:
 
 def speaks_as_the_server(watcher: PageClient, driver: PageClient) -> None:
     for message in (
-        {"type": "RunJavascriptMessage", "source": "alert(1)"}, {"type": "ResetGuiMessage"},
+        {"type": "RunJavascriptMessage", "source": "alert(1)"},
+        {"type": "ResetGuiMessage"},
         {"type": "GuiRemoveMessage", "uuid": watcher.elements["Take control"]},
         {"type": "RemoveSceneNodeMessage", "name": "/arm", "owner": ""},
         {"type": "SetPositionMessage", "name": watcher.gizmos[0], "position": HERE, "owner": ""},
-        {"type": "ThemeConfigurationMessage"}, {"type": "ShareUrlRequest"},
-    ):  # fmt: skip
+        {"type": "ThemeConfigurationMessage"},
+        {"type": "ShareUrlRequest"},
+    ):
         watcher.say(message)
 
 
@@ -127,25 +128,17 @@ def uses_what_the_console_does_not(watcher: PageClient, driver: PageClient) -> N
             {"type": "GuiButtonHoldMessage", "uuid": uuid, "frequency": 1e9},
             {"type": "GuiFormSubmitMessage", "uuid": uuid},
             {"type": "GuiFormDirtyMessage", "uuid": uuid},
-            {"type": "SceneNodeClickMessage", "name": "/arm", "instance_index": None,
-             "screen_pos": [0, 0], **ray},
+            {"type": "SceneNodeClickMessage", "name": "/arm", "instance_index": None, "screen_pos": [0, 0], **ray},
             {"type": "ScenePointerMessage", "event_type": "click", "screen_pos": [[0, 0]], **ray},
             {"type": "GetRenderResponseMessage", "payload": b"x" * 1000, "render_uuid": "guess"},
-        ):  # fmt: skip
+        ):
             page.say(message)
 
 
 def sends_what_is_no_message(watcher: PageClient, driver: PageClient) -> None:
     drag = msgspec.msgpack.encode({"type": "TransformControlsUpdateMessage", "position": HERE})
     for page in (watcher, driver):
-        for data in (
-            b"",
-            b"\xc1",
-            b"\x91" * 50_000,
-            b"\xff" * 100,
-            drag[:-3],
-            b"\xdf\xff\xff\xff\xff",
-        ):
+        for data in (b"", b"\xc1", b"\x91" * 50_000, b"\xff" * 100, drag[:-3], b"\xdf\xff\xff\xff\xff"):
             page.raw(data)
         value: Any
         for value in (None, [], 7, {}, {"type": 3}, {"type": ["x"]}, [[[[]]]]):
@@ -155,8 +148,12 @@ def sends_what_is_no_message(watcher: PageClient, driver: PageClient) -> None:
 
 def says_one_type_and_means_another(watcher: PageClient, driver: PageClient) -> None:
     # A map with the same key twice: parsers differ in which of them counts.
-    items = [("type", "ViewerCameraMessage"), ("type", "GuiUpdateMessage"),
-             ("uuid", watcher.elements["Start"]), ("updates", {"value": True})]  # fmt: skip
+    items = [
+        ("type", "ViewerCameraMessage"),
+        ("type", "GuiUpdateMessage"),
+        ("uuid", watcher.elements["Start"]),
+        ("updates", {"value": True}),
+    ]
     for order in (items, items[::-1], items[1:2] + items[2:] + items[:1]):
         parts = [msgspec.msgpack.encode(part) for pair in order for part in pair]
         watcher.raw(bytes([0x80 + len(order)]) + b"".join(parts))

@@ -44,10 +44,16 @@ def needle(name: str, parameters: Any = None, joints: int = 3) -> Needle:
     """A needle before an object, with the defaults of its parameters if there are no others."""
     part = WORLD_OBJECTS.find(name)
     return Needle(
-        pointer(straight, FK), part.pointer, np.zeros(joints), np.zeros(3),
-        np.zeros((4, 4)), part.numbers(parameters or part.parameters()), np.zeros(3), np.zeros(3),
+        pointer(straight, FK),
+        part.pointer,
+        np.zeros(joints),
+        np.zeros(3),
+        np.zeros((4, 4)),
+        part.numbers(parameters or part.parameters()),
+        np.zeros(3),
+        np.zeros(3),
         np.zeros((6, joints)),
-    )  # fmt: skip
+    )
 
 
 @kernel
@@ -81,9 +87,7 @@ def _stored(p: SimulationNumbers, s: Any) -> Any:
 
 
 @kernel
-def _lead(
-    p: SimulationNumbers, contacts: Any, arm: Any, way: Array, felt: Array, lost: Array
-) -> None:
+def _lead(p: SimulationNumbers, contacts: Any, arm: Any, way: Array, felt: Array, lost: Array) -> None:
     """Lead the tip along ``way`` (N, 3), a tick each ``PIECES`` rows.
 
     Writes the force at the begin of each tick (ticks, 6), and the energy lost so far (ticks,): what
@@ -121,8 +125,13 @@ def lead(way: Array, name: str = "plane", parameters: Any = None, **numbers: flo
     """
     # Whole records: numba takes a record for another one that begins with the same fields.
     p, contacts = record(SimulationNumbers, 3), record_array(ContactState, 1, 3)
-    known = {"world_stiffness": 200.0, "puncture_force": 0.5, "cutting_force": 0.1,
-             "shaft_friction": 20.0, "hole_radius": 2e-3}  # fmt: skip
+    known = {
+        "world_stiffness": 200.0,
+        "puncture_force": 0.5,
+        "cutting_force": 0.1,
+        "shaft_friction": 20.0,
+        "hole_radius": 2e-3,
+    }
     for key, value in (known | numbers).items():
         p[key] = value
     for key, *_ in fields_of(ButtonNumbers):
@@ -136,10 +145,7 @@ def lead(way: Array, name: str = "plane", parameters: Any = None, **numbers: flo
 
 def along_z(*heights: float, speed: float = 0.02) -> Array:
     """Straight way (N, 3) [m] through heights, at a speed [m/s]."""
-    legs = [
-        np.linspace(a, b, max(round(abs(b - a) / speed / DT), 200), endpoint=False)
-        for a, b in pairwise(heights)
-    ]
+    legs = [np.linspace(a, b, max(round(abs(b - a) / speed / DT), 200), endpoint=False) for a, b in pairwise(heights)]
     z = np.append(np.concatenate(legs), heights[-1])
     return np.column_stack((np.zeros((len(z), 2)), z))
 
@@ -149,9 +155,7 @@ def wandering(seed: int, ticks: int = 3000) -> Array:
     rng, times = np.random.default_rng(seed), DT * np.arange(ticks)
     rates, phases = rng.uniform(0.3, 6.0, (6, 3)), rng.uniform(0.0, 2.0 * np.pi, (6, 3))
     sizes = rng.normal(size=(6, 3)) * (1e-3, 1e-3, 5e-3)
-    way = np.einsum(
-        "ij,nij->nj", sizes, np.sin(2.0 * np.pi * times[:, None, None] * rates + phases)
-    )
+    way = np.einsum("ij,nij->nj", sizes, np.sin(2.0 * np.pi * times[:, None, None] * rates + phases))
     share = np.minimum(1.0, np.minimum(times, times[::-1]) / 0.2)
     way[:, 2] = share * (way[:, 2] - 2e-3) + (1.0 - share) * 0.01
     return way

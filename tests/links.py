@@ -97,9 +97,10 @@ ENTRIES = """
 """
 RAISED, TWICE = (Topic(name, Kind.POSE) for name in ("slave/raised_cp", "slave/plain_cp"))
 SETTINGS = (
-    "teleop.stages=[helper, compiled_raise, plain_raise]", "teleop.delays=[slave/servo_jp=0.05]",
+    "teleop.stages=[helper, compiled_raise, plain_raise]",
+    "teleop.delays=[slave/servo_jp=0.05]",
     "plain_raise.height=0.003",
-)  # fmt: skip
+)
 WATCHED = (topics.SLAVE_SETPOINT_JS, topics.SLAVE_REACH)
 
 
@@ -131,9 +132,7 @@ def common(*series: Any) -> list[Any]:
 
 def assert_delay_is_seen_in_the_latency(recorded: Bag) -> None:
     """The one of :data:`SETTINGS`, once."""
-    answers, setpoints = (
-        recorded.read(topic) for topic in (topics.SLAVE_SERVO_JP, topics.SLAVE_SETPOINT_JS)
-    )
+    answers, setpoints = (recorded.read(topic) for topic in (topics.SLAVE_SERVO_JP, topics.SLAVE_SETPOINT_JS))
     in_force = setpoints.stamp_ns > answers.stamp_ns[0]
     latency_ms = (setpoints.log_ns - setpoints.stamp_ns)[in_force] / MS
     assert len(latency_ms) > 1000

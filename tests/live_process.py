@@ -29,10 +29,14 @@ class LiveProcess:
     """
 
     def __init__(
-        self, folder: Path, *arguments: str, duration: float = 600.0,
-        env: Mapping[str, str] | None = None, ignores: tuple[int, ...] = (),
+        self,
+        folder: Path,
+        *arguments: str,
+        duration: float = 600.0,
+        env: Mapping[str, str] | None = None,
+        ignores: tuple[int, ...] = (),
         settings: tuple[str, ...] = QUICK,
-    ) -> None:  # fmt: skip
+    ) -> None:
         self.bag, self.temporary, self._log = folder / "bag", folder / "tmp", folder / "live.log"
         self._duration = duration
         self.temporary.mkdir()
@@ -41,10 +45,13 @@ class LiveProcess:
         command += [word for setting in settings for word in ("--set", setting)]
         with self._log.open("wb") as log:
             self.process = subprocess.Popen(
-                command, stdin=subprocess.DEVNULL, stdout=log, stderr=log,
+                command,
+                stdin=subprocess.DEVNULL,
+                stdout=log,
+                stderr=log,
                 env=os.environ | {"TMPDIR": str(self.temporary)} | dict(env or {}),
                 preexec_fn=lambda: [signal.signal(n, signal.SIG_IGN) for n in ignores],  # noqa: PLW1509
-            )  # fmt: skip
+            )
 
     @property
     def text(self) -> str:
@@ -106,9 +113,7 @@ def wait_until(condition: Callable[[], Any], what: str, timeout: float = TIMEOUT
 
 def has_recorded(status: Any, counts: Mapping[str, int]) -> bool:
     """Whether a recorder's report tells of more samples than these of each topic."""
-    return status is not None and all(
-        status.number(f"received.{name}") > count for name, count in counts.items()
-    )
+    return status is not None and all(status.number(f"received.{name}") > count for name, count in counts.items())
 
 
 def words(process: psutil.Process) -> list[str]:

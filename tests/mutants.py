@@ -69,9 +69,15 @@ class Mutant:
 
 
 def _mutant(
-    name: str, text: str, file: str, before: str, after: str, *rows: str,
-    composed: tuple[str, ...] | None = None, schedule: Schedule | None = None,
-) -> Mutant:  # fmt: skip
+    name: str,
+    text: str,
+    file: str,
+    before: str,
+    after: str,
+    *rows: str,
+    composed: tuple[str, ...] | None = None,
+    schedule: Schedule | None = None,
+) -> Mutant:
     return Mutant(name, text, ((file, before, after),), rows, composed, schedule)
 
 
@@ -112,7 +118,7 @@ MUTANTS = (
     _mutant("stop_unlatched", "a released stop button enables the arm", _STAGE,
             "            self.request(Event.STOP)\n", _RELEASED, "stop_latched"),
     Mutant("press_lost", "the stop button's reader keeps one message",
-           (("nodes/operation.py", "    Qos(keeps_all=True),", "    Qos(depth=1),"),
+           (("nodes/operation.py", "(Qos(keeps_all=True), Qos", "(Qos(depth=1), Qos"),
             ("slave/operation/presses.py", "missing = max(0, number - last - 1)", "missing = 0")),
            ("stop_brief",)),
     _mutant("released_by_others", "any button releases the stop", "slave/operation/presses.py",
@@ -283,10 +289,7 @@ def tree(mutant: Mutant) -> Path:
     """Directory that holds the mutant's packages, made or brought up to date."""
     texts = {source(file): text for file, text in changed(mutant).items()}
     copy = PLACE / mutant.name
-    for root in {
-        PACKAGE.parent,
-        *(ROOT / "src" / path.parts[len(ROOT.parts) + 1] for path in texts),
-    }:
+    for root in {PACKAGE.parent, *(ROOT / "src" / path.parts[len(ROOT.parts) + 1] for path in texts)}:
         for file in (root / root.name).rglob("*"):
             if not file.is_dir() and file.parent.name != "__pycache__":
                 text = texts.get(file)
@@ -305,9 +308,7 @@ def _put(data: bytes, file: Path) -> None:
     file.write_bytes(data)
 
 
-def drilled(
-    mutant: Mutant, rows: Sequence[str], *, is_composed: bool, is_live: bool = False
-) -> dict[str, list[str]]:
+def drilled(mutant: Mutant, rows: Sequence[str], *, is_composed: bool, is_live: bool = False) -> dict[str, list[str]]:
     """What the drill finds wrong with a mutant, by row."""
     with tempfile.TemporaryDirectory(prefix="mutant_") as folder:
         file = Path(folder) / "drill.json"

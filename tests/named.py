@@ -106,8 +106,7 @@ def circle(count: int = 400) -> Any:
 
 def _table(path: Path, names: str, columns: Any) -> None:
     separator = "," if path.suffix == ".csv" else " "
-    np.savetxt(path, columns, header=names.replace(" ", separator), comments="",
-               delimiter=separator, fmt="%.6f")  # fmt: skip
+    np.savetxt(path, columns, header=names.replace(" ", separator), comments="", delimiter=separator, fmt="%.6f")
 
 
 def _hand(path: Path) -> None:

@@ -39,10 +39,13 @@ class PageClient:
         self.values: dict[Any, Any]
         self.elements, self.gizmos, self.commands, self.values = {}, [], {}, {}
         self.socket = connect(
-            f"ws://127.0.0.1:{port}/", origin=Origin(f"http://127.0.0.1:{port}"), compression=None,
-            subprotocols=[Subprotocol(f"viser-v{viser.__version__}")], max_size=None,
+            f"ws://127.0.0.1:{port}/",
+            origin=Origin(f"http://127.0.0.1:{port}"),
+            compression=None,
+            subprotocols=[Subprotocol(f"viser-v{viser.__version__}")],
+            max_size=None,
             close_timeout=1,
-        )  # fmt: skip
+        )
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()
         if comes_up:

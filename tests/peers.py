@@ -118,9 +118,7 @@ class AnyPeer:
         self.nodes: list[Any] = []
         self._publishers: dict[str, Any] = {}
 
-    def launch(
-        self, name: str, parameters: dict[str, Any], arm: str, env: Mapping[str, str] | None
-    ) -> Any:
+    def launch(self, name: str, parameters: dict[str, Any], arm: str, env: Mapping[str, str] | None) -> Any:
         """Process of a node with parameters."""
         raise NotImplementedError
 
@@ -158,9 +156,14 @@ class AnyPeer:
             raise AssertionError("\n".join([str(error), *said])) from error
 
     def start(
-        self, name: str, wait: str = "active", arm: str = "", env: Mapping[str, str] | None = None,
-        has_arm: bool = True, **parameters: Any,
-    ) -> Any:  # fmt: skip
+        self,
+        name: str,
+        wait: str = "active",
+        arm: str = "",
+        env: Mapping[str, str] | None = None,
+        has_arm: bool = True,
+        **parameters: Any,
+    ) -> Any:
         """Start a node; double underscores in names stand for dots.
 
         A slave starts at home unless it is told otherwise, so that it follows at once. With one
@@ -169,22 +172,14 @@ class AnyPeer:
         """
         if name == "haptic_master":
             own = {key: parameters.pop(key) for key in set(parameters) if _is_of_hand(key)}
-            if (
-                has_arm
-                and parameters.get("autostart", True)
-                and self._runs("operator", arm) is None
-            ):
+            if has_arm and parameters.get("autostart", True) and self._runs("operator", arm) is None:
                 named = {key.removeprefix("operator__"): value for key, value in own.items()}
                 self.start("operator", wait, arm=arm, env=env, **named)
         if name == "slave_sim" and not parameters and (running := self._runs(name, arm)):
             return running
         if name == "slave":
             own = {key: parameters.pop(key) for key in set(parameters) if _is_of_arm(key)}
-            if (
-                has_arm
-                and parameters.get("autostart", True)
-                and self._runs("slave_sim", arm) is None
-            ):
+            if has_arm and parameters.get("autostart", True) and self._runs("slave_sim", arm) is None:
                 robot = {key: parameters[key] for key in ("robot",) if key in parameters}
                 self.start("slave_sim", wait, arm=arm, env=env, **robot, **own)
             home = load_robot(parameters.get("robot", "rcrt1")).home.tolist()
@@ -298,8 +293,7 @@ class AnyPeer:
     def set(self, name: str, at_once: bool = False, **values: Any) -> list[Any]:
         """Results of setting parameters over the node's services."""
         messages: list[ParameterMessage] = [
-            Parameter(key.replace("__", "."), value=value).to_parameter_msg()
-            for key, value in values.items()
+            Parameter(key.replace("__", "."), value=value).to_parameter_msg() for key, value in values.items()
         ]
         if at_once:
             request = SetParametersAtomically.Request(parameters=messages)

@@ -71,9 +71,7 @@ def moves(person: Person, seconds: float, seed: int = 1) -> tuple[NDArray[np.int
     steps = np.diff(places, axis=0)[at]
     turns = np.array([(a.inv() * b).as_rotvec() for a, b in pairwise(attitudes)])[at]
     now = Rotation.concatenate(attitudes)[at] * Rotation.from_rotvec(share[:, None] * turns)
-    poses = np.hstack(
-        (np.array(places)[at] + share[:, None] * steps, now.as_quat()[:, [3, 0, 1, 2]])
-    )
+    poses = np.hstack((np.array(places)[at] + share[:, None] * steps, now.as_quat()[:, [3, 0, 1, 2]]))
     return np.round(times * 1e9).astype(np.int64) + _BEGIN_NS, np.ascontiguousarray(poses)
 
 

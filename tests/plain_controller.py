@@ -34,10 +34,7 @@ ARMS = {
         ("yaw", "pitch", "roll", "slide", "shoulder", "base"),
     ),
     "ur5e": (
-        tuple(
-            f"{name}_joint"
-            for name in ("shoulder_pan", "shoulder_lift", "elbow", "wrist_1", "wrist_2", "wrist_3")
-        ),
+        tuple(f"{name}_joint" for name in ("shoulder_pan", "shoulder_lift", "elbow", "wrist_1", "wrist_2", "wrist_3")),
         (0.1, -1.5, 1.4, -1.5, -1.6, 0.2),
         (math.pi,) * 6,
         (),
@@ -47,14 +44,10 @@ ARMS = {
 """Names of the joints, where they stand, rated speeds, order of forward commands where another."""
 COMMANDS = {
     "joint_state": (JointState, "/robot_joint_command", "/robot_joint_states"),
-    "forward_command": (
-        Float64MultiArray, "/forward_position_controller/commands", "/joint_states"
-    ),
-    "joint_trajectory": (
-        JointTrajectory, "/joint_trajectory_controller/joint_trajectory", "/joint_states"
-    ),
+    "forward_command": (Float64MultiArray, "/forward_position_controller/commands", "/joint_states"),
+    "joint_trajectory": (JointTrajectory, "/joint_trajectory_controller/joint_trajectory", "/joint_states"),
     "crtk": (JointState, "/PSM1/servo_jp", "/PSM1/measured_js"),
-}  # fmt: skip
+}
 RATE, BANDWIDTH = 500.0, 200.0
 
 
@@ -73,9 +66,14 @@ class Controller:
     """
 
     def __init__(
-        self, kind: str, arm: str = "rcrt1", seed: str = "", *,
-        now: Callable[[], float] = time.monotonic, time_ns: Callable[[], int] = time.time_ns,
-    ) -> None:  # fmt: skip
+        self,
+        kind: str,
+        arm: str = "rcrt1",
+        seed: str = "",
+        *,
+        now: Callable[[], float] = time.monotonic,
+        time_ns: Callable[[], int] = time.time_ns,
+    ) -> None:
         self.joints, stands, self.rated, order = ARMS[arm]
         self.order = order or self.joints
         chance = random.Random(seed)
@@ -107,10 +105,7 @@ class Controller:
 
     def _go(self, goal: dict[str, float]) -> None:
         start = self.goal if self.is_leading else self.place
-        share = max(
-            abs(goal[n] - start[n]) / (s / RATE)
-            for n, s in zip(self.joints, self.rated, strict=True)
-        )
+        share = max(abs(goal[n] - start[n]) / (s / RATE) for n, s in zip(self.joints, self.rated, strict=True))
         if not self.is_leading:
             self.first, self.is_leading = share, True
         self.largest = max(self.largest, share)

@@ -108,10 +108,7 @@ def axes_of_dh(rows: list[tuple[float, float, float]]) -> list[tuple[Array, Arra
 
 _H = 0.5 * math.pi
 # Universal Robots, support article on DH parameters of their arms.
-UR5E = axes_of_dh(
-    [(0, _H, 0.1625), (-0.425, 0, 0), (-0.3922, 0, 0), (0, _H, 0.1333), (0, -_H, 0.0997),
-     (0, 0, 0.0996)]
-)  # fmt: skip
+UR5E = axes_of_dh([(0, _H, 0.1625), (-0.425, 0, 0), (-0.3922, 0, 0), (0, _H, 0.1333), (0, -_H, 0.0997), (0, 0, 0.0996)])
 
 
 def swivel_axes(rng: np.random.Generator, kind: str = "7") -> list[tuple[Array, Array]]:
@@ -123,10 +120,7 @@ def swivel_axes(rng: np.random.Generator, kind: str = "7") -> list[tuple[Array, 
 
 
 # KUKA, LBR iiwa 14 R820, lengths 360, 420, 400 and 126 mm; the limits are those of its data sheet.
-IIWA14 = axes_of_dh(
-    [(0, -_H, 0.36), (0, _H, 0), (0, _H, 0.42), (0, -_H, 0), (0, -_H, 0.4), (0, _H, 0),
-     (0, 0, 0.126)]
-)  # fmt: skip
+IIWA14 = axes_of_dh([(0, -_H, 0.36), (0, _H, 0), (0, _H, 0.42), (0, -_H, 0), (0, -_H, 0.4), (0, _H, 0), (0, 0, 0.126)])
 IIWA14_LIMITS = [(-math.radians(a), math.radians(a)) for a in (170, 120, 170, 120, 170, 120, 175)]
 
 
@@ -145,14 +139,7 @@ def random_urdf(seed: int, n: int) -> tuple[str, str]:
             tensor = np.diag(side.sum() - side)
             turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
             I = turn @ tensor @ turn.T  # noqa: E741
-            keys = (
-                ("xx", 0, 0),
-                ("xy", 0, 1),
-                ("xz", 0, 2),
-                ("yy", 1, 1),
-                ("yz", 1, 2),
-                ("zz", 2, 2),
-            )
+            keys = (("xx", 0, 0), ("xy", 0, 1), ("xz", 0, 2), ("yy", 1, 1), ("yz", 1, 2), ("zz", 2, 2))
             numbers = " ".join(f'i{key}="{I[i, j]:.17g}"' for key, i, j in keys)
             of = kind if name[0] == "l" else "revolute"
             lines.append(

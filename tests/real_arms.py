@@ -50,7 +50,4 @@ def _body(arm: Any, i: int) -> str:
     mass, *numbers = arm["bodies"][i]
     keys = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
     inertia = " ".join(f'{key}="{x!r}"' for key, x in zip(keys, numbers[3:], strict=True))
-    return (
-        f'<inertial><origin xyz="{row(numbers[:3])}"/><mass value="{mass!r}"/>'
-        f"<inertia {inertia}/></inertial>"
-    )
+    return f'<inertial><origin xyz="{row(numbers[:3])}"/><mass value="{mass!r}"/><inertia {inertia}/></inertial>'

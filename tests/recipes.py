@@ -27,9 +27,7 @@ def pose_rows(
     return np.tile([*position, w, x, y, z], (count, 1))
 
 
-def state(
-    stamp_ns: int, described: dict[str, str] | None = None, **values: float | topics.Limit
-) -> bytes:
+def state(stamp_ns: int, described: dict[str, str] | None = None, **values: float | topics.Limit) -> bytes:
     """Message of teleop/state with everything else zero, but gain 1, of a slave that follows.
 
     ``described`` holds further names and texts, such as the kind of the fixture.
@@ -66,9 +64,7 @@ class Recipe:
         self.rows[topic] = (stamps, values, logs + delay_ns)
 
     def write(self, path: Path) -> Bag:
-        with BagWriter(
-            path, self.topics, JOINTS, metadata=self.metadata, start_ns=START_NS
-        ) as writer:
+        with BagWriter(path, self.topics, JOINTS, metadata=self.metadata, start_ns=START_NS) as writer:
             for topic, log_ns, data in self.singles:
                 writer.write(topic, log_ns, data)
             longest = max(len(stamps) for stamps, *_ in self.rows.values())

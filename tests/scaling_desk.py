@@ -12,9 +12,7 @@ from teleop_core.graph.signals import STATE, TICK_NS
 from teleop_core.kernels import geometry
 from teleop_core.robots import load_robot
 
-ANY_HAND = PlausibilityParameters(
-    speed=1000.0, acceleration=1e6, turn=1e4, reach=100.0, button_silence=0.0
-)
+ANY_HAND = PlausibilityParameters(speed=1000.0, acceleration=1e6, turn=1e4, reach=100.0, button_silence=0.0)
 """A hand that may jump, as tests have it do."""
 
 MM = 1e-3
@@ -44,9 +42,7 @@ class Desk:
         row, self.hand = self.row, self.hand + np.asarray(move, dtype=float)
         self.turn = self.turn if turn is None else turn @ self.turn
         row["master_measured_cp_ns"] += stamp_step_ns
-        geometry.pose_from_transform(
-            geometry.transform(self.turn, self.hand), row["master_measured_cp"]
-        )
+        geometry.pose_from_transform(geometry.transform(self.turn, self.hand), row["master_measured_cp"])
         row["master_buttons"] = self.pressed
         self.scaling.step()
         if does_follow:

@@ -14,9 +14,7 @@ def controller(kind: str, arm: str = "rcrt1", seed: str = "") -> Work:
 
     def work(world: SimulatedWorld) -> int:
         node, executor = world.node("plain_controller"), world.executor()
-        made = Controller(
-            kind, arm, seed, now=lambda: 1e-9 * world.monotonic_ns(), time_ns=world.time_ns
-        )
+        made = Controller(kind, arm, seed, now=lambda: 1e-9 * world.monotonic_ns(), time_ns=world.time_ns)
         for topic, message, take in made.topics:
             node.create_subscription(message, f"/{topic.strip('/')}", take, Qos(depth=1000))
         says = node.create_publisher(JointState, made.says, Qos())

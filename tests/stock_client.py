@@ -18,9 +18,7 @@ if TYPE_CHECKING:
 crtk = pytest.importorskip("crtk_msgs.msg")
 MIDDLE = [0.1, 1.7, 0.36, 0.2, 0.5, 0.1]
 # A busy machine is no fault of the arm's.
-CALM: dict[str, Any] = {
-    "operation__longest_outage": 0.0, "command_timeout": 5.0, "start": MIDDLE, "start_speed": 1.0,
-}  # fmt: skip
+CALM: dict[str, Any] = {"operation__longest_outage": 0.0, "command_timeout": 5.0, "start": MIDDLE, "start_speed": 1.0}
 
 
 class StockClient:
@@ -31,9 +29,12 @@ class StockClient:
         self.newest: dict[str, Any] = {}
         self.commands: dict[str, Any] = {}
         for name, kind in (
-            ("operating_state", crtk.OperatingState), ("setpoint_cp", PoseStamped),
-            ("setpoint_js", JointState), ("goal_js", JointState), ("measured_cv", TwistStamped),
-        ):  # fmt: skip
+            ("operating_state", crtk.OperatingState),
+            ("setpoint_cp", PoseStamped),
+            ("setpoint_js", JointState),
+            ("goal_js", JointState),
+            ("measured_cv", TwistStamped),
+        ):
             peer.ros.create_subscription(kind, f"{arm}/{name}", self.taker(name), Qos())
 
     def taker(self, name: str) -> Callable[..., Any]:

@@ -22,23 +22,38 @@ PACKAGE = "crtk_msgs"
 DEPENDENCIES = ("builtin_interfaces", "geometry_msgs", "service_msgs", "std_msgs")
 """Packages whose messages ours hold; services hold ``service_msgs``."""
 RUNTIME = (
-    "rosidl_runtime_c", "rosidl_typesupport_interface", "rosidl_typesupport_c",
-    "rosidl_typesupport_introspection_c", "rosidl_typesupport_fastrtps_c",
-    "rosidl_typesupport_fastrtps_cpp", "rosidl_runtime_cpp", "rosidl_dynamic_typesupport", "rmw",
+    "rosidl_runtime_c",
+    "rosidl_typesupport_interface",
+    "rosidl_typesupport_c",
+    "rosidl_typesupport_introspection_c",
+    "rosidl_typesupport_fastrtps_c",
+    "rosidl_typesupport_fastrtps_cpp",
+    "rosidl_runtime_cpp",
+    "rosidl_dynamic_typesupport",
+    "rmw",
     "rcutils",
-)  # fmt: skip
+)
 """Packages whose headers the generated sources include."""
 LINKED = (
-    "rosidl_runtime_c", "rosidl_typesupport_c", "rosidl_typesupport_introspection_c",
-    "rosidl_typesupport_fastrtps_c", "rosidl_typesupport_fastrtps_cpp", "rmw", "rcutils", "fastcdr",
-)  # fmt: skip
+    "rosidl_runtime_c",
+    "rosidl_typesupport_c",
+    "rosidl_typesupport_introspection_c",
+    "rosidl_typesupport_fastrtps_c",
+    "rosidl_typesupport_fastrtps_cpp",
+    "rmw",
+    "rcutils",
+    "fastcdr",
+)
 """Libraries they call; the linker keeps those that a library of ours needs."""
 
 
 KINDS = (
-    "rosidl_generator_c", "rosidl_typesupport_introspection_c", "rosidl_typesupport_fastrtps_c",
-    "rosidl_typesupport_c", "rosidl_generator_py",
-)  # fmt: skip
+    "rosidl_generator_c",
+    "rosidl_typesupport_introspection_c",
+    "rosidl_typesupport_fastrtps_c",
+    "rosidl_typesupport_c",
+    "rosidl_generator_py",
+)
 """Libraries of one message package, in the order in which they need each other."""
 
 
@@ -193,9 +208,8 @@ def main() -> int:
     """Build from the command line; returns the exit code."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument(
-        "--prefix", type=Path, default=Path(sys.prefix),
-        help="where to install (default: this Python environment)",
-    )  # fmt: skip
+        "--prefix", type=Path, default=Path(sys.prefix), help="where to install (default: this Python environment)"
+    )
     parser.add_argument("--build", type=Path, help="where to generate (default: a folder in /tmp)")
     given = parser.parse_args()
     os.environ.setdefault("AMENT_PREFIX_PATH", sys.prefix)

@@ -32,9 +32,7 @@ setup(
     description="Master-slave teleoperation stack for ROS 2 Jazzy",
     license="Apache-2.0",
     packages=find_packages(include=["teleop_core", "teleop_core.*"]),
-    package_data={
-        "teleop_core": ["py.typed", "*.pyi", "kernels/compiled/**/*.nb?", "nodes/profiles/*.xml"]
-    },
+    package_data={"teleop_core": ["py.typed", "*.pyi", "kernels/compiled/**/*.nb?", "nodes/profiles/*.xml"]},
     python_requires=">=3.11",
     install_requires=[
         "argcomplete",

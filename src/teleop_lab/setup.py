@@ -32,7 +32,5 @@ setup(
         ("share/ament_index/resource_index/packages", ["resource/teleop_lab"]),
         ("share/teleop_lab", ["package.xml"]),
     ],
-    entry_points={
-        "teleop_core.commands": [f"{name} = teleop_lab.commands.{name}:add" for name in COMMANDS]
-    },
+    entry_points={"teleop_core.commands": [f"{name} = teleop_lab.commands.{name}:add" for name in COMMANDS]},
 )

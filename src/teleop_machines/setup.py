@@ -2,9 +2,7 @@
 
 from setuptools import find_packages, setup
 
-ROBOTS = (
-    "four_bar", "mma", "parallelogram", "rps3", "scara_stewart", "stewart", "three_finger_hand",
-)  # fmt: skip
+ROBOTS = ("four_bar", "mma", "parallelogram", "rps3", "scara_stewart", "stewart", "three_finger_hand")
 VERSION = "0.6.0"  # released together with teleop_core
 
 setup(
@@ -20,7 +18,5 @@ setup(
         ("share/ament_index/resource_index/packages", ["resource/teleop_machines"]),
         ("share/teleop_machines", ["package.xml"]),
     ],
-    entry_points={
-        "teleop_core.robots": [f"{name} = teleop_machines.{name}:make" for name in ROBOTS]
-    },
+    entry_points={"teleop_core.robots": [f"{name} = teleop_machines.{name}:make" for name in ROBOTS]},
 )

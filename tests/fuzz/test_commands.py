@@ -84,8 +84,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def session(folder: Path) -> bytes:
     """A recording of ours, of 60 ms."""
     path = folder / "whole"
-    tc.run("coarse_box", duration=0.06, out=path, settings={"recorder.compression": "none",
-           "recorder.tf_rate": 0.0})  # fmt: skip
+    tc.run("coarse_box", duration=0.06, out=path, settings={"recorder.compression": "none", "recorder.tf_rate": 0.0})
     return (path / "whole_0.mcap").read_bytes()
 
 

@@ -40,18 +40,14 @@ ANY_KEY = st.one_of(
 
 
 @pytest.mark.slow
-@fuzz(
-    "settings", key=ANY_KEY, value=TEXTS, equals=st.sampled_from(("=", "=", "=", "==", "", " = "))
-)
+@fuzz("settings", key=ANY_KEY, value=TEXTS, equals=st.sampled_from(("=", "=", "=", "==", "", " = ")))
 def test_any_setting_is_taken_or_refused(key: Any, value: Any, equals: Any) -> None:
     layer = layers.parse_setting(key + equals + value)
     Configuration.from_layers([BASE, layer])
 
 
 ENTRIES = st.dictionaries(ANY_KEY, st.one_of(TEXTS, st.sampled_from(NASTY)), max_size=4)
-STAGES = st.one_of(
-    st.sampled_from((*layers.declared_groups(), "/**/slave_sim", "left/slave_sim")), TEXTS
-)
+STAGES = st.one_of(st.sampled_from((*layers.declared_groups(), "/**/slave_sim", "left/slave_sim")), TEXTS)
 
 
 @st.composite
@@ -74,9 +70,7 @@ def _encoded(text: str) -> bytes:
 
 
 @fuzz("configurations", content=parameter_files())
-def test_any_parameter_file_is_taken_or_refused(
-    tmp_path_factory: pytest.TempPathFactory, content: bytes
-) -> None:
+def test_any_parameter_file_is_taken_or_refused(tmp_path_factory: pytest.TempPathFactory, content: bytes) -> None:
     path = tmp_path_factory.getbasetemp() / "parameters.yaml"
     path.write_bytes(content)
     Configuration.from_layers([BASE, layers.load_file(path)])

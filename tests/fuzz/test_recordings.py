@@ -60,9 +60,13 @@ def unchecked(path: Path) -> bytes:
     file = path.with_suffix(".mcap")
     with file.open("wb") as stream:
         writer = Writer(
-            stream, chunk_size=1000, compression=CompressionType.NONE, index_types=IndexType.NONE,
-            enable_crcs=False, use_statistics=False,
-        )  # fmt: skip
+            stream,
+            chunk_size=1000,
+            compression=CompressionType.NONE,
+            index_types=IndexType.NONE,
+            enable_crcs=False,
+            use_statistics=False,
+        )
         writer.start("ros2")
         channels = {}
         for name, ros_type, log_ns, data in Bag(path).raw():
@@ -125,13 +129,17 @@ def test_any_chunk_is_unpacked_to_its_size_or_refused(chunk: Any, size: Any) -> 
 
 
 NAMES = st.one_of(
-    st.sampled_from(("bag_0.mcap", "../bag_0.mcap", "/etc/passwd", "..", ".", "", "a" * 300, "\0")),
-    TEXTS,
+    st.sampled_from(("bag_0.mcap", "../bag_0.mcap", "/etc/passwd", "..", ".", "", "a" * 300, "\0")), TEXTS
 )
 VALUES = st.one_of(
-    st.none(), st.integers(), st.text(max_size=9), NAMES, st.lists(NAMES, max_size=4),
-    st.dictionaries(st.text(max_size=3), st.integers(), max_size=2), st.just(["bag_0.mcap"] * 3000),
-)  # fmt: skip
+    st.none(),
+    st.integers(),
+    st.text(max_size=9),
+    NAMES,
+    st.lists(NAMES, max_size=4),
+    st.dictionaries(st.text(max_size=3), st.integers(), max_size=2),
+    st.just(["bag_0.mcap"] * 3000),
+)
 ENTRIES = ("relative_file_paths", "compression_mode", "version", "files", "storage_identifier")
 
 

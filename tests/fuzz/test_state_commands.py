@@ -14,18 +14,21 @@ from teleop_core.slave.operation.states import COMMANDS
 from teleop_core.slave.pair import ArmParameters, SimulatedArm
 
 WORDS = st.one_of(
-    st.sampled_from(COMMANDS), st.text(max_size=20), st.sampled_from([f for f in Fault if f]),
-    st.booleans(), st.integers(1, 30), st.floats(-1e9, 1e9),
-)  # fmt: skip
+    st.sampled_from(COMMANDS),
+    st.text(max_size=20),
+    st.sampled_from([f for f in Fault if f]),
+    st.booleans(),
+    st.integers(1, 30),
+    st.floats(-1e9, 1e9),
+)
 """A command, or what is none; a fault; the stop button; ticks; a place for all joints."""
 
 
 @cache
 def arm(standstill: str) -> SimulatedArm:
-    return SimulatedArm(ArmParameters(
-        starts_at_home=True,
-        operation=OperationParameters(standstill=standstill, longest_outage=0.15),
-    ))  # fmt: skip
+    return SimulatedArm(
+        ArmParameters(starts_at_home=True, operation=OperationParameters(standstill=standstill, longest_outage=0.15))
+    )
 
 
 def play(slave: SimulatedArm, words: Any) -> None:
@@ -56,14 +59,8 @@ def play(slave: SimulatedArm, words: Any) -> None:
 
 
 @pytest.mark.slow
-@fuzz(
-    "state commands",
-    words=st.lists(WORDS, max_size=12),
-    standstill=st.sampled_from(("hold", "brake")),
-)
-def test_any_words_leave_flags_that_agree_and_a_setpoint_within_its_limits(
-    words: Any, standstill: Any
-) -> None:
+@fuzz("state commands", words=st.lists(WORDS, max_size=12), standstill=st.sampled_from(("hold", "brake")))
+def test_any_words_leave_flags_that_agree_and_a_setpoint_within_its_limits(words: Any, standstill: Any) -> None:
     slave = arm(standstill)
     slave.reset()
     play(slave, words)

@@ -45,10 +45,7 @@ def any_angles(rng: Any) -> Any:
 
 
 # Random sets inside the strokes; of the 3-RPS, whose legal triples all assemble, in a wider range.
-SEARCHES = {
-    "stewart": (platform_gaps, any_platform, 1.0),
-    "rps3": (ball_joint_gaps, any_angles, 2.0),
-}
+SEARCHES = {"stewart": (platform_gaps, any_platform, 1.0), "rps3": (ball_joint_gaps, any_angles, 2.0)}
 
 
 def finds(name: str, legs: Any, rng: np.random.Generator) -> bool:

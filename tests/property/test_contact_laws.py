@@ -81,10 +81,12 @@ def energies(places: Array, forces: Array) -> Array:
     step = np.diff(places, axis=0, prepend=places[:1])
     work, way = (forces * step).sum(axis=1), np.linalg.norm(step, axis=1)
     edges = np.flatnonzero(np.diff(forces.any(axis=1), prepend=False, append=False))
-    return np.array([
-        (-work[a:b].clip(max=0.0).sum(), work[a:b].clip(min=0.0).sum(), 0.26 * way[a:b].sum())
-        for a, b in edges.reshape(-1, 2)
-    ]).reshape(-1, 3)  # fmt: skip
+    return np.array(
+        [
+            (-work[a:b].clip(max=0.0).sum(), work[a:b].clip(min=0.0).sum(), 0.26 * way[a:b].sum())
+            for a, b in edges.reshape(-1, 2)
+        ]
+    ).reshape(-1, 3)
 
 
 def leaning(rng: np.random.Generator) -> tuple[Callable[[Array], Array], dict[str, float], float]:
@@ -114,9 +116,7 @@ def leaning(rng: np.random.Generator) -> tuple[Callable[[Array], Array], dict[st
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_no_contact_with_a_damped_wall_gives_back_more_than_it_took(
-    seed: int, own_parts: None
-) -> None:
+def test_no_contact_with_a_damped_wall_gives_back_more_than_it_took(seed: int, own_parts: None) -> None:
     rng = np.random.default_rng(seed)
     found = []
     for number in range(5):
@@ -138,9 +138,7 @@ def slow(times: Array) -> Array:
     return np.minimum(times, 1.0)[:, None] * np.stack(moved, axis=1)
 
 
-def test_an_undamped_wall_feeds_slow_contacts_of_a_trembling_hand_a_damped_one_not(
-    own_parts: None,
-) -> None:
+def test_an_undamped_wall_feeds_slow_contacts_of_a_trembling_hand_a_damped_one_not(own_parts: None) -> None:
     fed = {}
     for wall in ("soft", "damped"):
         taken, returned, _ = energies(*session(slow, 10.0, wall=wall)).T
@@ -153,13 +151,7 @@ def test_an_undamped_wall_feeds_slow_contacts_of_a_trembling_hand_a_damped_one_n
 
 @pytest.mark.parametrize(
     ("stiffness", "delay", "feeds"),
-    [
-        (1000.0, 0, False),
-        (330.0, 1, False),
-        (140.0, 3, False),
-        (1260.0, 0, True),
-        (1000.0, 1, True),
-    ],
+    [(1000.0, 0, False), (330.0, 1, False), (140.0, 3, False), (1260.0, 0, True), (1000.0, 1, True)],
 )
 def test_a_wall_is_passive_within_its_bound_and_not_far_beyond_it(
     stiffness: float, delay: int, feeds: bool, own_parts: None
@@ -199,9 +191,7 @@ def test_a_step_of_force_buzzes(own_parts: None) -> None:
 
 
 @pytest.mark.parametrize(("stiffness", "bound"), [(1000.0, 1e-3), (5000.0, 1e-3)])
-def test_a_loose_grip_is_not_thrown_about_by_a_stiff_wall(
-    stiffness: float, bound: float, own_parts: None
-) -> None:
+def test_a_loose_grip_is_not_thrown_about_by_a_stiff_wall(stiffness: float, bound: float, own_parts: None) -> None:
     def motion(times: Array) -> Array:
         return (HALF + 6e-3) * np.minimum(times / 0.5, 1.0)[:, None] * (1.0, 0.0, 0.0)
 

@@ -25,12 +25,15 @@ class Chaos:
 
     def __init__(self, robot: str, seed: int) -> None:
         self.rng = np.random.default_rng(seed)
-        self.slave = SimulatedArm(ArmParameters(
-            robot=robot, starts_at_home=True,
-            operation=OperationParameters(
-                longest_outage=0.15, standstill=("hold", "brake")[seed % 2], heartbeat=0.0
-            ),
-        ))  # fmt: skip
+        self.slave = SimulatedArm(
+            ArmParameters(
+                robot=robot,
+                starts_at_home=True,
+                operation=OperationParameters(
+                    longest_outage=0.15, standstill=("hold", "brake")[seed % 2], heartbeat=0.0
+                ),
+            )
+        )
         self.row, self.ns = self.slave.signals, 10**9
         drives = present(self.slave.robot.drives)
         self.reach = drives.speed_limit * 1e-3

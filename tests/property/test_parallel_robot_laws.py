@@ -34,9 +34,7 @@ def any_pose(rng: np.random.Generator) -> Array:
 
 @pytest.mark.parametrize(("name", "geometry"), ROBOTS)
 @pytest.mark.parametrize("step", [np.inf, 1e-3])
-def test_any_pose_gives_finite_joints_inside_the_limits_and_the_step(
-    name: str, geometry: str, step: float
-) -> None:
+def test_any_pose_gives_finite_joints_inside_the_limits_and_the_step(name: str, geometry: str, step: float) -> None:
     robot, rng = load_robot_set(name, settings(geometry)), np.random.default_rng(1)
     limits = robot.limits()
     limits[2] = step

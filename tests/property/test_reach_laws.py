@@ -10,10 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from teleop_core.bags.memory import MemoryBag
 from teleop_core.bags.series import Series
-from teleop_core.chain.mapping.inverse_kinematics import (
-    InverseKinematics,
-    InverseKinematicsParameters,
-)
+from teleop_core.chain.mapping.inverse_kinematics import InverseKinematics, InverseKinematicsParameters
 from teleop_core.chain.mapping.motion_scaling import MotionScaling
 from teleop_core.chain.mapping.parameters import MotionScalingParameters
 from teleop_core.chain.mapping.plausibility import PlausibilityParameters
@@ -26,9 +23,7 @@ from teleop_core.session.api import configuration
 from teleop_core.session.runner import replayed_blocks
 from teleop_core.session.virtual import VirtualTime
 
-ANY_HAND = PlausibilityParameters(
-    speed=1000.0, acceleration=1e6, turn=1e4, reach=100.0, button_silence=0.0
-)
+ANY_HAND = PlausibilityParameters(speed=1000.0, acceleration=1e6, turn=1e4, reach=100.0, button_silence=0.0)
 """A hand that may jump, as tests have it do."""
 
 REACH = {name: index for index, name in enumerate(SLAVE_REACH.columns)}
@@ -74,9 +69,7 @@ class Chain:
         self.told.append((solver["slave_reach"].copy(), self.stamp_ns))
         return self.robot.fk(self.joints)[:3, 3]
 
-    def follow(
-        self, samples: int, move: ArrayLike = (0.0, 0.0, 0.0), turn: ArrayLike = (0.0, 0.0, 0.0)
-    ) -> Array:
+    def follow(self, samples: int, move: ArrayLike = (0.0, 0.0, 0.0), turn: ArrayLike = (0.0, 0.0, 0.0)) -> Array:
         for _ in range(samples):
             place = self.step(move, turn)
         return place
@@ -117,9 +110,7 @@ def wander(chain: Chain, rng: np.random.Generator) -> tuple[Array, Array]:
 
 @pytest.mark.parametrize("seed", range(8))
 @pytest.mark.parametrize(("robot", "gain"), [("rcrt1", 1.0), ("rcrt1", 0.5), ("puma560", 1.0)])
-def test_a_hand_that_turns_back_from_beyond_reach_moves_the_slave_at_once(
-    robot: str, gain: float, seed: int
-) -> None:
+def test_a_hand_that_turns_back_from_beyond_reach_moves_the_slave_at_once(robot: str, gain: float, seed: int) -> None:
     rng = np.random.default_rng(seed)
     chain = Chain(robot, delay=int(rng.integers(1, 30)), coarse_gain=gain)
     move, turn = wander(chain, rng)
@@ -165,9 +156,7 @@ def test_the_state_names_the_joint_at_its_limit_until_the_hand_has_come_back() -
 
 
 @pytest.mark.parametrize(("stiffness", "largest"), [(500.0, 1.5), (2000.0, 0.5)])
-def test_the_hand_feels_the_limit_up_to_a_bound_and_nothing_when_it_is_back(
-    stiffness: float, largest: float
-) -> None:
+def test_the_hand_feels_the_limit_up_to_a_bound_and_nothing_when_it_is_back(stiffness: float, largest: float) -> None:
     force = {"is_on": True, "stiffness": stiffness, "max_force": largest}
     values = MotionScalingParameters().reach_force
     chain, step = beyond(reach_force=type(values)(**dict[str, Any](force)))
@@ -234,9 +223,7 @@ def every(period_ns: int, end_ns: int = 4_000_000_000) -> NDArray[np.int64]:
 
 @pytest.mark.parametrize("interpolation", ["none", "linear", "minimum_jerk"])
 @pytest.mark.parametrize("rate_hz", [10, 30, 125, 250, 500])
-def test_a_slow_master_costs_one_of_its_periods_and_no_more(
-    rate_hz: int, interpolation: str
-) -> None:
+def test_a_slow_master_costs_one_of_its_periods_and_no_more(rate_hz: int, interpolation: str) -> None:
     times, fast = setpoints(every(TICK_NS))
     period = 1.0 / rate_hz
     kind = {"slave.interpolation": interpolation}

@@ -27,9 +27,7 @@ ROUNDING = 1e-14
 ANGLE_ROUNDING = 1e-14
 # Box centres are reported to a nanometre.
 NANOMETRE = 1.0e-9
-ANY_HAND = PlausibilityParameters(
-    speed=1000.0, acceleration=1e6, turn=1e4, reach=100.0, button_silence=0.0
-)
+ANY_HAND = PlausibilityParameters(speed=1000.0, acceleration=1e6, turn=1e4, reach=100.0, button_silence=0.0)
 """A hand that may jump, as tests have it do."""
 PAUSE_NS = round(MotionScalingParameters().longest_pause * 1e9)
 R_SLAVE_MASTER = axis_map("axes", MotionScalingParameters().axes)
@@ -105,10 +103,12 @@ class Desk:
             self.scaling.retune(
                 MotionScalingParameters(
                     plausible=ANY_HAND,
-                    coarse_gain=0.1 + 3.0 * value, fine_gain=fine, tool_roll=3.0 * value,
+                    coarse_gain=0.1 + 3.0 * value,
+                    fine_gain=fine,
+                    tool_roll=3.0 * value,
                     mode="fine" if value > 0.5 else "coarse",
                 )
-            )  # fmt: skip
+            )
         return round(5e8 * value) + 1 if action == "gap" else TICK_NS
 
 
@@ -116,9 +116,7 @@ ACTIONS = ("nothing", "clutch", "fixture", "mode", "reset", "retune", "gap")
 metres, radians = st.floats(-0.02, 0.02), st.floats(-0.5, 0.5)
 triple = st.tuples(metres, metres, metres).map(np.array)
 turns = st.tuples(radians, radians, radians).map(np.array)
-events = st.lists(
-    st.tuples(st.sampled_from(ACTIONS), st.floats(0.0, 1.0), triple, turns), max_size=40
-)
+events = st.lists(st.tuples(st.sampled_from(ACTIONS), st.floats(0.0, 1.0), triple, turns), max_size=40)
 
 
 @given(events)
@@ -151,9 +149,7 @@ def test_clutching_resetting_and_pausing_hold_the_command_whatever_the_hand_does
 
 
 @given(events)
-def test_scaling_is_linear_between_the_events(
-    happened: list[tuple[str, float, Array, Array]],
-) -> None:
+def test_scaling_is_linear_between_the_events(happened: list[tuple[str, float, Array, Array]]) -> None:
     desk = Desk()
     for action, value, step, turn in happened:
         was_clutched = desk.buttons[0] > 0.0
@@ -206,9 +202,7 @@ def test_box_stays_at_the_slave_while_clutched(
 
 
 @given(events)
-def test_box_stays_where_it_is_until_gain_box_or_slave_change(
-    happened: list[tuple[str, float, Array, Array]],
-) -> None:
+def test_box_stays_where_it_is_until_gain_box_or_slave_change(happened: list[tuple[str, float, Array, Array]]) -> None:
     desk = Desk()
     for action, value, step, turn in happened:
         before, was_on = desk.box(), desk.row["teleop_state"][STATE["is_fixture_on"]]
@@ -234,9 +228,7 @@ def test_the_same_hand_never_moves_the_slave_further_in_fine_mode(
 
 
 @given(triple, st.lists(st.floats(0.01, 1.0), min_size=1, max_size=20))
-def test_gain_does_not_depend_on_how_often_the_hand_is_sampled(
-    end: Array, spacing: list[float]
-) -> None:
+def test_gain_does_not_depend_on_how_often_the_hand_is_sampled(end: Array, spacing: list[float]) -> None:
     shares = np.cumsum(spacing) / np.sum(spacing)
     once, often = Desk(), Desk()
     once.sample(end, np.zeros(3))
@@ -273,10 +265,14 @@ def session_of(
 ) -> VirtualTime:
     text = [f"{key}={value}" for key, value in settings_.items()]
     texts = [
-        f"seed={seed}", "operator.approach_time=0.5", "operator.center=[0.01, 0.0, 0.03]",
-        "operator.period=4.0", f"buttons.clutch={sorted(clutch)}",
-        f"buttons.fixture={list(fixture)}", f"buttons.mode={list(mode)}",
-    ]  # fmt: skip
+        f"seed={seed}",
+        "operator.approach_time=0.5",
+        "operator.center=[0.01, 0.0, 0.03]",
+        "operator.period=4.0",
+        f"buttons.clutch={sorted(clutch)}",
+        f"buttons.fixture={list(fixture)}",
+        f"buttons.mode={list(mode)}",
+    ]
     session = VirtualTime(configure(settings=[*texts, *text]))
     session.run(session.lead + 3)  # until the slave is where it starts, and follows
     return session
@@ -290,18 +286,14 @@ def assert_command_moves_with_the_hand(block: NDArray[np.void], first: int) -> N
     allowed = gain * np.linalg.norm(np.diff(hand[:, :3], axis=0), axis=1)
     assert (moved <= allowed + ROUNDING).all()
     turned, allowed_turn = (
-        (Rotation.from_quat(q[1:], scalar_first=True)
-         * Rotation.from_quat(q[:-1], scalar_first=True).inv()).magnitude()
+        (Rotation.from_quat(q[1:], scalar_first=True) * Rotation.from_quat(q[:-1], scalar_first=True).inv()).magnitude()
         for q in (command[:, 3:], hand[:, 3:])
-    )  # fmt: skip
+    )
     assert (turned <= allowed_turn + 10 * ANGLE_ROUNDING).all()
 
 
 @given(
-    st.integers(0, 1000),
-    st.lists(seconds, max_size=4, unique=True).filter(lambda t: len(t) % 2 == 0),
-    presses,
-    presses,
+    st.integers(0, 1000), st.lists(seconds, max_size=4, unique=True).filter(lambda t: len(t) % 2 == 0), presses, presses
 )
 @settings(max_examples=25)
 def test_buttons_in_a_running_session_never_move_the_slave(
@@ -334,11 +326,7 @@ def test_restarting_the_scaling_in_motion_holds_the_slave_where_it_is(seed: int,
 @given(st.integers(0, 1000), st.integers(600, 2500), st.sampled_from(["scaling", "ik", "both"]))
 @settings(max_examples=10)
 def test_restarting_at_rest_moves_nothing_at_all(seed: int, at: int, what: str) -> None:
-    rest: dict[str, Any] = {
-        "operator.kind": "hold",
-        "operator.center": [0.0, 0.0, 0.0],
-        "operator.rotation": 0.0,
-    }
+    rest: dict[str, Any] = {"operator.kind": "hold", "operator.center": [0.0, 0.0, 0.0], "operator.rotation": 0.0}
     session = session_of(seed, **rest, gimbal_noise=0.0, tremor_amplitude=0.0)
     before = session.run(at)[-1]
     if what in {"scaling", "both"}:
@@ -360,9 +348,7 @@ def test_parameters_changed_in_a_running_session_never_move_the_slave(seed: int)
         coarse, roll = rng.uniform(0.1, 3.0), rng.uniform(-3.0, 3.0)
         mode = ("coarse", "fine")[rng.integers(2)]
         session.stages["motion_scaling"].retune(
-            MotionScalingParameters(
-                plausible=ANY_HAND, coarse_gain=coarse, mode=mode, tool_roll=roll
-            )
+            MotionScalingParameters(plausible=ANY_HAND, coarse_gain=coarse, mode=mode, tool_roll=roll)
         )
         block = session.run(200)
         assert_command_moves_with_the_hand(np.concatenate((before[-1:], block)), 0)

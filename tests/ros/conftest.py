@@ -82,9 +82,14 @@ class NodeProcess:
     """One node as a user starts it, in a namespace if ``arm`` is not empty."""
 
     def __init__(
-        self, name: str, parameters: dict[str, Any], domain: str, folder: Path, arm: str = "",
+        self,
+        name: str,
+        parameters: dict[str, Any],
+        domain: str,
+        folder: Path,
+        arm: str = "",
         env: Mapping[str, str] | None = None,
-    ) -> None:  # fmt: skip
+    ) -> None:
         self.name = f"{arm}/{name}" if arm else name
         file = folder / f"{name}_{time.monotonic_ns()}.yaml"
         file.write_text(yaml.safe_dump({name: {"ros__parameters": parameters}}))
@@ -121,9 +126,7 @@ class Peer(AnyPeer):
         environment()
         self.context = Context()
         self.context.init(args=[], domain_id=int(self.domain))
-        self.node = Node(
-            "peer", context=self.context, use_global_arguments=False, enable_rosout=False
-        )
+        self.node = Node("peer", context=self.context, use_global_arguments=False, enable_rosout=False)
         self.world, self.ros = RosWorld(self.context), RosNode(self.node)
         self.executor = self.world.executor()
         self.executor.add_node(self.ros)
@@ -148,9 +151,7 @@ class Peer(AnyPeer):
         self.node.destroy_node()
         self.context.try_shutdown()
 
-    def launch(
-        self, name: str, parameters: dict[str, Any], arm: str, env: Mapping[str, str] | None
-    ) -> NodeProcess:
+    def launch(self, name: str, parameters: dict[str, Any], arm: str, env: Mapping[str, str] | None) -> NodeProcess:
         return NodeProcess(name, parameters, self.domain, self._folder, arm, env)
 
     def until(self, condition: Callable[[], Any], what: str, timeout: float) -> Any:
@@ -182,9 +183,7 @@ def common_peer() -> Iterator[Peer]:
 
 
 @contextmanager
-def _composed(
-    peer: Peer, folder: Path, namespace: str, parameters: dict[str, dict[str, Any]]
-) -> Any:
+def _composed(peer: Peer, folder: Path, namespace: str, parameters: dict[str, dict[str, Any]]) -> Any:
     common = {
         "recorder": {"out": str(folder / "bag")},
         "slave": {"start": load_robot("rcrt1").home.tolist()},  # follows at once
@@ -214,9 +213,7 @@ def compose(peer: Peer, tmp_path: Path) -> Iterator[Callable[..., object]]:
     """Starter of a composed session with parameters; all its nodes are active, its arm at home."""
     with ExitStack() as stack:
 
-        def start(
-            namespace: str = "", **parameters: dict[str, Any]
-        ) -> "subprocess.Popen[bytes] | Started":
+        def start(namespace: str = "", **parameters: dict[str, Any]) -> "subprocess.Popen[bytes] | Started":
             return stack.enter_context(_composed(peer, tmp_path, namespace, parameters))
 
         yield start
@@ -236,9 +233,12 @@ def composed_session(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., 
 
 
 def run_until(
-    peer: Peer, until: Callable[[], Any], out: Path, configuration: Configuration,
+    peer: Peer,
+    until: Callable[[], Any],
+    out: Path,
+    configuration: Configuration,
     processes: Processes = Processes.SIDES,
-) -> tuple[Bag, str]:  # fmt: skip
+) -> tuple[Bag, str]:
     """Run a live session until something is so; its recording, and what was shown of it.
 
     On a busy machine nobody knows what a session comes to in a time: it lasts until it has come to
@@ -247,9 +247,7 @@ def run_until(
     show: Any
     show, interrupt = Console(file=io.StringIO(), width=200), Interrupt()
     with ThreadPoolExecutor() as pool:
-        session = pool.submit(
-            live, configuration, out, show, processes=processes, interrupt=interrupt
-        )
+        session = pool.submit(live, configuration, out, show, processes=processes, interrupt=interrupt)
 
         def reached() -> Any:
             if session.done():
@@ -267,15 +265,11 @@ def run_until(
 
 
 @pytest.fixture
-def session_until(
-    peer: Peer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> Callable[..., tuple[Bag, str]]:
+def session_until(peer: Peer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., tuple[Bag, str]]:
     """Runner of a live session in the peer's domain, as :func:`run_until` says."""
     monkeypatch.setenv("ROS_DOMAIN_ID", peer.domain)
 
-    def run(
-        configuration: Configuration, until: Callable[[], Any], **options: Processes
-    ) -> tuple[Bag, str]:
+    def run(configuration: Configuration, until: Callable[[], Any], **options: Processes) -> tuple[Bag, str]:
         return run_until(peer, until, tmp_path / "bag", configuration, **options)
 
     return run

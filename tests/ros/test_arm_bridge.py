@@ -43,8 +43,11 @@ def test_conformance_passes_unchanged_through_the_bridge(peer: "Peer") -> None:
         command = [sys.executable, "-m", "teleop_core.cli", "conformance", "slave", "--yes"]
         done = subprocess.run(
             [*command, "--domain", peer.domain, "--wait", "30"],
-            check=False, capture_output=True, text=True, timeout=300,
-        )  # fmt: skip
+            check=False,
+            capture_output=True,
+            text=True,
+            timeout=300,
+        )
     finally:
         controller.terminate()
         assert controller.wait(20) == 0

@@ -21,9 +21,7 @@ if TYPE_CHECKING:
 pytestmark = pytest.mark.ros
 
 
-def test_a_node_in_a_namespace_keeps_the_parameters_that_a_file_gives_its_bare_name(
-    peer: "Peer",
-) -> None:
+def test_a_node_in_a_namespace_keeps_the_parameters_that_a_file_gives_its_bare_name(peer: "Peer") -> None:
     peer.start("slave", arm="left", robot="puma560", command_timeout=0.25)
     request = GetParameters.Request(names=["robot", "command_timeout"])
     robot, timeout = peer.call(GetParameters, "/left/slave/get_parameters", request).values
@@ -52,12 +50,7 @@ def test_two_arms_are_recorded_together_and_scored_one_by_one(
     is_slow = processes is Processes.NODES
     moving = topics.MASTER_MEASURED_CP if is_slow else topics.SLAVE_MEASURED_JS
     listeners = {arm: peer.listen(moving.of_arm(arm)) for arm in robots}
-    settings = [
-        "teleop.arms=[right, left]",
-        "left/robot=puma560",
-        "operator.approach_time=1.0",
-        CALM,
-    ]
+    settings = ["teleop.arms=[right, left]", "left/robot=puma560", "operator.approach_time=1.0", CALM]
     configuration = configure("coarse_box", settings=[*settings, "teleop.duration=600.0"])
     enough = {topic.of_arm(arm).name: 100 for arm in robots for topic in topics.STREAMS}
 

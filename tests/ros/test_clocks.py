@@ -21,9 +21,7 @@ EXAMPLE = Path(__file__).resolve().parents[2] / "bags" / "example"
 
 
 @pytest.mark.parametrize("name", ["slave", "recorder"])
-def test_a_clock_of_others_is_refused_in_one_line_at_the_start(
-    peer: "Peer", tmp_path: Path, name: str
-) -> None:
+def test_a_clock_of_others_is_refused_in_one_line_at_the_start(peer: "Peer", tmp_path: Path, name: str) -> None:
     node = peer.start(name, wait="", use_sim_time=True)
     assert node.wait() == 2
     (line,) = node.stderr.read_text().splitlines()

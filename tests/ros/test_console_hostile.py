@@ -30,9 +30,7 @@ def saved(driver: PageClient, console: Any, name: Any) -> tc.Recording:
     return tc.open_recording(folder)
 
 
-def test_arm_of_a_real_session_gets_no_other_command_and_stops_when_the_driver_says_so(
-    tmp_path: Path,
-) -> None:
+def test_arm_of_a_real_session_gets_no_other_command_and_stops_when_the_driver_says_so(tmp_path: Path) -> None:
     console = ConsoleProcess(tmp_path, "--out", tmp_path / "session")
     port = int(console.url.split(":")[2].strip("/"))
     try:

@@ -89,9 +89,7 @@ def test_the_emergency_stop_is_latched_until_it_is_released_reset_and_enabled(li
     wait_until(lambda: link.command("enable")[0], "enabled")
 
 
-def test_mode_that_the_button_of_the_stylus_changes_is_told_as_a_changed_parameter(
-    live: Any,
-) -> None:
+def test_mode_that_the_button_of_the_stylus_changes_is_told_as_a_changed_parameter(live: Any) -> None:
     _, link, _ = live
     wait_until(lambda: state(link) == "ENABLED", "enabled")
     for mode in ("fine", "coarse"):
@@ -158,9 +156,7 @@ def test_of_a_session_in_a_namespace_the_link_knows_arm_and_recorder(
         assert Bag(tmp_path / "kept").topics["left/slave/measured_cp"].count
 
 
-def test_a_second_session_of_the_process_is_alone_and_its_energies_are_seen(
-    live: Any, tmp_path: Path
-) -> None:
+def test_a_second_session_of_the_process_is_alone_and_its_energies_are_seen(live: Any, tmp_path: Path) -> None:
     first, *_ = live
     stages = ["teleop.stages=[network,passivity]", "reflection.passivity=tdpa"]
     texts = ["operator=remote", "teleop.duration=3600.0", "operator.patience=0.0", CALM, *stages]

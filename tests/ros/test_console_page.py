@@ -111,9 +111,7 @@ def way(stream: tc.Stream) -> Any:
     return stream[["x", "y", "z"]][-1] - stream[["x", "y", "z"]][0]
 
 
-def test_page_of_a_session_opens_without_errors_and_asks_no_other_host(
-    page: Any, console: ConsoleProcess
-) -> None:
+def test_page_of_a_session_opens_without_errors_and_asks_no_other_host(page: Any, console: ConsoleProcess) -> None:
     assert not page.faults()
     assert page.hosts() == {console.url.split("/")[2]}
 
@@ -156,9 +154,7 @@ def test_emergency_stop_stops_until_it_is_released(page: Any, console: ConsolePr
     page.shows("ENABLED", 60)
 
 
-def test_browser_that_is_closed_in_motion_leaves_the_slave_still(
-    page: Any, console: Any, tmp_path: Path
-) -> None:
+def test_browser_that_is_closed_in_motion_leaves_the_slave_still(page: Any, console: Any, tmp_path: Path) -> None:
     ready(page)
     begin = page.value(page.place_of(TIP))
     saved(page, console, "before_close")

@@ -95,8 +95,7 @@ class ForeignArm(Node):
     """A small CRTK arm of somebody else, with three joints, and what is wrong with it."""
 
     def __init__(self, context: Context, faults: tuple[object, ...]) -> None:
-        super().__init__("foreign", context=context, use_global_arguments=False,
-                         enable_rosout=False)  # fmt: skip
+        super().__init__("foreign", context=context, use_global_arguments=False, enable_rosout=False)
         self.faults, self.state, self.q = set(faults), "ENABLED", [0.1, 0.2, 0.3]
         self.goal, self.speed, self.busy_until = list(self.q), 0.5, 0.0
         best = ReliabilityPolicy.BEST_EFFORT
@@ -155,9 +154,7 @@ class ForeignArm(Node):
             step = min(max(self.goal[i] - self.q[i], -SPEED * dt), SPEED * dt)
             self.q[i] += step
             is_busy = is_busy or abs(step) > 0.0
-        is_busy = (
-            is_busy or time.monotonic() < self.busy_until
-        ) and "never busy" not in self.faults
+        is_busy = (is_busy or time.monotonic() < self.busy_until) and "never busy" not in self.faults
         if "no state" not in self.faults:
             state = crtk.OperatingState(state=self.state, is_homed=True, is_busy=is_busy)
             state.header.stamp = now
@@ -214,10 +211,7 @@ def foreign_arm(*faults: object) -> Iterator[Arm]:
 
 
 LOOKED = (("",), ("stamp", "no state"), ("nan", "unit"), ("length", "type"), ("qos",))
-MOVED = (
-    ("honest",), ("moves paused", "frozen"), ("never busy", "speeds"), ("any word",), ("scaled",),
-    ("late",),
-)  # fmt: skip
+MOVED = (("honest",), ("moves paused", "frozen"), ("never busy", "speeds"), ("any word",), ("scaled",), ("late",))
 """Faults of each arm: of several none hides another."""
 
 
@@ -239,13 +233,10 @@ def by_moving() -> Any:
 
 
 @pytest.mark.slow
-def test_a_foreign_arm_without_fault_passes_and_is_only_moved_by_what_it_takes(
-    by_moving: Any,
-) -> None:
+def test_a_foreign_arm_without_fault_passes_and_is_only_moved_by_what_it_takes(by_moving: Any) -> None:
     found = by_moving["honest"].result()
     verdicts = {name: one.verdict for name, one in found.items()}
-    sound = ("operating_state", "state_command", "measured_js", "measured_cp", "setpoint_js",
-             "move_jp", "servo_jp")  # fmt: skip
+    sound = ("operating_state", "state_command", "measured_js", "measured_cp", "setpoint_js", "move_jp", "servo_jp")
     assert {name: verdicts[name] for name in sound} == dict.fromkeys(sound, Verdict.OK), found
     others = {verdict for name, verdict in verdicts.items() if name not in sound}
     assert others == {Verdict.ABSENT}
@@ -263,9 +254,7 @@ def test_a_foreign_arm_without_fault_passes_and_is_only_moved_by_what_it_takes(
         ("no state", "operating_state", ""),
     ],
 )
-def test_faults_of_a_foreign_arm_are_found_by_looking(
-    by_looking: Any, fault: str, topic: str, note: str
-) -> None:
+def test_faults_of_a_foreign_arm_are_found_by_looking(by_looking: Any, fault: str, topic: str, note: str) -> None:
     found = by_looking[fault].result()[topic]
     assert found.verdict is Verdict.FAILED
     assert note in found.note
@@ -280,9 +269,7 @@ def test_faults_of_a_foreign_arm_are_found_by_looking(
         ("never busy", "move_jp", "never rose"),
     ],
 )
-def test_faults_of_a_foreign_arm_are_found_by_trying(
-    by_moving: Any, fault: str, topic: str, note: str
-) -> None:
+def test_faults_of_a_foreign_arm_are_found_by_trying(by_moving: Any, fault: str, topic: str, note: str) -> None:
     found = by_moving[fault].result()[topic]
     assert found.verdict is Verdict.FAILED
     assert note in found.note

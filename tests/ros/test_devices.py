@@ -38,9 +38,7 @@ def pad() -> Iterator[VirtualPad]:
 
 def opened(hand: RemoteHand, force: float = 0.0, **parameters: object) -> DeviceHand:
     operator: Any = OPERATORS.find("gamepad")
-    return DeviceHand(
-        NODE, hand, operator.opens, operator.parameters(**parameters), lambda: force
-    )  # fmt: skip
+    return DeviceHand(NODE, hand, operator.opens, operator.parameters(**parameters), lambda: force)
 
 
 class Clock:
@@ -61,9 +59,7 @@ class Clock:
             time.sleep(0.002)
 
 
-def test_a_gamepad_moves_the_hand_while_it_is_held_and_is_let_go_of_when_it_is_lost(
-    pad: VirtualPad,
-) -> None:
+def test_a_gamepad_moves_the_hand_while_it_is_held_and_is_let_go_of_when_it_is_lost(pad: VirtualPad) -> None:
     hand = RemoteHand()
     clock, device = Clock(hand), opened(hand, force=0.5, speed=0.1)
     try:

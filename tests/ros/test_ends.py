@@ -59,8 +59,7 @@ tc.register_stage(
 
 
 both_ways = pytest.mark.parametrize(
-    "composed_option",
-    [pytest.param((), id="sides"), pytest.param(("--composed",), id="one", marks=pytest.mark.soak)],
+    "composed_option", [pytest.param((), id="sides"), pytest.param(("--composed",), id="one", marks=pytest.mark.soak)]
 )
 
 
@@ -101,9 +100,7 @@ def test_no_node_outlives_the_command_and_the_recording_is_closed(
     assert code == (-signal.SIGKILL if number == signal.SIGKILL else 0), session.text
     assert session.recorded().topics["slave/measured_js"].count > 100
     left = [path.name for path in session.temporary.rglob("*") if not path.is_dir()]
-    marks = [
-        name for name in left if re.fullmatch(r"\d+\.domain", name)
-    ]  # the next session removes it
+    marks = [name for name in left if re.fullmatch(r"\d+\.domain", name)]  # the next session removes it
     assert left == (marks if number == signal.SIGKILL else [])
 
 
@@ -170,9 +167,7 @@ def test_a_process_that_stands_still_ends_the_session(start: Callable[..., Any])
     assert session.recorded().topics["slave/measured_js"].count > 100
 
 
-def test_a_session_that_waits_for_a_recorder_that_stands_still_uses_no_processor(
-    start: Callable[..., Any],
-) -> None:
+def test_a_session_that_waits_for_a_recorder_that_stands_still_uses_no_processor(start: Callable[..., Any]) -> None:
     if is_priority_granted(31):  # where it matters most
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(31))
     try:
@@ -200,14 +195,10 @@ def used(process: psutil.Process) -> float:
 
 
 @pytest.mark.soak
-def test_a_session_starts_with_no_kernel_compiled_on_a_busy_machine(
-    start: Callable[..., Any], tmp_path: Path
-) -> None:
+def test_a_session_starts_with_no_kernel_compiled_on_a_busy_machine(start: Callable[..., Any], tmp_path: Path) -> None:
     busy = subprocess.Popen([sys.executable, "-c", "while True: pass"])
     try:
-        session = start(
-            "--composed", duration=1.0, env={"NUMBA_CACHE_DIR": str(tmp_path / "cache")}
-        )
+        session = start("--composed", duration=1.0, env={"NUMBA_CACHE_DIR": str(tmp_path / "cache")})
         assert session.wait(400) == 0, session.text
     finally:
         busy.kill()

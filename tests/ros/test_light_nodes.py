@@ -23,13 +23,10 @@ print(*sys.modules)
 
 
 def modules_after(code: str) -> set[str]:
-    return set(subprocess.run([sys.executable, "-c", code], capture_output=True, check=True,
-                              text=True).stdout.split())  # fmt: skip
+    return set(subprocess.run([sys.executable, "-c", code], capture_output=True, check=True, text=True).stdout.split())
 
 
-def test_a_node_without_recordings_loads_no_reader_of_recordings_and_no_parser_of_messages() -> (
-    None
-):
+def test_a_node_without_recordings_loads_no_reader_of_recordings_and_no_parser_of_messages() -> None:
     loaded = modules_after(_LOADED)
     assert "rosidl_generator_py" in loaded
     assert not loaded & {"teleop_core.bags.reader", "mcap", "lark", "em", "matplotlib"}

@@ -25,9 +25,7 @@ if TYPE_CHECKING:
 pytestmark = [pytest.mark.ros, pytest.mark.slow]
 
 
-def test_stages_of_an_installed_package_sum_and_run_between_ours(
-    peer: "Peer", tmp_path: Path
-) -> None:
+def test_stages_of_an_installed_package_sum_and_run_between_ours(peer: "Peer", tmp_path: Path) -> None:
     site = tmp_path / "site"
     about = site / "my_stages-1.0.dist-info"
     about.mkdir(parents=True)
@@ -36,10 +34,12 @@ def test_stages_of_an_installed_package_sum_and_run_between_ours(
     (about / "entry_points.txt").write_text(textwrap.dedent(ENTRIES))
     listeners = [peer.listen(topic) for topic in WATCHED]
     session = LiveProcess(
-        tmp_path, "--scenario", "free_motion",
+        tmp_path,
+        "--scenario",
+        "free_motion",
         env={"ROS_DOMAIN_ID": peer.domain, "PYTHONPATH": str(site)},
         settings=(*SETTINGS, "operator.approach_time=1.0", CALM),
-    )  # fmt: skip
+    )
 
     def has_enough() -> bool:
         assert session.process.poll() is None, session.text

@@ -36,9 +36,7 @@ SESSION_TIMEOUT = 300.0
 
 
 def quick(duration: float) -> Configuration:
-    return configure(
-        "coarse_box", settings=[f"teleop.duration={duration}", "operator.approach_time=1.0"]
-    )
+    return configure("coarse_box", settings=[f"teleop.duration={duration}", "operator.approach_time=1.0"])
 
 
 def console() -> Any:
@@ -119,9 +117,7 @@ def test_a_node_that_cannot_start_is_named_with_its_reason(tmp_path: Path) -> No
     assert children() == []
 
 
-def test_play_publishes_a_recording_as_it_was(
-    peer: "Peer", monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_play_publishes_a_recording_as_it_was(peer: "Peer", monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("ROS_DOMAIN_ID", peer.domain)
     bag = Bag(EXAMPLE)
     pose, state = peer.listen(topics.MASTER_MEASURED_CP), peer.listen(topics.MASTER_BUTTONS)

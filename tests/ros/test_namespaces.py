@@ -41,9 +41,7 @@ def start(peer: "Peer", tmp_path: Path) -> Iterator[Callable[..., Any]]:
         file.write_text(yaml.safe_dump(content))
         command = [sys.executable, "-m", "teleop_core.nodes", "teleop_session", "--ros-args"]
         env = environment() | {"ROS_DOMAIN_ID": peer.domain}
-        started.append(
-            subprocess.Popen([*command, "--params-file", str(file), *arguments], env=env)
-        )
+        started.append(subprocess.Popen([*command, "--params-file", str(file), *arguments], env=env))
         return started[0]
 
     yield started_with
@@ -93,9 +91,14 @@ def test_arms_of_a_session_in_a_namespace_stay_apart_below_it_and_keep_the_names
 
     peer.wait(lambda: len(inside()) >= 7, "all nodes to be found")
     assert inside() == {
-        "operator", "haptic_master", "motion_scaling", "inverse_kinematics", "slave", "slave_sim",
+        "operator",
+        "haptic_master",
+        "motion_scaling",
+        "inverse_kinematics",
+        "slave",
+        "slave_sim",
         "recorder",
-    }  # fmt: skip
+    }
     bag = recorded(peer, process, tmp_path, "lab/slave", "lab/right/slave")
     shared = {topics.DIAGNOSTICS.name, TF.name}
     assert all(name.startswith("lab/") for name in {*bag.topics} - shared)

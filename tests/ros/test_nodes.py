@@ -18,9 +18,7 @@ pytestmark = pytest.mark.ros
 
 
 @pytest.mark.slow
-def test_a_full_disk_ends_the_recorder_with_one_line_and_a_readable_bag(
-    peer: "Peer", tmp_path: Path
-) -> None:
+def test_a_full_disk_ends_the_recorder_with_one_line_and_a_readable_bag(peer: "Peer", tmp_path: Path) -> None:
     recorder = peer.start("recorder", out=str(tmp_path / "bag"))
     peer.start("haptic_master")
     # As on a full disk, no file of the recorder can grow beyond this.
@@ -42,11 +40,14 @@ def test_parameters_are_accepted_or_refused_with_the_reason(peer: "Peer") -> Non
     accepted, refused, wrong_type, read_only, length, unknown = (
         peer.set(node, False, **{name: value})[0]
         for node, name, value in (
-            ("slave", "command_timeout", 0.2), ("slave", "command_timeout", 50.0),
-            ("slave", "command_timeout", 1), ("slave", "robot", "scara"),
-            ("slave_sim", "controller__pid__kp", [1.0, 2.0]), ("slave", "no_such", 1.0),
+            ("slave", "command_timeout", 0.2),
+            ("slave", "command_timeout", 50.0),
+            ("slave", "command_timeout", 1),
+            ("slave", "robot", "scara"),
+            ("slave_sim", "controller__pid__kp", [1.0, 2.0]),
+            ("slave", "no_such", 1.0),
         )
-    )  # fmt: skip
+    )
     assert accepted.successful
     assert not refused.successful
     assert "command_timeout" in refused.reason
@@ -70,23 +71,11 @@ def test_parameters_are_accepted_or_refused_with_the_reason(peer: "Peer") -> Non
         ("slave", "bad: [1.0", "is not YAML"),
     ],
 )
-def test_wrong_parameter_files_end_with_one_line_and_2(
-    tmp_path: Path, name: str, content: str, needed: str
-) -> None:
+def test_wrong_parameter_files_end_with_one_line_and_2(tmp_path: Path, name: str, content: str, needed: str) -> None:
     file = tmp_path / "parameters.yaml"
     file.write_text(f"{name}:\n  ros__parameters:\n    {content}\n")
-    command: Any = [
-        sys.executable,
-        "-m",
-        "teleop_core.nodes",
-        name,
-        "--ros-args",
-        "--params-file",
-        file,
-    ]
-    done = subprocess.run(
-        command, capture_output=True, text=True, timeout=90, env=environment(), check=False
-    )
+    command: Any = [sys.executable, "-m", "teleop_core.nodes", name, "--ros-args", "--params-file", file]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=90, env=environment(), check=False)
     assert done.returncode == 2
     assert len(done.stderr.strip().splitlines()) == 1, done.stderr
     assert needed in done.stderr

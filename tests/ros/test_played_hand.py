@@ -35,9 +35,7 @@ def test_a_recorded_hand_that_is_played_is_the_operator(
     tips.forget()
     command = [sys.executable, "-m", "teleop_core.cli", "play", str(bag), "--topics",
                HAND_SERVO_CP.name, HAND_BUTTONS.name]  # fmt: skip
-    player = subprocess.Popen(
-        command, stdout=subprocess.DEVNULL, env=environment() | {"ROS_DOMAIN_ID": peer.domain}
-    )
+    player = subprocess.Popen(command, stdout=subprocess.DEVNULL, env=environment() | {"ROS_DOMAIN_ID": peer.domain})
 
     def moves() -> int:
         assert player.poll() is None, "the player ended"

@@ -69,9 +69,7 @@ def test_an_override_changes_what_a_publisher_offers(peer: "Peer") -> None:
 
 def test_an_override_changes_what_a_subscription_asks_for(peer: "Peer") -> None:
     name = f"/{topics.SLAVE_SERVO_JP.name}"
-    peer.start(
-        "slave", **dict[str, Any]({f"qos_overrides.{name}.subscription.reliability": "reliable"})
-    )
+    peer.start("slave", **dict[str, Any]({f"qos_overrides.{name}.subscription.reliability": "reliable"}))
     peer.wait(lambda: peer.node.get_subscriptions_info_by_topic(name), "the subscription")
     (found,) = peer.node.get_subscriptions_info_by_topic(name)
     assert found.qos_profile.reliability is ReliabilityPolicy.RELIABLE

@@ -16,15 +16,9 @@ pytestmark = [pytest.mark.ros, pytest.mark.slow]
 
 
 @pytest.mark.parametrize(
-    "way",
-    [
-        pytest.param((), id="processes", marks=pytest.mark.soak),
-        pytest.param(("--composed",), id="composed"),
-    ],
+    "way", [pytest.param((), id="processes", marks=pytest.mark.soak), pytest.param(("--composed",), id="composed")]
 )
-def test_live_does_not_call_a_recording_that_moved_recorded(
-    peer: "Peer", tmp_path: Path, way: tuple[str, ...]
-) -> None:
+def test_live_does_not_call_a_recording_that_moved_recorded(peer: "Peer", tmp_path: Path, way: tuple[str, ...]) -> None:
     live = LiveProcess(tmp_path, *way, env={"ROS_DOMAIN_ID": peer.domain})
     try:
         peer.wait(lambda: list(live.bag.glob("*.mcap")), "a recording")

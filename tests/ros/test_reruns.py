@@ -40,19 +40,16 @@ def run(tmp_path: Path) -> Callable[..., Any]:
         file = tmp_path / "test_it.py"
         file.write_text(HEAD + body)
         (tmp_path / "pytest.ini").write_text("[pytest]\nmarkers = ros\n")
-        command: Any = [
-            sys.executable,
-            "-m",
-            "pytest",
-            "-p",
-            "middleware_faults",
-            *options,
-            str(file),
-        ]
+        command: Any = [sys.executable, "-m", "pytest", "-p", "middleware_faults", *options, str(file)]
         done = subprocess.run(
-            command, cwd=tmp_path, env=dict(os.environ) | {"PYTHONPATH": str(TESTS)},
-            capture_output=True, text=True, timeout=120, check=False,
-        )  # fmt: skip
+            command,
+            cwd=tmp_path,
+            env=dict(os.environ) | {"PYTHONPATH": str(TESTS)},
+            capture_output=True,
+            text=True,
+            timeout=120,
+            check=False,
+        )
         return done.returncode, done.stdout, len(file.with_suffix(".runs").read_text())
 
     return result

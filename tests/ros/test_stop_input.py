@@ -31,8 +31,7 @@ def start(peer: "Peer") -> Iterator[Callable[..., object]]:
 
     def start(presses: int) -> subprocess.Popen[str]:
         words, env = [sys.executable, str(READER), str(presses)], environment()
-        process = subprocess.Popen(words, stdout=subprocess.PIPE, text=True,
-                                   env=env | {"ROS_DOMAIN_ID": peer.domain})  # fmt: skip
+        process = subprocess.Popen(words, stdout=subprocess.PIPE, text=True, env=env | {"ROS_DOMAIN_ID": peer.domain})
         started.append(process)
         assert present(process.stdout).readline() == "ready\n"
         peer.wait(lambda: peer.node.count_subscribers(STOP_TOPIC) == 3, "all three readers")

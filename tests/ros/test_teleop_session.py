@@ -47,10 +47,7 @@ def test_a_flood_of_commands_is_not_followed_faster_and_drops_no_step(
             clock = max(clock + 1, peer.node.get_clock().now().nanoseconds)
             peer.send(topics.SLAVE_SERVO_JP, clock, home)
         status = peer.status("slave")
-        received, lost = (
-            status.number("received.slave/servo_jp"),
-            status.number("dropped_time_ms"),
-        )
+        received, lost = (status.number("received.slave/servo_jp"), status.number("dropped_time_ms"))
         if lost != known[-1][1]:
             known.append((received, lost))
         return received > known[-1][0] + 1000

@@ -13,13 +13,7 @@ import pytest
 
 from present import present
 from teleop_core.graph import topics
-from teleop_core.nodes.discovery import (
-    LOOPBACK,
-    NETWORK,
-    RANGE,
-    beyond_this_machine,
-    choose_transport,
-)
+from teleop_core.nodes.discovery import LOOPBACK, NETWORK, RANGE, beyond_this_machine, choose_transport
 from teleop_core.robots import load_robot
 
 if TYPE_CHECKING:
@@ -67,8 +61,10 @@ def test_a_plain_ros_process_hears_and_commands_our_nodes(peer: "Peer", said: An
     names = json.dumps(load_robot("rcrt1").joint_names)
     with subprocess.Popen(
         [sys.executable, "-c", STRANGER, names, json.dumps(HOME)],
-        env=plain(ROS_DOMAIN_ID=peer.domain, **said), stdout=subprocess.PIPE, text=True,
-    ) as stranger:  # fmt: skip
+        env=plain(ROS_DOMAIN_ID=peer.domain, **said),
+        stdout=subprocess.PIPE,
+        text=True,
+    ) as stranger:
         try:
             peer.wait_value("slave", "received.slave/servo_jp", lambda n: n > 50)
             assert present(stranger.stdout).readline() == "heard\n"
@@ -79,9 +75,7 @@ def test_a_plain_ros_process_hears_and_commands_our_nodes(peer: "Peer", said: An
 @pytest.mark.parametrize("said", [{}, {RANGE: "LOCALHOST"}, {"ROS_LOCALHOST_ONLY": "1"}])
 def test_a_node_has_sockets_of_this_machine_alone(peer: "Peer", said: Any) -> None:
     """As `ros2 run` starts it, by a user who has set nothing, or said so in either way."""
-    before = {
-        name: os.environ.pop(name) for name in list(os.environ) if name.startswith(MIDDLEWARE)
-    }
+    before = {name: os.environ.pop(name) for name in list(os.environ) if name.startswith(MIDDLEWARE)}
     os.environ.update(said)
     try:
         node = peer.start("slave")
@@ -133,9 +127,7 @@ def test_what_the_user_says_of_the_range_holds(said: Any, chosen: Any) -> None:
 
 
 @pytest.mark.slow
-def test_the_stream_of_a_slave_goes_on_while_one_who_reads_it_is_killed(
-    peer: "Peer", tmp_path: Path
-) -> None:
+def test_the_stream_of_a_slave_goes_on_while_one_who_reads_it_is_killed(peer: "Peer", tmp_path: Path) -> None:
     """A reader that was killed held its writer's thread up for two seconds at a time."""
     peer.start("slave", real_time__freeze_gc=True)
     listener = peer.listen(topics.SLAVE_MEASURED_CP)

@@ -104,9 +104,7 @@ def led(tmp_path: Path, bridge: Any, seed: int, *settings: Any, operator: Any = 
     ]  # fmt: skip
     others = [[*CONTROLLER, str(seed)], bridge, *([operator] if operator else [])]
     with arm(*others) as (env, newest):
-        done = subprocess.run(
-            live, env=env, check=False, capture_output=True, text=True, timeout=300
-        )
+        done = subprocess.run(live, env=env, check=False, capture_output=True, text=True, timeout=300)
         first, largest = newest()
     assert done.returncode == 0, done.stdout + done.stderr
     return tc.open_recording(out), first, largest
@@ -128,16 +126,12 @@ def goes_home_and_follows(recording: tc.Recording, first: Any, largest: Any) -> 
 
 
 @pytest.mark.soak
-def test_a_session_leads_it_home_and_after_the_hand_without_a_jump(
-    tmp_path: Path, bridge: list[Any]
-) -> None:
+def test_a_session_leads_it_home_and_after_the_hand_without_a_jump(tmp_path: Path, bridge: list[Any]) -> None:
     goes_home_and_follows(*led(tmp_path, bridge, 1))
 
 
 @pytest.mark.soak
-def test_a_gamepad_leads_it_home_and_after_its_stick_without_a_jump(
-    tmp_path: Path, bridge: list[Any]
-) -> None:
+def test_a_gamepad_leads_it_home_and_after_its_stick_without_a_jump(tmp_path: Path, bridge: list[Any]) -> None:
     pytest.importorskip("pygame")
     pad = [sys.executable, str(ROOT / "tests/padded_operator.py"), "operator"]
     operator = [*pad, "--ros-args", "-p", "kind:=gamepad"]
@@ -162,18 +156,13 @@ def test_a_person_at_the_console_leads_it_without_a_jump(
         ):
             seen = link.view().arms[""]
             wait_until(lambda: link.view() and "ENABLED, homed" in seen.operation_text, "homed")
-            tip, stylus = (
-                present(seen.get(SLAVE_MEASURED_CP))[:3],
-                present(seen.get(MASTER_MEASURED_CP))[:7],
-            )
+            tip, stylus = (present(seen.get(SLAVE_MEASURED_CP))[:3], present(seen.get(MASTER_MEASURED_CP))[:7])
             ways = chain(np.linspace(0.0, _PULLED, 100), repeat(_PULLED))  # a grip moves nothing
 
             def is_pulled() -> Any:
                 link.hold("", stylus + next(ways) * np.eye(7)[0])
                 link.view()
-                return (
-                    np.linalg.norm(present(seen.get(SLAVE_MEASURED_CP))[:3] - tip) > 0.5 * _PULLED
-                )
+                return np.linalg.norm(present(seen.get(SLAVE_MEASURED_CP))[:3] - tip) > 0.5 * _PULLED
 
             wait_until(is_pulled, "an arm that is pulled")
         first, largest = newest()
@@ -189,9 +178,8 @@ def test_it_starts_twenty_times_without_a_jump(tmp_path: Path, bridge: list[Any]
 @pytest.mark.soak
 def test_the_drill_stops_it_as_a_simulated_arm(tmp_path: Path, bridge: list[Any]) -> None:
     code, text, outcomes = run_drill(
-        tmp_path, "stop_topic", "--drives", shlex.join(bridge), "--arm", shlex.join(CONTROLLER),
-        "--set", *ARM,
-    )  # fmt: skip
+        tmp_path, "stop_topic", "--drives", shlex.join(bridge), "--arm", shlex.join(CONTROLLER), "--set", *ARM
+    )
     one = outcomes["stop_topic"]
     assert (one["state"], one["told"]) == ("FAULT", "stop")
     assert one["measured"]["step_ratio"]["value"] <= 1.0 + 1e-9, text

@@ -69,9 +69,7 @@ def test_a_recorder_shows_and_records_the_robot_that_it_hears(peer: "Peer", tmp_
         assert [place.x, place.y, place.z] == pytest.approx(tip[:3])
 
 
-def test_a_robot_that_is_not_the_recorders_is_not_drawn_as_this_one(
-    peer: "Peer", tmp_path: Path
-) -> None:
+def test_a_robot_that_is_not_the_recorders_is_not_drawn_as_this_one(peer: "Peer", tmp_path: Path) -> None:
     robot = load_robot("puma560")
     recorder = peer.start("recorder", out=str(tmp_path / "bag"))
     joints = np.concatenate((robot.start, np.zeros(2 * robot.n)))

@@ -52,9 +52,14 @@ def workspace(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def colcon(workspace: Path, *arguments: Any) -> Any:
     path = f"{COLCON.parent}:{os.environ['PATH']}"
     done = subprocess.run(
-        [COLCON, *arguments], cwd=workspace, capture_output=True, text=True, timeout=900,
-        env=environment() | {"PATH": path}, check=False,
-    )  # fmt: skip
+        [COLCON, *arguments],
+        cwd=workspace,
+        capture_output=True,
+        text=True,
+        timeout=900,
+        env=environment() | {"PATH": path},
+        check=False,
+    )
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout
 
@@ -100,9 +105,12 @@ def test_teleop_of_the_workspace_finds_the_commands_of_the_other_packages(worksp
     teleop = packages[0] / "lib" / "teleop_core" / "teleop"
     for words, text in ((["drill", "--list"], "kill_motion_scaling"), (["experiment"], "points24")):
         done = subprocess.run(
-            [teleop, *words], env=environment() | {"PYTHONPATH": ":".join(places)},
-            capture_output=True, text=True, check=False,
-        )  # fmt: skip
+            [teleop, *words],
+            env=environment() | {"PYTHONPATH": ":".join(places)},
+            capture_output=True,
+            text=True,
+            check=False,
+        )
         assert text in done.stdout, done.stderr
 
 

@@ -23,8 +23,14 @@ from teleop_core.session.virtual import VirtualTime
 LEAD = 3702
 TICKS = LEAD + 1500
 SHORT = ("approach_time=0.5", "operator.period=2.0", "buttons.fixture=[0.2]")
-ARMS = ("teleop.arms=[right, left]", "left/robot=scara", "left/seed=7", "left/coarse_gain=0.5",
-        "right/fixture=sphere", "right/fixture.sphere.radius=0.005")  # fmt: skip
+ARMS = (
+    "teleop.arms=[right, left]",
+    "left/robot=scara",
+    "left/seed=7",
+    "left/coarse_gain=0.5",
+    "right/fixture=sphere",
+    "right/fixture.sphere.radius=0.005",
+)
 
 
 def settings(*more: str) -> Configuration:
@@ -94,15 +100,10 @@ def test_text_of_two_arms_reads_back_the_same() -> None:
         (("teleop.arms=[right, left]", "middle/seed=3"), "right, left"),
         (("left/seed=3",), "left"),
         (("teleop.arms=[right, left]", "left/slave_sim.robot=mma"), "left/inverse_kinematics"),
-        (
-            ("teleop.arms=[right, left]", "teleop.delays=[up/slave/servo_jp=0.1]"),
-            "left/slave/servo_jp",
-        ),
+        (("teleop.arms=[right, left]", "teleop.delays=[up/slave/servo_jp=0.1]"), "left/slave/servo_jp"),
     ],
 )
-def test_wrong_arms_are_refused_in_one_line_before_anything_runs(
-    more: tuple[str, ...], says: str
-) -> None:
+def test_wrong_arms_are_refused_in_one_line_before_anything_runs(more: tuple[str, ...], says: str) -> None:
     with pytest.raises(TeleopError, match=says) as error:
         settings(*more)
     assert "\n" not in str(error.value)
@@ -118,8 +119,7 @@ def waits(times: Any) -> Array:
 def test_delay_of_one_arm_is_not_one_of_the_other(own_parts: None) -> None:
     register_operator("waits", waits)
     # The scara starts at home; its hand begins at once, whenever it follows.
-    still = ("left/operator=waits", "left/patience=0.0", "left/tremor_amplitude=0.0",
-             "left/gimbal_noise=0.0")  # fmt: skip
+    still = ("left/operator=waits", "left/patience=0.0", "left/tremor_amplitude=0.0", "left/gimbal_noise=0.0")
     delay = "teleop.delays=[left/slave/servo_jp=0.02]"
     block, both = (VirtualTime(settings(*ARMS, *still, *m)).run(TICKS) for m in ((delay,), ()))
     assert np.array_equal(block["slave_setpoint_js"], both["slave_setpoint_js"])
@@ -130,9 +130,7 @@ def test_delay_of_one_arm_is_not_one_of_the_other(own_parts: None) -> None:
 
 
 @pytest.mark.slow
-def test_one_recording_holds_and_replays_both_arms_to_the_bit(
-    tmp_path: Path, both: NDArray[np.void]
-) -> None:
+def test_one_recording_holds_and_replays_both_arms_to_the_bit(tmp_path: Path, both: NDArray[np.void]) -> None:
     configuration = settings(*ARMS, "duration=1.5")
     simulate(configuration, tmp_path / "bag")
     bag = Bag(tmp_path / "bag")
@@ -149,10 +147,13 @@ HAND_OVER: dict[str, Any] = {
     "left/operator.tour.points": (0.0, 0.0, 0.02, 0.0, -0.03, 0.02, *(0.0, 0.0, 0.02) * 4),
     "left/operator.buttons.jaw": (5.3, 9.5),
     "right/operator.tour.points": (
-        *(0.0, 0.0, 0.0), *(-0.03, 0.0, 0.0), *(-0.03, 0.0, 0.02) * 2, *(0.0, 0.0, 0.02) * 2,
+        *(0.0, 0.0, 0.0),
+        *(-0.03, 0.0, 0.0),
+        *(-0.03, 0.0, 0.02) * 2,
+        *(0.0, 0.0, 0.02) * 2,
     ),
     "right/operator.buttons.jaw": (8.5, 14.0),
-}  # fmt: skip
+}
 """The left arm lifts a block, the right one takes it from its jaw, carries it 30 mm and lets go."""
 
 

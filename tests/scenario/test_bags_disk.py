@@ -54,9 +54,7 @@ print(json.dumps({"told": told, "kilobytes": resource.getrusage(resource.RUSAGE_
 """
 
 
-def run_recorder(
-    path: Path, compression: str, seconds: int, ending: str
-) -> tuple[int, dict[str, Any]]:
+def run_recorder(path: Path, compression: str, seconds: int, ending: str) -> tuple[int, dict[str, Any]]:
     command = [sys.executable, "-c", RECORDER, str(path), compression, str(seconds), ending]
     done = subprocess.run(command, stdout=subprocess.PIPE, text=True, check=False, timeout=600)
     return done.returncode, json.loads(done.stdout or "{}")
@@ -82,9 +80,7 @@ def assert_safe(path: Path, told: str) -> None:
     bag = Bag(path)
     series = bag.read(topics.SLAVE_MEASURED_JS)
     total = sum(info.count for info in bag.topics.values())
-    (given,) = re.findall(
-        rf"first {bag.end_ns / 1e9:.1f} s \({total} of (\d+) messages\) are", told
-    )
+    (given,) = re.findall(rf"first {bag.end_ns / 1e9:.1f} s \({total} of (\d+) messages\) are", told)
     assert int(given) > total
     assert str(path) in told
     np.testing.assert_array_equal(series.stamp_ns, np.arange(len(series)) * 1_000_000)
@@ -95,9 +91,7 @@ def assert_safe(path: Path, told: str) -> None:
 
 
 @pytest.mark.parametrize("compression", ["none", "zstd"])
-def test_a_full_disk_keeps_what_was_recorded_so_far(
-    small_disk: str | None, tmp_path: Path, compression: str
-) -> None:
+def test_a_full_disk_keeps_what_was_recorded_so_far(small_disk: str | None, tmp_path: Path, compression: str) -> None:
     path = tmp_path / "disk" / "bag"
     code, result = run_recorder(path, compression, 30, small_disk or f"limit{LIMIT}")
     assert code == 0

@@ -50,17 +50,13 @@ def poses_file(path: Path, count: int = 40) -> Path:
     return path
 
 
-def test_the_published_table_comes_out_of_the_published_readings(
-    calibrate: Callable[..., str],
-) -> None:
+def test_the_published_table_comes_out_of_the_published_readings(calibrate: Callable[..., str]) -> None:
     text = calibrate("--data", "published", "--fit", "d3")
     assert re.search(r"d3 +5\.500\d +1\.1\d+ +mm", text)
     assert re.search(r"total +0\.7440 +0\.5925 +2\.0000 +0\.3515", text)
 
 
-def test_a_session_takes_the_arm_that_was_found(
-    calibrate: Callable[..., str], tmp_path: Path
-) -> None:
+def test_a_session_takes_the_arm_that_was_found(calibrate: Callable[..., str], tmp_path: Path) -> None:
     arm, numbers, bag = tmp_path / "arm.yaml", tmp_path / "c.json", tmp_path / "bag"
     text = calibrate("--poses", 20, "--out", arm, "--json", numbers)
     before, after = last_rms(text.rsplit("numbers:", 1)[0])
@@ -75,9 +71,7 @@ def test_a_session_takes_the_arm_that_was_found(
     assert np.isfinite(Bag(bag).read(SLAVE_MEASURED_CP).values).all()
 
 
-def test_a_file_of_poses_gives_the_offset_it_was_made_with(
-    calibrate: Callable[..., str], tmp_path: Path
-) -> None:
+def test_a_file_of_poses_gives_the_offset_it_was_made_with(calibrate: Callable[..., str], tmp_path: Path) -> None:
     text = calibrate("--data", poses_file(tmp_path / "poses.csv"), "--fit", "offsets")
     value, half = map(float, present(re.search(r"d3 +(\S+) +(\S+) +mm", text)).groups())
     assert abs(value - 5.5) < 2.0 * half < 0.2
@@ -85,9 +79,7 @@ def test_a_file_of_poses_gives_the_offset_it_was_made_with(
     assert "without its fifth" in text
 
 
-def test_a_tracker_of_unknown_place_gives_it_too(
-    calibrate: Callable[..., str], tmp_path: Path
-) -> None:
+def test_a_tracker_of_unknown_place_gives_it_too(calibrate: Callable[..., str], tmp_path: Path) -> None:
     text = calibrate("--data", poses_file(tmp_path / "p.csv"), "--fit", "d3", "--frame", "unknown")
     assert re.search(r"d3 +5\.[45]\d+ ", text)
     assert "frame_rz" in text
@@ -95,9 +87,7 @@ def test_a_tracker_of_unknown_place_gives_it_too(
 
 @pytest.mark.parametrize("robot", ["puma560", "config/robots/scara.yaml"])
 def test_other_chains_and_choices_are_taken(calibrate: Callable[..., str], robot: str) -> None:
-    text = calibrate(
-        "--robot", robot, "--errors", "prototype", "theta1=2e-3", "--choose", "random", "--seed", 3
-    )
+    text = calibrate("--robot", robot, "--errors", "prototype", "theta1=2e-3", "--choose", "random", "--seed", 3)
     assert re.search(r"theta1 +[12]\.\d+ ", text)
     before, after = last_rms(text)
     assert after < 0.2 * before

@@ -59,9 +59,7 @@ def test_sim_records_every_stream_at_1_khz(recording: Path) -> None:
 
 
 @pytest.mark.slow
-def test_the_same_seed_gives_the_same_bytes_and_another_seed_does_not(
-    teleop: "Run", tmp_path: Path
-) -> None:
+def test_the_same_seed_gives_the_same_bytes_and_another_seed_does_not(teleop: "Run", tmp_path: Path) -> None:
     bytes_of = []
     for folder, seed in (("a", 3), ("b", 3), ("c", 4)):
         out = tmp_path / folder / "bag"
@@ -71,9 +69,7 @@ def test_the_same_seed_gives_the_same_bytes_and_another_seed_does_not(
     assert bytes_of[0] != bytes_of[2]
 
 
-def test_replay_with_the_same_configuration_is_bit_identical(
-    teleop: "Run", recording: Path, tmp_path: Path
-) -> None:
+def test_replay_with_the_same_configuration_is_bit_identical(teleop: "Run", recording: Path, tmp_path: Path) -> None:
     teleop("replay", recording, "--out", tmp_path / "again")
     first, again = Bag(recording), Bag(tmp_path / "again")
     for topic in STREAMS:
@@ -87,9 +83,7 @@ def test_replay_with_another_configuration_answers_what_if(
 ) -> None:
     teleop_again("replay", recording, "--out", tmp_path / "what_if", "--set", "fine_gain=0.5")
     first, other = Bag(recording), Bag(tmp_path / "what_if")
-    assert np.array_equal(
-        first.read(topics.MASTER_MEASURED_CP).values, other.read(topics.MASTER_MEASURED_CP).values
-    )
+    assert np.array_equal(first.read(topics.MASTER_MEASURED_CP).values, other.read(topics.MASTER_MEASURED_CP).values)
     a, b = (bag.read(topics.SLAVE_MEASURED_CP).values for bag in (first, other))
     before_fine = slice(0, lead() + 5900)
     assert np.array_equal(a[before_fine], b[before_fine])
@@ -121,9 +115,7 @@ def test_state_reports_every_change_of_clutch_mode_and_box(recording: Path) -> N
     assert "box" not in at[11.0]
 
 
-def test_evaluate_prints_a_table_and_writes_json_and_page(
-    teleop: "Run", recording: Path, tmp_path: Path
-) -> None:
+def test_evaluate_prints_a_table_and_writes_json_and_page(teleop: "Run", recording: Path, tmp_path: Path) -> None:
     scores, page = tmp_path / "scores.json", tmp_path / "page.html"
     done = teleop("evaluate", recording, "--json", scores, "--html", page)
     assert "position, RMS mm" in done.stdout
@@ -162,9 +154,7 @@ def test_sim_refuses_wrong_input_in_one_line(
 
 
 @pytest.mark.slow
-def test_an_existing_output_is_never_overwritten(
-    teleop: "Run", recording: Path, tmp_path: Path
-) -> None:
+def test_an_existing_output_is_never_overwritten(teleop: "Run", recording: Path, tmp_path: Path) -> None:
     for command in (("sim",), ("replay", recording)):
         line = one_line(teleop(*command, "--out", recording, code=2))
         assert "exists" in line
@@ -187,9 +177,7 @@ def test_replay_and_evaluate_name_what_a_bag_lacks(teleop_again: "Run", tmp_path
     assert not (tmp_path / "out").exists()
 
 
-def test_recover_saves_what_a_truncated_bag_holds(
-    teleop: "Run", recording: Path, tmp_path: Path
-) -> None:
+def test_recover_saves_what_a_truncated_bag_holds(teleop: "Run", recording: Path, tmp_path: Path) -> None:
     cut = tmp_path / "cut"
     shutil.copytree(recording, cut)
     file = next(cut.glob("*.mcap"))
@@ -214,12 +202,7 @@ def test_lookups_answer_without_a_session(teleop: "Run", teleop_again: "Run") ->
 
 def test_help_answers_without_numpy(teleop: "Run") -> None:
     code = "import sys; from teleop_core import cli; cli.main(['--help'])"
-    done = subprocess.run(
-        [sys.executable, "-X", "importtime", "-c", code],
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    done = subprocess.run([sys.executable, "-X", "importtime", "-c", code], capture_output=True, text=True, check=False)
     assert "COMMAND" in done.stdout
     assert "numba" not in done.stderr
 
@@ -230,10 +213,10 @@ def test_progress_shows_on_a_terminal_and_not_in_a_pipe(teleop: "Run", tmp_path:
     assert "simulating" not in piped.stderr
     reader, terminal = pty.openpty()
     process = subprocess.Popen(
-        [sys.executable, "-m", "teleop_core.cli", "sim", "--duration", "1", "--out",
-         str(tmp_path / "seen")],
-        stderr=terminal, stdout=subprocess.DEVNULL,
-    )  # fmt: skip
+        [sys.executable, "-m", "teleop_core.cli", "sim", "--duration", "1", "--out", str(tmp_path / "seen")],
+        stderr=terminal,
+        stdout=subprocess.DEVNULL,
+    )
     os.close(terminal)
     shown = b""
     try:
@@ -245,9 +228,7 @@ def test_progress_shows_on_a_terminal_and_not_in_a_pipe(teleop: "Run", tmp_path:
     assert b"simulating" in shown
 
 
-def test_compiling_is_told_while_something_compiles_and_at_no_other_time(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_compiling_is_told_while_something_compiles_and_at_no_other_time(capsys: pytest.CaptureFixture[str]) -> None:
     assert not say_work()
     assert capsys.readouterr().err == ""
     with event.trigger_event("numba:compile"):  # what numba itself does around its compiler
@@ -266,19 +247,18 @@ def test_the_shell_completes_commands_and_options(tmp_path: Path) -> None:
     for line, expected in (("teleop ev", "evaluate"), ("teleop import --uni", "--unit")):
         answer = tmp_path / "answer"
         environment = os.environ | {
-            "_ARGCOMPLETE": "1", "COMP_LINE": line, "COMP_POINT": str(len(line)),
-            "_ARGCOMPLETE_STDOUT_FILENAME": str(answer), "_ARGCOMPLETE_SUPPRESS_SPACE": "1",
-        }  # fmt: skip
-        subprocess.run(
-            [sys.executable, "-m", "teleop_core.cli"], env=environment, check=False, timeout=60
-        )
+            "_ARGCOMPLETE": "1",
+            "COMP_LINE": line,
+            "COMP_POINT": str(len(line)),
+            "_ARGCOMPLETE_STDOUT_FILENAME": str(answer),
+            "_ARGCOMPLETE_SUPPRESS_SPACE": "1",
+        }
+        subprocess.run([sys.executable, "-m", "teleop_core.cli"], env=environment, check=False, timeout=60)
         assert answer.read_text() == expected
 
 
 @pytest.mark.slow
-def test_an_operator_can_follow_a_recording(
-    teleop_again: "Run", recording: Path, tmp_path: Path
-) -> None:
+def test_an_operator_can_follow_a_recording(teleop_again: "Run", recording: Path, tmp_path: Path) -> None:
     out = tmp_path / "followed"
     settings = ("path.kind=bag", f"path.bag={recording}", "tremor_amplitude=0.0")
     teleop_again("sim", "--duration", 8, "--out", out, "--set", *settings)
@@ -293,7 +273,5 @@ def test_an_operator_can_follow_a_recording(
     # The gimbal's noise, once recorded and once anew, with that of the first sample in both.
     assert (turns[0].inv() * turns[1]).magnitude().max() < 4 * 2e-3 * 3**0.5
     assert "missing.bag" in one_line(
-        teleop_again(
-            "sim", "--out", tmp_path / "x", "--set", "path.kind=bag", "path.bag=missing.bag", code=2
-        )
+        teleop_again("sim", "--out", tmp_path / "x", "--set", "path.kind=bag", "path.bag=missing.bag", code=2)
     )

@@ -36,9 +36,7 @@ def test_what_was_compiled_ahead_no_scenario_compiles_again() -> None:
         assert told in ("", done.stdout)
 
 
-def test_every_part_that_is_compiled_ahead_is_configured_and_has_the_file_that_it_needs(
-    tmp_path: Path,
-) -> None:
+def test_every_part_that_is_compiled_ahead_is_configured_and_has_the_file_that_it_needs(tmp_path: Path) -> None:
     jobs = [job for jobs in phases_of(is_all=True) for job in jobs]
     shapes = {setting.partition("=")[2] for _, setting, _ in jobs if "fixture=" in setting}
     kernels = {SHAPES.find(name).distance for name in SHAPES}

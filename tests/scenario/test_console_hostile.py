@@ -56,9 +56,7 @@ def test_page_that(
     until(lambda: server.viser.connections() == 1, "the page has gone")
 
 
-def handle_state(
-    server: ConsoleServer, uuid: str
-) -> tuple[str | bool, str, bool, bool, int, bool] | None:
+def handle_state(server: ConsoleServer, uuid: str) -> tuple[str | bool, str, bool, bool, int, bool] | None:
     """What viser keeps of an element that pages could change."""
     handle = server.viser.gui._gui_input_handle_from_uuid.get(uuid)
     if handle is None:
@@ -151,9 +149,7 @@ def test_stop_is_sent_while_the_loop_that_serves_the_pages_is_busy(
         goes_on.set()
 
 
-def test_stop_is_sent_beside_requests_that_begin_and_never_end(
-    served: tuple[ConsoleServer, Desk, PageClient],
-) -> None:
+def test_stop_is_sent_beside_requests_that_begin_and_never_end(served: tuple[ConsoleServer, Desk, PageClient]) -> None:
     server, desk, _ = served
     with ExitStack() as guests:
         for begun in (b"", b"GET /st", b"GET /stop HTTP/1.1\r\nHost: ") * (WAITING // 2):

@@ -53,9 +53,7 @@ def measured(recording: Path, time: float) -> Array:
 
 
 @pytest.mark.parametrize("time", [9.5, 4.25, 11.0])
-def test_tip_is_shown_where_the_recording_says_at_a_time(
-    page: Any, recording: Path, time: float
-) -> None:
+def test_tip_is_shown_where_the_recording_says_at_a_time(page: Any, recording: Path, time: float) -> None:
     go_to(page, time)
     wanted = measured(recording, time)
     page.until(f"""{page.place_of(TIP)}.every((x, i) => Math.abs(

@@ -60,9 +60,7 @@ def is_driven(server: ConsoleServer) -> bool:
     return server.drivers.driver is not None
 
 
-def test_page_opens_without_errors_asks_no_other_host_and_is_used(
-    tab: Any, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_page_opens_without_errors_asks_no_other_host_and_is_used(tab: Any, capfd: pytest.CaptureFixture[str]) -> None:
     with ConsoleServer(0, token="secret", label="arm") as server:
         clicks = []
         server.viser.gui.add_button("Start").on_click(lambda event: clicks.append(event.client_id))
@@ -136,9 +134,7 @@ class Elsewhere:
         self._server.server_close()
 
 
-def test_of_two_browsers_one_drives_and_a_reload_in_the_middle_keeps_it_so(
-    tab: Any, other: Any
-) -> None:
+def test_of_two_browsers_one_drives_and_a_reload_in_the_middle_keeps_it_so(tab: Any, other: Any) -> None:
     with ConsoleServer(0) as server:
         take = server.viser.gui.add_button("Take control")
         take.on_click(lambda event: server.drivers.take(present(event.client_id)))
@@ -172,8 +168,7 @@ def test_browser_that_stands_still_while_it_holds_the_stylus_loses_control(tab: 
         until(lambda: held, "the stylus moves")
         tab.value("new Promise((done) => setTimeout(done, 3000))")  # held still, but alive
         assert server.drivers.driver == page
-        tab.value("setTimeout(() => { const end = performance.now() + 4500; "
-                  "while (performance.now() < end); }, 0); 0")  # fmt: skip
+        tab.value("setTimeout(() => { const end = performance.now() + 4500; while (performance.now() < end); }, 0); 0")
         until(lambda: not is_driven(server), "control is lost")
         tab.mouse("mouseReleased", *grip)
         assert server.drivers.pages == (page,)  # its connection is well: a worker answers
@@ -193,9 +188,7 @@ def test_client_that_never_reads_costs_little_and_is_dropped_while_others_are_se
         scene = server.viser.scene
         body = scene.add_frame("/body")
         mesh = scene.add_point_cloud("/cloud", **cloud(0))
-        told, dead = handshake(
-            server.port, Origin=f"http://127.0.0.1:{server.port}", Sec_WebSocket_Protocol=SPOKEN
-        )
+        told, dead = handshake(server.port, Origin=f"http://127.0.0.1:{server.port}", Sec_WebSocket_Protocol=SPOKEN)
         assert "101" in told
         until(lambda: server.viser.connections() == 1, "the page that never reads")
         tab.visit(server.url)

@@ -24,9 +24,7 @@ STOP = """(() => {
         && box.bottom <= innerHeight && at(box.x + 5, box.y + 5)
         && at(box.right - 5, box.bottom - 5);
 })()"""
-SCROLL = (
-    """document.querySelectorAll('*').forEach((e) => { e.scrollTop = SHARE * e.scrollHeight; })"""
-)
+SCROLL = """document.querySelectorAll('*').forEach((e) => { e.scrollTop = SHARE * e.scrollHeight; })"""
 STOPPED = "document.documentElement.classList.contains('t-stopped')"
 DEAD = """[...document.querySelectorAll('button')].filter((b) =>
     ['Start', 'Pause', 'Home'].includes(b.innerText)).every((b) => b.disabled)"""
@@ -91,9 +89,7 @@ def test_space_stops_from_anywhere_but_a_field_in_which_it_is_typed(tab: Any) ->
         until(lambda: desk.stops == 1, "the stop is heard")
 
 
-def test_every_page_looks_stopped_whoever_pressed_and_says_when_the_console_is_gone(
-    tab: Any,
-) -> None:
+def test_every_page_looks_stopped_whoever_pressed_and_says_when_the_console_is_gone(tab: Any) -> None:
     with shown(Desk(is_stoppable=True)) as (server, desk):
         tab.visit(server.url)
         tab.shows("ENABLED")
@@ -103,9 +99,7 @@ def test_every_page_looks_stopped_whoever_pressed_and_says_when_the_console_is_g
     tab.shows("NO CONNECTION")
 
 
-def test_stop_is_in_the_page_before_there_is_an_arm_and_stops_it_as_soon_as_there_is(
-    tab: Any,
-) -> None:
+def test_stop_is_in_the_page_before_there_is_an_arm_and_stops_it_as_soon_as_there_is(tab: Any) -> None:
     pressed = threading.Event()
     with ConsoleServer(0) as server, splash(server) as say:
         tab.visit(server.url)

@@ -29,9 +29,7 @@ def test_law_tracks_within_three_resolutions_on_the_plant_that_predicts_the_mach
 ) -> None:
     found = tracking_of(bench.session(scenario, settings={"plant": "hardware", **LAWS[law]}))
     assert found.rms <= GOAL_UM
-    source = tracking_of(
-        bench.session(scenario, settings={"plant": "hardware", **LAWS["source_pid"]})
-    )
+    source = tracking_of(bench.session(scenario, settings={"plant": "hardware", **LAWS["source_pid"]}))
     assert found.rms < 0.2 * source.rms
     assert found.chatter < 0.5 * source.chatter
 
@@ -41,8 +39,9 @@ def test_tracking_is_what_its_definition_gives_of_the_recording() -> None:
     bench = Bench(seed=2)
     found = tracking_of(bench.session("fine_box", settings=law))
     recording = tc.run("fine_box", seed=2, settings=law)
-    frames = {name: recording[f"slave/{name}"].frame() for name in
-              ("setpoint_cp", "measured_cp", "true_cp", "measured_js")}  # fmt: skip
+    frames = {
+        name: recording[f"slave/{name}"].frame() for name in ("setpoint_cp", "measured_cp", "true_cp", "measured_js")
+    }
     # A measured pose comes a tick after the setpoint that it was sampled with.
     kept = (recording["slave/setpoint_cp"].stamp_ns[:-1] > NO_COMMAND_NS).nonzero()[0]
     wanted, seen, true = (

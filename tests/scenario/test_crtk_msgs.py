@@ -55,9 +55,7 @@ def test_every_field_has_the_name_type_and_place_that_crtk_gives_it() -> None:
 def test_without_a_compiler_one_line_says_what_to_install(tmp_path: Path) -> None:
     script: Any = [sys.executable, SOURCE / "build_without_ament.py", "--prefix", tmp_path]
     named = environment() | {"CC": "no-such-compiler"}
-    done = subprocess.run(
-        script, env=named, capture_output=True, text=True, timeout=100, check=False
-    )
+    done = subprocess.run(script, env=named, capture_output=True, text=True, timeout=100, check=False)
     assert done.returncode == 1
     (line,) = done.stderr.splitlines()
     assert "no compiler 'no-such-compiler'" in line

@@ -28,9 +28,7 @@ sys.exit(cli.main(sys.argv[1:]))
 
 
 def alone(*words: object, code: int = 0) -> subprocess.CompletedProcess[str]:
-    done = subprocess.run(
-        [sys.executable, "-c", ALONE, *map(str, words)], capture_output=True, text=True, check=False
-    )
+    done = subprocess.run([sys.executable, "-c", ALONE, *map(str, words)], capture_output=True, text=True, check=False)
     assert done.returncode == code, done.stdout + done.stderr
     return done
 
@@ -132,8 +130,7 @@ def test_command_that_cannot_be_loaded_is_named_and_the_others_work(
     captured = capsys.readouterr()
     assert "kill_motion_scaling" in captured.out
     assert captured.err == (
-        "note: no command broken, from no_such_module:add: "
-        "ModuleNotFoundError: No module named 'no_such_module'\n"
+        "note: no command broken, from no_such_module:add: ModuleNotFoundError: No module named 'no_such_module'\n"
     )
 
 

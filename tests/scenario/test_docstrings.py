@@ -12,10 +12,7 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 STYLE = tomllib.loads((ROOT / "docs" / "words.toml").read_text(encoding="utf-8"))
-ROOMS = (
-    "teleop_core", "teleop_machines", "teleop_console", "teleop_exchange", "teleop_lab",
-    "teleop_drill",
-)  # fmt: skip
+ROOMS = ("teleop_core", "teleop_machines", "teleop_console", "teleop_exchange", "teleop_lab", "teleop_drill")
 FILES = sorted(path for room in ROOMS for path in (ROOT / "src" / room / room).rglob("*.py"))
 SHORTEST = 6  # words of a message; what has less is a name or a format
 # Where a sentence or an item of a list ends, or an entry of Args begins.
@@ -32,9 +29,7 @@ def docstrings(text: str) -> Iterator[str]:
 def messages(text: str) -> Iterator[str]:
     """Other texts of some words, as of errors, parameters and help; what is put in is one word."""
     tree = ast.parse(text)
-    inside = {
-        part for node in ast.walk(tree) if isinstance(node, ast.JoinedStr) for part in node.values
-    }
+    inside = {part for node in ast.walk(tree) if isinstance(node, ast.JoinedStr) for part in node.values}
     for node in ast.walk(tree):
         if isinstance(node, ast.JoinedStr):
             parts = (p.value if isinstance(p, ast.Constant) else "it" for p in node.values)

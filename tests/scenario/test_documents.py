@@ -58,9 +58,14 @@ def anchors(text: str) -> set[str]:
 
 def run(code: list[str], folder: Path, **env: str) -> "subprocess.CompletedProcess[str]":
     done = subprocess.run(
-        [sys.executable, *code], cwd=folder, capture_output=True, text=True, timeout=300,
-        check=False, env=os.environ | env,
-    )  # fmt: skip
+        [sys.executable, *code],
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        timeout=300,
+        check=False,
+        env=os.environ | env,
+    )
     assert done.returncode == 0, done.stdout + done.stderr
     return done
 
@@ -88,9 +93,7 @@ def test_every_teleop_command_parses_with_its_settings(name: str) -> None:
 
 
 @pytest.mark.slow
-def test_every_session_of_a_documented_command_can_be_begun(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_every_session_of_a_documented_command_can_be_begun(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     for name in ("bags", "config", "examples"):
         (tmp_path / name).symlink_to(ROOT / name)
     (tmp_path / "my_arm.urdf").symlink_to(ROOT / "examples/ur5e.urdf")  # "yours" of a document
@@ -133,9 +136,7 @@ def prose(name: str) -> str:
 
 
 @pytest.mark.parametrize("path", TUTORIALS, ids=lambda path: path.stem)
-def test_every_tutorial_teaches_one_thing_in_ten_minutes_and_opens_with_its_picture(
-    path: Path,
-) -> None:
+def test_every_tutorial_teaches_one_thing_in_ten_minutes_and_opens_with_its_picture(path: Path) -> None:
     text = path.read_text(encoding="utf-8")
     assert text.count("**You learn:**") == 1
     assert text.count("```{code-cell} python\n:tags: [picture]\n") == 1
@@ -156,9 +157,7 @@ def test_every_block_that_says_so_is_run_or_parsed_by_the_tests() -> None:
 
 
 def test_every_picture_is_drawn_by_the_build_or_says_which_version_it_shows() -> None:
-    kept = {
-        path.name for path in ROOT.glob("docs/**/*") if path.suffix in {".png", ".webp", ".gif"}
-    }
+    kept = {path.name for path in ROOT.glob("docs/**/*") if path.suffix in {".png", ".webp", ".gif"}}
     assert kept == set(blocks.TAKEN)
     assert (ROOT / "docs/images/console.webp").stat().st_size < 2e6
 
@@ -178,9 +177,7 @@ def test_python_of_a_document_runs_from_top_to_bottom(name: Any, tmp_path: Path)
 
 
 @pytest.mark.slow
-def test_parts_of_the_package_in_the_documents_are_there_once_it_is_installed(
-    tmp_path: Path,
-) -> None:
+def test_parts_of_the_package_in_the_documents_are_there_once_it_is_installed(tmp_path: Path) -> None:
     section = text_of("docs/parts.md").split(PACKAGE_HEADING)[1]
     (tmp_path / "pyproject.toml").write_text(snippets(section, "toml")[0])
     (tmp_path / "my_teleop_parts.py").write_text(snippets(section, "python")[0])
@@ -217,9 +214,13 @@ def test_version_is_the_same_wherever_it_stands() -> None:
     assert version == teleop_lab.__version__ == teleop_drill.__version__
     assert version == teleop_machines.__version__
     for package in (
-        "teleop_core", "teleop_machines", "teleop_console", "teleop_exchange", "teleop_lab",
+        "teleop_core",
+        "teleop_machines",
+        "teleop_console",
+        "teleop_exchange",
+        "teleop_lab",
         "teleop_drill",
-    ):  # fmt: skip
+    ):
         assert ET.parse(ROOT / f"src/{package}/package.xml").findtext("version") == version
         assert f'VERSION = "{version}"' in text_of(f"src/{package}/setup.py")
     for said in (f'version = "{version}"', f"teleop_core=={version}"):

@@ -58,9 +58,7 @@ def test_own_architecture_feels_force_as_position_force_does_and_less_drag(tmp_p
     assert felt[3] >= felt[1] > 2.0 * felt[2]
 
 
-def test_more_channels_keep_a_late_hand_calm_and_the_fourth_lets_the_tip_go_where_it_is_led(
-    tmp_path: Path,
-) -> None:
+def test_more_channels_keep_a_late_hand_calm_and_the_fourth_lets_the_tip_go_where_it_is_led(tmp_path: Path) -> None:
     text = run("channels", tmp_path)
     fastest, way = numbers(r"most (\d+) mm/s", text), numbers(r"(-?[\d.]+) mm from", text)
     assert fastest[1] > 2.0 * max(fastest[5], fastest[7])
@@ -68,9 +66,7 @@ def test_more_channels_keep_a_late_hand_calm_and_the_fourth_lets_the_tip_go_wher
     assert way[4] > 1.0
 
 
-def test_delay_takes_least_of_what_waves_let_feel_and_they_alone_press_no_harder(
-    tmp_path: Path,
-) -> None:
+def test_delay_takes_least_of_what_waves_let_feel_and_they_alone_press_no_harder(tmp_path: Path) -> None:
     text = run("far_touch", tmp_path)
     felt, most = numbers(r"feels ([\d.]+) N", text), numbers(r"tip ([\d.]+) N at most", text)
     none, tank, tdpa, wave = (felt[i : i + 3] for i in range(0, 12, 3))
@@ -103,9 +99,7 @@ def test_a_tool_keeps_to_its_port_within_a_millimetre(tmp_path: Path) -> None:
     assert max(off) < max(most) < 2.0
 
 
-def test_a_block_is_carried_where_the_fingers_hold_it_and_lost_where_they_do_not(
-    tmp_path: Path,
-) -> None:
+def test_a_block_is_carried_where_the_fingers_hold_it_and_lost_where_they_do_not(tmp_path: Path) -> None:
     text = run("pick", tmp_path)
     ways, force = numbers(r"carried (-?[\d.]+) mm", text), numbers(r"drops, ([\d.]+) N", text)
     slips = numbers(r"(\d+) slips", text)
@@ -129,8 +123,11 @@ def test_blocks_go_from_peg_to_peg_where_hand_hole_and_fingers_let_them(tmp_path
 def test_shapes_made_of_others_hold_the_hand_and_better_still_the_slave(tmp_path: Path) -> None:
     text = run("combined_fixtures", tmp_path)
     assert re.findall(r"^(\w+) +(\w+)", text, re.MULTILINE) == [
-        ("union", "hand"), ("union", "both"), ("intersection", "hand"), ("intersection", "both"),
-    ]  # fmt: skip
+        ("union", "hand"),
+        ("union", "both"),
+        ("intersection", "hand"),
+        ("intersection", "both"),
+    ]
     hand, both, inside, inside_both = numbers(r"slave ([\d.]+) mm", text)
     assert both < 0.5 * hand
     assert inside_both < 0.5 * inside
@@ -191,9 +188,7 @@ def test_two_arms_are_scored_one_by_one(tmp_path: Path) -> None:
     assert all(error < 0.6 for error in numbers(r"([\d.]+) mm RMS", text))
 
 
-def test_delay_of_twenty_milliseconds_makes_references_twenty_milliseconds_old(
-    tmp_path: Path,
-) -> None:
+def test_delay_of_twenty_milliseconds_makes_references_twenty_milliseconds_old(tmp_path: Path) -> None:
     text = run("delay", tmp_path)
     assert "the reference in force is 20 ms old" in text
     direct, delayed = numbers(r"slave ([\d.]+) mm", text)
@@ -208,9 +203,7 @@ def test_sweep_tells_what_a_late_display_costs_and_runs_nothing_twice(tmp_path: 
     assert late > soon + 0.1
 
 
-def test_the_sink_for_mlflow_logs_a_run_for_each_session_or_says_what_it_needs(
-    tmp_path: Path,
-) -> None:
+def test_the_sink_for_mlflow_logs_a_run_for_each_session_or_says_what_it_needs(tmp_path: Path) -> None:
     command = [sys.executable, str(EXAMPLES.parent / "examples/mlflow_sink.py")]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
     if find_spec("mlflow") is None:
@@ -235,9 +228,7 @@ def test_own_task_takes_longer_the_later_the_slave_is_seen(tmp_path: Path) -> No
     assert late > soon + 0.1
 
 
-def test_walls_hold_the_hand_by_how_far_it_aims_and_damped_ones_do_not_feed_it(
-    tmp_path: Path,
-) -> None:
+def test_walls_hold_the_hand_by_how_far_it_aims_and_damped_ones_do_not_feed_it(tmp_path: Path) -> None:
     lines = [line.split() for line in run("walls", tmp_path).splitlines()[1:]]
     damped = [[float(text) for text in words[1:]] for words in lines if words[0] == "damped"]
     hand = [row[1] for row in damped]
@@ -272,9 +263,7 @@ def test_own_experiment_stands_beside_those_of_the_package(tmp_path: Path) -> No
     assert all(0.01 < float(error) < 2.0 for error in beside.groups())
 
 
-def test_plant_of_published_rests_predicts_the_published_errors_and_an_ideal_one_does_not(
-    tmp_path: Path,
-) -> None:
+def test_plant_of_published_rests_predicts_the_published_errors_and_an_ideal_one_does_not(tmp_path: Path) -> None:
     text = run("predict_the_machine", tmp_path)
     bias = re.search(r"bias\.theta1 = ([\d.]+) \(([\d.]+) to ([\d.]+)\)", text)
     assert bias is not None
@@ -318,16 +307,13 @@ def test_arms_are_led_closer_once_they_are_calibrated(tmp_path: Path) -> None:
 
 def test_commands_take_the_parts_of_the_examples(tmp_path: Path) -> None:
     files = [text for name in PARTS for text in ("--parts", str(EXAMPLES / f"{name}.py"))]
-    settings = ["fixture=pill", "controller=following", "robot=gantry",
-                "stages=[velocity_limit, hand_damping]"]  # fmt: skip
+    settings = ["fixture=pill", "controller=following", "robot=gantry", "stages=[velocity_limit, hand_damping]"]
     teleop = [sys.executable, "-m", "teleop_core.cli", *files]
     out = str(tmp_path / "bag")
     sim = ["sim", "--scenario", "coarse_box", "--duration", "5", "--out", out, "--set", *settings]
     scores = str(tmp_path / "scores.json")
     for arguments in (sim, ["evaluate", out, "--json", scores]):
-        done = subprocess.run(
-            [*teleop, *arguments], capture_output=True, text=True, timeout=300, check=False
-        )
+        done = subprocess.run([*teleop, *arguments], capture_output=True, text=True, timeout=300, check=False)
         assert done.returncode == 0, done.stderr
     assert "pill on for" in done.stdout
     (score,) = json.loads(Path(scores).read_text(encoding="utf-8"))
@@ -368,9 +354,7 @@ def test_a_person_moves_the_slave_while_they_hold_the_stylus_and_not_else(tmp_pa
 
 
 def test_who_sees_the_slave_later_takes_longer_to_the_goal(tmp_path: Path) -> None:
-    delays, times = zip(
-        *re.findall(r"seen +(\d+) ms late: ([\d.]+) s", run("step_by_step", tmp_path)), strict=True
-    )
+    delays, times = zip(*re.findall(r"seen +(\d+) ms late: ([\d.]+) s", run("step_by_step", tmp_path)), strict=True)
     assert delays == ("0", "200", "400")
     assert 1.0 < float(times[0]) < float(times[1]) < float(times[2])
 
@@ -381,19 +365,21 @@ def test_own_control_is_a_button_beside_the_others(tmp_path: Path) -> None:
 
 def test_examples_pass_a_strict_type_check_of_a_user() -> None:
     with tempfile.TemporaryDirectory() as folder:
-        options = ["--strict", "--config-file=", "--follow-imports=silent", "--no-error-summary",
-                   "--disable-error-code=import-untyped"]  # fmt: skip
+        options = [
+            "--strict",
+            "--config-file=",
+            "--follow-imports=silent",
+            "--no-error-summary",
+            "--disable-error-code=import-untyped",
+        ]
         files = [str(EXAMPLES / f"{name}.py") for name in NAMES]
         done = subprocess.run(
-            [sys.executable, "-m", "mypy", *options, *files], cwd=folder, capture_output=True,
-            text=True, check=False,
-        )  # fmt: skip
+            [sys.executable, "-m", "mypy", *options, *files], cwd=folder, capture_output=True, text=True, check=False
+        )
     assert done.returncode == 0, done.stdout
 
 
-def test_a_bridge_is_drilled_with_a_model_of_its_controller_and_one_that_coasts_is_found(
-    tmp_path: Path,
-) -> None:
+def test_a_bridge_is_drilled_with_a_model_of_its_controller_and_one_that_coasts_is_found(tmp_path: Path) -> None:
     sound, coasting = run("simulated_controller", tmp_path).split("coasts:")
     assert "\u2713 stop_topic: FAULT: stop" in sound
     assert "\u2713 freeze_slave_sim: FAULT: feedback" in sound

@@ -87,9 +87,7 @@ def test_replaying_the_file_itself_gives_the_same_motion(
         teleop_again(*next_command(text))
     said = teleop_again("replay", hand, "--out", tmp_path / "direct").stderr
     assert "note: hand.csv: x, y, z" in said
-    a, b = (
-        Bag(p).read(SLAVE_MEASURED_CP).values for p in (next_command(text)[-1], tmp_path / "direct")
-    )
+    a, b = (Bag(p).read(SLAVE_MEASURED_CP).values for p in (next_command(text)[-1], tmp_path / "direct"))
     assert np.array_equal(a, b)
 
 
@@ -102,8 +100,12 @@ def test_import_is_repeated_by_what_its_metadata_say(
     words = about["imported_by"].split()
     done = subprocess.run(
         [sys.executable, "-m", "teleop_core.cli", *words[1:-1], str(tmp_path / "again")],
-        cwd=hand.parent, capture_output=True, text=True, check=False, timeout=300,
-    )  # fmt: skip
+        cwd=hand.parent,
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=300,
+    )
     assert done.returncode == 0, done.stderr
     again = Bag(tmp_path / "again")
     assert again.metadata["imported_sha256"] == about["imported_sha256"]
@@ -112,9 +114,7 @@ def test_import_is_repeated_by_what_its_metadata_say(
     assert np.array_equal(one.stamp_ns, two.stamp_ns)
 
 
-def test_axes_with_a_minus_are_values_not_options(
-    teleop_again: "Run", hand: Path, tmp_path: Path
-) -> None:
+def test_axes_with_a_minus_are_values_not_options(teleop_again: "Run", hand: Path, tmp_path: Path) -> None:
     for number, axes in enumerate((("-y", "+x", "+z"), ("+y", "-x", "+z"), ("z", "x", "y"))):
         out = tmp_path / str(number)
         teleop_again("import", hand, "--out", out, "--axes", *axes, "--scale", "0.5")
@@ -132,9 +132,7 @@ def test_a_session_follows_the_recording_for_as_long_as_it_is(
     center = np.array([0.0, 0.01, 0.03])
     settings = (f"operator.center={center.tolist()}", "operator.approach_time=1.0")
     followed = tmp_path / "followed"
-    teleop_again(
-        "sim", "--out", followed, "--set", "operator=bag", f"operator.bag={out}", *settings
-    )
+    teleop_again("sim", "--out", followed, "--set", "operator=bag", f"operator.bag={out}", *settings)
     series = Bag(followed).read(MASTER_MEASURED_CP)
     end = REST_POSITION + center + PLACES[-1] - PLACES[0]
     assert np.linalg.norm(series.values[-1, :3] - end) < 5e-3  # the hand lags behind
@@ -157,12 +155,7 @@ def test_a_session_follows_the_recording_for_as_long_as_it_is(
     ],
 )
 def test_mistakes_are_one_line_and_leave_nothing(
-    teleop_again: "Run",
-    imported: Any,
-    hand: Path,
-    tmp_path: Path,
-    arguments: tuple[str, ...],
-    text: str,
+    teleop_again: "Run", imported: Any, hand: Path, tmp_path: Path, arguments: tuple[str, ...], text: str
 ) -> None:
     places = {"hand": hand, "out": tmp_path / "out", "bag": imported[0]}
     done = teleop_again(*(word.format(**places) for word in arguments), code=2)
@@ -172,9 +165,7 @@ def test_mistakes_are_one_line_and_leave_nothing(
     assert not list(tmp_path.iterdir())
 
 
-def test_a_data_set_of_several_recordings_is_made(
-    teleop_again: "Run", imported: Any, tmp_path: Path
-) -> None:
+def test_a_data_set_of_several_recordings_is_made(teleop_again: "Run", imported: Any, tmp_path: Path) -> None:
     _, text = imported
     answer = next_command(text)[-1]
     if not Bag(imported[0]).path.with_name("hand_replayed").exists():

@@ -82,9 +82,7 @@ def test_wrong_use_is_told_in_one_line_and_writes_nothing(
     assert not list(tmp_path.iterdir())
 
 
-def test_file_that_exists_is_kept_until_the_new_one_is_whole(
-    teleop_again: "Run", tmp_path: Path
-) -> None:
+def test_file_that_exists_is_kept_until_the_new_one_is_whole(teleop_again: "Run", tmp_path: Path) -> None:
     file = tmp_path / "found.json"
     file.write_text("before")
     teleop_again("experiment", "resolution", "nosuch", "--json", file, code=2)

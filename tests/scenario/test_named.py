@@ -46,9 +46,7 @@ def bench() -> experiments.Bench:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", experiments.EXPERIMENTS.names())
-def test_every_experiment_runs_to_its_end_and_agrees_as_it_did(
-    name: str, bench: experiments.Bench
-) -> None:
+def test_every_experiment_runs_to_its_end_and_agrees_as_it_did(name: str, bench: experiments.Bench) -> None:
     rows = experiments.run(name, bench=bench).rows
     assert sum(row.agrees is True for row in rows) == AGREEING[name]
 
@@ -62,9 +60,7 @@ def test_every_scenario_runs_to_its_end_and_is_followed(scenario: str) -> None:
     assert len(recording["slave/measured_js"]) == session_ticks(made, VirtualTime(made))
     score = recording.score()
     assert present(score.reach.followed_share) > 0.99
-    expected = pytest.approx(
-        TRACKED_MM.get(scenario, 0.05), rel=0.1 if scenario in TRACKED_MM else 1
-    )
+    expected = pytest.approx(TRACKED_MM.get(scenario, 0.05), rel=0.1 if scenario in TRACKED_MM else 1)
     assert score.position_error_mm.rms == expected
 
 

@@ -37,8 +37,14 @@ MS = 1e-3
 HOME = load_robot("rcrt1").home
 # Slave and hand begin at once: neither moves to another start, nor waits for the other.
 AT_ONCE = (f"slave.start={HOME.tolist()}", "patience=0.0")
-SHORT = (*AT_ONCE, "approach_time=0.5", "operator.period=2.0", "buttons.fixture=[0.2]",
-         "buttons.clutch=[0.9, 1.0]", "fixture.box.size=[0.01, 0.01, 0.01]")  # fmt: skip
+SHORT = (
+    *AT_ONCE,
+    "approach_time=0.5",
+    "operator.period=2.0",
+    "buttons.fixture=[0.2]",
+    "buttons.clutch=[0.9, 1.0]",
+    "fixture.box.size=[0.01, 0.01, 0.01]",
+)
 
 
 def session(*settings: str, scenario: str = "coarse_box", ticks: int = TICKS) -> NDArray[np.void]:
@@ -51,9 +57,7 @@ def plain() -> NDArray[np.void]:
     return session()
 
 
-def assert_same_streams(
-    block: NDArray[np.void], other: NDArray[np.void], topics: Sequence[Topic] = STREAMS
-) -> None:
+def assert_same_streams(block: NDArray[np.void], other: NDArray[np.void], topics: Sequence[Topic] = STREAMS) -> None:
     for topic in topics:
         for field in (topic.field, f"{topic.field}_ns"):
             assert np.array_equal(block[field], other[field]), field
@@ -68,13 +72,10 @@ def waits(times: Array) -> Array:
     return np.column_stack((swing, -swing, 0.5 * swing))
 
 
-def test_delay_of_20_ms_on_the_joint_commands_shifts_the_setpoints_by_20_ticks(
-    own_parts: None,
-) -> None:
+def test_delay_of_20_ms_on_the_joint_commands_shifts_the_setpoints_by_20_ticks(own_parts: None) -> None:
     register_operator("waits", waits)
     # The push of the limit that home is at would differ by rounding.
-    still = ("operator=waits", "tremor_amplitude=0.0", "gimbal_noise=0.0",
-             "reach_force.is_on=false")  # fmt: skip
+    still = ("operator=waits", "tremor_amplitude=0.0", "gimbal_noise=0.0", "reach_force.is_on=false")
     delayed, plain = session(*still, "teleop.delays=[slave/servo_jp=0.02]"), session(*still)
     assert np.ptp(plain["slave_setpoint_cp"][:, :3], axis=0).min() > 1 * MS
     assert_same_streams(delayed, plain, [t for t in STREAMS if t.name.startswith("master/")])
@@ -82,9 +83,7 @@ def test_delay_of_20_ms_on_the_joint_commands_shifts_the_setpoints_by_20_ticks(
         # The hand is followed from 20 ticks later on, with other roundings before it moves.
         assert np.allclose(delayed[field][20:], plain[field][:-20], rtol=0, atol=1e-9), field
     assert np.allclose(delayed["slave_setpoint_js"][:20], HOME, rtol=0, atol=1e-15)
-    assert np.array_equal(
-        delayed["slave_setpoint_js_ns"], np.maximum(plain["slave_servo_jp_ns"] - 20 * TICK_NS, 1)
-    )
+    assert np.array_equal(delayed["slave_setpoint_js_ns"], np.maximum(plain["slave_servo_jp_ns"] - 20 * TICK_NS, 1))
 
 
 @pytest.mark.parametrize(("seconds", "ticks"), [(0.0, 0), (0.0014, 1), (0.001, 1), (0.02, 20)])
@@ -107,12 +106,8 @@ def mirror(name: str, topic: Topic, **more: Any) -> Stage:
 
 
 @pytest.mark.slow
-def test_delay_to_one_reader_leaves_the_others_in_time(
-    own_parts: None, plain: NDArray[np.void]
-) -> None:
-    first, second = (
-        Topic(f"test/{name}", Kind.POSE, passed_on("slave/measured_cp")) for name in "ab"
-    )
+def test_delay_to_one_reader_leaves_the_others_in_time(own_parts: None, plain: NDArray[np.void]) -> None:
+    first, second = (Topic(f"test/{name}", Kind.POSE, passed_on("slave/measured_cp")) for name in "ab")
     register_stage(mirror("first", first))
     register_stage(mirror("second", second, late=(SLAVE_MEASURED_CP,)))
     block = session(
@@ -168,10 +163,15 @@ LIMIT = kernel(limit_step)
 
 def limit(name: str, step: Callable[[object, object, object, float], None]) -> Stage:
     return Stage(
-        name, LimitParameters, (SLAVE_SERVO_CP,), (LIMITED,), step=step,
-        state=(("place", "f8", (3,)), ("is_begun", "i8")), trigger=SLAVE_SERVO_CP,
+        name,
+        LimitParameters,
+        (SLAVE_SERVO_CP,),
+        (LIMITED,),
+        step=step,
+        state=(("place", "f8", (3,)), ("is_begun", "i8")),
+        trigger=SLAVE_SERVO_CP,
         replaces=SLAVE_SERVO_CP,
-    )  # fmt: skip
+    )
 
 
 @pytest.mark.slow
@@ -216,10 +216,7 @@ def test_what_a_plain_stage_raises_reaches_the_user(own_parts: None) -> None:
 
 # A second source of force.
 
-PUSH = Topic(
-    "contact/servo_cf", Kind.WRENCH, passed_on("master/measured_cp"), "master_base",
-    adds_to="master/servo_cf",
-)  # fmt: skip
+PUSH = Topic("contact/servo_cf", Kind.WRENCH, passed_on("master/measured_cp"), "master_base", adds_to="master/servo_cf")
 
 
 def push_step(p: Any, s: Any, row: Any, dt: float) -> None:
@@ -233,9 +230,7 @@ class PushParameters:
     newton: float = parameter(1.0, unit="N", doc="along the master's x")
 
 
-def test_second_source_of_force_is_added_and_pushes_the_hand(
-    own_parts: None, plain: NDArray[np.void]
-) -> None:
+def test_second_source_of_force_is_added_and_pushes_the_hand(own_parts: None, plain: NDArray[np.void]) -> None:
     register_stage(Stage("contact", PushParameters, (MASTER_MEASURED_CP,), (PUSH,), step=push_step))
     block = session("teleop.stages=[contact]", "contact.newton=1.5", "fixture.max_force=1.5")
     applied, walls = block["master_measured_cf"][1:, :3], block["master_servo_cf"][:-1, :3]
@@ -252,9 +247,7 @@ def test_second_source_of_force_is_added_and_pushes_the_hand(
 def test_sphere_holds_the_hand_at_the_same_distance_in_all_directions() -> None:
     block = session("fixture=sphere", "fixture.sphere.radius=0.005", "fixture.wall=soft")
     force = block["master_servo_cf"][:, :3]
-    center = block["master_measured_cp"][
-        np.argmax(block["teleop_state"][:, STATE["is_fixture_on"]])
-    ]
+    center = block["master_measured_cp"][np.argmax(block["teleop_state"][:, STATE["is_fixture_on"]])]
     is_free = ~block["master_buttons"][:, 0].astype(bool) & (np.arange(TICKS) < 890)
     is_pushed = is_free & (np.linalg.norm(force, axis=1) > 0.01)
     offset = block["master_measured_cp"][is_pushed, :3] - center[:3]
@@ -276,12 +269,21 @@ def test_default_axis_map_is_the_published_one(plain: NDArray[np.void]) -> None:
 
 
 def test_other_axis_map_moves_the_slave_along_other_axes() -> None:
-    line = ("operator=line", "operator.size=[0.02, 0.0, 0.0]", "rotation=0.0",
-            "operator.center=[0.0, 0.0, 0.0]", "operator.tilt=[0.0, 0.0, 0.0]")  # fmt: skip
+    line = (
+        "operator=line",
+        "operator.size=[0.02, 0.0, 0.0]",
+        "rotation=0.0",
+        "operator.center=[0.0, 0.0, 0.0]",
+        "operator.tilt=[0.0, 0.0, 0.0]",
+    )
     still = (*line, "approach_time=0.5", "operator.period=2.0", "buttons.fixture=[]",
              "buttons.clutch=[]", "tremor_amplitude=0.0", "starts_at_home=false")  # fmt: skip
-    axes = {"['-z', '-x', '+y']": (1, -1.0), "['+x', '+y', '+z']": (0, 1.0),
-            "['+y', '+z', '+x']": (2, 1.0), "['-x', '-y', '+z']": (0, -1.0)}  # fmt: skip
+    axes = {
+        "['-z', '-x', '+y']": (1, -1.0),
+        "['+x', '+y', '+z']": (0, 1.0),
+        "['+y', '+z', '+x']": (2, 1.0),
+        "['-x', '-y', '+z']": (0, -1.0),
+    }
     for text, (axis, sign) in axes.items():
         block: Any = VirtualTime(configure("coarse_box", settings=[*still, f"axes={text}"]))
         block.run(block.lead)  # where it starts, all directions have room

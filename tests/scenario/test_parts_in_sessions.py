@@ -23,9 +23,7 @@ ANSWER = tc.Topic("test/answer", tc.Kind.POSE, passed_on("slave/servo_cp"))
 
 def stage(step: Callable[[object, object, object, float], None]) -> tc.Stage:
     """Stage that answers every pose commanded; always the same graph, compiled once."""
-    made = tc.Stage(
-        "own", tc.NoParameters, (SLAVE_SERVO_CP,), (ANSWER,), step, trigger=SLAVE_SERVO_CP
-    )
+    made = tc.Stage("own", tc.NoParameters, (SLAVE_SERVO_CP,), (ANSWER,), step, trigger=SLAVE_SERVO_CP)
     return tc.register_stage(made)
 
 
@@ -34,9 +32,7 @@ def session(step: Callable[[object, object, object, float], None]) -> VirtualTim
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf])
-def test_stage_that_writes_no_number_ends_the_session_with_topic_and_time(
-    own_parts: None, value: float
-) -> None:
+def test_stage_that_writes_no_number_ends_the_session_with_topic_and_time(own_parts: None, value: float) -> None:
     def fails(p: Any, s: Any, row: Any, dt: float) -> None:
         row.test_answer[2] = value if row.now_ns > 5 * TICK_NS else 0.0
 
@@ -45,9 +41,7 @@ def test_stage_that_writes_no_number_ends_the_session_with_topic_and_time(
         session(fails).run(10)
 
 
-def test_misspelt_field_in_a_plain_stage_is_told_with_the_near_one_and_the_line(
-    own_parts: None,
-) -> None:
+def test_misspelt_field_in_a_plain_stage_is_told_with_the_near_one_and_the_line(own_parts: None) -> None:
     def misspells(p: Any, s: Any, row: Any, dt: float) -> None:
         row.test_answer[0] = row.slave_servo_pc[0]
 
@@ -132,9 +126,7 @@ def test_command_notes_an_answer_that_nobody_reads_and_scores_without_its_file(
     teleop: "Run", forgetful: Path, tmp_path: Path
 ) -> None:
     out, scores = tmp_path / "bag", tmp_path / "scores.json"
-    done = teleop(
-        "sim", "--parts", forgetful, "--duration", 0.5, "--out", out, "--set", "stages=[own]"
-    )
+    done = teleop("sim", "--parts", forgetful, "--duration", 0.5, "--out", out, "--set", "stages=[own]")
     notes = [line for line in done.stderr.splitlines() if not line.startswith("compiling kernels")]
     (note,) = notes
     assert note.startswith("note: stage 'own' writes test/answer, which no stage reads; replaces")

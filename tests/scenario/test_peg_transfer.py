@@ -35,8 +35,7 @@ def transferred(arms: str, duration: float) -> tc.Recording:
 
 
 @pytest.mark.parametrize(
-    ("arms", "duration", "counts"),
-    [("one", 32.0, [3]), ("two", 26.0, [2, 1]), ("hand_over", 45.0, [3, 3])],
+    ("arms", "duration", "counts"), [("one", 32.0, [3]), ("two", 26.0, [2, 1]), ("hand_over", 45.0, [3, 3])]
 )
 def test_every_kind_of_transfer_is_done_and_told_as_the_board_tells_it(
     arms: str, duration: float, counts: list[int]
@@ -118,9 +117,7 @@ class Board:
         ([0.22, -0.24, -0.1], False, Miss.DROP),
     ],
 )
-def test_a_block_counts_on_the_peg_of_its_colour_alone(
-    place: list[float], on_peg: bool, miss: Miss
-) -> None:
+def test_a_block_counts_on_the_peg_of_its_colour_alone(place: list[float], on_peg: bool, miss: Miss) -> None:
     state = Board().rest(place, on_peg=on_peg)
     assert state[COLUMN["miss"]] == miss
     assert state[COLUMN["successes"]] == (miss == Miss.NONE)

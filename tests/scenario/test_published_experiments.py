@@ -56,17 +56,13 @@ def following(block: NDArray[np.void]) -> NDArray[np.void]:
     return block[block["command_status"] == CommandStatus.FRESH]
 
 
-def test_largest_errors_are_of_the_published_size_but_smaller(
-    box: tuple[str, NDArray[np.void]],
-) -> None:
+def test_largest_errors_are_of_the_published_size_but_smaller(box: tuple[str, NDArray[np.void]]) -> None:
     name, block = box
     largest = position_error_mm(following(block)).max()
     assert 0.5 < largest / PUBLISHED[name][1] < 1.0
 
 
-def test_rotation_error_stays_below_the_published_limit(
-    box: tuple[str, NDArray[np.void]],
-) -> None:  # case 28
+def test_rotation_error_stays_below_the_published_limit(box: tuple[str, NDArray[np.void]]) -> None:  # case 28
     assert rotation_error_degrees(box[1]).max() < 0.9
 
 
@@ -77,9 +73,7 @@ def test_an_ideal_arm_is_far_better_than_any_machine(box: tuple[str, NDArray[np.
     assert rms(position_error_mm(ideal)) < 0.5 * rms(position_error_mm(following(block)))
 
 
-def test_slave_stays_in_the_box_within_a_millimetre(
-    box: tuple[str, NDArray[np.void]],
-) -> None:  # case 30
+def test_slave_stays_in_the_box_within_a_millimetre(box: tuple[str, NDArray[np.void]]) -> None:  # case 30
     name, block = box
     state = block["teleop_state"]
     on = state[:, STATE["is_fixture_on"]] > 0.0
@@ -103,9 +97,7 @@ def test_stamps_step_by_one_tick(box: tuple[str, NDArray[np.void]]) -> None:  # 
     _, block = box
     assert np.array_equal(np.diff(block["now_ns"]), np.full(len(block) - 1, TICK_NS))
     for topic in STREAMS:
-        is_sent = (
-            block[f"{topic.field}_ns"] > NO_COMMAND_NS
-        )  # no command is in force on the way to the start
+        is_sent = block[f"{topic.field}_ns"] > NO_COMMAND_NS  # no command is in force on the way to the start
         assert is_sent[np.argmax(is_sent) :].all(), topic.name
         late_ns = TICK_NS if topic is SLAVE_MEASURED_CP else 0  # of what the arm said before
         sent_ns = block["now_ns"][is_sent] - late_ns

@@ -57,8 +57,14 @@ def pinocchio_rcrt1() -> pinocchio.Model:
 def pinocchio_puma560() -> pinocchio.Model:
     """Modified Denavit-Hartenberg rows: turn and shift along x, shift along z, then the joint."""
     quarter, model, parent = np.pi / 2, pinocchio.Model(), 0
-    rows = ((0, 0, 0), (-quarter, 0, 0), (0, 0.4318, 0.15005), (-quarter, 0.0203, 0.4318),
-            (quarter, 0, 0), (-quarter, 0, 0))  # fmt: skip
+    rows = (
+        (0, 0, 0),
+        (-quarter, 0, 0),
+        (0, 0.4318, 0.15005),
+        (-quarter, 0.0203, 0.4318),
+        (quarter, 0, 0),
+        (-quarter, 0, 0),
+    )
     for number, (alpha, a, d) in enumerate(rows):
         turn = Rotation.from_rotvec([alpha, 0, 0]).as_matrix()
         place = pinocchio.SE3(turn, np.array([a, 0, 0]) + turn @ [0, 0, d])
@@ -128,12 +134,7 @@ def test_a_session_as_given_follows_as_little_as_it_says(name: str, robot: str) 
 @pytest.mark.parametrize("robot", ROBOTS)
 def test_the_share_in_place_is_that_of_poses_which_pinocchio_finds_reached(robot: str) -> None:
     stamps, poses = moves(PEOPLE["da_vinci_36"], SECONDS, seed=5)
-    reach = lab.reach(
-        recorded(stamps, poses),
-        robot=robot,
-        share=1e-3,
-        settings={"coarse_gain": 0.3, "fine_gain": 0.1},
-    )
+    reach = lab.reach(recorded(stamps, poses), robot=robot, share=1e-3, settings={"coarse_gain": 0.3, "fine_gain": 0.1})
     walked, arm = reach.given.in_place, tc.load_robot(robot)
     places, attitudes = asked(robot, reach.given.placement, poses)
     reached, held = tips(robot, walked.q)
@@ -164,9 +165,7 @@ def test_fine_mode_takes_the_fine_gain() -> None:
     reach = lab.reach(recorded(stamps, poses, pressed), robot="puma560", share=1e-3)
     walked, axes = reach.given.in_place, ((2, -1.0), (0, -1.0), (1, 1.0))
     moved = np.stack([sign * (poses[:, axis] - poses[0, axis]) for axis, sign in axes], axis=1)
-    np.testing.assert_allclose(
-        walked.asked[:, :3] - walked.asked[0, :3], 0.1 * moved, atol=ROUNDING
-    )
+    np.testing.assert_allclose(walked.asked[:, :3] - walked.asked[0, :3], 0.1 * moved, atol=ROUNDING)
 
 
 def test_the_tool_turns_about_the_axes_of_the_hand_but_for_the_misfit() -> None:
@@ -237,24 +236,18 @@ def test_a_table_of_others_is_taken_as_it_is(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_what_the_command_prints_and_writes_is_what_replay_takes(
-    tmp_path: Path, teleop: "Run"
-) -> None:
+def test_what_the_command_prints_and_writes_is_what_replay_takes(tmp_path: Path, teleop: "Run") -> None:
     bag = saved("da_vinci_30", 15.0, tmp_path)
     file, page = tmp_path / "reach.yaml", tmp_path / "reach.html"
     shown = teleop("reach", bag, "--robot", "rcrt1", "--out", file, "--html", page).stdout
-    proposed = (
-        float(present(re.search(r"followed in a session +[\d.]+ % +([\d.]+) %", shown))[1]) / 100.0
-    )
+    proposed = float(present(re.search(r"followed in a session +[\d.]+ % +([\d.]+) %", shown))[1]) / 100.0
     assert proposed >= 0.99
     line = next(line for line in shown.splitlines() if line.startswith("--set "))
     settings = line.removeprefix("--set ").replace("'", "").split()
     by_text = tc.replay(bag, robot="rcrt1", texts=settings)
     by_file = tc.replay(bag, robot="rcrt1", files=[file])
     assert abs(followed(by_text) - proposed) <= AGREE
-    np.testing.assert_array_equal(
-        by_text["slave/servo_jp"].values, by_file["slave/servo_jp"].values
-    )
+    np.testing.assert_array_equal(by_text["slave/servo_jp"].values, by_file["slave/servo_jp"].values)
     text = page.read_text()
     assert "as given, in space" in text
     assert "proposed, against time" in text

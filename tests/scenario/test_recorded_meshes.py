@@ -34,13 +34,10 @@ def arm(folder: Path, size: float = 1.0, lift: str = "0.42") -> Path:
     for part in ("urdf", "meshes"):
         (folder / "some_arm" / part).mkdir(parents=True)
     meshes = folder / "some_arm" / "meshes"
-    names = ("package://some_arm/meshes/0.stl", "../meshes/1.stl", f"file://{meshes}/2.STL",
-             "package://meshes/3.obj")  # fmt: skip
+    names = ("package://some_arm/meshes/0.stl", "../meshes/1.stl", f"file://{meshes}/2.STL", "package://meshes/3.obj")
     text = URDF.replace('xyz="0 0 0.42"', f'xyz="0 0 {lift}"')
     for k, (link, name) in enumerate(zip(LINKS, names, strict=True)):
-        trimesh.creation.box(size * np.array((0.1, 0.05 + 0.01 * k, 0.03))).export(
-            meshes / name.rpartition("/")[2]
-        )
+        trimesh.creation.box(size * np.array((0.1, 0.05 + 0.01 * k, 0.03))).export(meshes / name.rpartition("/")[2])
         shape = f'<visual><geometry><mesh filename="{name}"/></geometry></visual>'
         text = text.replace(f'<link name="{link}">', f'<link name="{link}">{shape}')
     path = folder / "some_arm" / "urdf" / "arm.urdf"
@@ -48,15 +45,8 @@ def arm(folder: Path, size: float = 1.0, lift: str = "0.42") -> Path:
     return path
 
 
-def recorded(
-    folder: Path, path: Path, **more: list[str] | Mapping[str, str | list[str]]
-) -> tc.Recording:
-    options: dict[str, Any] = {
-        "robot": str(path),
-        "geometry": ["tip=tool0"],
-        "duration": 0.3,
-        **more,
-    }
+def recorded(folder: Path, path: Path, **more: list[str] | Mapping[str, str | list[str]]) -> tc.Recording:
+    options: dict[str, Any] = {"robot": str(path), "geometry": ["tip=tool0"], "duration": 0.3, **more}
     return tc.run("coarse_box", out=folder / "bag", **options)
 
 
@@ -68,8 +58,7 @@ def drawn(path: Path) -> list[dict[int, tuple[Array, NDArray[np.int64]]]]:
 
 
 def assert_same_looks(
-    found: list[dict[int, tuple[Array, NDArray[np.int64]]]],
-    expected: list[dict[int, tuple[Array, NDArray[np.int64]]]],
+    found: list[dict[int, tuple[Array, NDArray[np.int64]]]], expected: list[dict[int, tuple[Array, NDArray[np.int64]]]]
 ) -> None:
     assert [list(looks) for looks in found] == [list(looks) for looks in expected]
     for one, other in zip(found, expected, strict=True):
@@ -83,9 +72,7 @@ def kept(metadata: dict[str, str]) -> list[str]:
 
 
 @pytest.mark.slow
-def test_a_moved_recording_is_replayed_scored_and_drawn_as_ever_once_the_arms_folder_is_gone(
-    tmp_path: Path,
-) -> None:
+def test_a_moved_recording_is_replayed_scored_and_drawn_as_ever_once_the_arms_folder_is_gone(tmp_path: Path) -> None:
     recording = recorded(tmp_path, arm(tmp_path / "mine"), settings={"world": "button"})
     before = tc.replay(present(recording.path))["slave/setpoint_js"].values
     looks, score = drawn(present(recording.path)), recording.score()
@@ -134,9 +121,7 @@ def test_what_a_recording_has_no_room_for_is_told_in_one_line_and_again_when_it_
         recorded_files(recording.metadata)
 
 
-def test_two_arms_with_the_same_meshes_keep_them_once_and_each_is_drawn_with_its_own(
-    tmp_path: Path,
-) -> None:
+def test_two_arms_with_the_same_meshes_keep_them_once_and_each_is_drawn_with_its_own(tmp_path: Path) -> None:
     left, right, other = (arm(tmp_path / n, size) for n, size in (("l", 1), ("r", 1), ("o", 2)))
     for one, distinct in ((right, 4), (other, 8)):
         settings = {"right/robot": str(one)}
@@ -177,12 +162,9 @@ def test_each_of_two_arms_of_one_xacro_is_replayed_with_its_own_arguments(tmp_pa
 
 
 @pytest.mark.parametrize(
-    "packed", ["", "x", "zlib, base64: x", "zlib, base64: " + base64.b64encode(
-        zlib.compress(b"another")).decode()]
-)  # fmt: skip
-def test_a_kept_mesh_that_was_damaged_is_told_as_one_that_is_gone(
-    packed: str, tmp_path: Path
-) -> None:
+    "packed", ["", "x", "zlib, base64: x", "zlib, base64: " + base64.b64encode(zlib.compress(b"another")).decode()]
+)
+def test_a_kept_mesh_that_was_damaged_is_told_as_one_that_is_gone(packed: str, tmp_path: Path) -> None:
     files = KeptFiles()
     files.add_robot(str(arm(tmp_path)))
     texts = {"robot": str(tmp_path / "gone.urdf"), **files.texts()}

@@ -49,8 +49,14 @@ LARGEST_PAGE = 4_000_000
 JOINTS = tuple(f"joint_{i}" for i in range(1, 7))
 START_NS = 1_700_000_000 * 1_000_000_000
 # A fixture of 30 mm around the middle of the path.
-FIXTURE = {"gain": 1.0, "is_fixture_on": 1.0, "fixture_center_x": 0.4, "fixture_size_x": 0.03,
-           "fixture_size_y": 0.03, "fixture_size_z": 0.03}  # fmt: skip
+FIXTURE = {
+    "gain": 1.0,
+    "is_fixture_on": 1.0,
+    "fixture_center_x": 0.4,
+    "fixture_size_x": 0.03,
+    "fixture_size_y": 0.03,
+    "fixture_size_z": 0.03,
+}
 
 
 @pytest.fixture(scope="module")
@@ -78,10 +84,14 @@ def record(path: Path, seed: int, fixture: dict[Any, Any] | None = None, count: 
     force = np.zeros((count, 6))
     force[:, :3] = -1000.0 * np.sign(curve) * np.maximum(np.abs(curve) - 0.015, 0.0)
     rows = {
-        MASTER_MEASURED_CP: poses, SLAVE_SERVO_CP: poses, SLAVE_SERVO_JP: np.zeros((count, 6)),
-        SLAVE_SETPOINT_JS: np.zeros((count, 6)), SLAVE_SETPOINT_CP: poses,
-        SLAVE_MEASURED_CP: measured, MASTER_MEASURED_CF: force,
-    }  # fmt: skip
+        MASTER_MEASURED_CP: poses,
+        SLAVE_SERVO_CP: poses,
+        SLAVE_SERVO_JP: np.zeros((count, 6)),
+        SLAVE_SETPOINT_JS: np.zeros((count, 6)),
+        SLAVE_SETPOINT_CP: poses,
+        SLAVE_MEASURED_CP: measured,
+        MASTER_MEASURED_CF: force,
+    }
     texts = {name: repr(FIXTURE.get(name, 0.0)) for name in STATE_FIELDS} | (fixture or {})
     metadata = {"scenario": '<curve> & "box" \'</script>', "robot": "rcrt1", "seed": str(seed)}
     with BagWriter(path, ALL, JOINTS, metadata=metadata, start_ns=START_NS) as writer:
@@ -97,8 +107,14 @@ def record(path: Path, seed: int, fixture: dict[Any, Any] | None = None, count: 
 def opened(browser: str, page: Path, folder: Path) -> Any:
     """The page's body attributes after its scripts have run, console lines and requested URLs."""
     log = folder / "net.json"
-    command = [browser, *FLAGS, f"--user-data-dir={folder / 'profile'}", f"--log-net-log={log}",
-               "--dump-dom", page.as_uri()]  # fmt: skip
+    command = [
+        browser,
+        *FLAGS,
+        f"--user-data-dir={folder / 'profile'}",
+        f"--log-net-log={log}",
+        "--dump-dom",
+        page.as_uri(),
+    ]
     done = subprocess.run(command, capture_output=True, text=True, timeout=240, check=True)
     body = re.search(r"<body([^>]*)>", done.stdout)
     assert body, "the browser showed no page:\n" + done.stderr[-2000:]
@@ -122,9 +138,7 @@ def requested(log: Any) -> set[Any]:
 
 @pytest.mark.browser
 @pytest.mark.slow
-def test_page_of_three_recordings_draws_everything_without_asking_the_network(
-    browser: str, tmp_path: Path
-) -> None:
+def test_page_of_three_recordings_draws_everything_without_asking_the_network(browser: str, tmp_path: Path) -> None:
     bags = [
         record(tmp_path / "box", 1),
         record(tmp_path / "sphere", 2, {"fixture": "sphere", "fixture.radius": "0.015"}),
@@ -158,8 +172,7 @@ def test_page_of_a_session_shows_both_arms_with_their_fixtures(
         bool(figure.traces) for found in studies(Bag(bag)) for figure in found.figures()
     )
     text = page.read_text()
-    for shown in ("two · right", "two · left", "box on for", "sphere on for", "arm right",
-                  "arm left", "robot puma560"):  # fmt: skip
+    for shown in ("two · right", "two · left", "box on for", "sphere on for", "arm right", "arm left", "robot puma560"):
         assert shown in text, shown
 
 
@@ -169,9 +182,7 @@ def test_page_tells_when_a_plot_cannot_be_drawn(browser: str, tmp_path: Path) ->
     page = tmp_path / "report.html"
     evaluate_bags([record(tmp_path / "live", 1)], None, page, cast(Console, _Silent()))
     text = page.read_text()
-    data = present(
-        re.search(r'id="page-data" type="application/json">(.*?)</script>', text, re.DOTALL)
-    )
+    data = present(re.search(r'id="page-data" type="application/json">(.*?)</script>', text, re.DOTALL))
     broken = json.loads(data.group(1))
     broken["figures"][2]["id"] = "nowhere"
     page.write_text(text.replace(data.group(1), json.dumps(broken)))

@@ -25,11 +25,7 @@ LONG, SHORT = 600_000, 20_000
 LARGEST_PAGE = 20_000_000
 # Curves are rounded to less than this.
 ROUNDING_MM, ROUNDING_N = 1e-3, 1e-3
-LIMITED = (
-    (4.0, 6.5, topics.Limit.JOINT),
-    (9.0, 9.25, topics.Limit.SPEED),
-    (12.0, 15.0, topics.Limit.JOINT),
-)
+LIMITED = ((4.0, 6.5, topics.Limit.JOINT), (9.0, 9.25, topics.Limit.SPEED), (12.0, 15.0, topics.Limit.JOINT))
 # Plots of a recording with a time axis, by their titles.
 POSITION, ERROR, FORCE = "Position against time", "Position error", "Force on the hand"
 PLOTS = """
@@ -89,9 +85,7 @@ def noisy(count: int, seed: int) -> Recipe:
     for begin, end, limit in LIMITED:
         for at, cause in ((begin, limit), (end, topics.Limit.NONE)):
             stamp_ns = START_NS + round(at * 1e3) * TICK_NS
-            recipe.singles.append(
-                (topics.TELEOP_STATE, stamp_ns, state(stamp_ns, limit=cause, limited_joint=2))
-            )
+            recipe.singles.append((topics.TELEOP_STATE, stamp_ns, state(stamp_ns, limit=cause, limited_joint=2)))
     return recipe
 
 
@@ -102,9 +96,7 @@ def short(tmp_path_factory: pytest.TempPathFactory) -> Any:
     recipes = {name: noisy(SHORT, seed) for seed, name in enumerate(("one", "two"))}
     for name, recipe in recipes.items():
         recipe.write(folder / name)
-    evaluate_bags(
-        [folder / name for name in recipes], None, folder / "page.html", cast(Console, _Silent())
-    )
+    evaluate_bags([folder / name for name in recipes], None, folder / "page.html", cast(Console, _Silent()))
     return folder / "page.html", recipes
 
 
@@ -211,9 +203,7 @@ def curve(tab: object, title: str, name: str, recording: str = "one") -> Any:
 # -- linked ----------------------------------------------------------------------------------------
 
 
-def test_zooming_one_plot_moves_all_of_that_recording_and_no_other(
-    opened: Callable[..., Any], short: Any
-) -> None:
+def test_zooming_one_plot_moves_all_of_that_recording_and_no_other(opened: Callable[..., Any], short: Any) -> None:
     tab = opened(short[0])
     whole = ranges(tab, "two")
     plot = plots(tab)[f"one/{ERROR}"]["id"]
@@ -237,9 +227,7 @@ def test_panning_one_plot_moves_all(opened: Callable[..., Any], short: Any) -> N
     assert np.allclose((begin, end), (9.0, 13.0), atol=0.05)
 
 
-def test_double_click_on_any_plot_shows_the_whole_recording(
-    opened: Callable[..., Any], short: Any
-) -> None:
+def test_double_click_on_any_plot_shows_the_whole_recording(opened: Callable[..., Any], short: Any) -> None:
     tab = opened(short[0])
     show(tab, 8.0, 12.0)
     plot = plots(tab)[f"one/{FORCE}"]["id"]
@@ -255,9 +243,7 @@ def test_double_click_on_any_plot_shows_the_whole_recording(
     assert ranges(tab, "one") == [(0.0, 19.999)]
 
 
-def test_strip_selects_moves_and_resizes_the_visible_time(
-    opened: Callable[..., Any], short: Any
-) -> None:
+def test_strip_selects_moves_and_resizes_the_visible_time(opened: Callable[..., Any], short: Any) -> None:
     tab = opened(short[0])
     strip = "#times-0 .strip"
     for begin, end, expected in (
@@ -274,9 +260,13 @@ def test_strip_selects_moves_and_resizes_the_visible_time(
 def test_keys_and_buttons_move_the_visible_time(opened: Callable[..., Any], short: Any) -> None:
     tab = opened(short[0])
     show(tab, 8.0, 12.0)
-    for act, expected in (("later", (11.2, 15.2)), ("earlier", (8.0, 12.0)),
-                          ("closer", (9.2, 10.8)), ("further", (8.0, 12.0)),
-                          ("all", (0.0, 19.999))):  # fmt: skip
+    for act, expected in (
+        ("later", (11.2, 15.2)),
+        ("earlier", (8.0, 12.0)),
+        ("closer", (9.2, 10.8)),
+        ("further", (8.0, 12.0)),
+        ("all", (0.0, 19.999)),
+    ):
         tab.value(f"document.querySelector('#times-0 .{act}').click()")
         assert np.allclose(ranges(tab, "one"), [expected], atol=1e-6), act
     tab.value("document.querySelector('#times-0 .strip').focus()")
@@ -288,9 +278,13 @@ def test_keys_and_buttons_move_the_visible_time(opened: Callable[..., Any], shor
 
 def test_range_beyond_the_recording_is_cut_to_it(opened: Callable[..., object], short: Any) -> None:
     tab = opened(short[0])
-    for begin, end, expected in ((-5.0, 5.0, (0.0, 10.0)), (15.0, 99.0, (0.0, 19.999)),
-                                 (7.0, 7.0, (0.0, 19.999)), (19.99, 30.0, (9.989, 19.999)),
-                                 (3.0, 3.0001, (3.0, 3.002))):  # fmt: skip
+    for begin, end, expected in (
+        (-5.0, 5.0, (0.0, 10.0)),
+        (15.0, 99.0, (0.0, 19.999)),
+        (7.0, 7.0, (0.0, 19.999)),
+        (19.99, 30.0, (9.989, 19.999)),
+        (3.0, 3.0001, (3.0, 3.002)),
+    ):
         show(tab, begin, end)
         assert np.allclose(ranges(tab, "one"), [expected], atol=1e-6), (begin, end)
 
@@ -299,9 +293,7 @@ def test_range_beyond_the_recording_is_cut_to_it(opened: Callable[..., object], 
 
 
 @pytest.mark.parametrize("count", [SHORT, LONG])
-def test_zooming_in_shows_every_sample(
-    opened: Callable[..., Any], short: Any, long: Any, count: Any
-) -> None:
+def test_zooming_in_shows_every_sample(opened: Callable[..., Any], short: Any, long: Any, count: Any) -> None:
     (page, recipe), name = (long, "long") if count == LONG else ((short[0], short[1]["one"]), "one")
     tab = opened(page)
     first, last = count - 5000, count - 4900
@@ -312,10 +304,7 @@ def test_zooming_in_shows_every_sample(
     setpoint = recipe.values(topics.SLAVE_SETPOINT_CP)[rows, :3] * 1e3
     force = recipe.rows[topics.MASTER_MEASURED_CF][1][rows, :3]
     expected = {
-        (ERROR, "against filtered reference"): (
-            np.linalg.norm(measured - setpoint, axis=1),
-            ROUNDING_MM,
-        ),
+        (ERROR, "against filtered reference"): (np.linalg.norm(measured - setpoint, axis=1), ROUNDING_MM),
         (FORCE, "magnitude"): (np.linalg.norm(force, axis=1), ROUNDING_N),
     }
     for (title, curve_name), (values, rounding) in expected.items():
@@ -328,16 +317,12 @@ def test_zooming_in_shows_every_sample(
         assert mode == "lines+markers"
     x, _, _ = curve(tab, ERROR, "against filtered reference", name)
     assert "every sample, 1 ms apart" in tab.value("document.querySelector('.told').textContent")
-    for axis, trace in enumerate(
-        t for t in plots(tab)[f"{name}/{POSITION}"]["traces"] if t["name"] == "measured"
-    ):
+    for axis, trace in enumerate(t for t in plots(tab)[f"{name}/{POSITION}"]["traces"] if t["name"] == "measured"):
         at = np.round(np.array(trace["x"]) * 1e3).astype(int) - (first - 1)
         assert np.abs(np.array(trace["y"]) - measured[at, axis]).max() < ROUNDING_MM
 
 
-def test_page_of_ten_minutes_is_small_and_shows_a_single_peak(
-    opened: Callable[..., Any], long: Any
-) -> None:
+def test_page_of_ten_minutes_is_small_and_shows_a_single_peak(opened: Callable[..., Any], long: Any) -> None:
     page, _ = long
     assert page.stat().st_size < LARGEST_PAGE
     tab = opened(page)
@@ -359,9 +344,7 @@ def bounds(shape: Any) -> list[Any]:
     return [[part[0], part[1]] for part in places]
 
 
-def test_every_plot_against_time_has_the_bands_of_the_state(
-    opened: Callable[..., Any], short: Any
-) -> None:
+def test_every_plot_against_time_has_the_bands_of_the_state(opened: Callable[..., Any], short: Any) -> None:
     tab = opened(short[0])
     timed = {name: plot for name, plot in plots(tab).items() if plot["times"]}
     assert len(timed) >= 8
@@ -396,9 +379,7 @@ def test_paths_show_the_visible_time(opened: Callable[..., object], short: Any, 
             assert np.allclose((min(known), max(known)), (0.0, 19.999), atol=1e-4)
 
 
-def test_long_path_in_a_plane_becomes_the_time_that_was_spent(
-    opened: Callable[..., object], long: Any
-) -> None:
+def test_long_path_in_a_plane_becomes_the_time_that_was_spent(opened: Callable[..., object], long: Any) -> None:
     tab = opened(long[0])
     kinds = {trace["type"] for trace in plots(tab)["long/Path per plane"]["traces"]}
     assert kinds == {"heatmap", "scatter"}
@@ -408,9 +389,7 @@ def test_long_path_in_a_plane_becomes_the_time_that_was_spent(
 
 
 @pytest.mark.parametrize(("width", "columns"), [(500, 1), (1200, 2)])
-def test_page_fits_into_the_window(
-    opened: Callable[..., Any], short: Any, width: int, columns: int
-) -> None:
+def test_page_fits_into_the_window(opened: Callable[..., Any], short: Any, width: int, columns: int) -> None:
     tab = opened(short[0], width)
     assert tab.value("document.documentElement.scrollWidth") <= width
     for name, plot in plots(tab).items():
@@ -418,9 +397,7 @@ def test_page_fits_into_the_window(
         assert plot["right"] <= width, name
 
 
-def test_page_follows_a_window_that_becomes_narrow_and_wide_again(
-    opened: Callable[..., Any], short: Any
-) -> None:
+def test_page_follows_a_window_that_becomes_narrow_and_wide_again(opened: Callable[..., Any], short: Any) -> None:
     tab = opened(short[0])
     for width, columns in ((500, 1), (1200, 3)):
         tab.resize(width, 900)
@@ -429,9 +406,7 @@ def test_page_follows_a_window_that_becomes_narrow_and_wide_again(
         assert tab.value("document.documentElement.scrollWidth") <= width
 
 
-def test_without_scripts_there_are_tables_and_a_word(
-    chromium: str, short: Any, tmp_path: Path
-) -> None:
+def test_without_scripts_there_are_tables_and_a_word(chromium: str, short: Any, tmp_path: Path) -> None:
     with Headless(chromium, tmp_path) as tab:
         tab.call("Emulation.setScriptExecutionDisabled", value=True)
         tab.call("Page.navigate", url=Path(short[0]).as_uri())
@@ -449,13 +424,9 @@ def test_table_is_folded_where_scripts_run(opened: Callable[..., Any], short: An
     assert "position, RMS" not in tab.value("document.body.innerText")
 
 
-def test_page_in_a_browser_that_cannot_unpack_says_so(
-    chromium: str, short: Any, tmp_path: Path
-) -> None:
+def test_page_in_a_browser_that_cannot_unpack_says_so(chromium: str, short: Any, tmp_path: Path) -> None:
     with Headless(chromium, tmp_path) as tab:
         source = "delete window.DecompressionStream"
         tab.call("Page.addScriptToEvaluateOnNewDocument", source=source)
         tab.open(Path(short[0]))
-        assert "one of 2023 or later can" in tab.value(
-            "document.getElementById('errors').textContent"
-        )
+        assert "one of 2023 or later can" in tab.value("document.getElementById('errors').textContent")

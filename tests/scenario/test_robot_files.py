@@ -30,10 +30,13 @@ rows:
   - {a: 0.3, d: -q, lower: 0.0, upper: 0.2, home: 0.1}
   - {theta: q}
 """
-XACRO = URDF.replace("<robot ", '<robot xmlns:xacro="http://www.ros.org/wiki/xacro" ').replace(
-    '<link name="base"/>',
-    '<link name="base"/><xacro:arg name="lift" default="0"/><!-- <xacro:arg/> ${1 / 0} -->',
-).replace('xyz="0 0 0.42"', 'xyz="0 0 ${0.4 + $(arg lift)}"')  # fmt: skip
+XACRO = (
+    URDF.replace("<robot ", '<robot xmlns:xacro="http://www.ros.org/wiki/xacro" ')
+    .replace(
+        '<link name="base"/>', '<link name="base"/><xacro:arg name="lift" default="0"/><!-- <xacro:arg/> ${1 / 0} -->'
+    )
+    .replace('xyz="0 0 0.42"', 'xyz="0 0 ${0.4 + $(arg lift)}"')
+)
 ROBOTS = {
     "arm.urdf": (URDF, ["tip=tool0"]),
     "scara.yaml": (TABLE, []),
@@ -79,9 +82,7 @@ def test_a_session_replays_to_the_bit_whatever_became_of_the_file_of_its_robot(
     becomes(path)
     monkeypatch.setitem(sys.modules, "xacro", None)  # as where it is not installed
     np.testing.assert_array_equal(replayed(present(recording.path)), before)
-    again = tc.replay(
-        present(recording.path), out=tmp_path / "again"
-    )  # which holds the arm as well
+    again = tc.replay(present(recording.path), out=tmp_path / "again")  # which holds the arm as well
     np.testing.assert_array_equal(replayed(present(again.path)), before)
 
 
@@ -137,9 +138,7 @@ def test_of_a_xacro_the_urdf_is_recorded_that_its_arguments_made(tmp_path: Path)
     urdf.write_text(recording.metadata["robot_file"])
     assert 'xyz="0 0 0.45"' in urdf.read_text()
     one = tc.load_robot(str(path), **{"xacro.lift": "0.05"}, tip="tool0")
-    np.testing.assert_array_equal(
-        one.fk(one.home), tc.load_robot(str(urdf), tip="tool0").fk(one.home)
-    )
+    np.testing.assert_array_equal(one.fk(one.home), tc.load_robot(str(urdf), tip="tool0").fk(one.home))
 
 
 def test_robots_of_a_name_store_no_file(tmp_path: Path) -> None:

@@ -23,9 +23,7 @@ TABLES = sorted(map(str, Path("config/robots").glob("*.yaml")))
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", [*list_robots(), *TABLES])
-def test_every_robot_follows_a_session_inside_its_limits_and_drives(
-    name: Any, tmp_path: Path
-) -> None:
+def test_every_robot_follows_a_session_inside_its_limits_and_drives(name: Any, tmp_path: Path) -> None:
     configuration = configure("free_motion", settings=[*SHORT, f"robot={name}"])
     simulate(configuration, tmp_path / "bag")
     robot, bag = load_robot(name), Bag(tmp_path / "bag")
@@ -47,9 +45,7 @@ def test_every_robot_follows_a_session_inside_its_limits_and_drives(
 def test_the_mma_reads_the_hand_as_well_as_its_encoders_allow(model: str) -> None:
     handle = ("device.handle=mma", f"device.handle_geometry=[model={model}]")
     poses = [
-        VirtualTime(configure("coarse_box", settings=[*SHORT, *extra])).run(3000)[
-            "master_measured_cp"
-        ]
+        VirtualTime(configure("coarse_box", settings=[*SHORT, *extra])).run(3000)["master_measured_cp"]
         for extra in ((), handle)
     ]
     # The Phantom's own reading step is 0.055 mm; the handle's encoders give less than 0.03 mm.

@@ -84,8 +84,10 @@ def test_every_stream_is_that_of_before_to_the_bit(scenario: str, seed: int) -> 
     expected = json.loads(FILE.read_text())
     if (here := arithmetic()) != (there := expected["arithmetic"]):
         library = " ".join(platform.libc_ver())
-        pytest.skip(f"sines of {library} here round otherwise ({here}) than those of "
-                    f"{FILE.name} ({there}): nothing to compare with")  # fmt: skip
+        pytest.skip(
+            f"sines of {library} here round otherwise ({here}) than those of "
+            f"{FILE.name} ({there}): nothing to compare with"
+        )
     assert digests(scenario, f"seed={seed}") == expected[f"{scenario}, seed {seed}"]
 
 
@@ -94,9 +96,7 @@ def test_tables_of_documents_that_take_sessions_are_what_the_code_says() -> None
     if arithmetic() != json.loads(FILE.read_text())["arithmetic"]:
         pytest.skip("sines of this machine round otherwise than those of the documents")
     script = Path(__file__).parents[2] / "docs" / "generate.py"
-    done = subprocess.run(
-        [sys.executable, script, "--check"], capture_output=True, text=True, check=False
-    )
+    done = subprocess.run([sys.executable, script, "--check"], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
 
 
@@ -111,9 +111,7 @@ def test_processors_that_round_otherwise_in_numpy_and_blas_give_the_same_bits() 
 def _short_sessions(processor: dict[str, str]) -> dict[str, dict[str, str]]:
     """Digests of :data:`SESSIONS`, computed in a process of its own."""
     command = [sys.executable, __file__, "--short"]
-    done = subprocess.run(
-        command, env=os.environ | processor, capture_output=True, text=True, check=False
-    )
+    done = subprocess.run(command, env=os.environ | processor, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     return json.loads(done.stdout)
 
@@ -127,19 +125,14 @@ def _has_avx512() -> bool:
 def short() -> None:
     """Print the digests of :data:`SESSIONS`."""
     found = {
-        f"{scenario}, {settings}": digests(scenario, *settings.split(), "duration=5")
-        for scenario, settings in SESSIONS
+        f"{scenario}, {settings}": digests(scenario, *settings.split(), "duration=5") for scenario, settings in SESSIONS
     }
     json.dump(found, sys.stdout)
 
 
 def make() -> None:
     """Print the digests of the present code."""
-    found = {
-        f"{name}, seed {seed}": digests(name, f"seed={seed}")
-        for name in SCENARIOS
-        for seed in SEEDS
-    }
+    found = {f"{name}, seed {seed}": digests(name, f"seed={seed}") for name in SCENARIOS for seed in SEEDS}
     json.dump({"arithmetic": arithmetic(), **found}, sys.stdout, indent=1)
     print()
 

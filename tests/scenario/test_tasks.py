@@ -103,11 +103,7 @@ def test_a_late_display_slows_the_operator_down() -> None:
 def test_only_the_operator_reads_the_display_wherever_it_stands() -> None:
     for stages in (["display", "network"], ["network", "display"]):
         graph = tc.build_graph(stages=stages)
-        found = {
-            link.reader.name: link.topic.name
-            for link in graph.links
-            if link.port == SLAVE_MEASURED_CP
-        }
+        found = {link.reader.name: link.topic.name for link in graph.links if link.port == SLAVE_MEASURED_CP}
         assert found["operator"] == "display/measured_cp"
         assert found["display"] == "network/measured_cp"
         assert "display/measured_cp" not in {v for k, v in found.items() if k != "operator"}
@@ -150,10 +146,7 @@ def place_of(p: FollowParameters, time: float) -> np.ndarray:
 
 
 def test_a_predictive_display_hides_the_network() -> None:
-    late: dict[str, Any] = {
-        "teleop.stages": ["network", "display", "task"],
-        "network.back.least_delay": 0.3,
-    }
+    late: dict[str, Any] = {"teleop.stages": ["network", "display", "task"], "network.back.least_delay": 0.3}
     plain, predicted = (
         tc.run("point", duration=20.0, settings={**late, "display.shows": shows}).score()
         for shows in ("slave", "command")

@@ -35,9 +35,12 @@ class SimulatedNode:
     """One process, as tests treat those of the live peer."""
 
     def __init__(
-        self, peer: "SimulatedPeer", name: str, crew: Callable[[SimulatedWorld], Crew],
+        self,
+        peer: "SimulatedPeer",
+        name: str,
+        crew: Callable[[SimulatedWorld], Crew],
         given: Mapping[str, Mapping[str, Any]],
-    ) -> None:  # fmt: skip
+    ) -> None:
         self.name, self._peer, self.crew = name, peer, None
         self.process = self.stderr = self
 
@@ -104,29 +107,29 @@ class SimulatedPeer(AnyPeer):
         self.executor.add_node(self.ros)
         self.observer = Observer(0, world=self.world)
 
-    def launch(
-        self, name: str, parameters: dict[str, Any], arm: str, env: Mapping[str, str] | None
-    ) -> SimulatedNode:
+    def launch(self, name: str, parameters: dict[str, Any], arm: str, env: Mapping[str, str] | None) -> SimulatedNode:
         full = f"{arm}/{name}".strip("/")
         return SimulatedNode(
-            self, full, lambda world: make_node(STAGES.find(name), namespace=arm, world=world),
+            self,
+            full,
+            lambda world: make_node(STAGES.find(name), namespace=arm, world=world),
             {full: flattened(parameters)},
-        )  # fmt: skip
+        )
 
     def foreign(self, name: str, work: Work) -> Process:
         """Start a process of others, which goes on until it is ended."""
-        made = self.machine.start(
-            name, lambda process: work(SimulatedWorld(self.bus, process)), after=_START
-        )
+        made = self.machine.start(name, lambda process: work(SimulatedWorld(self.bus, process)), after=_START)
         self.bus.watch(made)
         return made
 
     def side(self, *names: str, **parameters: Mapping[str, Any]) -> SimulatedNode:
         """Some nodes of a session in one process, at work."""
         made = SimulatedNode(
-            self, "side", lambda world: TeleopSession("", names, world, build_graph()),
+            self,
+            "side",
+            lambda world: TeleopSession("", names, world, build_graph()),
             {name: flattened(values) for name, values in parameters.items()},
-        )  # fmt: skip
+        )
         self.nodes.append(made)
         for name in names:
             self.wait_state(name, "active")
@@ -137,15 +140,11 @@ class SimulatedPeer(AnyPeer):
         home = {"slave": {"start": load_robot("rcrt1").home.tolist()}}
         names = (*BUILT_IN, RECORDER_NAME)
         given = {
-            f"{namespace}/{name}".strip("/"): home.get(name, {}) | dict(parameters.get(name, {}))
-            for name in names
+            f"{namespace}/{name}".strip("/"): home.get(name, {}) | dict(parameters.get(name, {})) for name in names
         }
         return self._session(namespace, build_graph(), given)
 
-    def run(
-        self, configuration: Configuration, until: Callable[[], Any], out: Path,
-        namespace: str = "",
-    ) -> Bag:  # fmt: skip
+    def run(self, configuration: Configuration, until: Callable[[], Any], out: Path, namespace: str = "") -> Bag:
         """Recording of a configured session in one process, which lasts until something is so."""
         given = parameters_of(configuration, str(out), namespace)
         session = self._session(namespace, configuration.graph, given)
@@ -153,13 +152,13 @@ class SimulatedPeer(AnyPeer):
         assert session.end() == 0
         return Bag(out)
 
-    def _session(
-        self, namespace: str, graph: Graph, given: Mapping[str, Mapping[str, Any]]
-    ) -> SimulatedNode:
+    def _session(self, namespace: str, graph: Graph, given: Mapping[str, Mapping[str, Any]]) -> SimulatedNode:
         made = SimulatedNode(
-            self, "session", lambda world: TeleopSession(namespace, (), world, graph),
+            self,
+            "session",
+            lambda world: TeleopSession(namespace, (), world, graph),
             {name: flattened(values) for name, values in given.items()},
-        )  # fmt: skip
+        )
         self.nodes.append(made)
         for name in (*(member.name for member in graph.members), RECORDER_NAME):
             self.wait_state(f"{namespace}/{name}".strip("/"), "active")

@@ -110,9 +110,7 @@ def test_an_arm_of_each_kind_is_led_home_without_a_jump(peer: "Peer", kind: str)
     assert_is_led_home_without_a_jump(real_arm(peer, kind))
 
 
-def test_an_arm_that_jumps_is_told_nothing_more_and_begins_anew_after_the_fault(
-    peer: "Peer",
-) -> None:
+def test_an_arm_that_jumps_is_told_nothing_more_and_begins_anew_after_the_fault(peer: "Peer") -> None:
     arm = real_arm(peer)
     peer.wait(lambda: arm.is_at(ROBOT.home), "an arm at home")
     arm.misbehave("jump")
@@ -180,8 +178,7 @@ def test_the_drill_finds_an_arm_from_a_urdf_lost(tmp_path: Path) -> None:
     settings = (f"robot={URDF}", "geometry=[tip=tool0]", "start=[0.0,-1.57,1.57,-1.57,-1.57,0.0]")
     rows = chosen(("kill_slave_sim",), is_composed=False)
     (lost,) = simulated_drill(
-        rows, tmp_path, print, drives=bridge, arm=controller("forward_command", "ur5e"),
-        texts=settings,
-    )  # fmt: skip
+        rows, tmp_path, print, drives=bridge, arm=controller("forward_command", "ur5e"), texts=settings
+    )
     assert lost.failures() == []
     assert lost.fault is Fault.FEEDBACK

@@ -28,9 +28,7 @@ def test_a_node_in_a_namespace_publishes_and_reports_below_it(peer: "Peer") -> N
     assert set(peer.observer.statuses) == {"left/slave", "left/slave_sim"}
 
 
-def test_a_recorder_in_a_namespace_records_the_topics_of_its_arm(
-    peer: "Peer", tmp_path: Path
-) -> None:
+def test_a_recorder_in_a_namespace_records_the_topics_of_its_arm(peer: "Peer", tmp_path: Path) -> None:
     recorder = peer.start("recorder", arm="left", out=str(tmp_path / "bag"))
     stamp = 0
 

@@ -25,9 +25,7 @@ def has(listener: "Listener", count: int) -> bool:
 
 
 @pytest.mark.parametrize("is_side", [False, True], ids=["alone", "in a side of a session"])
-def test_slave_answers_every_sample_of_its_arm_also_several_that_come_within_a_tick(
-    peer: Any, is_side: bool
-) -> None:
+def test_slave_answers_every_sample_of_its_arm_also_several_that_come_within_a_tick(peer: Any, is_side: bool) -> None:
     answers = peer.listen(topics.SLAVE_MEASURED_CP)
     if is_side:
         peer.side("slave", slave={"start": ARM.home.tolist()})
@@ -60,9 +58,7 @@ def test_slave_answers_every_sample_of_its_arm_also_several_that_come_within_a_t
 
 
 @pytest.mark.parametrize("count", [200, 400])
-def test_what_comes_while_a_node_is_late_waits_for_it_up_to_its_catch_up(
-    peer: "Peer", count: int
-) -> None:
+def test_what_comes_while_a_node_is_late_waits_for_it_up_to_its_catch_up(peer: "Peer", count: int) -> None:
     given = {"max_catch_up": 300, "autostart": False}
     node = make_node(STAGES.find("slave"), world=peer.world, values=given)
     node.ros.trigger("configure")

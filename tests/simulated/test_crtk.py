@@ -20,9 +20,7 @@ def client(peer: "Peer") -> StockClient:
     return StockClient.of_slave(peer)
 
 
-def test_a_pose_is_moved_to_and_one_out_of_reach_is_refused_and_counted(
-    client: StockClient,
-) -> None:
+def test_a_pose_is_moved_to_and_one_out_of_reach_is_refused_and_counted(client: StockClient) -> None:
     pose = client.newest["setpoint_cp"].pose
     goal = PoseStamped(pose=pose)
     goal.pose.position.z -= 0.01
@@ -37,9 +35,7 @@ def test_a_pose_is_moved_to_and_one_out_of_reach_is_refused_and_counted(
     client.peer.wait_value("slave", "refused.slave/move_cp", lambda count: count == 1)
 
 
-def test_states_are_commanded_and_told_and_a_paused_arm_refuses_to_move(
-    client: StockClient,
-) -> None:
+def test_states_are_commanded_and_told_and_a_paused_arm_refuses_to_move(client: StockClient) -> None:
     client.send("state_command", crtk.StringStamped(string="pause"))
     client.reaches(("PAUSED", True, False))
     client.send("move_jp", JointState(position=[a - 0.05 for a in MIDDLE]))
@@ -58,9 +54,7 @@ def six(wrench: Any) -> Array:
     return np.array([force.x, force.y, force.z, torque.x, torque.y, torque.z])
 
 
-def test_a_measured_force_is_told_along_the_tip_and_about_the_base_under_its_stamp(
-    client: StockClient,
-) -> None:
+def test_a_measured_force_is_told_along_the_tip_and_about_the_base_under_its_stamp(client: StockClient) -> None:
     node, newest = client.peer.ros, client.newest
     for name in ("body/measured_cf", "spatial/measured_cf"):
         node.create_subscription(WrenchStamped, f"slave/{name}", client.taker(name), Qos())

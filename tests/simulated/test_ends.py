@@ -15,9 +15,7 @@ if TYPE_CHECKING:
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_a_node_that_was_shut_down_by_service_still_ends_well(
-    peer: "Peer", tmp_path: Path, number: Any
-) -> None:
+def test_a_node_that_was_shut_down_by_service_still_ends_well(peer: "Peer", tmp_path: Path, number: Any) -> None:
     node = peer.start("recorder", out=str(tmp_path / "bag"))
     assert peer.change("recorder", Transition.TRANSITION_ACTIVE_SHUTDOWN)
     assert (tmp_path / "bag" / "metadata.yaml").exists()

@@ -7,11 +7,7 @@ import pytest
 from std_msgs.msg import Float64MultiArray
 
 from simulated_arms import controller
-from teleop_core.graph.topics import (
-    SLAVE_JAW_MEASURED_JS,
-    SLAVE_JAW_SERVO_JP,
-    SLAVE_JAW_SETPOINT_JS,
-)
+from teleop_core.graph.topics import SLAVE_JAW_MEASURED_JS, SLAVE_JAW_SERVO_JP, SLAVE_JAW_SETPOINT_JS
 from teleop_core.middleware.world import Qos
 
 if TYPE_CHECKING:
@@ -61,17 +57,16 @@ def gripper(peer: Any, kind: str) -> Gripper:
     peer.foreign("controller", controller(kind, "gripper"))
     found = Gripper(peer)
     command, state = TOPICS[kind]
-    peer.start("jaw_bridge", kind=kind, joint="knuckle", scale=-1.0, offset=0.8,
-               command_topic=command, state_topic=state)  # fmt: skip
+    peer.start(
+        "jaw_bridge", kind=kind, joint="knuckle", scale=-1.0, offset=0.8, command_topic=command, state_topic=state
+    )
     peer.start("jaw")
     peer.start("slave")
     return found
 
 
 @pytest.mark.parametrize("kind", sorted(TOPICS))
-def test_a_gripper_that_holds_something_opens_only_once_the_hand_has_closed(
-    peer: "Peer", kind: str
-) -> None:
+def test_a_gripper_that_holds_something_opens_only_once_the_hand_has_closed(peer: "Peer", kind: str) -> None:
     found = gripper(peer, kind)
     peer.wait(lambda: found.is_at(HELD), "where the gripper is")
     found.command(0.8, lambda: found.says("jaw", "close the hand first"), "a jaw that holds")

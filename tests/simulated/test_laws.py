@@ -40,9 +40,7 @@ def test_a_recorder_that_starts_while_its_disk_is_gone_says_so() -> None:
 @pytest.mark.slow
 def test_a_disk_that_fails_between_a_chunk_and_its_index_keeps_more_than_was_said() -> None:
     """Of seed 40113: the law wanted no more."""
-    faults = (
-        Fault(1.858, "slow disk", "", 3.0, 0.98551), Fault(4.1117, "read-only disk", "", 0.27, 0.5)
-    )  # fmt: skip
+    faults = (Fault(1.858, "slow disk", "", 3.0, 0.98551), Fault(4.1117, "read-only disk", "", 0.27, 0.5))
     assert run_seed(40113, faults).broken == ()
 
 
@@ -52,16 +50,14 @@ def test_a_recorder_says_that_a_process_was_killed_with_what_waited_in_it() -> N
     faults = (
         Fault(1.8555, "standstill", "teleop_session", 0.8036, 0.7),
         Fault(2.79, "kill", "teleop_session", 1.0, 0.5),
-    )  # fmt: skip
+    )
     assert run_seed(60060, faults, None, Processes.ONE).broken == ()
 
 
 @pytest.mark.slow
 def test_a_slave_that_was_started_while_the_clock_was_behind_follows_once_it_is_right() -> None:
     """Of seed 10003: it refused every command as one of the future."""
-    faults = (
-        Fault(1.3, "kill", "slave_side", 1.0, 0.5), Fault(2.57, "clock step", "", 0.5, 0.91)
-    )  # fmt: skip
+    faults = (Fault(1.3, "kill", "slave_side", 1.0, 0.5), Fault(2.57, "clock step", "", 0.5, 0.91))
     assert run_seed(10003, faults).broken == ()
 
 
@@ -69,19 +65,17 @@ def test_a_slave_that_was_started_while_the_clock_was_behind_follows_once_it_is_
 def test_an_intruder_under_a_clock_that_was_ahead_does_not_shut_the_hand_out_for_good() -> None:
     """Of seed 21039: the slave, started anew, took the first it heard, of the future."""
     faults = (
-        Fault(6.913, "kill", "slave_side", 1.0, 0.5), Fault(7.854, "intruder", "", 1.52, 0.0658),
+        Fault(6.913, "kill", "slave_side", 1.0, 0.5),
+        Fault(7.854, "intruder", "", 1.52, 0.0658),
         Fault(8.179, "clock step", "", 0.595, 0.9609472),
-    )  # fmt: skip
+    )
     assert run_seed(21039, faults).broken == ()
 
 
 @pytest.mark.slow
 def test_a_session_that_began_under_a_slow_clock_stamps_by_it_and_moves_by_new_commands() -> None:
     """Of seed 61046: the law took them for old ones."""
-    faults = (
-        Fault(4.109, "kill", "teleop_session", 1.0, 0.5),
-        Fault(4.633, "clock step", "", 1.5546, 0.5542206),
-    )  # fmt: skip
+    faults = (Fault(4.109, "kill", "teleop_session", 1.0, 0.5), Fault(4.633, "clock step", "", 1.5546, 0.5542206))
     assert run_seed(61046, faults, None, Processes.ONE).broken == ()
 
 

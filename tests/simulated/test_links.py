@@ -98,9 +98,7 @@ def recorded(stages: None, common_peer: Any, tmp_path_factory: pytest.TempPathFa
     listeners = [common_peer.listen(topic) for topic in WATCHED]
     settings = [*SETTINGS, "operator.approach_time=1.0"]
     out = tmp_path_factory.mktemp("session") / "bag"
-    found: Bag = common_peer.run(
-        configure("free_motion", settings=settings), lambda: is_enough(*listeners), out
-    )
+    found: Bag = common_peer.run(configure("free_motion", settings=settings), lambda: is_enough(*listeners), out)
     return found
 
 
@@ -116,9 +114,7 @@ def test_stages_of_a_user_run_between_ours_compiled_and_plain(recorded: Bag) -> 
     assert_stages_run_between_ours(recorded)
 
 
-def test_an_answer_that_is_no_number_is_counted_and_told_but_not_sent(
-    stages: None, peer: "Peer"
-) -> None:
+def test_an_answer_that_is_no_number_is_counted_and_told_but_not_sent(stages: None, peer: "Peer") -> None:
     answers = peer.listen(Topic("test/failing", Kind.POSE))
     peer.start("failing")
 

@@ -42,9 +42,7 @@ class Pair:
         self.machine.scheduler.sleep(seconds)
 
 
-def test_what_is_sent_before_both_have_found_each_other_is_not_heard_but_latched_messages_are() -> (
-    None
-):
+def test_what_is_sent_before_both_have_found_each_other_is_not_heard_but_latched_messages_are() -> None:
     for is_latched in (False, True):
         pair, qos = Pair(), Qos(depth=3, is_latched=is_latched)
         writer = pair.here.node("a").create_publisher(Bool, "/t", qos)
@@ -81,9 +79,7 @@ def test_qualities_that_do_not_go_together_do_not_meet() -> None:
     pair = Pair()
     writer = pair.here.node("a").create_publisher(Bool, "/t", Qos(is_reliable=False))
     node = pair.there.node("b")
-    strict, lenient = (
-        node.create_taker(Bool, "/t", Qos(is_reliable=reliable)) for reliable in (True, False)
-    )
+    strict, lenient = (node.create_taker(Bool, "/t", Qos(is_reliable=reliable)) for reliable in (True, False))
     pair.sleep(FOUND)
     writer.publish(b"x")
     pair.sleep(0.01)
@@ -97,10 +93,7 @@ def test_a_reliable_message_is_late_on_a_bad_line_and_another_one_is_lost_and_co
     pair.bus.lines["here", "there"] = Line(loss=0.5)
     writer = pair.here.node("a").create_publisher(Bool, "/t", Qos(depth=1000))
     node = pair.there.node("b")
-    sure, fast = (
-        node.create_taker(Bool, "/t", Qos(depth=1000, is_reliable=reliable))
-        for reliable in (True, False)
-    )
+    sure, fast = (node.create_taker(Bool, "/t", Qos(depth=1000, is_reliable=reliable)) for reliable in (True, False))
     pair.sleep(FOUND)
     for _ in range(200):
         writer.publish(b"x")
@@ -177,8 +170,10 @@ def test_the_drill_gives_the_same_bits_in_processes_that_hash_otherwise(tmp_path
         words = ["drill", "--simulated", "--seed", "5", "stop_service"]
         done = subprocess.run(
             [sys.executable, "-m", "teleop_core.cli", *words, "--out", place, "--json", file],
-            env=os.environ | {"PYTHONHASHSEED": hashed}, capture_output=True, check=False,
-        )  # fmt: skip
+            env=os.environ | {"PYTHONHASHSEED": hashed},
+            capture_output=True,
+            check=False,
+        )
         assert done.returncode == 0, done.stdout
         bags = {p.relative_to(place): p.read_bytes() for p in place.rglob("*") if p.is_file()}
         seen.append((file.read_bytes(), bags))

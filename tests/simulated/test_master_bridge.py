@@ -10,12 +10,7 @@ import yaml
 from sensor_msgs.msg import Joy
 
 from foreign_hand import AXES, ROWS, TYPES, Device, stamp, turning
-from teleop_core.graph.topics import (
-    MASTER_BUTTONS,
-    MASTER_MEASURED_CP,
-    MASTER_SERVO_CF,
-    SLAVE_SERVO_CP,
-)
+from teleop_core.graph.topics import MASTER_BUTTONS, MASTER_MEASURED_CP, MASTER_SERVO_CF, SLAVE_SERVO_CP
 from teleop_core.middleware.world import Qos
 
 if TYPE_CHECKING:
@@ -27,17 +22,21 @@ MASTERS = Path(__file__).parents[2] / "config" / "masters"
 def started(peer: "Peer", kind: str = "PoseStamped") -> Device:
     device = Device(peer, kind)
     device.bridge = peer.start(
-        "master_bridge", pose_topic="/touch/pose", device_axes=AXES, unit=0.001,
-        pose_message=f"geometry_msgs/msg/{kind}", buttons_topic="/touch/joy",
-        button_places=[1, -1, 0], force_topic="/touch/force", largest_force=2.0,
-    )  # fmt: skip
+        "master_bridge",
+        pose_topic="/touch/pose",
+        device_axes=AXES,
+        unit=0.001,
+        pose_message=f"geometry_msgs/msg/{kind}",
+        buttons_topic="/touch/joy",
+        button_places=[1, -1, 0],
+        force_topic="/touch/force",
+        largest_force=2.0,
+    )
     return device
 
 
 @pytest.mark.parametrize("kind", TYPES)
-def test_poses_of_each_type_arrive_in_the_axes_of_the_master_in_metres(
-    peer: "Peer", kind: str
-) -> None:
+def test_poses_of_each_type_arrive_in_the_axes_of_the_master_in_metres(peer: "Peer", kind: str) -> None:
     measured, buttons = map(peer.listen, (MASTER_MEASURED_CP, MASTER_BUTTONS))
     device = started(peer, kind)
     device.place = np.array([10.0, 20.0, 30.0])
@@ -49,9 +48,7 @@ def test_poses_of_each_type_arrive_in_the_axes_of_the_master_in_metres(
     peer.wait(turning(peer, is_there), "the place")
     device.buttons = [0, 1]
     pressed = [1.0, 0.0, 0.0]
-    peer.wait(
-        turning(peer, lambda: buttons.take() and list(buttons.values[-1]) == pressed), "clutch"
-    )
+    peer.wait(turning(peer, lambda: buttons.take() and list(buttons.values[-1]) == pressed), "clutch")
 
 
 def test_a_device_whose_poses_have_no_stamp_is_refused_with_a_line_in_the_log(peer: "Peer") -> None:
@@ -59,9 +56,7 @@ def test_a_device_whose_poses_have_no_stamp_is_refused_with_a_line_in_the_log(pe
     device.has_stamps = False
     peer.wait(turning(peer, lambda: "have no stamp" in device.bridge.stderr.read_text()), "a line")
     device.has_stamps = True
-    peer.wait(
-        turning(peer, lambda: "follows the device" in device.bridge.stderr.read_text()), "its end"
-    )
+    peer.wait(turning(peer, lambda: "follows the device" in device.bridge.stderr.read_text()), "its end")
 
 
 def test_a_device_that_swings_leads_the_slave(peer: "Peer") -> None:
@@ -86,9 +81,7 @@ def test_a_device_that_swings_leads_the_slave(peer: "Peer") -> None:
     peer.wait(lambda: "no master/measured_cp" in peer.status("motion_scaling").message, "silence")
 
 
-def test_a_device_is_given_forces_along_its_own_axes_and_none_once_it_is_silent(
-    peer: "Peer",
-) -> None:
+def test_a_device_is_given_forces_along_its_own_axes_and_none_once_it_is_silent(peer: "Peer") -> None:
     device, asked = started(peer), np.array([0.5, -1.0, 0.3])
 
     def is_pushed() -> bool:

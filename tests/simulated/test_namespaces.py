@@ -11,7 +11,6 @@ if TYPE_CHECKING:
 def test_names_for_all_nodes_of_a_process_are_taken_out_and_others_are_kept() -> None:
     given = ["node", "-r", "__ns:=/x", "--ros-args", "-r", "__ns:=/lab", "--remap", "__node:=arm",
              "-r", "slave:__node:=other", "-r", "a:=b", "--", "-r", "__ns:=/y"]  # fmt: skip
-    kept = ["node", "-r", "__ns:=/x", "--ros-args", "-r", "slave:__node:=other", "-r", "a:=b",
-            "--", "-r", "__ns:=/y"]  # fmt: skip
+    kept = ["node", "-r", "__ns:=/x", "--ros-args", "-r", "slave:__node:=other", "-r", "a:=b", "--", "-r", "__ns:=/y"]
     assert taken_names(given) == (kept, {"__ns": "/lab", "__node": "arm"})
     assert taken_names(kept) == (kept, {})

@@ -38,9 +38,7 @@ class Sender:
         self.peer.send(SLAVE_SERVO_CP, stamp, pose)
 
 
-def test_a_foreign_publisher_is_behind_the_network_and_nothing_comes_before_its_time(
-    peer: "Peer",
-) -> None:
+def test_a_foreign_publisher_is_behind_the_network_and_nothing_comes_before_its_time(peer: "Peer") -> None:
     came, back = peer.listen(NETWORK_SERVO_CP), peer.listen(NETWORK_SETPOINT_CP)
     peer.start("network", there__least_delay=DELAY)
     ages: list[Any]
@@ -73,13 +71,14 @@ def test_a_foreign_publisher_is_behind_the_network_and_nothing_comes_before_its_
     assert sender.sent_ns[last] < set_ns + 50 * MS < max(sender.sent_ns.values())
 
 
-def test_a_slave_is_led_across_a_network_and_the_recording_tells_the_age(
-    peer: Any, tmp_path: Path
-) -> None:
+def test_a_slave_is_led_across_a_network_and_the_recording_tells_the_age(peer: Any, tmp_path: Path) -> None:
     settings = [
-        "teleop.stages=[network]", "network.there.least_delay=0.2", "network.back.least_delay=0.2",
-        "slave.starts_at_home=true", "slave.operation.longest_outage=0",
-    ]  # fmt: skip
+        "teleop.stages=[network]",
+        "network.there.least_delay=0.2",
+        "network.back.least_delay=0.2",
+        "slave.starts_at_home=true",
+        "slave.operation.longest_outage=0",
+    ]
     setpoints = peer.listen(SLAVE_SETPOINT_JS)
 
     def is_led() -> bool:
@@ -89,16 +88,13 @@ def test_a_slave_is_led_across_a_network_and_the_recording_tells_the_age(
 
     bag = peer.run(configure("free_motion", settings=settings), is_led, tmp_path / "bag")
     said = [one.text for one in peer.machine.log]
-    assert not any(
-        "not newer" in text for text in said
-    )  # what did not arrive anew is not sent again
+    assert not any("not newer" in text for text in said)  # what did not arrive anew is not sent again
     series = bag.read(NETWORK_SERVO_CP.name)
     ages = (series.log_ns - series.stamp_ns)[series.stamp_ns > 0]
     assert ages.min() >= 199 * MS
     sent = bag.read(SLAVE_SERVO_CP.name)
     known = dict(zip(sent.stamp_ns, sent.values, strict=True))
-    pairs = [(known[s], v) for s, v in zip(series.stamp_ns, series.values, strict=True)
-             if s in known]  # fmt: skip
+    pairs = [(known[s], v) for s, v in zip(series.stamp_ns, series.values, strict=True) if s in known]
     assert len(pairs) > 0.5 * len(series.stamp_ns)
     for own, arrived in pairs:
         np.testing.assert_array_equal(own, arrived)

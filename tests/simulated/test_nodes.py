@@ -74,9 +74,7 @@ def test_motion_scaling_is_silent_until_it_knows_where_the_slave_is(peer: "Peer"
     np.testing.assert_array_equal(answers.values[0], where)
 
 
-def test_a_button_that_was_pressed_and_released_while_the_node_stood_still_was_pressed(
-    peer: "Peer",
-) -> None:
+def test_a_button_that_was_pressed_and_released_while_the_node_stood_still_was_pressed(peer: "Peer") -> None:
     peer.start("motion_scaling")
     answers, stamp = peer.listen(topics.SLAVE_SERVO_CP), 0
 
@@ -270,9 +268,7 @@ def test_parameters_are_described_with_unit_and_bounds(peer: "Peer") -> None:
     assert robot.read_only
     assert not gains.read_only
     assert steps.integer_range[0].to_value == 50
-    answer = peer.call(
-        GetParameters, "/slave_sim/get_parameters", GetParameters.Request(names=names)
-    )
+    answer = peer.call(GetParameters, "/slave_sim/get_parameters", GetParameters.Request(names=names))
     assert answer.values[3].type == 8  # doubles, although empty
 
 
@@ -347,9 +343,7 @@ def test_a_supervisor_drives_the_lifecycle_twice(
     assert node.end() == 0
 
 
-def test_a_refused_configure_leaves_the_node_usable_by_the_supervisor(
-    peer: "Peer", tmp_path: Path
-) -> None:
+def test_a_refused_configure_leaves_the_node_usable_by_the_supervisor(peer: "Peer", tmp_path: Path) -> None:
     (tmp_path / "taken").mkdir()
     node = peer.start("recorder", autostart=False, out=str(tmp_path / "taken"), wait="unconfigured")
     assert not peer.change("recorder", Transition.TRANSITION_CONFIGURE)

@@ -81,9 +81,7 @@ def command(peer: "Peer", name: str) -> Any:
     return answer.success, answer.message
 
 
-def test_a_stop_message_stops_the_setpoint_within_two_ticks_and_reset_and_enable_end_it(
-    peer: "Peer",
-) -> None:
+def test_a_stop_message_stops_the_setpoint_within_two_ticks_and_reset_and_enable_end_it(peer: "Peer") -> None:
     peer.start("slave")
     streamer = Streamer(peer)
     streamer.until(streamer.moves, "motion")
@@ -181,9 +179,7 @@ def say(button: Publisher, *, pressed: int, released: int) -> None:
         button.publish(Bool(data=is_pressed))
 
 
-def test_a_press_that_releases_follow_at_once_stops_the_arm(
-    peer: "Peer", button: Publisher
-) -> None:
+def test_a_press_that_releases_follow_at_once_stops_the_arm(peer: "Peer", button: Publisher) -> None:
     button.publish(Bool(data=False))
     for released in (1, 12, 30, 100) * 3:
         say(button, pressed=1, released=released)
@@ -225,9 +221,7 @@ def test_a_button_that_was_pressed_before_the_slave_began_stops_it(peer: "Peer")
     go_on(peer)
 
 
-def test_a_stop_is_released_by_the_button_that_pressed_it_alone(
-    peer: "Peer", button: Publisher
-) -> None:
+def test_a_stop_is_released_by_the_button_that_pressed_it_alone(peer: "Peer", button: Publisher) -> None:
     other = peer.ros.create_publisher(Bool, STOP_TOPIC, Qos())
     peer.wait(lambda: other.get_subscription_count() == 2, "both readers of the other button")
     for one in (button, other):

@@ -49,9 +49,7 @@ def count(path: Path, topic: Any = MASTER) -> int:
 
 
 @pytest.mark.slow
-def test_a_split_closes_the_recording_and_goes_on_in_the_next_directory(
-    peer: "Peer", tmp_path: Path
-) -> None:
+def test_a_split_closes_the_recording_and_goes_on_in_the_next_directory(peer: "Peer", tmp_path: Path) -> None:
     session = Session(peer, out=str(tmp_path / "bag"))
     session.send()
     assert session.ask("split") == (True, f"{tmp_path}/bag is closed; goes on in {tmp_path}/bag_1")

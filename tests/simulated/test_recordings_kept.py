@@ -45,9 +45,7 @@ def test_a_recorder_whose_directory_moved_keeps_everything_and_does_not_say_succ
     assert Bag(tmp_path / "moved").topics["master/measured_cp"].count > 1500
 
 
-def test_a_recorder_that_cannot_write_metadata_keeps_everything_for_recover(
-    peer: "Peer", tmp_path: Path
-) -> None:
+def test_a_recorder_that_cannot_write_metadata_keeps_everything_for_recover(peer: "Peer", tmp_path: Path) -> None:
     recorder = start(peer, tmp_path)
     (tmp_path / "bag" / "metadata.yaml").mkdir()
     assert recorder.end(signal.SIGINT) == 1

@@ -9,9 +9,7 @@ if TYPE_CHECKING:
     from peers import AnyPeer as Peer
 
 
-def test_a_stop_is_said_until_every_arm_rests_and_each_goes_on_when_it_is_told(
-    peer: "Peer",
-) -> None:
+def test_a_stop_is_said_until_every_arm_rests_and_each_goes_on_when_it_is_told(peer: "Peer") -> None:
     peer.start("slave", arm="left")
     peer.start("slave", arm="right")
     remote = RemoteControl(0, world=peer.world)

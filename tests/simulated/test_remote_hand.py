@@ -36,12 +36,7 @@ class Person:
         self.peer = peer
         peer.publisher(OPERATOR_SERVO_CP)
 
-    def hold(
-        self,
-        place: Sequence[float] | Array,
-        until: Callable[[], object] | Callable[[], bool],
-        what: str,
-    ) -> None:
+    def hold(self, place: Sequence[float] | Array, until: Callable[[], object] | Callable[[], bool], what: str) -> None:
         """Want the stylus at a place from the inkwell [m] until something is so."""
         pose = rest_pose()
         pose[:3] += place
@@ -74,9 +69,7 @@ def is_held(peer: "Peer") -> Callable[[], object]:
     return lambda: peer.status("operator").values.get("hand.is_held") == "1"
 
 
-def test_the_slave_goes_with_a_person_holds_without_and_no_grip_makes_it_jump(
-    peer: "Peer", session: object
-) -> None:
+def test_the_slave_goes_with_a_person_holds_without_and_no_grip_makes_it_jump(peer: "Peer", session: object) -> None:
     peer.wait(lambda: peer.status("operator").message.endswith(RESTS), "a hand that waits")
     peer.wait_value("operator", "has_begun", lambda n: n == 1)
     tips, person = peer.listen(SLAVE_MEASURED_CP), Person(peer)

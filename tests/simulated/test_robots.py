@@ -21,9 +21,7 @@ if TYPE_CHECKING:
 SHORT = ("operator.approach_time=0.5", "operator.size=[0.02, 0.02, 0.02]")
 KINDS = ("rcrt1", "puma560", "stewart", "scara_stewart", "three_finger_hand")
 """Robots of each kind; the others go by ``make soak``."""
-SLAVES = [
-    pytest.param(name, marks=() if name in KINDS else pytest.mark.soak) for name in list_robots()
-]
+SLAVES = [pytest.param(name, marks=() if name in KINDS else pytest.mark.soak) for name in list_robots()]
 GRID = 55e-6  # m, reading step of the Phantom Omni
 MS = 1_000_000
 
@@ -51,9 +49,7 @@ def short_session(peer: Any, tmp_path: Path) -> Callable[..., Any]:
         measured = bag.read(topics.SLAVE_MEASURED_JS)
         wanted = session.run(2000)["slave_measured_js"]
         assert measured.names == session.joint_names[""]
-        travel, wanted_travel = (
-            np.ptp(rows[:, : len(measured.names)], axis=0) for rows in (measured.values, wanted)
-        )
+        travel, wanted_travel = (np.ptp(rows[:, : len(measured.names)], axis=0) for rows in (measured.values, wanted))
         assert wanted_travel.max() > 1e-3
         return bag, travel < 0.5 * wanted_travel
 
@@ -67,17 +63,13 @@ def off_grid(bag: Any) -> Any:
 
 
 @pytest.mark.parametrize("name", SLAVES)
-def test_every_slave_follows_the_hand_through_a_session_of_nodes(
-    short_session: Callable[..., Any], name: str
-) -> None:
+def test_every_slave_follows_the_hand_through_a_session_of_nodes(short_session: Callable[..., Any], name: str) -> None:
     bag, is_short = short_session(f"robot={name}")
     assert not is_short.any()
     assert off_grid(bag) < 1e-6
 
 
-def test_the_mma_leads_a_session_of_nodes_with_its_own_encoders(
-    short_session: Callable[..., Any],
-) -> None:
+def test_the_mma_leads_a_session_of_nodes_with_its_own_encoders(short_session: Callable[..., Any]) -> None:
     bag, is_short = short_session("device.handle=mma")
     assert not is_short.any()
     assert off_grid(bag) > 0.1
@@ -122,9 +114,7 @@ def test_the_hybrids_node_answers_a_pose_with_joints_that_lead_there(peer: "Peer
 def test_a_stewart_slave_goes_where_a_pose_says_from_process_to_process(peer: "Peer") -> None:
     robot = load_robot("stewart")
     goal, stamp = beside_home(robot), 0
-    setpoints, measured = (
-        peer.listen(topic) for topic in (topics.SLAVE_SETPOINT_JS, topics.SLAVE_MEASURED_JS)
-    )
+    setpoints, measured = (peer.listen(topic) for topic in (topics.SLAVE_SETPOINT_JS, topics.SLAVE_MEASURED_JS))
     for name in ("slave", "inverse_kinematics"):
         peer.start(name, wait="", robot="stewart")
     for name in ("slave", "inverse_kinematics"):

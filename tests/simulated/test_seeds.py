@@ -35,37 +35,25 @@ def test_schedules_are_drawn_from_their_seed_and_all_kinds_come() -> None:
     assert {len(faults) for faults in drawn} == set(range(1, 11))
 
 
-def test_a_schedule_that_breaks_a_law_is_cut_down_to_what_does_it(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_schedule_that_breaks_a_law_is_cut_down_to_what_does_it(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(StopInput, "take", lambda *_, **__: [])  # nobody hears a stop
     found = run_seed(
-        0, [
+        0,
+        [
             Fault(1.0, "clock drift", "", 1.0, 0.3),
             Fault(1.5, "press", "", 0.5, 0.4),
             Fault(2.0, "garbage", "", 0.5, 0.6),
         ],
-    )  # fmt: skip
+    )
     assert [one.law for one in found.broken] == ["stop"]
     assert [fault.kind for fault in shrink(found, "stop").faults] == ["press"]
 
 
 def test_one_schedule_is_run_again_by_its_seed_and_faults(tmp_path: Path) -> None:
-    words = [
-        "drill",
-        "--seeds",
-        "1",
-        "--seed",
-        "3",
-        "--faults",
-        "0",
-        "--out",
-        str(tmp_path / "bags"),
-    ]
+    words = ["drill", "--seeds", "1", "--seed", "3", "--faults", "0", "--out", str(tmp_path / "bags")]
     done = subprocess.run(
-        [sys.executable, "-m", "teleop_core.cli", *words], check=False, capture_output=True,
-        text=True,
-    )  # fmt: skip
+        [sys.executable, "-m", "teleop_core.cli", *words], check=False, capture_output=True, text=True
+    )
     assert done.returncode == 0, done.stdout + done.stderr
     assert draw(3, SIDES)[0].text() in done.stdout
     assert (tmp_path / "bags/recording_1/metadata.yaml").exists()
@@ -75,9 +63,8 @@ def test_many_schedules_are_told_as_a_table_of_faults_and_states(tmp_path: Path)
     file = tmp_path / "seeds.json"
     words = ["drill", "--seeds", "2", "--seed", "10", "--json", str(file)]
     done = subprocess.run(
-        [sys.executable, "-m", "teleop_core.cli", *words], check=False, capture_output=True,
-        text=True,
-    )  # fmt: skip
+        [sys.executable, "-m", "teleop_core.cli", *words], check=False, capture_output=True, text=True
+    )
     assert done.returncode == 0, done.stdout + done.stderr
     found = json.loads(file.read_text(encoding="utf-8"))
     assert found["sessions"] == 2
@@ -87,9 +74,7 @@ def test_many_schedules_are_told_as_a_table_of_faults_and_states(tmp_path: Path)
     assert {name.split(" / ")[0] for name in found["under"]} <= set(drawn)
 
 
-def test_of_three_seeds_the_one_is_run_whose_faults_have_met_least(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_of_three_seeds_the_one_is_run_whose_faults_have_met_least(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(seeds, "_ROUND", 1)
     ran = [found.seed for found in seeds.run_seeds(30, 3, 1)]
     assert ran[0] == 30
@@ -112,9 +97,8 @@ def test_of_three_seeds_the_one_is_run_whose_faults_have_met_least(
 )
 def test_arguments_that_do_not_go_together_are_refused_in_one_line(words: Any, needed: Any) -> None:
     done = subprocess.run(
-        [sys.executable, "-m", "teleop_core.cli", "drill", *words], check=False,
-        capture_output=True, text=True,
-    )  # fmt: skip
+        [sys.executable, "-m", "teleop_core.cli", "drill", *words], check=False, capture_output=True, text=True
+    )
     assert done.returncode == 2
     assert needed in done.stderr
     assert len(done.stderr.strip().splitlines()) == 1

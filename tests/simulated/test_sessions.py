@@ -11,10 +11,7 @@ from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 
 from teleop_core.bags.messages import write_values
-from teleop_core.chain.mapping.inverse_kinematics import (
-    InverseKinematics,
-    InverseKinematicsParameters,
-)
+from teleop_core.chain.mapping.inverse_kinematics import InverseKinematics, InverseKinematicsParameters
 from teleop_core.graph import topics
 from teleop_core.graph.topics import Topic
 from teleop_core.kernels.geometry import Array
@@ -36,10 +33,13 @@ LONGEST_TIMEOUT = 5.0  # [s], of a slave
 STILL = 3e-4  # [rad or m], a few encoder steps: what counts as not moving
 # A hand without tremor and noise that goes 20 mm away and stays there.
 STEADY: dict[str, Any] = {
-    "operator__kind": "hold", "operator__center": [0.0, 0.0, 0.02], "operator__approach_time": 2.0,
+    "operator__kind": "hold",
+    "operator__center": [0.0, 0.0, 0.02],
+    "operator__approach_time": 2.0,
     "operator__rotation": 0.0,
-    "operator__tremor_amplitude": 0.0, "device__gimbal_noise": 0.0,
-}  # fmt: skip
+    "operator__tremor_amplitude": 0.0,
+    "device__gimbal_noise": 0.0,
+}
 
 
 def test_poses_that_are_not_unit_or_not_finite_are_refused(peer: "Peer") -> None:
@@ -178,9 +178,7 @@ def test_a_foreign_pose_gives_the_same_answer_as_our_own(peer: "Peer") -> None:
         stamp += MS
         peer.send(topics.SLAVE_SETPOINT_CP, 1, where)
         if is_foreign:
-            message = write_values(
-                topics.MASTER_MEASURED_CP.kind, PoseStamped(), stamp, pose, frame_id="a_real_device"
-            )
+            message = write_values(topics.MASTER_MEASURED_CP.kind, PoseStamped(), stamp, pose, frame_id="a_real_device")
             publisher.publish(message)
         else:
             peer.send(topics.MASTER_MEASURED_CP, stamp, pose)
@@ -261,10 +259,7 @@ def follows(peer: "Peer", setpoints: "Listener") -> None:
 @pytest.mark.alone
 @pytest.mark.parametrize("name", ["motion_scaling", "inverse_kinematics", "haptic_master"])
 def test_restarting_a_node_does_not_move_the_slave(peer: "Peer", name: str) -> None:
-    measured, setpoints = (
-        peer.listen(topics.SLAVE_MEASURED_JS),
-        peer.listen(topics.SLAVE_SETPOINT_JS),
-    )
+    measured, setpoints = (peer.listen(topics.SLAVE_MEASURED_JS), peer.listen(topics.SLAVE_SETPOINT_JS))
     chain(peer)
     before = rest(peer, measured)
     measured.forget()
@@ -293,9 +288,7 @@ def test_slave_holds_when_the_master_dies(peer: "Peer") -> None:
     measured = peer.listen(topics.SLAVE_MEASURED_JS)
     circle = {"operator__kind": "circle", "operator__approach_time": 0.5, "operator__period": 4.0}
     chain(peer, circle)
-    peer.wait(
-        lambda: measured.take() and np.abs(measured.values[-1][:6] - HOME).max() > 5e-3, "motion"
-    )
+    peer.wait(lambda: measured.take() and np.abs(measured.values[-1][:6] - HOME).max() > 5e-3, "motion")
     (master,) = [node for node in peer.nodes if node.name == "haptic_master"]
     master.process.kill()
     peer.wait(peer.slave_holds, "slave holds")
@@ -326,9 +319,7 @@ def test_nodes_give_bit_equal_setpoints_to_the_core_for_the_same_commands(peer: 
     # Stamps from 0 on: within the feedback timeout nothing depends on when feedback came.
     peer.start("inverse_kinematics", feedback_timeout=5.0)
     peer.publisher(topics.SLAVE_SERVO_CP)
-    peer.wait(
-        lambda: peer.ros.count_publishers(references.topic.name), "publisher of slave/servo_jp"
-    )
+    peer.wait(lambda: peer.ros.count_publishers(references.topic.name), "publisher of slave/servo_jp")
     peer.wait(lambda: setpoints.take() > 100, "slave/setpoint_js")
 
     def take_all() -> int:

@@ -12,9 +12,7 @@ if TYPE_CHECKING:
     from peers import AnyPeer as Peer
 
 
-def test_a_button_that_was_released_before_it_was_found_is_released_after_a_standstill_too(
-    peer: "Peer",
-) -> None:
+def test_a_button_that_was_released_before_it_was_found_is_released_after_a_standstill_too(peer: "Peer") -> None:
     button = StopButton(peer)
     button.say(is_pressed=True)
     button.say(is_pressed=False)
@@ -36,9 +34,7 @@ def test_a_button_that_was_released_before_it_was_found_is_released_after_a_stan
 
 
 @pytest.mark.parametrize("is_idle", [True, False])
-def test_what_a_button_said_before_it_was_found_counts_unless_the_listener_is_idle(
-    peer: "Peer", is_idle: bool
-) -> None:
+def test_what_a_button_said_before_it_was_found_counts_unless_the_listener_is_idle(peer: "Peer", is_idle: bool) -> None:
     button = peer.ros.create_publisher(Bool, STOP_TOPIC, Qos())
     for _ in range(3):
         button.publish(Bool(data=False))

@@ -32,10 +32,7 @@ HOME = load_robot("rcrt1").home.tolist()
 MS = 1_000_000
 
 
-SETTINGS = {
-    "operator": {"approach_time": 1.0, "patience": 0.0},
-    "motion_scaling": {"reach_force": {"is_on": False}},
-}
+SETTINGS = {"operator": {"approach_time": 1.0, "patience": 0.0}, "motion_scaling": {"reach_force": {"is_on": False}}}
 
 
 @pytest.fixture
@@ -56,8 +53,7 @@ def recorded(composed_session: Any) -> Bag:
 
 def test_a_composed_session_loses_no_sample_between_its_stages(recorded: Bag) -> None:
     sample, pose, joints = (
-        recorded.read(t).stamp_ns
-        for t in (topics.MASTER_MEASURED_CP, topics.SLAVE_SERVO_CP, topics.SLAVE_SERVO_JP)
+        recorded.read(t).stamp_ns for t in (topics.MASTER_MEASURED_CP, topics.SLAVE_SERVO_CP, topics.SLAVE_SERVO_JP)
     )
     # From the first sample on that was taken when the slave had said where it is.
     assert np.array_equal(sample[sample >= pose[0]], pose)
@@ -69,16 +65,18 @@ def test_a_composed_session_loses_no_sample_between_its_stages(recorded: Bag) ->
 
 def test_a_composed_session_computes_what_virtual_time_computes(recorded: Bag) -> None:
     live_poses = recorded.read(topics.MASTER_MEASURED_CP).values
-    settings = ["operator.approach_time=1.0", "haptic_master.patience=0.0",
-                f"slave.start={HOME}", "motion_scaling.reach_force.is_on=false"]  # fmt: skip
+    settings = [
+        "operator.approach_time=1.0",
+        "haptic_master.patience=0.0",
+        f"slave.start={HOME}",
+        "motion_scaling.reach_force.is_on=false",
+    ]
     virtual = VirtualTime(configure(settings=settings)).run(len(live_poses))
     # No force acts without a box, so the hand moves alike; its sample is the same, bit for bit.
     assert np.array_equal(live_poses, virtual["master_measured_cp"])
 
 
-def test_an_outside_master_takes_over_when_the_inside_one_is_off(
-    peer: "Peer", session: object
-) -> None:
+def test_an_outside_master_takes_over_when_the_inside_one_is_off(peer: "Peer", session: object) -> None:
     assert peer.change("haptic_master", Transition.TRANSITION_DEACTIVATE)
     peer.wait_state("haptic_master", "inactive")
     commands = peer.listen(topics.SLAVE_SERVO_CP)
@@ -100,10 +98,7 @@ def test_an_outside_master_takes_over_when_the_inside_one_is_off(
 def test_the_inside_master_comes_back_without_a_jump(peer: "Peer", session: object) -> None:
     measured = peer.listen(topics.SLAVE_MEASURED_CP)
     # Few samples are no stream, of which an outage would pause the arm.
-    peer.wait(
-        lambda: measured.take() and np.ptp(np.array(measured.values)[:, :3], axis=0).max() > 1e-3,
-        "motion",
-    )
+    peer.wait(lambda: measured.take() and np.ptp(np.array(measured.values)[:, :3], axis=0).max() > 1e-3, "motion")
     assert peer.change("haptic_master", Transition.TRANSITION_DEACTIVATE)
     peer.wait_state("haptic_master", "inactive")
     peer.wait(peer.slave_holds, "slave holds")
@@ -121,9 +116,11 @@ def test_the_inside_master_comes_back_without_a_jump(peer: "Peer", session: obje
 def test_a_node_may_leave_a_composed_session_in_any_moment(peer: "Peer", session: Any) -> None:
     for _ in range(20):
         for transition in (
-            Transition.TRANSITION_DEACTIVATE, Transition.TRANSITION_CLEANUP,
-            Transition.TRANSITION_CONFIGURE, Transition.TRANSITION_ACTIVATE,
-        ):  # fmt: skip
+            Transition.TRANSITION_DEACTIVATE,
+            Transition.TRANSITION_CLEANUP,
+            Transition.TRANSITION_CONFIGURE,
+            Transition.TRANSITION_ACTIVATE,
+        ):
             assert peer.change("haptic_master", transition)
     ticks = peer.status("slave").number("ticks")
     peer.wait_value("slave", "ticks", lambda now: now > ticks + 500)
@@ -138,8 +135,7 @@ def test_a_composed_session_records_all_topics_at_times_that_rise_from_stage_to_
     bag = peer.run(configure("coarse_box"), lambda: peer.has_recorded(enough), tmp_path / "bag")
     for topic in STREAMS:
         assert bag.topics[topic.name].count > 1500, topic.name
-    chain = (topics.MASTER_MEASURED_CP, topics.SLAVE_SERVO_CP, topics.SLAVE_SERVO_JP,
-             topics.SLAVE_SETPOINT_JS)  # fmt: skip
+    chain = (topics.MASTER_MEASURED_CP, topics.SLAVE_SERVO_CP, topics.SLAVE_SERVO_JP, topics.SLAVE_SETPOINT_JS)
     series = [bag.read(topic) for topic in chain]
     for before, after in pairwise(series):
         _, i, j = np.intersect1d(before.stamp_ns, after.stamp_ns, return_indices=True)

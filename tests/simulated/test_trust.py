@@ -21,13 +21,9 @@ NODES = ("operator", "haptic_master", "motion_scaling", "inverse_kinematics", "s
 
 
 @pytest.mark.parametrize("name", NODES)
-def test_bytes_that_are_no_message_are_refused_on_every_topic_a_node_reads(
-    peer: "Peer", name: str
-) -> None:
+def test_bytes_that_are_no_message_are_refused_on_every_topic_a_node_reads(peer: "Peer", name: str) -> None:
     reads = STAGES.find(name).reads
-    looks: dict[str, Any] = (
-        {"kind": "remote"} if name == "operator" else {}
-    )  # others do not look at what is told
+    looks: dict[str, Any] = {"kind": "remote"} if name == "operator" else {}  # others do not look at what is told
     node = peer.start(name, has_arm=False, **looks)
 
     def refused() -> bool:
@@ -103,9 +99,7 @@ def test_a_sender_whose_stamps_stand_still_is_told_what_to_do(peer: "Peer") -> N
     peer.wait(told, "the advice")
 
 
-def test_a_recorder_does_not_take_a_second_publisher_for_losses(
-    peer: "Peer", tmp_path: Path
-) -> None:
+def test_a_recorder_does_not_take_a_second_publisher_for_losses(peer: "Peer", tmp_path: Path) -> None:
     peer.start("recorder", out=str(tmp_path / "bag"))
     topic = topics.MASTER_MEASURED_CP
     first = peer.publisher(topic)

@@ -15,9 +15,7 @@ FRAME = pd.DataFrame({"t": T, "x": 0.01 * np.sin(T), "y": 0.005 * T, "z": 0.0 * 
 
 
 def test_a_data_frame_moves_the_hand_as_its_array_does() -> None:
-    rows = FRAME.reindex(
-        columns=["t", "x", "y", "z", "rx", "ry", "rz", "clutch", "fixture", "mode"], fill_value=0.0
-    )
+    rows = FRAME.reindex(columns=["t", "x", "y", "z", "rx", "ry", "rz", "clutch", "fixture", "mode"], fill_value=0.0)
     by_array = tc.run(operator=rows.to_numpy(dtype=float), duration=1.5)
     for frame in (FRAME, FRAME.set_index("t")):
         by_frame = tc.run(operator=frame, duration=1.5)

@@ -43,9 +43,11 @@ def test_position_position_is_a_spring_from_the_command_to_the_tip() -> None:
 
 def test_the_hand_feels_no_spring_while_the_slave_goes_its_own_way() -> None:
     rows = pressing(
-        "reflection.architecture=position_position", "feedback_timeout=1.0",
-        "delays=[slave/measured_cp@motion_scaling=0.2]", ticks=6000,
-    )  # fmt: skip
+        "reflection.architecture=position_position",
+        "feedback_timeout=1.0",
+        "delays=[slave/measured_cp@motion_scaling=0.2]",
+        ticks=6000,
+    )
     follows = rows["teleop_state"][:, STATE["is_following"]] > 0.0
     own_way = slice(0, int(np.argmax(follows)))
     moved = np.linalg.norm(np.ptp(rows["slave_measured_cp"][own_way, :3], axis=0))
@@ -56,9 +58,11 @@ def test_the_hand_feels_no_spring_while_the_slave_goes_its_own_way() -> None:
 
 def test_position_position_over_a_network_is_a_spring_to_where_the_tip_was() -> None:
     rows = pressing(
-        "teleop.stages=[network]", "network.preset=delay_100", "feedback_timeout=1.0",
+        "teleop.stages=[network]",
+        "network.preset=delay_100",
+        "feedback_timeout=1.0",
         "reflection.architecture=position_position",
-    )  # fmt: skip
+    )
     away = rows["network_measured_cp"][:-1, :3] - rows["slave_servo_cp"][1:, :3]
     force = on_the_slave(rows["master_servo_cf"][1:])
     np.testing.assert_allclose(force[6000:], 150.0 * away[6000:], atol=1e-12)
@@ -74,10 +78,14 @@ def swing(architecture: str, stiffness: float, delay: float) -> float:
     """Fastest that the hand gets [m/s] where it presses a block of which it hears late."""
     both = ",".join(f"slave/measured_{kind}@motion_scaling={delay}" for kind in ("cf", "cp"))
     rows = pressing(
-        f"reflection.architecture={architecture}", "world.material=own", f"delays=[{both}]",
-        f"world.stiffness={stiffness}", "world.damping=0.0", "feedback_timeout=1.0",
+        f"reflection.architecture={architecture}",
+        "world.material=own",
+        f"delays=[{both}]",
+        f"world.stiffness={stiffness}",
+        "world.damping=0.0",
+        "feedback_timeout=1.0",
         ticks=16_000,
-    )  # fmt: skip
+    )
     places = rows["master_measured_cp"][6000:, :3]
     return np.linalg.norm(places[20:] - places[:-20], axis=1).max() / 0.02
 
@@ -88,9 +96,7 @@ def test_a_spring_softer_than_the_grip_throws_no_hand_that_force_does() -> None:
     assert swing("position_position", 20_000.0, 0.1) < 1.5 * calm
 
 
-@pytest.mark.parametrize(
-    ("kind", "silent"), [("position_force", "cf"), ("position_position", "cp")]
-)
+@pytest.mark.parametrize(("kind", "silent"), [("position_force", "cf"), ("position_position", "cp")])
 def test_what_falls_silent_fades_within_a_tenth_of_a_second(kind: str, silent: str) -> None:
     chosen = [*CALM, f"reflection.architecture={kind}", "feedback_timeout=0.05"]
     session = VirtualTime(configure("palpation", settings=chosen))
@@ -120,9 +126,7 @@ def test_another_architecture_sets_in_from_nothing_within_a_tenth_of_a_second() 
     force = np.linalg.norm(session.run(200)["master_servo_cf"][:, :3], axis=1)
     assert force[0] < 0.02 * force[150:].max()
     assert np.abs(np.diff(force)).max() < 2.0 * 150.0 * 55e-6  # of the spring, two steps read
-    stage.retune(
-        build(MotionScalingParameters, chosen | {"reflection.position_position.stiffness": 0.0})
-    )
+    stage.retune(build(MotionScalingParameters, chosen | {"reflection.position_position.stiffness": 0.0}))
     assert not session.run(2)["master_servo_cf"].any()
 
 
@@ -147,9 +151,7 @@ def test_an_architecture_of_ones_own_is_one_call_and_remembers_twelve_numbers() 
         lambda n, m, f, a, t, out: out.base[3:].fill(0.0),  # behind what it may write
     ],
 )
-def test_an_architecture_that_cannot_work_is_refused_before_anything_runs(
-    wrong: Callable[..., Any],
-) -> None:
+def test_an_architecture_that_cannot_work_is_refused_before_anything_runs(wrong: Callable[..., Any]) -> None:
     with pytest.raises(PartError, match="architecture"):
         tc.register_architecture(tc.Architecture("wrong", tc.NoParameters, wrong))
 

@@ -67,9 +67,7 @@ def test_a_command_in_the_arms_order_and_signs_is_measured_as_what_was_commanded
         ({"order": ["a", "a"]}, "order"),
     ],
 )
-def test_joints_that_do_not_fit_are_refused_by_their_parameter(
-    given: Mapping[str, Any], name: str
-) -> None:
+def test_joints_that_do_not_fit_are_refused_by_their_parameter(given: Mapping[str, Any], name: str) -> None:
     with pytest.raises(ParameterError) as caught:
         JointMap(("a", "b"), **given)
     assert caught.value.name == f"arm_bridge.{name}"
@@ -95,9 +93,7 @@ def test_names_in_another_order_among_others_are_read_by_name() -> None:
         (sample(3, (0.2, 0.2)), Wrong.JUMP, "a jumped by 0.1"),
     ],
 )
-def test_a_sample_that_cannot_be_is_refused_and_changes_nothing(
-    wrong: Sample, reason: Wrong, words: str
-) -> None:
+def test_a_sample_that_cannot_be_is_refused_and_changes_nothing(wrong: Sample, reason: Wrong, words: str) -> None:
     heard = hearing()
     assert heard.hear(sample(2), 2 * MS)
     assert not heard.hear(wrong, 3 * MS)
@@ -221,9 +217,7 @@ def test_an_arm_that_the_server_left_behind_is_not_passed_on_while_it_is_enabled
 
 
 @pytest.mark.parametrize("moved", [0.0, 0.1])
-def test_an_arm_that_was_left_behind_at_its_last_command_goes_the_rest_slowly_and_is_led_again(
-    moved: float,
-) -> None:
+def test_an_arm_that_was_left_behind_at_its_last_command_goes_the_rest_slowly_and_is_led_again(moved: float) -> None:
     made, now = bridge(), 10**9
     made.signals["slave_operation"][0] = State.ENABLED
     setpoint, robot = made.signals["slave_setpoint_js"], load_robot(ArmBridgeParameters().robot)
@@ -296,9 +290,7 @@ def test_the_configuration_of_each_arm_has_parameters_that_exist(file: Path) -> 
 
 
 @pytest.mark.parametrize("file", ARMS, ids=lambda path: path.stem)
-def test_a_session_takes_the_file_of_each_arm_and_leaves_the_bridge_its_own(
-    file: Path, tmp_path: Path
-) -> None:
+def test_a_session_takes_the_file_of_each_arm_and_leaves_the_bridge_its_own(file: Path, tmp_path: Path) -> None:
     text = file.read_text()
     robot = yaml.safe_load(text)["/**"]["ros__parameters"]["robot"]
     (tmp_path / "arm.yaml").write_text(re.sub(rf"{re.escape(robot)}.*", str(UR5E), text))

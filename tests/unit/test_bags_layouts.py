@@ -27,14 +27,10 @@ def names_of(kind: Kind) -> tuple[str, ...]:
     return topics.JAW if kind is Kind.JAW else JOINTS
 
 
-def rosbags_message(
-    kind: Kind, stamp_ns: int, values: Array, names: tuple[str, ...], frame_id: str
-) -> object:
+def rosbags_message(kind: Kind, stamp_ns: int, values: Array, names: tuple[str, ...], frame_id: str) -> object:
     """The same message made by rosbags."""
     t = ros_types.typestore().types
-    header = t["std_msgs/msg/Header"](
-        t["builtin_interfaces/msg/Time"](*divmod(stamp_ns, 10**9)), frame_id
-    )
+    header = t["std_msgs/msg/Header"](t["builtin_interfaces/msg/Time"](*divmod(stamp_ns, 10**9)), frame_id)
     point, turn, vector = (t[f"geometry_msgs/msg/{n}"] for n in ("Point", "Quaternion", "Vector3"))
     v, kind_type = values.tolist(), t[kind.ros_type]
     if kind is Kind.POSE:
@@ -65,9 +61,7 @@ def streams(draw: st.DrawFn) -> tuple[Layout, NDArray[np.int64], Array]:
 
 @settings(deadline=None)
 @given(streams())
-def test_bytes_are_those_that_rosbags_writes(
-    stream: tuple[Layout, NDArray[np.int64], Array],
-) -> None:
+def test_bytes_are_those_that_rosbags_writes(stream: tuple[Layout, NDArray[np.int64], Array]) -> None:
     form, stamps, values = stream
     for row, stamp, numbers in zip(form.encode(stamps, values), stamps, values, strict=True):
         message = rosbags_message(form.kind, int(stamp), numbers, form.joint_names, form.frame_id)
@@ -76,9 +70,7 @@ def test_bytes_are_those_that_rosbags_writes(
 
 @settings(deadline=None)
 @given(streams())
-def test_decoding_gives_back_what_was_encoded(
-    stream: tuple[Layout, NDArray[np.int64], Array],
-) -> None:
+def test_decoding_gives_back_what_was_encoded(stream: tuple[Layout, NDArray[np.int64], Array]) -> None:
     form, stamps, values = stream
     rows = form.encode(stamps, values)
     assert form.matches(rows)
@@ -89,9 +81,7 @@ def test_decoding_gives_back_what_was_encoded(
 
 @settings(deadline=None)
 @given(streams())
-def test_single_messages_have_the_bytes_of_the_batch(
-    stream: tuple[Layout, NDArray[np.int64], Array],
-) -> None:
+def test_single_messages_have_the_bytes_of_the_batch(stream: tuple[Layout, NDArray[np.int64], Array]) -> None:
     form, stamps, values = stream
     for row, stamp, numbers in zip(form.encode(stamps, values), stamps, values, strict=True):
         data = form.encode_one(int(stamp), numbers)
@@ -104,18 +94,14 @@ def test_single_messages_have_the_bytes_of_the_batch(
 
 @settings(deadline=None)
 @given(streams())
-def test_a_stream_is_recognised_by_its_first_message(
-    stream: tuple[Layout, NDArray[np.int64], Array],
-) -> None:
+def test_a_stream_is_recognised_by_its_first_message(stream: tuple[Layout, NDArray[np.int64], Array]) -> None:
     form, stamps, values = stream
     assert discover(form.kind, form.encode_one(int(stamps[0]), values[0])) is form
 
 
 @settings(deadline=None)
 @given(streams())
-def test_reading_by_attribute_agrees_with_reading_bytes(
-    stream: tuple[Layout, NDArray[np.int64], Array],
-) -> None:
+def test_reading_by_attribute_agrees_with_reading_bytes(stream: tuple[Layout, NDArray[np.int64], Array]) -> None:
     form, stamps, values = stream
     data = form.encode_one(int(stamps[0]), values[0])
     message = ros_types.deserialise(data, form.kind.ros_type)

@@ -8,15 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from teleop_core.bags.messages import (
-    Refusal,
-    Report,
-    check,
-    read_reports,
-    read_values,
-    report,
-    write_values,
-)
+from teleop_core.bags.messages import Refusal, Report, check, read_reports, read_values, report, write_values
 from teleop_core.base.texts import printable
 from teleop_core.graph.topics import Kind
 
@@ -51,9 +43,7 @@ def joint_state(
 def test_reading_gives_back_what_was_written(kind: Any) -> None:
     names = ("jaw",) if kind is Kind.JAW else ("a", "b")
     values = np.arange(1.0, 1.0 + kind.width(2))
-    message = write_values(
-        kind, empty_message(kind), 3_000_000_004, values, frame_id="f", joint_names=names
-    )
+    message = write_values(kind, empty_message(kind), 3_000_000_004, values, frame_id="f", joint_names=names)
     assert (message.header.stamp.sec, message.header.stamp.nanosec) == (3, 4)
     assert message.header.frame_id == "f"
     taken = read_values(kind, message, names)
@@ -84,11 +74,7 @@ def test_a_missing_joint_is_refused() -> None:
 
 @pytest.mark.parametrize(
     "message",
-    [
-        joint_state(("a", "b"), (1.0,)),
-        joint_state(("a", "b"), (1.0, 2.0), (1.0,)),
-        joint_state(("a", "b"), ()),
-    ],
+    [joint_state(("a", "b"), (1.0,)), joint_state(("a", "b"), (1.0, 2.0), (1.0,)), joint_state(("a", "b"), ())],
 )
 def test_joint_vectors_of_another_length_are_refused(message: Record) -> None:
     assert read_values(Kind.STATE, message, ("a", "b")) is Refusal.WRONG_LENGTH
@@ -119,12 +105,9 @@ def test_opposite_infinities_do_not_cancel() -> None:
 
 
 @pytest.mark.parametrize(
-    ("norm", "reason"),
-    [(1.0009, None), (0.9991, None), (1.0011, Refusal.NOT_UNIT), (0.0, Refusal.NOT_UNIT)],
+    ("norm", "reason"), [(1.0009, None), (0.9991, None), (1.0011, Refusal.NOT_UNIT), (0.0, Refusal.NOT_UNIT)]
 )
-def test_quaternions_off_unit_length_by_more_than_a_thousandth_are_refused(
-    norm: float, reason: Refusal | None
-) -> None:
+def test_quaternions_off_unit_length_by_more_than_a_thousandth_are_refused(norm: float, reason: Refusal | None) -> None:
     values = POSE.copy()
     values[3:] = norm * np.array([0.5, 0.5, -0.5, 0.5])
     assert check(Kind.POSE, 5, values, None) is reason
@@ -140,9 +123,7 @@ TEXT = st.text(st.characters(codec="utf-8", exclude_characters="\0")).map(printa
 
 
 @settings(deadline=None)
-@given(
-    st.integers(0, 2**31 * 10**9 - 1), TEXT, st.integers(0, 3), TEXT, st.dictionaries(TEXT, TEXT)
-)
+@given(st.integers(0, 2**31 * 10**9 - 1), TEXT, st.integers(0, 3), TEXT, st.dictionaries(TEXT, TEXT))
 def test_a_report_says_when_read_what_it_was_given(
     stamp_ns: int, name: str, level: int, message: str, values: dict[str, str]
 ) -> None:

@@ -41,19 +41,13 @@ def ours(path: Path, parts: int = 3, **options: Any) -> Path:
     stamps, values = samples()
     with BagWriter(path, topics.ALL, JOINTS, **options) as writer:
         for part in np.array_split(np.arange(len(stamps)), parts):
-            writer.write_block(
-                {t: (stamps[part], v[part], stamps[part]) for t, v in values.items()}
-            )
+            writer.write_block({t: (stamps[part], v[part], stamps[part]) for t, v in values.items()})
         writer.write(topics.TELEOP_STATE, 9, report(8, "scaling", 1, "fine", {"mode": "fine"}))
     return path
 
 
 def foreign(
-    path: Path,
-    *,
-    frame_id: str | None = None,
-    joint_names: tuple[str, str, str] = JOINTS,
-    **options: Any,
+    path: Path, *, frame_id: str | None = None, joint_names: tuple[str, str, str] = JOINTS, **options: Any
 ) -> Path:
     """A file that the mcap library wrote."""
     stamps, values = samples()
@@ -106,12 +100,15 @@ FOREIGN = {
     "no message index": {"index_types": IndexType.CHUNK, "chunk_size": 2000},
     "no index": {"index_types": IndexType.NONE, "chunk_size": 2000},
     "no summary": {
-        "index_types": IndexType.NONE, "use_statistics": False, "use_summary_offsets": False,
-        "repeat_channels": False, "repeat_schemas": False,
+        "index_types": IndexType.NONE,
+        "use_statistics": False,
+        "use_summary_offsets": False,
+        "repeat_channels": False,
+        "repeat_schemas": False,
     },
     "other frame": {"frame_id": "somewhere_else"},
     "other joint order": {"joint_names": ("c", "a", "b")},
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("options", FOREIGN.values(), ids=FOREIGN)
@@ -283,11 +280,7 @@ def test_a_recording_without_messages_is_refused(tmp_path: Path) -> None:
         ("just text", "damaged"),
         ("rosbag2_bagfile_information: {version: 9}", "damaged"),
         ("rosbag2_bagfile_information: {relative_file_paths: [gone.mcap]}", "gone.mcap"),
-        (
-            "rosbag2_bagfile_information: {relative_file_paths: [bag_0.mcap], "
-            "compression_mode: MESSAGE}",
-            "by 'message'",
-        ),
+        ("rosbag2_bagfile_information: {relative_file_paths: [bag_0.mcap], compression_mode: MESSAGE}", "by 'message'"),
     ],
 )
 def test_a_wrong_metadata_file_is_refused(tmp_path: Path, text: str, expected: str) -> None:
@@ -393,9 +386,7 @@ def test_recovery_reads_files_of_other_writers_without_an_end(tmp_path: Path) ->
     assert count == sum(info.count for info in bag.topics.values()) > 60
     _, values = samples()
     series = bag.read(topics.SLAVE_MEASURED_CP)
-    np.testing.assert_array_equal(
-        series.values, values[topics.SLAVE_MEASURED_CP][: len(series.stamp_ns)]
-    )
+    np.testing.assert_array_equal(series.values, values[topics.SLAVE_MEASURED_CP][: len(series.stamp_ns)])
 
 
 def test_recovery_never_overwrites(tmp_path: Path) -> None:

@@ -57,9 +57,7 @@ def block(
     }
 
 
-def record(
-    path: Path, rng: np.random.Generator, blocks: int = 3, count: int = 50, **options: Any
-) -> dict[str, int]:
+def record(path: Path, rng: np.random.Generator, blocks: int = 3, count: int = 50, **options: Any) -> dict[str, int]:
     with BagWriter(path, topics.ALL, JOINTS, **options) as writer:
         for number in range(blocks):
             begin = number * count
@@ -74,9 +72,7 @@ def mcap_file(path: Path) -> Path:
 
 
 @EVERY_COMPRESSION
-def test_rosbags_reads_every_value_that_was_written(
-    tmp_path: Path, rng: np.random.Generator, compression: str
-) -> None:
+def test_rosbags_reads_every_value_that_was_written(tmp_path: Path, rng: np.random.Generator, compression: str) -> None:
     written = block(rng, 5, 40)
     with BagWriter(tmp_path / "bag", topics.ALL, JOINTS, compression=compression) as writer:
         writer.write_block(written)
@@ -92,9 +88,7 @@ def test_rosbags_reads_every_value_that_was_written(
         assert found[topic.name] == [(t, r.tobytes()) for t, r in zip(logs, rows, strict=True)]
 
 
-def test_messages_of_one_time_stand_in_the_order_of_their_topics(
-    tmp_path: Path, rng: np.random.Generator
-) -> None:
+def test_messages_of_one_time_stand_in_the_order_of_their_topics(tmp_path: Path, rng: np.random.Generator) -> None:
     with BagWriter(tmp_path / "bag", topics.ALL, JOINTS) as writer:
         writer.write_block(block(rng, 0, 1000))
     order = [topic.name for topic in topics.STREAMS]
@@ -119,11 +113,7 @@ def test_messages_of_one_time_stand_in_the_order_of_their_topics(
     at=st.lists(st.integers(0, 6), max_size=4),
 )
 def test_streams_out_of_step_stand_at_their_times_among_the_others(
-    tmp_path_factory: pytest.TempPathFactory,
-    begin_ns: int,
-    missing: list[set[int]],
-    late: int,
-    at: list[int],
+    tmp_path_factory: pytest.TempPathFactory, begin_ns: int, missing: list[set[int]], late: int, at: list[int]
 ) -> None:
     path, rng = tmp_path_factory.mktemp("steps") / "bag", np.random.default_rng(5)
     chosen, expected = topics.STREAMS[:4], []
@@ -241,9 +231,7 @@ def test_the_same_calls_give_the_same_bytes(tmp_path: Path, compression: str) ->
     assert len(digests) == 1
 
 
-def test_arrays_may_be_reused_as_soon_as_a_block_is_written(
-    tmp_path: Path, rng: np.random.Generator
-) -> None:
+def test_arrays_may_be_reused_as_soon_as_a_block_is_written(tmp_path: Path, rng: np.random.Generator) -> None:
     samples = block(rng, 0, 20, [topics.SLAVE_MEASURED_CP])
     stamps, values, logs = samples[topics.SLAVE_MEASURED_CP]
     expected = values.copy()
@@ -254,11 +242,7 @@ def test_arrays_may_be_reused_as_soon_as_a_block_is_written(
 
 
 @settings(max_examples=20, deadline=None)
-@given(
-    every=st.integers(1, 7),
-    of=st.integers(1, 7),
-    sizes=st.lists(st.integers(0, 30), min_size=1, max_size=5),
-)
+@given(every=st.integers(1, 7), of=st.integers(1, 7), sizes=st.lists(st.integers(0, 30), min_size=1, max_size=5))
 def test_every_nth_sample_is_recorded_whatever_the_blocks(
     tmp_path_factory: pytest.TempPathFactory, every: int, of: int, sizes: list[int]
 ) -> None:
@@ -298,9 +282,7 @@ def test_only_chosen_topics_are_recorded(tmp_path: Path, rng: np.random.Generato
 
 
 @pytest.mark.parametrize("values", [{"topics": ("slave/measured",)}, {"every_of": ("slave=2",)}])
-def test_topics_that_nobody_announced_are_refused_and_leave_no_folder(
-    tmp_path: Path, values: dict[str, Any]
-) -> None:
+def test_topics_that_nobody_announced_are_refused_and_leave_no_folder(tmp_path: Path, values: dict[str, Any]) -> None:
     parameters = RecordingParameters(**values)
     with pytest.raises(UnknownNameError, match=r"one of: .*slave/\w+, "):
         BagWriter(tmp_path / "bag", topics.ALL, JOINTS, parameters=parameters)
@@ -325,9 +307,7 @@ def test_recording_parameters_out_of_range_are_refused(
         RecordingParameters(**values)
 
 
-def test_an_existing_recording_is_never_overwritten(
-    tmp_path: Path, rng: np.random.Generator
-) -> None:
+def test_an_existing_recording_is_never_overwritten(tmp_path: Path, rng: np.random.Generator) -> None:
     record(tmp_path / "bag", rng)
     before = mcap_file(tmp_path / "bag").read_bytes()
     with pytest.raises(RecordingError, match="choose another --out") as caught:
@@ -343,9 +323,7 @@ def test_a_place_that_cannot_be_written_is_named(tmp_path: Path) -> None:
     assert caught.value.path == tmp_path / "file" / "bag"
 
 
-def test_a_recording_is_finished_when_the_session_fails(
-    tmp_path: Path, rng: np.random.Generator
-) -> None:
+def test_a_recording_is_finished_when_the_session_fails(tmp_path: Path, rng: np.random.Generator) -> None:
     def fail() -> None:
         with BagWriter(tmp_path / "bag", topics.ALL, JOINTS) as writer:
             writer.write_block(block(rng, 0, 10))
@@ -359,9 +337,7 @@ def test_a_recording_is_finished_when_the_session_fails(
     assert bag.reports("diagnostics")[0].message == "broken"
 
 
-def test_a_recording_in_progress_does_not_look_complete(
-    tmp_path: Path, rng: np.random.Generator
-) -> None:
+def test_a_recording_in_progress_does_not_look_complete(tmp_path: Path, rng: np.random.Generator) -> None:
     with BagWriter(tmp_path / "bag", topics.ALL, JOINTS) as writer:
         writer.write_block(block(rng, 0, 10))
         assert not (tmp_path / "bag" / "metadata.yaml").exists()

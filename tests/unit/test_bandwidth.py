@@ -102,9 +102,7 @@ def test_the_mean_wait_is_that_of_the_queue_with_random_arrivals_and_equal_servi
 
 @pytest.mark.parametrize("order", ["newest", "kept"])
 @pytest.mark.parametrize("queue", [1, 20])
-def test_more_than_the_line_carries_is_lost_and_the_rest_as_old_as_the_queue_is_long(
-    order: str, queue: int
-) -> None:
+def test_more_than_the_line_carries_is_lost_and_the_rest_as_old_as_the_queue_is_long(order: str, queue: int) -> None:
     service, ticks = 2.5, 8000
     network = line(service, there__packet_order=order, there__queue=queue)
     came = arrivals(network, range(2, ticks), ticks)
@@ -152,8 +150,12 @@ def test_a_packet_that_waits_keeps_its_own_values_and_increments_add_up() -> Non
 
 
 def test_a_session_over_a_narrow_line_scores_its_losses_and_repeats_to_the_bit() -> None:
-    given = ["teleop.stages=[network]", "slave.starts_at_home=true",
-             f"network.there.bandwidth={500 * BITS}", "network.there.queue=1"]  # fmt: skip
+    given = [
+        "teleop.stages=[network]",
+        "slave.starts_at_home=true",
+        f"network.there.bandwidth={500 * BITS}",
+        "network.there.queue=1",
+    ]
     rows = VirtualTime(configure("free_motion", settings=given)).run(6000)
     state = rows["network_state"][-1]
     assert state[1] / state[0] == pytest.approx(0.5, abs=0.01)

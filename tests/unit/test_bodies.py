@@ -16,14 +16,16 @@ from teleop_core.robots.kinematics import FkStatus
 from teleop_machines.mma_models import frames, joints_of_model, loop_closure, model_table
 
 TABLE = {
-    "name": "own", "convention": "modified", "angles": "degrees",
+    "name": "own",
+    "convention": "modified",
+    "angles": "degrees",
     "rows": [
         {"theta": "q", "lower": -150, "upper": 150},
         {"a": 0.4, "alpha": 30, "theta": "q", "lower": -120, "upper": 120, "home": 60},
         {"a": 0.3, "alpha": -90, "d": "q", "lower": -0.1, "upper": 0.1},
     ],
     "task": ["x", "y", "z"],
-}  # fmt: skip
+}
 SERIAL = ("rcrt1", "puma560", "scara", "planar_3r", "five_axis")
 OFF = np.array([0.2, 0.1, 0.5, -0.3, 0.4, 0.2, 0.1])
 ROUNDING = 1e-12  # m and of rotation matrices, on robots of about a metre
@@ -137,8 +139,7 @@ def test_coupler_and_rocker_of_a_four_bar_end_in_one_point(mode: float) -> None:
     for theta in np.linspace(-3.0, 3.0, 13):
         poses = bodies.poses([theta])
         coupler, rocker = (
-            end_of(bodies.bodies[i].solids[1], poses[i], 1.0)
-            for i in (bodies.index("coupler"), bodies.index("rocker"))
+            end_of(bodies.bodies[i].solids[1], poses[i], 1.0) for i in (bodies.index("coupler"), bodies.index("rocker"))
         )
         assert coupler == pytest.approx(rocker, abs=LOOPS_CLOSE)
 
@@ -157,11 +158,13 @@ def test_a_parallelogram_keeps_its_coupler_parallel_to_the_ground() -> None:
 @pytest.mark.parametrize(
     ("name", "geometry"),
     [
-        ("stewart", {}), ("rps3", {}), ("scara_stewart", {}),
+        ("stewart", {}),
+        ("rps3", {}),
+        ("scara_stewart", {}),
         ("scara_stewart", {"heading": "carried"}),
         ("scara_stewart", {"sigma_b": 0.2, "sigma_m": 0.2}),
     ],
-)  # fmt: skip
+)
 def test_legs_are_as_long_as_their_joints_say(name: str, geometry: dict[str, float | str]) -> None:
     robot = tc.load_robot(name, **geometry)
     bodies = bodies_of(robot)

@@ -101,9 +101,7 @@ def test_a_kernel_that_only_looks_at_arrays_counts_no_holders() -> None:
 
 
 @pytest.mark.parametrize("function", [looks, makes, adds, picks, hands_on, gives])
-def test_calls_leave_their_arguments_with_the_holders_that_they_had(
-    function: Callable[[Arm], object],
-) -> None:
+def test_calls_leave_their_arguments_with_the_holders_that_they_had(function: Callable[[Arm], object]) -> None:
     own = arm()
     function(own)
     before = [sys.getrefcount(array) for array in own]

@@ -38,9 +38,7 @@ def press(
 
 
 @pytest.mark.parametrize("damping", [0.0, 5.0])
-def test_a_press_rises_to_the_click_force_falls_to_the_contact_force_and_meets_the_stop(
-    damping: float,
-) -> None:
+def test_a_press_rises_to_the_click_force_falls_to_the_contact_force_and_meets_the_stop(damping: float) -> None:
     button = ButtonParameters(click_force=1.5, contact_force=0.5, click_travel=1e-3, stroke=4e-3)
     depth, push, _, _ = press(2e-3, -3.99e-3, button=button, damping=damping)
     wanted = np.interp(depth, (0.0, 1e-3, 4e-3), (0.0, 1.5, 0.5))
@@ -102,11 +100,16 @@ def test_the_push_is_that_of_the_spring_at_least_and_with_the_stop_at_most(dampi
 
 @settings(max_examples=60, deadline=None, derandomize=True)
 @given(
-    seed=st.integers(0, 10_000), stiffness=st.floats(100.0, 50_000.0),
-    damping=st.floats(0.0, 3.0), friction=st.sampled_from([0.0, 0.4]),
-    click=st.floats(0.05, 10.0), contact=st.floats(0.0, 1.0), travel=st.floats(3e-4, 5e-3),
-    more=st.floats(3e-4, 5e-3), hysteresis=st.floats(0.0, 1.0),
-)  # fmt: skip
+    seed=st.integers(0, 10_000),
+    stiffness=st.floats(100.0, 50_000.0),
+    damping=st.floats(0.0, 3.0),
+    friction=st.sampled_from([0.0, 0.4]),
+    click=st.floats(0.05, 10.0),
+    contact=st.floats(0.0, 1.0),
+    travel=st.floats(3e-4, 5e-3),
+    more=st.floats(3e-4, 5e-3),
+    hysteresis=st.floats(0.0, 1.0),
+)
 def test_no_motion_gets_energy_from_a_button(
     seed: int,
     stiffness: float,
@@ -120,13 +123,16 @@ def test_no_motion_gets_energy_from_a_button(
 ) -> None:
     """In no tick: what it gave grows by what is stored, or more."""
     button = ButtonParameters(
-        click_force=click, contact_force=contact * click, click_travel=travel,
-        stroke=travel + more, hysteresis=hysteresis, radius=0.1, length=0.03,
-    )  # fmt: skip
-    way = wandering(seed)
-    _, _, lost, _ = press(
-        way=way, button=button, world_stiffness=stiffness, damping=damping, world_friction=friction
+        click_force=click,
+        contact_force=contact * click,
+        click_travel=travel,
+        stroke=travel + more,
+        hysteresis=hysteresis,
+        radius=0.1,
+        length=0.03,
     )
+    way = wandering(seed)
+    _, _, lost, _ = press(way=way, button=button, world_stiffness=stiffness, damping=damping, world_friction=friction)
     # Where the force has a corner, the sum over the pieces of a tick errs by as much.
     piece = np.abs(np.diff(way, axis=0)).max() / PIECES
     steepest = stiffness + 11.0 * click / min(travel, more)
@@ -160,11 +166,13 @@ def test_its_outline_lies_on_the_post_and_on_the_stop() -> None:
 @pytest.mark.parametrize(
     ("texts", "name"),
     [
-        (["world.button.stroke=0.002"], "stroke"), (["world.button.stroke=0.02"], "stroke"),
+        (["world.button.stroke=0.002"], "stroke"),
+        (["world.button.stroke=0.02"], "stroke"),
         (["world.button.contact_force=1.1"], "contact_force"),
-        (["world.button.hysteresis=1.1"], "hysteresis"), (["world.puncture_force=1.0"], "puncture"),
+        (["world.button.hysteresis=1.1"], "hysteresis"),
+        (["world.puncture_force=1.0"], "puncture"),
     ],
-)  # fmt: skip
+)
 def test_numbers_that_no_button_has_are_refused_by_name(texts: list[str], name: str) -> None:
     with pytest.raises(ParameterError, match=name) as error:
         configure("palpation", settings=["world=button", *texts])

@@ -50,9 +50,7 @@ def kernel_tips(robot: Robot, errors: LinkErrors, q: Array) -> Array:
     return np.array(out)
 
 
-def measured_at(
-    robot: Robot, errors: LinkErrors, count: int, rng: np.random.Generator, noise: float = 0.0
-) -> Measured:
+def measured_at(robot: Robot, errors: LinkErrors, count: int, rng: np.random.Generator, noise: float = 0.0) -> Measured:
     model = Model.of(robot)
     return tracked(model, errors, random_poses(robot, count, rng), noise, rng)
 
@@ -145,11 +143,7 @@ def test_a_frame_that_nobody_knows_costs_no_accuracy(is_elsewhere: bool) -> None
 
 
 def test_intervals_hold_the_truth_as_often_as_they_say() -> None:
-    names, rng, model = (
-        ["d3", "theta1", "theta2", "theta5"],
-        np.random.default_rng(8),
-        Model.of(RCRT1),
-    )
+    names, rng, model = (["d3", "theta1", "theta2", "theta5"], np.random.default_rng(8), Model.of(RCRT1))
     errors, inside, trials = LinkErrors.of(RCRT1, {"d3": 1e-3, "theta2": 1e-3}), 0, 250
     true = errors.vector[[model.names.index(name) for name in names]]
     q = random_poses(RCRT1, 12, rng)
@@ -176,10 +170,7 @@ def test_more_poses_make_intervals_narrower_by_the_root() -> None:
 
 def test_what_cannot_be_told_apart_is_named_with_what_it_acts_as() -> None:
     measured = measured_at(RCRT1, LinkErrors.none(6), 60, np.random.default_rng(10))
-    left = {
-        entry.name: entry.reason
-        for entry in identify(Model.of(RCRT1), measured, keeps_all=True).left
-    }
+    left = {entry.name: entry.reason for entry in identify(Model.of(RCRT1), measured, keeps_all=True).left}
     # On the tool's axis lies the tip: its turn does nothing. Slides along one axis are one, as
     # are turns about it; links 2 and 3 have parallel x axes.
     assert left["theta6"] == left["alpha6"] == "does not change what is measured"
@@ -216,9 +207,7 @@ def test_an_arm_that_is_as_drawn_is_said_to_be() -> None:
     assert not nothing.found.names
     assert nothing.fitted.before == nothing.fitted.after
     assert "as drawn" in str(nothing)
-    assert robot_from_table(nothing.table()).fk(RCRT1.home) == pytest.approx(
-        RCRT1.fk(RCRT1.home), abs=1e-15
-    )
+    assert robot_from_table(nothing.table()).fk(RCRT1.home) == pytest.approx(RCRT1.fk(RCRT1.home), abs=1e-15)
 
 
 # Published measurements.
@@ -254,9 +243,7 @@ def test_the_offset_of_d3_is_found_with_a_ruler_and_with_a_tracker(seed: int) ->
         found = made.found.errors.named()
         assert found["d3"] == pytest.approx(made.equivalent["d3"], abs=bound)
         assert made.equivalent["d3"] == pytest.approx(5.5e-3, abs=0.1e-3)
-        before, after = (
-            s["total"].rms for s in (present(made.tried).before, present(made.tried).after)
-        )
+        before, after = (s["total"].rms for s in (present(made.tried).before, present(made.tried).after))
         assert before == pytest.approx(5.5e-3, rel=0.02)
         assert after < 0.4e-3
         assert noise == "ruler" or after < 0.1e-3
@@ -296,13 +283,10 @@ def test_chosen_poses_tell_more_than_random_ones(name: str) -> None:
     robot = load_robot(name)
     model, worth = Model.of(robot), {}
     rng = np.random.default_rng(13)
-    names = identify(
-        model, measured_at(robot, LinkErrors.none(robot.n), 60, rng, 1e-5), keeps_all=True
-    ).names
+    names = identify(model, measured_at(robot, LinkErrors.none(robot.n), 60, rng, 1e-5), keeps_all=True).names
     at = [model.names.index(entry) for entry in names]
     zero = np.zeros(len(model.names))
-    for how, q in (("best", optimal_poses(model, 15, names, rng)),
-                   ("any", random_poses(robot, 15, rng))):  # fmt: skip
+    for how, q in (("best", optimal_poses(model, 15, names, rng)), ("any", random_poses(robot, 15, rng))):
         J = model.jacobian(q, zero)[:, :, at].reshape(-1, len(at))
         worth[how] = np.linalg.slogdet(J.T @ J)[1]
     # By the k-th root of determinants: random ones would have to be a seventh more.
@@ -347,10 +331,7 @@ def test_numbers_of_json_are_those_of_the_table() -> None:
     calibration = simulate(RCRT1, poses=20)
     numbers = json.loads(json.dumps(calibration.to_json(), allow_nan=False))
     assert numbers["found"]["d3"]["value"] == calibration.found.errors.d[2]
-    assert (
-        numbers["accuracy"][1]["after"]["total"]["rms"]
-        == present(calibration.tried).after["total"].rms
-    )
+    assert numbers["accuracy"][1]["after"]["total"]["rms"] == present(calibration.tried).after["total"].rms
     assert f"{1e3 * calibration.found.errors.d[2]:.4f}" in str(calibration)
 
 

@@ -51,8 +51,7 @@ def load(tmp_path: Path) -> Any:
     """Robot of axes with limits [rad], the same for all joints or one pair for each."""
 
     def made(
-        axes: list[tuple[Array, Array]],
-        limits: Sequence[float | tuple[float, float]] = (-math.pi, math.pi),
+        axes: list[tuple[Array, Array]], limits: Sequence[float | tuple[float, float]] = (-math.pi, math.pi)
     ) -> Robot:
         pairs = limits if isinstance(limits, list) else [limits] * len(axes)
         path = tmp_path / "arm.urdf"
@@ -92,9 +91,7 @@ def test_every_legal_pose_is_found_with_all_its_solutions(case: Case, load: Load
             branches = arm.ik_all(wanted)
             assert 1 <= len(branches) <= 8
             assert apart(joints, branches) < 1e-5
-            np.testing.assert_allclose(
-                arm.fk(branches), np.tile(wanted, (len(branches), 1, 1)), atol=1e-9
-            )
+            np.testing.assert_allclose(arm.fk(branches), np.tile(wanted, (len(branches), 1, 1)), atol=1e-9)
 
 
 TWO_ROUNDS = [WIDE, WIDE, (-1.0, 5.5), WIDE, (-6.0, 0.5), WIDE]
@@ -109,9 +106,7 @@ NEAREST = {
 
 
 @pytest.mark.parametrize("kind", NEAREST)
-def test_the_nearest_branch_inside_the_limits_answers_whole_turns_included(
-    kind: str, load: Load
-) -> None:
+def test_the_nearest_branch_inside_the_limits_answers_whole_turns_included(kind: str, load: Load) -> None:
     rng = np.random.default_rng(8)
     axes, limits = NEAREST[kind]
     arm = load(axes(rng), limits)
@@ -217,9 +212,7 @@ def test_rounded_files_are_recognised_and_solved_to_the_last_digit(load: Load) -
 
 
 @pytest.mark.parametrize("arm", ["m1013", "m0609", "ur5e", "irb120", "iiwa14"])
-def test_files_that_say_1_571_are_solved_in_closed_form_beside_the_seed(
-    arm: str, tmp_path: Path
-) -> None:
+def test_files_that_say_1_571_are_solved_in_closed_form_beside_the_seed(arm: str, tmp_path: Path) -> None:
     def rounded(found: "re.Match[str]") -> str:
         angles = (float(text) for text in found[1].split())
         off = rng.uniform(-2.5e-4, 2.5e-4, 3)
@@ -278,8 +271,7 @@ def test_narrow_limits_of_seven_axes_lose_no_reachable_pose(seed: int, load: Loa
     rng = np.random.default_rng(seed)
     for _ in range(4):
         middle, half = rng.uniform(-2.5, 2.5, 7), rng.uniform(0.05, 0.6, 7)
-        arm = load(swivel_axes(rng), list(zip((middle - half).tolist(), (middle + half).tolist(),
-                                              strict=True)))  # fmt: skip
+        arm = load(swivel_axes(rng), list(zip((middle - half).tolist(), (middle + half).tolist(), strict=True)))
         assert "swivel" in arm.solution
         q = rng.uniform(arm.lower, arm.upper, (300, 7))
         tips, seeds = arm.fk(q), np.clip(q + rng.normal(0.0, 0.02, q.shape), arm.lower, arm.upper)
@@ -290,27 +282,19 @@ def test_narrow_limits_of_seven_axes_lose_no_reachable_pose(seed: int, load: Loa
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_the_arcs_of_the_swivel_hold_a_legal_posture_without_any_search(
-    seed: int, load: Load
-) -> None:
+def test_the_arcs_of_the_swivel_hold_a_legal_posture_without_any_search(seed: int, load: Load) -> None:
     rng = np.random.default_rng(40 + seed)
     middle, half = rng.uniform(-2.5, 2.5, 7), rng.uniform(0.02, 0.5, 7)
-    arm = load(
-        swivel_axes(rng), [(float(m - h), float(m + h)) for m, h in zip(middle, half, strict=True)]
-    )
+    arm = load(swivel_axes(rng), [(float(m - h), float(m + h)) for m, h in zip(middle, half, strict=True)])
     found, work = np.empty((13, 8)), np.empty((60, 4))
     for q in rng.uniform(arm.lower, arm.upper, (100, 7)):
-        count, _ = swivel._branches(
-            arm.fk(q), arm.geometry_row, arm.home.copy(), arm.limits(), True, found, work
-        )
+        count, _ = swivel._branches(arm.fk(q), arm.geometry_row, arm.home.copy(), arm.limits(), True, found, work)
         off = (found[:count, :7] - middle + math.pi) % (2.0 * math.pi) - math.pi
         assert ((abs(off) <= half + 1e-9).all(axis=1) & (found[:count, 7] > 0.5)).any()
 
 
 @kernel
-def psi_of(
-    branch: Any, elbow: Any, seed: Array, limits: Array, geometry: Array, work: Array
-) -> float:
+def psi_of(branch: Any, elbow: Any, seed: Array, limits: Array, geometry: Array, work: Array) -> float:
     """Psi [rad] that is taken of a branch; infinity where none is legal."""
     S, W = work[16 + 20 * elbow : 25 + 20 * elbow], work[25 + 20 * elbow : 34 + 20 * elbow]
     K, arcs = geometry[constants_at(7) :], np.empty(ARCS)
@@ -320,14 +304,7 @@ def psi_of(
 
 @kernel
 def write_at(
-    branch: Any,
-    psi: Any,
-    elbow: Any,
-    seed: Array,
-    limits: Array,
-    geometry: Array,
-    work: Array,
-    q: Any,
+    branch: Any, psi: Any, elbow: Any, seed: Array, limits: Array, geometry: Array, work: Array, q: Any
 ) -> None:
     """Write the joints (8,) of a branch at psi [rad], by whole turns into limits if any are."""
     S, W = work[16 + 20 * elbow : 25 + 20 * elbow], work[25 + 20 * elbow : 34 + 20 * elbow]
@@ -339,11 +316,7 @@ def write_at(
 def test_no_legal_swivel_is_nearer_to_the_seed_than_the_answer_less_its_margin(load: Load) -> None:
     rng, scan, legal = np.random.default_rng(6), np.arange(-3.14, 3.14, 0.02), 0
     for _ in range(4):
-        arm, found, work = (
-            load(swivel_axes(rng), narrow(rng, 7)),
-            np.empty((13, 8)),
-            np.empty((60, 4)),
-        )
+        arm, found, work = (load(swivel_axes(rng), narrow(rng, 7)), np.empty((13, 8)), np.empty((60, 4)))
         limits, row, others = arm.limits(), arm.geometry_row, [0, 1, 2, 4, 5, 6]
         for q in rng.uniform(arm.lower, arm.upper, (15, 7)):
             seed = rng.uniform(arm.lower, arm.upper)
@@ -406,9 +379,7 @@ def least_manipulability(arm: Robot, joints: Array) -> float:
 
 
 @pytest.mark.parametrize(("flat", "beside"), [(1, 2), (5, 4)], ids=["shoulder", "wrist"])
-def test_slow_paths_past_a_singular_posture_keep_more_manipulability(
-    flat: int, beside: int, load: Load
-) -> None:
+def test_slow_paths_past_a_singular_posture_keep_more_manipulability(flat: int, beside: int, load: Load) -> None:
     arm, rng = load(IIWA14, IIWA14_LIMITS), np.random.default_rng(3)
     for _ in range(5):
         joints = past_singular(rng, flat, beside)
@@ -434,9 +405,7 @@ def test_far_from_singular_postures_the_least_move_alone_is_made(load: Load) -> 
 
 
 @pytest.mark.parametrize("beside", [0.0, 0.02, 0.1])
-def test_seven_axes_stay_in_the_branch_of_the_seed_and_give_up_the_margin_first(
-    beside: float, load: Load
-) -> None:
+def test_seven_axes_stay_in_the_branch_of_the_seed_and_give_up_the_margin_first(beside: float, load: Load) -> None:
     rng = np.random.default_rng(8)
     arms = [load(IIWA14, IIWA14_LIMITS), *(load(swivel_axes(rng), narrow(rng, 7)) for _ in "abc")]
     for arm in arms:

@@ -62,9 +62,7 @@ class Mechanism:
         frame = pinocchio.Frame("tip", body, tip or at(0, 0, 0), pinocchio.FrameType.OP_FRAME)
         self.tip_frame, self.motors, self.body = self.model.addFrame(frame), motors, body
         self.data, self.start = self.model.createData(), pinocchio.neutral(self.model)
-        self.pins = [
-            pinocchio.RigidConstraintModel(kind, self.model, *ends) for kind, *ends in self.pins
-        ]
+        self.pins = [pinocchio.RigidConstraintModel(kind, self.model, *ends) for kind, *ends in self.pins]
         self.pin_data = [pin.createData() for pin in self.pins]
         # Joint velocities per motor speed (nv, n); a joint may be geared to several motors.
         self.gears = np.zeros((self.model.nv, len(motors)))
@@ -102,10 +100,12 @@ class Mechanism:
         """Constraint Jacobian (3 k, nv)."""
         self.gaps(x)
         pinocchio.computeJointJacobians(self.model, self.data, x)
-        return np.vstack([
-            pinocchio.getConstraintJacobian(self.model, self.data, pin, data)
-            for pin, data in zip(self.pins, self.pin_data, strict=True)
-        ])  # fmt: skip
+        return np.vstack(
+            [
+                pinocchio.getConstraintJacobian(self.model, self.data, pin, data)
+                for pin, data in zip(self.pins, self.pin_data, strict=True)
+            ]
+        )
 
     def closed(self, x: Array, free: NDArray[np.int64] | None = None) -> Array:
         """Configuration next to x in which all pins hold; only free columns move."""
@@ -197,10 +197,7 @@ def hybrid(g: Mapping[str, float], heading: str) -> Any:
     sign, sixths = np.array([1.0, -1.0] * 3), math.pi / 3.0 * np.arange(6)
     base, platform = (
         r * np.stack((np.cos(angles), np.sin(angles), 0.0 * angles), axis=1)
-        for r, angles in (
-            (g["r_b"], sixths - sign * g["sigma_b"]),
-            (g["r_m"], sixths + sign * g["sigma_m"]),
-        )
+        for r, angles in ((g["r_b"], sixths - sign * g["sigma_b"]), (g["r_m"], sixths + sign * g["sigma_m"]))
     )
     slides = add_legs(drawn, drawn.ground, body, base, platform)
     drawn.finish([*arm, *slides], body, at(0, 0, g["e_eff"]))
@@ -511,9 +508,7 @@ def test_parallelogram_is_the_four_bar_whose_coupler_does_not_turn(theta: float)
 
 
 @pytest.mark.parametrize("theta", [0.0, math.pi])
-def test_where_all_links_are_in_line_the_parallelogram_takes_one_of_two_motions(
-    theta: float,
-) -> None:
+def test_where_all_links_are_in_line_the_parallelogram_takes_one_of_two_motions(theta: float) -> None:
     robot, drawn, x = parallelogram(theta)
     assert drawn.freedoms(x) == 2
     parallel = np.array([[1.0], [-1.0], [1.0]])

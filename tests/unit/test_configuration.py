@@ -40,17 +40,12 @@ def test_text_of_a_configuration_reads_back_the_same(name: str) -> None:
 
 
 def test_setting_with_its_stage_sets_that_parameter_alone() -> None:
-    assert layers.parse_setting("haptic_master.hand.stiffness=250") == {
-        "haptic_master": {"hand.stiffness": 250.0}
-    }
+    assert layers.parse_setting("haptic_master.hand.stiffness=250") == {"haptic_master": {"hand.stiffness": 250.0}}
 
 
 def test_bare_key_sets_every_stage_that_has_it() -> None:
     layer = layers.parse_setting("robot=mma")
-    assert layer == {
-        name: {"robot": "mma"}
-        for name in ("inverse_kinematics", "slave", "slave_sim", "arm_bridge")
-    }
+    assert layer == {name: {"robot": "mma"} for name in ("inverse_kinematics", "slave", "slave_sim", "arm_bridge")}
     assert layers.parse_setting("seed=5") == {
         name: {"seed": 5} for name in ("operator", "haptic_master", "network", "slave_sim")
     }
@@ -123,9 +118,7 @@ def test_setting_whose_value_is_no_yaml_is_refused() -> None:
         ("fine_gain=11", "motion_scaling.fine_gain"),
     ],
 )
-def test_setting_that_breaks_its_declaration_is_refused_by_full_name(
-    setting: str, name: str
-) -> None:
+def test_setting_that_breaks_its_declaration_is_refused_by_full_name(setting: str, name: str) -> None:
     with pytest.raises(ParameterError) as error:
         configure(settings=[setting])
     assert error.value.name == name
@@ -180,9 +173,7 @@ def test_what_operator_and_device_both_know_is_said_of_one_of_them(stage: str) -
         ("a: [", "YAML"),
     ],
 )
-def test_file_of_another_shape_is_refused_with_its_name(
-    tmp_path: Path, text: str, says: str
-) -> None:
+def test_file_of_another_shape_is_refused_with_its_name(tmp_path: Path, text: str, says: str) -> None:
     path = tmp_path / "mine.yaml"
     path.write_text(text)
     with pytest.raises(TeleopError, match=says) as error:
@@ -204,9 +195,7 @@ def test_unknown_name_in_a_file_is_refused_with_its_stage(tmp_path: Path) -> Non
     assert "command_timeout" in error.value.alternatives
 
 
-def test_what_stands_under_every_node_holds_for_those_that_have_it_and_say_nothing_else(
-    tmp_path: Path,
-) -> None:
+def test_what_stands_under_every_node_holds_for_those_that_have_it_and_say_nothing_else(tmp_path: Path) -> None:
     own = {"slave": {"ros__parameters": {"robot": "mma"}}}
     every = {"/**": {"ros__parameters": {"robot": "puma560", "command_timeout": 0.3}}}
     layer = layers.load_file(write(tmp_path / "mine.yaml", own | every))

@@ -10,8 +10,7 @@ from teleop_console.drivers import PATIENCE, Drivers
 
 STEPS = st.lists(
     st.tuples(
-        st.sampled_from(("join", "leave", "take", "hold", "let_go", "heard", "expire", "wait")),
-        st.integers(0, 3),
+        st.sampled_from(("join", "leave", "take", "hold", "let_go", "heard", "expire", "wait")), st.integers(0, 3)
     ),
     max_size=60,
 )
@@ -36,9 +35,7 @@ def pages(count: int, clock: Clock | None = None) -> tuple[Drivers, list[object]
 
 
 @given(STEPS)
-def test_never_does_more_than_one_page_drive_nor_one_that_is_closed(
-    steps: list[tuple[str, int]],
-) -> None:
+def test_never_does_more_than_one_page_drive_nor_one_that_is_closed(steps: list[tuple[str, int]]) -> None:
     clock = Clock()
     told: list[Any]
     drivers, told = Drivers(clock=clock), []
@@ -65,9 +62,7 @@ def test_first_page_drives_and_the_second_watches_until_it_takes_control() -> No
     assert changes == [1]
 
 
-def test_nobody_gets_control_unasked_when_the_driver_leaves_but_a_page_that_is_loaded_anew() -> (
-    None
-):
+def test_nobody_gets_control_unasked_when_the_driver_leaves_but_a_page_that_is_loaded_anew() -> None:
     drivers, changes = pages(2)
     drivers.leave(0)
     assert drivers.driver is None

@@ -86,9 +86,7 @@ def test_live_figures_are_those_of_all_samples_at_even_times() -> None:
 
 
 @pytest.mark.parametrize(("gap", "counted"), [(0.9, 0.9), (2.0, 0.0)])
-def test_a_second_that_the_page_did_not_see_is_not_counted_as_followed(
-    gap: float, counted: float
-) -> None:
+def test_a_second_that_the_page_did_not_see_is_not_counted_as_followed(gap: float, counted: float) -> None:
     scores = LiveScores()
     for time in (0.0, gap):
         scores.add(time, seen((1, 0, 0), (0, 0, 0)))

@@ -65,9 +65,7 @@ def test_texts_stand_out_from_their_ground(name: str, ground: str) -> None:
 def test_colors_of_the_page_stand_in_one_table() -> None:
     for file in Path(teleop_console.__path__[0]).glob("*.*"):
         if file.suffix in {".py", ".js"} and file.name != "look.py":
-            found = re.findall(
-                r"#[0-9a-fA-F]{6}\b|rgba?\(|\(\d{2,3}, \d{1,3}, \d{2,3}\)", file.read_text()
-            )
+            found = re.findall(r"#[0-9a-fA-F]{6}\b|rgba?\(|\(\d{2,3}, \d{1,3}, \d{2,3}\)", file.read_text())
             assert not found, file.name
 
 

@@ -42,8 +42,7 @@ def test_server_that_ends_while_others_come_in_leaves_no_connection_open() -> No
     for _ in range(4):
         with ConsoleServer(0) as server:
             came, ends = threading.Barrier(3), threading.Event()
-            guests = [threading.Thread(target=come_in, args=(server.port, came, ends))
-                      for _ in range(2)]  # fmt: skip
+            guests = [threading.Thread(target=come_in, args=(server.port, came, ends)) for _ in range(2)]
             for guest in guests:
                 guest.start()
             came.wait(30)
@@ -68,8 +67,9 @@ def test_owner_that_cannot_be_known_is_another_process() -> None:
     assert owner(free_port()) == "another process"
 
 
-@pytest.mark.parametrize(("host", "port"), [("127.0.0.1", 65536), ("127.0.0.1", -1),
-                                            ("192.0.2.1", 0), ("no such host", 0)])  # fmt: skip
+@pytest.mark.parametrize(
+    ("host", "port"), [("127.0.0.1", 65536), ("127.0.0.1", -1), ("192.0.2.1", 0), ("no such host", 0)]
+)
 def test_address_that_is_none_of_this_machine_is_a_wrong_value(host: str, port: int) -> None:
     with pytest.raises(ParameterError):
         listen(host, port)

@@ -63,9 +63,7 @@ def test_a_view_has_what_others_read_as_the_last_sample_by_that_time(
     joints = last(messages["slave/measured_js"], time_ns)
     told = [*joints.position, *joints.velocity, *joints.effort]
     assert seen.streams["slave/measured_js"].tolist() == told
-    state = {
-        pair.key: pair.value for pair in last(messages["teleop/state"], time_ns).status[0].values
-    }
+    state = {pair.key: pair.value for pair in last(messages["teleop/state"], time_ns).status[0].values}
     assert {name: float(state[name]) for name in seen.state} == seen.state
     assert seen.operation_text
 
@@ -73,10 +71,7 @@ def test_a_view_has_what_others_read_as_the_last_sample_by_that_time(
 @settings(max_examples=100, deadline=None)
 @given(
     steps=st.lists(
-        st.tuples(
-            st.sampled_from(("advance", "seek", "step", "play", "pause", "loop")),
-            st.floats(-2.0, 9.0),
-        ),
+        st.tuples(st.sampled_from(("advance", "seek", "step", "play", "pause", "loop")), st.floats(-2.0, 9.0)),
         max_size=30,
     )
 )
@@ -163,26 +158,21 @@ def test_a_recording_cannot_be_commanded(link: RecordedLink) -> None:
     assert not link.is_live
 
 
-def test_parameters_are_those_that_it_was_made_with(
-    session: tc.Recording, link: RecordedLink
-) -> None:
+def test_parameters_are_those_that_it_was_made_with(session: tc.Recording, link: RecordedLink) -> None:
     found = link.parameters()
     assert found["motion_scaling", "axes"].value == ("-z", "-x", "+y")
     assert found["slave_sim", "robot"].value == "rcrt1"
     assert all(info.is_fixed for info in found.values())
 
 
-def test_of_a_long_recording_one_of_some_samples_is_kept_and_memory_stays_bounded(
-    session: tc.Recording,
-) -> None:
+def test_of_a_long_recording_one_of_some_samples_is_kept_and_memory_stays_bounded(session: tc.Recording) -> None:
     bag = session.bag
     most = 300_000
     (arm,), thinning = recorded_arms(bag, configuration_of(bag), most)
     track = arm.tracks[SLAVE_MEASURED_CP.name]
     whole = session["slave/measured_cp"]
     assert thinning > 5
-    kept = sum(one.values.nbytes + one.log_ns.nbytes + one.stamp_ns.nbytes
-               for one in arm.tracks.values())  # fmt: skip
+    kept = sum(one.values.nbytes + one.log_ns.nbytes + one.stamp_ns.nbytes for one in arm.tracks.values())
     assert kept < 1.2 * most
     np.testing.assert_array_equal(track.values, whole.values[::thinning])
 
@@ -230,9 +220,7 @@ def test_a_path_that_is_none_is_refused(tmp_path: Path) -> None:
 
 
 def test_a_robot_that_is_named_by_the_recording_alone_is_enough(small: MemoryBag) -> None:
-    link = RecordedLink(
-        foreign(small, ("slave/servo_jp", "master/measured_cf"), {"robot": "rcrt1"})
-    )
+    link = RecordedLink(foreign(small, ("slave/servo_jp", "master/measured_cf"), {"robot": "rcrt1"}))
     seen = link.view().arms[""]
     assert "slave/measured_cp" in seen.streams
     assert "master/measured_cf" not in seen.streams
@@ -240,10 +228,7 @@ def test_a_robot_that_is_named_by_the_recording_alone_is_enough(small: MemoryBag
 
 
 def test_each_arm_of_two_is_seen_as_it_was(small: MemoryBag) -> None:
-    later = {
-        topic.of_arm("right"): replace(s, values=s.values[::-1])
-        for topic, s in small.streams.items()
-    }
+    later = {topic.of_arm("right"): replace(s, values=s.values[::-1]) for topic, s in small.streams.items()}
     metadata = {"arms": "left right", "robot": "rcrt1", "right/robot": "rcrt1"}
     link = RecordedLink(MemoryBag("two", small.streams | later, {}, metadata))
     assert [arm.name for arm in link.arms] == ["", "right"]
@@ -254,9 +239,7 @@ def test_each_arm_of_two_is_seen_as_it_was(small: MemoryBag) -> None:
     np.testing.assert_array_equal(seen["right"].streams["slave/measured_js"], joints.values[0])
 
 
-def test_after_a_jump_in_time_plots_show_what_was_before(
-    session: tc.Recording, link: RecordedLink
-) -> None:
+def test_after_a_jump_in_time_plots_show_what_was_before(session: tc.Recording, link: RecordedLink) -> None:
     with ConsoleServer(port=0) as server:
         page = Console(server, link)
         page.panel.remember(link.view)
@@ -269,6 +252,4 @@ def test_after_a_jump_in_time_plots_show_what_was_before(
     begin = session.bag.start_ns
     index = np.searchsorted(tip.log_ns, begin + ((5.0 + at) * 1e9).round().astype(int), "right") - 1
     is_known = index >= 0
-    np.testing.assert_array_equal(
-        place[is_known], np.column_stack([tip[axis] for axis in "xyz"])[index[is_known]]
-    )
+    np.testing.assert_array_equal(place[is_known], np.column_stack([tip[axis] for axis in "xyz"])[index[is_known]])

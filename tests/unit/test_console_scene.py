@@ -71,25 +71,20 @@ def sent(server: Server) -> int:
 
 
 @pytest.mark.parametrize("time", [0.0, 3.0, 7.5, 11.0])
-def test_the_tip_is_drawn_where_it_was_measured(
-    server: Server, link: RecordedLink, time: float
-) -> None:
+def test_the_tip_is_drawn_where_it_was_measured(server: Server, link: RecordedLink, time: float) -> None:
     scene, view = drawn(server, link, time)
     tip, measured = scene.arms[""].drawn.frames["tip"], view.arms[""].streams[TIP]
     np.testing.assert_allclose(tip.position, measured[:3], atol=STILL)
     assert abs(tip.wxyz @ measured[3:]) > 1.0 - STILL
 
 
-def test_the_stylus_moves_on_the_page_as_the_command_of_the_tip_does(
-    server: Server, link: RecordedLink
-) -> None:
+def test_the_stylus_moves_on_the_page_as_the_command_of_the_tip_does(server: Server, link: RecordedLink) -> None:
     scene, before = drawn(server, link, 2.0)
     link.seek(6.0)
     after = link.view()
     base = turned(scene.arms[""].master.base)
     hand, command = (
-        after.arms[""].streams[name][:3] - before.arms[""].streams[name][:3]
-        for name in (MASTER, "slave/servo_cp")
+        after.arms[""].streams[name][:3] - before.arms[""].streams[name][:3] for name in (MASTER, "slave/servo_cp")
     )
     assert np.linalg.norm(hand) > 5e-3
     np.testing.assert_allclose(base @ hand, command, atol=5e-4)  # gain 1
@@ -201,9 +196,7 @@ def test_every_robot_is_drawn(server: Server, name: str) -> None:
     assert all(np.isfinite(frame.position).all() for frame in scene.arms[""].drawn.frames.values())
 
 
-def test_a_link_with_a_visual_is_drawn_as_it_looks_and_the_others_plainly(
-    server: Any, tmp_path: Path
-) -> None:
+def test_a_link_with_a_visual_is_drawn_as_it_looks_and_the_others_plainly(server: Any, tmp_path: Path) -> None:
     server.scene.reset()
     text = (Path(__file__).parents[2] / "examples" / "any_arm.urdf").read_text(encoding="utf-8")
     box = '<visual><geometry><box size="0.1 0.2 0.3"/></geometry></visual>'
@@ -241,9 +234,7 @@ def test_a_joint_at_its_limit_has_a_halo_and_its_body_keeps_its_colour(server: S
     assert halo.color == HELD
 
 
-def test_no_joint_is_marked_at_home_unless_the_session_says_that_it_is_in_the_way(
-    server: Server,
-) -> None:
+def test_no_joint_is_marked_at_home_unless_the_session_says_that_it_is_in_the_way(server: Server) -> None:
     server.scene.reset()
     robot = tc.load_robot("rcrt1")  # its home is the end of d3
     scene = Scene(server, [Arm("", robot)])
@@ -281,8 +272,9 @@ def test_the_first_camera_sees_all_of_every_robot_in_a_square_window(server: Ser
         server.scene.reset()
         scene = Scene(server, [Arm("", tc.load_robot(name))])
         camera, (low, high) = scene.whole(), scene.arms[""].room()
-        corners = np.array([[(low, high)[i][0], (low, high)[j][1], (low, high)[k][2]]
-                            for i in (0, 1) for j in (0, 1) for k in (0, 1)])  # fmt: skip
+        corners = np.array(
+            [[(low, high)[i][0], (low, high)[j][1], (low, high)[k][2]] for i in (0, 1) for j in (0, 1) for k in (0, 1)]
+        )
         turn = rotations_from_quaternions(camera.quaternion[None])[0]
         right, down, depth = ((corners - camera.position) @ turn).T
         half = np.tan(0.5 * server.initial_camera.fov)
@@ -346,9 +338,7 @@ TURNED = {
 }
 
 
-@pytest.mark.parametrize(
-    "kind", [name for name in SHAPES if not hasattr(SHAPES.find(name).parameters, "file")]
-)
+@pytest.mark.parametrize("kind", [name for name in SHAPES if not hasattr(SHAPES.find(name).parameters, "file")])
 def test_outlines_are_those_of_the_fixtures_with_their_parameters(kind: str) -> None:
     part: Any
     values: Any
@@ -365,8 +355,7 @@ def test_outlines_are_those_of_the_fixtures_with_their_parameters(kind: str) -> 
 
 
 def test_the_scene_draws_a_fixture_where_its_parameters_have_it(server: Server) -> None:
-    session = tc.run("coarse_box", duration=5.0, fixture="half_space",
-                     fixture__half_space__room=0.02)  # fmt: skip
+    session = tc.run("coarse_box", duration=5.0, fixture="half_space", fixture__half_space__room=0.02)
     scene, view = drawn(server, RecordedLink(session.bag), 4.5)
     assert view.arms[""].state["is_fixture_on"]
     line: Any = scene.arms[""].master.outline.line
@@ -380,9 +369,7 @@ def pressed() -> tc.Recording:
     return tc.run("palpation", duration=9.0)
 
 
-def test_the_object_is_drawn_where_the_tip_touches_it(
-    server: Server, pressed: tc.Recording
-) -> None:
+def test_the_object_is_drawn_where_the_tip_touches_it(server: Server, pressed: tc.Recording) -> None:
     scene, _ = drawn(server, RecordedLink(pressed.bag), 8.0)
     points = present(scene.arms[""].world.line).points.reshape(-1, 3)
     low, high = points.min(axis=0), points.max(axis=0)
@@ -395,9 +382,7 @@ def test_the_object_is_drawn_where_the_tip_touches_it(
     assert place[2] == pytest.approx(high[2], abs=1e-4)
 
 
-def test_the_push_on_the_tip_is_drawn_there_as_large_as_it_is(
-    server: Server, pressed: tc.Recording
-) -> None:
+def test_the_push_on_the_tip_is_drawn_there_as_large_as_it_is(server: Server, pressed: tc.Recording) -> None:
     force = pressed["slave/measured_cf"]
     size = np.linalg.norm(force[["fx", "fy", "fz"]], axis=1)
     scene, view = drawn(server, RecordedLink(pressed.bag), force.time[np.argmax(size)])

@@ -42,9 +42,7 @@ def test_lists_are_read_as_people_write_them(
     assert _parsed(shown, ParameterInfo("node", "name", present)) == wanted
 
 
-@pytest.mark.parametrize(
-    "value", [(0.1, 2.0), ("a=0.1", "b"), ("ball at=[0, 1]", "box"), (), True, 3, 0.25, "hold"]
-)
+@pytest.mark.parametrize("value", [(0.1, 2.0), ("a=0.1", "b"), ("ball at=[0, 1]", "box"), (), True, 3, 0.25, "hold"])
 def test_a_setting_text_is_read_by_the_session_as_the_value(value: Any) -> None:
     found = parse(_text(value)) if not isinstance(value, bool) else {"True": True}[_text(value)]
     assert (tuple(found) if isinstance(found, list) else found) == value
@@ -52,9 +50,14 @@ def test_a_setting_text_is_read_by_the_session_as_the_value(value: Any) -> None:
 
 @pytest.mark.parametrize(
     ("doc", "unit"),
-    [("delay of a link [s]", " [s]"), ("one of [a, b] things", ""), ("no unit", ""), ("", ""),
-     ("weight [kg m] or length [m]", " [m]")],
-)  # fmt: skip
+    [
+        ("delay of a link [s]", " [s]"),
+        ("one of [a, b] things", ""),
+        ("no unit", ""),
+        ("", ""),
+        ("weight [kg m] or length [m]", " [m]"),
+    ],
+)
 def test_a_label_has_the_unit_that_ends_the_meaning(doc: str, unit: str) -> None:
     with ConsoleServer(0) as server:
         control = _control(server.viser.gui, "x", ParameterInfo("slave", "x", 1.0, doc))
@@ -63,10 +66,7 @@ def test_a_label_has_the_unit_that_ends_the_meaning(doc: str, unit: str) -> None
 
 def test_value_that_a_button_of_the_stylus_changed_is_shown_as_it_is_and_can_be_set_back() -> None:
     desk: Any = Desk()
-    desk.known = {
-        MODE: ParameterInfo(*MODE, "coarse", choices=("coarse", "fine")),
-        GAIN: ParameterInfo(*GAIN, 0.1),
-    }
+    desk.known = {MODE: ParameterInfo(*MODE, "coarse", choices=("coarse", "fine")), GAIN: ParameterInfo(*GAIN, 0.1)}
     with ConsoleServer(0) as server:
         settings = SettingsPanel(server.viser, desk, lambda _: True)
         settings.refresh()
@@ -94,9 +94,12 @@ def test_search_finds_words_of_stage_name_and_meaning_and_changed_only_what_is_n
         inputs: Any = server.viser.gui._gui_input_handle_from_uuid.values()
         shown = {one.label: one for one in inputs}
         for text, found in (
-            ("", [MODE, GAIN, filtered]), ("SCALING gain", [MODE, GAIN]), ("m/m", [GAIN]),
-            ("smoothed", [filtered]), ("nothing like it", []),
-        ):  # fmt: skip
+            ("", [MODE, GAIN, filtered]),
+            ("SCALING gain", [MODE, GAIN]),
+            ("m/m", [GAIN]),
+            ("smoothed", [filtered]),
+            ("nothing like it", []),
+        ):
             shown["search"].value = text
             assert settings.keys() == found, text
         shown["search"].value = ""

@@ -38,9 +38,7 @@ def opened(folder: Path) -> Iterator[tuple[StartPage, list[Wish]]]:
         waiting.join()
 
 
-def test_what_the_driver_begins_is_what_is_started_and_nothing_can_be_begun_beside_it(
-    tmp_path: Path,
-) -> None:
+def test_what_the_driver_begins_is_what_is_started_and_nothing_can_be_begun_beside_it(tmp_path: Path) -> None:
     asked = {"scenario": ["wall"], "operator": ["remote"]}
     with opened(tmp_path) as (start, wishes):
         assert start.answer("/begin", asked, DRIVES)[0] == HTTPStatus.OK
@@ -60,9 +58,7 @@ def test_page_that_watches_begins_ends_shows_and_runs_nothing(tmp_path: Path, pa
     with opened(tmp_path) as (start, wishes):
         for path in ("/begin", "/end", "/show", "/run"):
             query = {"operator": ["remote"], "name": ["run_1"], "kind": ["export"]}
-            assert start.answer(path, query, page) == (
-                HTTPStatus.CONFLICT, "You watch. Take control first.",
-            )  # fmt: skip
+            assert start.answer(path, query, page) == (HTTPStatus.CONFLICT, "You watch. Take control first.")
         assert not wishes
         assert not start.is_ended
         assert start.told == ""
@@ -104,9 +100,7 @@ def test_robot_that_is_dropped_can_be_chosen_and_replaces_no_other(
         wait_until(lambda: wishes, "it is begun", 60)
 
 
-@pytest.mark.parametrize(
-    "name", ["", "../arm.urdf", "/tmp/arm.urdf", ".urdf", "arm.py", "a/b.urdf"]
-)
+@pytest.mark.parametrize("name", ["", "../arm.urdf", "/tmp/arm.urdf", ".urdf", "arm.py", "a/b.urdf"])
 def test_robot_goes_nowhere_but_into_its_folder_and_comes_from_the_driver_alone(
     tmp_path: Path, name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -125,9 +119,7 @@ def test_robot_goes_nowhere_but_into_its_folder_and_comes_from_the_driver_alone(
 
 
 @pytest.mark.parametrize("name", ["..", "../run_1", "/etc", "", "run_2", "run_1/../run_1"])
-def test_only_recordings_of_the_folder_are_shown_or_handed_to_commands(
-    tmp_path: Path, name: str
-) -> None:
+def test_only_recordings_of_the_folder_are_shown_or_handed_to_commands(tmp_path: Path, name: str) -> None:
     shutil.copytree(EXAMPLE, tmp_path / "bags" / "run_1")
     recordings = Recordings(tmp_path / "bags")
     assert recordings.path("run_1") == tmp_path / "bags" / "run_1"

@@ -36,10 +36,12 @@ class Hand:
         self.server, self.drivers, self.said = server, {1, 2}, []
         scene = Scene(server, [Arm("", tc.load_robot("rcrt1"))])
         self.stylus = Stylus(
-            server, scene, lambda client: client in self.drivers,
+            server,
+            scene,
+            lambda client: client in self.drivers,
             lambda arm, pose: self.said.append(pose.tolist()),
             lambda arm: self.said.append("let go"),
-        )  # fmt: skip
+        )
         self.gizmo: Any = server.scene.get_handle_by_name(f"{scene.masters['']}/grip")
         self.time = 0.0
         self.see(POSE)
@@ -49,9 +51,7 @@ class Hand:
         self.time += dt
         self.stylus.draw(View(time=self.time, arms={"": ArmView({"master/measured_cp": pose})}))
 
-    def drag(
-        self, phase: Literal["start", "update", "end"], client: int = 1, x: Any = None
-    ) -> None:
+    def drag(self, phase: Literal["start", "update", "end"], client: int = 1, x: Any = None) -> None:
         """What viser does when a browser says that the gizmo was dragged."""
         if x is not None:
             self.gizmo.position = (x, *POSE[1:3])
@@ -148,9 +148,7 @@ def test_a_small_step_is_held_for_a_while_and_further_ones_add_up(hand: Any) -> 
 
 @pytest.mark.parametrize("axis", ["rx", "ry", "rz"])
 @pytest.mark.parametrize("sign", [1, -1])
-def test_a_step_of_turn_is_about_an_axis_of_the_base_and_a_step_back_undoes_it(
-    axis: str, sign: int
-) -> None:
+def test_a_step_of_turn_is_about_an_axis_of_the_base_and_a_step_back_undoes_it(axis: str, sign: int) -> None:
     turned = stepped(POSE, axis, sign)
     before, after = rotations_from_quaternions(np.stack((POSE[3:], turned[3:])))
     assert np.trace(after @ before.T) == pytest.approx(1.0 + 2.0 * np.cos(STEP_TURN), abs=1e-12)
@@ -161,9 +159,7 @@ def test_a_step_of_turn_is_about_an_axis_of_the_base_and_a_step_back_undoes_it(
     np.testing.assert_allclose(stepped(turned, axis, -sign), POSE, atol=1e-12)
 
 
-def test_nothing_is_stepped_before_the_stylus_is_known_or_while_it_is_dragged(
-    server: Server, hand: Hand
-) -> None:
+def test_nothing_is_stepped_before_the_stylus_is_known_or_while_it_is_dragged(server: Server, hand: Hand) -> None:
     hand.drag("start")
     hand.take()
     hand.stylus.nudge("", "x", 1)
@@ -172,16 +168,13 @@ def test_nothing_is_stepped_before_the_stylus_is_known_or_while_it_is_dragged(
     server.scene.reset()
     scene = Scene(server, [Arm("", tc.load_robot("rcrt1"))])
     fresh.said = []
-    stylus = Stylus(
-        server, scene, lambda _: True, lambda *_: fresh.said.append(1), fresh.said.append
-    )
+    stylus = Stylus(server, scene, lambda _: True, lambda *_: fresh.said.append(1), fresh.said.append)
     stylus.nudge("", "x", 1)
     assert fresh.said == []
 
 
 def test_unknown_axes_are_refused(hand: Hand) -> None:
-    with pytest.raises(tc.ParameterError,
-                       match="axis"):  # fmt: skip
+    with pytest.raises(tc.ParameterError, match="axis"):
         hand.stylus.nudge("", "w", 1)
 
 

@@ -68,8 +68,7 @@ class Other:
         ball = '<geom type="sphere" size="{}" pos="{}" mass="0" priority="1" condim="{}" {}/>'
         soft = "" if stiffness is None else f'solimp="{IMPEDANCE} {IMPEDANCE} 0.001"'
         balls = "".join(
-            ball.format(radius, row(way), 3 if friction else 1, f'friction="{friction} 0 0" {soft}')
-            for way in ways
+            ball.format(radius, row(way), 3 if friction else 1, f'friction="{friction} 0 0" {soft}') for way in ways
         )
         text = WORLD.format(gravity=row(gravity), impratio=100, friction=friction, mass=MASS,
                             begin=row(begin), joints=joints, inertia=inertia,
@@ -141,9 +140,7 @@ def test_a_wall_gives_back_the_speed_that_theory_says_whatever_the_stiffness(
 
 
 @pytest.mark.parametrize("damping", [0.2, 1.0])
-def test_a_body_bounces_as_high_and_as_long_as_mujocos_of_the_same_restitution(
-    damping: float,
-) -> None:
+def test_a_body_bounces_as_high_and_as_long_as_mujocos_of_the_same_restitution(damping: float) -> None:
     drop, stiffness = 0.1, 50_000.0
     wanted = restitution(damping, math.sqrt(2.0 * G * drop))
     other_damping = brentq(lambda c: damped_restitution(c, stiffness) - wanted, 0.1, 150.0)
@@ -159,8 +156,7 @@ def test_a_body_bounces_as_high_and_as_long_as_mujocos_of_the_same_restitution(
 
 def test_without_damping_a_bounce_is_mujocos_at_every_moment() -> None:
     stiffness, drop = 5000.0, 0.05
-    ours = fly((0.0, 0.0, drop), (0.0, 0.0, 0.0), 800, mass=MASS, world_stiffness=stiffness,
-               gravity=(0.0, 0.0, -G))  # fmt: skip
+    ours = fly((0.0, 0.0, drop), (0.0, 0.0, 0.0), 800, mass=MASS, world_stiffness=stiffness, gravity=(0.0, 0.0, -G))
     q, _ = Other((0.0, 0.0, drop + 0.01), stiffness=stiffness).fly((), 800)
     assert ours["place"][:, 2].min() < -4e-3
     assert np.abs(q[:, 1] + drop - ours["place"][:, 2]).max() < 1e-3
@@ -180,9 +176,7 @@ def test_a_body_at_rest_lies_as_deep_as_its_weight_over_the_stiffness(stiffness:
 
 @pytest.mark.parametrize("points", [1, 4])
 @pytest.mark.parametrize("friction", [0.1, 0.5])
-def test_a_sliding_body_stops_where_friction_says_and_where_mujocos_stops(
-    friction: float, points: int
-) -> None:
+def test_a_sliding_body_stops_where_friction_says_and_where_mujocos_stops(friction: float, points: int) -> None:
     """After v² / 2 μ g, and as soon as v / μ g, on one point or four."""
     stiffness, begin = 20_000.0, (0.0, 0.0, -MASS * G / 20_000.0 / points)
     ours = fly(begin, (1.0, 0.0, 0.0), 1500, (1.0, 0.0, 0.0), points=points, mass=MASS,
@@ -198,9 +192,7 @@ def test_a_sliding_body_stops_where_friction_says_and_where_mujocos_stops(
 
 
 @pytest.mark.parametrize("friction", [0.2, 0.6])
-def test_on_a_slope_a_body_sticks_below_the_angle_of_friction_and_slides_above_it(
-    friction: float,
-) -> None:
+def test_on_a_slope_a_body_sticks_below_the_angle_of_friction_and_slides_above_it(friction: float) -> None:
     stiffness, angle = 20_000.0, math.atan(friction)
     for share in (0.9, 1.2):
         tilt = share * angle
@@ -228,9 +220,7 @@ def test_a_ball_that_slides_ends_rolling_with_five_sevenths_of_its_speed() -> No
     ours = fly((0.0, 0.0, radius - MASS * G / stiffness), (0.7, 0.0, 0.0), 500, mass=MASS,
                inertia=inertia, tool_radius=radius, world_friction=0.3, world_damping=1.0,
                world_stiffness=stiffness, gravity=(0.0, 0.0, -G))  # fmt: skip
-    other = Other(
-        (0.0, 0.0, radius), radius=radius, friction=0.3, joints=SLIDES + HINGE, inertia=inertia
-    )
+    other = Other((0.0, 0.0, radius), radius=radius, friction=0.3, joints=SLIDES + HINGE, inertia=inertia)
     _, dq = other.fly((0.7, 0.0, 0.0), 500)
     assert ours["speed"][-1, 0] == pytest.approx(0.5, rel=0.01)
     assert ours["speed"][-1, 4] == pytest.approx(0.5 / radius, rel=0.02)

@@ -27,9 +27,7 @@ from teleop_core.session.notes import notes_of, passive_note, rendered_note
 
 COLUMN = {name: index for index, name in enumerate(MASTER_CONTACT.columns)}
 CALM = HandParameters()
-STILL = build(
-    OperatorParameters, {"kind": "hold", "rotation": 0.0, "tremor_amplitude": 0.0, "patience": 0.0}
-)
+STILL = build(OperatorParameters, {"kind": "hold", "rotation": 0.0, "tremor_amplitude": 0.0, "patience": 0.0})
 
 
 def master(hand: HandParameters = CALM, **device: Any) -> HeldMaster:
@@ -53,9 +51,7 @@ def push(device: HeldMaster, forces: Array) -> Iterator[Any]:
 
 @pytest.mark.parametrize("thermal_time", [0.1, 1.0, 5.0])
 @pytest.mark.parametrize("command", [1.0, 2.0, 3.3, 50.0])
-def test_mean_square_of_the_force_never_exceeds_the_continuous_one(
-    thermal_time: float, command: float
-) -> None:
+def test_mean_square_of_the_force_never_exceeds_the_continuous_one(thermal_time: float, command: float) -> None:
     forces = np.zeros((6000, 3))
     forces[:, 1] = command * np.sign(np.sin(np.arange(6000) / 200.0)) * (np.arange(6000) > 50)
     _, applied, _ = push(master(thermal_time=thermal_time), forces)
@@ -92,9 +88,7 @@ def test_motors_cool_while_nothing_is_asked_of_them() -> None:
 
 
 @pytest.mark.parametrize("axis", [0, 1, 2])
-def test_reading_of_a_pushed_device_runs_ahead_of_the_hand_by_force_over_stiffness(
-    axis: int,
-) -> None:
+def test_reading_of_a_pushed_device_runs_ahead_of_the_hand_by_force_over_stiffness(axis: int) -> None:
     device = master(friction=0.0, continuous_force=3.3)
     force = np.zeros(3)
     force[axis] = 1.5
@@ -150,21 +144,32 @@ def recorded(path: Path, rows: Array) -> Score:
 
 
 def test_contacts_are_scored_by_their_last_sample(tmp_path: Path) -> None:
-    rows = np.array([
-        (0, 0, 0, 0, 3.3), (1, 2e-5, 0, 1e-6, 3.3), (1, 8e-5, 6e-5, 1e-6, 3.1),
-        (2, 1e-4, 1.1e-4, 5e-6, 2.0), (3, 1e-9, 2e-9, 0.0, 3.3), (4, 4e-3, 1e-3, 1e-3, 3.3),
-    ])  # fmt: skip
+    rows = np.array(
+        [
+            (0, 0, 0, 0, 3.3),
+            (1, 2e-5, 0, 1e-6, 3.3),
+            (1, 8e-5, 6e-5, 1e-6, 3.1),
+            (2, 1e-4, 1.1e-4, 5e-6, 2.0),
+            (3, 1e-9, 2e-9, 0.0, 3.3),
+            (4, 4e-3, 1e-3, 1e-3, 3.3),
+        ]
+    )
     score = recorded(tmp_path / "bag", rows)
     found = {key: score.value(f"contact.{key}") for key in (
         "count", "touches", "feeding", "feeding_device", "returned_max", "gain_max_uj",
         "taken_max_mj", "worst_s", "largest_force_min_n",
     )}  # fmt: skip
     assert found == {
-        "count": 3, "touches": 1, "feeding": 1, "feeding_device": 1,
-        "returned_max": pytest.approx(1.1), "gain_max_uj": pytest.approx(10.0),
-        "taken_max_mj": pytest.approx(4.0), "worst_s": pytest.approx(0.3),
+        "count": 3,
+        "touches": 1,
+        "feeding": 1,
+        "feeding_device": 1,
+        "returned_max": pytest.approx(1.1),
+        "gain_max_uj": pytest.approx(10.0),
+        "taken_max_mj": pytest.approx(4.0),
+        "worst_s": pytest.approx(0.3),
         "largest_force_min_n": 2.0,
-    }  # fmt: skip
+    }
 
 
 def test_a_session_without_contact_has_none(tmp_path: Path) -> None:
@@ -229,9 +234,7 @@ def test_a_wall_without_damping_is_told_whatever_its_stiffness(wall: str) -> Non
         assert not rendered_note(DEVICE, FixtureParameters(wall=wall, **silent))
 
 
-def test_passive_stiffness_falls_with_delay_and_coarse_readings_and_gains_nothing_by_damping() -> (
-    None
-):
+def test_passive_stiffness_falls_with_delay_and_coarse_readings_and_gains_nothing_by_damping() -> None:
     given = {"damping": 10.0, "period": 1e-3, "delay": 0.0, "friction": 0.26, "step": 55e-6}
     assert math.isclose(passive_stiffness(**given), 1000.0)
     assert passive_stiffness(**given | {"delay": 1e-3}) < 0.34 * 1000.0
@@ -245,9 +248,7 @@ def test_a_declared_delay_between_device_and_wall_counts() -> None:
     late = configuration("coarse_box", delays={"master/servo_cf": 1e-3})
     assert "2 ms from sample to force it is passive up to 333 N/m" in " ".join(notes_of(late))
     both = dict.fromkeys(("master/measured_cp", "master/servo_cf"), 1e-3)
-    assert "3 ms from sample to force" in " ".join(
-        notes_of(configuration("coarse_box", delays=both))
-    )
+    assert "3 ms from sample to force" in " ".join(notes_of(configuration("coarse_box", delays=both)))
     elsewhere = configuration("coarse_box", delays={"slave/servo_cp": 1e-3})
     assert not notes_of(elsewhere)
     assert len(notes_of(configuration("coarse_box"), transport=1e-3)) == 1

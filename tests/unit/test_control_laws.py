@@ -92,14 +92,14 @@ def test_arm_that_sticks_comes_to_rest_at_the_nearest_count_and_stays(law: str) 
 
 
 @pytest.mark.parametrize("law", LAWS)
-def test_step_without_a_filter_overshoots_by_no_more_than_a_twentieth_on_the_hardware(
-    law: str,
-) -> None:
+def test_step_without_a_filter_overshoots_by_no_more_than_a_twentieth_on_the_hardware(law: str) -> None:
     parameters = ArmParameters(
-        starts_at_home=True, interpolation="none", reference_filter=UNFILTERED,
+        starts_at_home=True,
+        interpolation="none",
+        reference_filter=UNFILTERED,
         controller=build(ControllerParameters, {"kind": law}),
         plant=build(PlantParameters, {"kind": "hardware"}),
-    )  # fmt: skip
+    )
     answer = answer_to_steps(parameters)
     assert (answer.overshoot <= 0.05).all()
     assert answer.rest_error <= 34e-6
@@ -149,11 +149,7 @@ FRICTIONLESS: dict[str, Any] = {"plant": "ideal", "coulomb": (0.0,) * 6}
 def test_true_model_leaves_nothing_to_correct_where_there_is_no_dry_friction() -> None:
     by_model = tracking_error(slave("computed_torque", **FRICTIONLESS))
     by_joint = tracking_error(
-        slave(
-            "friction_compensation",
-            own={"friction_compensation.friction_share": 0.0},
-            **FRICTIONLESS,
-        )
+        slave("friction_compensation", own={"friction_compensation.friction_share": 0.0}, **FRICTIONLESS)
     )
     # Rounding of the encoders is 0.3 counts; efforts are held for a tick.
     assert (by_model[:3] < 1.5).all()
@@ -163,8 +159,7 @@ def test_true_model_leaves_nothing_to_correct_where_there_is_no_dry_friction() -
 def test_friction_that_is_fed_forward_is_most_of_the_error_that_friction_makes() -> None:
     name = "friction_compensation.friction_share"
     without, with_it = (
-        tracking_error(slave("friction_compensation", faults=STEADY, own={name: share}))
-        for share in (0.0, 0.8)
+        tracking_error(slave("friction_compensation", faults=STEADY, own={name: share})) for share in (0.0, 0.8)
     )
     assert (with_it[:2] < 0.6 * without[:2]).all()
 
@@ -195,19 +190,13 @@ def test_adaptive_law_stays_within_its_bounds_whatever_it_is_asked_for() -> None
     rng = np.random.default_rng(11)
     arm = slave("adaptive", own={"adaptive.rate": 7.0}, reference_filter=UNFILTERED)
     reach = 0.05 * present(ARM.drives).speed_limit
-    way = np.clip(
-        ARM.home + np.cumsum(rng.uniform(-reach, reach, (3000, 6)), axis=0) * 0.2,
-        ARM.lower,
-        ARM.upper,
-    )
+    way = np.clip(ARM.home + np.cumsum(rng.uniform(-reach, reach, (3000, 6)), axis=0) * 0.2, ARM.lower, ARM.upper)
     _, _, efforts = run(arm, way)
     memory, drives = arm.simulated.arm.memory, ARM.drives
     assert np.isfinite(efforts).all()
     assert (np.abs(memory[:, adaptive._MORE_INERTIA]) <= 0.5 * present(drives).inertia).all()
     assert (np.abs(memory[:, adaptive._MORE_VISCOUS]) <= present(drives).viscous).all()
-    assert (
-        np.abs(memory[:, adaptive._MORE_FRICTION]) <= 0.8 * known_friction(ARM) * (1 + 1e-12)
-    ).all()
+    assert (np.abs(memory[:, adaptive._MORE_FRICTION]) <= 0.8 * known_friction(ARM) * (1 + 1e-12)).all()
     assert (np.abs(memory[:, adaptive._LOAD]) <= present(drives).effort_limit).all()
 
 
@@ -218,11 +207,7 @@ def test_adaptive_law_stays_within_its_bounds_whatever_it_is_asked_for() -> None
 def test_blocked_joint_winds_nothing_up(law: str) -> None:
     part = CONTROLLERS.find(law)
     gains = part.gains(part.parameters(), ARM, present(ARM.drives).viscous)
-    memory, effort, limit = (
-        np.zeros((6, part.memory)),
-        np.empty(6),
-        present(ARM.drives).effort_limit.copy(),
-    )
+    memory, effort, limit = (np.zeros((6, part.memory)), np.empty(6), present(ARM.drives).effort_limit.copy())
     feedforward = np.zeros(part.feedforward(6))
     if part.uses_model:
         feedforward[12:] = np.diag(present(ARM.drives).inertia).ravel()
@@ -241,9 +226,7 @@ def test_blocked_joint_winds_nothing_up(law: str) -> None:
 # The model as an argument.
 
 
-def test_law_gets_the_model_that_is_known_behind_the_gravity_that_is_compensated(
-    own_parts: None,
-) -> None:
+def test_law_gets_the_model_that_is_known_behind_the_gravity_that_is_compensated(own_parts: None) -> None:
     seen = []
 
     def control(*arrays: Any) -> None:
@@ -252,9 +235,7 @@ def test_law_gets_the_model_that_is_known_behind_the_gravity_that_is_compensated
         effort[:] = 0.0
 
     register_controller(
-        Controller(
-            "looking", COMPUTED_TORQUE.parameters, COMPUTED_TORQUE.gains, control, uses_model=True
-        )
+        Controller("looking", COMPUTED_TORQUE.parameters, COMPUTED_TORQUE.gains, control, uses_model=True)
     )
     arm = slave("looking", gravity_compensation="all", trials="small")
     arm.step()
@@ -266,20 +247,27 @@ def test_law_gets_the_model_that_is_known_behind_the_gravity_that_is_compensated
     assert np.allclose(found[6:12], gravity, rtol=0, atol=1e-9)  # at rest: bias is gravity
     ddq = np.empty(6)
     present(ARM.dynamics).acceleration(
-        at, np.zeros(6), found[12:].reshape(6, 6) @ np.ones(6) + found[6:12],
-        present(ARM.dynamics).parameters.copy(), ddq,
-    )  # fmt: skip
+        at,
+        np.zeros(6),
+        found[12:].reshape(6, 6) @ np.ones(6) + found[6:12],
+        present(ARM.dynamics).parameters.copy(),
+        ddq,
+    )
     assert np.allclose(ddq, 1.0, rtol=1e-9, atol=0)
 
 
 def test_law_that_uses_the_model_in_plain_python_gives_the_same_bits(own_parts: None) -> None:
     register_controller(
         Controller(
-            "plain_torque", COMPUTED_TORQUE.parameters, COMPUTED_TORQUE.gains,
-            computed_torque_control.py_func, COMPUTED_TORQUE.memory, COMPUTED_TORQUE.begin,
+            "plain_torque",
+            COMPUTED_TORQUE.parameters,
+            COMPUTED_TORQUE.gains,
+            computed_torque_control.py_func,
+            COMPUTED_TORQUE.memory,
+            COMPUTED_TORQUE.begin,
             uses_model=True,
         )
-    )  # fmt: skip
+    )
     way = circling(300)
     plain, compiled = (run(slave(kind), way) for kind in ("plain_torque", "computed_torque"))
     assert np.array_equal(plain, compiled)
@@ -293,9 +281,7 @@ def test_law_that_does_not_ask_for_the_model_gets_gravity_alone(own_parts: None)
         lengths.append(len(feedforward) - len(effort))
         effort[:] = 0.0
 
-    register_controller(
-        Controller("short", COMPUTED_TORQUE.parameters, COMPUTED_TORQUE.gains, control)
-    )
+    register_controller(Controller("short", COMPUTED_TORQUE.parameters, COMPUTED_TORQUE.gains, control))
     slave("short", trials="small").step()
     assert set(lengths) == {0}
 

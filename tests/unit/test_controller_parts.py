@@ -24,19 +24,13 @@ ARM = load_robot("rcrt1")
 
 
 def own(name: str = "own", **more: int | Callable[..., object] | type[float] | None) -> Any:
-    parts: dict[str, Any] = {
-        "parameters": PidParameters, "gains": pid_gains, "control": pid_control, "memory": 4
-    }  # fmt: skip
+    parts: dict[str, Any] = {"parameters": PidParameters, "gains": pid_gains, "control": pid_control, "memory": 4}
     return Controller(name, **{**parts, **more})
 
 
 def slave(kind: str, **values: Any) -> SimulatedArm:
     return SimulatedArm(
-        ArmParameters(
-            controller=build(ControllerParameters, {"kind": kind}),
-            start=tuple(ARM.home.tolist()),
-            **values,
-        )
+        ArmParameters(controller=build(ControllerParameters, {"kind": kind}), start=tuple(ARM.home.tolist()), **values)
     )
 
 
@@ -65,9 +59,7 @@ def test_pd_gains_put_both_poles_at_the_bandwidth() -> None:
     drives, viscous = ARM.drives, present(ARM.drives).viscous
     gains = PD.gains(PdParameters(), ARM, viscous)
     # inertia (s + bandwidth)²
-    assert np.allclose(
-        gains[:, 0], present(drives).bandwidth ** 2 * present(drives).inertia, rtol=1e-12, atol=0
-    )
+    assert np.allclose(gains[:, 0], present(drives).bandwidth ** 2 * present(drives).inertia, rtol=1e-12, atol=0)
     damping = (gains[:, 1] + viscous) / present(drives).inertia
     assert np.allclose(damping, 2.0 * present(drives).bandwidth, rtol=1e-12, atol=0)
 

@@ -34,9 +34,7 @@ def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-def test_a_description_in_the_cache_is_the_arm_of_its_file_with_the_arguments_of_its_package(
-    cache: Path,
-) -> None:
+def test_a_description_in_the_cache_is_the_arm_of_its_file_with_the_arguments_of_its_package(cache: Path) -> None:
     plain, panda, ur5e = (load_robot(n, tip="tool0") for n in (str(EXAMPLE), PANDA, UR5E))
     assert (panda.name, ur5e.name) == ("any_arm", "ur5e")
     for robot in (panda, ur5e):
@@ -56,9 +54,7 @@ def test_a_commit_that_the_user_names_is_looked_for_where_the_package_puts_it(
 
 
 @pytest.mark.parametrize("is_half", [False, True])
-def test_what_is_not_in_the_cache_is_refused_with_the_command_that_fetches_it(
-    is_half: bool, cache: Path
-) -> None:
+def test_what_is_not_in_the_cache_is_refused_with_the_command_that_fetches_it(is_half: bool, cache: Path) -> None:
     panda = cache / "example-robot-data"
     shutil.rmtree(panda / "robots" if is_half else panda)
     with pytest.raises(ParameterError, match="`robot_descriptions pull panda_description`") as told:
@@ -105,9 +101,7 @@ def test_a_recording_keeps_the_text_of_a_description(name: str, cache: Path) -> 
 
 
 def test_a_session_of_a_description_is_replayed_without_the_cache(cache: Path) -> None:
-    recording = tc.run(
-        "coarse_box", duration=0.5, out=cache / "bag", robot=PANDA, geometry=["tip=tool0"]
-    )
+    recording = tc.run("coarse_box", duration=0.5, out=cache / "bag", robot=PANDA, geometry=["tip=tool0"])
     before = tc.replay(present(recording.path))["slave/setpoint_js"].values
     shutil.rmtree(cache / "example-robot-data")
     after = tc.replay(present(recording.path))["slave/setpoint_js"].values

@@ -61,9 +61,7 @@ def test_a_dead_zone_takes_rest_and_gives_all_directions_alike(rates: Array, zon
 
 
 @given(st.floats(0.0, 0.9), st.floats(0.0, 1.0), st.floats(0.0, 1.0))
-def test_more_deflection_is_never_less_speed_and_nothing_jumps(
-    zone: float, first: float, second: float
-) -> None:
+def test_more_deflection_is_never_less_speed_and_nothing_jumps(zone: float, first: float, second: float) -> None:
     low, high = beyond(np.sort([first, second]), zone)
     assert 0.0 <= high - low <= (abs(second - first) + 1e-12) / (1.0 - zone) + 1e-12
 
@@ -131,9 +129,7 @@ def test_each_press_of_a_button_is_one_press_of_the_hand() -> None:
 
 @pytest.mark.parametrize("name", [*LIVE, "elsewhere"])
 def test_virtual_time_refuses_a_device_and_says_who_works(name: str) -> None:
-    with pytest.raises(
-        ParameterError, match=rf"'{name}', must be one of random, .*remote.* in virt"
-    ):
+    with pytest.raises(ParameterError, match=rf"'{name}', must be one of random, .*remote.* in virt"):
         VirtualTime(configure(settings=[f"operator={name}"]))
 
 
@@ -192,9 +188,7 @@ def test_both_forms_of_reports_say_the_same(numbers: list[int]) -> None:
 
 
 @given(six, six)
-def test_axes_of_the_mouse_and_of_the_master_are_turned_and_not_mirrored(
-    first: Array, second: Array
-) -> None:
+def test_axes_of_the_mouse_and_of_the_master_are_turned_and_not_mirrored(first: Array, second: Array) -> None:
     assume(np.linalg.norm(np.cross(first[:3], second[:3])) > 1e-3)
     reports = [Reports(), Reports(), Reports()]
     deflections = (first[:3], second[:3], np.cross(first[:3], second[:3]))
@@ -272,11 +266,14 @@ def test_a_gamepad_at_rest_says_nothing(gamepad: Gamepad) -> None:
 @pytest.mark.parametrize(
     ("axis", "share", "rates"),
     [
-        ("left x", 1.0, [1, 0, 0, 0, 0, 0]), ("left y", -1.0, [0, 0, -1, 0, 0, 0]),
-        ("right y", -1.0, [0, 1, 0, 0, 0, 0]), ("right x", 1.0, [0, 0, 0, 0, -1, 0]),
-        ("left trigger", 1.0, [0, 0, 0, 0, 0, 1]), ("right trigger", 1.0, [0, 0, 0, 0, 0, -1]),
+        ("left x", 1.0, [1, 0, 0, 0, 0, 0]),
+        ("left y", -1.0, [0, 0, -1, 0, 0, 0]),
+        ("right y", -1.0, [0, 1, 0, 0, 0, 0]),
+        ("right x", 1.0, [0, 0, 0, 0, -1, 0]),
+        ("left trigger", 1.0, [0, 0, 0, 0, 0, 1]),
+        ("right trigger", 1.0, [0, 0, 0, 0, 0, -1]),
     ],
-)  # fmt: skip
+)
 def test_each_stick_of_a_gamepad_moves_or_turns_along_its_axis(
     pad: VirtualPad, gamepad: Gamepad, axis: str, share: float, rates: list[int]
 ) -> None:
@@ -295,9 +292,7 @@ def test_buttons_of_a_gamepad(pad: VirtualPad, gamepad: Gamepad) -> None:
     assert gamepad.read().rates[3] == -1.0
 
 
-def test_the_right_trigger_closes_the_jaw_where_that_is_wanted_and_rolls_no_more(
-    pad: VirtualPad,
-) -> None:
+def test_the_right_trigger_closes_the_jaw_where_that_is_wanted_and_rolls_no_more(pad: VirtualPad) -> None:
     from teleop_core.chain.devices.gamepad import GamepadParameters, open_gamepad
 
     made = open_gamepad(GamepadParameters(device="virtual", triggers="jaw"))
@@ -317,9 +312,7 @@ def test_a_gamepad_that_is_unplugged_is_gone(pad: VirtualPad, gamepad: Gamepad) 
         gamepad.read()
 
 
-def test_the_command_lists_what_is_there(
-    pad: VirtualPad, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_command_lists_what_is_there(pad: VirtualPad, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["devices"]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert "gamepad      Virtual Controller" in lines

@@ -36,9 +36,7 @@ def test_a_stretched_arm_has_no_manipulability() -> None:
 def test_lengths_weigh_linear_against_angular_speed() -> None:
     arm = load_robot("rcrt1")
     q = arm.home + 0.1
-    assert dexterity.manipulability(arm, q, 0.1) == pytest.approx(
-        1e3 * dexterity.manipulability(arm, q)
-    )
+    assert dexterity.manipulability(arm, q, 0.1) == pytest.approx(1e3 * dexterity.manipulability(arm, q))
 
 
 def test_samples_lie_in_the_annulus_that_the_arm_can_reach() -> None:

@@ -22,27 +22,16 @@ REACHED = 1e-9
 def modified_link(alpha: float, a: float, d: float, theta: float) -> Array:
     """Equation (10) of the lecture."""
     ca, sa, ct, st = math.cos(alpha), math.sin(alpha), math.cos(theta), math.sin(theta)
-    return np.array(
-        [
-            [ct, -st, 0, a],
-            [st * ca, ct * ca, -sa, -sa * d],
-            [st * sa, ct * sa, ca, ca * d],
-            [0, 0, 0, 1],
-        ]
-    )
+    return np.array([[ct, -st, 0, a], [st * ca, ct * ca, -sa, -sa * d], [st * sa, ct * sa, ca, ca * d], [0, 0, 0, 1]])
 
 
 def test_d1_a_modified_row_is_equation_10() -> None:
     for alpha, a, d, theta in np.random.default_rng(1).uniform(-2.0, 2.0, (100, 4)):
         chain = table([{"alpha": alpha, "a": a, "d": d, "theta": "q"}], angles="radians")
-        assert np.abs(
-            chain.link_transforms([theta])[0] - modified_link(alpha, a, d, theta)
-        ).max() < (ROUNDING)
+        assert np.abs(chain.link_transforms([theta])[0] - modified_link(alpha, a, d, theta)).max() < (ROUNDING)
 
 
-@pytest.mark.parametrize(
-    ("convention", "link"), [("standard", "RevoluteDH"), ("modified", "RevoluteMDH")]
-)
+@pytest.mark.parametrize(("convention", "link"), [("standard", "RevoluteDH"), ("modified", "RevoluteMDH")])
 def test_roboticstoolbox_builds_the_same_chain(convention: str, link: str) -> None:
     import roboticstoolbox as rtb  # takes seconds
 
@@ -104,9 +93,7 @@ def test_paths_of_a_chain_keep_their_steps_and_pass_the_straight_wrist() -> None
     q[4] = 0.0
     straight = robot.fk(q)
     swing = np.linspace(0.4, -0.4, 1000)
-    poses = np.array(
-        [transform(straight[:3, :3] @ rotation("y", a), straight[:3, 3]) for a in swing]
-    )
+    poses = np.array([transform(straight[:3, :3] @ rotation("y", a), straight[:3, 3]) for a in swing])
     found, statuses = stepped(robot, poses, robot.ik(poses[0]).q, 0.01)
     assert set(statuses) <= {IkStatus.FOLLOWED, IkStatus.NEAR_SINGULAR}
     assert np.abs(robot.fk(found[-1]) - poses[-1]).max() < REACHED

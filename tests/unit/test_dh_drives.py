@@ -12,8 +12,7 @@ from teleop_core.robots.drives import ENTRIES
 from ways import followed
 
 TABLES = tuple(
-    f"config/robots/{name}.yaml"
-    for name in ("rcrt1", "scara", "five_axis_standard", "five_axis_sheth_uicker")
+    f"config/robots/{name}.yaml" for name in ("rcrt1", "scara", "five_axis_standard", "five_axis_sheth_uicker")
 )
 TABLE = {
     "name": "my_arm",
@@ -68,10 +67,7 @@ def test_a_chain_that_states_every_entry_assumes_nothing() -> None:
         ({"q1": {"speed_limit": True}}, "drives q1 speed_limit"),
         ({"q1": {"speed_limit": "fast"}}, "drives q1 speed_limit"),
         ({"q1": {"bandwidth": 1e4}}, "drives q1 bandwidth"),
-        (
-            {"q1": {"inertia": 1e-6, "viscous": 1.0}},
-            "drives q1 (viscous + coulomb / friction_speed) / inertia",
-        ),
+        ({"q1": {"inertia": 1e-6, "viscous": 1.0}}, "drives q1 (viscous + coulomb / friction_speed) / inertia"),
     ],
 )
 def test_malformed_drives_of_a_chain_are_refused_by_name(

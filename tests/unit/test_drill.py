@@ -47,9 +47,7 @@ def trace(values: ArrayLike, numbers: Any = None) -> Any:
 
 
 @pytest.mark.parametrize(("steps", "ratio"), [([1e-3, 2e-3], 2.0), ([5e-4, -5e-4], 0.5)])
-def test_the_ratio_is_that_of_the_largest_step_of_any_joint(
-    steps: list[float], ratio: float
-) -> None:
+def test_the_ratio_is_that_of_the_largest_step_of_any_joint(steps: list[float], ratio: float) -> None:
     still = np.zeros((len(steps) + 1, 1))
     moving = np.concatenate(([0.0], np.cumsum(steps)))[:, np.newaxis]
     found = drill.measure.step_ratio(trace(np.hstack((still, moving))), np.array([9.0, 1.0]), DT)
@@ -57,9 +55,7 @@ def test_the_ratio_is_that_of_the_largest_step_of_any_joint(
 
 
 def test_messages_that_were_lost_count_as_ticks_in_which_a_joint_could_move() -> None:
-    assert drill.measure.step_ratio(trace([[0.0], [3e-3]], [0, 3]), np.array([1.0]), DT) == (
-        pytest.approx(1.0)
-    )
+    assert drill.measure.step_ratio(trace([[0.0], [3e-3]], [0, 3]), np.array([1.0]), DT) == (pytest.approx(1.0))
 
 
 def test_another_publisher_is_no_step() -> None:
@@ -123,18 +119,14 @@ def test_the_hand_goes_round_at_constant_speed_once_it_has_set_in() -> None:
     places = np.array([drill.hand.circle(time)[:3] for time in times])
     speeds = np.linalg.norm(np.diff(places, axis=0), axis=1) / drill.hand.PERIOD
     assert speeds == pytest.approx(2.0 * math.pi * drill.hand.RADIUS / drill.hand.ROUND, rel=1e-4)
-    assert (
-        np.linalg.norm(drill.hand.circle(drill.hand.PERIOD)[:3] - drill.hand.circle(0.0)[:3]) < 1e-6
-    )
+    assert np.linalg.norm(drill.hand.circle(drill.hand.PERIOD)[:3] - drill.hand.circle(0.0)[:3]) < 1e-6
 
 
 def sent(distortion: Callable[..., Any], count: int = 100) -> list[Sample]:
     """Samples that leave, of one every two milliseconds."""
     out = []
     for number in range(count):
-        out += distortion(
-            Sample(number * 2 * MS, drill.hand.circle(2.0 + number * drill.hand.PERIOD))
-        )
+        out += distortion(Sample(number * 2 * MS, drill.hand.circle(2.0 + number * drill.hand.PERIOD)))
     return out
 
 
@@ -172,10 +164,14 @@ def outcome(**changed: object) -> drill.Outcome:
     """One that is as expected, of an arm that was stopped."""
     good: dict[str, Any] = {
         "exercise": next(one for one in drill.EXERCISES if one.name == "stop_topic"),
-        "state": State.FAULT, "fault": Fault.STOP,
+        "state": State.FAULT,
+        "fault": Fault.STOP,
         "measures": {"travel_m": Measured("travel_m", "{0:.1f} mm, at most {1:.1f}", 1e-3, 2e-3)},
-        "recording": "intact", "recovered": 0.2, "cure": drill.Cure.RESET, "detected": 1e-3,
-    }  # fmt: skip
+        "recording": "intact",
+        "recovered": 0.2,
+        "cure": drill.Cure.RESET,
+        "detected": 1e-3,
+    }
     return drill.Outcome(**(good | changed))
 
 
@@ -244,9 +240,7 @@ ROBOT = NUMBERS.robot
 BEGIN: Any = 1_500 * MS
 
 
-def seen(
-    joints: Array, lies: float = 1.0, told: Any = None, warned: Any = None, late: float = 0.0
-) -> Seen:
+def seen(joints: Array, lies: float = 1.0, told: Any = None, warned: Any = None, late: float = 0.0) -> Seen:
     """What a tap hears of an arm whose setpoint and measured joints are these, each millisecond."""
     joints = np.asarray(joints)
     measured = ROBOT.start + lies * (joints - ROBOT.start)
@@ -292,9 +286,7 @@ def test_an_arm_that_goes_where_the_hand_goes_is_as_expected() -> None:
         (round_and_round(speed=0.0), ["path_m"]),
     ],
 )
-def test_an_arm_that_goes_on_goes_neither_faster_nor_slower_than_the_hand(
-    joints: Array, names: list[str]
-) -> None:
+def test_an_arm_that_goes_on_goes_neither_faster_nor_slower_than_the_hand(joints: Array, names: list[str]) -> None:
     assert wrong("loss", seen(joints)) == names
 
 
@@ -386,9 +378,7 @@ def test_a_joint_that_creeps_after_its_reference_and_stops_at_once_is_no_ramp() 
 
 
 @pytest.mark.parametrize("recorded", [[], [5, 6, 9], [5, 5, 6, 9, 9, 9]])
-def test_messages_that_are_not_recorded_are_counted_one_by_one(
-    tmp_path: Path, recorded: list[int]
-) -> None:
+def test_messages_that_are_not_recorded_are_counted_one_by_one(tmp_path: Path, recorded: list[int]) -> None:
     """Against a recording made by the writer itself; a stamp that comes again counts again."""
     heard = np.array([5, 5, 6, 7, 9, 9])
     names = ROBOT.joint_names

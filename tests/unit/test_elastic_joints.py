@@ -67,9 +67,7 @@ def test_a_gear_rings_at_the_frequency_of_two_masses_on_its_spring() -> None:
     for _ in range(1000):
         for i in range(1, 6):  # all other joints are held
             arm.q[i], s["link"][i], arm.dq[i], s["link_speed"][i] = held[i], held[i], 0.0, 0.0
-        integrate_elastic(
-            arm.acceleration, arm.dynamics, p, s, arm.contacts, 20, weight, arm.q, arm.dq, DT
-        )
+        integrate_elastic(arm.acceleration, arm.dynamics, p, s, arm.contacts, 20, weight, arm.q, arm.dq, DT)
         path.append((arm.q[0], s["link"][0]))
     motors, links = np.array(path).T
     # Nothing pushes from outside: the common centre of mass stays.

@@ -31,9 +31,7 @@ def test_an_error_of_another_process_is_the_same(error: errors.TeleopError) -> N
 @pytest.mark.parametrize("more", [0, 60])
 def test_the_nearest_name_stands_first_and_each_once(more: int) -> None:
     names = ["force_range", "coarse_gain", "force_gain", "force_gain"]
-    error = errors.UnknownNameError(
-        "key", "force_gian", [*names, *(f"other_{i}" for i in range(more))]
-    )
+    error = errors.UnknownNameError("key", "force_gian", [*names, *(f"other_{i}" for i in range(more))])
     assert error.alternatives[:3] == ("force_range", "coarse_gain", "force_gain")
     listed = str(error).partition("one of: ")[2].split(", ")
     assert listed[0] == "force_gain"

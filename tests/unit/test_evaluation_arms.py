@@ -33,8 +33,14 @@ COUNT = 5000
 JOINTS = {"": ("a", "b"), "left": ("c", "d", "e")}
 MM = 1e-3
 ROUNDING = 1e-9  # [mm], of metres in doubles
-METADATA = {"arms": "right left", "scenario": "pair", "robot": "rcrt1", "seed": "7",
-            "left/robot": "puma560", "left/seed": "8"}  # fmt: skip
+METADATA = {
+    "arms": "right left",
+    "scenario": "pair",
+    "robot": "rcrt1",
+    "seed": "7",
+    "left/robot": "puma560",
+    "left/seed": "8",
+}
 
 
 def state(gain: float) -> bytes:
@@ -43,10 +49,7 @@ def state(gain: float) -> bytes:
 
 
 def write(
-    path: Path,
-    offsets: dict[str, float],
-    metadata: dict[str, str] = METADATA,
-    lost: Sequence[Topic] = (),
+    path: Path, offsets: dict[str, float], metadata: dict[str, str] = METADATA, lost: Sequence[Topic] = ()
 ) -> Path:
     """A recording of arms whose tips are so far [m] from their references."""
     stamps = np.arange(1, COUNT + 1) * TICK_NS
@@ -155,9 +158,7 @@ def test_arm_that_was_recorded_alone_is_found_by_its_topics(tmp_path: Path) -> N
     assert topic_prefix(bag, "") == topic_prefix(bag, "left") == "left/"
 
 
-def test_arms_without_names_are_the_plain_one_and_those_with_topics_of_their_own(
-    tmp_path: Path,
-) -> None:
+def test_arms_without_names_are_the_plain_one_and_those_with_topics_of_their_own(tmp_path: Path) -> None:
     bag = Bag(write(tmp_path / "pair", {"": 1 * MM, "left": 3 * MM}, {"robot": "rcrt1"}))
     assert arm_names(bag) == ("", "left")
     plain, left = scores(bag)

@@ -101,9 +101,7 @@ def test_sphere_is_scored_by_the_distance_from_its_middle(recipe: Recipe, path: 
     assert (score.kind, score.unscored) == ("sphere", None)
 
 
-def test_box_of_the_hand_scores_as_the_box_of_the_slave_that_older_recordings_tell(
-    tmp_path: Path,
-) -> None:
+def test_box_of_the_hand_scores_as_the_box_of_the_slave_that_older_recordings_tell(tmp_path: Path) -> None:
     scores = []
     for described in (BOX, None):
         recipe = Recipe(2000)
@@ -114,8 +112,7 @@ def test_box_of_the_hand_scores_as_the_box_of_the_slave_that_older_recordings_te
         score = evaluate(recipe.write(tmp_path / str(described is None))).fixture
         assert score.kind == "box"
         scores.append(score)
-    for name in ("outside_share", "penetration_max_mm", "penetration_rms_mm", "on_s",
-                 "hand_penetration_max_mm"):  # fmt: skip
+    for name in ("outside_share", "penetration_max_mm", "penetration_rms_mm", "on_s", "hand_penetration_max_mm"):
         new, old = (getattr(score, name) for score in scores)
         assert np.isclose(new, old, rtol=1e-12), name
         assert new > 0.0
@@ -143,14 +140,18 @@ def test_each_arm_has_its_own_map_of_axes(recipe: Recipe, path: Path) -> None:
 @pytest.mark.parametrize(
     "axes",
     [
-        "-z", ["+x", "+y"], ["+x", "+x", "+y"], ["+x", "+y", "-z"], ["a", "b", "c"],
-        [["-z"], "-x", "+y"], [{}, "-x", "+y"], [None, 1, 0.5],
+        "-z",
+        ["+x", "+y"],
+        ["+x", "+x", "+y"],
+        ["+x", "+y", "-z"],
+        ["a", "b", "c"],
+        [["-z"], "-x", "+y"],
+        [{}, "-x", "+y"],
+        [None, 1, 0.5],
     ],
-)  # fmt: skip
+)
 def test_map_of_axes_that_is_none_is_the_published_one(
-    recipe: Recipe,
-    path: Path,
-    axes: str | Sequence[str | float | list[str] | dict[str, object] | None],
+    recipe: Recipe, path: Path, axes: str | Sequence[str | float | list[str] | dict[str, object] | None]
 ) -> None:
     said = {"motion_scaling": {"ros__parameters": {"axes": axes}}}
     recipe.metadata["configuration"] = yaml.safe_dump(said)
@@ -170,9 +171,7 @@ def test_kind_and_size_may_change_while_the_fixture_is_on(recipe: Recipe, path: 
     assert score.fixture.kind == "sphere and box"
     assert np.isclose(present(score.fixture.penetration_max_mm), 11.0, atol=ROUNDING_MM)
     mean_square = (1.0 + 11.0**2 + 1.0) / 3
-    assert np.isclose(
-        present(score.fixture.penetration_rms_mm), np.sqrt(mean_square), atol=ROUNDING_MM
-    )
+    assert np.isclose(present(score.fixture.penetration_rms_mm), np.sqrt(mean_square), atol=ROUNDING_MM)
     assert np.isclose(score.fixture.on_s, 1.5)
     drawn = {trace["name"] for trace in figures(bag)["Path in space"].traces}
     assert drawn >= {"sphere", "box"}
@@ -281,9 +280,7 @@ def test_only_a_box_is_held_against_the_published_overshoot(tmp_path: Path) -> N
     assert rows["box"]["slave outside, max"].published == "1.000"
 
 
-def test_another_robot_is_not_held_against_the_published_overshoot(
-    recipe: Recipe, path: Path
-) -> None:
+def test_another_robot_is_not_held_against_the_published_overshoot(recipe: Recipe, path: Path) -> None:
     recipe.singles = [fixture_on(BOX)]
     recipe.metadata["robot"] = "puma560"
     assert rows_of(recipe.write(path))["slave outside, max"].published == ""
@@ -297,8 +294,10 @@ def test_outline_stands_around_the_slave_in_every_picture(
     kind = described["fixture"]
     recipe.singles = [fixture_on(described, gain, at=200)]
     shown = figures(recipe.write(path))
-    ends = [(1e3 * middle - gain * size / 2, 1e3 * middle + gain * size / 2)
-            for middle, size in zip(CENTER, SIZES[kind], strict=True)]  # fmt: skip
+    ends = [
+        (1e3 * middle - gain * size / 2, 1e3 * middle + gain * size / 2)
+        for middle, size in zip(CENTER, SIZES[kind], strict=True)
+    ]
     (trace,) = [t for t in shown["Path in space"].traces if t["name"] == kind]
     for axis, (low, high) in zip("xyz", ends, strict=True):
         assert np.allclose((np.nanmin(trace[axis]), np.nanmax(trace[axis])), (low, high), atol=0.05)
@@ -316,9 +315,11 @@ def test_outline_stands_around_the_slave_in_every_picture(
 OPEN = {
     "half_space": ({"normal": (0.0, 1.0, 0.0), "room": 0.01}, [(2, -10.0)]),
     "box": ({"place": (0.0, 0.0, 0.025), "keep_out": True}, [(0, -10.0)]),
-    "line": ({"direction": (1.0, 0.0, 0.0), "radius": 0.002, "length": 0.0},
-             [(0, -2.0), (0, 2.0), (2, -2.0), (2, 2.0)]),
-}  # fmt: skip
+    "line": (
+        {"direction": (1.0, 0.0, 0.0), "radius": 0.002, "length": 0.0},
+        [(0, -2.0), (0, 2.0), (2, -2.0), (2, 2.0)],
+    ),
+}
 """Shapes that are open on a side, and their walls [mm] on the slave's axes."""
 
 
@@ -333,12 +334,9 @@ def test_walls_are_drawn_where_there_are_some_and_nowhere_else(
     recipe.singles = [fixture_on(told, gain, at=200)]
     shown = figures(recipe.write(path))
     found = {(s["yref"], s["y0"]) for s in shown["Position against time"].layout["shapes"]}
-    expected = [(f"y{axis + 1}" if axis else "y", 1e3 * CENTER[axis] + gain * place)
-                for axis, place in walls]  # fmt: skip
+    expected = [(f"y{axis + 1}" if axis else "y", 1e3 * CENTER[axis] + gain * place) for axis, place in walls]
     assert [axis for axis, _ in sorted(found)] == [axis for axis, _ in sorted(expected)]
-    np.testing.assert_allclose(
-        [place for _, place in sorted(found)], [p for _, p in sorted(expected)], atol=1e-3
-    )
+    np.testing.assert_allclose([place for _, place in sorted(found)], [p for _, p in sorted(expected)], atol=1e-3)
     assert f"leaves the {kind} by" in shown["Path in space"].sentence
 
 

@@ -33,10 +33,14 @@ BUILT_IN = ["haptic_master", "motion_scaling", "inverse_kinematics", "slave", "s
 SMOOTH_CP = Topic("slave/smooth_cp", Kind.POSE, passed_on("slave/servo_cp"), "slave_base")
 NOISE_CV = Topic("slave/noise_cv", Kind.TWIST)
 SMOOTHER = Stage(
-    "smoother", NoParameters, reads=(SLAVE_SERVO_CP,), writes=(SMOOTH_CP, NOISE_CV),
-    step=lambda parameters, state, signals, dt: None, replaces=SLAVE_SERVO_CP,
+    "smoother",
+    NoParameters,
+    reads=(SLAVE_SERVO_CP,),
+    writes=(SMOOTH_CP, NOISE_CV),
+    step=lambda parameters, state, signals, dt: None,
+    replaces=SLAVE_SERVO_CP,
     trigger=SLAVE_SERVO_CP,
-)  # fmt: skip
+)
 
 
 def configuration(**session: int | list[str]) -> str:
@@ -50,8 +54,13 @@ def recipe() -> Recipe:
     made.topics += [SMOOTH_CP, NOISE_CV]
     made.metadata["configuration"] = configuration(stages=["smoother"])
     poses, joints = pose_rows(2000), np.zeros((2000, 6))
-    way = {MASTER_MEASURED_CP: poses, SLAVE_SERVO_CP: poses, SMOOTH_CP: poses,
-           SLAVE_SERVO_JP: joints, SLAVE_SETPOINT_JS: joints}  # fmt: skip
+    way = {
+        MASTER_MEASURED_CP: poses,
+        SLAVE_SERVO_CP: poses,
+        SMOOTH_CP: poses,
+        SLAVE_SERVO_JP: joints,
+        SLAVE_SETPOINT_JS: joints,
+    }
     for place, (topic, rows) in enumerate(way.items(), start=1):
         made.rows[topic] = (made.stamps, rows, made.stamps + place * 100_000)
     return made
@@ -76,9 +85,7 @@ def test_stage_of_a_user_has_its_own_latency(recipe: Recipe, path: Path) -> None
 
 
 @pytest.mark.usefixtures("_smoother")
-def test_table_and_page_show_the_stage_of_a_user(
-    recipe: Recipe, path: Path, tmp_path: Path
-) -> None:
+def test_table_and_page_show_the_stage_of_a_user(recipe: Recipe, path: Path, tmp_path: Path) -> None:
     recipe.write(path)
     shown = Console(width=80, record=True, file=io.StringIO(), color_system=None)
     evaluate_bags([path], None, tmp_path / "page.html", shown)
@@ -91,10 +98,7 @@ def test_table_and_page_show_the_stage_of_a_user(
 def test_gaps_of_a_topic_of_a_user_are_counted(recipe: Recipe, path: Path) -> None:
     recipe.drop(SMOOTH_CP, [100, 101, 500])
     score = evaluate(recipe.write(path))
-    assert (score.topics["slave/smooth_cp"].count, score.topics["slave/smooth_cp"].gaps) == (
-        1997,
-        3,
-    )
+    assert (score.topics["slave/smooth_cp"].count, score.topics["slave/smooth_cp"].gaps) == (1997, 3)
     assert score.topics["slave/servo_cp"].gaps == 0
 
 
@@ -106,9 +110,7 @@ def test_a_recording_that_lacks_many_messages_is_told_so_first(recipe: Recipe, p
 
 
 @pytest.mark.usefixtures("_smoother")
-def test_only_a_stamp_that_is_passed_on_may_come_again_for_one_that_was_lost(
-    recipe: Recipe, path: Path
-) -> None:
+def test_only_a_stamp_that_is_passed_on_may_come_again_for_one_that_was_lost(recipe: Recipe, path: Path) -> None:
     stamps = recipe.stamps.copy()
     stamps[700] = stamps[699]
     recipe.rows[SMOOTH_CP] = (stamps, pose_rows(2000), recipe.stamps)
@@ -140,9 +142,7 @@ def test_stage_that_is_not_installed_leaves_the_built_in_ones(recipe: Recipe, pa
         configuration(arms=3),
     ],
 )
-def test_graph_that_cannot_be_built_is_that_of_the_built_in_stages(
-    recipe: Recipe, path: Path, text: str
-) -> None:
+def test_graph_that_cannot_be_built_is_that_of_the_built_in_stages(recipe: Recipe, path: Path, text: str) -> None:
     recipe.metadata["configuration"] = text
     assert read_origin(recipe.write(path)).graph == build_graph()
 

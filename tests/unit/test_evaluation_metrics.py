@@ -107,12 +107,7 @@ def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
         for begin in range(0, COUNT, 500):
             part = slice(begin, begin + 500)
             rows = {SLAVE_MEASURED_CP: poses, SLAVE_SETPOINT_CP: beside, SLAVE_SERVO_CP: beside}
-            writer.write_block(
-                {
-                    topic: (stamps[part], values[part], stamps[part])
-                    for topic, values in rows.items()
-                }
-            )
+            writer.write_block({topic: (stamps[part], values[part], stamps[part]) for topic, values in rows.items()})
     return out
 
 
@@ -214,9 +209,7 @@ def test_unknown_key_is_told_with_the_alternatives_nearby(bag: Bag) -> None:
     score = evaluate(bag)
     with pytest.raises(UnknownNameError) as caught:
         score.value("position_error_mm.mean")
-    assert caught.value.alternatives == tuple(
-        f"position_error_mm.{n}" for n in ("rms", "sd", "max")
-    )
+    assert caught.value.alternatives == tuple(f"position_error_mm.{n}" for n in ("rms", "sd", "max"))
     with pytest.raises(UnknownNameError, match=r"in all"):
         score.value("jerk.rms")
     with pytest.raises(EvaluationError, match="of cubic is 'cubic', must be a number"):
@@ -249,9 +242,7 @@ def test_score_tells_what_it_is_in_three_lines_and_as_a_table(bag: Bag) -> None:
 # -- wrong metrics ---------------------------------------------------------------------------------
 
 
-def changed(
-    **entries: str | Sequence[str | Key | Topic] | Callable[..., object],
-) -> type[JerkMetric]:
+def changed(**entries: str | Sequence[str | Key | Topic] | Callable[..., object]) -> type[JerkMetric]:
     """The jerk metric with something else in it."""
     return type("Changed", (JerkMetric,), entries)
 
@@ -287,9 +278,7 @@ def test_wrong_metric_is_refused_before_anything_runs(
 
 
 @pytest.mark.parametrize("name", ["session", "a.b", ""])
-def test_name_that_json_cannot_hold_is_refused(
-    added: Callable[[str, object], None], name: str
-) -> None:
+def test_name_that_json_cannot_hold_is_refused(added: Callable[[str, object], None], name: str) -> None:
     with pytest.raises(PartError, match=r"without dots|named by letters"):
         added(name, changed(name=name, keys=()))
 
@@ -316,9 +305,7 @@ def test_metric_that_raises_is_named_in_one_line(bag: Bag, method: str) -> None:
         evaluate(bag, further=[part])
 
 
-def test_metric_that_cannot_draw_is_named(
-    added: Callable[[str, object], None], path: Path, tmp_path: Path
-) -> None:
+def test_metric_that_cannot_draw_is_named(added: Callable[[str, object], None], path: Path, tmp_path: Path) -> None:
     added("jerk", changed(figures=fail))
     with pytest.raises(EvaluationError, match="'jerk' failed with ZeroDivisionError"):
         evaluate_bags([path], None, tmp_path / "page.html", Console(file=io.StringIO()))

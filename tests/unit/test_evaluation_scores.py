@@ -50,8 +50,14 @@ from teleop_core.graph.topics import (
 EXACT_MM = 1e-9
 EXACT_DEG = 1e-7
 STAGES = ("haptic_master", "motion_scaling", "inverse_kinematics", "slave", "total")
-BOX: dict[str, Any] = {"is_fixture_on": 1.0, "fixture_center_x": 0.4, "fixture_center_z": -0.18,
-       "fixture_size_x": 0.03, "fixture_size_y": 0.03, "fixture_size_z": 0.03}  # fmt: skip
+BOX: dict[str, Any] = {
+    "is_fixture_on": 1.0,
+    "fixture_center_x": 0.4,
+    "fixture_center_z": -0.18,
+    "fixture_size_x": 0.03,
+    "fixture_size_y": 0.03,
+    "fixture_size_z": 0.03,
+}
 
 
 @pytest.fixture
@@ -67,9 +73,7 @@ def path(tmp_path: Path) -> Path:
 # -- errors ----------------------------------------------------------------------------------------
 
 
-def test_constant_offset_gives_its_length_as_rms_and_maximum_and_no_deviation(
-    recipe: Any, path: Path
-) -> None:
+def test_constant_offset_gives_its_length_as_rms_and_maximum_and_no_deviation(recipe: Any, path: Path) -> None:
     recipe.values(SLAVE_MEASURED_CP)[:, :3] += [3e-4, 0.0, 4e-4]
     error: Any = evaluate(recipe.write(path)).position_error_mm
     assert np.allclose((error.rms, error.sd, error.max), (0.5, 0.0, 0.5), atol=EXACT_MM)
@@ -83,9 +87,7 @@ def test_errors_against_reference_and_command_are_told_apart(recipe: Recipe, pat
     assert np.isclose(present(score.command_error_mm.max), np.sqrt(5.0), atol=EXACT_MM)
 
 
-def test_command_error_takes_the_command_that_was_known_at_the_sampling_time(
-    recipe: Recipe, path: Path
-) -> None:
+def test_command_error_takes_the_command_that_was_known_at_the_sampling_time(recipe: Recipe, path: Path) -> None:
     stamps, values, logs = recipe.rows[SLAVE_SERVO_CP]
     values[1500:, 0] += 5e-3
     recipe.rows[SLAVE_SERVO_CP] = (stamps + 200, values, logs + 200)  # 0.2 us after the sampling
@@ -95,8 +97,7 @@ def test_command_error_takes_the_command_that_was_known_at_the_sampling_time(
 
 
 @pytest.mark.parametrize(
-    ("angles", "expected"),
-    [((0.3, 66.6, 0.0), "roll"), ((0.0, 66.9, 0.0), "pitch"), ((0.0, 66.6, 0.3), "yaw")],
+    ("angles", "expected"), [((0.3, 66.6, 0.0), "roll"), ((0.0, 66.9, 0.0), "pitch"), ((0.0, 66.6, 0.3), "yaw")]
 )
 def test_turn_about_one_fixed_axis_is_an_error_of_its_angle_alone(
     recipe: Recipe, path: Path, angles: tuple[float, float, float], expected: str
@@ -105,9 +106,7 @@ def test_turn_about_one_fixed_axis_is_an_error_of_its_angle_alone(
     error = evaluate(recipe.write(path)).orientation_error_deg
     for name in ("roll", "pitch", "yaw"):
         spread, largest = getattr(error, name), 0.3 if name == expected else 0.0
-        assert np.allclose(
-            (spread.rms, spread.sd, spread.max), (largest, 0, largest), atol=EXACT_DEG
-        )
+        assert np.allclose((spread.rms, spread.sd, spread.max), (largest, 0, largest), atol=EXACT_DEG)
     assert error.degenerate_share == 0.0
 
 
@@ -119,9 +118,7 @@ def test_turn_beyond_180_degrees_is_the_short_way_round(recipe: Recipe, path: Pa
     assert np.isclose(present(error.angle.max), 0.2, atol=EXACT_DEG)
 
 
-def test_orientation_straight_down_has_no_roll_and_no_yaw_but_an_angle(
-    recipe: Recipe, path: Path
-) -> None:
+def test_orientation_straight_down_has_no_roll_and_no_yaw_but_an_angle(recipe: Recipe, path: Path) -> None:
     recipe.values(SLAVE_SETPOINT_CP)[:] = pose_rows(3000, angles=(0.0, 90.0, 0.0))
     recipe.values(SLAVE_MEASURED_CP)[:] = pose_rows(3000, angles=(0.0, 90.0, 0.5))
     error = evaluate(recipe.write(path)).orientation_error_deg
@@ -130,9 +127,7 @@ def test_orientation_straight_down_has_no_roll_and_no_yaw_but_an_angle(
     assert np.isclose(present(error.angle.rms), 0.5, atol=EXACT_DEG)
 
 
-def test_lost_messages_do_not_pair_a_pose_with_the_reference_of_another_tick(
-    recipe: Any, path: Path
-) -> None:
+def test_lost_messages_do_not_pair_a_pose_with_the_reference_of_another_tick(recipe: Any, path: Path) -> None:
     motion = np.linspace(0.0, 0.3, 3000)[:, None] * [1.0, 0.0, 0.0]  # 0.1 mm each tick
     for topic in recipe.rows:
         recipe.values(topic)[:, :3] += motion
@@ -188,9 +183,7 @@ def test_force_is_scored_by_its_magnitude(recipe: Recipe, path: Path) -> None:
     assert np.isclose(present(evaluate(recipe.write(path)).force_n.rms), 5.0)
 
 
-def test_without_state_and_force_their_scores_are_not_applicable(
-    recipe: Recipe, path: Path
-) -> None:
+def test_without_state_and_force_their_scores_are_not_applicable(recipe: Recipe, path: Path) -> None:
     recipe.singles = []
     score = evaluate(recipe.write(path))
     assert score.session.gain is None
@@ -214,9 +207,7 @@ def test_a_fall_of_the_force_on_the_tip_counts_from_sample_to_sample_but_not_ove
     assert score.value("touch.drop_n") == pytest.approx(1.5)
 
 
-def test_a_tool_that_follows_misses_its_remote_centre_by_the_distance_of_its_shaft(
-    recipe: Recipe, path: Path
-) -> None:
+def test_a_tool_that_follows_misses_its_remote_centre_by_the_distance_of_its_shaft(recipe: Recipe, path: Path) -> None:
     poses = recipe.values(SLAVE_MEASURED_CP)
     poses[:, 3:7] = [1.0, 0.0, 0.0, 0.0]
     beside = np.where(np.arange(len(poses)) % 2, 3e-3, 4e-3)
@@ -282,9 +273,7 @@ def test_a_transfer_takes_from_the_last_grip_to_rest_and_what_was_before_does_no
     assert score.value("transfer.time_s") == pytest.approx(0.15, abs=1e-9)
 
 
-def test_a_hand_waits_where_it_rests_for_longer_than_three_tenths_of_a_second(
-    recipe: Recipe, path: Path
-) -> None:
+def test_a_hand_waits_where_it_rests_for_longer_than_three_tenths_of_a_second(recipe: Recipe, path: Path) -> None:
     stamps = recipe.stamps[0] // 10**9 * 10**9 + np.arange(4000) * 1_000_000
     poses = pose_rows(len(stamps))
     speed = np.full(len(stamps), 0.02)  # 2 mm in a tenth of a second
@@ -296,9 +285,7 @@ def test_a_hand_waits_where_it_rests_for_longer_than_three_tenths_of_a_second(
     assert score.value("waits.share") == pytest.approx((10 - 3) / 40, abs=1 / 40)
 
 
-def test_peaks_of_a_force_count_where_it_rises_and_falls_by_a_tenth_of_a_newton(
-    recipe: Recipe, path: Path
-) -> None:
+def test_peaks_of_a_force_count_where_it_rises_and_falls_by_a_tenth_of_a_newton(recipe: Recipe, path: Path) -> None:
     force = np.zeros((len(recipe.stamps), 6))
     for begin, height in ((100, 0.5), (300, 1.0), (500, 0.09), (700, 0.2)):
         force[begin : begin + 100, 2] = height * np.sin(np.linspace(0.0, np.pi, 100))
@@ -351,10 +338,7 @@ def test_stage_that_was_not_recorded_has_no_delay(recipe: Recipe, path: Path) ->
 def test_dropped_samples_are_gaps_of_their_topic_alone(recipe: Recipe, path: Path) -> None:
     recipe.drop(SLAVE_MEASURED_CP, [100, 101, 102, 999, 1000, 2500])
     score = evaluate(recipe.write(path))
-    assert (score.topics["slave/measured_cp"].count, score.topics["slave/measured_cp"].gaps) == (
-        2994,
-        6,
-    )
+    assert (score.topics["slave/measured_cp"].count, score.topics["slave/measured_cp"].gaps) == (2994, 6)
     assert score.topics["slave/servo_cp"].gaps == 0
     assert score.topics["teleop/state"].gaps is None
     assert (score.ticks.executed, score.ticks.late, score.ticks.dropped) == (2994, None, 6)
@@ -369,9 +353,14 @@ def test_topic_recorded_at_a_tenth_of_the_rate_has_no_gaps(recipe: Recipe, path:
 def test_ticks_are_those_that_the_slave_reported_last(recipe: Recipe, path: Path) -> None:
     for second in (1, 2):
         at = START_NS + second * 1000 * TICK_NS
-        values = {"ticks": str(1000 * second), "late": str(3 * second),
-                  "missed": str(9 * second), "caught_up": str(8 * second),
-                  "rate_hz": "999.9", "refused.slave/servo_jp.jump": "0"}  # fmt: skip
+        values = {
+            "ticks": str(1000 * second),
+            "late": str(3 * second),
+            "missed": str(9 * second),
+            "caught_up": str(8 * second),
+            "rate_hz": "999.9",
+            "refused.slave/servo_jp.jump": "0",
+        }
         recipe.singles.append((DIAGNOSTICS, at, report(at, "slave_sim", 0, "ACTIVE", values)))
     score = evaluate(recipe.write(path))
     assert (score.ticks.executed, score.ticks.late) == (2000, 6)
@@ -393,9 +382,7 @@ def test_long_recording_scores_the_same_window_by_window_as_at_once(
     bag = recipe.write(path)
     parts = list(windows(bag, recipe.rows))
     assert len(parts) > 13_000 * TICK_NS // (2 * WINDOW_NS)
-    assert (
-        sum(p.own(SLAVE_MEASURED_CP).stop - p.own(SLAVE_MEASURED_CP).start for p in parts) == 13_000
-    )
+    assert sum(p.own(SLAVE_MEASURED_CP).stop - p.own(SLAVE_MEASURED_CP).start for p in parts) == 13_000
     streamed: dict[str, Any] = evaluate(bag).to_json()
     monkeypatch.setattr("teleop_core.evaluation.windows.WINDOW_NS", 10**15)
     once: dict[str, Any] = evaluate(bag).to_json()
@@ -455,12 +442,7 @@ def pattern(key: str) -> str:
 
 def test_session_is_told_by_the_metadata(recipe: Recipe, path: Path) -> None:
     session = evaluate(recipe.write(path)).session
-    assert (session.name, session.scenario, session.robot, session.seed) == (
-        "bag",
-        "at_rest",
-        "rcrt1",
-        7,
-    )
+    assert (session.name, session.scenario, session.robot, session.seed) == ("bag", "at_rest", "rcrt1", 7)
     assert np.isclose(session.duration_s, 2.999)
 
 
@@ -508,9 +490,7 @@ def test_texts_of_a_recording_cannot_become_markup(recipe: Recipe, tmp_path: Pat
 
 
 @pytest.mark.parametrize("topic", [SLAVE_MEASURED_CP, SLAVE_SETPOINT_CP, SLAVE_SERVO_CP])
-def test_missing_topic_is_named_with_what_there_is(
-    recipe: Recipe, path: Path, topic: Topic
-) -> None:
+def test_missing_topic_is_named_with_what_there_is(recipe: Recipe, path: Path, topic: Topic) -> None:
     del recipe.rows[topic]
     recipe.write(path)
     with pytest.raises(RecordingError) as caught:
@@ -528,9 +508,7 @@ def test_poses_that_never_meet_their_reference_are_refused(recipe: Recipe, path:
 
 
 @pytest.mark.parametrize(("text", "told"), [("wide", "must be a number"), (None, "lacks gain")])
-def test_state_of_another_make_is_refused_in_one_line(
-    recipe: Recipe, path: Path, text: Any, told: str
-) -> None:
+def test_state_of_another_make_is_refused_in_one_line(recipe: Recipe, path: Path, text: Any, told: str) -> None:
     values = dict.fromkeys(STATE_FIELDS, "0.0") | {"gain": text}
     values = {name: value for name, value in values.items() if value is not None}
     recipe.singles = [(TELEOP_STATE, START_NS, report(START_NS, "teleop", 0, "", values))]
@@ -538,9 +516,7 @@ def test_state_of_another_make_is_refused_in_one_line(
         evaluate(recipe.write(path))
 
 
-def test_nothing_is_written_when_one_recording_cannot_be_scored(
-    recipe: Recipe, path: Path, tmp_path: Path
-) -> None:
+def test_nothing_is_written_when_one_recording_cannot_be_scored(recipe: Recipe, path: Path, tmp_path: Path) -> None:
     recipe.write(path)
     target = tmp_path / "scores.json"
     with pytest.raises(RecordingError):

@@ -54,9 +54,7 @@ def test_spread_does_not_depend_on_how_the_samples_are_cut(stretches: list[list[
 
 def test_sample_deviation_of_a_small_error_on_a_large_mean_keeps_its_digits() -> None:
     samples = 1e6 + np.tile([1e-3, -1e-3], 5000)
-    assert np.isclose(
-        present(moments(samples[:7], samples[7:]).spread().sd), samples.std(ddof=1), rtol=1e-6
-    )
+    assert np.isclose(present(moments(samples[:7], samples[7:]).spread().sd), samples.std(ddof=1), rtol=1e-6)
 
 
 def test_spread_without_samples_is_not_applicable() -> None:
@@ -226,9 +224,7 @@ def test_quaternion_order_is_that_of_the_package() -> None:
 # -- published figures ----------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("gain", "mode"), [(1.0, COARSE), (0.5, COARSE), (2.0, COARSE), (0.1, FINE), (0.2, FINE)]
-)
+@pytest.mark.parametrize(("gain", "mode"), [(1.0, COARSE), (0.5, COARSE), (2.0, COARSE), (0.1, FINE), (0.2, FINE)])
 def test_gain_chooses_the_published_mode(gain: float, mode: Published) -> None:
     assert published_for(gain) is mode
 

@@ -19,9 +19,7 @@ PUBLIC = {
     "teleop_drill", "teleop_console", "teleop_exchange", "teleop_lab.experiments", "numpy",
     "numpy.typing", "pandas", "plotly.graph_objects",
 }  # fmt: skip
-ROS_EXAMPLES = {
-    "crtk_client", "foreign_slave", "own_exercise", "ros_device", "simulated_controller",
-}  # fmt: skip
+ROS_EXAMPLES = {"crtk_client", "foreign_slave", "own_exercise", "ros_device", "simulated_controller"}
 ROS = {
     "crtk_msgs.msg",
     "rclpy",

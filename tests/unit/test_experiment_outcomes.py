@@ -15,16 +15,7 @@ from hypothesis import strategies as st
 from teleop_core.base.errors import ParameterError, UnknownNameError
 from teleop_core.evaluation.figure import Figure
 from teleop_lab import experiments
-from teleop_lab.experiments import (
-    EXACT,
-    Experiment,
-    Outcome,
-    Row,
-    Tolerance,
-    absolute,
-    factor,
-    percent,
-)
+from teleop_lab.experiments import EXACT, Experiment, Outcome, Row, Tolerance, absolute, factor, percent
 from teleop_lab.experiments.experiment_table import numbers, summary, text
 from teleop_lab.experiments.page import experiments_page
 

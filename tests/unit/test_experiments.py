@@ -15,15 +15,7 @@ from teleop_core.session.configuration import configure
 from teleop_core.session.recording import Stream
 from teleop_lab import experiments
 from teleop_lab.experiments import Bench, Experiment, Findings, Row
-from teleop_lab.experiments.accuracy import (
-    AXES,
-    DESIRED_MM,
-    Axis,
-    as_read,
-    longer_d3,
-    moved,
-    readings,
-)
+from teleop_lab.experiments.accuracy import AXES, DESIRED_MM, Axis, as_read, longer_d3, moved, readings
 from teleop_lab.experiments.points24 import Visits, visits_of
 from teleop_lab.experiments.reference_filter import gain_at, step_response
 from teleop_lab.experiments.responses import response
@@ -133,9 +125,7 @@ def test_bench_of_the_same_seed_gives_the_same_bits() -> None:
     assert first.score.to_json() == second.score.to_json()
 
 
-def test_streams_of_an_old_session_come_back_with_the_same_bits(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_streams_of_an_old_session_come_back_with_the_same_bits(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("teleop_lab.experiments.bench._WHOLE", 1)
     bench = Bench()
     old = bench.session("coarse_box", settings=SHORT)
@@ -303,9 +293,7 @@ def test_friction_that_sticks_keeps_the_tip_off_where_the_ideal_arm_rests() -> N
     target = np.array([0.3, 1.9, 0.40, 0.4, 0.5, -0.3])
     off = {
         plant: np.linalg.norm(
-            response(
-                Bench(settings={"plant": plant, "controller": "source_pid"}).slave(), target
-            ).error_mm[-1]
+            response(Bench(settings={"plant": plant, "controller": "source_pid"}).slave(), target).error_mm[-1]
         )
         for plant in ("ideal", "hardware")
     }

@@ -56,9 +56,7 @@ def test_table_is_the_frame_of_the_recording(
     assert not list(tmp_path.glob(".*"))
 
 
-def test_without_topics_all_numbers_are_there_and_states_are_held(
-    saved: tc.Recording, tmp_path: Path
-) -> None:
+def test_without_topics_all_numbers_are_there_and_states_are_held(saved: tc.Recording, tmp_path: Path) -> None:
     teleop_exchange.export_recording(saved, tmp_path / "all.parquet")
     got = pd.read_parquet(tmp_path / "all.parquet")
     for name in saved.topics:
@@ -78,9 +76,7 @@ def test_a_report_alone_has_a_row_for_each_message(saved: tc.Recording, tmp_path
 
 
 def test_rows_at_a_rate_hold_the_newest_message(saved: tc.Recording, tmp_path: Path) -> None:
-    teleop_exchange.export_recording(
-        saved, tmp_path / "a.csv", topics=["slave/measured_cp"], rate=125.0
-    )
+    teleop_exchange.export_recording(saved, tmp_path / "a.csv", topics=["slave/measured_cp"], rate=125.0)
     got = pd.read_csv(tmp_path / "a.csv")
     stream = saved["slave/measured_cp"]
     assert np.allclose(got["time"], np.arange(len(got)) / 125.0, rtol=0, atol=1e-9)
@@ -88,9 +84,7 @@ def test_rows_at_a_rate_hold_the_newest_message(saved: tc.Recording, tmp_path: P
     assert len(got) == int(saved.duration * 125.0) + 1
 
 
-def test_units_stand_in_the_metadata_and_on_request_in_the_names(
-    saved: tc.Recording, tmp_path: Path
-) -> None:
+def test_units_stand_in_the_metadata_and_on_request_in_the_names(saved: tc.Recording, tmp_path: Path) -> None:
     topics = ["slave/measured_cp", "slave/measured_js", "master/measured_cf"]
     for name, units in (("plain.parquet", False), ("named.parquet", True)):
         teleop_exchange.export_recording(saved, tmp_path / name, topics=topics, units=units)
@@ -113,8 +107,9 @@ def sparse(path: Path, chunks: int) -> tc.Recording:
             poses[:, 1] = np.arange(100)
             presses = stamps[::33] + 1_000_000
             pressed = np.tile([begin % 2, 0.0, 1.0], (len(presses), 1))
-            writer.write_block({MASTER_MEASURED_CP: (stamps, poses, stamps),
-                                MASTER_BUTTONS: (presses, pressed, presses)})  # fmt: skip
+            writer.write_block(
+                {MASTER_MEASURED_CP: (stamps, poses, stamps), MASTER_BUTTONS: (presses, pressed, presses)}
+            )
     return tc.open_recording(path)
 
 
@@ -225,9 +220,7 @@ def test_counters_of_a_data_set_count(data_set: tuple[Path, teleop_exchange.Expo
     assert not np.any(frames["task_index"])
 
 
-def test_descriptions_of_a_data_set_agree_with_its_frames(
-    data_set: tuple[Path, teleop_exchange.ExportReport],
-) -> None:
+def test_descriptions_of_a_data_set_agree_with_its_frames(data_set: tuple[Path, teleop_exchange.ExportReport]) -> None:
     out, _ = data_set
     frames, info = frames_of(out), json.loads((out / "meta/info.json").read_text())
     assert info["codebase_version"] == "v3.0"
@@ -248,9 +241,12 @@ def test_descriptions_of_a_data_set_agree_with_its_frames(
     stats = json.loads((out / "meta/stats.json").read_text())
     state = vectors(frames["observation.state"])
     for name, expected in (
-        ("min", state.min(0)), ("max", state.max(0)), ("mean", state.mean(0)),
-        ("std", state.std(0)), ("q90", np.quantile(state, 0.9, axis=0)),
-    ):  # fmt: skip
+        ("min", state.min(0)),
+        ("max", state.max(0)),
+        ("mean", state.mean(0)),
+        ("std", state.std(0)),
+        ("q90", np.quantile(state, 0.9, axis=0)),
+    ):
         assert np.allclose(stats["observation.state"][name], expected, rtol=1e-6, atol=1e-9)
 
 
@@ -291,19 +287,21 @@ print(json.dumps([len(found), found.num_episodes, found[0]["task"],
 """
 
 
-def test_the_loader_of_lerobot_reads_the_same_numbers(
-    data_set: tuple[Path, teleop_exchange.ExportReport],
-) -> None:
+def test_the_loader_of_lerobot_reads_the_same_numbers(data_set: tuple[Path, teleop_exchange.ExportReport]) -> None:
     """LEROBOT_PYTHON names a Python that has the lerobot package; else that of the tests."""
     python = os.environ.get("LEROBOT_PYTHON", sys.executable)
-    tried = subprocess.run(
-        [python, "-c", "import lerobot.datasets.lerobot_dataset"], capture_output=True, check=False
-    )
+    tried = subprocess.run([python, "-c", "import lerobot.datasets.lerobot_dataset"], capture_output=True, check=False)
     if tried.returncode:
         pytest.skip("the lerobot package is not installed")
     out = str(Path(data_set[0]))
-    done = subprocess.run([python, "-c", _LOADER, out], capture_output=True, text=True, timeout=300,
-                          check=False, env=os.environ | {"HF_HUB_OFFLINE": "1"})  # fmt: skip
+    done = subprocess.run(
+        [python, "-c", _LOADER, out],
+        capture_output=True,
+        text=True,
+        timeout=300,
+        check=False,
+        env=os.environ | {"HF_HUB_OFFLINE": "1"},
+    )
     assert done.returncode == 0, done.stderr
     count, episodes, task, states, actions = json.loads(done.stdout.splitlines()[-1])
     frames = frames_of(data_set[0])

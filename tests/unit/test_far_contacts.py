@@ -18,8 +18,7 @@ def steel() -> dict[str, drift.Drift]:
 
 @pytest.fixture(scope="module")
 def pricked() -> dict[tuple[tuple[str, str], float], puncture.Puncture]:
-    jobs = [(FORCE, 0.0), (FORCE, 0.2), (("position_position", "none"), 0.2),
-            (("position_force", "wave"), 0.4)]  # fmt: skip
+    jobs = [(FORCE, 0.0), (FORCE, 0.2), (("position_position", "none"), 0.2), (("position_force", "wave"), 0.4)]
     return {job: puncture.measure_puncture(Bench(), job) for job in jobs}
 
 
@@ -27,11 +26,7 @@ def pricked() -> dict[tuple[tuple[str, str], float], puncture.Puncture]:
 def test_ten_contacts_700_ms_away_leave_no_drift_that_grows_with_tdpa(
     material: str, steel: dict[str, drift.Drift]
 ) -> None:
-    found = (
-        steel["tdpa"]
-        if material == "steel"
-        else drift.measure_drift(Bench(), (material, "tdpa", FAR))
-    )
+    found = steel["tdpa"] if material == "steel" else drift.measure_drift(Bench(), (material, "tdpa", FAR))
     assert len(found.left) == drift.CONTACTS
     # Until the hand has paid what the first contact cost, the arm goes slowly.
     assert 1e3 * found.left.max() < 3.0 * drift.GOAL_MM
@@ -40,26 +35,20 @@ def test_ten_contacts_700_ms_away_leave_no_drift_that_grows_with_tdpa(
     assert found.leaving.min() > (1e-4 if material == "tissue" else 2e-3)  # held back in touch
 
 
-def test_a_command_that_nothing_holds_back_has_no_drift_but_gives_more_energy(
-    steel: dict[str, drift.Drift],
-) -> None:
+def test_a_command_that_nothing_holds_back_has_no_drift_but_gives_more_energy(steel: dict[str, drift.Drift]) -> None:
     assert steel["none"].peak == 0.0
     assert steel["none"].given > 0.1
     for kind in ("tank", "tdpa", "wave"):  # their drags take energy
         assert steel[kind].given < 0.0
 
 
-def test_a_tank_holds_a_command_back_before_steel_and_leaves_no_drift_either(
-    steel: dict[str, drift.Drift],
-) -> None:
+def test_a_tank_holds_a_command_back_before_steel_and_leaves_no_drift_either(steel: dict[str, drift.Drift]) -> None:
     assert len(steel["tank"].left) == drift.CONTACTS  # no drive had to give all it has
     assert steel["tank"].peak > 2e-3
     assert 1e3 * steel["tank"].left.max() < drift.GOAL_MM
 
 
-def test_tdpa_presses_steel_no_harder_than_the_arm_that_is_on_its_way(
-    steel: dict[str, drift.Drift],
-) -> None:
+def test_tdpa_presses_steel_no_harder_than_the_arm_that_is_on_its_way(steel: dict[str, drift.Drift]) -> None:
     assert 5.0 < steel["tdpa"].force < 18.5
 
 
@@ -76,9 +65,7 @@ def test_a_hand_notices_a_puncture_as_soon_as_the_news_is_there(
 def test_the_tip_overshoots_by_the_way_of_round_trip_and_reaction_and_by_what_springs(
     pricked: dict[tuple[tuple[str, str], float], puncture.Puncture],
 ) -> None:
-    assert puncture.least_overshoot(0.2) - puncture.least_overshoot(0.0) == pytest.approx(
-        0.2 * puncture.SPEED
-    )
+    assert puncture.least_overshoot(0.2) - puncture.least_overshoot(0.0) == pytest.approx(0.2 * puncture.SPEED)
     for late in (0.0, 0.2):
         more = pricked[FORCE, late].overshoot - puncture.least_overshoot(late)
         # Hand and tissue spring by 0.4 N over the hand's stiffness of 300 N/m at most, and the arm.

@@ -101,9 +101,7 @@ def test_all_messages_arrive_whole_and_in_their_order(messages: list[tuple[str, 
         reader.close()
 
 
-def test_a_recorder_that_takes_nothing_holds_nobody_up_and_what_is_lost_is_counted(
-    ends: Callable[[], Ends],
-) -> None:
+def test_a_recorder_that_takes_nothing_holds_nobody_up_and_what_is_lost_is_counted(ends: Callable[[], Ends]) -> None:
     feed, reader, takers = ends()
     data, sent = bytes(1 << 20), 40
     for _ in range(sent):
@@ -180,9 +178,7 @@ def test_a_second_recorder_of_a_machine_hears_no_loop_and_takes_none_away() -> N
         one.close()
 
 
-@pytest.mark.parametrize(
-    "sent", [bytes(range(256)) * 100, bytes(100), b"\0\0\0\0\7\0\1\0" + bytes(12)]
-)
+@pytest.mark.parametrize("sent", [bytes(range(256)) * 100, bytes(100), b"\0\0\0\0\7\0\1\0" + bytes(12)])
 def test_bytes_that_are_no_feed_end_with_their_line(ends: Callable[[], Ends], sent: bytes) -> None:
     feed, reader, takers = ends()
     with socket.socket(socket.AF_UNIX) as other:

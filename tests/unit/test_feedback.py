@@ -111,15 +111,11 @@ def test_a_longer_silence_of_the_arm_is_a_fault_whose_setpoint_stands_still() ->
     assert np.array_equal(led.tick(follows=True), still)
 
 
-def test_an_arm_that_was_lost_is_led_from_where_it_is_found_and_only_when_it_is_enabled_again() -> (
-    None
-):
+def test_an_arm_that_was_lost_is_led_from_where_it_is_found_and_only_when_it_is_enabled_again() -> None:
     led = following(**{"operation.longest_silence": 0.5})
     for _ in range(600):
         held = led.tick(speaks=False, follows=True)
-    there = np.clip(
-        held + 0.1, ARM.lower, ARM.upper
-    )  # a bridge that died let it stand while the server braked
+    there = np.clip(held + 0.1, ARM.lower, ARM.upper)  # a bridge that died let it stand while the server braked
     found = [held, *(led.tick(there, follows=True) for _ in range(3000))]
     near = led.slave.parameters["near"]
     assert (np.abs(found[-1] - there) <= near).all()
@@ -298,10 +294,7 @@ def test_a_command_that_presses_a_joint_into_its_end_is_the_fault_joint_limit_in
 
 def test_a_command_of_more_than_a_second_ahead_is_refused_and_the_next_one_is_taken() -> None:
     led = following()
-    for ahead_ns, status in (
-        (900_000_000, CommandStatus.FRESH),
-        (1_100_000_000, CommandStatus.REFUSED),
-    ):
+    for ahead_ns, status in ((900_000_000, CommandStatus.FRESH), (1_100_000_000, CommandStatus.REFUSED)):
         led.tick(follows=True, ahead_ns=ahead_ns)
         assert led.status is status
     led.tick(follows=True, ahead_ns=901_000_000)

@@ -19,9 +19,7 @@ GAIN, ZERO, POLE, DT = 0.1, 100.0, 10.0, 1e-3
 ROUNDING = 1e-15
 
 
-def filtered(
-    values: Any, start: float = 0.0, gain: float = GAIN, zero: float = ZERO, pole: float = POLE
-) -> Array:
+def filtered(values: Any, start: float = 0.0, gain: float = GAIN, zero: float = ZERO, pole: float = POLE) -> Array:
     """Output of the filter that rests at ``start`` before the values come."""
     last_input, output, out = start, start, []
     for value in values:
@@ -82,20 +80,15 @@ def test_output_never_leaves_the_range_of_its_inputs(values: list[float]) -> Non
     assert output.min() >= min(values) - 1e-13
 
 
-@pytest.mark.parametrize(
-    "values", [{"gain": 0.2}, {"gain": 0.0}, {"pole": 20.0}, {"zero": 50.0}, {"zero": 0.0}]
-)
-def test_filter_that_would_not_come_to_rest_at_its_input_is_refused(
-    values: dict[str, float],
-) -> None:
+@pytest.mark.parametrize("values", [{"gain": 0.2}, {"gain": 0.0}, {"pole": 20.0}, {"zero": 50.0}, {"zero": 0.0}])
+def test_filter_that_would_not_come_to_rest_at_its_input_is_refused(values: dict[str, float]) -> None:
     # Steady output is gain * zero / pole times the input: else the arm stands elsewhere.
     with pytest.raises(ParameterError):
         build(ReferenceFilterParameters, values)
 
 
 @pytest.mark.parametrize(
-    "values",
-    [{}, {"gain": 0.2, "pole": 20.0}, {"pole": 5.0, "zero": 50.0}, {"gain": 1.0, "pole": 100.0}],
+    "values", [{}, {"gain": 0.2, "pole": 20.0}, {"pole": 5.0, "zero": 50.0}, {"gain": 1.0, "pole": 100.0}]
 )
 def test_filter_of_unit_steady_gain_is_accepted(values: dict[str, float]) -> None:
     build(ReferenceFilterParameters, values)

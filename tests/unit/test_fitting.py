@@ -58,13 +58,9 @@ def test_the_plant_has_the_numbers_that_its_fit_finds(found: FitResult) -> None:
 
 
 def test_fitted_rests_are_the_measured_ones_but_for_point_1(found: FitResult) -> None:
-    off = (found.predicted - found.measured)[1:, [0, 1, 3]] / present(ARM.drives).encoder_step[
-        [0, 1, 3]
-    ]
+    off = (found.predicted - found.measured)[1:, [0, 1, 3]] / present(ARM.drives).encoder_step[[0, 1, 3]]
     assert np.sqrt(np.mean(off**2)) < 6.0
-    assert (
-        abs(found.predicted[0, 1] - found.measured[0, 1]) / present(ARM.drives).encoder_step[1] > 50
-    )
+    assert abs(found.predicted[0, 1] - found.measured[0, 1]) / present(ARM.drives).encoder_step[1] > 50
 
 
 def test_spread_of_runs_is_the_pooled_deviation_about_the_means_of_their_points() -> None:
@@ -83,8 +79,12 @@ def test_fitted_spread_of_the_runs_is_the_measured_one(found: FitResult) -> None
 @pytest.mark.soak
 def test_numbers_that_made_rests_come_back_from_them(published: RestTable) -> None:
     inside = np.clip(published.targets, ARM.lower, ARM.upper)
-    truth = {"coulomb": (0.15, 0.4, 1.0, 0.01, 0.0012, 0.0009), "bias": (-0.05,) + (0.0,) * 5,
-             "weights": ("m2b_L0b=0.02",), "wander": (0.2,) * 6}  # fmt: skip
+    truth = {
+        "coulomb": (0.15, 0.4, 1.0, 0.01, 0.0012, 0.0009),
+        "bias": (-0.05,) + (0.0,) * 5,
+        "weights": ("m2b_L0b=0.02",),
+        "wander": (0.2,) * 6,
+    }
     made = slave(seed=7, **{f"plant.hardware.{k}": v for k, v in truth.items()})
     rests = rest_positions(made, inside, 8)
     free = ["coulomb.theta1", "coulomb.theta2", "bias.theta1", "weight.m2b_L0b"]
@@ -97,9 +97,7 @@ def test_numbers_that_made_rests_come_back_from_them(published: RestTable) -> No
         assert abs(again.value(f"wander.{name}") - 0.2) < 0.08
 
 
-def test_plain_squares_believe_point_1_and_weigh_less(
-    published: RestTable, found: FitResult
-) -> None:
+def test_plain_squares_believe_point_1_and_weigh_less(published: RestTable, found: FitResult) -> None:
     plain = fit(published, slave(), ["coulomb.theta2", "weight.m2b_L0b"], loss="linear")
     assert plain.value("weight.m2b_L0b") < 0.6 * found.value("weight.m2b_L0b")
 
@@ -178,18 +176,14 @@ def test_a_table_of_another_shape_is_refused_in_one_line(
     assert not (tmp_path / "out.yaml").exists()
 
 
-def test_a_missing_table_and_folder_are_told(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_missing_table_and_folder_are_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["fit", str(tmp_path / "none.csv")]) == 2
     assert "none.csv" in capsys.readouterr().err
     assert main(["fit", "--json", str(tmp_path / "no" / "fit.json")]) == 2
     assert "make it first" in capsys.readouterr().err
 
 
-def test_command_writes_a_plant_that_a_session_takes(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_command_writes_a_plant_that_a_session_takes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out, numbers = tmp_path / "plant.yaml", tmp_path / "fit.json"
     names = ["coulomb.theta1", "bias.theta1"]
     assert main(["fit", "--free", *names, "--out", str(out), "--json", str(numbers)]) == 0

@@ -91,9 +91,7 @@ def test_command_neither_leaves_a_fixture_nor_steps_farther_than_the_hand(
 ) -> None:
     coarse, fine = data.draw(GAINS)
     desk = HeldDesk(chosen(side, name, data.draw(KINDS[name])), coarse_gain=coarse, fine_gain=fine)
-    for event, move, count in data.draw(
-        st.lists(st.tuples(EVENTS, STEPS, st.integers(1, 8)), max_size=12)
-    ):
+    for event, move, count in data.draw(st.lists(st.tuples(EVENTS, STEPS, st.integers(1, 8)), max_size=12)):
         if event:
             desk.hold(event)
         for _ in range(count):
@@ -168,9 +166,7 @@ def test_no_button_moves_a_slave_that_is_held_in(side: str, button: str) -> None
 
 
 @HELD
-def test_switched_off_while_it_holds_a_fixture_leaves_the_slave_where_it_is_led_from(
-    side: str,
-) -> None:
+def test_switched_off_while_it_holds_a_fixture_leaves_the_slave_where_it_is_led_from(side: str) -> None:
     desk = HeldDesk(fixture(side))
     desk.go((20 * MM, 0, 0))
     desk.hold("fixture")
@@ -208,9 +204,7 @@ def test_put_on_while_the_hand_moves_a_fixture_holds_the_slave_from_there(side: 
     ],
 )
 @HELD
-def test_what_is_changed_while_the_hand_is_outside_leads_the_slave_by_the_hands_steps(
-    side: str, after: Any
-) -> None:
+def test_what_is_changed_while_the_hand_is_outside_leads_the_slave_by_the_hands_steps(side: str, after: Any) -> None:
     rng, desk = np.random.default_rng(6), HeldDesk(fixture(side))
     desk.go((18 * MM, 4 * MM, 0))
     before = desk.sent
@@ -275,9 +269,7 @@ def test_after_a_pause_of_the_master_the_slave_stays_where_it_is(side: str) -> N
 
 @HELD
 @pytest.mark.parametrize("aside", [0.0, 1e-6, 2 * MM])
-def test_a_hand_that_goes_through_a_forbidden_body_does_not_throw_the_slave_across(
-    side: str, aside: float
-) -> None:
+def test_a_hand_that_goes_through_a_forbidden_body_does_not_throw_the_slave_across(side: str, aside: float) -> None:
     desk = HeldDesk(fixture(side, kind="sphere", keep_out=True, place=(0.03, 0.0, 0.0)))
     desk.go((0, aside, 0))
     for _ in range(46):
@@ -310,11 +302,7 @@ def test_a_shape_that_does_not_lead_in_within_a_few_rounds_holds_the_slave_where
 ) -> None:
     register_shape(Shape("wedge", WedgeParameters, wedge_distance, lambda _: np.zeros((2, 3))))
     rng, desk = np.random.default_rng(7), HeldDesk(fixture(side, kind="wedge"))
-    for move in (
-        (0.0, 95 * MM, 0.0),
-        (0.0, 25 * MM, 0.0),
-        *rng.normal(scale=2 * MM, size=(300, 3)),
-    ):
+    for move in ((0.0, 95 * MM, 0.0), (0.0, 25 * MM, 0.0), *rng.normal(scale=2 * MM, size=(300, 3))):
         assert desk.go(move) <= ROUNDING
         assert desk.outside() <= LEAVES
     for _ in range(60):  # back where there is room

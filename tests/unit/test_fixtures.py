@@ -27,22 +27,16 @@ def penetration(offset: Any, size: Array = CUBE) -> tuple[Array, float]:
     return way, length
 
 
-def force(
-    position: ArrayLike, stiffness: float = STIFFNESS, largest: float = LARGEST, size: Array = CUBE
-) -> Array:
+def force(position: ArrayLike, stiffness: float = STIFFNESS, largest: float = LARGEST, size: Array = CUBE) -> Array:
     depth, length = penetration(position, size)
     push = np.full(3, math.nan)
     wall_force(depth, length, stiffness, largest, push)
     return push
 
 
-@pytest.mark.parametrize(
-    ("mm", "newton"), [(14.9, 0.0), (15.5, -1.65), (16.0, -3.3), (17.0, -3.3), (-15.5, 1.65)]
-)
+@pytest.mark.parametrize(("mm", "newton"), [(14.9, 0.0), (15.5, -1.65), (16.0, -3.3), (17.0, -3.3), (-15.5, 1.65)])
 @pytest.mark.parametrize("axis", [0, 1, 2])
-def test_wall_pushes_with_the_published_force(
-    mm: float, newton: float, axis: int
-) -> None:  # case 23
+def test_wall_pushes_with_the_published_force(mm: float, newton: float, axis: int) -> None:  # case 23
     position, expected = np.zeros(3), np.zeros(3)
     position[axis], expected[axis] = mm * 1e-3, newton
     assert np.allclose(force(position), expected, rtol=0, atol=ROUNDING)
@@ -62,9 +56,7 @@ def test_hard_wall_pushes_fully_at_once() -> None:
 
 @pytest.mark.parametrize("stiffness", [STIFFNESS, math.inf])
 @pytest.mark.parametrize("position", [(0, 0, 0), (0.015, 0, 0), (0.015, -0.015, 0.015)])
-def test_inside_and_on_the_wall_there_is_no_force(
-    stiffness: float, position: tuple[float, float, float]
-) -> None:
+def test_inside_and_on_the_wall_there_is_no_force(stiffness: float, position: tuple[float, float, float]) -> None:
     assert not force(position, stiffness).any()
 
 

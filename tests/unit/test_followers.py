@@ -79,9 +79,7 @@ def reduced(text: str, tip: str) -> pinocchio.Model:
 
 
 @pytest.mark.parametrize("seed", SEEDS)
-def test_pose_and_jacobian_are_those_of_the_chain_through_its_map(
-    seed: int, tmp_path: Path
-) -> None:
+def test_pose_and_jacobian_are_those_of_the_chain_through_its_map(seed: int, tmp_path: Path) -> None:
     text, tip, found = followed(seed)
     path = tmp_path / "arm.urdf"
     path.write_text(text)
@@ -99,9 +97,7 @@ def test_pose_and_jacobian_are_those_of_the_chain_through_its_map(
 
 
 @pytest.mark.parametrize("seed", SEEDS)
-def test_efforts_inertia_and_accelerations_are_those_of_the_chain_through_its_map(
-    seed: int, tmp_path: Path
-) -> None:
+def test_efforts_inertia_and_accelerations_are_those_of_the_chain_through_its_map(seed: int, tmp_path: Path) -> None:
     text, tip, found = followed(seed)
     path = tmp_path / "arm.urdf"
     path.write_text(text)
@@ -139,11 +135,7 @@ def test_pinocchios_own_reader_of_mimic_agrees(seed: int, tmp_path: Path) -> Non
     pinocchio.framesForwardKinematics(whole, data, theirs)
     np.testing.assert_allclose(robot.fk(q), data.oMf[frame].homogeneous, atol=1e-9)
     # By their inverse dynamics: crba of pinocchio 4.1 does not agree with it where joints mimic.
-    still, M, row = (
-        np.zeros(whole.nv),
-        np.empty((robot.n, robot.n)),
-        present(robot.dynamics).parameters,
-    )
+    still, M, row = (np.zeros(whole.nv), np.empty((robot.n, robot.n)), present(robot.dynamics).parameters)
     weight = pinocchio.rnea(whole, data, theirs, still, still).copy()
     rises = [pinocchio.rnea(whole, data, theirs, still, e).copy() for e in np.eye(whole.nv)]
     inertia = np.array(rises)[np.ix_(columns, columns)] - weight[columns]
@@ -178,9 +170,7 @@ def loaded(tmp_path: Path, old: str = "", new: str = "", **options: str) -> tc.R
     return tc.load_robot(str(path), **({"tip": "tip", "task": "x y z"} | options))
 
 
-def test_a_leader_keeps_the_limits_speeds_and_friction_of_those_that_follow_it(
-    tmp_path: Path,
-) -> None:
+def test_a_leader_keeps_the_limits_speeds_and_friction_of_those_that_follow_it(tmp_path: Path) -> None:
     robot = loaded(tmp_path)
     assert robot.joint_names == ("turn", "lead", "out")
     # -1 <= 0.4 - 2 q <= 2 is -0.8 <= q <= 0.7
@@ -220,9 +210,7 @@ def test_legal_poses_are_found_and_all_branches_are_solutions(tmp_path: Path) ->
 def test_a_path_is_followed_by_an_arm_with_followers_in_a_session(tmp_path: Path) -> None:
     path, options = str(tmp_path / "arm.urdf"), ["tip=tip", "task=x y z"]
     Path(path).write_text(re.sub("<dynamics[^>]*/>", "", ARM))  # friction alone would be 1 mm
-    recording = tc.run(
-        "coarse_box", duration=3.0, robot=path, geometry=options, starts_at_home=False
-    )
+    recording = tc.run("coarse_box", duration=3.0, robot=path, geometry=options, starts_at_home=False)
     assert present(recording.score().value("position_error_mm.rms")) < 1.0
 
 

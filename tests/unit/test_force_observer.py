@@ -88,9 +88,7 @@ def test_a_constant_push_on_the_tip_is_estimated_within_four_per_cent(
 
 
 @pytest.mark.parametrize("hertz", [3.0, 30.0])
-def test_a_push_is_told_through_a_low_pass_of_the_bandwidth_behind_that_of_the_speeds(
-    hertz: float,
-) -> None:
+def test_a_push_is_told_through_a_low_pass_of_the_bandwidth_behind_that_of_the_speeds(hertz: float) -> None:
     true, estimated = pressed(
         "rcrt1", (0.3, 0.5, -0.8), "plant=fine_encoders", f"estimate_bandwidth={hertz}", seconds=0.1
     )
@@ -144,9 +142,7 @@ ENTRIES = st.floats(-1.0, 1.0).map(lambda value: round(value, 3))
 
 @given(n=st.integers(1, 9), data=st.data(), force=st.lists(ENTRIES, min_size=3, max_size=3))
 @settings(max_examples=100, deadline=None)
-def test_the_force_is_the_damped_least_squares_of_the_efforts(
-    n: int, data: st.DataObject, force: list[float]
-) -> None:
+def test_the_force_is_the_damped_least_squares_of_the_efforts(n: int, data: st.DataObject, force: list[float]) -> None:
     entries = data.draw(st.lists(ENTRIES, min_size=3 * n, max_size=3 * n))
     scale = np.array(data.draw(st.lists(st.floats(0.1, 100.0), min_size=n, max_size=n)))
     J = np.vstack((np.reshape(entries, (3, n)), np.full((3, n), np.nan)))
@@ -178,12 +174,9 @@ def test_a_stretched_arm_tells_a_finite_force() -> None:
 def test_the_estimate_is_scored_in_touch_where_there_is_one() -> None:
     given = ["reflection.architecture=unilateral", "duration=14.0"]
     none, found = (
-        tc.run(configure("palpation", settings=[*given, f"estimate={word}"])).score()
-        for word in ("false", "true")
+        tc.run(configure("palpation", settings=[*given, f"estimate={word}"])).score() for word in ("false", "true")
     )
     assert none.value("force_sensing.estimated_rms_n") is None
     assert none.value("force_sensing.measured_rms_n") == 0.0
-    assert (
-        0.001 < present(found.value("force_sensing.estimated_rms_n")) < 0.1
-    )  # of pushes up to 1.8 N
+    assert 0.001 < present(found.value("force_sensing.estimated_rms_n")) < 0.1  # of pushes up to 1.8 N
     assert present(found.value("force_sensing.estimated_max_n")) < 0.25

@@ -12,9 +12,7 @@ from teleop_core.kernels.geometry import Array
 MS = 1_000_000
 
 
-def forces(
-    asked: Sequence[Sequence[float]] | Array, **parameters: Any
-) -> tuple[Array, HapticMaster]:
+def forces(asked: Sequence[Sequence[float]] | Array, **parameters: Any) -> tuple[Array, HapticMaster]:
     """Forces (N, 3) that the device gives, for those asked in each tick (N, 3) [N]."""
     stage = HapticMaster(HapticMasterParameters(**parameters))
     given = []

@@ -38,9 +38,7 @@ def told(stage: SlaveSim, ticks: int = TICKS) -> Array:
 
 @given(force=st.floats(1e-3, 5.0), torque=st.floats(1e-4, 0.5), seed=st.integers(0, 99))
 @settings(max_examples=5, deadline=None)
-def test_noise_has_the_stated_standard_deviation_and_no_mean(
-    force: float, torque: float, seed: int
-) -> None:
+def test_noise_has_the_stated_standard_deviation_and_no_mean(force: float, torque: float, seed: int) -> None:
     texts = (f"force_noise={force}", f"torque_noise={torque}", f"seed={seed}")
     measured, true = told(arm(*texts))
     assert not true.any()
@@ -59,9 +57,7 @@ def test_noise_is_the_same_for_one_seed_and_another_for_another() -> None:
     stage.reset()
     np.testing.assert_array_equal(told(stage, 1500)[0], first)
     np.testing.assert_array_equal(told(arm("force_noise=0.1", "seed=7"), 1500)[0], first)
-    assert not np.any(told(arm("force_noise=0.1", "seed=8"), 100)[0] == first[:100], axis=0)[
-        :3
-    ].any()
+    assert not np.any(told(arm("force_noise=0.1", "seed=8"), 100)[0] == first[:100], axis=0)[:3].any()
 
 
 def test_noise_does_not_depend_on_how_many_ticks_are_made_at_once() -> None:
@@ -92,9 +88,7 @@ def test_the_weight_of_the_tool_is_seen_along_minus_z_whatever_the_pose() -> Non
         stage.arm.q[:] = stage.state["link"] = stage.state["carried"] = joints
         stage.signals["slave_setpoint_js"] = joints
         stage.step()
-        np.testing.assert_allclose(
-            stage.signals["slave_measured_cf"], [0.0, 0.0, -0.3 * 9.80665, 0.0, 0.0, 0.0]
-        )
+        np.testing.assert_allclose(stage.signals["slave_measured_cf"], [0.0, 0.0, -0.3 * 9.80665, 0.0, 0.0, 0.0])
 
 
 def test_a_bias_is_what_is_told_of_nothing() -> None:
@@ -146,9 +140,7 @@ def test_a_sensor_that_is_retuned_tells_the_new_numbers_from_the_next_tick_on() 
     assert measured[:, 0].std() == pytest.approx(0.01, rel=0.3)
 
 
-@pytest.mark.parametrize(
-    "text", ["force_noise=-0.1", "force_bias=[1.0]", "force_bandwidth=501.0", "tool_mass=nan"]
-)
+@pytest.mark.parametrize("text", ["force_noise=-0.1", "force_bias=[1.0]", "force_bandwidth=501.0", "tool_mass=nan"])
 def test_a_sensor_that_cannot_be_is_refused_by_name(text: str) -> None:
     with pytest.raises(ParameterError) as caught:
         arm(text)

@@ -15,16 +15,25 @@ from teleop_core.graph.layers import parse_text
 from teleop_core.session.configuration import configure
 
 UNUSED = {
-    "fixture.sphere.diameter": 0.03, "fixture.keep_out_sphere.diameter": 0.02,
-    "fixture.keep_out_sphere.place": [0.025, 0.0, 0.0], "fixture.mesh.place": [0.0, 0.0, 0.01],
-    "fixture.line.tolerance": 0.002, "fixture.cylinder.length": 0.0, "fixture.side": "both",
-    "fixture.union.parts": ["keep_out_box place=[0.0, 0.02, 0.0] size=[0.01, 0.01, 0.01]",
-                            "cylinder diameter=0.01 length=0.05"],
-}  # fmt: skip
-KEPT = {"fixture.sphere.radius": 0.015, "fixture.line.radius": 0.002,
-        "fixture.cylinder.length": 0.0, "fixture.side": "both",
-        "fixture.union.parts": ["not box at=[0.0, 0.02, 0.0] size=[0.01, 0.01, 0.01]",
-                                "cylinder radius=0.005 length=0.05"]}  # fmt: skip
+    "fixture.sphere.diameter": 0.03,
+    "fixture.keep_out_sphere.diameter": 0.02,
+    "fixture.keep_out_sphere.place": [0.025, 0.0, 0.0],
+    "fixture.mesh.place": [0.0, 0.0, 0.01],
+    "fixture.line.tolerance": 0.002,
+    "fixture.cylinder.length": 0.0,
+    "fixture.side": "both",
+    "fixture.union.parts": [
+        "keep_out_box place=[0.0, 0.02, 0.0] size=[0.01, 0.01, 0.01]",
+        "cylinder diameter=0.01 length=0.05",
+    ],
+}
+KEPT = {
+    "fixture.sphere.radius": 0.015,
+    "fixture.line.radius": 0.002,
+    "fixture.cylinder.length": 0.0,
+    "fixture.side": "both",
+    "fixture.union.parts": ["not box at=[0.0, 0.02, 0.0] size=[0.01, 0.01, 0.01]", "cylinder radius=0.005 length=0.05"],
+}
 
 
 @pytest.mark.parametrize(
@@ -36,9 +45,7 @@ KEPT = {"fixture.sphere.radius": 0.015, "fixture.line.radius": 0.002,
         ("mesh", {"fixture.place": [0.0, 0.0, 0.01]}),
     ],
 )  # fmt: skip
-def test_a_recording_of_before_has_the_same_shapes_under_their_names_of_today(
-    kind: str, more: dict[str, Any]
-) -> None:
+def test_a_recording_of_before_has_the_same_shapes_under_their_names_of_today(kind: str, more: dict[str, Any]) -> None:
     found = present_layer({"motion_scaling": {"fixture.kind": kind} | UNUSED})["motion_scaling"]
     assert found == KEPT | {"fixture.kind": kind} | more
     values = {name.removeprefix("fixture."): value for name, value in found.items()}
@@ -54,8 +61,7 @@ def test_objects_of_before_and_all_names_of_today_stay_what_they_are() -> None:
 
 
 def test_a_report_of_before_is_scored_as_it_was() -> None:
-    told = {"fixture": "keep_out_sphere", "fixture.place": "(0.025, 0.0, 0.0)",
-            "fixture.diameter": "0.03"}  # fmt: skip
+    told = {"fixture": "keep_out_sphere", "fixture.place": "(0.025, 0.0, 0.0)", "fixture.diameter": "0.03"}
     fixture = reported_fixture(told, np.ones(3))
     assert not fixture.fault
     assert fixture.kind == "keep_out_sphere"

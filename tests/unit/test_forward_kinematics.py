@@ -134,8 +134,7 @@ def test_assemblies_of_the_3_rps_are_those_of_its_polynomial() -> None:
 def test_legs_of_a_real_pose_always_assemble() -> None:
     robot, rng = load_robot("stewart"), np.random.default_rng(6)
     turned = [
-        rotation("z", a) @ rotation("y", b) @ rotation("x", c)
-        for a, b, c in rng.uniform(-math.pi, math.pi, (3000, 3))
+        rotation("z", a) @ rotation("y", b) @ rotation("x", c) for a, b, c in rng.uniform(-math.pi, math.pi, (3000, 3))
     ]
     places = rng.uniform([-0.08, -0.08, 0.12], [0.08, 0.08, 0.28], (3000, 3))
     poses = np.array([transform(R, p) for R, p in zip(turned, places, strict=True)])
@@ -288,9 +287,7 @@ def test_a_batch_is_its_single_questions(name: str) -> None:
     for k, legs in enumerate(q):
         one = robot.solve_fk(legs)
         assert np.array_equal(one.T, batch.T[k])
-        assert (one.status, one.residual, one.mode) == (
-            batch.status[k], batch.residual[k], batch.mode[k],
-        )  # fmt: skip
+        assert (one.status, one.residual, one.mode) == (batch.status[k], batch.residual[k], batch.mode[k])
     assert robot.solve_fk(np.empty((0, robot.n))).T.shape == (0, 4, 4)
     assert robot.follow_fk(np.empty((0, robot.n))).T.shape == (0, 4, 4)
 
@@ -315,11 +312,7 @@ def test_bad_questions_are_refused_by_name() -> None:
 
 
 def test_a_workspace_is_made_of_joints_that_close_and_of_all_where_there_are_no_loops() -> None:
-    for name, low, high in (
-        ("rcrt1", 300, 300),
-        ("rps3", 100, 200),
-        ("three_finger_hand", 300, 300),
-    ):
+    for name, low, high in (("rcrt1", 300, 300), ("rps3", 100, 200), ("three_finger_hand", 300, 300)):
         points, values = sample_workspace(load_robot(name), 300, np.random.default_rng(13))
         assert low <= len(points) == len(values) <= high
         assert np.isfinite(points).all()

@@ -124,9 +124,7 @@ def test_robots_are_listed_and_name_what_they_control() -> None:
         ({"mode": 0.5}, "mode"),
     ],
 )
-def test_impossible_loops_are_refused_with_their_values(
-    geometry: Mapping[str, str | float], name: str
-) -> None:
+def test_impossible_loops_are_refused_with_their_values(geometry: Mapping[str, str | float], name: str) -> None:
     with pytest.raises(ParameterError) as refusal:
         load_robot("four_bar", **geometry)
     assert refusal.value.name == name

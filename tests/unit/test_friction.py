@@ -139,9 +139,7 @@ def wander_once(p: SimulationNumbers, s: SimulationState) -> None:
 
 
 @kernel
-def wander_on(
-    p: SimulationNumbers, s: SimulationState, share: float, ticks: int, found: Array
-) -> None:
+def wander_on(p: SimulationNumbers, s: SimulationState, share: float, ticks: int, found: Array) -> None:
     """Share of dry friction in force, every hundredth tick (ticks / 100, 6).
 
     All joints slip by a ``share`` of the way on which friction changes in every tick.
@@ -209,10 +207,11 @@ def test_an_arm_at_rest_stays_there_however_long_it_is_held() -> None:
     arm = load_robot("rcrt1")
     given = {"plant.kind": "hardware", "controller.kind": "source_pid", "seed": 3}
     for target in np.clip(read_rests(PUBLISHED, arm).targets, arm.lower, arm.upper)[1:4]:
-        counts = np.array([
-            Mover(build(ArmParameters, given), settle=seconds).move(target)
-            / present(arm.drives).encoder_step
-            for seconds in (1.0, 5.0, 20.0, 60.0)
-        ])  # fmt: skip
+        counts = np.array(
+            [
+                Mover(build(ArmParameters, given), settle=seconds).move(target) / present(arm.drives).encoder_step
+                for seconds in (1.0, 5.0, 20.0, 60.0)
+            ]
+        )
         assert np.ptp(counts, axis=0)[[0, 1, 3, 4, 5]].max() < 1e-6
         assert np.ptp(counts, axis=0)[2] < 2.5  # the integrator of d3 may still take a count

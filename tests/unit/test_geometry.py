@@ -98,9 +98,7 @@ def test_rotation_matrix_of_a_quaternion_is_scipys(quaternion: Array) -> None:
 
 
 @given(quaternions)
-def test_quaternion_of_its_own_matrix_is_itself_up_to_sign_with_w_not_negative(
-    quaternion: Array,
-) -> None:
+def test_quaternion_of_its_own_matrix_is_itself_up_to_sign_with_w_not_negative(quaternion: Array) -> None:
     back = quaternion_of(matrix_of(quaternion))
     assert back[0] >= 0.0
     # Half turns have two quaternions of w = 0.
@@ -159,9 +157,7 @@ def test_pose_and_transform_are_inverse_to_each_other(quaternion: Array, place: 
     assert np.allclose(matrix_of(back[3:]), matrix_of(quaternion), rtol=0, atol=TWICE_ROUNDED)
 
 
-@pytest.mark.parametrize(
-    "angle", [0.0, 1e-12, 1e-9, 1e-6, 1e-3, 1.0, 2.0, math.pi - 1e-6, math.pi - 1e-9, math.pi]
-)
+@pytest.mark.parametrize("angle", [0.0, 1e-12, 1e-9, 1e-6, 1e-3, 1.0, 2.0, math.pi - 1e-6, math.pi - 1e-9, math.pi])
 def test_angle_between_rotations_keeps_its_digits_small_and_large(angle: float) -> None:
     start = Rotation.from_rotvec([0.3, -0.7, 1.1]).as_matrix()
     axis = np.array([2.0, -1.0, 2.0]) / 3.0
@@ -178,9 +174,7 @@ def test_coordinate_rotations_are_scipys(axis: str, angle: float) -> None:
 
 
 @given(st.floats(-3.1, 3.1), st.floats(-1.5, 1.5), st.floats(-3.1, 3.1))
-def test_roll_pitch_yaw_are_the_fixed_angles_that_made_the_rotation(
-    roll: float, pitch: float, yaw: float
-) -> None:
+def test_roll_pitch_yaw_are_the_fixed_angles_that_made_the_rotation(roll: float, pitch: float, yaw: float) -> None:
     turns = (geometry.rotation(axis, a) for axis, a in zip("zyx", (roll, pitch, yaw), strict=True))
     r_z, r_y, r_x = turns
     angles = geometry.roll_pitch_yaw(r_z @ r_y @ r_x)
@@ -190,9 +184,7 @@ def test_roll_pitch_yaw_are_the_fixed_angles_that_made_the_rotation(
 
 @pytest.mark.parametrize("pitch", [math.pi / 2, -math.pi / 2])
 @pytest.mark.parametrize("roll", [-2.0, 0.0, 0.7])
-def test_roll_pitch_yaw_at_a_right_angle_give_the_rotation_back_with_yaw_zero(
-    pitch: float, roll: float
-) -> None:
+def test_roll_pitch_yaw_at_a_right_angle_give_the_rotation_back_with_yaw_zero(pitch: float, roll: float) -> None:
     matrix = geometry.rotation("z", roll) @ geometry.rotation("y", pitch)
     angles = geometry.roll_pitch_yaw(matrix)
     again = geometry.rotation("z", angles[0]) @ geometry.rotation("y", angles[1])

@@ -48,9 +48,7 @@ def test_figures_are_those_of_each_episode_alone(table: Path, tmp_path: Path) ->
     assert found.loc[2, "time_s"] == pytest.approx(len(alone) / RATE, abs=0.05)
 
 
-def test_an_episode_that_cannot_be_read_says_why_and_is_not_among_the_usual(
-    table: Path, tmp_path: Path
-) -> None:
+def test_an_episode_that_cannot_be_read_says_why_and_is_not_among_the_usual(table: Path, tmp_path: Path) -> None:
     broken = pd.read_csv(table)
     broken.loc[broken.episode_index == 6, ["x", "y", "z"]] = np.nan
     file = tmp_path / "broken.csv"

@@ -10,14 +10,7 @@ from teleop_core.base.parameters import NoParameters
 from teleop_core.graph import topics
 from teleop_core.graph.graph import BUILT_IN, Delay, Graph, build_graph
 from teleop_core.graph.stage import STAGES, Stage, register_stage
-from teleop_core.graph.topics import (
-    SLAVE_MEASURED_CP,
-    SLAVE_SERVO_CP,
-    Kind,
-    Topic,
-    in_force,
-    passed_on,
-)
+from teleop_core.graph.topics import SLAVE_MEASURED_CP, SLAVE_SERVO_CP, Kind, Topic, in_force, passed_on
 from teleop_core.session.configuration import configure
 
 BASE = tuple(STAGES.find(name) for name in BUILT_IN)
@@ -49,11 +42,7 @@ def names(graph: Graph) -> list[str]:
 
 def feeds(graph: Graph, reader: str, port: str) -> list[str]:
     """Names of what arrives at a port of a stage of the default arm."""
-    return [
-        link.topic.name
-        for link in graph.links
-        if link.reader.name == reader and link.port.name == port
-    ]
+    return [link.topic.name for link in graph.links if link.reader.name == reader and link.port.name == port]
 
 
 # What follows.
@@ -66,9 +55,10 @@ def test_order_of_a_tick_is_that_of_the_data_however_stages_are_listed(seed: int
 
 
 def test_order_of_stages_decides_where_the_data_does_not() -> None:
-    others = [stage(name, writes=(topic,)) for name, topic in (
-        ("b", ECHO), ("a", Topic("test/other", Kind.POSE, passed_on("slave/measured_cp"))),
-    )]  # fmt: skip
+    others = [
+        stage(name, writes=(topic,))
+        for name, topic in (("b", ECHO), ("a", Topic("test/other", Kind.POSE, passed_on("slave/measured_cp"))))
+    ]
     assert names(Graph((*BASE, *others))) == [*BUILT_IN, "b", "a"]
     assert names(Graph((*BASE, *others[::-1]))) == [*BUILT_IN, "a", "b"]
 
@@ -111,8 +101,11 @@ def test_topic_that_adds_to_another_arrives_beside_it() -> None:
 
 def test_chain_leads_from_the_hand_to_the_slave() -> None:
     assert [topic.name for _, topic in Graph(BASE).chain()] == [
-        "master/measured_cp", "slave/servo_cp", "slave/servo_jp", "slave/setpoint_js",
-    ]  # fmt: skip
+        "master/measured_cp",
+        "slave/servo_cp",
+        "slave/servo_jp",
+        "slave/setpoint_js",
+    ]
 
 
 def test_chain_passes_through_a_replacing_stage() -> None:
@@ -187,22 +180,22 @@ NOTED = stage(writes=(), notes=(("command_status", "i8"),))
 BAD_GRAPHS = {
     "reader nobody writes for": ((*BASE, UNFED), "echo", "test/unwritten, which no stage writes"),
     "two stages of one name": ((*BASE, BASE[4]), "slave", "two have this name"),
-    "two writers of a topic": (
-        (*BASE, stage("a"), stage("b")), "b", "the only one that writes test/echo; a does",
-    ),
+    "two writers of a topic": ((*BASE, stage("a"), stage("b")), "b", "the only one that writes test/echo; a does"),
     "two stages for one column": ((*BASE, NOTED), "echo", "slave uses"),
     "stages that wait for each other": ((*BASE, *CIRCLE), "forth", "forth, back wait"),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize(
     ("arms", "name", "expected"),
-    [(("left", "left"), "left", "two have this name"), (("", "left arm"), "left arm", "letters"),
-     (("right", ""), "", "letters"), (("right", "2nd"), "2nd", "letters")],
-)  # fmt: skip
-def test_arms_that_cannot_be_told_apart_or_named_are_refused(
-    arms: tuple[str, str], name: str, expected: str
-) -> None:
+    [
+        (("left", "left"), "left", "two have this name"),
+        (("", "left arm"), "left arm", "letters"),
+        (("right", ""), "", "letters"),
+        (("right", "2nd"), "2nd", "letters"),
+    ],
+)
+def test_arms_that_cannot_be_told_apart_or_named_are_refused(arms: tuple[str, str], name: str, expected: str) -> None:
     with pytest.raises(PartError) as error:
         Graph(BASE, arms)
     assert (error.value.kind, error.value.name) == ("arm", name)
@@ -229,15 +222,19 @@ def test_circle_runs_with_a_late_input_or_a_delay() -> None:
 BAD_STAGES = {
     "replaces what it does not read": ({"replaces": SLAVE_SERVO_CP}, "reads slave/servo_cp"),
     "replaces what is of another kind": (
-        {"reads": (topics.MASTER_SERVO_CF,), "writes": (Topic("test/x", Kind.POSE),),
-         "replaces": topics.MASTER_SERVO_CF},
+        {
+            "reads": (topics.MASTER_SERVO_CF,),
+            "writes": (Topic("test/x", Kind.POSE),),
+            "replaces": topics.MASTER_SERVO_CF,
+        },
         "writes its like first",
     ),
     "is late in what it does not read": ({"late": (SLAVE_SERVO_CP,)}, "slave/servo_cp (late)"),
     "needs what it does not read": ({"needs": (SLAVE_SERVO_CP,)}, "slave/servo_cp (needs)"),
     "is triggered by what it does not read": ({"trigger": SLAVE_SERVO_CP}, "slave/servo_cp"),
     "passes on a stamp it does not get": (
-        {"writes": (Topic("test/x", Kind.POSE, passed_on("slave/servo_cp")),)}, "slave/servo_cp",
+        {"writes": (Topic("test/x", Kind.POSE, passed_on("slave/servo_cp")),)},
+        "slave/servo_cp",
     ),
     "spares a text": ({"spares": "operator"}, "spares as a tuple of names"),
     "has no step": ({"step": None}, "with a step"),
@@ -245,7 +242,7 @@ BAD_STAGES = {
     "has a step and a maker": ({"make": lambda p, dt: None}, "with a step"),
     "has joints and no robot": ({"reads": (topics.SLAVE_MEASURED_JS,), "writes": ()}, "Robot"),
     "has no fields for a state": ({"state": (("a", "nothing"),)}, "state"),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("case", BAD_STAGES)
@@ -275,12 +272,15 @@ def test_unknown_stage_is_refused_with_the_known_ones() -> None:
 
 @pytest.mark.parametrize(
     "setting",
-    ["teleop.stages=[reader]", "teleop.stages=[slave_sim]", "teleop.stages=[recorder]",
-     "teleop.arms=[left, left]", "teleop.delays=[nothing=0.1]"],
-)  # fmt: skip
-def test_wrong_graph_is_refused_by_the_configuration_in_one_line(
-    own_parts: None, setting: str
-) -> None:
+    [
+        "teleop.stages=[reader]",
+        "teleop.stages=[slave_sim]",
+        "teleop.stages=[recorder]",
+        "teleop.arms=[left, left]",
+        "teleop.delays=[nothing=0.1]",
+    ],
+)
+def test_wrong_graph_is_refused_by_the_configuration_in_one_line(own_parts: None, setting: str) -> None:
     register_stage(stage("reader", (UNWRITTEN,), ()))
     with pytest.raises(TeleopError) as error:
         configure(settings=[setting])

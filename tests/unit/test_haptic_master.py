@@ -55,9 +55,7 @@ def parameters(
     """Those of the operator and of the device; ``tremor_…`` of the hand are the operator's."""
     own: dict[str, Any] = {k: v for k, v in (hand or {}).items() if k.startswith("tremor")}
     rest = {k: v for k, v in (hand or {}).items() if k not in own}
-    person = replace(
-        operator, seed=seed, patience=0.0, buttons=ButtonParameters(**(buttons or {})), **own
-    )
+    person = replace(operator, seed=seed, patience=0.0, buttons=ButtonParameters(**(buttons or {})), **own)
     return person, HapticMasterParameters(
         seed=seed, device=DeviceParameters(**(device or {})), hand=HandParameters(**rest)
     )
@@ -193,9 +191,7 @@ def test_hand_and_device_give_way_by_force_over_stiffness_but_for_friction(
 
 
 @pytest.mark.parametrize("stiffness", [(1260.0, 2310.0, 1020.0), (1e7, 1e6, 1e5)])
-def test_two_masses_move_exactly_under_a_force_that_is_held_for_a_tick(
-    stiffness: tuple[float, float, float],
-) -> None:
+def test_two_masses_move_exactly_under_a_force_that_is_held_for_a_tick(stiffness: tuple[float, float, float]) -> None:
     """Against the exponential of their own equations, tick by tick, axis by axis."""
     hand = HandParameters()
     frictionless: dict[str, Any] = {**QUIET, **COLD, "friction": 0.0, "stiffness": stiffness}
@@ -221,10 +217,7 @@ def test_two_masses_move_exactly_under_a_force_that_is_held_for_a_tick(
         master.signals["master_servo_cf"][:3] = force
         tick()
         expected = np.array(
-            [
-                (step @ [*state, push])[:4]
-                for step, state, push in zip(steps, expected, force, strict=True)
-            ]
+            [(step @ [*state, push])[:4] for step, state, push in zip(steps, expected, force, strict=True)]
         )
         for name, column in (("position", 0), ("hand", 1)):
             moved = master.state[name] - REST_POSITION
@@ -316,9 +309,7 @@ def test_turning_rate_is_that_of_the_stylus_in_base_axes() -> None:
     assert np.allclose(measured, 0.9375 * about_stylus_z, rtol=0, atol=1e-3)
 
 
-def test_turning_rate_does_not_see_that_opposite_quaternions_are_one_attitude(
-    own_parts: None,
-) -> None:
+def test_turning_rate_does_not_see_that_opposite_quaternions_are_one_attitude(own_parts: None) -> None:
     rate = 3.0
 
     def wrapped(times: Array) -> Array:
@@ -357,9 +348,7 @@ def test_clutch_times_that_are_no_rising_pairs_are_refused(clutch: tuple[float, 
 
 @pytest.mark.parametrize("button", ["fixture", "mode"])
 @pytest.mark.parametrize("presses", [(1.0, 1.05), (2.0, 1.95), (1.0, 1.1)])
-def test_presses_that_would_run_into_one_are_refused(
-    button: str, presses: tuple[float, float]
-) -> None:
+def test_presses_that_would_run_into_one_are_refused(button: str, presses: tuple[float, float]) -> None:
     with pytest.raises(ParameterError) as error:
         ButtonParameters(**{button: presses})
     assert error.value.name == f"operator.buttons.{button}"
@@ -374,9 +363,7 @@ RANDOM = operator(kind="random", approach_time=0.5)
 
 
 def test_same_seed_gives_the_same_bits_and_another_seed_others() -> None:
-    first, again, other = (
-        run(held(parameters(seed=seed, operator=RANDOM)), 1500) for seed in (5, 5, 6)
-    )
+    first, again, other = (run(held(parameters(seed=seed, operator=RANDOM)), 1500) for seed in (5, 5, 6))
     for topic in TOPICS:
         assert np.array_equal(first[topic], again[topic])
     assert np.abs(places(first)[-1] - places(other)[-1]).max() > 1e-3
@@ -392,9 +379,7 @@ def test_reset_repeats_the_session_to_the_bit() -> None:
 
 
 @pytest.mark.parametrize("sizes", [(1,) * 50, (7, 993, 1000), (1000,) * 3, (999, 1)])
-def test_what_the_operator_wants_does_not_depend_on_the_blocks_it_is_drawn_in(
-    sizes: tuple[int, ...],
-) -> None:
+def test_what_the_operator_wants_does_not_depend_on_the_blocks_it_is_drawn_in(sizes: tuple[int, ...]) -> None:
     buttons = {"clutch": (0.5, 1.0), "mode": (0.02,)}
     one_by_one = run(held(parameters(operator=RANDOM, buttons=buttons)), sum(sizes))
     master = held(parameters(operator=RANDOM, buttons=buttons))
@@ -429,9 +414,7 @@ EXTREMES = [
 
 @pytest.mark.parametrize("friction", [0.0, 0.26, 5.0])
 @pytest.mark.parametrize("hand", EXTREMES)
-def test_hand_at_the_edge_of_its_parameters_stays_where_it_wants_to_be(
-    hand: dict[str, float], friction: float
-) -> None:
+def test_hand_at_the_edge_of_its_parameters_stays_where_it_wants_to_be(hand: dict[str, float], friction: float) -> None:
     device = {**QUIET, "apparent_mass": 1e-3, "friction": friction}
     calm = {"stiffness": 300.0, **hand, "tremor_amplitude": 0.0}
     master = held(parameters(device=device, hand=calm))

@@ -25,9 +25,7 @@ ARM = load_robot("rcrt1")
 TARGET = ARM.home + np.array([0.5, -0.4, -0.04, 0.6, 0.5, 0.4])
 
 
-def slave(
-    plant: str = "hardware", controller: str = "source_pid", **settings: Any
-) -> ArmParameters:
+def slave(plant: str = "hardware", controller: str = "source_pid", **settings: Any) -> ArmParameters:
     given = {"plant.kind": plant, "controller.kind": controller}
     return build(ArmParameters, given | settings)
 
@@ -125,11 +123,7 @@ def test_every_fault_can_be_left_out_alone(fault: str) -> None:
     kind = parameters.plant.kind
     with_it = HARDWARE.physics(slave().plant.kind.parameters, ARM)
     without = HARDWARE.physics(kind.parameters, ARM)
-    differ = {
-        name
-        for name in vars(with_it)
-        if not np.array_equal(getattr(with_it, name), getattr(without, name))
-    }
+    differ = {name for name in vars(with_it) if not np.array_equal(getattr(with_it, name), getattr(without, name))}
     expected = {
         "friction": {"coulomb"}, "sticking": {"bristle"}, "wandering": {"wander"},
         "bias": {"bias"}, "weights": {"dynamics"}, "drive_steps": {"effort_step"},

@@ -20,9 +20,7 @@ from teleop_core.shapes.height_field import HEIGHT_FIELD, HeightFieldParameters
 from teleop_core.shapes.mesh import MESH, MeshParameters
 
 SPACING = 2e-3
-X, Y = np.meshgrid(
-    SPACING * (np.arange(31) - 15.0), SPACING * (np.arange(25) - 12.0), indexing="ij"
-)
+X, Y = np.meshgrid(SPACING * (np.arange(31) - 15.0), SPACING * (np.arange(25) - 12.0), indexing="ij")
 TILT = np.array((0.3, -0.2))
 BALL, DEEP = 0.05, -0.045  # radius of a ball, and height of its middle [m]
 FIELDS = {
@@ -52,23 +50,17 @@ def field(folder: Path, name: str, ending: str = "csv", **more: float) -> Height
     return HeightFieldParameters(file=str(folder / f"{name}.{ending}"), **more)
 
 
-def found(
-    group: HeightFieldParameters, places: Array, part: tc.Shape = HEIGHT_FIELD
-) -> tuple[Array, Array]:
+def found(group: HeightFieldParameters, places: Array, part: tc.Shape = HEIGHT_FIELD) -> tuple[Array, Array]:
     """Distances (N,) and normals (N, 3) of an object at places (N, 3)."""
     normals, shape = np.zeros((len(places), 3)), part.numbers(group)
     distances = [part.distance(*row) for row in zip(places, repeat(shape), normals, strict=False)]
     return np.array(distances), normals
 
 
-def near_surface(
-    name: str, rng: np.random.Generator, count: int = 20_000
-) -> tuple[Array, Array, Array]:
+def near_surface(name: str, rng: np.random.Generator, count: int = 20_000) -> tuple[Array, Array, Array]:
     """Places (N, 3) to 3 mm from a surface and away from its edges; distances and normals there."""
     half = (0.5 * np.array((np.ptp(X), np.ptp(Y)))) - AWAY
-    places = np.column_stack(
-        (rng.uniform(-half, half, (count, 2)), rng.uniform(-0.02, 0.02, count))
-    )
+    places = np.column_stack((rng.uniform(-half, half, (count, 2)), rng.uniform(-0.02, 0.02, count)))
     if name == "ball":
         ways = places - (0.0, 0.0, DEEP)
         size = np.linalg.norm(ways, axis=1)
@@ -147,15 +139,17 @@ def test_no_motion_gains_energy_from_a_field(friction: float, folder: Path) -> N
     rng, group, shares = np.random.default_rng(5), field(folder, "waves"), []
     share = np.linspace(0.0, 1.0, 3001)
     for _ in range(40):
-        way = sum(
-            (1.0 - np.cos(2.0 * np.pi * k * share))[:, None] * rng.normal(size=3)
-            for k in range(1, 5)
-        )
+        way = sum((1.0 - np.cos(2.0 * np.pi * k * share))[:, None] * rng.normal(size=3) for k in range(1, 5))
         way = way / np.abs(way).max() * (0.05, 0.04, 0.02) + (0.0, 0.0, 0.008)
         force, lost, _ = lead(
-            way, "height_field", group, puncture_force=0.0, world_stiffness=1000.0,
-            world_friction=friction, world_damping=2.0 * friction,
-        )  # fmt: skip
+            way,
+            "height_field",
+            group,
+            puncture_force=0.0,
+            world_stiffness=1000.0,
+            world_friction=friction,
+            world_damping=2.0 * friction,
+        )
         turned = np.abs((force[:-1] * np.diff(way[:-1], axis=0)).sum(axis=1)).sum()
         if turned > 1e-3 and not force[-1].any():
             shares.append(lost[-1] / turned)
@@ -166,8 +160,11 @@ def test_no_motion_gains_energy_from_a_field(friction: float, folder: Path) -> N
 def test_a_recording_replays_to_the_bit_when_its_file_is_gone(folder: Path, tmp_path: Path) -> None:
     path = tmp_path / "ball.csv"
     path.write_bytes((folder / "ball.csv").read_bytes())
-    settings: Any = {"world": "height_field", "world.height_field.file": str(path),
-                "world.place": [0.241, -0.236, -0.077]}  # fmt: skip
+    settings: Any = {
+        "world": "height_field",
+        "world.height_field.file": str(path),
+        "world.place": [0.241, -0.236, -0.077],
+    }
     recording = tc.run("palpation", duration=8.0, out=tmp_path / "bag", settings=settings)
     before = recording["slave/true_cf"].values
     assert np.abs(before).max() > 0.1
@@ -188,13 +185,14 @@ def test_the_page_draws_the_field_where_it_lies(folder: Path) -> None:
 @pytest.mark.parametrize(
     ("content", "said"),
     [
-        (b"1,2,x", "ValueError"), (b"", "no data"), (b"0,0\n0,0", "4 x 4"),
-        (b"0,0,0,nan\n" * 4, "finite"), (b"\xff\xfe", "Unicode"),
+        (b"1,2,x", "ValueError"),
+        (b"", "no data"),
+        (b"0,0\n0,0", "4 x 4"),
+        (b"0,0,0,nan\n" * 4, "finite"),
+        (b"\xff\xfe", "Unicode"),
     ],
-)  # fmt: skip
-def test_a_file_that_is_no_table_of_heights_is_refused(
-    content: bytes, said: str, folder: Path
-) -> None:
+)
+def test_a_file_that_is_no_table_of_heights_is_refused(content: bytes, said: str, folder: Path) -> None:
     path = folder / "bad.csv"
     path.write_bytes(content)
     with pytest.raises(ParameterError, match=said) as error:
@@ -206,10 +204,12 @@ def test_a_file_that_is_no_table_of_heights_is_refused(
 @pytest.mark.parametrize(
     ("more", "parameter"),
     [
-        ({"spacing": 1e-5}, "step"), ({"step": 5e-5}, "step"), ({"spacing": 0.1}, "step"),
+        ({"spacing": 1e-5}, "step"),
+        ({"step": 5e-5}, "step"),
+        ({"spacing": 0.1}, "step"),
         ({"spacing": 0.1, "step": 5e-3}, "spacing"),
     ],
-)  # fmt: skip
+)
 def test_a_field_that_does_not_fit_its_numbers_is_refused_by_their_name(
     more: dict[str, float], parameter: str, folder: Path
 ) -> None:

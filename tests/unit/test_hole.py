@@ -71,12 +71,7 @@ def test_depth_counts_in_the_hole_alone() -> None:
 
 def test_the_page_draws_its_edges() -> None:
     robot = load_robot("rcrt1")
-    values: dict[str, Any] = {
-        "kind": "hole",
-        "place": (0.3, 0.0, 0.0),
-        "hole.axis": TILTED,
-        "tool_points": 5,
-    }
+    values: dict[str, Any] = {"kind": "hole", "place": (0.3, 0.0, 0.0), "hole.axis": TILTED, "tool_points": 5}
     drawn = object_outline(values, robot)
     assert len(drawn) == 5 * 40
 
@@ -124,16 +119,12 @@ def test_the_score_tells_depth_resistance_and_torque(session: tc.Recording) -> N
     score = session.score()
     is_touching = wrench[:, :3].any(axis=1)
     axis = np.array([-0.9178, 0.0, 0.3971])
-    assert score.value("insertion.depth_mm") == pytest.approx(
-        1e3 * depth[is_touching].max(), abs=0.05
-    )
+    assert score.value("insertion.depth_mm") == pytest.approx(1e3 * depth[is_touching].max(), abs=0.05)
     against = wrench[:, :3] @ axis / np.linalg.norm(axis)
     assert score.value("insertion.resistance_n") == pytest.approx(against.max(), rel=1e-6)
     torque = np.linalg.norm(wrench[:, 3:], axis=1).max()
     assert score.value("insertion.torque_nm") == pytest.approx(torque, rel=1e-6)
-    assert score.value("touch.peak_n") == pytest.approx(
-        np.linalg.norm(wrench[:, :3], axis=1).max(), rel=1e-6
-    )
+    assert score.value("touch.peak_n") == pytest.approx(np.linalg.norm(wrench[:, :3], axis=1).max(), rel=1e-6)
 
 
 def test_a_session_without_a_hole_has_no_insertion(tmp_path: Path) -> None:

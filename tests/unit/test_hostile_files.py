@@ -33,8 +33,7 @@ from teleop_core.session.master_bag import as_master_bag
 MS = 1_000_000
 GIGABYTE = 1 << 30
 ESCAPES = "\x1b]0;owned\x07\x1b[2J\x1b[31m\x9b\u202e"
-STREAMS = (topics.SLAVE_MEASURED_CP, topics.SLAVE_SETPOINT_CP, topics.SLAVE_SERVO_CP,
-           topics.MASTER_MEASURED_CP)  # fmt: skip
+STREAMS = (topics.SLAVE_MEASURED_CP, topics.SLAVE_SETPOINT_CP, topics.SLAVE_SERVO_CP, topics.MASTER_MEASURED_CP)
 
 
 @pytest.fixture
@@ -144,9 +143,7 @@ def recorded(path: Path, **metadata: str) -> Path:
     return path
 
 
-def test_no_command_prints_codes_that_stand_in_a_recording(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_no_command_prints_codes_that_stand_in_a_recording(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = recorded(tmp_path / "bag", scenario=ESCAPES, robot=ESCAPES, seed=ESCAPES)
     assert cli.main(["evaluate", str(path), "--html", str(tmp_path / "page.html")]) == 0
     said = "".join(capsys.readouterr())
@@ -182,16 +179,11 @@ def test_a_file_that_is_listed_three_thousand_times_is_refused_in_one_line(tmp_p
     assert len(str(told.value)) <= LONGEST_LINE
 
 
-VALUES = {
-    "number": 10**5000, "numbers": [10**5000], "text": "x" * 10**6, "texts": ["y" * 99] * 9999,
-    "codes": ESCAPES,
-}  # fmt: skip
+VALUES = {"number": 10**5000, "numbers": [10**5000], "text": "x" * 10**6, "texts": ["y" * 99] * 9999, "codes": ESCAPES}
 
 
 @pytest.mark.parametrize("value", VALUES.values(), ids=VALUES)
-def test_every_value_is_shown_in_a_few_printable_words(
-    value: str | int | Sequence[str | int],
-) -> None:
+def test_every_value_is_shown_in_a_few_printable_words(value: str | int | Sequence[str | int]) -> None:
     text = str(UnknownNameError("name", value, ["a", "b"]))
     assert len(text) <= LONGEST_LINE
     assert printable(text) == text

@@ -19,32 +19,29 @@ from teleop_core.kernels.geometry import Array
 
 SIZE, ROTATION, APPROACH = (0.06, 0.05, 0.04), 0.2, 2.0
 CENTER, TILT = (0.01, -0.02, 0.03), (-0.5, 0.1, 0.2)
-EXACT: dict[str, Any] = {
-    "shortfall": 0.0,
-    "noise_along": 0.0,
-    "noise_across": 0.0,
-    "corrections": 0,
-}
+EXACT: dict[str, Any] = {"shortfall": 0.0, "noise_along": 0.0, "noise_across": 0.0, "corrections": 0}
 
 
 def region(**values: object) -> OperatorParameters:
-    given = {"kind": "human", "size": SIZE, "rotation": ROTATION, "approach_time": APPROACH,
-             "center": CENTER, "tilt": TILT}  # fmt: skip
+    given = {
+        "kind": "human",
+        "size": SIZE,
+        "rotation": ROTATION,
+        "approach_time": APPROACH,
+        "center": CENTER,
+        "tilt": TILT,
+    }
     return build(OperatorParameters, given | values)
 
 
 def motion(
-    seed: int = 1,
-    parameters: HumanParameters | None = None,
-    **values: float | tuple[float, float, float],
+    seed: int = 1, parameters: HumanParameters | None = None, **values: float | tuple[float, float, float]
 ) -> Callable[..., Any]:
     setting = Setting(region(**values), np.zeros((6, 4)), seed)
     return OPERATORS.find("human").make(parameters or HumanParameters(), setting)
 
 
-def reaches(
-    count: int, parameters: HumanParameters, seed: int = 1, **values: object
-) -> list[Submovement]:
+def reaches(count: int, parameters: HumanParameters, seed: int = 1, **values: object) -> list[Submovement]:
     """The first submovements."""
     plan = submovements(parameters, region(**values), np.random.default_rng(seed))
     return list(islice(plan, count))

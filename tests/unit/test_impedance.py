@@ -43,10 +43,7 @@ def slave(**values: float) -> tuple[Any, Callable[..., float]]:
     row["slave_setpoint_cp_ns"] = NO_COMMAND_NS + 1
 
     def command(
-        force: float = 0.0,
-        lead: float = 0.0,
-        ticks: int = 1,
-        place: tuple[float, float, float] = (0.1, 0.2, 0.3),
+        force: float = 0.0, lead: float = 0.0, ticks: int = 1, place: tuple[float, float, float] = (0.1, 0.2, 0.3)
     ) -> float:
         row["slave_servo_cp"][:3] = place
         row["slave_servo_cp_ns"] += ticks * TICK_NS
@@ -133,9 +130,12 @@ def settled(rows: NDArray[np.void]) -> slice:
 @pytest.mark.parametrize("architecture", ["three_channel", "four_channel"])
 def test_the_hand_feels_the_force_by_its_gain_and_a_spring_to_the_tip(architecture: str) -> None:
     rows = pressing(
-        f"reflection.architecture={architecture}", f"{architecture}.force_gain=0.5",
-        f"{architecture}.stiffness=80.0", "reflection.max_force=10.0", *LATE,
-    )  # fmt: skip
+        f"reflection.architecture={architecture}",
+        f"{architecture}.force_gain=0.5",
+        f"{architecture}.stiffness=80.0",
+        "reflection.max_force=10.0",
+        *LATE,
+    )
     now, before = settled(rows), slice(4999, len(rows) - 1)
     away = rows["network_measured_cp"][before, :3] - rows["slave_servo_cp"][now, :3]
     felt = 0.5 * rows["network_measured_cf"][before, :3] + 80.0 * away
@@ -161,14 +161,10 @@ def test_without_a_fourth_channel_the_hand_sends_no_force(architecture: str) -> 
     rows = pressing(f"reflection.architecture={architecture}", "impedance.stiffness=500.0")
     assert not rows["slave_servo_cf"].any()
     yielded = rows["impedance_servo_cp"][:, 2] - rows["network_servo_cp"][:, 2]
-    assert yielded.max() == pytest.approx(
-        rows["slave_measured_cf"][:, 2].max() / 500.0, rel=0.05
-    )  # presses last
+    assert yielded.max() == pytest.approx(rows["slave_measured_cf"][:, 2].max() / 500.0, rel=0.05)  # presses last
 
 
-def test_a_press_that_lasts_leaves_four_channels_no_way_from_the_command_and_three_its_force() -> (
-    None
-):
+def test_a_press_that_lasts_leaves_four_channels_no_way_from_the_command_and_three_its_force() -> None:
     away = {}
     for architecture in ("three_channel", "four_channel"):
         rows = pressing(f"reflection.architecture={architecture}", ticks=12_000)
@@ -188,21 +184,20 @@ def test_a_session_whose_slave_does_not_yield_sends_no_force_there() -> None:
     assert feeds["slave/servo_cf"].topic.name == "network/servo_cf"
     assert feeds["slave/servo_cp"].topic.name == "network/servo_cp"
     assert feeds["slave/measured_cf"].topic.name == "slave/measured_cf"  # its own, not late
-    (into,) = (
-        link
-        for link in with_it.links
-        if link.reader.name == "passivity" and link.port.name == "slave/servo_cp"
-    )
+    (into,) = (link for link in with_it.links if link.reader.name == "passivity" and link.port.name == "slave/servo_cp")
     assert into.topic.name == "impedance/servo_cp"  # passivity counts how it yields
 
 
 def test_a_force_of_the_hand_behind_a_deadband_is_off_by_no_more_than_its_share() -> None:
     rows = pressing(
-        "reflection.architecture=four_channel", "network.deadband.is_on=true",
-        "network.deadband.force=0.1", "network.deadband.least_force=0.02",
-        "network.deadband.place=0.1", "network.deadband.turn=1.0",
+        "reflection.architecture=four_channel",
+        "network.deadband.is_on=true",
+        "network.deadband.force=0.1",
+        "network.deadband.least_force=0.02",
+        "network.deadband.place=0.1",
+        "network.deadband.turn=1.0",
         "network.deadband.longest_pause=1.0",
-    )  # fmt: skip
+    )
     told, came = rows["slave_servo_cf"][6000:, :3], rows["network_servo_cf"][6000:, :3]
     off, size = (np.linalg.norm(each, axis=1) for each in (told - came, came))
     assert size.max() > 0.5
@@ -213,9 +208,7 @@ def test_a_force_of_the_hand_behind_a_deadband_is_off_by_no_more_than_its_share(
 
 
 @pytest.mark.parametrize("architecture", ["three_channel", "four_channel"])
-def test_channels_before_a_slave_that_does_not_yield_are_refused_with_what_there_is(
-    architecture: str,
-) -> None:
+def test_channels_before_a_slave_that_does_not_yield_are_refused_with_what_there_is(architecture: str) -> None:
     with pytest.raises(ParameterError, match=r"teleop.stages=\[impedance\].*position_force") as got:
         configure("palpation", settings=[f"reflection.architecture={architecture}"])
     assert got.value.value == architecture

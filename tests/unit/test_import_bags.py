@@ -30,8 +30,7 @@ T = np.arange(COUNT) * 0.01
 PLACES = 0.03 * np.column_stack((np.sin(T), np.cos(T), T))
 XYZW = Rotation.from_rotvec(np.column_stack((np.sin(T), 0.2 * T, np.cos(T)))).as_quat()
 POSES = np.column_stack((PLACES, XYZW[:, [3, 0, 1, 2]]))
-KINDS = ("PoseStamped", "PoseWithCovarianceStamped", "TransformStamped", "Odometry", "Pose",
-         "Transform", "TFMessage")  # fmt: skip
+KINDS = ("PoseStamped", "PoseWithCovarianceStamped", "TransformStamped", "Odometry", "Pose", "Transform", "TFMessage")
 
 
 @cache
@@ -63,23 +62,20 @@ class Maker:
         g = "geometry_msgs/msg"
         x, y, z = PLACES[i]
         turn = self.make(f"{g}/Quaternion", **dict(zip("xyzw", XYZW[i], strict=True)))
-        pose = self.make(f"{g}/Pose", position=self.make(f"{g}/Point", x=x, y=y, z=z),
-                         orientation=turn)  # fmt: skip
-        move = self.make(f"{g}/Transform", translation=self.make(f"{g}/Vector3", x=x, y=y, z=z),
-                         rotation=turn)  # fmt: skip
+        pose = self.make(f"{g}/Pose", position=self.make(f"{g}/Point", x=x, y=y, z=z), orientation=turn)
+        move = self.make(f"{g}/Transform", translation=self.make(f"{g}/Vector3", x=x, y=y, z=z), rotation=turn)
         spread = self.make(f"{g}/PoseWithCovariance", pose=pose, covariance=np.full(36, float(i)))
         head = self.header(stamp_ns, seq=i)
-        moved = self.make(
-            f"{g}/TransformStamped", header=head, child_frame_id=child, transform=move
-        )
+        moved = self.make(f"{g}/TransformStamped", header=head, child_frame_id=child, transform=move)
         zero = self.make(f"{g}/Vector3", x=0.0, y=0.0, z=float(i))
-        twist = self.make(f"{g}/TwistWithCovariance", covariance=np.zeros(36),
-                          twist=self.make(f"{g}/Twist", linear=zero, angular=zero))  # fmt: skip
+        twist = self.make(
+            f"{g}/TwistWithCovariance",
+            covariance=np.zeros(36),
+            twist=self.make(f"{g}/Twist", linear=zero, angular=zero),
+        )
         return {
             "PoseStamped": lambda: self.make(f"{g}/PoseStamped", header=head, pose=pose),
-            "PoseWithCovarianceStamped": lambda: self.make(
-                f"{g}/PoseWithCovarianceStamped", header=head, pose=spread
-            ),
+            "PoseWithCovarianceStamped": lambda: self.make(f"{g}/PoseWithCovarianceStamped", header=head, pose=spread),
             "TransformStamped": lambda: moved,
             "Odometry": lambda: self.make(
                 "nav_msgs/msg/Odometry", header=head, child_frame_id=child, pose=spread, twist=twist
@@ -91,9 +87,11 @@ class Maker:
 
     def joy(self, stamp_ns: Any, buttons: list[int]) -> Any:
         return self.make(
-            "sensor_msgs/msg/Joy", header=self.header(stamp_ns), axes=np.zeros(2, np.float32),
+            "sensor_msgs/msg/Joy",
+            header=self.header(stamp_ns),
+            axes=np.zeros(2, np.float32),
             buttons=np.array(buttons, np.int32),
-        )  # fmt: skip
+        )
 
 
 def write2(
@@ -117,9 +115,7 @@ def write2(
 
 
 def write1(
-    path: Path,
-    messages: list[tuple[str, int, Any]],
-    compression: Writer1.CompressionFormat | None = None,
+    path: Path, messages: list[tuple[str, int, Any]], compression: Writer1.CompressionFormat | None = None
 ) -> Path:
     """ROS 1 bag."""
     maker, writer = types_of(False), Writer1(path)
@@ -148,10 +144,7 @@ def poses(
 
 
 def presses(
-    buttons: Callable[..., Any],
-    topic: str = "/joy",
-    stamps: NDArray[np.int64] = STAMPS,
-    is_ros2: bool = True,
+    buttons: Callable[..., Any], topic: str = "/joy", stamps: NDArray[np.int64] = STAMPS, is_ros2: bool = True
 ) -> Any:
     maker = Maker(is_ros2)
     return [(topic, LOGS[i], maker.joy(stamps[i], buttons(i))) for i in range(COUNT)]
@@ -161,9 +154,7 @@ def in_order(*parts: list[tuple[str, int, object]]) -> list[tuple[str, int, obje
     return sorted((m for part in parts for m in part), key=lambda message: message[1])
 
 
-def imported(
-    path: Path, tmp_path: Path, **options: Any
-) -> tuple[teleop_exchange.ImportReport, tc.Stream]:
+def imported(path: Path, tmp_path: Path, **options: Any) -> tuple[teleop_exchange.ImportReport, tc.Stream]:
     report = teleop_exchange.import_recording(path, tmp_path / "out", **options)
     return report, report.recording["master/measured_cp"]
 
@@ -178,9 +169,7 @@ def assert_same(stream: tc.Stream, stamps: ArrayLike = STAMPS, rows: Array = POS
 
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("version", ["mcap", "db3", "ros1"])
-def test_every_message_of_a_pose_is_read_from_every_storage(
-    kind: str, version: str, tmp_path: Path
-) -> None:
+def test_every_message_of_a_pose_is_read_from_every_storage(kind: str, version: str, tmp_path: Path) -> None:
     messages = poses(kind, is_ros2=version != "ros1")
     if version == "ros1":
         path = write1(tmp_path / "user.bag", messages)
@@ -194,9 +183,7 @@ def test_every_message_of_a_pose_is_read_from_every_storage(
 
 @pytest.mark.parametrize("mode", [CompressionMode.FILE, CompressionMode.MESSAGE])
 @pytest.mark.parametrize("storage", list(StoragePlugin))
-def test_compressed_recordings_are_read(
-    mode: CompressionMode, storage: StoragePlugin, tmp_path: Path
-) -> None:
+def test_compressed_recordings_are_read(mode: CompressionMode, storage: StoragePlugin, tmp_path: Path) -> None:
     if mode is CompressionMode.FILE and storage is StoragePlugin.MCAP:
         mode = CompressionMode.STORAGE
     assert_same(imported(write2(tmp_path / "bag", poses(), storage, mode), tmp_path)[1])
@@ -242,9 +229,7 @@ def test_messages_need_not_be_alike(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("storage", list(StoragePlugin))
-def test_messages_count_in_the_order_of_their_recording(
-    storage: StoragePlugin, tmp_path: Path
-) -> None:
+def test_messages_count_in_the_order_of_their_recording(storage: StoragePlugin, tmp_path: Path) -> None:
     rng = np.random.default_rng(3)
     messages = poses()
     shuffled = [messages[i] for i in rng.permutation(COUNT)]
@@ -563,9 +548,7 @@ def test_a_bag_that_was_cut_off_is_told(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("is_ros2", [True, False])
-def test_both_masters_of_the_da_vinci_kit_and_its_pedal_are_two_arms(
-    tmp_path: Path, is_ros2: bool
-) -> None:
+def test_both_masters_of_the_da_vinci_kit_and_its_pedal_are_two_arms(tmp_path: Path, is_ros2: bool) -> None:
     maker = Maker(is_ros2)
     messages: Any = []
     for i, (stamp, log) in enumerate(zip(STAMPS, LOGS, strict=True)):

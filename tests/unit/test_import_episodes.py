@@ -48,9 +48,7 @@ def test_each_recording_is_that_of_its_episode_alone(kind: str, tmp_path: Path) 
     ]
     for number, rows in zip(NUMBERS, ROWS, strict=True):
         table((number,)).to_csv(tmp_path / f"{number}.csv")
-        alone = teleop_exchange.import_recording(
-            tmp_path / f"{number}.csv", tmp_path / str(number), episode=number
-        )
+        alone = teleop_exchange.import_recording(tmp_path / f"{number}.csv", tmp_path / str(number), episode=number)
         one, other = (r.recording["master/measured_cp"] for r in (report.made[number], alone))
         assert len(one.stamp_ns) == rows
         np.testing.assert_array_equal(one.stamp_ns, other.stamp_ns)
@@ -91,9 +89,7 @@ def test_an_episode_that_cannot_be_imported_does_not_keep_the_others(
     lines = capsys.readouterr().out.splitlines()
     assert [": refused: " in line for line in lines] == [False, True, False, False]
     assert lines[-1].endswith("2 episodes imported, 0 kept, 1 refused")
-    assert sorted(one.name for one in (tmp_path / "out").iterdir()) == [
-        "episode_000000", "episode_000005",
-    ]  # fmt: skip
+    assert sorted(one.name for one in (tmp_path / "out").iterdir()) == ["episode_000000", "episode_000005"]
 
 
 def test_what_is_wrong_for_all_episodes_is_said_once(tmp_path: Path) -> None:

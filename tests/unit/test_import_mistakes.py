@@ -99,9 +99,7 @@ def test_without_a_place_columns_are_asked_for(tmp_path: Path) -> None:
         ("t", np.where(np.arange(COUNT) < 100, T, T - 0.5), "goes back in 49 rows (24.5 %)"),
     ],
 )
-def test_columns_that_say_nothing_are_refused(
-    column: str, values: float | Array, text: str, tmp_path: Path
-) -> None:
+def test_columns_that_say_nothing_are_refused(column: str, values: float | Array, text: str, tmp_path: Path) -> None:
     assert text in refusal(written(tmp_path, GOOD.assign(**{column: values})), tmp_path)
 
 

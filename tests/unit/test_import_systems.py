@@ -22,24 +22,20 @@ HEAD = ["NO_OF_FRAMES\t300", "NO_OF_CAMERAS\t4", "NO_OF_BODIES\t1", "FREQUENCY\t
         "NO_OF_ANALOG\t0", "ANALOG_FREQUENCY\t0", "DESCRIPTION\t--",
         "TIME_STAMP\t2020-01-22, 17:47:17\t22107.99179716", "DATA_INCLUDED\t6D",
         "BODY_NAMES\tStylus"]  # fmt: skip
-NAMES = ["Frame", "Time", "Stylus X", "Y", "Z", "Roll", "Pitch", "Yaw", "Residual",
-         *(f"Rot[{i}]" for i in range(9))]  # fmt: skip
+NAMES = ["Frame", "Time", "Stylus X", "Y", "Z", "Roll", "Pitch", "Yaw", "Residual", *(f"Rot[{i}]" for i in range(9))]
 
 QUALISYS: dict[str, Any] = {
-    "unit": "mm", "time_unit": "s", "matrix_order": "column",
+    "unit": "mm",
+    "time_unit": "s",
+    "matrix_order": "column",
     "matrix": tuple(f"Rot[{i}]" for i in range(9)),
-}  # fmt: skip
-JIGSAWS: dict[str, Any] = {
-    "rate": 30.0, "unit": "m",
-    "arms": {"left": {"position": "1-3", "matrix": "4-12"},
-             "right": {"position": "20-22", "matrix": "23-31"}},
-}  # fmt: skip
-UNITY: dict[str, Any] = {
-    "unit": "m",
-    "handedness": "left",
-    "axes": ("+z", "-x", "+y"),
-    "quaternion_order": "xyzw",
 }
+JIGSAWS: dict[str, Any] = {
+    "rate": 30.0,
+    "unit": "m",
+    "arms": {"left": {"position": "1-3", "matrix": "4-12"}, "right": {"position": "20-22", "matrix": "23-31"}},
+}
+UNITY: dict[str, Any] = {"unit": "m", "handedness": "left", "axes": ("+z", "-x", "+y"), "quaternion_order": "xyzw"}
 
 
 def poses(recording: tc.Recording, topic: str = "master/measured_cp") -> tuple[Array, Array]:
@@ -54,10 +50,7 @@ def poses(recording: tc.Recording, topic: str = "master/measured_cp") -> tuple[A
 def qualisys(path: Path, end: str = "") -> Path:
     """Rigid body of Track Manager: eleven lines before the numbers, lengths in mm."""
     angles = TURNS.as_euler("XYZ", degrees=True)
-    rows = [
-        [n + 1, T[n], *(1e3 * PLACES[n]), *angles[n], 0.4, *TURNS[n].as_matrix().T.ravel()]
-        for n in range(COUNT)
-    ]
+    rows = [[n + 1, T[n], *(1e3 * PLACES[n]), *angles[n], 0.4, *TURNS[n].as_matrix().T.ravel()] for n in range(COUNT)]
     lines = [*HEAD, "\t".join(NAMES) + end]
     lines += ["\t".join(f"{value:.6f}" for value in row) for row in rows]
     path.write_text("\r\n".join(lines) + "\r\n")
@@ -66,9 +59,7 @@ def qualisys(path: Path, end: str = "") -> Path:
 
 @pytest.mark.parametrize("end", ["", "\t"])
 def test_a_rigid_body_of_qualisys_is_what_it_was(tmp_path: Path, end: str) -> None:
-    report = teleop_exchange.import_recording(
-        qualisys(tmp_path / "hand.tsv", end), tmp_path / "bag", **QUALISYS
-    )
+    report = teleop_exchange.import_recording(qualisys(tmp_path / "hand.tsv", end), tmp_path / "bag", **QUALISYS)
     assert report.counts.samples == report.counts.rows == COUNT
     places, matrices = poses(report.recording)
     np.testing.assert_allclose(places, PLACES, atol=1e-8)
@@ -76,9 +67,7 @@ def test_a_rigid_body_of_qualisys_is_what_it_was(tmp_path: Path, end: str) -> No
     assert report.rate == pytest.approx(100.0)
 
 
-def test_places_far_beyond_a_hand_are_refused_until_somebody_says_their_unit(
-    tmp_path: Path,
-) -> None:
+def test_places_far_beyond_a_hand_are_refused_until_somebody_says_their_unit(tmp_path: Path) -> None:
     file = qualisys(tmp_path / "hand.tsv")
     with pytest.raises(tc.TeleopError, match=r"up to 50 m from the origin.*--unit mm, or --unit m"):
         teleop_exchange.import_recording(file, tmp_path / "bag")
@@ -97,9 +86,7 @@ def jigsaws(path: Path) -> Path:
 
 
 def test_both_masters_of_jigsaws_are_two_arms_that_replay(tmp_path: Path) -> None:
-    report = teleop_exchange.import_recording(
-        jigsaws(tmp_path / "a.txt"), tmp_path / "bag", **JIGSAWS
-    )
+    report = teleop_exchange.import_recording(jigsaws(tmp_path / "a.txt"), tmp_path / "bag", **JIGSAWS)
     assert [one.arm for one in (report, *report.others)] == ["left", "right"]
     assert report.rate == pytest.approx(30.0, rel=1e-3)
     for number, topic in enumerate(("master/measured_cp", "right/master/measured_cp")):
@@ -125,9 +112,7 @@ def unity(path: Path) -> Path:
 
 
 def test_left_handed_axes_of_unity_are_mirrored_with_their_turns(tmp_path: Path) -> None:
-    report = teleop_exchange.import_recording(
-        unity(tmp_path / "hand.csv"), tmp_path / "bag", **UNITY
-    )
+    report = teleop_exchange.import_recording(unity(tmp_path / "hand.csv"), tmp_path / "bag", **UNITY)
     places, matrices = poses(report.recording)
     np.testing.assert_allclose(places, PLACES, atol=1e-12)
     np.testing.assert_allclose(matrices, TURNS.as_matrix(), atol=1e-12)
@@ -157,9 +142,7 @@ def test_a_column_that_is_called_clutch_and_is_no_button_is_told(tmp_path: Path)
     assert any("no button clutch: 'Clutch' holds more than 0 and 1" in text for text in report.told)
 
 
-def test_two_hands_of_a_table_are_said_on_the_command_line(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_two_hands_of_a_table_are_said_on_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     table = pd.DataFrame({"t": T, "press": T > 1.0})
     for hand, sign in (("l", 1.0), ("r", -1.0)):
         for axis, column in zip("xyz", PLACES.T, strict=True):

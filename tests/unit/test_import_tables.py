@@ -20,12 +20,8 @@ from teleop_exchange.times import ordered
 
 COUNT, RATE = 400, 100.0
 TIMES = np.arange(COUNT) / RATE
-PLACES = np.column_stack(
-    (0.03 * np.sin(2.0 * TIMES), 0.02 * np.cos(3.0 * TIMES), 0.1 + 0.01 * TIMES)
-)
-TURNS = Rotation.from_rotvec(
-    np.column_stack((0.5 * np.sin(TIMES), 0.4 * np.cos(2.0 * TIMES), 0.6 * TIMES))
-)
+PLACES = np.column_stack((0.03 * np.sin(2.0 * TIMES), 0.02 * np.cos(3.0 * TIMES), 0.1 + 0.01 * TIMES))
+TURNS = Rotation.from_rotvec(np.column_stack((0.5 * np.sin(TIMES), 0.4 * np.cos(2.0 * TIMES), 0.6 * TIMES)))
 WXYZ = TURNS.as_quat(scalar_first=True)
 HEAD = ["t", "x", "y", "z", "qw", "qx", "qy", "qz"]
 TABLE = np.column_stack((TIMES, PLACES, WXYZ))
@@ -44,11 +40,7 @@ def imported(path: Path, tmp_path: Path, **options: Any) -> Any:
 
 
 def assert_same_motion(
-    stream: tc.Stream,
-    places: Array = PLACES,
-    turns: Rotation = TURNS,
-    times: Array = TIMES,
-    metres: float = 1e-15,
+    stream: tc.Stream, places: Array = PLACES, turns: Rotation = TURNS, times: Array = TIMES, metres: float = 1e-15
 ) -> None:
     assert np.allclose(stream[["x", "y", "z"]], places, rtol=0, atol=metres)
     got = Rotation.from_quat(stream[["qw", "qx", "qy", "qz"]], scalar_first=True)
@@ -104,16 +96,12 @@ def test_lists_in_parquet_are_columns_with_numbers(tmp_path: Path) -> None:
 @pytest.mark.parametrize("sep", [",", " ", "\t"])
 def test_without_a_head_columns_go_by_number_from_one(sep: str, tmp_path: Path) -> None:
     noise = np.random.default_rng(1).normal(size=(COUNT, 3))
-    pd.DataFrame(np.hstack((noise, TABLE))).to_csv(
-        tmp_path / "bare.txt", sep=sep, header=False, index=False
-    )
+    pd.DataFrame(np.hstack((noise, TABLE))).to_csv(tmp_path / "bare.txt", sep=sep, header=False, index=False)
     options: dict[str, Any] = {"time": 4, "position": "5-7", "quaternion": ("8", "9", 10, "11")}
     assert_same_motion(imported(tmp_path / "bare.txt", tmp_path, **options)[1])
 
 
-def test_eight_columns_without_a_head_are_time_place_and_quaternion_with_w_last(
-    tmp_path: Path,
-) -> None:
+def test_eight_columns_without_a_head_are_time_place_and_quaternion_with_w_last(tmp_path: Path) -> None:
     rows = np.column_stack((TIMES, PLACES, TURNS.as_quat()))
     np.savetxt(tmp_path / "trajectory.txt", rows, fmt="%.17g")
     report, stream = imported(tmp_path / "trajectory.txt", tmp_path)
@@ -202,13 +190,9 @@ def test_names_of_a_quaternion_say_its_order(tmp_path: Path) -> None:
     assert_same_motion(stream)
 
 
-def test_quaternions_of_any_sign_and_nearly_unit_length_give_a_continuous_one(
-    tmp_path: Path,
-) -> None:
+def test_quaternions_of_any_sign_and_nearly_unit_length_give_a_continuous_one(tmp_path: Path) -> None:
     rng = np.random.default_rng(3)
-    values = (
-        WXYZ * rng.choice([-1.0, 1.0], COUNT)[:, None] * rng.uniform(0.95, 1.05, COUNT)[:, None]
-    )
+    values = WXYZ * rng.choice([-1.0, 1.0], COUNT)[:, None] * rng.uniform(0.95, 1.05, COUNT)[:, None]
     _, stream = turned(tmp_path / "a.csv", tmp_path, HEAD[4:], values)
     assert_same_motion(stream)
     got = stream[HEAD[4:]]
@@ -298,12 +282,8 @@ def test_irregular_times_stay_as_they_are(tmp_path: Path) -> None:
 # Places.
 
 
-@pytest.mark.parametrize(
-    ("unit", "metres"), [("m", 1.0), ("cm", 0.01), ("mm", 1e-3), ("in", 0.0254)]
-)
-def test_unit_of_the_place_is_given_or_stands_in_the_names(
-    unit: str, metres: float, tmp_path: Path
-) -> None:
+@pytest.mark.parametrize(("unit", "metres"), [("m", 1.0), ("cm", 0.01), ("mm", 1e-3), ("in", 0.0254)])
+def test_unit_of_the_place_is_given_or_stands_in_the_names(unit: str, metres: float, tmp_path: Path) -> None:
     rows = np.column_stack((TIMES, PLACES / metres))
     head: list[str]
     options: dict[str, Any]
@@ -311,9 +291,7 @@ def test_unit_of_the_place_is_given_or_stands_in_the_names(
         ((["t", "x", "y", "z"], {"unit": unit}), (["t", *(f"{a} [{unit}]" for a in "xyz")], {}))
     ):
         frame(head, rows).to_csv(tmp_path / "a.csv", index=False)
-        report = teleop_exchange.import_recording(
-            tmp_path / "a.csv", tmp_path / str(number), **dict[str, Any](options)
-        )
+        report = teleop_exchange.import_recording(tmp_path / "a.csv", tmp_path / str(number), **dict[str, Any](options))
         got = report.recording["master/measured_cp"][["x", "y", "z"]]
         assert np.allclose(got, PLACES, rtol=0, atol=1e-15)
 
@@ -330,9 +308,7 @@ def test_the_chosen_middle_comes_to_zero(center: str, tmp_path: Path) -> None:
     frame().to_csv(tmp_path / "a.csv", index=False)
     _, stream = imported(tmp_path / "a.csv", tmp_path, center=center, scale=2.0)
     got = stream[["x", "y", "z"]]
-    middle = {
-        "mean": got.mean(axis=0), "start": got[0], "middle": got.min(axis=0) + got.max(axis=0)
-    }[center]  # fmt: skip
+    middle = {"mean": got.mean(axis=0), "start": got[0], "middle": got.min(axis=0) + got.max(axis=0)}[center]
     assert np.abs(middle).max() < 1e-15
     assert np.allclose(np.diff(got, axis=0), 2.0 * np.diff(PLACES, axis=0), rtol=0, atol=1e-15)
 
@@ -506,9 +482,11 @@ def test_our_own_export_comes_back(tmp_path: Path) -> None:
     teleop_exchange.export_recording(recording, tmp_path / "bag.csv")
     topic = "master/measured_cp"
     _, stream = imported(
-        tmp_path / "bag.csv", tmp_path, position=[f"{topic}.{axis}" for axis in "xyz"],
+        tmp_path / "bag.csv",
+        tmp_path,
+        position=[f"{topic}.{axis}" for axis in "xyz"],
         quaternion=[f"{topic}.q{axis}" for axis in "wxyz"],
-    )  # fmt: skip
+    )
     own = recording[topic]
     assert len(stream) == len(own)
     assert np.array_equal(stream[["x", "y", "z"]], own[["x", "y", "z"]])
@@ -565,12 +543,9 @@ def test_metadata_say_how_the_import_can_be_repeated(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("options", "text"),
-    [({"unit": "m", "scale": 100.0}, "unit mm"), ({"rate": 5.0}, "slow"), ({"rate": 1e4}, "5 m/s")],
+    ("options", "text"), [({"unit": "m", "scale": 100.0}, "unit mm"), ({"rate": 5.0}, "slow"), ({"rate": 1e4}, "5 m/s")]
 )
-def test_what_looks_wrong_is_told(
-    options: Mapping[str, str | float], text: str, tmp_path: Path
-) -> None:
+def test_what_looks_wrong_is_told(options: Mapping[str, str | float], text: str, tmp_path: Path) -> None:
     rows = PLACES if "rate" in options else np.column_stack((TIMES, PLACES))
     rows = 2.0 * rows
     frame(HEAD[:4][-rows.shape[1] :], rows).to_csv(tmp_path / "a.csv", index=False)
@@ -603,37 +578,27 @@ def test_what_looks_wrong_is_told(
         ("t x y z q0 q1 q2 q3", "t", "x y z", "q0 q1 q2 q3"),
     ],
 )  # fmt: skip
-def test_names_of_many_recorders_are_understood(
-    head: str, time: str, place: str, turn: str
-) -> None:
+def test_names_of_many_recorders_are_understood(head: str, time: str, place: str, turn: str) -> None:
     columns = head.split()
     places = names.find_positions(columns)[:1]
     for found, expected in (
-        (names.find_time(columns), time), (places[0] if places else (), place),
+        (names.find_time(columns), time),
+        (places[0] if places else (), place),
         (names.find_quaternion(columns), turn),
-    ):  # fmt: skip
+    ):
         assert [columns[i] for i in found] == expected.split()
 
 
 def test_other_positions_beside_the_one_taken_are_told(tmp_path: Path) -> None:
     head = ["t", *(f"{hand}.{axis}" for hand in ("left", "right") for axis in "xyz")]
-    frame(head, np.column_stack((TIMES, PLACES, 2.0 * PLACES))).to_csv(
-        tmp_path / "a.csv", index=False
-    )
+    frame(head, np.column_stack((TIMES, PLACES, 2.0 * PLACES))).to_csv(tmp_path / "a.csv", index=False)
     report, stream = imported(tmp_path / "a.csv", tmp_path)
     assert np.allclose(stream[["x", "y", "z"]], PLACES, rtol=0, atol=1e-15)
     assert any("right.x" in text for text in report.told)
 
 
 @pytest.mark.parametrize(
-    ("name", "unit"),
-    [
-        ("x [mm]", "mm"),
-        ("Time (Seconds)", "s"),
-        ("stamp_ns", "ns"),
-        ("roll (deg)", "deg"),
-        ("x", ""),
-    ],
+    ("name", "unit"), [("x [mm]", "mm"), ("Time (Seconds)", "s"), ("stamp_ns", "ns"), ("roll (deg)", "deg"), ("x", "")]
 )
 def test_units_stand_behind_names(name: str, unit: str) -> None:
     assert names.without_unit(name)[1] == unit

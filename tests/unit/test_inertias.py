@@ -16,17 +16,13 @@ from teleop_core.robots.arms.rcrt1_dynamics import LINKS, link_inertias
 from teleop_core.robots.drives import Dynamics, independent_axes
 from teleop_core.robots.inertias import LinkInertia, check_possible
 
-points = st.lists(
-    st.tuples(st.floats(0.01, 2.0), *[st.floats(-1.0, 1.0)] * 3), min_size=4, max_size=12
-)
+points = st.lists(st.tuples(st.floats(0.01, 2.0), *[st.floats(-1.0, 1.0)] * 3), min_size=4, max_size=12)
 
 
 def of_points(cloud: list[tuple[float, float, float, float]]) -> LinkInertia:
     """Link of point masses (mass, x, y, z): sums over the points, as the definition says."""
     masses, places = np.array([p[0] for p in cloud]), np.array([p[1:] for p in cloud])
-    tensor = sum(
-        m * (p @ p * np.eye(3) - np.outer(p, p)) for m, p in zip(masses, places, strict=True)
-    )
+    tensor = sum(m * (p @ p * np.eye(3) - np.outer(p, p)) for m, p in zip(masses, places, strict=True))
     center = masses @ places / masses.sum()
     return LinkInertia(name="cloud", mass=masses.sum(), center=center, inertia=tensor)
 
@@ -48,9 +44,7 @@ def test_every_cloud_of_masses_has_a_possible_inertia_or_is_flat(
 
 
 @given(points)
-def test_central_inertia_is_that_of_pinocchio(
-    cloud: list[tuple[float, float, float, float]],
-) -> None:
+def test_central_inertia_is_that_of_pinocchio(cloud: list[tuple[float, float, float, float]]) -> None:
     link = of_points(cloud)
     pseudo = pinocchio.PseudoInertia.FromMatrix(link.pseudo)
     theirs = pinocchio.Inertia.FromPseudoInertia(pseudo)
@@ -59,9 +53,7 @@ def test_central_inertia_is_that_of_pinocchio(
 
 
 @given(st.tuples(*[st.floats(0.01, 1.0)] * 3))
-def test_the_triangle_inequality_is_the_pseudo_inertias_sign(
-    moments: tuple[float, float, float],
-) -> None:
+def test_the_triangle_inequality_is_the_pseudo_inertias_sign(moments: tuple[float, float, float]) -> None:
     link = principal(moments)
     least = np.linalg.eigvalsh(link.pseudo)[0]
     if least > 1e-6:
@@ -81,9 +73,7 @@ def test_every_robot_has_possible_inertias(name: str) -> None:
 
 
 def test_the_rcrt1_states_its_links() -> None:
-    assert [link.name for link in present(load_robot("rcrt1").dynamics).links] == [
-        "link 1", "link 2", "link 3",
-    ]  # fmt: skip
+    assert [link.name for link in present(load_robot("rcrt1").dynamics).links] == ["link 1", "link 2", "link 3"]
 
 
 def test_link_3_with_the_printed_product_and_the_mended_centre_is_refused() -> None:

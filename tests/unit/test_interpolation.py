@@ -24,11 +24,7 @@ ROUNDING = 1e-13
 
 
 def way(
-    interpolation: str,
-    commands: Array,
-    ticks_between: list[int],
-    robot: str = "planar_3r",
-    after: int = 0,
+    interpolation: str, commands: Array, ticks_between: list[int], robot: str = "planar_3r", after: int = 0
 ) -> Array:
     """Command in force at the end of every tick (N, n), under commands that come now and then.
 
@@ -63,9 +59,7 @@ def wander(count: int, period: int, seed: int = 3) -> Array:
 
 @pytest.mark.parametrize("interpolation", ["linear", "minimum_jerk"])
 @pytest.mark.parametrize("period", PERIODS)
-def test_each_command_is_reached_exactly_one_period_after_it_came(
-    interpolation: str, period: int
-) -> None:
+def test_each_command_is_reached_exactly_one_period_after_it_came(interpolation: str, period: int) -> None:
     commands = wander(12, period)
     found = way(interpolation, commands, [period] * 11, after=period)
     # The first comes alone; of the others each is there when the next one is due, not before.
@@ -110,10 +104,7 @@ def least_jerk(commands: Array, ticks_between: list[int], after: int) -> Array:
     found = [place] * ticks_between[0]
     for k, ticks in enumerate([*ticks_between[1:], after], start=1):
         time = ticks_between[k - 1] * DT
-        ends = (
-            [place, rate, bend],
-            [commands[k], (commands[k] - commands[k - 1]) / time, 0.0 * HOME],
-        )
+        ends = ([place, rate, bend], [commands[k], (commands[k] - commands[k - 1]) / time, 0.0 * HOME])
         polynomial = BPoly.from_derivatives([0.0, time], np.array(ends))
         found += list(polynomial(np.minimum(DT * np.arange(1, ticks + 1), time)))
         place, rate, bend = found[-1], 0.0 * HOME, 0.0 * HOME
@@ -122,12 +113,8 @@ def least_jerk(commands: Array, ticks_between: list[int], after: int) -> Array:
     return np.array(found)
 
 
-@pytest.mark.parametrize(
-    "ticks", [[20] * 9, [100] * 5, [3, 5, 40, 7, 90, 90, 11], [200, 30, 90, 10]], ids=str
-)
-def test_minimum_jerk_way_is_the_polynomial_of_fifth_degree_with_smooth_ends(
-    ticks: list[int],
-) -> None:
+@pytest.mark.parametrize("ticks", [[20] * 9, [100] * 5, [3, 5, 40, 7, 90, 90, 11], [200, 30, 90, 10]], ids=str)
+def test_minimum_jerk_way_is_the_polynomial_of_fifth_degree_with_smooth_ends(ticks: list[int]) -> None:
     rng = np.random.default_rng(5)
     steps = 0.4 * DT * np.array([0, *ticks])[:, None] * SPEED
     commands = HOME + np.cumsum(steps * rng.uniform(-1.0, 1.0, steps.shape), axis=0)
@@ -148,18 +135,14 @@ def largest_changes(found: Array, period: int) -> list[tuple[float, float]]:
 
 def test_minimum_jerk_way_is_as_smooth_at_its_ends_as_on_the_way() -> None:
     commands = wander(12, 100)
-    speed, acceleration = largest_changes(
-        way("minimum_jerk", commands, [100] * 11, after=100)[100:], 100
-    )
+    speed, acceleration = largest_changes(way("minimum_jerk", commands, [100] * 11, after=100)[100:], 100)
     assert speed[0] <= speed[1]
     assert acceleration[0] <= 1.1 * acceleration[1]
     kinks = largest_changes(way("linear", commands, [100] * 11, after=100)[100:], 100)
     assert kinks[0][0] > 20.0 * speed[0]
 
 
-@pytest.mark.parametrize(
-    ("first", "then"), [("linear", "minimum_jerk"), ("minimum_jerk", "linear")]
-)
+@pytest.mark.parametrize(("first", "then"), [("linear", "minimum_jerk"), ("minimum_jerk", "linear")])
 def test_kinds_change_on_the_way_without_a_jump(first: str, then: str) -> None:
     slave = SimulatedArm(ArmParameters(robot="planar_3r", interpolation=first))
     row, found = slave.signals, []
@@ -229,14 +212,8 @@ def test_minimum_jerk_way_that_would_swing_beyond_a_limit_stays_at_it() -> None:
 
 
 @pytest.mark.slow
-@given(
-    st.lists(st.floats(-1e-3, 5e-3), min_size=2, max_size=8),
-    st.integers(2, 90),
-    st.sampled_from(INTERPOLATIONS),
-)
-def test_no_way_leaves_the_limits_of_the_joints(
-    places: list[float], ticks: int, interpolation: str
-) -> None:
+@given(st.lists(st.floats(-1e-3, 5e-3), min_size=2, max_size=8), st.integers(2, 90), st.sampled_from(INTERPOLATIONS))
+def test_no_way_leaves_the_limits_of_the_joints(places: list[float], ticks: int, interpolation: str) -> None:
     found = slide(interpolation, places, ticks)
     assert found.max() <= TOP
     assert found.min() >= SLIDING.lower[D3]

@@ -9,10 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from present import present
-from teleop_core.chain.mapping.inverse_kinematics import (
-    InverseKinematics,
-    InverseKinematicsParameters,
-)
+from teleop_core.chain.mapping.inverse_kinematics import InverseKinematics, InverseKinematicsParameters
 from teleop_core.graph.signals import TICK_NS
 from teleop_core.graph.topics import SLAVE_REACH
 from teleop_core.kernels.geometry import Array, pose_from_transform, rotation, transform
@@ -106,9 +103,7 @@ def test_tool_turns_away_from_home_and_back_without_a_flip(about: str, sign: int
 
 @pytest.mark.parametrize("tool_speed", [0.2, 0.5, 2.0])
 @pytest.mark.parametrize("distance", [0.0, 1e-12, 1e-9, 1e-6, 1e-4, 1e-3, 5e-3, 0.02, 0.1])
-def test_joints_stay_within_their_speeds_beside_the_singularity(
-    distance: float, tool_speed: float
-) -> None:
+def test_joints_stay_within_their_speeds_beside_the_singularity(distance: float, tool_speed: float) -> None:
     stage, poses = Stage(), pass_by(distance, tool_speed)
     last = stage.settle(poses[0])
     for pose in poses:
@@ -277,9 +272,7 @@ poses = st.tuples(*[st.floats(-1e3, 1e3)] * 3, *[st.floats(-3.2, 3.2)] * 3)
 
 
 @given(st.lists(poses, min_size=1, max_size=20))
-def test_any_poses_give_finite_joints_within_limits_and_speeds(
-    wanted: list[tuple[float, ...]],
-) -> None:
+def test_any_poses_give_finite_joints_within_limits_and_speeds(wanted: list[tuple[float, ...]]) -> None:
     stage = Stage()
     last, most = ARM.home, ALONE
     for x, y, z, a, b, c in wanted:

@@ -18,12 +18,7 @@ from teleop_core.graph.signals import TICK_NS
 from teleop_core.kernels.geometry import Array
 from teleop_core.slave.jaw.grip import WEIGHT
 from teleop_core.slave.jaw.jaw import Jaw, JawParameters
-from teleop_core.slave.jaw.jaw_sim import (
-    GripObjectParameters,
-    JawSim,
-    JawSimParameters,
-    PegParameters,
-)
+from teleop_core.slave.jaw.jaw_sim import GripObjectParameters, JawSim, JawSimParameters, PegParameters
 from teleop_core.slave.operation import State
 
 ENABLED, STATE = float(State.ENABLED), topics.OPERATION.index("state")
@@ -35,9 +30,7 @@ FORCE, IS_GRIPPED, SLID, GRIPS, SLIPS, DROPS = range(len(topics.SLAVE_JAW_GRIP.c
 class Bench:
     """An open jaw, its drive, and a hand that leads it; the tip is led by hand too."""
 
-    def __init__(
-        self, *, jaw: Mapping[str, Any] | None = None, places: Array = PLACE, **thing: float
-    ) -> None:
+    def __init__(self, *, jaw: Mapping[str, Any] | None = None, places: Array = PLACE, **thing: float) -> None:
         self.given = JawSimParameters(
             **(jaw or {}), object=GripObjectParameters(place=tuple(np.ravel(places)), **thing)
         )
@@ -65,9 +58,8 @@ class Bench:
             row["slave_jaw_measured_js"] = told["slave_jaw_measured_js"]
             row["slave_jaw_measured_js_ns"] = now_ns
         self.rows.append(
-            np.concatenate([told["slave_jaw_" + name] for name in
-                            ("setpoint_js", "measured_js", "grip", "object_cp")])
-        )  # fmt: skip
+            np.concatenate([told["slave_jaw_" + name] for name in ("setpoint_js", "measured_js", "grip", "object_cp")])
+        )
 
     def run(self, command: float | None, ticks: int) -> None:
         for _ in range(ticks):
@@ -110,9 +102,7 @@ def stall_force(bench: Bench) -> float:
 
 @pytest.mark.parametrize("size", [0.01, 0.02, 0.028])
 @pytest.mark.parametrize("stiffness", [300.0, 4e3, 1e5])
-def test_a_stalled_jaw_presses_with_its_effort_over_its_lever(
-    size: float, stiffness: float
-) -> None:
+def test_a_stalled_jaw_presses_with_its_effort_over_its_lever(size: float, stiffness: float) -> None:
     bench = Bench(size=size, stiffness=stiffness)
     bench.run(OPEN, 200)
     bench.run(CLOSED, 2000)
@@ -125,9 +115,7 @@ def test_a_stalled_jaw_presses_with_its_effort_over_its_lever(
 
 
 @pytest.mark.parametrize("stiffness", [300.0, 4e3, 1e5])
-def test_the_push_at_impact_stays_below_that_of_a_mass_on_a_spring_without_losses(
-    stiffness: float,
-) -> None:
+def test_the_push_at_impact_stays_below_that_of_a_mass_on_a_spring_without_losses(stiffness: float) -> None:
     bench = Bench(stiffness=stiffness, damping=0.0)
     bench.run(OPEN, 200)
     bench.run(CLOSED, 600)
@@ -160,9 +148,7 @@ def test_what_is_lifted_slides_only_where_friction_of_both_fingers_is_less_than_
 
 
 @pytest.mark.parametrize("share", [0.98, 1.02])
-def test_what_is_carried_slides_only_where_friction_is_less_than_weight_and_pull(
-    share: float,
-) -> None:
+def test_what_is_carried_slides_only_where_friction_is_less_than_weight_and_pull(share: float) -> None:
     pull = 6.0  # m/s², across
     probe = Bench()
     probe.run(CLOSED, 600)
@@ -178,9 +164,7 @@ def test_what_is_carried_slides_only_where_friction_is_less_than_weight_and_pull
 
 
 @pytest.mark.parametrize("state", [State.DISABLED, State.PAUSED, State.FAULT])
-def test_in_every_state_but_enabled_the_jaw_keeps_its_grip_whatever_is_commanded(
-    state: State,
-) -> None:
+def test_in_every_state_but_enabled_the_jaw_keeps_its_grip_whatever_is_commanded(state: State) -> None:
     bench = Bench()
     bench.run(CLOSED, 600)
     bench.carry(CLOSED, lift(0.05))
@@ -212,9 +196,7 @@ HOLDS = (State.DISABLED, State.PAUSED, State.FAULT, "silence", "no feedback", "n
 
 
 @pytest.mark.parametrize("how", HOLDS)
-def test_a_needle_stays_held_after_a_stop_until_the_hand_has_closed_and_opened_again(
-    how: str | State,
-) -> None:
+def test_a_needle_stays_held_after_a_stop_until_the_hand_has_closed_and_opened_again(how: str | State) -> None:
     bench = Bench(size=0.001, mass=0.001)  # 1 mm thick
     bench.run(CLOSED, 600)
     bench.carry(CLOSED, lift(0.05))
@@ -260,9 +242,7 @@ def test_a_hand_that_did_not_move_leads_on_at_once() -> None:
 
 
 @pytest.mark.parametrize(("angle", "held"), [(0.5, 0.0), (0.7, 0.7)])
-def test_a_jaw_that_was_silent_keeps_its_grip_unless_somebody_moved_it_meanwhile(
-    angle: float, held: float
-) -> None:
+def test_a_jaw_that_was_silent_keeps_its_grip_unless_somebody_moved_it_meanwhile(angle: float, held: float) -> None:
     server = Jaw(JawParameters())
     row = server.signals
     row["slave_operation"][STATE] = ENABLED
@@ -320,9 +300,7 @@ def test_whatever_is_commanded_setpoint_angle_and_effort_keep_their_limits(seed:
 
 
 @pytest.mark.parametrize("seed", range(3))
-@pytest.mark.parametrize(
-    ("stiffness", "damping"), [(300.0, 0.0), (1e4, 0.0), (1e6, 0.0), (1e4, 20.0)]
-)
+@pytest.mark.parametrize(("stiffness", "damping"), [(300.0, 0.0), (1e4, 0.0), (1e6, 0.0), (1e4, 20.0)])
 def test_fingers_and_object_never_have_more_energy_than_the_drive_gave(
     seed: int, stiffness: float, damping: float
 ) -> None:
@@ -374,9 +352,7 @@ def test_an_object_that_slides_out_above_the_table_has_dropped_and_lies_there() 
     bench = Bench()
     bench.run(CLOSED, 600)
     bench.carry(CLOSED, lift(0.05))
-    bench.carry(
-        CLOSED, bench.tip[:3] + 400.0 * 0.5 * (1e-3 * np.arange(20)[:, None]) ** 2 * [1.0, 0.0, 0.0]
-    )
+    bench.carry(CLOSED, bench.tip[:3] + 400.0 * 0.5 * (1e-3 * np.arange(20)[:, None]) ** 2 * [1.0, 0.0, 0.0])
     bench.run(CLOSED, 500)
     assert (bench.grip[[IS_GRIPPED, GRIPS, SLIPS, DROPS]] == (0, 1, 1, 1)).all()
     assert bench.object[2] == PLACE[2]
@@ -483,9 +459,7 @@ def test_a_block_comes_off_its_peg_only_by_the_height_of_the_peg(rise: float) ->
 
 
 @pytest.mark.parametrize("share", [0.95, 1.05])
-def test_a_block_that_is_let_go_over_a_peg_goes_onto_it_within_its_clearance_else_it_dropped(
-    share: float,
-) -> None:
+def test_a_block_that_is_let_go_over_a_peg_goes_onto_it_within_its_clearance_else_it_dropped(share: float) -> None:
     bench, above = pegged(), up(0.025)
     bench.run(CLOSED, 600)
     go(bench, above, above + SIDE + [share * CLEARANCE, 0.0, 0.0])
@@ -498,18 +472,14 @@ def test_a_block_that_is_let_go_over_a_peg_goes_onto_it_within_its_clearance_els
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_wherever_a_block_is_pulled_below_the_top_its_peg_holds_it_with_friction_at_most(
-    seed: int,
-) -> None:
+def test_wherever_a_block_is_pulled_below_the_top_its_peg_holds_it_with_friction_at_most(seed: int) -> None:
     rng, bench = np.random.default_rng(seed), pegged()
     bench.run(CLOSED, 600)
     most = 2.0 * 0.5 * bench.grip[FORCE]
     begin, pulls = len(bench.rows), []
     for _ in range(40):
         x, y, z = rng.uniform([-3e-3, -3e-3, 0.0], [3e-3, 3e-3, 0.9 * HEIGHT])
-        for place in way(
-            bench.tip[:3].copy(), PLACE + np.array([x, y, z]), speed=rng.uniform(0.01, 0.3)
-        ):
+        for place in way(bench.tip[:3].copy(), PLACE + np.array([x, y, z]), speed=rng.uniform(0.01, 0.3)):
             bench.tick(CLOSED, place)
             pulls.append(bench.board["pull"])
     off = np.linalg.norm(np.array(bench.rows)[begin:, 10:12] - PLACE[:2], axis=1)
@@ -585,9 +555,7 @@ def test_a_handle_leads_the_jaw_by_its_share_and_no_farther_than_it_goes() -> No
 
 
 @pytest.mark.parametrize(("source", "column"), [("clutch", 0), ("fixture", 1), ("mode", 2)])
-def test_a_button_closes_the_jaw_as_long_as_it_is_held_or_from_press_to_press(
-    source: str, column: int
-) -> None:
+def test_a_button_closes_the_jaw_as_long_as_it_is_held_or_from_press_to_press(source: str, column: int) -> None:
     buttons = np.zeros((6, 3))
     buttons[[1, 2, 4], column] = 1.0
     buttons[:, (column + 1) % 3] = 1.0  # another one
@@ -616,9 +584,7 @@ def test_what_is_no_jaw_is_refused_by_its_name(make: Callable[..., object], name
 # -- sessions --------------------------------------------------------------------------------------
 
 
-def test_the_block_is_picked_carried_and_set_down_and_the_recording_tells_it(
-    tmp_path: Path,
-) -> None:
+def test_the_block_is_picked_carried_and_set_down_and_the_recording_tells_it(tmp_path: Path) -> None:
     recording = tc.run("pick").save(tmp_path / "bag")
     score = recording.score()
     counts = [score.value(f"jaw.{name}") for name in ("grips", "slips", "drops")]
@@ -637,9 +603,7 @@ def test_the_block_is_picked_carried_and_set_down_and_the_recording_tells_it(
     assert score.value("jaw.peak_force_n") == gripping.max()
 
 
-def test_three_blocks_are_brought_from_peg_to_peg_and_the_score_says_in_what_time(
-    tmp_path: Path,
-) -> None:
+def test_three_blocks_are_brought_from_peg_to_peg_and_the_score_says_in_what_time(tmp_path: Path) -> None:
     score = tc.run("peg_transfer").save(tmp_path / "bag").score()
     found = [score.value(f"transfer.{name}") for name in ("transferred", "dropped", "peak_pull_n")]
     assert found == [3, 0, 0.0]
@@ -654,9 +618,7 @@ def test_over_pegs_that_are_higher_than_the_hand_lifts_no_block_is_brought() -> 
     assert score.value("jaw.slips") == 1
     force = score.value("jaw.peak_force_n")
     assert (
-        present(0.9 * present(force))
-        < present(score.value("transfer.peak_pull_n"))
-        <= present(force)
+        present(0.9 * present(force)) < present(score.value("transfer.peak_pull_n")) <= present(force)
     )  # 2 µ F, and µ is 0.5
 
 
@@ -672,10 +634,16 @@ def test_an_emergency_stop_in_the_air_drops_nothing() -> None:
 
 def test_over_a_network_the_jaw_closes_later_by_its_delay() -> None:
     here = tc.run("pick", duration=7.0).score().value("jaw.delay_s")
-    far = tc.run(
-        "pick", duration=7.0, stages=["network", "jaw_command", "jaw", "jaw_sim"],
-        settings={"network.there.least_delay": 0.1},
-    ).score().value("jaw.delay_s")  # fmt: skip
+    far = (
+        tc.run(
+            "pick",
+            duration=7.0,
+            stages=["network", "jaw_command", "jaw", "jaw_sim"],
+            settings={"network.there.least_delay": 0.1},
+        )
+        .score()
+        .value("jaw.delay_s")
+    )
     assert present(far) - present(here) == pytest.approx(0.1, abs=2e-3)
 
 
@@ -683,10 +651,7 @@ JAWS = ("servo_jp", "setpoint_js", "measured_js", "grip", "object_cp", "board")
 
 
 def test_a_recorded_jaw_is_replayed_to_the_same_bits(tmp_path: Path) -> None:
-    settings: dict[str, Any] = {
-        "jaw_sim.object.friction": 0.05,
-        "operator.buttons.jaw": [5.3, 12.9],
-    }  # it slides
+    settings: dict[str, Any] = {"jaw_sim.object.friction": 0.05, "operator.buttons.jaw": [5.3, 12.9]}  # it slides
     first = tc.run("pick", duration=8.0, settings=settings).save(tmp_path / "bag")
     again = tc.replay(tmp_path / "bag")
     for name in ("hand/jaw", "slave/measured_js", *(f"slave/jaw/{name}" for name in JAWS)):

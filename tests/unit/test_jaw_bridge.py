@@ -27,9 +27,7 @@ class Gripper:
         self.sent: list[Any]
         self.now_ns, self.position, self.sent, self.setpoint_age = 0, 0.8, [], 0.0
 
-    def lead(
-        self, setpoint: float, ticks: int = 200, *, stamp_ns: int = MS, speaks: bool = True
-    ) -> None:
+    def lead(self, setpoint: float, ticks: int = 200, *, stamp_ns: int = MS, speaks: bool = True) -> None:
         """Commands of some periods while the server asks for an angle."""
         self.row["slave_jaw_setpoint_js"], self.row["slave_jaw_setpoint_js_ns"] = setpoint, stamp_ns
         for _ in range(ticks):

@@ -39,9 +39,7 @@ def test_a_map_says_which_button_is_what(pressed: Any, places: Any, expected: li
 
 
 @pytest.mark.parametrize("places", [(0, 1, 2), (2, -1, -1)])
-def test_a_message_with_fewer_buttons_is_refused_with_what_to_set(
-    places: tuple[int, int, int],
-) -> None:
+def test_a_message_with_fewer_buttons_is_refused_with_what_to_set(places: tuple[int, int, int]) -> None:
     refusal = read_values(Kind.BUTTONS, joy(1, 0), buttons=places)
     assert refusal is Refusal.FEW_BUTTONS
     assert "set joy_buttons=[0, -1, 1]" in refusal.value

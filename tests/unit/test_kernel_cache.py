@@ -155,9 +155,13 @@ print(sum(tick.stats.cache_hits.values()))
 def run(folder: Path) -> tuple[list[float], int]:
     """Values and cache hits of a fresh process that imports the modules."""
     done = subprocess.run(
-        [sys.executable, "outer.py"], cwd=folder, capture_output=True, text=True, check=True,
+        [sys.executable, "outer.py"],
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        check=True,
         env={**os.environ, "PYTHONDONTWRITEBYTECODE": "1", "NUMBA_CACHE_DIR": str(folder / "c")},
-    )  # fmt: skip
+    )
     values, hits = done.stdout.splitlines()
     return [float(value) for value in values.split()], int(hits)
 
@@ -219,24 +223,16 @@ def test_kernels_of_unchanged_files_come_from_the_cache(calls: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["inner.py", "middle.py", "outer.py"])
-def test_change_of_one_digit_in_a_called_file_reaches_its_cached_callers(
-    calls: Path, name: str
-) -> None:
+def test_change_of_one_digit_in_a_called_file_reaches_its_cached_callers(calls: Path, name: str) -> None:
     changed = CALLS[name].replace("2.0 * x", "5.0 * x").replace("+ 1.0", "+ 4.0")
     write(calls / name, changed.replace("10.0 *", "20.0 *"))
     assert (
         run(calls)
-        == {
-            "inner.py": ([160.0, 16.0], 0),
-            "middle.py": ([100.0, 10.0], 0),
-            "outer.py": ([140.0, 7.0], 0),
-        }[name]
+        == {"inner.py": ([160.0, 16.0], 0), "middle.py": ([100.0, 10.0], 0), "outer.py": ([140.0, 7.0], 0)}[name]
     )
 
 
-def test_changed_constant_of_another_module_reaches_every_cached_kernel_that_uses_it(
-    constants: Path,
-) -> None:
+def test_changed_constant_of_another_module_reaches_every_cached_kernel_that_uses_it(constants: Path) -> None:
     assert run(constants) == (CONSTANT_VALUES, len(CONSTANT_VALUES))
     text = CONSTANTS["values.py"]
     for old, new in CHANGES.items():
@@ -263,9 +259,13 @@ def test_kernel_without_a_source_file_works_and_leaves_nothing_on_the_disk(tmp_p
     text = CALLS["inner.py"] + "print(factor(4.0))"
     for arguments, given in ((["-c", text], ""), (["-"], text)):
         done = subprocess.run(
-            [sys.executable, *arguments], input=given, capture_output=True, text=True, check=True,
+            [sys.executable, *arguments],
+            input=given,
+            capture_output=True,
+            text=True,
+            check=True,
             env={**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache")},
-        )  # fmt: skip
+        )
         assert done.stdout == "8.0\n"
     assert not list(tmp_path.rglob("*factor*"))
 
@@ -357,9 +357,7 @@ def test_another_version_of_numba_is_refused_in_one_line(found: str) -> None:
         check_version(found)
 
 
-PAIRS = (
-    "from typing import NamedTuple\n\nclass {0}(NamedTuple):\n    first: float\n    second: float\n"
-)
+PAIRS = "from typing import NamedTuple\n\nclass {0}(NamedTuple):\n    first: float\n    second: float\n"
 TOTAL = """
 from pairs import {0}
 from teleop_core.kernels import kernel
@@ -385,10 +383,7 @@ def in_store(folder: Path, place: Path) -> tuple[list[float], int]:
     """What the script prints where the store is at a place, and how many kernels it found there."""
     env = {**os.environ, "PYTHONDONTWRITEBYTECODE": "1", "TELEOP_KERNELS": str(place)}
     env.pop("NUMBA_CACHE_DIR", None)
-    done = subprocess.run(
-        [sys.executable, "outer.py"], cwd=folder, capture_output=True, text=True, check=True,
-        env=env,
-    )  # fmt: skip
+    done = subprocess.run([sys.executable, "outer.py"], cwd=folder, capture_output=True, text=True, check=True, env=env)
     values, hits = done.stdout.splitlines()
     return [float(value) for value in values.split()], int(hits)
 
@@ -421,9 +416,7 @@ def test_a_copy_that_differs_takes_nothing_of_the_other_and_leaves_it_there(stor
     assert in_store(first, place) == ([70.0, 7.0], 1)
 
 
-def test_what_nobody_used_for_long_is_removed_from_the_store(
-    stored: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_nobody_used_for_long_is_removed_from_the_store(stored: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     place = stored / "kept"
     monkeypatch.setenv("TELEOP_KERNELS", str(place))
     monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)

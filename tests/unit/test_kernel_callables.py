@@ -171,23 +171,12 @@ def test_plain_functions_run_in_threads_and_each_thread_gets_its_own_exceptions(
     [
         (types.float64(ROW), r"test_kernel_callables.py:\d+: 'takes_two' must take 1 argument"),
         (types.float64(ROW, ROW, ROW), "'takes_two' must take 3 arguments"),
-        (
-            types.float64(ROW, types.float32),
-            "argument 2 of 'takes_two' is float32, must be float64, int64, bool",
-        ),
-        (
-            types.float64(ROW, types.float64[:]),
-            "argument 2 of 'takes_two' is array.*must be .* C-contiguous",
-        ),
-        (
-            types.complex128(ROW, ROW),
-            "result of 'takes_two' is complex128, must be void, float64 or int64",
-        ),
+        (types.float64(ROW, types.float32), "argument 2 of 'takes_two' is float32, must be float64, int64, bool"),
+        (types.float64(ROW, types.float64[:]), "argument 2 of 'takes_two' is array.*must be .* C-contiguous"),
+        (types.complex128(ROW, ROW), "result of 'takes_two' is complex128, must be void, float64 or int64"),
     ],
 )
-def test_signature_that_a_plain_function_cannot_have_is_refused(
-    signature: Any, message: str
-) -> None:
+def test_signature_that_a_plain_function_cannot_have_is_refused(signature: Any, message: str) -> None:
     def takes_two(row: Any, x: Any) -> float:
         return 0.0
 

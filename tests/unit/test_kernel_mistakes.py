@@ -62,15 +62,9 @@ def test_mistake_in_a_pointer_or_an_argument_has_its_place_too() -> None:
         wrong({"gain": 1.0})
 
 
-def test_place_of_a_mistake_is_counted_from_the_package_or_the_working_directory(
-    tmp_path: Path,
-) -> None:
+def test_place_of_a_mistake_is_counted_from_the_package_or_the_working_directory(tmp_path: Path) -> None:
     text = "from teleop_core.kernels import kernel\n@kernel\ndef f(x):\n    return x.gain\nf(1.0)\n"
     (tmp_path / "own.py").write_text(text)
-    done = subprocess.run(
-        [sys.executable, "own.py"], cwd=tmp_path, capture_output=True, text=True, check=False
-    )
+    done = subprocess.run([sys.executable, "own.py"], cwd=tmp_path, capture_output=True, text=True, check=False)
     last = done.stderr.splitlines()[-1]
-    assert last.startswith(
-        "teleop_core.base.errors.KernelError: own.py:4: kernel 'f': Unknown attri"
-    )
+    assert last.startswith("teleop_core.base.errors.KernelError: own.py:4: kernel 'f': Unknown attri")

@@ -103,8 +103,11 @@ def mypy(folder: Path, text: str) -> list[int]:
     command = [sys.executable, "-m", "mypy", "--strict", "--config-file", "pyproject.toml"]
     done = subprocess.run(
         [*command, "--no-error-summary", "--no-pretty", str(folder / "user.py")],
-        cwd=ROOT, capture_output=True, text=True, check=False,
-    )  # fmt: skip
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
     assert not done.stderr
     errors = [line for line in done.stdout.splitlines() if ": error: " in line]
     ours = [line for line in errors if "user.py:" in line]

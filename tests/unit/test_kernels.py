@@ -9,16 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from teleop_core.kernels import (
-    IS_COMPILED,
-    apart,
-    bound,
-    inner,
-    is_kernel,
-    kernel,
-    kernel_from_source,
-    records,
-)
+from teleop_core.kernels import IS_COMPILED, apart, bound, inner, is_kernel, kernel, kernel_from_source, records
 from teleop_core.kernels.geometry import Array, multiply_quaternions
 
 compiled_only = pytest.mark.skipif(not IS_COMPILED, reason="measures the compiler")
@@ -191,9 +182,7 @@ def test_what_a_kernel_that_stands_apart_raises_comes_to_its_caller() -> None:
         hand_on(apart(take_all, long, short), long, short)
 
 
-def test_kernel_that_makes_an_array_is_called_by_a_generated_one_that_is_compiled_before_it() -> (
-    None
-):
+def test_kernel_that_makes_an_array_is_called_by_a_generated_one_that_is_compiled_before_it() -> None:
     text = "@kernel\ndef swapped(x, y):\n    pair = np.empty(2)\n    pair[0], pair[1] = y, x\n"
     space = {"kernel": kernel, "np": np}
     exec(text + "    return pair[0] - pair[1]\n", space)
@@ -231,7 +220,10 @@ print(top(row, half), deep(row), bound(top, row, half)(), raise_pending())
 
 def test_without_the_compiler_kernels_are_python_functions_that_give_the_same() -> None:
     done = subprocess.run(
-        [sys.executable, "-c", PURE], capture_output=True, text=True, check=True,
+        [sys.executable, "-c", PURE],
+        capture_output=True,
+        text=True,
+        check=True,
         env={**os.environ, "NUMBA_DISABLE_JIT": "1"},
-    )  # fmt: skip
+    )
     assert done.stdout.splitlines() == ["False function True True False", "2.0 4.0 2.0 None"]

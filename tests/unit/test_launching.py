@@ -70,9 +70,7 @@ def test_nothing_records_where_it_is_not_wanted() -> None:
 
 def test_a_robot_is_that_of_all_stages_of_its_arm() -> None:
     one = parameters(processes(given(robot="puma560"))[0])
-    assert {one[f"/{name}"]["robot"] for name in ("slave", "slave_sim", "inverse_kinematics")} == {
-        "puma560"
-    }
+    assert {one[f"/{name}"]["robot"] for name in ("slave", "slave_sim", "inverse_kinematics")} == {"puma560"}
     both = processes(given(TWO_ARMS, right_robot="puma560", processes="nodes"))
     two = parameters(both[0])
     assert two["/slave_sim"]["robot"] == "rcrt1"
@@ -80,17 +78,13 @@ def test_a_robot_is_that_of_all_stages_of_its_arm() -> None:
     assert sum(process.namespace == "/right" for process in both) == len(STAGES)
 
 
-@pytest.mark.parametrize(
-    ("name", "value"), [("log_level", "loud"), ("record", "perhaps"), ("processes", "")]
-)
+@pytest.mark.parametrize(("name", "value"), [("log_level", "loud"), ("record", "perhaps"), ("processes", "")])
 def test_an_argument_of_no_meaning_is_refused(name: str, value: str) -> None:
     with pytest.raises(ParameterError, match=name):
         processes(given(**dict[str, Any]({name: value})))
 
 
-@pytest.mark.parametrize(
-    ("file", "own", "count"), [("teleop", ONE_ARM, 7), ("two_arms", TWO_ARMS, 13)]
-)
+@pytest.mark.parametrize(("file", "own", "count"), [("teleop", ONE_ARM, 7), ("two_arms", TWO_ARMS, 13)])
 def test_a_launch_file_declares_its_arguments_and_starts_its_nodes(
     monkeypatch: pytest.MonkeyPatch, file: str, own: dict[str, tuple[str, str]], count: int
 ) -> None:
@@ -101,13 +95,15 @@ def test_a_launch_file_declares_its_arguments_and_starts_its_nodes(
     ros: Any
     launch, actions, ros = ModuleType("launch"), ModuleType("launch.actions"), ModuleType("ros")
     launch.LaunchDescription = list
-    actions.DeclareLaunchArgument = lambda name, default_value, description: declared.update(
-        {name: default_value}
-    )
+    actions.DeclareLaunchArgument = lambda name, default_value, description: declared.update({name: default_value})
     actions.OpaqueFunction = lambda function: function
     ros.Node = lambda **arguments: started.append(arguments)
-    modules = {"launch": launch, "launch.actions": actions, "launch_ros": ModuleType("launch_ros"),
-               "launch_ros.actions": ros}  # fmt: skip
+    modules = {
+        "launch": launch,
+        "launch.actions": actions,
+        "launch_ros": ModuleType("launch_ros"),
+        "launch_ros.actions": ros,
+    }
     for name, module in modules.items():
         monkeypatch.setitem(sys.modules, name, module)
     made = runpy.run_path(str(LAUNCH / f"{file}.launch.py"))["generate_launch_description"]()
@@ -123,19 +119,13 @@ def test_a_launch_file_declares_its_arguments_and_starts_its_nodes(
     assert stays == {"slave", "slave_sim", "recorder"}
 
 
-BOMB = "\n".join(
-    f"{own}: &{own} [{', '.join([inner] * 99)}]"
-    for own, inner in (("a", "1"), ("b", "*a"), ("c", "*b"))
-)
+BOMB = "\n".join(f"{own}: &{own} [{', '.join([inner] * 99)}]" for own, inner in (("a", "1"), ("b", "*a"), ("c", "*b")))
 
 
 @pytest.mark.parametrize(
-    ("text", "says"),
-    [("a: " + "x" * LARGEST_TEXT, "has more than"), ("[", "is not YAML"), (BOMB, "values")],
+    ("text", "says"), [("a: " + "x" * LARGEST_TEXT, "has more than"), ("[", "is not YAML"), (BOMB, "values")]
 )
-def test_a_parameter_file_of_a_node_costs_no_more_than_any_other(
-    tmp_path: Path, text: str, says: str
-) -> None:
+def test_a_parameter_file_of_a_node_costs_no_more_than_any_other(tmp_path: Path, text: str, says: str) -> None:
     file = tmp_path / "mine.yaml"
     file.write_text(text)
     with pytest.raises(TeleopError, match=says):

@@ -54,9 +54,7 @@ def test_a_port_that_one_process_still_reads_stays_whole(place: Callable[..., Pa
     assert names(folder) == []
 
 
-def test_a_port_without_a_lock_stays_while_it_is_in_the_memory_of_a_process(
-    place: Callable[..., Path],
-) -> None:
+def test_a_port_without_a_lock_stays_while_it_is_in_the_memory_of_a_process(place: Callable[..., Path]) -> None:
     folder = place(PORT, f"sem.{PORT}_mutex")
     with (folder / PORT).open("rb") as file:
         held = mmap.mmap(file.fileno(), 0, prot=mmap.PROT_READ)
@@ -66,9 +64,7 @@ def test_a_port_without_a_lock_stays_while_it_is_in_the_memory_of_a_process(
     assert names(folder) == []
 
 
-def test_what_was_just_made_stays_for_its_owner_may_be_about_to_lock_it(
-    place: Callable[..., Path],
-) -> None:
+def test_what_was_just_made_stays_for_its_owner_may_be_about_to_lock_it(place: Callable[..., Path]) -> None:
     folder = place(SEGMENT)
     (folder / f"{SEGMENT}_el").touch()
     assert remove_leftovers(folder) == 0

@@ -71,9 +71,7 @@ def test_reference_within_all_limits_comes_back_and_the_slave_gets_there(slave: 
     begin = inside(slave)
     goal = begin + 0.01 * INWARD
     for share in np.linspace(0.0, 1.0, 31):
-        assert np.array_equal(
-            sent(slave, begin + share * (goal - begin)), begin + share * (goal - begin)
-        )
+        assert np.array_equal(sent(slave, begin + share * (goal - begin)), begin + share * (goal - begin))
     for _ in range(30):
         sent(slave, goal)
     assert joints_of(slave, slave.observe()) == pytest.approx(goal, abs=1e-3)
@@ -110,9 +108,7 @@ def test_reference_that_is_a_jump_comes_back_as_the_one_before(slave: SlaveSide)
 
 
 def test_stopped_slave_holds_and_says_where_whatever_is_sent() -> None:
-    slave = sides.SlaveSide(
-        scenario="free_motion", settings=(*AT_HOME, "slave.operation.events=[stop@0.5]")
-    )
+    slave = sides.SlaveSide(scenario="free_motion", settings=(*AT_HOME, "slave.operation.events=[stop@0.5]"))
     slave.begin()
     begin, back = joints_of(slave, slave.observe()), []
     for k in range(60):
@@ -123,9 +119,7 @@ def test_stopped_slave_holds_and_says_where_whatever_is_sent() -> None:
 
 
 def test_bag_has_what_was_observed_and_sent(tmp_path: Path) -> None:
-    slave = sides.SlaveSide(
-        scenario="free_motion", settings=AT_HOME, fps=50, bag=str(tmp_path / "bag")
-    )
+    slave = sides.SlaveSide(scenario="free_motion", settings=AT_HOME, fps=50, bag=str(tmp_path / "bag"))
     slave.begin()
     lead = slave._session.now_ns // 1_000_000
     begin, seen, given = inside(slave), [], []
@@ -194,14 +188,9 @@ def test_both_sides_refuse_what_they_cannot_use(slave: SlaveSide) -> None:
 
 @pytest.mark.parametrize(
     ("package", "base", "names"),
-    [
-        ("lerobot_robot_teleop_core", "Robot", ROBOT),
-        ("lerobot_teleoperator_teleop_core", "Teleoperator", TELEOPERATOR),
-    ],
+    [("lerobot_robot_teleop_core", "Robot", ROBOT), ("lerobot_teleoperator_teleop_core", "Teleoperator", TELEOPERATOR)],
 )
-def test_class_for_lerobot_has_what_its_documents_ask_for(
-    package: str, base: str, names: set[str]
-) -> None:
+def test_class_for_lerobot_has_what_its_documents_ask_for(package: str, base: str, names: set[str]) -> None:
     tree = ast.parse((PACKAGE / package / "__init__.py").read_text())
     classes = {node.name: node for node in tree.body if isinstance(node, ast.ClassDef)}
     bases = ["Connection", base]  # in this order: what is shared stands in for LeRobot's abstract
@@ -221,9 +210,7 @@ def test_lerobot_makes_both_by_their_type_and_a_loop_runs() -> None:
     from lerobot.utils.import_utils import register_third_party_plugins
 
     register_third_party_plugins()
-    kind, teleop_kind = (
-        base.get_choice_class("teleop_core") for base in (RobotConfig, TeleoperatorConfig)
-    )
+    kind, teleop_kind = (base.get_choice_class("teleop_core") for base in (RobotConfig, TeleoperatorConfig))
     robot = make_robot_from_config(kind(scenario="free_motion"))
     teleop = make_teleoperator_from_config(teleop_kind(scenario="free_motion"))
     with robot, teleop:

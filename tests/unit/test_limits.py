@@ -15,11 +15,7 @@ from teleop_core.graph.topics import SLAVE_REACH, Limit
 from teleop_core.kernels.geometry import Array
 
 REACH = {name: index for index, name in enumerate(SLAVE_REACH.columns)}
-PLAIN: dict[str, Any] = {
-    "axes": ("+x", "+y", "+z"),
-    "tool_axes": ("+x", "+y", "+z"),
-    "tool_roll": 0.0,
-}
+PLAIN: dict[str, Any] = {"axes": ("+x", "+y", "+z"), "tool_axes": ("+x", "+y", "+z"), "tool_roll": 0.0}
 STEP, TURN = 1e-4, 1e-3  # of the hand, each sample [m, rad]
 WALL, ANGLE = 5e-3, 0.03  # how far along x, and about x, the arm can go [m, rad]
 # Sums of a hundred steps.

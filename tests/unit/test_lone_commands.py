@@ -4,10 +4,7 @@ import numpy as np
 import pytest
 
 from present import present
-from teleop_core.chain.mapping.inverse_kinematics import (
-    InverseKinematics,
-    InverseKinematicsParameters,
-)
+from teleop_core.chain.mapping.inverse_kinematics import InverseKinematics, InverseKinematicsParameters
 from teleop_core.graph.signals import DT, TICK_NS
 from teleop_core.kernels.geometry import Array, pose_from_transform
 from teleop_core.robots import load_robot
@@ -70,9 +67,7 @@ def test_a_lone_pose_20_mm_away_is_reached_within_the_limits(chain: Chain) -> No
     chain.send(goal)
     path = chain.run(1500)
     np.testing.assert_allclose(chain.tip, goal, atol=1e-6)
-    assert (
-        np.abs(np.diff(path, axis=0)) <= present(ARM.drives).speed_limit * DT * (1 + 1e-9)
-    ).all()
+    assert (np.abs(np.diff(path, axis=0)) <= present(ARM.drives).speed_limit * DT * (1 + 1e-9)).all()
 
 
 def test_lone_poses_with_pauses_between_them_are_all_reached(chain: Chain) -> None:

@@ -30,9 +30,7 @@ def visual(link: str, name: str) -> str:
     return f"<visual>{origin}<geometry>{mesh}</geometry></visual>"
 
 
-def arm(
-    folder: Path, name: str = "package://some_arm/meshes/part.stl", links: Sequence[str] = LINKS
-) -> Path:
+def arm(folder: Path, name: str = "package://some_arm/meshes/part.stl", links: Sequence[str] = LINKS) -> Path:
     """The example as a package with a mesh at some links; path of its URDF."""
     for part in ("urdf", "meshes"):
         (folder / "some_arm" / part).mkdir(parents=True)
@@ -57,22 +55,20 @@ def test_meshes_are_where_pinocchio_has_them_at_any_posture(middle: float, tmp_p
     solids = pinocchio.buildGeomFromUrdf(model, str(path), kind, package_dirs=[str(tmp_path)])
     data, placed = model.createData(), solids.createData()
     for q in np.random.default_rng(3).uniform(robot.lower, robot.upper, (5, robot.n)):
-        pinocchio.updateGeometryPlacements(
-            model, data, solids, placed, np.r_[q[:5], np.cos(q[5]), np.sin(q[5])]
-        )
+        pinocchio.updateGeometryPlacements(model, data, solids, placed, np.r_[q[:5], np.cos(q[5]), np.sin(q[5])])
         expected = [T.act(corner * (0.001, 0.002, 0.001)) for T in placed.oMg for corner in CORNERS]
         poses = bodies.poses(q)
-        found = np.concatenate([
-            vertices @ rotations_from_quaternions(poses[body, None, 3:])[0].T + poses[body, :3]
-            for body, (vertices, _) in looks.items()
-        ])  # fmt: skip
+        found = np.concatenate(
+            [
+                vertices @ rotations_from_quaternions(poses[body, None, 3:])[0].T + poses[body, :3]
+                for body, (vertices, _) in looks.items()
+            ]
+        )
         found = np.unique(found.round(9), axis=0)
         np.testing.assert_allclose(found, np.unique(np.round(expected, 9), axis=0), atol=2e-9)
 
 
-def test_plain_shapes_are_drawn_too_and_a_length_in_millimetres_is_read_as_such(
-    tmp_path: Path,
-) -> None:
+def test_plain_shapes_are_drawn_too_and_a_length_in_millimetres_is_read_as_such(tmp_path: Path) -> None:
     path = arm(tmp_path, links=())
     ball = '<visual><geometry><sphere radius="0.04"/></geometry></visual>'
     inch = '<visual><geometry><mesh filename="../meshes/part.dae"/></geometry></visual>'
@@ -114,9 +110,15 @@ def test_no_file_is_read_outside_the_package_and_none_that_is_no_mesh(tmp_path: 
     (path.parents[1] / "meshes" / "link.stl").symlink_to(outside)
     up = "../" * 20
     for name in (
-        f"file://{outside}", str(outside), f"{up}{outside}", f"package://some_arm/{up}{outside}",
-        f"package://{up}{outside}", "package://some_arm/meshes/link.stl", "../urdf/arm.urdf",
-        "package://", "",
-    ):  # fmt: skip
+        f"file://{outside}",
+        str(outside),
+        f"{up}{outside}",
+        f"package://some_arm/{up}{outside}",
+        f"package://{up}{outside}",
+        "package://some_arm/meshes/link.stl",
+        "../urdf/arm.urdf",
+        "package://",
+        "",
+    ):
         with pytest.raises(ParameterError, match=r"^mesh is "):
             mesh_file(name, path)

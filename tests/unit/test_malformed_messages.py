@@ -60,9 +60,7 @@ def recorded(path: Path, *, bad: tuple[int, ...] = (), good: int = 3) -> Bag:
 
 
 @pytest.mark.parametrize("bad", [(0,), (2,), (1, 3), (0, 4)])
-def test_a_recording_is_read_without_its_malformed_messages(
-    tmp_path: Path, bad: tuple[int, ...]
-) -> None:
+def test_a_recording_is_read_without_its_malformed_messages(tmp_path: Path, bad: tuple[int, ...]) -> None:
     bag = recorded(tmp_path / "bag", bad=bad)
     with pytest.warns(UserWarning, match=f"{len(bad)} of {3 + len(bad)} messages are left out"):
         series = bag.read("slave/measured_cp")

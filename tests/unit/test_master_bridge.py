@@ -146,9 +146,12 @@ def test_buttons_are_taken_from_where_they_are_and_missing_ones_are_released() -
 def test_a_jointed_device_is_where_the_forward_kinematics_of_its_robot_says() -> None:
     robot = load_robot("scara")
     stage = bridge(
-        pose_message=master_bridge.POSE_MESSAGES[-1], handle="scara", device_axes=TURNED,
-        handle_joints=[f"{robot.joint_names[0]}=turn"], handle_signs=[-1.0] + [1.0] * 3,
-    )  # fmt: skip
+        pose_message=master_bridge.POSE_MESSAGES[-1],
+        handle="scara",
+        device_axes=TURNED,
+        handle_joints=[f"{robot.joint_names[0]}=turn"],
+        handle_signs=[-1.0] + [1.0] * 3,
+    )
     names = ["turn", *robot.joint_names[1:], "gripper"]
     q = robot.home + 0.1
     assert stage.hear_joints(names, [-q[0], *q[1:], 0.0], NOW_NS, NOW_NS)

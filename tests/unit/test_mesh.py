@@ -88,9 +88,7 @@ def found(name: str, group: object, places: Array) -> tuple[Array, Array]:
 
 
 @pytest.mark.parametrize("name", BOUNDS)
-def test_a_fine_mesh_has_distance_and_normal_of_its_shape_within_the_bounds(
-    name: str, folder: Path
-) -> None:
+def test_a_fine_mesh_has_distance_and_normal_of_its_shape_within_the_bounds(name: str, folder: Path) -> None:
     places = np.random.default_rng(1).uniform(-0.045, 0.045, (40_000, 3))
     wanted, outward = found(name, analytic(name), places)
     is_compared = np.abs(wanted) < 3e-3
@@ -164,18 +162,21 @@ def loop(rng: np.random.Generator, middle: tuple[float, float, float]) -> Array:
 
 @pytest.mark.parametrize("friction", [0.0, 0.6])
 @pytest.mark.parametrize("name", ["box", "sphere"])
-def test_no_motion_gains_energy_from_a_mesh_whatever_edge_it_crosses(
-    name: str, friction: float, folder: Path
-) -> None:
+def test_no_motion_gains_energy_from_a_mesh_whatever_edge_it_crosses(name: str, friction: float, folder: Path) -> None:
     """Tips that are led around closed ways, so fast and deep that they cross all its ridges."""
     rng, group = np.random.default_rng(5), parameters(folder, name)
     shares = []
     for _ in range(60):
         way = loop(rng, (0.0, 0.0, 0.028 if name == "box" else 0.018))
         force, lost, _ = lead(
-            way, "mesh", group, puncture_force=0.0, world_stiffness=1000.0,
-            world_friction=friction, world_damping=2.0 * friction,
-        )  # fmt: skip
+            way,
+            "mesh",
+            group,
+            puncture_force=0.0,
+            world_stiffness=1000.0,
+            world_friction=friction,
+            world_damping=2.0 * friction,
+        )
         turned = np.abs((force[:-1] * np.diff(way[:-1], axis=0)).sum(axis=1)).sum()
         if turned > 1e-3 and np.linalg.norm(force[-1]) == 0.0:
             shares.append(lost[-1] / turned)
@@ -187,9 +188,7 @@ def test_a_sliding_tip_feels_the_friction_of_the_analytic_shape(folder: Path) ->
     times = np.arange(4000) * 1e-3
     tilt, turn = 0.4 * np.sin(3.0 * times) + 1.0, 1.9 * times
     depth = 0.5e-3
-    way = (0.015 - depth) * np.column_stack(
-        (np.sin(tilt) * np.cos(turn), np.sin(tilt) * np.sin(turn), np.cos(tilt))
-    )
+    way = (0.015 - depth) * np.column_stack((np.sin(tilt) * np.cos(turn), np.sin(tilt) * np.sin(turn), np.cos(tilt)))
     made_of = {"world_stiffness": 1000.0, "world_friction": 0.6, "puncture_force": 0.0}
     wanted, _, _ = lead(way, "sphere", **made_of)
     force, _, _ = lead(way, "mesh", parameters(folder, "sphere"), **made_of)
@@ -294,9 +293,14 @@ def obj(size: float, faces: NDArray[np.int64]) -> str:
 
 @pytest.mark.parametrize(
     ("size", "count", "said"),
-    [(30.0, 0, "triangles|can be read"), (1e120, 4, "longest side"), (1e308, 4, "longest side"),
-     (-1e308, 4, "longest side"), (1e-300, 4, "mesh")],
-)  # fmt: skip
+    [
+        (30.0, 0, "triangles|can be read"),
+        (1e120, 4, "longest side"),
+        (1e308, 4, "longest side"),
+        (-1e308, 4, "longest side"),
+        (1e-300, 4, "mesh"),
+    ],
+)
 @pytest.mark.parametrize("write", [off, obj])
 @pytest.mark.parametrize("use", ["world", "fixture"])
 def test_a_mesh_without_triangles_or_of_no_size_is_refused_in_one_line(
@@ -346,9 +350,7 @@ def test_a_grid_is_made_once_and_kept_by_what_the_file_says(
         trimesh.creation.box(size).export(file)
         for _ in range(3):
             distance_grid._found.cache_clear()
-            grid = distance_grid.distance_grid(
-                distance_grid.GridRequest(str(file), 1e-3, (0.0, 0.0, 0.0), 2e-3)
-            )
+            grid = distance_grid.distance_grid(distance_grid.GridRequest(str(file), 1e-3, (0.0, 0.0, 0.0), 2e-3))
             heard.append(grid.numbers)
     assert len(made) == 2
     np.testing.assert_array_equal(heard[0], heard[2])
@@ -429,11 +431,7 @@ def recorded(folder: Path, where: Path) -> tuple[tc.Recording, Path]:
 
 @pytest.mark.parametrize(("becomes", "said"), [(gone, "is gone"), (another, "is another by now")])
 def test_a_mesh_too_large_to_keep_is_told_when_it_is_not_that_of_the_recording(
-    becomes: Callable[[Path], None],
-    said: str,
-    folder: Path,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
+    becomes: Callable[[Path], None], said: str, folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(kept_files, "_MOST", 10)
     with pytest.warns(UserWarning, match="only digests of block.stl"):
@@ -447,8 +445,7 @@ def test_a_mesh_too_large_to_keep_is_told_when_it_is_not_that_of_the_recording(
 def test_the_page_draws_the_edges_and_sections_of_a_mesh_where_it_lies(folder: Path) -> None:
     robot, place = load_robot("rcrt1"), np.array((0.2, -0.2, -0.1))
     drawn = object_outline(
-        {"kind": "mesh", "mesh.file": str(folder / "box.stl"), "place": tuple(place.tolist())},
-        robot,
+        {"kind": "mesh", "mesh.file": str(folder / "box.stl"), "place": tuple(place.tolist())}, robot
     )
     assert drawn.shape[1:] == (2, 3)
     offsets, half = drawn.reshape(-1, 3) - place, 0.5e-3 * np.array(BOX)

@@ -62,9 +62,7 @@ def test_no_reading_takes_the_tool_out_of_the_published_reach(mma: Robot) -> Non
     assert distance.max() < 624.13 * MM
 
 
-def test_tool_force_is_held_by_the_transposed_jacobian_and_the_shoulder_residual(
-    mma: Robot,
-) -> None:
+def test_tool_force_is_held_by_the_transposed_jacobian_and_the_shoulder_residual(mma: Robot) -> None:
     q, wrench = mma.home + 0.1, np.array([1.0, -2.0, 3.0, 0.1, 0.2, -0.3])
     idle = holding_torques(mma, q, np.zeros(6))
     assert np.count_nonzero(idle) == 1
@@ -90,9 +88,7 @@ def test_shoulder_torque_lifts_against_gravity(mma: Robot) -> None:
         ({"d1": math.nan}, ParameterError),
     ],
 )
-def test_impossible_geometry_is_refused(
-    options: Mapping[str, str | float], error: type[ParameterError]
-) -> None:
+def test_impossible_geometry_is_refused(options: Mapping[str, str | float], error: type[ParameterError]) -> None:
     with pytest.raises(error):
         load_robot("mma", **options)
 

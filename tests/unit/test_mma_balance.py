@@ -55,13 +55,11 @@ def test_rate_from_the_printed_rounded_inputs_is_the_printed_one() -> None:  # H
 
 def test_rate_from_unrounded_inputs() -> None:  # H17
     spring = mma_balance.ShoulderSpring()
-    difference = mma_balance.gravity_torque(
-        total(), mma_balance.ARM_LEVEL
-    ) - mma_balance.gravity_torque(total(), mma_balance.ARM_AT_45_DEGREES)
-    deflection = spring.length(AT_45_DEGREES) - spring.length(LEVEL)
-    rate = mma_balance.matching_rate(
-        float(difference), float(deflection), float(spring.lever(LEVEL))
+    difference = mma_balance.gravity_torque(total(), mma_balance.ARM_LEVEL) - mma_balance.gravity_torque(
+        total(), mma_balance.ARM_AT_45_DEGREES
     )
+    deflection = spring.length(AT_45_DEGREES) - spring.length(LEVEL)
+    rate = mma_balance.matching_rate(float(difference), float(deflection), float(spring.lever(LEVEL)))
     assert math.isclose(rate, 655.95, abs_tol=0.005)
     assert math.isclose(1.15 * rate, 754.34, abs_tol=0.005)
 

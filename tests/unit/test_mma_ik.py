@@ -70,9 +70,7 @@ def test_seed_near_a_solution_gives_a_solution_at_least_as_near(mma: Any, degree
     assert (moves <= math.sqrt(7.0) * math.radians(degrees)).all()
 
 
-def test_solution_is_as_near_to_the_seed_as_the_best_of_a_fine_scan_of_all_branches(
-    mma: Robot,
-) -> None:
+def test_solution_is_as_near_to_the_seed_as_the_best_of_a_fine_scan_of_all_branches(mma: Robot) -> None:
     q, seeds = readings(mma, 30, seed=3), readings(mma, 30, seed=4)
     worse = []
     for T, seed in zip(mma.fk(q), seeds, strict=True):
@@ -153,9 +151,7 @@ CROSSINGS = {
 
 @pytest.mark.parametrize("beside", [0.0, 1e-6, 0.01, 0.5, 3.0])
 @pytest.mark.parametrize("crossing", CROSSINGS)
-def test_path_through_or_beside_the_wrist_singularity_is_followed(
-    mma: Robot, crossing: str, beside: float
-) -> None:
+def test_path_through_or_beside_the_wrist_singularity_is_followed(mma: Robot, crossing: str, beside: float) -> None:
     start, end = (np.array(angles, float) for angles in CROSSINGS[crossing])
     shift = np.array([0.0, 0.0, 0.0, 0.0, beside, 0.5 * beside, 0.0])
     T, seed = joint_path(mma, start + shift, end + shift)
@@ -177,9 +173,7 @@ def pose_along(T: Array, direction: Array, distance: float) -> Array:
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_motion_goes_on_along_the_direction_that_a_singularity_has_lost(
-    mma: Robot, sign: float
-) -> None:
+def test_motion_goes_on_along_the_direction_that_a_singularity_has_lost(mma: Robot, sign: float) -> None:
     seed = np.radians([10.0, -80.0, 5.0, 85.0, 90.0, 90.0, 20.0])
     J = mma.jacobian(seed)
     J[:3] /= 0.1

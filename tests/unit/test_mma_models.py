@@ -60,9 +60,7 @@ def test_dummy_frames_turn_the_tool_by_half_a_turn_at_home(mma: Robot) -> None: 
     assert np.abs(tool[:3, :3] - np.diag([-1.0, -1.0, 1.0])).max() < TURN
 
 
-def test_conventional_and_dummy_frames_share_increments_and_differ_by_a_quarter_turn(
-    mma: Robot,
-) -> None:
+def test_conventional_and_dummy_frames_share_increments_and_differ_by_a_quarter_turn(mma: Robot) -> None:
     quarter = rotation("z", -0.5 * math.pi)
     for q in random_readings(50):
         a, b = tool_of_model(mma, q, "A"), tool_of_model(mma, q, "B")
@@ -98,9 +96,7 @@ def test_loop_closes_for_every_reading_and_any_split_of_the_short_side(mma: Robo
     for q, side in zip(random_readings(100), np.linspace(0.005, 0.06, 100), strict=True):
         loop = mma_models.loop_closure(q, mma.geometry, side)
         assert np.abs(loop.along_link_3 - loop.along_link_3a).max() < EXACT
-        table = mma_models.frames(
-            mma_models.model_table("C", mma.geometry, side), mma_models.joints_of_model(q, "C")
-        )
+        table = mma_models.frames(mma_models.model_table("C", mma.geometry, side), mma_models.joints_of_model(q, "C"))
         assert np.abs(table["4'"][:3, 3] - loop.frame_4).max() < EXACT
         assert np.abs(table["12"] - mma.fk(q)).max() < EXACT
 
@@ -142,9 +138,7 @@ def test_pose_and_jacobian_in_pinocchio_are_the_same(mma: Robot) -> None:
         serial = mma_models.joints_of_model(q, "B")
         pinocchio.framesForwardKinematics(model, data, serial)
         assert np.abs(data.oMf[frame].homogeneous - mma.fk(q)).max() < EXACT
-        columns = pinocchio.computeFrameJacobian(
-            model, data, serial, frame, pinocchio.LOCAL_WORLD_ALIGNED
-        )
+        columns = pinocchio.computeFrameJacobian(model, data, serial, frame, pinocchio.LOCAL_WORLD_ALIGNED)
         hybrid = columns.copy()
         hybrid[:, 2], hybrid[:, 3] = columns[:, 3], columns[:, 2] - columns[:, 3]
         assert np.abs(hybrid - mma.jacobian(q)).max() < EXACT

@@ -31,17 +31,13 @@ def test_parallel_axes_counted_in_space_look_overconstrained() -> None:
 
 
 @pytest.mark.parametrize(("joints", "freedoms", "expected"), [(4, 1, 3), (9, 3, 6)])
-def test_passive_joints_are_those_without_a_motor(
-    joints: int, freedoms: int, expected: int
-) -> None:
+def test_passive_joints_are_those_without_a_motor(joints: int, freedoms: int, expected: int) -> None:
     # P5: four-bar and 3-RPS.
     assert mobility.passive_joints(joints, freedoms) == expected
 
 
 @pytest.mark.parametrize(("links", "joints", "expected"), [(10, 10, 1), (5, 5, 1), (14, 18, 5)])
-def test_independent_loops_of_mma_parallelogram_and_stewart_platform(
-    links: int, joints: int, expected: int
-) -> None:
+def test_independent_loops_of_mma_parallelogram_and_stewart_platform(links: int, joints: int, expected: int) -> None:
     # H13 and P6.
     assert mobility.independent_loops(links, joints) == expected
 
@@ -58,9 +54,7 @@ def test_independent_loops_of_mma_parallelogram_and_stewart_platform(
         (lambda: mobility.passive_joints(3, 4), "freedoms"),
     ],
 )
-def test_counts_that_no_mechanism_has_are_refused_by_name(
-    call: Callable[..., object], name: str
-) -> None:
+def test_counts_that_no_mechanism_has_are_refused_by_name(call: Callable[..., object], name: str) -> None:
     with pytest.raises(ParameterError) as caught:
         call()
     assert caught.value.name == name

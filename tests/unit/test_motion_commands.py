@@ -37,11 +37,7 @@ class Bench:
     """A slave at rest in the middle of its range, and the ticks it makes."""
 
     def __init__(self, name: str = "rcrt1", middle: Array = MIDDLE, **values: float | bool) -> None:
-        given = (
-            {"robot": name, "start_speed": 1.0, "start": tuple(np.asarray(middle).tolist())}
-            | DIRECT
-            | values
-        )
+        given = {"robot": name, "start_speed": 1.0, "start": tuple(np.asarray(middle).tolist())} | DIRECT | values
         self.slave = SimulatedArm(build(ArmParameters, given))
         self.robot, self.motion, self.now_ns = self.slave.robot, self.slave.server.motion, 10**9
         self.run(1)
@@ -179,16 +175,17 @@ def test_another_number_of_joints_is_wrong_use(bench: Bench, command: str) -> No
 
 @pytest.mark.parametrize("state", [State.DISABLED, State.PAUSED, State.FAULT])
 def test_nothing_is_moved_outside_enabled(bench: Bench, state: State) -> None:
-    bench.slave.server.request(
-        {"DISABLED": "disable", "PAUSED": "pause", "FAULT": "stop"}[state.name]
-    )
+    bench.slave.server.request({"DISABLED": "disable", "PAUSED": "pause", "FAULT": "stop"}[state.name])
     before, now_ns = bench.run(500)[-1], bench.now_ns
     told = [
-        bench.motion.move(MIDDLE + SMALL), bench.motion.move_by(SMALL),
-        move_to_pose(bench.motion, bench.tip), bench.motion.drive_joints(SMALL, now_ns),
-        bench.motion.drive_tip(SMALL, now_ns), bench.motion.servo(MIDDLE + 1e-3, now_ns),
+        bench.motion.move(MIDDLE + SMALL),
+        bench.motion.move_by(SMALL),
+        move_to_pose(bench.motion, bench.tip),
+        bench.motion.drive_joints(SMALL, now_ns),
+        bench.motion.drive_tip(SMALL, now_ns),
+        bench.motion.servo(MIDDLE + 1e-3, now_ns),
         bench.motion.servo_by(1e-3 * SMALL, now_ns),
-    ]  # fmt: skip
+    ]
     assert {answer for answer, _ in told} == {Answer.REFUSED}
     assert all(state.name in text for _, text in told)
     np.testing.assert_array_equal(bench.run(100)[-1], before)
@@ -229,9 +226,7 @@ def test_joints_run_at_the_speed_asked_for_until_the_timeout_then_brake(bench: B
     assert bench.motion.source == "velocity"
     silent = bench.run(500)
     moved = np.abs(np.diff(silent, axis=0)).max(axis=1) > 0.0
-    braking = (
-        np.max(np.abs(speed) * present(ARM.drives).inertia / present(ARM.drives).effort_limit) / DT
-    )
+    braking = np.max(np.abs(speed) * present(ARM.drives).inertia / present(ARM.drives).effort_limit) / DT
     # 50 ticks of the timeout were over when the listening began.
     assert TIMEOUT_TICKS - 52 <= np.flatnonzero(moved)[-1] <= TIMEOUT_TICKS - 48 + braking
     assert bench.motion.source == "nothing"
@@ -243,9 +238,7 @@ def test_speeds_beyond_the_drives_are_cut_in_proportion(bench: Bench) -> None:
     path = np.vstack((MIDDLE, bench.run(90)))
     insist_on_limits(ARM, path)
     speed = np.diff(path, axis=0)[-1] / DT
-    np.testing.assert_allclose(
-        speed[:2], present(ARM.drives).speed_limit[:2] * [1.0, 0.5], rtol=1e-9
-    )
+    np.testing.assert_allclose(speed[:2], present(ARM.drives).speed_limit[:2] * [1.0, 0.5], rtol=1e-9)
 
 
 @pytest.mark.parametrize("axis", range(6))
@@ -261,9 +254,7 @@ def test_the_tip_runs_along_its_twist_and_no_other_way(bench: Bench, axis: int) 
     bench.run(50)
     went = (bench.tip[:3, 3] - before[:3, 3]) / (50 * DT)
     turned = (bench.tip[:3, :3] @ before[:3, :3].T - np.eye(3)) / (50 * DT)
-    spin = 0.5 * np.array(
-        [turned[2, 1] - turned[1, 2], turned[0, 2] - turned[2, 0], turned[1, 0] - turned[0, 1]]
-    )
+    spin = 0.5 * np.array([turned[2, 1] - turned[1, 2], turned[0, 2] - turned[2, 0], turned[1, 0] - turned[0, 1]])
     np.testing.assert_allclose(went, twist[:3], atol=2e-5)
     np.testing.assert_allclose(spin, twist[3:], atol=2e-4)
     assert np.linalg.norm(start[:3, 3] - before[:3, 3]) < 0.006
@@ -306,9 +297,7 @@ def test_a_robot_that_cannot_turn_its_tip_does_of_a_twist_what_it_can() -> None:
     assert bench.tip[0, 3] - before[0, 3] > 0.002
 
 
-def test_a_running_stream_is_not_taken_over_by_a_speed_and_a_speed_not_by_a_stream(
-    bench: Bench,
-) -> None:
+def test_a_running_stream_is_not_taken_over_by_a_speed_and_a_speed_not_by_a_stream(bench: Bench) -> None:
     for _ in range(20):
         bench.follow(MIDDLE + 1e-4)
     answer, text = bench.motion.drive_joints(SMALL, bench.now_ns)
@@ -446,9 +435,7 @@ def test_whatever_is_commanded_no_step_exceeds_the_limits_of_the_drives(
         elif name in {"move", "pose", "joints", "tip", "step", "hold"}:
             acts: dict[str, Callable[[], object]] = {
                 "move": lambda: motion.move(bench.setpoint + wild),
-                "pose": lambda: move_to_pose(
-                    motion, bench.tip @ transform(rotation("z", wild[3]), 0.1 * wild[:3])
-                ),
+                "pose": lambda: move_to_pose(motion, bench.tip @ transform(rotation("z", wild[3]), 0.1 * wild[:3])),
                 "joints": lambda: motion.drive_joints(20.0 * wild, now_ns),
                 "tip": lambda: motion.drive_tip(5.0 * wild, now_ns),
                 "step": lambda: motion.servo_by(0.1 * wild, now_ns),

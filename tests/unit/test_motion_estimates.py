@@ -13,10 +13,7 @@ from present import present
 from teleop_core.graph.signals import DT
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot
-from teleop_core.slave.controllers.disturbance_observer import (
-    DISTURBANCE_OBSERVER,
-    DisturbanceObserverParameters,
-)
+from teleop_core.slave.controllers.disturbance_observer import DISTURBANCE_OBSERVER, DisturbanceObserverParameters
 from teleop_core.slave.controllers.motion_estimates import (
     FRICTION_SHARE,
     MEMORY,
@@ -44,9 +41,7 @@ def followed(values: Any, expected: float, fading: float) -> Array:
 
 
 @given(fadings, st.floats(-5.0, 5.0), st.floats(-5.0, 5.0))
-def test_constant_acceleration_is_followed_without_lag(
-    fading: float, speed: float, acceleration: float
-) -> None:
+def test_constant_acceleration_is_followed_without_lag(fading: float, speed: float, acceleration: float) -> None:
     times = DT * np.arange(1, 3001)
     last = followed(speed * times + 0.5 * acceleration * times**2, 0.0, fading)[-1]
     end = times[-1]
@@ -93,18 +88,14 @@ ways = st.lists(st.floats(-1.0, 1.0), min_size=1, max_size=30).map(np.array)
 
 
 @given(ways)
-def test_friction_fed_forward_never_exceeds_what_is_known_and_turns_with_the_way(
-    way: Array,
-) -> None:
+def test_friction_fed_forward_never_exceeds_what_is_known_and_turns_with_the_way(way: Array) -> None:
     there, back = frictions(way), frictions(-way)
     assert (np.abs(there) <= 2.0).all()
     assert np.allclose(there, -back, rtol=0, atol=1e-12)
 
 
 @given(ways, st.integers(2, 9))
-def test_friction_fed_forward_depends_on_the_way_not_on_how_fast_it_is_made(
-    way: Array, parts: int
-) -> None:
+def test_friction_fed_forward_depends_on_the_way_not_on_how_fast_it_is_made(way: Array, parts: int) -> None:
     whole = np.concatenate(([0.0], way))
     slow = np.concatenate([np.linspace(a, b, parts + 1)[1:] for a, b in zip(whole, way)])  # noqa: B905
     assert np.allclose(frictions(slow)[parts - 1 :: parts], frictions(way), rtol=0, atol=1e-9)
@@ -116,9 +107,7 @@ def test_friction_fed_forward_keeps_its_value_while_the_setpoint_rests() -> None
 
 
 @given(st.floats(-10.0, 10.0), st.floats(1e-3, 1.0))
-def test_far_setpoint_counts_as_nearer_and_near_ones_as_they_are(
-    error: float, linear: float
-) -> None:
+def test_far_setpoint_counts_as_nearer_and_near_ones_as_they_are(error: float, linear: float) -> None:
     near = approach(error, linear)
     assert abs(near) <= abs(error)
     assert near == error or abs(error) > linear
@@ -141,9 +130,7 @@ def test_dead_band_takes_its_width_off(value: float, room: float) -> None:
 def test_one_encoder_count_shakes_no_joint_loose(axis: int) -> None:
     # The law itself, at rest on its setpoint, with one count more or less measured.
     drives = present(ARM.drives)
-    gains = DISTURBANCE_OBSERVER.gains(
-        DisturbanceObserverParameters(dead_band=0.0), ARM, drives.viscous
-    )
+    gains = DISTURBANCE_OBSERVER.gains(DisturbanceObserverParameters(dead_band=0.0), ARM, drives.viscous)
     zero, efforts = np.zeros(6), []
     for counts in (0.0, 1.0):
         memory, effort = np.zeros((6, DISTURBANCE_OBSERVER.memory)), np.empty(6)
@@ -165,7 +152,5 @@ def test_filters_are_slower_where_encoders_are_coarse_for_the_friction_there_is(
     bandwidth = -np.log(fading) / DT
     assert (bandwidth >= 2.0 * pole * (1.0 - 1e-9)).all()
     assert (bandwidth <= 3.5 * pole * (1.0 + 1e-9)).all()
-    assert np.allclose(
-        bandwidth[1:4], 3.5 * pole[1:4], rtol=1e-9, atol=0
-    )  # friction is large there
+    assert np.allclose(bandwidth[1:4], 3.5 * pole[1:4], rtol=1e-9, atol=0)  # friction is large there
     assert np.allclose(bandwidth[4:], 2.0 * pole[4:], rtol=1e-9, atol=0)

@@ -42,9 +42,7 @@ def test_spectral_arc_length_is_that_of_its_authors() -> None:
 
 
 def test_log_dimensionless_jerk_is_that_of_its_authors() -> None:
-    assert motion_measures.log_dimensionless_jerk(BELL[:, None], 100.0) == pytest.approx(
-        BELL_LDLJ, abs=DECIMALS
-    )
+    assert motion_measures.log_dimensionless_jerk(BELL[:, None], 100.0) == pytest.approx(BELL_LDLJ, abs=DECIMALS)
 
 
 @pytest.mark.parametrize("factor", [0.01, 300.0])
@@ -85,10 +83,7 @@ def test_peaks_are_those_whose_prominence_scipy_finds_as_large(seed: int) -> Non
 
 
 def test_plateau_is_one_peak() -> None:
-    assert motion_measures.turning_points(np.array([0.0, 2.0, 2.0, 2.0, 0.0, 2.0, 0.0]), 1.0) == (
-        [1, 5],
-        [4],
-    )
+    assert motion_measures.turning_points(np.array([0.0, 2.0, 2.0, 2.0, 0.0, 2.0, 0.0]), 1.0) == ([1, 5], [4])
 
 
 def test_each_bell_of_speed_is_a_submovement() -> None:
@@ -109,16 +104,12 @@ def test_turn_rate_is_that_of_a_steady_turn_whatever_the_signs(axis: list[float]
     angles = np.arange(0.0, 7.0, 0.02)
     turns = Rotation.from_rotvec(angles[:, None] * axis).as_quat(scalar_first=True)
     turns[::3] *= -1.0
-    np.testing.assert_allclose(
-        motion_measures.turn_rates(turns), 0.02 * motion_measures.RATE, rtol=1e-6
-    )
+    np.testing.assert_allclose(motion_measures.turn_rates(turns), 0.02 * motion_measures.RATE, rtol=1e-6)
 
 
 @pytest.mark.parametrize("rate", [100.0, 609.0, 1000.0])
 @pytest.mark.parametrize("frequency", [8.6, 10.0, 11.4])
-def test_tremor_is_the_root_mean_square_of_a_wave_in_its_band(
-    rate: float, frequency: float
-) -> None:
+def test_tremor_is_the_root_mean_square_of_a_wave_in_its_band(rate: float, frequency: float) -> None:
     times = np.arange(0.0, 20.0, 1.0 / rate)
     place = hand(times)
     place[:, 1] += 100e-6 * np.sin(2.0 * math.pi * frequency * times)
@@ -222,10 +213,6 @@ def test_nothing_has_no_figures() -> None:
 
 def test_share_of_power_is_that_of_the_waves_in_it() -> None:
     times = np.arange(0.0, 60.0, 1.0 / motion_measures.RATE)
-    velocity = np.column_stack(
-        (np.sin(2.0 * math.pi * 0.5 * times), np.sin(2.0 * math.pi * 2.0 * times))
-    )
+    velocity = np.column_stack((np.sin(2.0 * math.pi * 0.5 * times), np.sin(2.0 * math.pi * 2.0 * times)))
     frequency, density = motion_measures.velocity_spectrum([velocity])
-    assert motion_measures.share_between(1.0, 3.0, frequency, density) == pytest.approx(
-        0.5, abs=0.01
-    )
+    assert motion_measures.share_between(1.0, 3.0, frequency, density) == pytest.approx(0.5, abs=0.01)

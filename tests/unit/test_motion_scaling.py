@@ -13,12 +13,7 @@ from teleop_core.chain.mapping.parameters import FixtureParameters, MotionScalin
 from teleop_core.chain.operators.rest import REST_POSITION, REST_TILT
 from teleop_core.graph.signals import TICK_NS
 from teleop_core.graph.topics import NO_COMMAND_NS
-from teleop_core.kernels.geometry import (
-    Array,
-    quaternion_from_rotation,
-    rotation,
-    rotation_from_quaternion,
-)
+from teleop_core.kernels.geometry import Array, quaternion_from_rotation, rotation, rotation_from_quaternion
 
 DEGREE = math.pi / 180.0
 # Sums and products of a few numbers of size one.
@@ -211,9 +206,7 @@ def test_slave_follows_however_late_as_long_as_newer_commands_come_into_force(la
     assert desk.state("is_following") == 0.0
 
 
-def test_reset_starts_again_at_the_setpoint_with_the_box_off_and_the_mode_of_the_parameters() -> (
-    None
-):
+def test_reset_starts_again_at_the_setpoint_with_the_box_off_and_the_mode_of_the_parameters() -> None:
     desk = Desk()
     desk.step()
     desk.press("fixture")

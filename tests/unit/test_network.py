@@ -81,25 +81,38 @@ def test_both_directions_have_delays_of_their_own() -> None:
             row[f"{name}_ns"] = tick * MS
         row["slave_measured_cf_ns"], row["slave_measured_cf"][2] = tick * MS, tick
         network.step()
-        seen.append((row["network_servo_cp_ns"], row["network_measured_cf_ns"],
-                     MS * row["network_measured_cf"][2], row["network_reach_ns"]))  # fmt: skip
+        seen.append(
+            (
+                row["network_servo_cp_ns"],
+                row["network_measured_cf_ns"],
+                MS * row["network_measured_cf"][2],
+                row["network_reach_ns"],
+            )
+        )
     ages = (MS * np.arange(1, 400)[:, None] - np.array(seen))[200:] / MS
     assert (ages == [30, 100, 100, 100]).all()
 
 
 @pytest.mark.parametrize("order", ["newest", "kept"])
 @settings(max_examples=10, deadline=None)
-@given(mean=st.floats(1e-3, 0.2), loss=st.floats(0.0, 0.9), hold=st.sampled_from([0.0, 0.05]),
-       seed=st.integers(0, 10**6))  # fmt: skip
+@given(
+    mean=st.floats(1e-3, 0.2), loss=st.floats(0.0, 0.9), hold=st.sampled_from([0.0, 0.05]), seed=st.integers(0, 10**6)
+)
 def test_nothing_overtakes_nothing_is_invented_and_what_arrives_was_sent(
     order: str, mean: float, loss: float, hold: float, seed: int
 ) -> None:
     places = walk(800, seed)
     came, stamps = through(
-        link(seed=seed, there__kind="jitter", there__jitter__mean=mean, there__loss=loss,
-             there__jitter__hold=hold, there__packet_order=order),
+        link(
+            seed=seed,
+            there__kind="jitter",
+            there__jitter__mean=mean,
+            there__loss=loss,
+            there__jitter__hold=hold,
+            there__packet_order=order,
+        ),
         places,
-    )  # fmt: skip
+    )
     assert (np.diff(stamps) >= 0).all()
     sent = stamps // MS - 2
     has_come = stamps > 0
@@ -109,10 +122,7 @@ def test_nothing_overtakes_nothing_is_invented_and_what_arrives_was_sent(
 
 def test_where_order_is_kept_the_reader_gets_older_commands() -> None:
     """An independent computation of both, packet by packet, agrees with what arrives."""
-    level = {
-        f"there__{name.replace('.', '__')}": value
-        for name, value in PRESETS["delay_100"]["there"].items()
-    }
+    level = {f"there__{name.replace('.', '__')}": value for name, value in PRESETS["delay_100"]["there"].items()}
     for order in ("newest", "kept"):
         network = link(there__packet_order=order, **level)
         places = walk(30_000)
@@ -158,8 +168,7 @@ def drawn(
 
 def of_level(level: str) -> dict[str, Any]:
     """Parameters of the kind of a preset's way to the slave."""
-    return {name.partition(".")[2]: value for name, value in PRESETS[level]["there"].items()
-            if "." in name}  # fmt: skip
+    return {name.partition(".")[2]: value for name, value in PRESETS[level]["there"].items() if "." in name}
 
 
 def burst_loss(to_bad: float, stay_bad: float, *lengths: tuple[float, float]) -> float:
@@ -170,8 +179,7 @@ def burst_loss(to_bad: float, stay_bad: float, *lengths: tuple[float, float]) ->
     """
     n = np.arange(200_000)
     # P(int(X) = n) of a Pareto II distribution (Lomax), from its survival function.
-    chance = [(1.0 + n / scale) ** -shape - (1.0 + (n + 1.0) / scale) ** -shape
-              for shape, scale in lengths]  # fmt: skip
+    chance = [(1.0 + n / scale) ** -shape - (1.0 + (n + 1.0) / scale) ** -shape for shape, scale in lengths]
     mean = [float((n * p).sum()) for p in chance]
     kept = [float(((stay_bad - to_bad) ** (n + 1.0) * p).sum()) for p in chance]
     bad = to_bad / (1.0 + to_bad - stay_bad)
@@ -183,8 +191,7 @@ def burst_loss(to_bad: float, stay_bad: float, *lengths: tuple[float, float]) ->
 
 
 @pytest.mark.parametrize(
-    ("level", "lost", "burst"),
-    [("loss_10", 9.8, 1.4), ("loss_30", 30.4, 1.8), ("loss_50", 50.4, 2.5)],
+    ("level", "lost", "burst"), [("loss_10", 9.8, 1.4), ("loss_30", 30.4, 1.8), ("loss_50", 50.4, 2.5)]
 )
 def test_the_published_levels_of_loss_lose_what_their_chain_says_in_bursts_as_long(
     level: str, lost: float, burst: float
@@ -201,9 +208,7 @@ def test_the_published_levels_of_loss_lose_what_their_chain_says_in_bursts_as_lo
 
 def test_bad_times_end_within_bursts_too() -> None:
     """Bursts last 10.6 packets in the mean: seldom is the time still bad at the end of one."""
-    given: dict[str, Any] = {
-        "to_bad": 0.02, "stay_bad": 0.9, "good": (100.0, 1e-3), "bad": (10.0, 100.0)
-    }  # fmt: skip
+    given: dict[str, Any] = {"to_bad": 0.02, "stay_bad": 0.9, "good": (100.0, 1e-3), "bad": (10.0, 100.0)}
     exact = burst_loss(*given.values())
     found = drawn("gilbert_elliott", given, 600_000) == LOST
     assert found.mean() == pytest.approx(exact, abs=0.01)
@@ -212,12 +217,9 @@ def test_bad_times_end_within_bursts_too() -> None:
 
 
 @pytest.mark.parametrize(
-    ("level", "mean", "sd"),
-    [("delay_100", 100.0, 34), ("delay_300", 299.6, 91), ("delay_500", 500.2, 95)],
+    ("level", "mean", "sd"), [("delay_100", 100.0, 34), ("delay_300", 299.6, 91), ("delay_500", 500.2, 95)]
 )
-def test_the_published_levels_of_delay_have_their_mean_and_spread(
-    level: str, mean: float, sd: int
-) -> None:
+def test_the_published_levels_of_delay_have_their_mean_and_spread(level: str, mean: float, sd: int) -> None:
     there = PRESETS[level]["there"]
     given = {k.partition(".")[2]: v for k, v in there.items() if k.startswith("jitter.")}
     found = 1e3 * (there["least_delay"] + drawn("jitter", given, 200_000))
@@ -252,18 +254,11 @@ def test_outages_last_for_any_time_up_to_the_longest_and_pause_after_each(in_pac
 
 
 @pytest.mark.parametrize("unit", ["", "_packets"])
-@pytest.mark.parametrize(
-    ("level", "lost"), [("3_of_8", 1.5 / 10.0), ("1_of_1", 0.5 / 1.5), ("2_of_1", 1.0 / 2.0)]
-)
-def test_the_published_outages_lose_the_share_that_outage_and_pause_give(
-    level: str, unit: str, lost: float
-) -> None:
+@pytest.mark.parametrize(("level", "lost"), [("3_of_8", 1.5 / 10.0), ("1_of_1", 0.5 / 1.5), ("2_of_1", 1.0 / 2.0)])
+def test_the_published_outages_lose_the_share_that_outage_and_pause_give(level: str, unit: str, lost: float) -> None:
     name = f"outages_{level}{unit}"
     rate = PRESETS[name]["there"].get("packet_rate", 1000.0)
-    shares = [
-        np.mean(drawn("outages", of_level(name), 1_000_000, seed, 1.0 / rate) == LOST)
-        for seed in (2, 3)
-    ]
+    shares = [np.mean(drawn("outages", of_level(name), 1_000_000, seed, 1.0 / rate) == LOST) for seed in (2, 3)]
     # The standard deviation of two million packets is 0.009 at 3_of_8, less at the others.
     assert np.mean(shares) == pytest.approx(lost, abs=0.02)
 
@@ -276,9 +271,7 @@ def test_a_trace_is_played_row_by_row_and_begins_anew_at_its_end(tmp_path: Path)
     differing = np.flatnonzero(found != np.concatenate((one, one, one))[:700])
     assert len(differing) <= 2  # where a sum of milliseconds is a bit beside a border
     seldom = drawn("trace", {"file": str(file)}, 50, period=0.77)
-    np.testing.assert_array_equal(
-        seldom, np.array([0.05, LOST, 0.07])[(np.arange(50) * 0.77 % 0.3 / 0.1).astype(int)]
-    )
+    np.testing.assert_array_equal(seldom, np.array([0.05, LOST, 0.07])[(np.arange(50) * 0.77 % 0.3 / 0.1).astype(int)])
     network = link(there__kind="trace", there__trace__file=str(file))
     _, stamps = through(network, walk(700))
     age = np.arange(2, 702) - stamps / MS
@@ -301,9 +294,7 @@ def test_a_trace_is_played_row_by_row_and_begins_anew_at_its_end(tmp_path: Path)
         ("", "two rows"),
     ],
 )
-def test_a_trace_that_cannot_be_is_refused_by_its_line(
-    tmp_path: Path, text: str, said: str
-) -> None:
+def test_a_trace_that_cannot_be_is_refused_by_its_line(tmp_path: Path, text: str, said: str) -> None:
     file = tmp_path / "pings.csv"
     file.write_text(text)
     with pytest.raises(ParameterError, match=said):
@@ -395,13 +386,9 @@ def test_packets_go_no_faster_than_their_rate() -> None:
 
 @settings(max_examples=30, deadline=None)
 @given(place=st.sampled_from([1e-4, 1e-3]), pause=st.sampled_from([1, 7, 50]))
-def test_behind_a_deadband_a_command_is_off_by_no_more_than_that_nor_silent_for_long(
-    place: float, pause: int
-) -> None:
+def test_behind_a_deadband_a_command_is_off_by_no_more_than_that_nor_silent_for_long(place: float, pause: int) -> None:
     places = walk(800)
-    network = link(
-        deadband__is_on=True, deadband__place=place, deadband__longest_pause=pause * 1e-3
-    )
+    network = link(deadband__is_on=True, deadband__place=place, deadband__longest_pause=pause * 1e-3)
     came, stamps = through(network, places)
     assert np.linalg.norm(came[1:] - places[1:], axis=1).max() <= place
     assert (np.arange(2, 802)[1:] - stamps[1:] / MS).max() <= pause - 1
@@ -436,8 +423,10 @@ def test_a_turn_counts_by_its_angle_whatever_the_sign_of_its_quaternion(sign: fl
 
 
 def test_a_force_behind_a_deadband_is_off_by_no_more_than_its_share() -> None:
-    given = ["reflection.architecture=position_force", *(f"network.deadband.{text}" for text in
-             ("is_on=true", "place=1e-3", "turn=0.05"))]  # fmt: skip
+    given = [
+        "reflection.architecture=position_force",
+        *(f"network.deadband.{text}" for text in ("is_on=true", "place=1e-3", "turn=0.05")),
+    ]
     run = session(*given, scenario="palpation")
     rows = run.run(run.lead + 10_000)
     own, there = (rows[f"{name}_measured_cf"][:, :3] for name in ("slave", "network"))
@@ -472,8 +461,9 @@ def test_a_network_that_loses_everything_says_so() -> None:
 def test_another_network_takes_over_and_what_is_on_its_way_still_arrives() -> None:
     network, places = link(there__least_delay=0.1), walk(600)
     through(network, places[:300])
-    network.retune(build(NetworkParameters, {"there.least_delay": 0.02, "there.kind": "jitter",
-                                             "there.jitter.mean": 0.0}))  # fmt: skip
+    network.retune(
+        build(NetworkParameters, {"there.least_delay": 0.02, "there.kind": "jitter", "there.jitter.mean": 0.0})
+    )
     _, stamps = through(network, places[300:], begin=300)
     age = np.arange(302, 602) - stamps / MS
     assert age[0] == 100.0
@@ -538,8 +528,7 @@ def test_a_command_holds_while_nothing_is_heard_of_a_far_slave_and_goes_on_from_
 
 
 def test_a_slave_that_was_stopped_far_away_is_taken_up_where_it_rests() -> None:
-    run = session(AT_HOME, "network.preset=iss", "slave.operation.events=[stop@6, reset@9, "
-                  "enable@9.1, resume@9.2]")  # fmt: skip
+    run = session(AT_HOME, "network.preset=iss", "slave.operation.events=[stop@6, reset@9, enable@9.1, resume@9.2]")
     rows = run.run(16_000)
     stopped = rows["slave_setpoint_cp"][7500, :3]
     echo = rows["slave_servo_cp"][8500, :3]

@@ -25,9 +25,7 @@ def recorded(stamps: NDArray[np.int64], values: Array, pieces: int) -> NDArray[n
 
 @pytest.mark.parametrize("begin_ns", [TICK_NS, 123_456_789, 7 * SELDOM_NS])
 @pytest.mark.parametrize("pieces", [1, 7])
-def test_what_does_not_change_is_said_in_each_period_whatever_its_stamps(
-    begin_ns: int, pieces: int
-) -> None:
+def test_what_does_not_change_is_said_in_each_period_whatever_its_stamps(begin_ns: int, pieces: int) -> None:
     stamps = begin_ns + TICK_NS * np.arange(1000)
     found = recorded(stamps, np.zeros(1000), pieces)
     assert found[0] == stamps[0]

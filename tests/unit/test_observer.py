@@ -22,8 +22,7 @@ COLUMN = {name: i for i, name in enumerate(TASK_STATE.columns)}
 
 def pointing(lag: float, way: float, width: float, trials: int, seed: int = 1) -> list[float]:
     """Times [s] from target to target of an observer whose pointer is seen late, to and fro."""
-    seen = tc.Seen(np.zeros(7), np.zeros(7), np.zeros(6), np.zeros(len(STATE)),
-                   np.zeros(len(COLUMN)))  # fmt: skip
+    seen = tc.Seen(np.zeros(7), np.zeros(7), np.zeros(6), np.zeros(len(STATE)), np.zeros(len(COLUMN)))
     seen.slave[3] = seen.state[STATE["gain"]] = 1.0
     p = ObserverParameters(fastest=10.0, noise_across=0.0, axes=("+x", "+y", "+z"))
     setting = tc.Setting(OperatorParameters(), np.zeros((6, 4)), seed, seen)
@@ -65,8 +64,7 @@ def test_a_person_who_sees_late_takes_as_long_as_people_did(lag: float) -> None:
 
 def test_a_smaller_target_takes_longer_and_so_does_a_farther_one() -> None:
     near, far, small = (
-        np.mean(pointing(0.02, way, width, 30))
-        for way, width in ((0.1, 0.02), (0.4, 0.02), (0.1, 0.005))
+        np.mean(pointing(0.02, way, width, 30)) for way, width in ((0.1, 0.02), (0.4, 0.02), (0.1, 0.005))
     )
     assert far > near
     assert small > near
@@ -74,12 +72,8 @@ def test_a_smaller_target_takes_longer_and_so_does_a_farther_one() -> None:
 
 def test_nobody_moves_without_a_goal() -> None:
     seen = tc.Seen(*(np.zeros(n) for n in (7, 7, 6, len(STATE), len(COLUMN))))
-    person = Observer(
-        ObserverParameters(), tc.Setting(OperatorParameters(), np.zeros((6, 4)), 1, seen)
-    )
-    rows = np.vstack(
-        [person(np.arange(16 * k, 16 * k + 16, dtype=np.float64) * TICK) for k in range(100)]
-    )
+    person = Observer(ObserverParameters(), tc.Setting(OperatorParameters(), np.zeros((6, 4)), 1, seen))
+    rows = np.vstack([person(np.arange(16 * k, 16 * k + 16, dtype=np.float64) * TICK) for k in range(100)])
     assert not rows.any()
 
 

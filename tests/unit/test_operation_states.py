@@ -14,14 +14,7 @@ from teleop_core.base.parameters import build
 from teleop_core.kernels import kernel
 from teleop_core.kernels.fields import record
 from teleop_core.kernels.geometry import Array
-from teleop_core.slave.operation import (
-    Answer,
-    Event,
-    Fault,
-    OperationParameters,
-    State,
-    command_event,
-)
+from teleop_core.slave.operation import Answer, Event, Fault, OperationParameters, State, command_event
 from teleop_core.slave.operation.states import COMMANDS, TABLE, OperatingState, answer_text, change
 from teleop_core.slave.pair import ArmParameters, SimulatedArm
 
@@ -57,9 +50,7 @@ def make(state: State, **fields: object) -> OperatingState:
 
 
 @pytest.mark.parametrize(("state", "event"), list(itertools.product(State, Event)))
-def test_every_state_takes_or_refuses_every_event_as_the_table_says(
-    state: State, event: Event
-) -> None:
+def test_every_state_takes_or_refuses_every_event_as_the_table_says(state: State, event: Event) -> None:
     s = make(state)
     answer = Answer(_change(s, int(event)))
     expected = EXPECTED[event][state]
@@ -182,9 +173,7 @@ def test_a_slave_enables_and_homes_itself_unless_it_is_told_not_to() -> None:
 
 def test_homing_is_smooth_and_within_the_limits() -> None:
     robot = "puma560"
-    slave = SimulatedArm(
-        ArmParameters(robot=robot, operation=OperationParameters(starts_enabled=False))
-    )
+    slave = SimulatedArm(ArmParameters(robot=robot, operation=OperationParameters(starts_enabled=False)))
     row, found, ns = slave.signals, [], 10**9
     slave.server.request("enable")
     slave.server.request("home")
@@ -224,9 +213,7 @@ def test_from_an_emergency_stop_the_setpoint_stands_still_in_the_next_tick() -> 
     values = arm.slave.server.operation
     assert values["is_stopped"] == 1.0
     drives = present(arm.slave.robot.drives)
-    braking = (0.1 * 2 * np.pi * arm.limit / arm.limit.max()) / (
-        drives.effort_limit / drives.inertia
-    )
+    braking = (0.1 * 2 * np.pi * arm.limit / arm.limit.max()) / (drives.effort_limit / drives.inertia)
     assert 0.0 < values["rest_time"] <= braking.max() + 0.1  # and the loop comes to rest
 
 
@@ -312,9 +299,7 @@ def test_no_session_can_have_an_emergency_stop_told_only(word: str) -> None:
 
 @pytest.mark.parametrize("seconds", [0.03, 0.13, 0.27, 0.41, 0.66, 0.93, 1.21])
 @pytest.mark.parametrize("law", ["pid", "source_pid"])
-def test_resume_is_refused_while_a_joint_swings_though_it_stands_still_at_each_turn(
-    law: str, seconds: float
-) -> None:
+def test_resume_is_refused_while_a_joint_swings_though_it_stands_still_at_each_turn(law: str, seconds: float) -> None:
     arm = Arm(law=law, is_filtered=False, seconds=seconds)
     arm.slave.server.request("pause")
     while arm.slave.server.request("resume")[0] is Answer.BRAKING:
@@ -324,9 +309,7 @@ def test_resume_is_refused_while_a_joint_swings_though_it_stands_still_at_each_t
     paused.slave.server.request("pause")
     paused.run(1e-9 * (arm.ns - paused.ns))
     for _ in range(200):  # nothing of the swing is left to come
-        assert (
-            np.abs(paused.slave.simulated.arm.dq) <= paused.slave.server.parameters["rest_speed"]
-        ).all()
+        assert (np.abs(paused.slave.simulated.arm.dq) <= paused.slave.server.parameters["rest_speed"]).all()
         paused.run(0.001)
 
 
@@ -349,9 +332,7 @@ def test_an_arm_that_was_paused_while_it_homed_homes_when_it_is_resumed() -> Non
     assert slave.server.request("resume")[0] is Answer.DONE
     run(10_000)
     assert slave.server.operation["is_homed"] == 1.0
-    assert np.allclose(
-        row["slave_setpoint_js"], slave.server.parameters["start"], rtol=0, atol=1e-12
-    )
+    assert np.allclose(row["slave_setpoint_js"], slave.server.parameters["start"], rtol=0, atol=1e-12)
 
 
 def test_unhome_and_disable_end_what_a_pause_left_of_homing() -> None:

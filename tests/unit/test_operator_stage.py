@@ -28,10 +28,7 @@ class Held:
         self.now = 0
 
     def go(
-        self,
-        ticks: int,
-        place: Array | None = None,
-        buttons: tuple[float, float, float] = (0.0, 0.0, 0.0),
+        self, ticks: int, place: Array | None = None, buttons: tuple[float, float, float] = (0.0, 0.0, 0.0)
     ) -> tuple[Array, Array]:
         """Go on; ``place`` from the inkwell [m], None for a hand that is silent.
 
@@ -120,12 +117,7 @@ def test_an_operator_sees_the_slave_as_late_as_the_link_says(delay: int) -> None
     assert np.ptp(told[:, 0]) > 1e-3
 
 
-SESSION: dict[str, Any] = {
-    "duration": 1.5,
-    "seed": 4,
-    "buttons.fixture": [0.3],
-    "operator": "human",
-}
+SESSION: dict[str, Any] = {"duration": 1.5, "seed": 4, "buttons.fixture": [0.3], "operator": "human"}
 
 
 @pytest.fixture(scope="module")
@@ -142,9 +134,7 @@ def test_a_replay_of_the_hand_is_that_of_the_device_to_the_bit(
         assert np.array_equal(again[topic].values, recorded[topic].values), topic
 
 
-def test_a_session_in_virtual_time_misses_no_message_of_what_is_sent_where_it_changes(
-    recorded: tc.Recording,
-) -> None:
+def test_a_session_in_virtual_time_misses_no_message_of_what_is_sent_where_it_changes(recorded: tc.Recording) -> None:
     topics = recorded.score().topics
     assert topics["hand/tremor"].gaps is None
     assert not sum(topic.gaps or 0 for topic in topics.values())
@@ -153,9 +143,7 @@ def test_a_session_in_virtual_time_misses_no_message_of_what_is_sent_where_it_ch
 def test_a_replayed_hand_feels_another_fixture(recorded: tc.Recording) -> None:
     loose = tc.replay(recorded, begin="hand", device__friction=0.0)
     assert np.array_equal(loose["hand/servo_cp"].values, recorded["hand/servo_cp"].values)
-    assert not np.array_equal(
-        loose["master/measured_cp"].values, recorded["master/measured_cp"].values
-    )
+    assert not np.array_equal(loose["master/measured_cp"].values, recorded["master/measured_cp"].values)
 
 
 def test_a_replay_that_cannot_begin_there_says_so(recorded: tc.Recording) -> None:

@@ -43,9 +43,7 @@ def path_of(kind: str, seed: int = 1, **values: float) -> Callable[[Array], tupl
     return sample
 
 
-def motion_of(
-    kind: str, seed: int, **values: float | tuple[float, float, float]
-) -> Callable[..., Any]:
+def motion_of(kind: str, seed: int, **values: float | tuple[float, float, float]) -> Callable[..., Any]:
     if kind == "recorded":
         return following("recorded", *RECORDED).make(NoParameters(), None)  # type: ignore[arg-type]
     given = {"center": CENTER, "size": SIZE, "tilt": TILT, "approach_time": 2.0, "period": 4.0}
@@ -255,9 +253,7 @@ def test_own_motion_moves_the_hand_as_the_built_in_one_of_the_same_formula(own_p
     assert np.array_equal(poses(master_of("mine"), 600), poses(built_in, 600))
 
 
-def test_operator_who_is_asked_tick_by_tick_moves_the_hand_to_the_same_bits(
-    own_parts: None,
-) -> None:
+def test_operator_who_is_asked_tick_by_tick_moves_the_hand_to_the_same_bits(own_parts: None) -> None:
     asked = []
 
     def make(parameters: NoParameters, setting: Setting) -> Callable[[Array], Array]:
@@ -315,9 +311,7 @@ BAD_MOTIONS = {
 
 
 @pytest.mark.parametrize("case", BAD_MOTIONS)
-def test_operator_who_answers_wrongly_is_refused_before_the_first_tick(
-    own_parts: None, case: str
-) -> None:
+def test_operator_who_answers_wrongly_is_refused_before_the_first_tick(own_parts: None, case: str) -> None:
     motion: Any
     motion, expected = BAD_MOTIONS[case]
     register_operator("mine", motion)
@@ -331,9 +325,8 @@ def test_operator_who_answers_wrongly_is_refused_before_the_first_tick(
 
 @pytest.mark.parametrize(
     ("values", "expected"),
-    [({"make": 5}, "make can be called"), ({"ahead": 0}, ">= 1 tick"),
-     ({"parameters": dict}, "dataclass")],
-)  # fmt: skip
+    [({"make": 5}, "make can be called"), ({"ahead": 0}, ">= 1 tick"), ({"parameters": dict}, "dataclass")],
+)
 def test_operator_that_is_put_together_wrongly_is_refused(
     own_parts: None, values: Mapping[str, int | type[object]], expected: str
 ) -> None:

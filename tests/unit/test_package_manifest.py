@@ -12,13 +12,8 @@ import pytest
 from present import present
 
 SOURCES = Path(__file__).resolve().parents[2] / "src"
-PACKAGES = (
-    "teleop_core", "teleop_machines", "teleop_console", "teleop_exchange", "teleop_lab",
-    "teleop_drill",
-)  # fmt: skip
-ROS = re.compile(
-    r"rclpy|rcl_interfaces|builtin_interfaces|ament_index_python|launch|launch_ros|std_srvs|.*_msgs"
-)
+PACKAGES = ("teleop_core", "teleop_machines", "teleop_console", "teleop_exchange", "teleop_lab", "teleop_drill")
+ROS = re.compile(r"rclpy|rcl_interfaces|builtin_interfaces|ament_index_python|launch|launch_ros|std_srvs|.*_msgs")
 NAMED_BY = {"pyyaml": "python3-yaml"} | {name: name for name in PACKAGES}
 
 

@@ -21,10 +21,7 @@ ROUNDING = 1e-9
 
 def bands(recipe: Recipe, path: Path) -> dict[str, Band]:
     bag = recipe.write(path)
-    return {
-        band.cause: band
-        for band in bands_of(Context(bag, "", read_history(bag), read_origin(bag, "")))
-    }
+    return {band.cause: band for band in bands_of(Context(bag, "", read_history(bag), read_origin(bag, "")))}
 
 
 def told(at: int, **values: Any) -> tuple[Topic, int, bytes]:
@@ -70,9 +67,7 @@ def test_recording_that_does_not_tell_limits_has_no_bands(tmp_path: Path) -> Non
 def test_every_cause_has_a_band_of_its_own_colour(tmp_path: Path) -> None:
     recipe = Recipe(COUNT)
     causes = [limit for limit in Limit if limit is not Limit.NONE]
-    recipe.singles += [
-        told(200 * (i + 1), limit=limit, limited_joint=-1) for i, limit in enumerate(causes)
-    ]
+    recipe.singles += [told(200 * (i + 1), limit=limit, limited_joint=-1) for i, limit in enumerate(causes)]
     found = bands(recipe, tmp_path / "bag").values()
     assert len(found) == len(causes) == len({band.color for band in found})
 
@@ -82,9 +77,7 @@ def test_stretches_hold_just_the_times_at_which_it_is_so(seed: int) -> None:
     rng = np.random.default_rng(seed)
     at = np.sort(rng.choice(np.arange(-50, COUNT + 50), 200, replace=False))
     is_so = rng.random(200) < 0.5
-    stretches = stretches_of(
-        history([(a, None) for a in at]), is_so, START_NS, START_NS + COUNT * TICK_NS
-    )
+    stretches = stretches_of(history([(a, None) for a in at]), is_so, START_NS, START_NS + COUNT * TICK_NS)
     times = (np.arange(COUNT) + 0.5) * 1e-3
     row = np.searchsorted(at * 1e-3, times, side="right") - 1
     expected = np.where(row >= 0, is_so[row], False)

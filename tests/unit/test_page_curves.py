@@ -11,9 +11,7 @@ from teleop_core.kernels.geometry import Array
 def against_time(values: Array, layout: Any = None) -> figure.Figure:
     x = np.arange(len(values)) * 1e-3
     axes = {"xaxis": figure.time_axis(), "yaxis": {"title": {"text": "force [N]"}}}
-    return figure.Figure(
-        "Force", "It pushes.", [figure.line(x, values, "force", "#000", 1, "N")], layout or axes
-    )
+    return figure.Figure("Force", "It pushes.", [figure.line(x, values, "force", "#000", 1, "N")], layout or axes)
 
 
 # -- axes of time ----------------------------------------------------------------------------------
@@ -24,9 +22,7 @@ def test_axes_of_time_are_known_by_how_they_are_made() -> None:
     assert figure.is_against_time(against_time(np.zeros(5), figure.stacked_axes("xyz", "mm")))
     turned = {"xaxis": {**figure.time_axis(), "range": [0, 1]}}
     assert figure.is_against_time(against_time(np.zeros(5), turned))
-    assert not figure.is_against_time(
-        against_time(np.zeros(5), {"xaxis": {"title": {"text": "time"}}})
-    )
+    assert not figure.is_against_time(against_time(np.zeros(5), {"xaxis": {"title": {"text": "time"}}}))
     assert not figure.is_against_time(figure.Figure("Nothing", "", []))
 
 

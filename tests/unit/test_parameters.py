@@ -52,9 +52,7 @@ def test_nested_groups_are_reached_by_dotted_names() -> None:
 
 def test_declarations_come_in_order_with_dotted_names() -> None:
     names = [spec.name for spec in specs(Arm)]
-    assert names == [
-        "name", "count", "is_on", "slow", "fast", "tags", "spring.stiffness", "spring.rest",
-    ]  # fmt: skip
+    assert names == ["name", "count", "is_on", "slow", "fast", "tags", "spring.stiffness", "spring.rest"]
 
 
 def test_declarations_carry_what_the_table_and_ros_need() -> None:
@@ -84,9 +82,7 @@ def test_lists_serve_as_tuples() -> None:
         ("tags", "a"),
     ],
 )
-def test_another_type_is_refused_by_name(
-    name: str, value: str | float | bool | tuple[float, int] | None
-) -> None:
+def test_another_type_is_refused_by_name(name: str, value: str | float | bool | tuple[float, int] | None) -> None:
     error = refusal({name: value})
     assert error.name == name
     assert "type" in error.requirement or "list" in error.requirement
@@ -162,9 +158,7 @@ class Loose:
         ("silence", 1e-9, "0, or between 0.01 and 9 s"),
     ],
 )
-def test_without_bounds_of_its_own_a_number_has_those_of_its_unit(
-    name: str, value: float, needed: str
-) -> None:
+def test_without_bounds_of_its_own_a_number_has_those_of_its_unit(name: str, value: float, needed: str) -> None:
     with pytest.raises(ParameterError) as told:
         build(Loose, {name: value})
     assert told.value.requirement == needed
@@ -197,9 +191,7 @@ def test_refusal_names_the_stage_too() -> None:
         st.tuples(st.floats(-1.0, 10.0), st.floats(-1.0, 10.0)), st.integers(1, 1000),
     )
 )  # fmt: skip
-def test_values_of_a_group_build_it_again(
-    values: Mapping[str, str | float | tuple[float, float]],
-) -> None:
+def test_values_of_a_group_build_it_again(values: Mapping[str, str | float | tuple[float, float]]) -> None:
     arm = build(Arm, values)
     assert build(Arm, values_of(arm)) == arm
 

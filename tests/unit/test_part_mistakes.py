@@ -94,9 +94,7 @@ WAYS_IN = {
 def test_group_that_is_no_dataclass_but_an_object_is_refused(
     own_parts: None, kind: str, group: NoParameters | TooFast | type[object]
 ) -> None:
-    with pytest.raises(
-        PartError, match=f"^{kind} 'own' must be one whose parameters are a dataclas"
-    ):
+    with pytest.raises(PartError, match=f"^{kind} 'own' must be one whose parameters are a dataclas"):
         WAYS_IN[kind](group)
 
 
@@ -104,18 +102,14 @@ def test_group_that_is_no_dataclass_but_an_object_is_refused(
 
 
 @pytest.mark.parametrize("name", ["", "my fixture", "a.b", "a/b", "-a", "a=b", None, 5])
-def test_name_that_keys_and_files_cannot_hold_is_refused(
-    own_parts: None, name: str | int | None
-) -> None:
+def test_name_that_keys_and_files_cannot_hold_is_refused(own_parts: None, name: str | int | None) -> None:
     with pytest.raises(PartError, match="named by letters, digits, _ and -") as error:
         register_shape(replace(SPHERE, name=cast(str, name)))
     assert (error.value.kind, error.value.name) == ("shape", name)
 
 
 @pytest.mark.parametrize("name", ["my_2nd", "my-cone", "Kegel", "größe"])
-def test_name_of_letters_digits_underscores_and_hyphens_is_taken(
-    own_parts: None, name: str
-) -> None:
+def test_name_of_letters_digits_underscores_and_hyphens_is_taken(own_parts: None, name: str) -> None:
     assert register_shape(replace(SPHERE, name=name)).name == name
 
 
@@ -129,9 +123,7 @@ def test_name_of_a_stage_that_is_no_identifier_is_refused(name: str) -> None:
 
 
 @pytest.mark.parametrize("word", ["reads", "writes", "late", "needs"])
-@pytest.mark.parametrize(
-    "value", [SLAVE_SERVO_CP, "slave/servo_cp", ("slave/servo_cp",), [SLAVE_SERVO_CP], None]
-)
+@pytest.mark.parametrize("value", [SLAVE_SERVO_CP, "slave/servo_cp", ("slave/servo_cp",), [SLAVE_SERVO_CP], None])
 def test_topics_of_a_stage_that_are_no_tuple_of_topics_are_refused_with_an_example(
     word: str, value: str | Sequence[str | Topic] | Topic | None
 ) -> None:
@@ -154,9 +146,7 @@ def test_misspelt_field_of_a_plain_record_suggests_the_near_one() -> None:
         row.gian  # noqa: B018
     with pytest.raises(AttributeError, match=told):
         row.gian = 1.0
-    with pytest.raises(
-        AttributeError, match=r"^record has no field 'xyz' \(fields: gain, place\)$"
-    ):
+    with pytest.raises(AttributeError, match=r"^record has no field 'xyz' \(fields: gain, place\)$"):
         row.xyz  # noqa: B018
 
 
@@ -230,9 +220,7 @@ def test_index_that_goes_wrong_later_is_found_with_checks_compiled_in(tmp_path: 
 # Sessions and metrics.
 
 
-def test_parameter_of_a_stage_that_the_session_has_not_is_refused_with_the_way_out(
-    own_parts: None,
-) -> None:
+def test_parameter_of_a_stage_that_the_session_has_not_is_refused_with_the_way_out(own_parts: None) -> None:
     @dataclass(frozen=True, kw_only=True)
     class Limit:
         speed: float = parameter(0.1, unit="m/s", doc="of the tool")

@@ -37,8 +37,7 @@ from teleop_core.slave.operation import Fault
 from teleop_core.slave.world.parameters import MATERIALS
 
 pytestmark = pytest.mark.usefixtures("own_parts")
-BOTH = ("teleop.stages=[network,passivity]", "feedback_timeout=1.0", "reach_force.is_on=false",
-        "gimbal_noise=0.0")  # fmt: skip
+BOTH = ("teleop.stages=[network,passivity]", "feedback_timeout=1.0", "reach_force.is_on=false", "gimbal_noise=0.0")
 TICK_NS = 1_000_000
 
 
@@ -74,9 +73,7 @@ def moved(axis: int, way: float) -> Array:
 
 @pytest.mark.parametrize("along", range(6))
 @pytest.mark.parametrize("pushed", range(6))
-def test_the_power_of_the_slaves_port_is_each_force_times_its_own_speed(
-    pushed: int, along: int
-) -> None:
+def test_the_power_of_the_slaves_port_is_each_force_times_its_own_speed(pushed: int, along: int) -> None:
     """Force with speed and torque with turn, in J: 2 N over 1 mm are 2 mJ."""
     tick, force = slave_port(), np.zeros(6)
     force[pushed] = 2.0
@@ -107,8 +104,12 @@ def test_what_is_left_to_a_slave_counts_ways_and_turns_on_all_six_axes(axis: int
 
 
 def test_energies_at_the_hand_are_its_push_times_its_way_on_every_axis() -> None:
-    rows = pressing("reflection.passivity=none", "operator.kind=circle", "world.material=silicone",
-                    "operator.size=[0.006,0.02,0.006]")  # fmt: skip
+    rows = pressing(
+        "reflection.passivity=none",
+        "operator.kind=circle",
+        "world.material=silicone",
+        "operator.size=[0.006,0.02,0.006]",
+    )
     push, place = rows["master_servo_cf"][:-1, :3], rows["master_measured_cp"][:, :3]
     told = rows["master_energy"]
     begun = int(np.argmax(np.diff(told[:, ROUND]) == 0.0)) + 1
@@ -175,9 +176,8 @@ def slave_law(law: Callable[..., None] = tdpa_slave) -> Callable[..., tuple[Arra
     last = moved(2, 0.0)
 
     def command(
-        wanted: Array, tip: Array, force: Array, heard: float = 0.0, into: float = 0.0,
-        out: float = 0.0,
-    ) -> tuple[Array, Array]:  # fmt: skip
+        wanted: Array, tip: Array, force: Array, heard: float = 0.0, into: float = 0.0, out: float = 0.0
+    ) -> tuple[Array, Array]:
         given = wanted.copy()
         port[IN] += into
         flow = np.array([heard, into, out])
@@ -202,9 +202,7 @@ def paid_lead(force: float, left: float) -> float:
 
 @pytest.mark.parametrize("force", [0.0, 0.5, 8.0])
 @pytest.mark.parametrize("heard", [0.0, 4e-3])
-def test_a_command_is_ahead_of_the_tip_as_far_as_credit_and_hand_pay_for(
-    force: float, heard: float
-) -> None:
+def test_a_command_is_ahead_of_the_tip_as_far_as_credit_and_hand_pay_for(force: float, heard: float) -> None:
     command, most = slave_law(), paid_lead(force, 1e-3 + heard)
     port, given = command(moved(2, -0.02), moved(2, 0.0), pushed(2, force), heard=heard)
     assert -given[2] == pytest.approx(most, rel=1e-9)
@@ -241,9 +239,7 @@ def test_what_the_arm_lent_is_not_lent_again_in_the_next_touch() -> None:
 
 
 @pytest.mark.parametrize("seed", range(20))
-def test_an_arm_that_lags_gives_a_spring_no_more_than_was_paid_however_the_hand_goes(
-    seed: int,
-) -> None:
+def test_an_arm_that_lags_gives_a_spring_no_more_than_was_paid_however_the_hand_goes(seed: int) -> None:
     """Of springs that are no stiffer than the one that is paid for."""
     rng, command = np.random.default_rng(seed), slave_law()
     stiffness, lag = SPRING * rng.uniform(0.05, 1.0), rng.uniform(1.0, 60.0)
@@ -276,12 +272,8 @@ def test_drift_goes_by_the_way_on_which_the_hand_comes_back_and_drives_the_arm_n
     assert height == 0.0
 
 
-@pytest.mark.parametrize(
-    ("way", "met"), [((3e-3, 0, 0), 0), ((0, 0, -1e-3), 0), ((3e-3, 0, 1e-3), 1e-3)]
-)
-def test_only_the_way_against_its_drift_brings_the_hand_back(
-    way: tuple[float, int, float], met: float
-) -> None:
+@pytest.mark.parametrize(("way", "met"), [((3e-3, 0, 0), 0), ((0, 0, -1e-3), 0), ((3e-3, 0, 1e-3), 1e-3)])
+def test_only_the_way_against_its_drift_brings_the_hand_back(way: tuple[float, int, float], met: float) -> None:
     port, last, air = np.zeros(len(ENERGY)), moved(0, 0.0), np.zeros(6)
     begin_round(port, 2.0, 1.0)
     port[DRIFT + 2] = -5e-3
@@ -297,9 +289,7 @@ HAND_NUMBERS = np.array([3e-4, 6e-3, 10.0])
 
 
 @pytest.mark.parametrize(("left", "after"), [(5e-3, 0.0), (-1e-3, -1e-3)])
-def test_a_touch_that_is_over_leaves_nothing_to_give_but_what_is_owed(
-    left: float, after: float
-) -> None:
+def test_a_touch_that_is_over_leaves_nothing_to_give_but_what_is_owed(left: float, after: float) -> None:
     memory, port, push, still = np.zeros(12), np.zeros(len(ENERGY)), np.zeros(3), np.zeros(3)
     port[MARGIN] = left
     tdpa_hand(HAND_NUMBERS, memory, still, still, still, still, still, port, push, 1.0, 1e-3)
@@ -330,9 +320,7 @@ def test_a_hand_pays_by_a_drag_until_the_slave_has_its_store_and_no_longer() -> 
 
 
 @pytest.mark.parametrize("size", [0.5, 2.0, 5.0, 15.0])
-def test_a_tank_lets_a_command_go_against_the_force_the_less_the_larger_that_is_and_stops(
-    size: float,
-) -> None:
+def test_a_tank_lets_a_command_go_against_the_force_the_less_the_larger_that_is_and_stops(size: float) -> None:
     command, tip = slave_law(tank_slave), moved(2, 0.0)
     force = np.array([0.0, 0.6 * size, 0.8 * size, 0.0, 0.0, 0.0])
     port, given = command(moved(2, -0.02), tip, force, heard=1.0)
@@ -353,9 +341,12 @@ def presses(rows: Any) -> int:
 def test_a_hand_with_a_tank_rests_on_steel_without_bouncing_near_and_far(late: float) -> None:
     """The hand of the scenario presses four or five times in 20 s."""
     rows = pressing(
-        "reflection.passivity=tank", "world.material=steel", f"network.there.least_delay={late}",
-        f"network.back.least_delay={late}", ticks=20_000,
-    )  # fmt: skip
+        "reflection.passivity=tank",
+        "world.material=steel",
+        f"network.there.least_delay={late}",
+        f"network.back.least_delay={late}",
+        ticks=20_000,
+    )
     assert presses(rows) <= 5
     assert not rows["slave_operation"][:, OPERATION.index("fault")].any()
     assert gained(rows) < 0.3e-3
@@ -402,9 +393,11 @@ def test_with_another_passivity_energies_begin_anew_while_a_session_runs() -> No
     before = session.run(7500)
     assert before["master_energy"][-1, IN] > 1e-5
     values = {
-        "reflection.architecture": "position_force", "reflection.passivity": "tdpa",
-        "reach_force.is_on": False, "feedback_timeout": 1.0,
-    }  # fmt: skip
+        "reflection.architecture": "position_force",
+        "reflection.passivity": "tdpa",
+        "reach_force.is_on": False,
+        "feedback_timeout": 1.0,
+    }
     session.stages["motion_scaling"].retune(build(MotionScalingParameters, values))
     after = session.run(3000)
     told = after["master_energy"]
@@ -424,9 +417,7 @@ YIELDING = {
 """Settings of architectures before a slave that yields."""
 
 
-def drawn(
-    rng: np.random.Generator, kind: str, architecture: str = "position_force"
-) -> tuple[Any, ...]:
+def drawn(rng: np.random.Generator, kind: str, architecture: str = "position_force") -> tuple[Any, ...]:
     """Settings of a session drawn at random: world, gains, hand and network."""
     stiffness = 10.0 ** rng.uniform(1.5, 4.7)
     there = rng.uniform(0.0, 0.5)
@@ -434,18 +425,26 @@ def drawn(
         f"network.{way}.{name}={value}"
         for way, delay in (("there", there), ("back", rng.uniform(0.0, 0.5)))
         for name, value in (
-            ("kind", "jitter"), ("least_delay", delay), ("jitter.mean", rng.choice([1e-4, 0.03])),
-            ("loss", rng.choice([0.0, 0.2, 0.5])), ("packet_order", rng.choice(["newest", "kept"])),
+            ("kind", "jitter"),
+            ("least_delay", delay),
+            ("jitter.mean", rng.choice([1e-4, 0.03])),
+            ("loss", rng.choice([0.0, 0.2, 0.5])),
+            ("packet_order", rng.choice(["newest", "kept"])),
         )
-    ]  # fmt: skip
+    ]
     return (
-        f"reflection.passivity={kind}", "world.material=own", f"world.stiffness={stiffness}",
-        f"world.damping={rng.choice([0.0, 0.5])}", f"hand.stiffness={rng.uniform(100.0, 1000.0)}",
-        f"world.friction_coefficient={rng.choice([0.0, 0.5])}", f"seed={rng.integers(1000)}",
+        f"reflection.passivity={kind}",
+        "world.material=own",
+        f"world.stiffness={stiffness}",
+        f"world.damping={rng.choice([0.0, 0.5])}",
+        f"hand.stiffness={rng.uniform(100.0, 1000.0)}",
+        f"world.friction_coefficient={rng.choice([0.0, 0.5])}",
+        f"seed={rng.integers(1000)}",
         f"operator.kind={rng.choice(['line', 'human', 'circle'])}",
-        f"{architecture}.force_gain={rng.uniform(0.3, 3.0)}", *ways,
+        f"{architecture}.force_gain={rng.uniform(0.3, 3.0)}",
+        *ways,
         *YIELDING.get(architecture, ()),
-    )  # fmt: skip
+    )
 
 
 def gained(rows: Any) -> float:
@@ -525,9 +524,7 @@ LENT = 1e-3
 
 
 @pytest.mark.parametrize("kind", ["tank", "tdpa", "wave"])
-def test_no_session_takes_more_out_of_both_true_ports_than_it_put_in_and_was_lent_once(
-    kind: str,
-) -> None:
+def test_no_session_takes_more_out_of_both_true_ports_than_it_put_in_and_was_lent_once(kind: str) -> None:
     rng = np.random.default_rng(11)
     for number in range(6):
         architecture = (
@@ -576,14 +573,16 @@ def test_a_hand_that_hears_nothing_leads_the_drives_to_their_limit_on_steel_but_
 
 @pytest.mark.parametrize("kind", ["tank", "tdpa"])
 @pytest.mark.parametrize("material", ["rubber", "wood", "steel"])
-def test_touch_after_touch_of_something_rough_and_hard_creates_no_energy(
-    kind: str, material: str
-) -> None:
+def test_touch_after_touch_of_something_rough_and_hard_creates_no_energy(kind: str, material: str) -> None:
     rows = pressing(
-        f"reflection.passivity={kind}", f"world.material={material}", "operator.kind=circle",
-        "operator.size=[0.02,0.03,0.0]", "network.there.least_delay=0.05",
-        "network.back.least_delay=0.05", ticks=16_000,
-    )  # fmt: skip
+        f"reflection.passivity={kind}",
+        f"world.material={material}",
+        "operator.kind=circle",
+        "operator.size=[0.02,0.03,0.0]",
+        "network.there.least_delay=0.05",
+        "network.back.least_delay=0.05",
+        ticks=16_000,
+    )
     assert created(rows, 1.0) < LENT
     assert presses(rows) >= 3
     assert np.linalg.norm(rows["master_measured_cf"][:, :3], axis=1).max() > 1.0
@@ -593,9 +592,7 @@ def test_touch_after_touch_of_something_rough_and_hard_creates_no_energy(
 @pytest.mark.slow
 @pytest.mark.parametrize("architecture", ["position_force", "three_channel", "four_channel"])
 @pytest.mark.parametrize("kind", ["tank", "tdpa"])
-def test_no_network_and_no_world_makes_passivity_give_the_hand_energy(
-    kind: str, architecture: str
-) -> None:
+def test_no_network_and_no_world_makes_passivity_give_the_hand_energy(kind: str, architecture: str) -> None:
     """Delay to 1 s there and back, jitter, loss to a half, 30 N/m to 50 kN/m, any grip."""
     rng = np.random.default_rng(7)
     for _ in range(10):
@@ -618,13 +615,15 @@ def wall_shares(kind: str, stiffness: float) -> tuple[float, float]:
 
     The hand is that of ``coarse_box``; the slave touches nothing.
     """
-    texts = ("reflection.architecture=position_force", f"reflection.passivity={kind}",
-             f"fixture.stiffness={stiffness}", "fixture.damping=10.0")  # fmt: skip
+    texts = (
+        "reflection.architecture=position_force",
+        f"reflection.passivity={kind}",
+        f"fixture.stiffness={stiffness}",
+        "fixture.damping=10.0",
+    )
     contact = VirtualTime(configure("coarse_box", settings=texts)).run(30_000)["master_contact"]
     ends = np.flatnonzero(np.diff(contact[:, 0], append=-1.0))
-    taken, returned = (
-        contact[ends, MASTER_CONTACT.columns.index(name)] for name in ("taken", "returned")
-    )
+    taken, returned = (contact[ends, MASTER_CONTACT.columns.index(name)] for name in ("taken", "returned"))
     is_contact = taken > TOUCH_J
     assert is_contact.sum() >= 5
     shares = returned[is_contact] / taken[is_contact]
@@ -644,8 +643,7 @@ def test_a_stiff_wall_gives_back_no_more_than_it_took_with_passivity(stiffness: 
 @pytest.mark.parametrize("kind", ["tank", "tdpa"])
 def test_a_session_begins_without_a_blow(kind: str) -> None:
     """The slave is at home, so that the hand leads it from the first sample on."""
-    texts = ("teleop.stages=[passivity]", "reflection.architecture=position_force",
-             f"reflection.passivity={kind}")  # fmt: skip
+    texts = ("teleop.stages=[passivity]", "reflection.architecture=position_force", f"reflection.passivity={kind}")
     rows = VirtualTime(configure("coarse_box", settings=texts)).run(1000)
     assert rows["teleop_state"][100, 0] == 1.0
     assert np.linalg.norm(rows["master_servo_cf"][:, :3], axis=1).max() < 0.3
@@ -663,13 +661,9 @@ def test_steel_throws_a_hand_50_ms_away_and_passivity_keeps_it() -> None:
 
 
 @pytest.mark.parametrize("kind", ["tank", "tdpa"])
-def test_four_channels_100_ms_away_give_the_hand_no_energy_and_the_slave_none_that_is_unpaid(
-    kind: str,
-) -> None:
+def test_four_channels_100_ms_away_give_the_hand_no_energy_and_the_slave_none_that_is_unpaid(kind: str) -> None:
     late = ("network.there.least_delay=0.05", "network.back.least_delay=0.05")
-    rows = pressing(
-        f"reflection.passivity={kind}", *YIELDING["four_channel"], "world.material=silicone", *late
-    )
+    rows = pressing(f"reflection.passivity={kind}", *YIELDING["four_channel"], "world.material=silicone", *late)
     check_ports(rows)
     assert np.linalg.norm(rows["master_servo_cf"], axis=1).max() > 0.5
     assert gained(rows) < 3.3 * STEP

@@ -49,13 +49,9 @@ def loop_matrix(axis: int) -> Array:
 
 
 @given(st.floats(1e-4, 50.0), st.floats(0.0, 1.0), st.floats(1.0, 300.0))
-def test_gains_put_three_poles_at_the_bandwidth(
-    inertia: float, friction_share: float, bandwidth: float
-) -> None:
+def test_gains_put_three_poles_at_the_bandwidth(inertia: float, friction_share: float, bandwidth: float) -> None:
     viscous = friction_share * 3.0 * inertia * bandwidth
-    kp, ki, kd = critically_damped_gains(
-        np.array([inertia]), np.array([viscous]), np.array([bandwidth])
-    )
+    kp, ki, kd = critically_damped_gains(np.array([inertia]), np.array([viscous]), np.array([bandwidth]))
     polynomial = np.array([inertia, (viscous + kd)[0], kp[0], ki[0]])
     wanted = inertia * np.poly([-bandwidth] * 3)
     assert np.allclose(polynomial, wanted, rtol=1e-12, atol=0)
@@ -126,17 +122,13 @@ efforts_and_gains = st.tuples(st.floats(0.0, 1e4), st.floats(0.0, 1e5), st.float
 
 
 @given(st.lists(st.floats(-10.0, 10.0), min_size=1, max_size=50), efforts_and_gains)
-def test_effort_never_exceeds_the_limit(
-    errors: list[float], gains: tuple[float, float, float]
-) -> None:
+def test_effort_never_exceeds_the_limit(errors: list[float], gains: tuple[float, float, float]) -> None:
     efforts, _ = run(errors, gains, limit=5.9)
     assert np.abs(efforts).max() <= 5.9
 
 
 @given(st.lists(st.floats(-1.0, 1.0), min_size=1, max_size=300), st.sampled_from(list(AXES)))
-def test_integral_never_grows_beyond_what_the_drive_can_give(
-    errors: list[float], axis: int
-) -> None:
+def test_integral_never_grows_beyond_what_the_drive_can_give(errors: list[float], axis: int) -> None:
     limit, memory = DRIVES.effort_limit[axis], np.zeros(3)
     for error in np.repeat(errors, 3):
         pid_step(0.0, -error, GAINS[axis], memory, 0.0, limit, DT)

@@ -85,10 +85,15 @@ def test_there_are_24_turns_and_all_are_maps_that_parameters_take() -> None:
 
 def test_a_placement_is_the_same_as_file_as_texts_and_as_settings(tmp_path: Path) -> None:
     placement = Placement(
-        robot="puma560", start=START,
-        axes=("+y", "-x", "+z"), coarse_gain=0.3, fine_gain=0.03, rotation_gain=0.25,
-        tool_axes=("-x", "+y", "-z"), tool_roll=-1.25,
-    )  # fmt: skip
+        robot="puma560",
+        start=START,
+        axes=("+y", "-x", "+z"),
+        coarse_gain=0.3,
+        fine_gain=0.03,
+        rotation_gain=0.25,
+        tool_axes=("-x", "+y", "-z"),
+        tool_roll=-1.25,
+    )
     file = tmp_path / "placement.yaml"
     file.write_text(placement.parameter_file())
     assert yaml.safe_load(file.read_text())["slave"]["ros__parameters"]["start"] == list(START)

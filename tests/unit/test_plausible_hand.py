@@ -95,11 +95,7 @@ def test_a_hand_that_moves_on_after_a_teleport_loses_that_step_and_the_next() ->
 
 
 @settings(max_examples=100, deadline=None)
-@given(
-    st.lists(
-        st.tuples(*[st.floats(allow_nan=False, allow_infinity=False)] * 3), min_size=1, max_size=20
-    )
-)
+@given(st.lists(st.tuples(*[st.floats(allow_nan=False, allow_infinity=False)] * 3), min_size=1, max_size=20))
 def test_wild_samples_move_no_farther_than_a_hand_could_and_leave_numbers(
     samples: list[tuple[float, float, float]],
 ) -> None:

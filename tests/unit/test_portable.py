@@ -107,8 +107,7 @@ def test_the_rule_finds_what_it_is_for(text: str, what: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("a", "b"),
-    [((3,), (3,)), ((4, 3), (3,)), ((3,), (3, 5)), ((7, 2, 3), (7, 3, 4)), ((2, 3), (7, 3, 3))],
+    ("a", "b"), [((3,), (3,)), ((4, 3), (3,)), ((3,), (3, 5)), ((7, 2, 3), (7, 3, 4)), ((2, 3), (7, 3, 3))]
 )
 def test_products_are_those_of_numpy(a: tuple[int, ...], b: tuple[int, ...]) -> None:
     rng = np.random.default_rng(1)
@@ -130,9 +129,7 @@ def test_an_inverse_motion_leads_back() -> None:
     from teleop_core.kernels.geometry import rotation, transform
 
     there = transform(rotation("x", 0.7), np.array([0.1, -0.2, 0.3]))
-    np.testing.assert_allclose(
-        portable.product(portable.inverse_motion(there), there), np.eye(4), atol=1e-15
-    )
+    np.testing.assert_allclose(portable.product(portable.inverse_motion(there), there), np.eye(4), atol=1e-15)
 
 
 @pytest.mark.parametrize("size", [0.0, 1e-3, 1.0, 30.0])

@@ -9,11 +9,7 @@ from teleop_core.slave.operation.presses import Presses
 
 def told(presses: Presses, *messages: tuple[int, bool], sender: bytes = b"a") -> list[bool]:
     """States that messages (number, is_pressed) of a sender add, in order."""
-    return [
-        said
-        for number, is_pressed in messages
-        for said in presses.take(sender, number, 0, is_pressed=is_pressed)
-    ]
+    return [said for number, is_pressed in messages for said in presses.take(sender, number, 0, is_pressed=is_pressed)]
 
 
 def test_every_message_of_an_unbroken_row_is_said_once() -> None:

@@ -117,11 +117,15 @@ def test_a_hole_is_entered_from_its_own_side_alone() -> None:
 
 @settings(max_examples=60, deadline=None, derandomize=True)
 @given(
-    seed=st.integers(0, 10_000), stiffness=st.floats(100.0, 50_000.0),
-    damping=st.floats(0.0, 3.0), friction=st.sampled_from([0.0, 0.4]),
-    puncture=st.floats(0.05, 10.0), cutting=st.floats(0.0, 15.0), shaft=st.floats(0.0, 10_000.0),
+    seed=st.integers(0, 10_000),
+    stiffness=st.floats(100.0, 50_000.0),
+    damping=st.floats(0.0, 3.0),
+    friction=st.sampled_from([0.0, 0.4]),
+    puncture=st.floats(0.05, 10.0),
+    cutting=st.floats(0.0, 15.0),
+    shaft=st.floats(0.0, 10_000.0),
     hole=st.floats(2e-4, 1e-2),
-)  # fmt: skip
+)
 def test_no_motion_of_a_needle_gets_energy_from_what_it_punctures(
     seed: int,
     stiffness: float,
@@ -135,10 +139,15 @@ def test_no_motion_of_a_needle_gets_energy_from_what_it_punctures(
     """In no tick: what it gave grows by what is stored, or more."""
     way = wandering(seed)
     _, lost, _ = lead(
-        way, world_stiffness=stiffness, world_damping=damping,
-        world_friction=friction, puncture_force=puncture, cutting_force=cutting,
-        shaft_friction=shaft, hole_radius=hole,
-    )  # fmt: skip
+        way,
+        world_stiffness=stiffness,
+        world_damping=damping,
+        world_friction=friction,
+        puncture_force=puncture,
+        cutting_force=cutting,
+        shaft_friction=shaft,
+        hole_radius=hole,
+    )
     # Where the force has a corner, the sum over the pieces of a tick errs by as much.
     piece = np.abs(np.diff(way, axis=0)).max() / PIECES
     assert lost[0] == 0.0
@@ -176,9 +185,7 @@ def test_in_the_scenario_the_hand_pierces_a_membrane_once_and_enters_it_twice(
     assert (stage.punctures, stage.depth) == (1, 0.0)
 
 
-def test_the_hand_feels_the_membrane_give_way(
-    pierced: tuple[VirtualTime, NDArray[np.void]],
-) -> None:
+def test_the_hand_feels_the_membrane_give_way(pierced: tuple[VirtualTime, NDArray[np.void]]) -> None:
     force = pierced[1]["master_servo_cf"][:, :3]
     size = np.linalg.norm(force, axis=1)
     assert size.max() == pytest.approx(0.5, rel=1e-2)
@@ -215,17 +222,14 @@ def test_the_score_has_the_fall_of_the_force() -> None:
 
 def test_without_a_puncture_force_nothing_of_a_needle_changes_a_bit() -> None:
     needles = ["world.cutting_force=3.0", "world.shaft_friction=500.0", "world.hole_radius=0.01"]
-    plain, other = (
-        VirtualTime(configure("palpation", settings=given)).run(10_000) for given in ([], needles)
-    )
+    plain, other = (VirtualTime(configure("palpation", settings=given)).run(10_000) for given in ([], needles))
     assert plain["slave_true_cf"].any()
     for name in present(plain.dtype.names):
         np.testing.assert_array_equal(plain[name], other[name])
 
 
 @pytest.mark.parametrize(
-    "setting",
-    ["puncture_force=-0.1", "cutting_force=-1.0", "shaft_friction=nan", "hole_radius=0.0"],
+    "setting", ["puncture_force=-0.1", "cutting_force=-1.0", "shaft_friction=nan", "hole_radius=0.0"]
 )
 def test_numbers_that_no_needle_has_are_refused_by_name(setting: str) -> None:
     with pytest.raises(ParameterError, match=setting.partition("=")[0]) as error:

@@ -47,9 +47,7 @@ ROLL_PITCH_YAW = {
 }
 
 
-def joints(
-    theta1: int, theta2: float, d3: int, theta4: float, theta5: float, theta6: float
-) -> Array:
+def joints(theta1: int, theta2: float, d3: int, theta4: float, theta5: float, theta6: float) -> Array:
     """Joint vector from degrees and mm."""
     angles = np.array([theta1, theta2, 0.0, theta4, theta5, theta6]) * DEGREE
     angles[2] = d3 * MM
@@ -81,9 +79,13 @@ def standard_link(theta: float, d: float, alpha: float, a4_32: float | None = No
 def denavit_hartenberg(q: Array, a4_32: float = -1.0) -> Array:
     quarter = math.pi / 2
     table = (
-        (q[0], 0.0, -quarter, None), (q[1], 0.0, quarter, None), (0.0, q[2], 0.0, None),
-        (q[3], 0.0, -quarter, a4_32), (q[4], 0.0, quarter, None), (q[5], L6, 0.0, None),
-    )  # fmt: skip
+        (q[0], 0.0, -quarter, None),
+        (q[1], 0.0, quarter, None),
+        (0.0, q[2], 0.0, None),
+        (q[3], 0.0, -quarter, a4_32),
+        (q[4], 0.0, quarter, None),
+        (q[5], L6, 0.0, None),
+    )
     return np.linalg.multi_dot([standard_link(*row) for row in table])
 
 
@@ -161,9 +163,7 @@ def test_at_the_wrist_singularity_joint_4_keeps_its_value_and_joint_6_turns() ->
     assert math.isclose(answer.q[5], 0.1, abs_tol=1e-9)
 
 
-def test_roll_that_joint_6_cannot_do_alone_at_the_wrist_singularity_is_shared_with_joint_4() -> (
-    None
-):
+def test_roll_that_joint_6_cannot_do_alone_at_the_wrist_singularity_is_shared_with_joint_4() -> None:
     rng = np.random.default_rng(4)
     for roll, seed4 in rng.uniform(ARM.lower[3], ARM.upper[3], (500, 2)):
         total = roll + rng.uniform(ARM.lower[5], ARM.upper[5])
@@ -175,9 +175,7 @@ def test_roll_that_joint_6_cannot_do_alone_at_the_wrist_singularity_is_shared_wi
 
 @pytest.mark.parametrize("size", [0.0, 5e-324, 1e-200, 1e200, 1.7e308])
 @pytest.mark.parametrize("direction", [(1, 0, 0), (0, 1, 0), (0, 0, -1), (1, 1, 1)])
-def test_smallest_and_largest_places_give_finite_joints(
-    size: float, direction: tuple[int, int, int]
-) -> None:
+def test_smallest_and_largest_places_give_finite_joints(size: float, direction: tuple[int, int, int]) -> None:
     answer = ARM.ik(transform(np.eye(3), size * np.array(direction, dtype=float)))
     assert np.isfinite(answer.q).all()
     assert not np.isnan(answer.residual).any()
@@ -196,11 +194,7 @@ def test_pose_beyond_the_reach_is_unreachable_and_the_arm_points_there() -> None
 
 @pytest.mark.parametrize(
     ("posture", "joint", "bound"),
-    [
-        ((85, 90, 300, 10, 20, 30), 0, 80),
-        ((10, 165, 300, 10, 20, 30), 1, 160),
-        ((10, 90, 300, 10, 85, 30), 4, 80),
-    ],
+    [((85, 90, 300, 10, 20, 30), 0, 80), ((10, 165, 300, 10, 20, 30), 1, 160), ((10, 90, 300, 10, 85, 30), 4, 80)],
 )
 def test_pose_past_a_joint_limit_is_limited_and_stays_at_the_limit(
     posture: tuple[int, ...], joint: int, bound: int
@@ -251,8 +245,10 @@ def test_tendon_ratios_of_the_printed_radii_pull_both_motors() -> None:
 
 @given(
     st.lists(st.floats(-3.0, 3.0), min_size=2, max_size=2),
-    st.floats(0.1, 5.0), st.floats(-5.0, -0.1), st.floats(-3.0, 3.0),
-)  # fmt: skip
+    st.floats(0.1, 5.0),
+    st.floats(-5.0, -0.1),
+    st.floats(-3.0, 3.0),
+)
 def test_joint_angles_come_back_from_the_motor_angles(
     angles: list[float], ratio5: float, ratio6: float, coupling: float
 ) -> None:

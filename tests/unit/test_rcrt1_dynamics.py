@@ -23,9 +23,7 @@ DEGREE = math.pi / 180.0
 MOTORS = np.diag([LINKS["J1"], LINKS["J2"], LINKS["J3"]])
 ROW = link_row()
 
-states = st.tuples(
-    st.floats(-1.4, 1.4), st.floats(0.9, 2.8), st.floats(0.1, 0.42), *[st.floats(-3.0, 3.0)] * 3
-)
+states = st.tuples(st.floats(-1.4, 1.4), st.floats(0.9, 2.8), st.floats(0.1, 0.42), *[st.floats(-3.0, 3.0)] * 3)
 
 
 def inertia(q: Sequence[float] | Array, row: Array = ROW) -> Array:
@@ -49,16 +47,9 @@ def acceleration(q: Array, dq: Array, effort: Array) -> Array:
 
 @pytest.mark.parametrize(
     ("theta2", "g3z", "torque"),
-    [
-        (113.4, -0.264245, -1.4084),
-        (113.4, 0.264245, -5.1625),
-        (90.0, -0.264245, -1.8141),
-        (90.0, 0.264245, -5.9046),
-    ],
+    [(113.4, -0.264245, -1.4084), (113.4, 0.264245, -5.1625), (90.0, -0.264245, -1.8141), (90.0, 0.264245, -5.9046)],
 )
-def test_gravity_torque_is_the_published_one_for_both_readings_of_g3z(
-    theta2: float, g3z: float, torque: float
-) -> None:
+def test_gravity_torque_is_the_published_one_for_both_readings_of_g3z(theta2: float, g3z: float, torque: float) -> None:
     # Case 25; half of the last digit given.
     effort = gravity((0.0, theta2 * DEGREE, 0.421), link_row(G3z=g3z))
     assert math.isclose(effort[1], torque, abs_tol=5e-5)
@@ -116,9 +107,7 @@ PINOCCHIO = pinocchio_model()
 
 
 @given(states, st.tuples(*[st.floats(-6.0, 6.0)] * 2, st.floats(-25.0, 25.0)))
-def test_accelerations_are_pinocchios(
-    state: tuple[float, ...], drive: tuple[float, float, float]
-) -> None:
+def test_accelerations_are_pinocchios(state: tuple[float, ...], drive: tuple[float, float, float]) -> None:
     q, dq, effort = np.zeros(6), np.zeros(6), np.zeros(6)
     q[:3], dq[:3], effort[:3] = state[:3], state[3:], drive
     expected = pinocchio.aba(PINOCCHIO, PINOCCHIO.createData(), q[:3], dq[:3], effort[:3])

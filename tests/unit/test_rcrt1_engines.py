@@ -30,10 +30,14 @@ TABLE = (
 )
 
 states = st.tuples(
-    st.floats(-1.4, 1.4), st.floats(0.9, 2.8), st.floats(0.1, 0.42),
+    st.floats(-1.4, 1.4),
+    st.floats(0.9, 2.8),
+    st.floats(0.1, 0.42),
     *[st.floats(-3.0, 3.0)] * 3,
-    st.floats(-6.0, 6.0), st.floats(-6.0, 6.0), st.floats(-25.0, 25.0),
-)  # fmt: skip
+    st.floats(-6.0, 6.0),
+    st.floats(-6.0, 6.0),
+    st.floats(-25.0, 25.0),
+)
 
 
 def central(
@@ -81,10 +85,16 @@ def mujoco_xml(table: Any) -> str:
             center, tensor = turn @ center, turn @ tensor @ turn.T
         upper = (*np.diag(tensor), tensor[0, 1], tensor[0, 2], tensor[1, 2])
         child = BODY.format(
-            name=f"link{index + 1}", frame="", kind=("hinge", "hinge", "slide")[index],
-            axis=("0 0 1", "0 1 0", "0 0 1")[index], armature=MOTORS[index],
-            center=numbers(center), mass=mass, inertia=numbers(upper), child=child,
-        )  # fmt: skip
+            name=f"link{index + 1}",
+            frame="",
+            kind=("hinge", "hinge", "slide")[index],
+            axis=("0 0 1", "0 1 0", "0 0 1")[index],
+            armature=MOTORS[index],
+            center=numbers(center),
+            mass=mass,
+            inertia=numbers(upper),
+            child=child,
+        )
     return f"""<mujoco>
   <option gravity="0 0 {-LINKS["g"]!r}"/>
   <compiler angle="radian"/>
@@ -121,9 +131,7 @@ def pinocchio_model() -> Model:
     model, parent, place = pinocchio.Model(), 0, pinocchio.SE3.Identity()
     model.gravity.linear = np.array([0.0, 0.0, -LINKS["g"]])
     joints = (pinocchio.JointModelRZ(), pinocchio.JointModelRZ(), pinocchio.JointModelPZ())
-    for joint, twist, (mass, center, *rest) in zip(
-        joints, (-math.pi / 2, math.pi / 2, 0.0), TABLE, strict=True
-    ):
+    for joint, twist, (mass, center, *rest) in zip(joints, (-math.pi / 2, math.pi / 2, 0.0), TABLE, strict=True):
         parent = model.addJoint(parent, joint, place, f"joint{parent + 1}")
         place = pinocchio.SE3(pinocchio.utils.rotate("x", twist), np.zeros(3))
         body = pinocchio.Inertia(mass, np.array(center), central(mass, center, *rest))

@@ -73,9 +73,7 @@ class Session(Recipe):
                 ends = np.searchsorted(columns[2], (begin_ns, begin_ns + SECOND_NS))
                 block[topic] = tuple(column[slice(*ends)] for column in columns)
             blocks.append(block)
-        with BagWriter(
-            path, self.topics, JOINTS, metadata=self.metadata, start_ns=START_NS
-        ) as writer:
+        with BagWriter(path, self.topics, JOINTS, metadata=self.metadata, start_ns=START_NS) as writer:
             for topic, log_ns, data in self.singles:
                 writer.write(topic, log_ns, data)
             for block in blocks:
@@ -156,9 +154,7 @@ def test_a_stretch_goes_on_across_windows_whatever_its_cause(path: Path) -> None
 
 
 @pytest.mark.parametrize(("silence_ms", "aligning_ms"), [(500, 0), (501, 501), (3000, 3000)])
-def test_silence_of_more_than_half_a_second_counts_as_aligning(
-    path: Path, silence_ms: int, aligning_ms: int
-) -> None:
+def test_silence_of_more_than_half_a_second_counts_as_aligning(path: Path, silence_ms: int, aligning_ms: int) -> None:
     session = Session()
     ticks = np.arange(0, COUNT, 10)
     ticks = np.concatenate((ticks[ticks <= 5000], ticks[ticks <= 5000] + 5000 + silence_ms))
@@ -198,9 +194,7 @@ def test_what_inverse_kinematics_left_is_counted_while_the_slave_follows(path: P
     for spread, left in ((score.residual_mm, millimetres), (score.residual_deg, degrees)):
         kept = left[is_counted]
         expected = np.sqrt(np.mean(kept**2)), np.std(kept, ddof=1), kept.max()
-        assert np.allclose(
-            [present(v) for v in (spread.rms, spread.sd, spread.max)], expected, rtol=1e-9, atol=0
-        )
+        assert np.allclose([present(v) for v in (spread.rms, spread.sd, spread.max)], expected, rtol=1e-9, atol=0)
 
 
 # -- rate and interpolation ------------------------------------------------------------------------
@@ -212,9 +206,13 @@ def configured(interpolation: str) -> str:
 
 @pytest.mark.parametrize(
     ("interpolation", "period_ms", "delay_ms", "shown"),
-    [("linear", 8, 8.0, "linear, 8 ms"), ("minimum_jerk", 33, 33.0, "minimum jerk, 33 ms"),
-     ("none", 8, 0.0, "none"), ("linear", 1, 0.0, "linear")],
-)  # fmt: skip
+    [
+        ("linear", 8, 8.0, "linear, 8 ms"),
+        ("minimum_jerk", 33, 33.0, "minimum jerk, 33 ms"),
+        ("none", 8, 0.0, "none"),
+        ("linear", 1, 0.0, "linear"),
+    ],
+)
 def test_interpolation_is_late_by_a_period_of_slow_commands(
     path: Path, interpolation: str, period_ms: int, delay_ms: float, shown: str
 ) -> None:
@@ -236,9 +234,7 @@ def lines(score: Score, label: str) -> list[str]:
 # -- what the hand asked for -----------------------------------------------------------------------
 
 
-def hand_and_command(
-    session: Session, gain: Array, is_held: NDArray[np.bool_], cuts: Array
-) -> tuple[Array, Array]:
+def hand_and_command(session: Session, gain: Array, is_held: NDArray[np.bool_], cuts: Array) -> tuple[Array, Array]:
     """Write a hand that wanders, and the command that follows it but for what is cut off."""
     rng = np.random.default_rng(4)
     hand = np.cumsum(1e-5 * rng.normal(size=(COUNT, 3)), axis=0)
@@ -278,10 +274,7 @@ def test_asked_error_is_what_was_cut_off_since_the_last_clutch_stroke(path: Path
     kept = missing[~is_held]
     bag = session.write(path)
     assert len(list(windows(bag, [topics.SLAVE_SERVO_CP]))) >= 3
-    error: Any = (
-        evaluate(bag).value("asked_error_mm.rms"),
-        evaluate(bag).value("asked_error_mm.max"),
-    )
+    error: Any = (evaluate(bag).value("asked_error_mm.rms"), evaluate(bag).value("asked_error_mm.max"))
     assert kept.max() > 0.3
     assert np.allclose(error, (np.sqrt(np.mean(kept**2)), kept.max()), rtol=0, atol=EXACT_MM)
 
@@ -334,12 +327,9 @@ def turned_session(cut_from: int = COUNT, **parameters: Any) -> Any:
 
 
 @pytest.mark.parametrize(
-    "parameters",
-    [{}, {"tool_roll": 0.4}, {"axes": ("+x", "+y", "+z"), "tool_axes": ("-x", "+y", "-z")}],
+    "parameters", [{}, {"tool_roll": 0.4}, {"axes": ("+x", "+y", "+z"), "tool_axes": ("-x", "+y", "-z")}]
 )
-def test_a_tool_that_turns_as_the_hand_is_where_it_was_asked_to_be(
-    path: Path, parameters: Any
-) -> None:
+def test_a_tool_that_turns_as_the_hand_is_where_it_was_asked_to_be(path: Path, parameters: Any) -> None:
     session, _ = turned_session(**parameters)
     assert present(evaluate(session.write(path)).asked_error_deg.max) < 1e-5
 
@@ -363,9 +353,8 @@ def test_a_tool_that_turns_less_than_the_hand_has_no_asked_orientation(path: Pat
 
 @pytest.mark.parametrize(
     ("lost_ms", "told"),
-    [(0, None), (149, None), (151, "98.9 % < 99 %"), (300, "97.9 % < 99 %"),
-     (7500, "49.9 % < 99 %")],
-)  # fmt: skip
+    [(0, None), (149, None), (151, "98.9 % < 99 %"), (300, "97.9 % < 99 %"), (7500, "49.9 % < 99 %")],
+)
 def test_marks_of_published_figures_need_99_percent_and_the_table_says_so(
     path: Path, lost_ms: int, told: str | None
 ) -> None:
@@ -387,16 +376,19 @@ def test_recordings_of_before_have_no_rows_of_reach_and_no_marks(path: Path) -> 
     session.topics.remove(topics.SLAVE_REACH)
     known = set(STATE_FIELDS) - {"limit", "limited_joint"}
     texts = {name: str(float(name in {"gain", "is_following"})) for name in known}
-    session.singles = [
-        (topics.TELEOP_STATE, START_NS, report(START_NS, "teleop", 0, "FOLLOWING", texts))
-    ]
+    session.singles = [(topics.TELEOP_STATE, START_NS, report(START_NS, "teleop", 0, "FOLLOWING", texts))]
     score: Any = evaluate(session.write(path))
     assert shares(score) == [None] * len(SHARES)
     assert score.reach.residual_mm.rms is score.reach.interpolation is None
     assert score.value("asked_error_mm.rms") is None
     text = table_of(score)
-    for label in ("followed, time %", "longest not followed s", "at a joint's end %",
-                  "left by IK, RMS mm", "interpolation"):  # fmt: skip
+    for label in (
+        "followed, time %",
+        "longest not followed s",
+        "at a joint's end %",
+        "left by IK, RMS mm",
+        "interpolation",
+    ):
         assert label not in text
     line = next(line for line in text.splitlines() if "too little to compare" in line)
     assert line.strip().endswith("not known")

@@ -58,8 +58,6 @@ print(*sorted(ready() - before))
 @pytest.mark.slow
 @pytest.mark.skipif(not IS_COMPILED, reason="nothing is compiled in pure Python")
 def test_commands_faults_and_new_gains_compile_nothing_once_a_slave_runs() -> None:
-    done = subprocess.run(
-        [sys.executable, "-c", SCRIPT], capture_output=True, text=True, timeout=300, check=False
-    )
+    done = subprocess.run([sys.executable, "-c", SCRIPT], capture_output=True, text=True, timeout=300, check=False)
     assert done.returncode == 0, done.stderr
     assert done.stdout.split() == []

@@ -35,9 +35,7 @@ ROUNDED = {
 
 
 @pytest.mark.parametrize("name", [name for name in ARMS if "class" in ARMS[name]])
-def test_the_class_is_that_of_ssik_wherever_we_have_a_closed_form(
-    name: str, tmp_path: Path
-) -> None:
+def test_the_class_is_that_of_ssik_wherever_we_have_a_closed_form(name: str, tmp_path: Path) -> None:
     ours = ROUNDED.get(name, OURS.get(ARMS[name]["class"], "search"))
     assert load(name, tmp_path).solution.startswith(ours)
 
@@ -50,18 +48,14 @@ def test_every_pose_is_solved_from_home_and_from_beside(name: Any, tmp_path: Pat
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ARMS)
-def test_no_path_flips_or_outruns_a_drive_and_none_stops_without_a_reason(
-    name: Any, tmp_path: Path
-) -> None:
+def test_no_path_flips_or_outruns_a_drive_and_none_stops_without_a_reason(name: Any, tmp_path: Path) -> None:
     path = lines(load(name, tmp_path), 10)
     assert (path.too_fast, path.unexplained) == (0, 0)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", TWELVE)
-def test_an_arm_goes_on_through_the_singular_posture_of_its_wrist(
-    name: str, tmp_path: Path
-) -> None:
+def test_an_arm_goes_on_through_the_singular_posture_of_its_wrist(name: str, tmp_path: Path) -> None:
     path = wrists(load(name, tmp_path), 10)
     assert path is None or (path.too_fast, path.arrived) == (0, path.count)
 
@@ -103,9 +97,7 @@ def followed(name: str, folder: Path) -> float:
 
 
 @pytest.mark.filterwarnings("ignore::teleop_core.TeleopWarning")  # of its efforts
-def test_a_large_arm_whose_wrist_is_slower_than_the_noise_of_the_hand_keeps_its_place(
-    tmp_path: Path,
-) -> None:
+def test_a_large_arm_whose_wrist_is_slower_than_the_noise_of_the_hand_keeps_its_place(tmp_path: Path) -> None:
     assert followed("r2000ic210l", tmp_path) > 0.99
 
 

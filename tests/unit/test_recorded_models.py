@@ -56,9 +56,7 @@ def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.mark.parametrize("robot", ["rcrt1", "rps3"])
 def test_the_recorded_tip_frame_is_the_measured_tip(tmp_path: Path, robot: str) -> None:
-    recording = tc.run(
-        "coarse_box", duration=0.3, robot=robot, out=tmp_path / "bag", settings={"plant": "ideal"}
-    )
+    recording = tc.run("coarse_box", duration=0.3, robot=robot, out=tmp_path / "bag", settings={"plant": "ideal"})
     tips, tip = frames(tmp_path / "bag")["slave_base>slave_tip"], recording["slave/measured_cp"]
     measured = dict(zip(tip.stamp_ns.tolist(), tip.values, strict=True))
     assert len(tips) > 10
@@ -127,15 +125,10 @@ def test_a_rate_of_zero_leaves_both_out(tmp_path: Path) -> None:
 
 def test_who_chooses_topics_chooses_the_model_too(tmp_path: Path) -> None:
     chosen = ["slave/measured_js", "master/measured_cp", "tf"]
-    made = tc.run(
-        "free_motion", duration=0.1, out=tmp_path / "bag", settings={"recorder.topics": chosen}
-    )
+    made = tc.run("free_motion", duration=0.1, out=tmp_path / "bag", settings={"recorder.topics": chosen})
     assert set(made.topics) == set(chosen)
     with pytest.raises(UnknownNameError):
-        tc.run(
-            "free_motion", duration=0.1, out=tmp_path / "other",
-            settings={"recorder.topics": ["tff"]},
-        )  # fmt: skip
+        tc.run("free_motion", duration=0.1, out=tmp_path / "other", settings={"recorder.topics": ["tff"]})
 
 
 @pytest.mark.slow
@@ -157,9 +150,7 @@ def test_a_replay_gives_the_same_bytes(bag: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("arms", [[], ["right", "left"]])
-def test_what_is_saved_from_memory_has_the_frames_of_what_was_recorded(
-    tmp_path: Path, arms: list[str]
-) -> None:
+def test_what_is_saved_from_memory_has_the_frames_of_what_was_recorded(tmp_path: Path, arms: list[str]) -> None:
     tc.run("free_motion", duration=0.2, arms=arms, out=tmp_path / "recorded")
     tc.run("free_motion", duration=0.2, arms=arms).save(tmp_path / "saved")
     recorded, saved = (frames(tmp_path / name) for name in ("recorded", "saved"))

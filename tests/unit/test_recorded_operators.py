@@ -45,11 +45,7 @@ def bag(
         block = {MASTER_MEASURED_CP: (stamps, poses, stamps)}
         for topic, found in changes.items():
             at = START_NS + np.rint(np.array(list(found)) * 1e9).astype(np.int64)
-            block[topic] = (
-                at,
-                np.array(list(present(found).values()), float).reshape(len(at), -1),
-                at,
-            )
+            block[topic] = (at, np.array(list(present(found).values()), float).reshape(len(at), -1), at)
         writer.write_block(block)
     return path
 
@@ -153,12 +149,8 @@ def test_a_recording_lasts_as_long_as_it_and_its_approach(tmp_path: Path) -> Non
     assert length(path, center=CENTER, approach_time=3.0) == pytest.approx(5.0)
 
 
-@pytest.mark.parametrize(
-    ("given", "seconds"), [({}, 5.0), ({"duration": 1.5}, 1.5), ({"scenario": "coarse_box"}, 5.0)]
-)
-def test_a_session_lasts_as_long_as_what_it_follows_unless_told(
-    given: Any, seconds: float, tmp_path: Path
-) -> None:
+@pytest.mark.parametrize(("given", "seconds"), [({}, 5.0), ({"duration": 1.5}, 1.5), ({"scenario": "coarse_box"}, 5.0)])
+def test_a_session_lasts_as_long_as_what_it_follows_unless_told(given: Any, seconds: float, tmp_path: Path) -> None:
     path = bag(tmp_path / "bag")
     settings: dict[str, Any] = {"operator.center": CENTER, "operator.approach_time": 3.0}
     if duration := given.pop("duration", None):
@@ -216,9 +208,7 @@ def test_a_table_with_the_usual_head_is_taken_in_metres_seconds_and_radians(tmp_
 
 def test_other_tables_are_guessed_with_a_note(tmp_path: Path) -> None:
     rows = np.column_stack((1e3 * T, 1e3 * PLACES))
-    np.savetxt(
-        tmp_path / "a.csv", rows, "%.17g", ";", header="ms;x (mm);y (mm);z (mm)", comments=""
-    )
+    np.savetxt(tmp_path / "a.csv", rows, "%.17g", ";", header="ms;x (mm);y (mm);z (mm)", comments="")
     with pytest.warns(UserWarning, match="in ms"):
         got = motion(tmp_path / "a.csv", kind="file")(T)
     assert np.allclose(got[:, :3], PLACES - PLACES[0], rtol=0, atol=1e-12)
@@ -226,9 +216,8 @@ def test_other_tables_are_guessed_with_a_note(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("content", "text"),
-    [("t,x,y\n0,1,2\n1,2,3\n", "--position"), ("t,x,y,z\n0,1,2,lost\n1,1,1,1\n", "lost"),
-     ("", "is empty")],
-)  # fmt: skip
+    [("t,x,y\n0,1,2\n1,2,3\n", "--position"), ("t,x,y,z\n0,1,2,lost\n1,1,1,1\n", "lost"), ("", "is empty")],
+)
 def test_tables_that_are_no_motion_are_refused(content: str, text: str, tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text(content)
     with pytest.raises(tc.TeleopError) as error:

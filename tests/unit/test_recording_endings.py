@@ -86,10 +86,7 @@ def test_a_file_moved_into_another_recording_leaves_that_one_alone(tmp_path: Pat
     with BagWriter(tmp_path / "other", [TOPIC], JOINTS) as writer:
         writer.write_block(second(0))
     before = (tmp_path / "other" / "metadata.yaml").read_bytes()
-    told = record(
-        tmp_path / "bag",
-        lambda path: (path / "bag_0.mcap").rename(tmp_path / "other" / "bag_0.mcap"),
-    )
+    told = record(tmp_path / "bag", lambda path: (path / "bag_0.mcap").rename(tmp_path / "other" / "bag_0.mcap"))
     assert (tmp_path / "other" / "metadata.yaml").read_bytes() == before
     assert f"teleop recover {tmp_path / 'other' / 'bag_0.mcap'}" in told
     out, count = recover(tmp_path / "other" / "bag_0.mcap", tmp_path / "saved")
@@ -107,9 +104,7 @@ def file_limit() -> Iterator[None]:
 
 
 @pytest.mark.parametrize("room", [10, 2000, 20_000, 100_000])
-def test_a_full_disk_costs_no_message_that_was_written_whole(
-    file_limit: None, tmp_path: Path, room: int
-) -> None:
+def test_a_full_disk_costs_no_message_that_was_written_whole(file_limit: None, tmp_path: Path, room: int) -> None:
     """However little room is left: chunks are whole, and recover finds them all."""
 
     def fill(path: Path) -> None:

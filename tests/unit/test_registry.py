@@ -98,9 +98,7 @@ def test_part_that_fails_its_trial_is_not_added() -> None:
     assert "mine" not in parts.names()
 
 
-def test_nothing_is_imported_before_it_is_asked_for(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_nothing_is_imported_before_it_is_asked_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     installed(tmp_path, monkeypatch, "cone = own_module:CONE")
     parts = registry()
     assert parts.names() == ("here", "json", "cone")
@@ -120,9 +118,7 @@ def test_installed_part_that_cannot_be_loaded_is_refused_in_one_line(
         assert "\n" not in str(error.value)
 
 
-def test_installed_part_that_takes_a_built_in_name_is_refused(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_installed_part_that_takes_a_built_in_name_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     installed(tmp_path, monkeypatch, "here = own_module:CONE")
     with pytest.raises(PartError, match="named once") as error:
         registry().names()
@@ -130,8 +126,7 @@ def test_installed_part_that_takes_a_built_in_name_is_refused(
 
 
 @pytest.mark.parametrize(
-    ("parts", "name"),
-    [(SHAPES, "box"), (CONTROLLERS, "pid"), (OPERATORS, "line"), (STAGES, "slave_sim")],
+    ("parts", "name"), [(SHAPES, "box"), (CONTROLLERS, "pid"), (OPERATORS, "line"), (STAGES, "slave_sim")]
 )
 def test_name_of_a_built_in_part_is_taken_on_every_seam(parts: Registry[Any], name: str) -> None:
     other = next(parts.find(found) for found in parts if found != name)

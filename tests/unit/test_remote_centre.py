@@ -62,9 +62,7 @@ def test_the_shaft_passes_through_the_centre_and_the_tip_goes_where_it_is_led(se
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_wherever_a_command_jumps_the_tool_turns_no_faster_than_it_may_and_stays_in_the_port(
-    seed: int,
-) -> None:
+def test_wherever_a_command_jumps_the_tool_turns_no_faster_than_it_may_and_stays_in_the_port(seed: int) -> None:
     rng = np.random.default_rng(seed)
     poses = walk(seed)
     poses[:, :3] = rng.uniform(-0.3, 0.3, (len(poses), 3))  # beside, behind, at the centre

@@ -40,9 +40,7 @@ class Run:
         self.hand = hand or RemoteHand(RemoteParameters(**parameters))
         self.rows, self.last = np.zeros((0, 13)), 0.0
 
-    def for_time(
-        self, duration: float, wanted: Callable[..., Any] | None = None, period: float = 0.02
-    ) -> Array:
+    def for_time(self, duration: float, wanted: Callable[..., Any] | None = None, period: float = 0.02) -> Array:
         """Go on; ``wanted(time)`` says what pose comes every so often, or None for silence."""
         due = 0.0
         for _ in range(round(duration / DT / AHEAD)):
@@ -135,9 +133,7 @@ def test_the_bounds_are_such_that_every_sample_is_plausible() -> None:
 
 
 @given(place)
-def test_a_grip_takes_its_first_pose_as_where_the_stylus_is(
-    where: tuple[float, float, float],
-) -> None:
+def test_a_grip_takes_its_first_pose_as_where_the_stylus_is(where: tuple[float, float, float]) -> None:
     run = Run()
     run.for_time(0.1, lambda t: pose(where, [0.3, 0.0, 0.0]))
     assert np.abs(run.rows[:, :6]).max() < 1e-12
@@ -201,11 +197,15 @@ def test_a_pose_that_is_older_than_the_timeout_is_no_grip() -> None:
 @pytest.mark.parametrize(
     "bad",
     [
-        [np.nan, 0, 0, 1, 0, 0, 0], [0, np.inf, 0, 1, 0, 0, 0], [0, 0, 0, np.nan, 0, 0, 0],
-        [0, 0, 0, 0, 0, 0, 0], [0, 0, 0, 0.9, 0, 0, 0], [0, 0, 1e6, 1, 0, 0, 0],
+        [np.nan, 0, 0, 1, 0, 0, 0],
+        [0, np.inf, 0, 1, 0, 0, 0],
+        [0, 0, 0, np.nan, 0, 0, 0],
+        [0, 0, 0, 0, 0, 0, 0],
+        [0, 0, 0, 0.9, 0, 0, 0],
+        [0, 0, 1e6, 1, 0, 0, 0],
         [1e308, -1e308, 1e308, 1, 0, 0, 0],
     ],
-)  # fmt: skip
+)
 def test_what_is_no_pose_is_refused_counted_and_counts_as_silence(bad: list[float]) -> None:
     run = Run()
     run.for_time(0.1, lambda t: pose())
@@ -245,9 +245,7 @@ def test_every_tap_is_seen_as_one_press(taps: int, is_held: bool) -> None:
 
 
 @given(st.lists(st.tuples(st.floats(1e-3, 1.0), st.booleans()), min_size=1, max_size=30))
-def test_every_press_is_seen_also_where_the_time_between_two_was_slept_through(
-    turns: list[tuple[float, bool]],
-) -> None:
+def test_every_press_is_seen_also_where_the_time_between_two_was_slept_through(turns: list[tuple[float, bool]]) -> None:
     hand, now, shown, presses, was_down = RemoteHand(), 0.0, [], 0, False
     for gap, is_down in [*turns, *[(0.2, False)] * 60]:  # in the end there is time for all
         presses += is_down and not was_down

@@ -66,6 +66,4 @@ def test_model_of_axes_that_do_not_act_on_each_other_is_their_inertia(name: str)
     forward = pointer(present(dynamics).acceleration, ACCELERATION)
     write_model(forward, present(dynamics).parameters.copy(), robot.home.copy(), np.ones(n), out)
     assert np.array_equal(out[:n], np.zeros(n))
-    assert np.allclose(
-        out[n:].reshape(n, n), np.diag(present(robot.drives).inertia), rtol=1e-14, atol=0
-    )
+    assert np.allclose(out[n:].reshape(n, n), np.diag(present(robot.drives).inertia), rtol=1e-14, atol=0)

@@ -108,9 +108,7 @@ def test_the_chosen_branch_is_the_nearest_to_the_seed_that_limits_allow(name: st
 
 
 # The legs of the hybrid contradict each other by a step; pinned loops are the test of its Jacobian.
-@pytest.mark.parametrize(
-    "name", [name for name in (*list_robots(), *TABLES) if name != "scara_stewart"]
-)
+@pytest.mark.parametrize("name", [name for name in (*list_robots(), *TABLES) if name != "scara_stewart"])
 def test_the_jacobian_is_the_difference_quotient_of_forward_kinematics(name: str) -> None:
     arm, step, is_chain = ARMS[name], 1e-6, name in {*BRANCHES, *TABLES}
     for q in drawn(name, 50) if is_chain or name == "mma" else near_home(name, 6):
@@ -121,9 +119,7 @@ def test_the_jacobian_is_the_difference_quotient_of_forward_kinematics(name: str
             spin = rate[:3, :3] @ pose[:3, :3].T
             numeric = [*rate[:3, 3], spin[2, 1], spin[0, 2], spin[1, 0]]
             # Rounding over the step, 1e-16 / 1e-6, and its square; loops are solved to rounding.
-            assert np.abs(jacobian[:, j] - numeric).max() < (
-                1e-8 if name in {*BRANCHES, *TABLES} else 1e-5
-            )
+            assert np.abs(jacobian[:, j] - numeric).max() < (1e-8 if name in {*BRANCHES, *TABLES} else 1e-5)
 
 
 @robots
@@ -190,9 +186,7 @@ def test_a_path_keeps_every_joint_within_its_speed_and_its_branch(name: str) -> 
 
 
 @arms
-def test_random_jumps_never_move_a_joint_faster_than_its_drive_or_out_of_its_limits(
-    name: str,
-) -> None:
+def test_random_jumps_never_move_a_joint_faster_than_its_drive_or_out_of_its_limits(name: str) -> None:
     arm = ARMS[name]
     followed(arm, arm.fk(drawn(name, 500, seed=6)), arm.home, 1e-2)
 

@@ -128,9 +128,7 @@ def registered(monkeypatch: pytest.MonkeyPatch) -> Callable[..., object]:
     return register_robot
 
 
-def test_a_registered_robot_loads_by_its_name_and_is_listed(
-    registered: Callable[..., object],
-) -> None:
+def test_a_registered_robot_loads_by_its_name_and_is_listed(registered: Callable[..., object]) -> None:
     arm = registered(robot_from_table(TABLE))
     assert load_robot("my_arm") is arm
     assert "my_arm" in list_robots()
@@ -188,9 +186,7 @@ def crank_jacobian(q: Array, geometry: Array, J: Array) -> None:
     J[:2, 0], J[5, 0] = (-geometry[0] * np.sin(q[0]), geometry[0] * np.cos(q[0])), 1.0
 
 
-def crank_ik(
-    T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual: Array
-) -> IkStatus:
+def crank_ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual: Array) -> IkStatus:
     wanted = np.arctan2(T[1, 3], T[0, 3])
     q[0] = np.clip(wanted, limits[0, 0], limits[1, 0])
     residual[:] = 0.0
@@ -203,22 +199,20 @@ def crank_ik_all(T: Array, geometry: Array, solutions: Array) -> int:
 
 
 def crank(reach: float = 0.3, **kernels: Callable[..., object]) -> Robot:
-    plain: dict[str, Any] = {
-        "fk": crank_fk,
-        "jacobian": crank_jacobian,
-        "ik": crank_ik,
-        "ik_all": crank_ik_all,
-    }
+    plain: dict[str, Any] = {"fk": crank_fk, "jacobian": crank_jacobian, "ik": crank_ik, "ik_all": crank_ik_all}
     return Robot(
-        name="crank", joint_names=("q",), lower=np.array([-1.0]),
-        upper=np.array([1.0]), home=np.array([0.0]),
-        geometry={"reach": reach}, kernels=Kernels(**(plain | kernels)), drives=geared_motors(1),
-    )  # fmt: skip
+        name="crank",
+        joint_names=("q",),
+        lower=np.array([-1.0]),
+        upper=np.array([1.0]),
+        home=np.array([0.0]),
+        geometry={"reach": reach},
+        kernels=Kernels(**(plain | kernels)),
+        drives=geared_motors(1),
+    )
 
 
-def test_a_robot_of_plain_python_functions_answers_like_any_other(
-    registered: Callable[..., object],
-) -> None:
+def test_a_robot_of_plain_python_functions_answers_like_any_other(registered: Callable[..., object]) -> None:
     registered(crank)
     robot = load_robot("crank", reach=0.5)
     angles = np.linspace(-0.5, 0.5, 9)[:, None]
@@ -235,9 +229,7 @@ def test_an_error_in_a_plain_function_reaches_the_caller_of_a_batch() -> None:
         crank(fk=fk).fk(np.zeros((3, 1)))
 
 
-def test_a_robot_with_a_wrong_kernel_is_refused_before_anything_runs(
-    registered: Callable[..., object],
-) -> None:
+def test_a_robot_with_a_wrong_kernel_is_refused_before_anything_runs(registered: Callable[..., object]) -> None:
     def ik(T: Array, seed: Array, q: Any) -> int:
         return 0
 
@@ -274,9 +266,7 @@ def test_unknown_names_list_the_alternatives() -> None:
 
 def test_a_robot_is_one_line_at_the_prompt_and_a_table_in_a_notebook() -> None:
     arm = robot_from_table(TABLE)
-    assert repr(arm) == (
-        "Robot 'my_arm', 3 joints [rad, m]: q1 -2.618…2.618, q2 -2.094…2.094, slide -0.1…0.1"
-    )
+    assert repr(arm) == ("Robot 'my_arm', 3 joints [rad, m]: q1 -2.618…2.618, q2 -2.094…2.094, slide -0.1…0.1")
     html = arm._repr_html_()
     assert html.count("<tr>") == 4
     assert "slide" in html

@@ -13,13 +13,7 @@ from pinocchio import Data, Model
 
 from present import present
 from random_arms import random_urdf
-from teleop_core.base.errors import (
-    ParameterError,
-    RecordingError,
-    ShapeError,
-    TeleopWarning,
-    UnknownNameError,
-)
+from teleop_core.base.errors import ParameterError, RecordingError, ShapeError, TeleopWarning, UnknownNameError
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot, load_robot_set
 from teleop_core.robots.chains.chain_dynamics import inertia_matrix, inverse_dynamics, tip_efforts
@@ -36,9 +30,7 @@ TEXT = EXAMPLE.read_text()
 REACHED = (IkStatus.FOLLOWED, IkStatus.NEAR_SINGULAR)
 
 
-def model_and_q(
-    text: str, robot: Robot, q: Array, model: Model | None = None
-) -> tuple[Model, Data, Array, list[int]]:
+def model_and_q(text: str, robot: Robot, q: Array, model: Model | None = None) -> tuple[Model, Data, Array, list[int]]:
     model = model or pinocchio.buildModelFromXML(text)
     out = pinocchio.neutral(model)
     for name, value in zip(robot.joint_names, q, strict=True):
@@ -62,9 +54,7 @@ def test_pose_jacobian_and_home_inertia_are_those_of_pinocchio(seed: int, tmp_pa
     frame = model.getFrameId(tip)
     pinocchio.framesForwardKinematics(model, data, theirs)
     np.testing.assert_allclose(robot.fk(q), data.oMf[frame].homogeneous, atol=1e-10)
-    J = pinocchio.computeFrameJacobian(model, data, theirs, frame, pinocchio.LOCAL_WORLD_ALIGNED)[
-        :, columns
-    ]
+    J = pinocchio.computeFrameJacobian(model, data, theirs, frame, pinocchio.LOCAL_WORLD_ALIGNED)[:, columns]
     np.testing.assert_allclose(robot.jacobian(q), J, atol=1e-10)
     model, data, home, columns = model_and_q(text, robot, robot.home)
     inertia = np.diag(pinocchio.crba(model, data, home))[columns]
@@ -72,9 +62,7 @@ def test_pose_jacobian_and_home_inertia_are_those_of_pinocchio(seed: int, tmp_pa
 
 
 @pytest.mark.parametrize("seed", range(12))
-def test_efforts_and_accelerations_of_the_links_are_those_of_pinocchio(
-    seed: int, tmp_path: Path
-) -> None:
+def test_efforts_and_accelerations_of_the_links_are_those_of_pinocchio(seed: int, tmp_path: Path) -> None:
     text, tip = random_urdf(seed, 1 + seed)
     path = tmp_path / "arm.urdf"
     path.write_text(text.replace('effort="20"', 'effort="1e4"'))
@@ -86,11 +74,7 @@ def test_efforts_and_accelerations_of_the_links_are_those_of_pinocchio(
     held = [whole.getJointId(n) for n in whole.names if n not in ("universe", *robot.joint_names)]
     model = pinocchio.buildReducedModel(whole, held, pinocchio.neutral(whole))
     data, theirs = model.createData(), model_and_q(text, robot, q, model)[2]
-    row, effort, found = (
-        present(robot.dynamics).parameters.copy(),
-        np.empty(robot.n),
-        np.empty(robot.n),
-    )
+    row, effort, found = (present(robot.dynamics).parameters.copy(), np.empty(robot.n), np.empty(robot.n))
     inverse_dynamics(q, dq, ddq, row, effort)
     expected = pinocchio.rnea(model, data, theirs, dq, ddq)
     np.testing.assert_allclose(effort, expected, rtol=0.0, atol=1e-10 * abs(expected).max())
@@ -124,11 +108,7 @@ def test_a_wrench_on_the_tip_acts_as_in_pinocchio(seed: int, tmp_path: Path) -> 
     turned = pinocchio.SE3(data.oMf[model.getFrameId(tip)].rotation.T, np.zeros(3))
     forces = [pinocchio.Force.Zero() for _ in range(model.njoints)]
     forces[frame.parentJoint] = frame.placement.act(turned.act(pinocchio.Force(wrench)))
-    row, effort, more = (
-        present(robot.dynamics).parameters.copy(),
-        np.empty(robot.n),
-        np.empty(robot.n),
-    )
+    row, effort, more = (present(robot.dynamics).parameters.copy(), np.empty(robot.n), np.empty(robot.n))
     inverse_dynamics(q, dq, ddq, row, effort)
     tip_efforts(q, wrench, row, more)
     expected = pinocchio.rnea(model, data, theirs, dq, ddq, forces)
@@ -169,9 +149,7 @@ def test_forward_dynamics_are_asked_of_a_slave_with_vectors_of_its_joints() -> N
 
 
 @pytest.mark.parametrize("dynamics", ["independent", "links"])
-def test_a_start_is_looked_for_when_it_is_asked_for_and_not_before(
-    dynamics: str, tmp_path: Path
-) -> None:
+def test_a_start_is_looked_for_when_it_is_asked_for_and_not_before(dynamics: str, tmp_path: Path) -> None:
     text, tip = random_urdf(5, 6)
     path = tmp_path / "arm.urdf"
     path.write_text(text.replace('effort="20"', 'effort="1e4"'))
@@ -211,9 +189,7 @@ def test_a_joint_that_turns_points_on_its_axis_has_the_inertia_of_an_assumed_mot
         assert abs(ddq).max() < 1e4
 
 
-def test_the_inertia_of_the_links_at_home_with_their_motors_is_that_of_the_drives(
-    tmp_path: Path,
-) -> None:
+def test_the_inertia_of_the_links_at_home_with_their_motors_is_that_of_the_drives(tmp_path: Path) -> None:
     path = tmp_path / "arm.urdf"
     path.write_text(TEXT.replace("<axis", '<dynamics damping="2" friction="1"/><axis'))
     arm = load_robot(str(path), tip="tool0", dynamics="links")
@@ -267,27 +243,20 @@ def test_limits_of_zero_are_unknown_ones_and_never_zero(tmp_path: Path) -> None:
     assert (drives.speed_limit > 0.0).all()
 
 
-def test_a_session_says_which_limits_are_assumed_and_nothing_of_a_file_that_gives_all(
-    tmp_path: Path,
-) -> None:
+def test_a_session_says_which_limits_are_assumed_and_nothing_of_a_file_that_gives_all(tmp_path: Path) -> None:
     path = tmp_path / "arm.urdf"
     path.write_text(TEXT.replace('velocity="3.1"', 'velocity="0"'))
-    texts = [notes_of(configuration("coarse_box", robot=str(file), geometry=["tip=tool0"]))
-             for file in (path, EXAMPLE)]  # fmt: skip
+    texts = [notes_of(configuration("coarse_box", robot=str(file), geometry=["tip=tool0"])) for file in (path, EXAMPLE)]
     assert texts[1] == []
     (note,) = texts[0]
-    speeds = ", ".join(
-        f"{v:g}" for v in present(load_robot(str(path), tip="tool0").drives).speed_limit
-    )
+    speeds = ", ".join(f"{v:g}" for v in present(load_robot(str(path), tip="tool0").drives).speed_limit)
     assert f"{path} does not give every joint its limits of velocity" in note
     assert f"velocity {speeds}" in note
     assert "effort" not in note
 
 
 @pytest.mark.parametrize("friction", ['damping="2" friction="1"', 'damping="2"', 'friction="1"'])
-def test_friction_that_would_stop_the_links_in_no_time_has_a_motor_behind_it(
-    friction: str, tmp_path: Path
-) -> None:
+def test_friction_that_would_stop_the_links_in_no_time_has_a_motor_behind_it(friction: str, tmp_path: Path) -> None:
     path = tmp_path / "arm.urdf"
     path.write_text(TEXT.replace("<axis", f"<dynamics {friction}/><axis"))
     drives = present(load_robot(str(path), tip="tool0").drives)
@@ -298,21 +267,15 @@ def test_friction_that_would_stop_the_links_in_no_time_has_a_motor_behind_it(
     assert (rate >= 1500.0).any()
 
 
-def test_an_inertia_of_no_body_is_no_matter_where_nothing_moves_it_or_axes_are_independent(
-    tmp_path: Path,
-) -> None:
+def test_an_inertia_of_no_body_is_no_matter_where_nothing_moves_it_or_axes_are_independent(tmp_path: Path) -> None:
     path = tmp_path / "arm.urdf"
     none = '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="1" ixz="1" iyz="1"/>'
     path.write_text(TEXT.replace('"base"/>', f'"base">{none}</inertial></link>', 1))
     for dynamics in ("independent", "links"):
-        found, plain = (
-            load_robot(str(file), dynamics=dynamics, **TOOL) for file in (path, EXAMPLE)
-        )
+        found, plain = (load_robot(str(file), dynamics=dynamics, **TOOL) for file in (path, EXAMPLE))
         np.testing.assert_array_equal(present(found.drives).inertia, present(plain.drives).inertia)
     path.write_text(TEXT.replace('izz="0.008"', 'izz="0.9"', 1))
-    assert (
-        present(load_robot(str(path), **TOOL).drives).inertia[0] > present(plain.drives).inertia[0]
-    )
+    assert present(load_robot(str(path), **TOOL).drives).inertia[0] > present(plain.drives).inertia[0]
 
 
 def test_an_arm_of_fewer_joints_controls_the_directions_that_are_asked(tmp_path: Path) -> None:
@@ -329,8 +292,7 @@ def test_a_session_follows_with_an_arm_from_a_file() -> None:
     assert present(recording.score().value("position_error_mm.rms")) < 1.0
 
 
-CIRCLE = (f'type="fixed"><parent link="{link}"/><child link="tool0"/>'
-          for link in ("flange", "tool0"))  # fmt: skip
+CIRCLE = (f'type="fixed"><parent link="{link}"/><child link="tool0"/>' for link in ("flange", "tool0"))
 LOW, ELBOW = 'lower="-2.6"', '"elbow" type="revolute"'
 TOOL = {"tip": "tool0"}
 
@@ -347,10 +309,7 @@ MISTAKES: dict[str, tuple[tuple[str, dict[str, Any]], str]] = {
     "tip before every joint": ((TEXT, {"tip": "base"}), "some joint between"),
     "unknown option": ((TEXT, {"tip": "tool0", "L1": 1.0}), "L1"),
     "unknown dynamics": ((TEXT, {"tip": "tool0", "dynamics": "full"}), "independent, links"),
-    "too weak": (
-        changed('effort="80"', 'effort="0.05"', dynamics="links", **TOOL),
-        "of joint elbow",
-    ),
+    "too weak": (changed('effort="80"', 'effort="0.05"', dynamics="links", **TOOL), "of joint elbow"),
     "unknown direction": ((TEXT, {"tip": "tool0", "task": "x up"}), "up"),
     "no robot": (("<model/>", TOOL), "<robot>"),
     "no links": (("<robot/>", TOOL), "<link>"),
@@ -368,10 +327,7 @@ MISTAKES: dict[str, tuple[tuple[str, dict[str, Any]], str]] = {
         ),
         "joint ",
     ),
-    "a link that carries itself": (
-        changed('<parent link="upper_arm"/>', '<parent link="forearm"/>'),
-        "joint elbow",
-    ),
+    "a link that carries itself": (changed('<parent link="upper_arm"/>', '<parent link="forearm"/>'), "joint elbow"),
     "no parent": (changed('<parent link="upper_arm"/>', ""), "parent of joint elbow"),
     "planar": (changed(ELBOW, '"elbow" type="planar"'), "type of joint elbow"),
     "no type": (changed(ELBOW, '"elbow"'), "type of joint elbow"),
@@ -384,10 +340,7 @@ MISTAKES: dict[str, tuple[tuple[str, dict[str, Any]], str]] = {
     "floating": (changed(ELBOW, '"elbow" type="floating"'), "joint elbow"),
     "no length of axis": (changed("0 1 0", "0 0 0"), "axis of joint shoulder"),
     "limits without room": (changed(LOW, 'lower="2.6"'), "joint elbow"),
-    "no limits": (
-        changed(f'<limit {LOW} upper="2.6"', "<limit"),
-        "<limit> of joint elbow is 'missing'",
-    ),
+    "no limits": (changed(f'<limit {LOW} upper="2.6"', "<limit"), "<limit> of joint elbow is 'missing'"),
     "no limit": (
         changed(f'<limit {LOW} upper="2.6" effort="80" velocity="3.1"/>', ""),
         "<limit> of joint elbow is 'missing'",
@@ -397,10 +350,7 @@ MISTAKES: dict[str, tuple[tuple[str, dict[str, Any]], str]] = {
     "two numbers of three": (changed('xyz="0 0 0.42"', 'xyz="0 0.42"'), "joint elbow"),
     "negative effort": (changed('effort="80"', 'effort="-80"'), "effort of joint elbow"),
     "negative mass": (changed('mass value="3.0"', 'mass value="-3.0"'), "link forearm"),
-    "an inertia of no body": (
-        changed('izz="0.008"', 'izz="0.9"', dynamics="links", **TOOL),
-        "of link forearm",
-    ),
+    "an inertia of no body": (changed('izz="0.008"', 'izz="0.9"', dynamics="links", **TOOL), "of link forearm"),
 }
 
 
@@ -487,9 +437,7 @@ def test_an_origin_farther_than_an_arm_reaches_is_refused(place: str, tmp_path: 
         ('izz="0.008"', 'izz="-0.008"', "link forearm has a negative inertia, which no body has"),
     ],
 )
-def test_numbers_that_look_like_another_unit_are_told(
-    old: str, new: str, said: str, tmp_path: Path
-) -> None:
+def test_numbers_that_look_like_another_unit_are_told(old: str, new: str, said: str, tmp_path: Path) -> None:
     assert told(changed(old, new)[0], tmp_path)[1] == said
 
 
@@ -521,14 +469,10 @@ def test_frames_that_weigh_next_to_nothing_have_no_inertia(tmp_path: Path) -> No
         path = tmp_path / "arm.urdf"
         path.write_text(text)
         found, plain = (load_robot(str(f), dynamics=dynamics, **TOOL) for f in (path, EXAMPLE))
-        np.testing.assert_array_equal(
-            present(found.dynamics).parameters, present(plain.dynamics).parameters
-        )
+        np.testing.assert_array_equal(present(found.dynamics).parameters, present(plain.dynamics).parameters)
 
 
-def test_a_heavy_arm_of_weak_drives_is_not_held_by_a_friction_that_was_assumed(
-    tmp_path: Path,
-) -> None:
+def test_a_heavy_arm_of_weak_drives_is_not_held_by_a_friction_that_was_assumed(tmp_path: Path) -> None:
     heavy = re.sub(r'(value|i[xyz]{2})="([^"]*)"', lambda m: f'{m[1]}="{10 * float(m[2])}"', TEXT)
     path = tmp_path / "arm.urdf"
     path.write_text(re.sub(r'effort="[^"]*"', 'effort="30"', heavy))
@@ -602,13 +546,10 @@ def few(name: str, folder: Path) -> str:
 
 
 @pytest.mark.parametrize("name", FEW)
-def test_an_arm_controls_as_many_directions_as_its_tip_can_move_in_at_once(
-    name: str, tmp_path: Path
-) -> None:
+def test_an_arm_controls_as_many_directions_as_its_tip_can_move_in_at_once(name: str, tmp_path: Path) -> None:
     _, rank, task = FEW[name]
     arm = load_robot(few(name, tmp_path))
-    held = [direction for direction, is_held in zip(DIRECTIONS, arm.task_mask, strict=True)
-            if is_held]  # fmt: skip
+    held = [direction for direction, is_held in zip(DIRECTIONS, arm.task_mask, strict=True) if is_held]
     assert " ".join(held) == task
     assert directions_of(arm, lever(arm)).rank == rank
     for q in np.random.default_rng(1).uniform(arm.lower, arm.upper, (20, arm.n)):
@@ -623,12 +564,12 @@ def test_an_arm_of_full_rank_controls_all_directions_and_a_task_is_kept(tmp_path
 
 @pytest.mark.parametrize(
     ("task", "told"),
-    [("", "it controls x y z rx ry, and not rz"),
-     ("x y z rx ry rz", 'asked for x y z rx ry rz; "task=x y z rx ry" it can follow')],
-)  # fmt: skip
-def test_a_session_says_which_directions_such_an_arm_does_not_hold(
-    task: str, told: str, tmp_path: Path
-) -> None:
+    [
+        ("", "it controls x y z rx ry, and not rz"),
+        ("x y z rx ry rz", 'asked for x y z rx ry rz; "task=x y z rx ry" it can follow'),
+    ],
+)
+def test_a_session_says_which_directions_such_an_arm_does_not_hold(task: str, told: str, tmp_path: Path) -> None:
     path = few("five axes", tmp_path)
     made = configuration(robot=path, geometry=[f"task={task}"] if task else [])
     (note, *_) = notes_of(made)

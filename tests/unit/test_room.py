@@ -56,9 +56,7 @@ def test_the_start_in_the_file_is_what_the_rule_says(name: str) -> None:
 def test_from_the_start_the_tool_goes_far_in_every_direction(name: str) -> None:
     robot = tc.load_robot(name)
     metres, radians = room(robot, robot.start)
-    reach = np.linalg.norm(
-        robot.solve_fk_batch(samples(robot), search=False).T[:, :3, 3], axis=1
-    ).max()
+    reach = np.linalg.norm(robot.solve_fk_batch(samples(robot), search=False).T[:, :3, 3], axis=1).max()
     assert metres >= reach / 16
     assert radians >= math.radians(29.9)
 
@@ -154,9 +152,7 @@ def test_an_arm_from_a_urdf_starts_with_room_in_every_scenario(scenario: str) ->
 
 
 def test_a_posture_that_is_asked_for_is_the_start_of_an_arm_from_a_urdf_too() -> None:
-    made = tc.configuration(
-        "coarse_box", robot=ANY_ARM, geometry=["tip=tool0"], slave__start=[0.1] * 6
-    )
+    made = tc.configuration("coarse_box", robot=ANY_ARM, geometry=["tip=tool0"], slave__start=[0.1] * 6)
     assert (made.group("slave").start_of(tc.load_robot(ANY_ARM, tip="tool0")) == 0.1).all()
 
 

@@ -28,11 +28,7 @@ def tilted(rng: np.random.Generator, most: float = 0.6) -> Array:
 def test_ball_joints_are_those_of_the_specification_and_give_the_legs_back() -> None:
     lengths, angles = [1.2, 1.0, 0.9], np.radians([60.0, 70.0, 80.0])
     S = joint_points(lengths, angles, b=B)
-    printed = [
-        [0.4, 0.0, 1.039230],
-        [-0.328990, 0.569827, 0.939693],
-        [-0.421858, -0.730680, 0.886327],
-    ]
+    printed = [[0.4, 0.0, 1.039230], [-0.328990, 0.569827, 0.939693], [-0.421858, -0.730680, 0.886327]]
     assert np.allclose(S, printed, atol=PRINTED)
     back = leg_coordinates(S, b=B)
     assert np.allclose(back[0], lengths, atol=1e-14)

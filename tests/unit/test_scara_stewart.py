@@ -20,12 +20,7 @@ PRINTED_M, PRINTED_DEG = 1e-6, 2e-4
 # Leg errors of rounding, over the square of the tilt by which similar hexagons see a turn.
 SOLVED = 1e-9
 PAIRS = {"sigma_b": math.radians(15.0), "sigma_m": math.radians(15.0)}
-ROBOTS: Sequence[dict[str, Any]] = [
-    {},
-    {"heading": "carried"},
-    PAIRS,
-    {**PAIRS, "heading": "carried"},
-]
+ROBOTS: Sequence[dict[str, Any]] = [{}, {"heading": "carried"}, PAIRS, {**PAIRS, "heading": "carried"}]
 
 
 def attitude(alpha: float, beta: float, gamma: float) -> Array:
@@ -128,9 +123,7 @@ def test_a_platform_tilted_too_far_is_limited_to_the_nearest_tilt() -> None:
 
 def test_similar_hexagons_hide_the_turn_of_a_level_platform_and_say_so() -> None:
     robot = load_robot("scara_stewart")
-    left, right = (
-        transform(rotation("z", angle), np.array([0.6, 0.0, 0.5])) for angle in (0.3, -0.3)
-    )
+    left, right = (transform(rotation("z", angle), np.array([0.6, 0.0, 0.5])) for angle in (0.3, -0.3))
     results = robot.ik(left), robot.ik(right)
     assert np.allclose(results[0].q, results[1].q, atol=1e-15)
     assert results[0].status == results[1].status == IkStatus.NEAR_SINGULAR
@@ -170,9 +163,7 @@ def test_in_pairs_the_platform_shifts_with_a_leg_and_in_line_its_centre_is_held(
 
 @pytest.mark.parametrize("heading", ["fixed", "carried"])
 @pytest.mark.parametrize("beside", [0.0, 1e-6, -1e-6, 0.02, -0.02])
-def test_a_path_over_the_axis_of_joint_one_goes_on_at_the_other_side(
-    heading: str, beside: float
-) -> None:
+def test_a_path_over_the_axis_of_joint_one_goes_on_at_the_other_side(heading: str, beside: float) -> None:
     robot = load_robot("scara_stewart", heading=heading)
     R = attitude(30.0, 0.0, 0.0)
     x = np.concatenate((np.linspace(0.4, -0.4, 4000), np.full(4000, -0.4)))

@@ -56,9 +56,7 @@ def test_a_message_that_was_overtaken_on_the_way_is_the_owners_and_no_loss() -> 
 
 
 @pytest.mark.parametrize("begin", [1, 41, 5000, 90_000])
-def test_a_second_publisher_is_refused_whatever_its_numbers_and_the_first_one_goes_on(
-    begin: int,
-) -> None:
+def test_a_second_publisher_is_refused_whatever_its_numbers_and_the_first_one_goes_on(begin: int) -> None:
     sender = Sender()
     first, second = feed_in_turn(sender, range(40, 140), range(begin, begin + 100))
     assert first == [None] * 100

@@ -39,9 +39,7 @@ def other() -> Iterator[subprocess.Popen[str]]:
     process.communicate()
 
 
-def test_a_second_session_of_a_domain_is_refused_with_the_first_ones_process(
-    other: subprocess.Popen[str],
-) -> None:
+def test_a_second_session_of_a_domain_is_refused_with_the_first_ones_process(other: subprocess.Popen[str]) -> None:
     assert domains() == (7,)
     said = f"domain 7 has a session already, process {other.pid}:"
     with pytest.raises(SessionError, match=said), announced(7):

@@ -32,13 +32,7 @@ class Axis:
     """One axis of a drive table under its PID: exact between ticks, with limit and encoder."""
 
     def __init__(
-        self,
-        robot: Robot,
-        axis: int,
-        weight: float,
-        *,
-        is_limited: bool = True,
-        is_rounded: bool = True,
+        self, robot: Robot, axis: int, weight: float, *, is_limited: bool = True, is_rounded: bool = True
     ) -> None:
         drives = present(robot.drives)
         self.gains = PID.gains(PidParameters(setpoint_weight=weight), robot, drives.viscous)[[axis]]
@@ -109,14 +103,8 @@ def test_answer_with_a_third_is_that_of_two_poles(name: str, axis: int) -> None:
 
 
 @settings(max_examples=50)
-@given(
-    st.lists(st.floats(-1.0, 1.0), min_size=2, max_size=40),
-    st.floats(0.0, 1.0),
-    st.floats(0.0, 1.0),
-)
-def test_effort_is_that_of_the_textbook_s_weighted_law(
-    setpoints: list[float], weight: float, place: float
-) -> None:
+@given(st.lists(st.floats(-1.0, 1.0), min_size=2, max_size=40), st.floats(0.0, 1.0), st.floats(0.0, 1.0))
+def test_effort_is_that_of_the_textbook_s_weighted_law(setpoints: list[float], weight: float, place: float) -> None:
     kp, ki, kd = 50.0, 400.0, 2.0
     gains, memory, effort = np.array([[kp, ki, kd, weight]]), np.zeros((1, 4)), np.zeros(1)
     total, one = 0.0, np.ones(1)
@@ -130,21 +118,15 @@ def test_effort_is_that_of_the_textbook_s_weighted_law(
 
 
 @given(
-    st.lists(st.tuples(st.floats(-3.0, 3.0), st.floats(-3.0, 3.0)), min_size=1, max_size=60),
-    st.sampled_from(range(6)),
+    st.lists(st.tuples(st.floats(-3.0, 3.0), st.floats(-3.0, 3.0)), min_size=1, max_size=60), st.sampled_from(range(6))
 )
-def test_whole_setpoint_is_the_law_without_weights_to_the_bit(
-    pairs: list[tuple[float, float]], axis: int
-) -> None:
+def test_whole_setpoint_is_the_law_without_weights_to_the_bit(pairs: list[tuple[float, float]], axis: int) -> None:
     robot = ROBOTS["rcrt1"]
     gains = PID.gains(PidParameters(), robot, present(robot.drives).viscous)[[axis]].copy()
     limit, memory, plain = present(robot.drives).effort_limit[[axis]], np.zeros((1, 4)), np.zeros(3)
     effort = np.empty(1)
     for setpoint, measured in pairs:
-        pid_control(
-            gains, memory, np.array([setpoint]), np.array([measured]), np.zeros(1), limit, DT,
-            effort,
-        )  # fmt: skip
+        pid_control(gains, memory, np.array([setpoint]), np.array([measured]), np.zeros(1), limit, DT, effort)
         same = pid_step(setpoint, measured, gains[0, :3].copy(), plain, 0.0, limit[0], DT)
         assert effort[0] == same
     assert np.array_equal(memory[0, :3], plain)
@@ -167,11 +149,14 @@ def slave_step_trace(name: Any, axis: Any, size: Any) -> Array:
     start[axis] = min(start[axis], robot.upper[axis] - size)
     slave = SimulatedArm(
         ArmParameters(
-            robot=name, starts_at_home=True, gravity_compensation="all", interpolation="none",
+            robot=name,
+            starts_at_home=True,
+            gravity_compensation="all",
+            interpolation="none",
             controller=build(ControllerParameters, {"kind": "pid", "pid.setpoint_weight": THIRD}),
             reference_filter=ReferenceFilterParameters(is_on=False),
         )
-    )  # fmt: skip
+    )
     slave.simulated.arm.q[:] = start
     slave.simulated.state["measured"] = start
     for field in ("command", "filtered", "setpoint", "target"):
@@ -195,9 +180,7 @@ def slave_step_trace(name: Any, axis: Any, size: Any) -> Array:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("name", "axis"), [(n, a) for n, a in AXES if n != "rps3" and a < 3])
-def test_slave_passes_its_goal_by_no_more_than_what_dry_friction_leaves(
-    name: Any, axis: Any
-) -> None:
+def test_slave_passes_its_goal_by_no_more_than_what_dry_friction_leaves(name: Any, axis: Any) -> None:
     robot = ROBOTS[name]
     drives = present(robot.drives)
     count, whole = drives.encoder_step[axis], 0.9 * (robot.upper[axis] - robot.lower[axis])

@@ -245,8 +245,12 @@ def test_distances_have_the_same_bits_compiled_and_as_plain_python() -> None:
     plain = {**os.environ, "NUMBA_DISABLE_JIT": "1", "PYTHONPATH": os.pathsep.join(sys.path)}
     done = subprocess.run(
         [sys.executable, "-c", DIGEST, os.path.dirname(__file__)],
-        capture_output=True, text=True, timeout=300, check=True, env=plain,
-    )  # fmt: skip
+        capture_output=True,
+        text=True,
+        timeout=300,
+        check=True,
+        env=plain,
+    )
     assert done.stdout.strip() == digest()
 
 

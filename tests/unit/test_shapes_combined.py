@@ -52,15 +52,17 @@ class Part(NamedTuple):
 
 
 @st.composite
-def parts_of(
-    draw: st.DrawFn, kinds: Sequence[str] = tuple(KINDS), *, may_be_not: bool = True
-) -> list[Part]:
+def parts_of(draw: st.DrawFn, kinds: Sequence[str] = tuple(KINDS), *, may_be_not: bool = True) -> list[Part]:
     """Two to four parts, each perhaps beside the middle, or what is outside of it."""
     return [
-        Part(kind, draw(KINDS[kind]), np.array(draw(st.just((0.0,) * 3) | middles)),
-             draw(st.sampled_from([1.0, -1.0])) if may_be_not else 1.0)
+        Part(
+            kind,
+            draw(KINDS[kind]),
+            np.array(draw(st.just((0.0,) * 3) | middles)),
+            draw(st.sampled_from([1.0, -1.0])) if may_be_not else 1.0,
+        )
         for kind in draw(st.lists(st.sampled_from(kinds), min_size=2, max_size=4))
-    ]  # fmt: skip
+    ]
 
 
 def whole(name: str, texts: Sequence[str]) -> Any:
@@ -76,9 +78,7 @@ def test_every_shape_that_is_not_made_of_others_can_be_a_part() -> None:
 
 
 @given(parts_of(), places)
-def test_a_union_is_as_far_as_its_nearest_part_inside_and_outside(
-    parts: list[Part], offset: Any
-) -> None:
+def test_a_union_is_as_far_as_its_nearest_part_inside_and_outside(parts: list[Part], offset: Any) -> None:
     distance, out = of("union", parts, offset)
     assert distance == min(part.distance(np.array(offset)) for part in parts)
     assert math.isclose(np.linalg.norm(out), 1.0)
@@ -97,9 +97,7 @@ def test_not_turns_a_shape_inside_out(parts: list[Part], offset: Any) -> None:
 
 @given(parts_of(CONVEX, may_be_not=False), places)
 @settings(max_examples=300)
-def test_no_place_in_all_parts_is_nearer_than_an_intersection_of_convex_ones(
-    parts: list[Part], offset: Any
-) -> None:
+def test_no_place_in_all_parts_is_nearer_than_an_intersection_of_convex_ones(parts: list[Part], offset: Any) -> None:
     offset = np.array(offset)
     distance, out = of("intersection", parts, offset)
     farthest = max(part.distance(offset) for part in parts)
@@ -117,11 +115,14 @@ def test_the_rounds_nearly_always_end_at_the_nearest_place() -> None:
     for _ in range(400):
         normals, length = rng.normal(size=(2, 3)), rng.uniform(0.004, 0.06, 4)
         normals /= np.linalg.norm(normals, axis=1)[:, None]
-        parameters = whole("intersection", (
-            f"half_space normal={normals[0].tolist()} room={0.2 * length[0]}",
-            f"cylinder direction={normals[1].tolist()} radius={0.5 * length[1]} length={length[2]}",
-            f"sphere radius={0.5 * length[3]}",
-        ))  # fmt: skip
+        parameters = whole(
+            "intersection",
+            (
+                f"half_space normal={normals[0].tolist()} room={0.2 * length[0]}",
+                f"cylinder direction={normals[1].tolist()} radius={0.5 * length[1]} length={length[2]}",
+                f"sphere radius={0.5 * length[3]}",
+            ),
+        )
         for offset in rng.uniform(-0.04, 0.04, (5, 3)):
             distance, out = found("intersection", parameters, offset)
             if distance > 0.0:
@@ -162,16 +163,18 @@ def test_six_walls_at_right_angles_are_a_box(size: tuple[float, ...], offset: An
 def test_a_thin_wedge_leads_to_its_edge() -> None:
     """Two walls that meet at 20 degrees, and a place 10 mm beyond their edge."""
     angle = math.radians(10.0)
-    walls = [f"half_space normal={[math.sin(angle), side * math.cos(angle), 0.0]} room=0.0"
-             for side in (1.0, -1.0)]  # fmt: skip
+    walls = [f"half_space normal={[math.sin(angle), side * math.cos(angle), 0.0]} room=0.0" for side in (1.0, -1.0)]
     distance, out = found("intersection", whole("intersection", walls), [-0.01, 0.0, 0.0])
     assert distance == pytest.approx(0.01, abs=1e-6)
     np.testing.assert_allclose(out, (-1.0, 0.0, 0.0), atol=2e-4)
 
 
 def test_between_two_walls_where_nothing_is_inside_the_farthest_leads() -> None:
-    walls = ("half_space normal=[0, 1, 0] room=0.0", "half_space normal=[0, -1, 0] room=0.0",
-             "not sphere at=[0.02, 0, 0] radius=0.015")  # fmt: skip
+    walls = (
+        "half_space normal=[0, 1, 0] room=0.0",
+        "half_space normal=[0, -1, 0] room=0.0",
+        "not sphere at=[0.02, 0, 0] radius=0.015",
+    )
     distance, _ = found("intersection", whole("intersection", walls), [0.02, 0.001, 0.0])
     assert distance > 0.013
 
@@ -228,13 +231,10 @@ def test_a_report_of_a_union_has_its_shape_again() -> None:
 
 
 @pytest.mark.parametrize("kind", ["mesh", "union"])
-def test_meshes_hold_a_hand_and_are_replayed_and_scored_though_they_are_gone(
-    kind: str, tmp_path: Path
-) -> None:
+def test_meshes_hold_a_hand_and_are_replayed_and_scored_though_they_are_gone(kind: str, tmp_path: Path) -> None:
     trimesh.creation.box((30.0, 30.0, 30.0)).export(tmp_path / "box.stl")
     trimesh.creation.icosphere(subdivisions=4, radius=8.0).export(tmp_path / "ball.stl")
-    parts = [f"mesh file='{tmp_path / 'box.stl'}'",
-             f"mesh file='{tmp_path / 'ball.stl'}' at=[0.0, 0.015, 0.0]"]  # fmt: skip
+    parts = [f"mesh file='{tmp_path / 'box.stl'}'", f"mesh file='{tmp_path / 'ball.stl'}' at=[0.0, 0.015, 0.0]"]
     of_kind = {"mesh.file": str(tmp_path / "box.stl"), "union.parts": parts}
     given_settings: Any = {"fixture": kind} | {f"fixture.{n}": v for n, v in of_kind.items()}
     held = tc.run("coarse_box", duration=6.0, settings=given_settings, out=tmp_path / "bag")

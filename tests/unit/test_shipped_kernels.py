@@ -54,8 +54,7 @@ wheels = _script()
 pytestmark = [
     pytest.mark.skipif(not IS_COMPILED, reason="nothing is compiled in pure Python"),
     pytest.mark.skipif(
-        not all(get_host_cpu_features().get(name) for name in TIERS[V3]),
-        reason="this processor is of no such tier",
+        not all(get_host_cpu_features().get(name) for name in TIERS[V3]), reason="this processor is of no such tier"
     ),
 ]
 
@@ -115,9 +114,7 @@ def test_kernels_that_were_compiled_here_come_before_shipped_ones(tree: Path) ->
     assert (count, read) == ("0", ["False", "False"])
 
 
-def test_kernels_are_compiled_where_shipped_ones_are_broken(
-    shipped: tuple[Path, str], tree: Path
-) -> None:
+def test_kernels_are_compiled_where_shipped_ones_are_broken(shipped: tuple[Path, str], tree: Path) -> None:
     for k, file in enumerate((tree / "teleop_core/kernels" / FOLDER.name).rglob("*.nbc")):
         file.write_bytes(b"no kernel" if k % 2 else b"")
     count, bits = wheels.run(tree, None, SCRIPT).split()

@@ -94,18 +94,7 @@ def one_tick_error(rate: float, steps: int) -> float:
     q, dq, effort = np.zeros(6), np.ones(6), np.full(6, 0.3 * rate)
     slave = SlaveSim(SlaveSimParameters())
     slave.parameters["viscous"], slave.parameters["coulomb"] = rate, 0.0
-    integrate(
-        SPIN,
-        np.ones(6),
-        slave.parameters,
-        slave.state,
-        slave.arm.contacts,
-        steps,
-        effort,
-        q,
-        dq,
-        DT,
-    )
+    integrate(SPIN, np.ones(6), slave.parameters, slave.state, slave.arm.contacts, steps, effort, q, dq, DT)
     exact = expm(np.array([[0, 1, 0], [0, -rate, 1], [0, 0, 0]]) * 1e-3) @ [0.0, 1.0, effort[0]]
     return max(abs(q[0] - exact[0]) / 1e-3, abs(dq[0] - exact[1]))
 
@@ -136,9 +125,8 @@ def test_more_steps_change_the_path_of_the_arm_less_and_less() -> None:
         q, dq = MIDDLE.copy(), np.array([1.0, -1.0, 0.02, 1.0, -1.0, 1.0])
         for _ in range(100):
             integrate(
-                arm.acceleration, arm.dynamics, slave.parameters, slave.state, arm.contacts, steps,
-                effort, q, dq, DT,
-            )  # fmt: skip
+                arm.acceleration, arm.dynamics, slave.parameters, slave.state, arm.contacts, steps, effort, q, dq, DT
+            )
         ends.append(q)
     in_counts = np.array([np.abs((b - a) / COUNT).max() for a, b in pairwise(ends)])
     # Where joints turn round, dry friction is steep: there the order shows from 4 steps on only.
@@ -316,10 +304,7 @@ def test_poses_are_those_of_setpoint_and_readings() -> None:
     row = bench.row
     read, read_ns = row["slave_measured_js"][:6].copy(), int(row["slave_measured_js_ns"])
     bench.tick(MIDDLE)
-    for joints, pose in (
-        (bench.setpoint, row["slave_setpoint_cp"]),
-        (read, row["slave_measured_cp"]),
-    ):
+    for joints, pose in ((bench.setpoint, row["slave_setpoint_cp"]), (read, row["slave_measured_cp"])):
         assert np.allclose(ARM.fk(joints)[:3, 3], pose[:3], rtol=0, atol=1e-15)
     assert row["now_ns"] - read_ns == TICK_NS
 
@@ -518,9 +503,7 @@ def test_gains_that_change_in_motion_make_no_step_of_effort(bandwidth: tuple[flo
     begin_ns = bench.now_ns
     before = moved(4000)[-40:]
     damping = bench.slave.simulated.arm.gains[:, 2].copy()
-    bench.slave.retune(
-        ArmParameters(start=tuple(MIDDLE.tolist()), controller=pid(bandwidth=bandwidth))
-    )
+    bench.slave.retune(ArmParameters(start=tuple(MIDDLE.tolist()), controller=pid(bandwidth=bandwidth)))
     step = np.abs(moved(3) - before.mean(axis=0)).max(axis=0)
     # What the integrators held against the derivatives; steps of encoders are in the rest.
     assert (step < 0.12 * damping * np.pi * way).all()
@@ -538,9 +521,7 @@ def test_gains_that_change_before_the_first_tick_count_from_the_begin(law: str) 
             slave.signals["now_ns"] = slave.signals["slave_servo_jp_ns"] = (k + 1) * TICK_NS
             slave.signals["slave_servo_jp"] = slave.robot.home - 1e-5 * k
             slave.step()
-    assert (
-        changed.signals["slave_measured_js"].tolist() == made.signals["slave_measured_js"].tolist()
-    )
+    assert changed.signals["slave_measured_js"].tolist() == made.signals["slave_measured_js"].tolist()
 
 
 @pytest.mark.parametrize("length", [1, 5, 7])

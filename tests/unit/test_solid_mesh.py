@@ -16,9 +16,7 @@ VOLUMES = {
 
 
 @pytest.mark.parametrize("solid", VOLUMES, ids=lambda solid: solid.kind)
-def test_triangles_of_a_solid_face_outwards_and_enclose_its_volume_about_its_centre(
-    solid: Solid,
-) -> None:
+def test_triangles_of_a_solid_face_outwards_and_enclose_its_volume_about_its_centre(solid: Solid) -> None:
     points, faces = mesh_of(solid, 64)
     a, b, c = points[faces].transpose(1, 0, 2) - HERE[:3]
     volumes = np.einsum("ij,ij->i", a, np.cross(b, c)) / 6.0  # of pyramids over the centre

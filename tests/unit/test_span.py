@@ -23,9 +23,7 @@ def recording() -> Any:
     # The hand begins 3.7 s after the recording, when the slave has reached its start posture.
     buttons = {"clutch": (5.5, 6.5), "fixture": (1.0,)}
     settings = {f"buttons.{name}": times for name, times in buttons.items()}
-    return tc.run(
-        "coarse_box", duration=10.0, approach_time=2.0, starts_at_home=False, settings=settings
-    )
+    return tc.run("coarse_box", duration=10.0, approach_time=2.0, starts_at_home=False, settings=settings)
 
 
 @pytest.fixture(scope="module")
@@ -86,12 +84,9 @@ def test_strokes_of_the_clutch_are_those_within_the_span(recording: Any, score: 
 
 
 @pytest.mark.parametrize(
-    "span",
-    [(3.0, 3.0), (5.0, 2.0), (-1.0, 2.0), (1e3, 2e3), (float("nan"), 1.0), (0.0, float("nan"))],
+    "span", [(3.0, 3.0), (5.0, 2.0), (-1.0, 2.0), (1e3, 2e3), (float("nan"), 1.0), (0.0, float("nan"))]
 )
-def test_span_without_time_is_refused_with_what_there_is(
-    recording: tc.Recording, span: tuple[float, float]
-) -> None:
+def test_span_without_time_is_refused_with_what_there_is(recording: tc.Recording, span: tuple[float, float]) -> None:
     with pytest.raises(ParameterError, match=rf"before the end at {recording.duration:.3f} s"):
         recording.score(span=span)
 

@@ -46,9 +46,7 @@ def test_the_exact_boundary_is_the_published_one(delay: float) -> None:
 
 @pytest.mark.parametrize("grip", GRIPS.values(), ids=GRIPS)
 @pytest.mark.parametrize("delay", DELAYS)
-def test_the_exact_boundary_is_where_the_roots_of_the_sampled_hand_leave_the_circle(
-    grip: Grip, delay: float
-) -> None:
+def test_the_exact_boundary_is_where_the_roots_of_the_sampled_hand_leave_the_circle(grip: Grip, delay: float) -> None:
     exact = exact_boundary(grip, delay)
     assert largest_root(grip, delay, 0.98 * exact) < 0.0 < largest_root(grip, delay, 1.02 * exact)
 
@@ -66,9 +64,7 @@ def test_our_device_stands_a_wall_that_is_late_as_stiff_as_its_exact_axis_within
 
 @pytest.mark.parametrize("grip", GRIPS.values(), ids=GRIPS)
 @pytest.mark.parametrize("delay", DELAYS)
-def test_our_hand_and_mapping_swing_up_where_an_axis_that_is_a_tick_later_does(
-    grip: Grip, delay: float
-) -> None:
+def test_our_hand_and_mapping_swing_up_where_an_axis_that_is_a_tick_later_does(grip: Grip, delay: float) -> None:
     exact = exact_boundary(grip, delay + DT)
     assert growth(grip, delay, 0.98 * exact) < 0.0 < growth(grip, delay, 1.02 * exact)
 
@@ -89,9 +85,7 @@ def test_force_throws_a_hand_above_its_boundary_but_not_with_a_tank_or_by_a_soft
     bench, force = Bench(), ("position_force", "none")
     found = chain_boundary(bench, MEDIUM, 0.05, force)
     assert 600.0 < found < 1200.0
-    for way in (
-        ("position_force", "tank"), ("position_position", "none"), ("position_force", "tdpa"),
-    ):  # fmt: skip
+    for way in (("position_force", "tank"), ("position_position", "none"), ("position_force", "tdpa")):
         assert chain_boundary(bench, MEDIUM, 0.05, way) == STIFFEST
     calm, thrown = (fastest(bench, MEDIUM, 0.05, share * found, force) for share in (0.5, 2.0))
     assert thrown > 2.0 * calm

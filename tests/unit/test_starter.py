@@ -26,9 +26,7 @@ def starter() -> Iterator[Starter]:
 
 
 @pytest.fixture
-def start(
-    starter: Starter, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> Iterator[Callable[..., Started]]:
+def start(starter: Starter, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[..., Started]]:
     """Start something, with a file ``given`` beside those for what it writes."""
     monkeypatch.chdir(tmp_path)
     with (tmp_path / "written").open("wb") as written, tempfile.TemporaryFile() as given:
@@ -49,10 +47,7 @@ def written(tmp_path: Path) -> str:
 def test_a_program_has_the_words_environment_folder_and_files_that_it_was_given(
     start: Callable[..., Started], tmp_path: Path
 ) -> None:
-    text = (
-        "import os, sys; print(os.environ['COLOUR'], os.getcwd(), open(sys.argv[1]).read(), "
-        "'numba' in sys.modules)"
-    )
+    text = "import os, sys; print(os.environ['COLOUR'], os.getcwd(), open(sys.argv[1]).read(), 'numba' in sys.modules)"
     process = start(sys.executable, "-c", text, "/dev/fd/<given>", COLOUR="blue")
     assert process.wait(PATIENCE) == 0
     assert written(tmp_path) == f"blue {tmp_path} what was given False\n"
@@ -89,9 +84,7 @@ def test_the_code_of_a_copy_is_told_and_what_it_raised_is_written(
     assert words in written(tmp_path)
 
 
-def test_a_program_that_there_is_not_ends_with_its_reason(
-    start: Callable[..., Started], tmp_path: Path
-) -> None:
+def test_a_program_that_there_is_not_ends_with_its_reason(start: Callable[..., Started], tmp_path: Path) -> None:
     assert start("/no/such/program").wait(PATIENCE) == 1
     assert "FileNotFoundError" in written(tmp_path)
 
@@ -107,9 +100,7 @@ def test_a_process_is_known_to_run_until_a_signal_ends_it(start: Callable[..., S
     assert process.poll() == -signal.SIGKILL
 
 
-def test_what_a_starter_that_was_killed_has_started_goes_on_and_nobody_knows_its_end(
-    tmp_path: Path,
-) -> None:
+def test_what_a_starter_that_was_killed_has_started_goes_on_and_nobody_knows_its_end(tmp_path: Path) -> None:
     waits = (sys.executable, "-c", "import signal; signal.pause()")
     with Starter("", environment()) as starter, (tmp_path / "log").open("wb") as log:
         files = {"out": log.fileno(), "err": log.fileno()}

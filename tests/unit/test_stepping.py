@@ -76,9 +76,7 @@ def test_the_tip_goes_where_a_program_leads_the_hand_by_the_axes_and_the_gain() 
     own.command([0.0, 0.02, 0.0])  # y of the master is z of the slave
     seen = own.step(50)
     assert seen.time == pytest.approx(begin.time + 1.0)
-    np.testing.assert_allclose(
-        seen.measured_cp[:3] - begin.measured_cp[:3], [0, 0, 0.01], atol=5e-4
-    )
+    np.testing.assert_allclose(seen.measured_cp[:3] - begin.measured_cp[:3], [0, 0, 0.01], atol=5e-4)
     np.testing.assert_array_equal(seen.servo_cp, own.values("slave/servo_cp"))
 
 
@@ -121,8 +119,6 @@ def test_a_program_that_leads_the_hand_gets_the_same_bits_again() -> None:
         (UnknownNameError, "one of: slave/servo_jp", lambda: tc.Session().values("slave/pose")),
     ],
 )
-def test_a_command_that_no_hand_can_follow_is_refused_by_name(
-    error: type[TeleopError], text: str, do: Any
-) -> None:
+def test_a_command_that_no_hand_can_follow_is_refused_by_name(error: type[TeleopError], text: str, do: Any) -> None:
     with pytest.raises(error, match=text):
         do()

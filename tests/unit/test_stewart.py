@@ -28,9 +28,7 @@ def turn(alpha: float, beta: float, gamma: float) -> Array:
 EXAMPLE = transform(turn(30.0, 0.0, 0.0), np.array([0.0, 0.0, 20.0]))
 
 
-def poses(
-    rng: np.random.Generator, count: int, height: float = 0.2, tilt: float = 25.0
-) -> Iterator[Array]:
+def poses(rng: np.random.Generator, count: int, height: float = 0.2, tilt: float = 25.0) -> Iterator[Array]:
     for _ in range(count):
         shift = rng.uniform(-0.15, 0.15, 3) * height
         yield transform(turn(*rng.uniform(-tilt, tilt, 3)), shift + np.array([0.0, 0.0, height]))

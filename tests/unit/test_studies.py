@@ -26,9 +26,7 @@ METRICS = ["position_error_mm.rms", "task.attempts"]
 
 
 def study(**changes: Any) -> Study:
-    whole = Study(
-        "point", {"display.latency": (0.0, 0.1)}, (1, 2), METRICS, {"teleop.duration": 1.0}
-    )
+    whole = Study("point", {"display.latency": (0.0, 0.1)}, (1, 2), METRICS, {"teleop.duration": 1.0})
     return replace(whole, **changes)
 
 
@@ -103,9 +101,13 @@ def test_a_session_that_fails_is_a_point_with_its_error(own_parts: None, tmp_pat
         "tc.register_operator('tired', motion)\n"
     )
     data = sweep(
-        None, metrics=["position_error_mm.rms"], settings={"operator.kind": ["tired", "hold"]},
-        parts=[parts], jobs=1, teleop__duration=0.5,
-    )  # fmt: skip
+        None,
+        metrics=["position_error_mm.rms"],
+        settings={"operator.kind": ["tired", "hold"]},
+        parts=[parts],
+        jobs=1,
+        teleop__duration=0.5,
+    )
     errors = data["error"].values.ravel()
     assert "tired" in errors[0]
     assert not errors[1]
@@ -123,10 +125,8 @@ def test_a_session_that_fails_is_a_point_with_its_error(own_parts: None, tmp_pat
         ({"metrics": []}, "key of a score"),
         ({"seeds": (-1,)}, "whole numbers >= 0"),
     ],
-)  # fmt: skip
-def test_a_wrong_study_is_refused_before_its_first_session(
-    changes: dict[str, Any], said: str
-) -> None:
+)
+def test_a_wrong_study_is_refused_before_its_first_session(changes: dict[str, Any], said: str) -> None:
     with pytest.raises(tc.TeleopError, match=said):
         study(**changes).points()
 
@@ -153,11 +153,7 @@ def test_a_file_says_the_same_as_a_call(tmp_path: Path, found: Found) -> None:
         f"metrics: {json.dumps(METRICS)}\n"
     )
     assert read_study(file).explain(found[0]).to_run == 0
-    for text, said in (
-        ("seds: 1", "seeds"),
-        ("sweep: {a: 1}", "a list of values"),
-        ("[", "is not YAML"),
-    ):
+    for text, said in (("seds: 1", "seeds"), ("sweep: {a: 1}", "a list of values"), ("[", "is not YAML")):
         file.write_text(text)
         with pytest.raises(tc.TeleopError, match=said):
             read_study(file)
@@ -214,11 +210,10 @@ def test_dask_workers_give_the_same_bits(found: Found, tmp_path: Path) -> None:
     _, data = found
     with (
         distributed.LocalCluster(
-            n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None,
-            local_directory=str(tmp_path),
+            n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None, local_directory=str(tmp_path)
         ) as cluster,
         distributed.Client(cluster, set_as_default=False) as client,
-    ):  # fmt: skip
+    ):
         again = study().run(client=client)
     for metric in METRICS:
         assert np.array_equal(again[metric].values, data[metric].values, equal_nan=True)

@@ -46,11 +46,7 @@ def test_only_lengths_of_links_that_are_none_make_an_arm_that_is_searched() -> N
 
 
 def test_slides_and_first_joints_that_do_not_fit_the_plane_are_searched() -> None:
-    turns: list[dict[str, Any]] = [
-        {"theta": "q"},
-        {"a": 0.4, "theta": "q"},
-        {"a": 0.3, "theta": "q"},
-    ]
+    turns: list[dict[str, Any]] = [{"theta": "q"}, {"a": 0.4, "theta": "q"}, {"a": 0.3, "theta": "q"}]
     leaning = {"alpha": 30, "a": 0.1, "d": "q", "lower": 0, "upper": 1}
     for rows, task in (
         ([*turns, leaning], ["x", "y", "z", "rz"]),
@@ -206,17 +202,23 @@ def test_h11_proximal_and_distal_tables_of_the_thesis_are_one_arm() -> None:
     # Singh 2014, tables 3.1 and 3.3: theta2 and d3 change sign, d2 = d5 = 0.
     slide = {"lower": -1, "upper": 1}
     distal = [
-        {"a": 0.4, "alpha": 180, "d": 0.3, "theta": "q"}, {"a": 0.3, "theta": "q"},
-        {"d": "q", **slide}, {"d": 0.05, "theta": "q"},
-    ]  # fmt: skip
+        {"a": 0.4, "alpha": 180, "d": 0.3, "theta": "q"},
+        {"a": 0.3, "theta": "q"},
+        {"d": "q", **slide},
+        {"d": 0.05, "theta": "q"},
+    ]
     proximal = [
-        {"d": 0.3, "theta": "q"}, {"a": 0.4, "theta": "q"}, {"a": 0.3, "d": "q", **slide},
+        {"d": 0.3, "theta": "q"},
+        {"a": 0.4, "theta": "q"},
+        {"a": 0.3, "d": "q", **slide},
         {"alpha": 180, "d": 0.05, "theta": "q"},
-    ]  # fmt: skip
+    ]
     sheth_uicker = [
-        {"a": 0.4, "alpha": 180, "c": 0.3, "gamma": "q"}, {"a": 0.3, "gamma": "q"},
-        {"c": "q", **slide}, {"c": 0.05, "gamma": "q"},
-    ]  # fmt: skip
+        {"a": 0.4, "alpha": 180, "c": 0.3, "gamma": "q"},
+        {"a": 0.3, "gamma": "q"},
+        {"c": "q", **slide},
+        {"c": 0.05, "gamma": "q"},
+    ]
     task = ["x", "y", "z", "rz"]
     one, two = table(distal, "standard", task=task).robot(), table(proximal, task=task).robot()
     three = table(sheth_uicker, "sheth_uicker", task=task).robot()
@@ -230,9 +232,10 @@ def test_h11_proximal_and_distal_tables_of_the_thesis_are_one_arm() -> None:
 
 def test_tilt_and_height_that_an_arm_lacks_are_left_as_residual_and_the_rest_is_followed() -> None:
     for arm, q, axis, height in (
-        (SCARA, [0.3, 0.8, 0.1, -0.4], "x", 0.0), (PLANAR, [0.4, 0.9, -0.5], "y", 0.25),
+        (SCARA, [0.3, 0.8, 0.1, -0.4], "x", 0.0),
+        (PLANAR, [0.4, 0.9, -0.5], "y", 0.25),
         (FIVE, FIVE.home, "x", 0.0),
-    ):  # fmt: skip
+    ):
         for tilt, lift in ((0.3, 0.0), (0.0, height)):
             pose = arm.fk(q)
             pose[2, 3] += lift

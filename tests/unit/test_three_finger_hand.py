@@ -46,9 +46,7 @@ def test_finger_of_the_specification() -> None:
 
 
 @pytest.mark.parametrize("finger", [1, 2, 3])
-def test_every_finger_solution_touches_the_point_and_the_original_is_among_them(
-    finger: int,
-) -> None:
+def test_every_finger_solution_touches_the_point_and_the_original_is_among_them(finger: int) -> None:
     hand, rng = Hand({"l31": 0.02, "l12": 0.06}), np.random.default_rng(2)
     counts = set()
     for q in rng.uniform(-3.0, 3.0, (500, 9)):
@@ -92,9 +90,7 @@ def test_inverse_follows_the_object_next_to_the_seed(robot: Robot, hand: Hand) -
         assert result.status == IkStatus.FOLLOWED
         assert np.allclose(robot.fk(result.q), T, atol=SOLVED)
         assert np.abs(hand.slip(result.q)).max() < SOLVED
-        inside = [
-            q for q in robot.ik_all(T) if (q >= robot.lower).all() and (q <= robot.upper).all()
-        ]
+        inside = [q for q in robot.ik_all(T) if (q >= robot.lower).all() and (q <= robot.upper).all()]
         nearest = min(np.abs(q - robot.home).max() for q in inside)
         assert math.isclose(np.abs(result.q - robot.home).max(), nearest, abs_tol=SOLVED)
 
@@ -119,9 +115,7 @@ def test_an_object_out_of_reach_is_unreachable_with_finite_joints(robot: Robot) 
 
 
 @pytest.mark.parametrize("out", [0.02, 0.04, 0.1])
-def test_a_path_to_straight_fingers_and_back_returns_to_the_same_grasp(
-    robot: Robot, out: float
-) -> None:
+def test_a_path_to_straight_fingers_and_back_returns_to_the_same_grasp(robot: Robot, out: float) -> None:
     # The end is held, so that joints which lagged behind at the straight finger catch up.
     shares = [*np.sin(np.linspace(0.0, math.pi, 3000)), *np.zeros(300)]
     path = np.repeat(robot.fk(robot.home)[None], len(shares), axis=0)

@@ -22,9 +22,7 @@ from teleop_core.slave.slave_sim import SlaveSim
 STILL = np.zeros((1, 6))
 
 
-def pushed(
-    begin: ArrayLike, axis: ArrayLike, name: str = "plane", parameters: Any = None, **numbers: Any
-) -> Array:
+def pushed(begin: ArrayLike, axis: ArrayLike, name: str = "plane", parameters: Any = None, **numbers: Any) -> Array:
     """Wrench (6,) [N, N·m] on a tool that stands still, of points without friction."""
     return drag(begin, axis, STILL, name, parameters, **numbers)[0][0]
 
@@ -58,9 +56,7 @@ def test_a_ball_touches_as_a_point_does_a_radius_nearer() -> None:
     ball = pushed((0.0, 0.0, 0.004), (0.0, 0.0, -1.0), points=1, tool_radius=0.005)
     assert ball[2] == pytest.approx(1.0)
     steps = np.tile((1e-5, 0.0, 0.0, 0.0, 0.0, 0.0), (100, 1))
-    dragged, *_ = drag(
-        (0, 0, 0.004), (0, 0, -1), steps, points=1, tool_radius=0.005, world_friction=0.2
-    )
+    dragged, *_ = drag((0, 0, 0.004), (0, 0, -1), steps, points=1, tool_radius=0.005, world_friction=0.2)
     assert dragged[-1, 0] == pytest.approx(-0.2)
     assert dragged[-1, 4] == pytest.approx(0.005 * 0.2)  # friction acts below the ball's middle
 
@@ -70,9 +66,7 @@ def test_a_ball_that_rolls_is_not_held_and_one_that_spins_in_place_is() -> None:
     roll = np.tile((radius * rate, 0.0, 0.0, 0.0, rate, 0.0), (50, 1))
     spin = roll * (0, 0, 0, 0, 1, 0)
     numbers: dict[str, Any] = {"points": 1, "tool_radius": radius, "world_friction": 0.5}
-    rolled, spun = (
-        drag((0.0, 0.0, 0.004), (0.0, 1.0, 0.0), steps, **numbers)[0] for steps in (roll, spin)
-    )
+    rolled, spun = (drag((0.0, 0.0, 0.004), (0.0, 1.0, 0.0), steps, **numbers)[0] for steps in (roll, spin))
     assert np.abs(rolled[:, 0]).max() < 1e-9
     assert spun[-1, 0] == pytest.approx(0.5)
 
@@ -82,13 +76,9 @@ def test_each_point_has_its_own_bristle() -> None:
     axis, half = np.array([1.0, 0.0, 0.0]), 0.02  # long beside a bristle's bend of 0.3 mm
     rate, steps = 2e-3, np.zeros((200, 6))
     angles = rate * np.arange(201)
-    steps[:, :3] = half * np.diff(
-        np.column_stack((np.cos(angles), np.sin(angles), 0.0 * angles)), axis=0
-    )
+    steps[:, :3] = half * np.diff(np.column_stack((np.cos(angles), np.sin(angles), 0.0 * angles)), axis=0)
     steps[:, 5] = rate
-    felt, *_ = drag(
-        (half, 0.0, -1e-3), axis, steps, points=4, tool_length=2.0 * half, world_friction=0.3
-    )
+    felt, *_ = drag((half, 0.0, -1e-3), axis, steps, points=4, tool_length=2.0 * half, world_friction=0.3)
     tip = half * np.array([math.cos(angles[-2]), math.sin(angles[-2]), 0.0])
     about_middle = felt[-1, 3:] + np.cross(tip, felt[-1, :3])
     assert np.abs(felt[-1, :2]).max() < 0.01
@@ -131,9 +121,7 @@ def test_an_arm_feels_force_and_torque_through_its_transposed_jacobian(name: str
     np.testing.assert_allclose(moved - free, wanted, atol=0.07 * np.abs(wanted).max())
 
 
-def wandering(
-    seed: int, ticks: int, size: float = 4e-3, turn: float = 0.1, slower: float = 1.0
-) -> tuple[Array, Array]:
+def wandering(seed: int, ticks: int, size: float = 4e-3, turn: float = 0.1, slower: float = 1.0) -> tuple[Array, Array]:
     """First place (3,) and steps (ticks, 6) of a tool that wanders and turns."""
     rng, times = np.random.default_rng(seed), 1e-3 / slower * np.arange(ticks + 1)
     rates, phases = rng.uniform(0.3, 2.0, (4, 6)), rng.uniform(0.0, 2.0 * np.pi, (4, 6))
@@ -152,9 +140,7 @@ SOLIDS = {
 """Where a tool wanders, its axis, the object's shape, and the tool's radius."""
 
 
-def gained(
-    name: str, seed: int, ticks: int, points: int, slower: float = 1.0
-) -> tuple[float, float]:
+def gained(name: str, seed: int, ticks: int, points: int, slower: float = 1.0) -> tuple[float, float]:
     """Energy that an object gave a wandering tool beyond what it took, and work turned over [J]."""
     middle, axis, parameters, radius = SOLIDS[name]
     begin, steps = wandering(seed, ticks, slower=slower)
@@ -182,9 +168,7 @@ def test_no_contact_makes_energy_in_hundreds_of_random_motions(name: str, points
 @pytest.mark.parametrize("name", SOLIDS)
 def test_what_ticks_add_falls_with_the_way_in_a_tick(name: str) -> None:
     fast, slow = (
-        np.sum(
-            [gained(name, seed, round(500 * slower), 5, slower) for seed in range(0, 40, 4)], axis=0
-        )
+        np.sum([gained(name, seed, round(500 * slower), 5, slower) for seed in range(0, 40, 4)], axis=0)
         for slower in (1.0, 4.0)
     )
     assert slow[1] == pytest.approx(fast[1], rel=0.01)
@@ -193,9 +177,7 @@ def test_what_ticks_add_falls_with_the_way_in_a_tick(name: str) -> None:
 
 @pytest.mark.parametrize("damping", [0.0, 1.0])
 @pytest.mark.parametrize("seed", range(4))
-def test_a_rod_that_tumbles_onto_a_plane_never_has_more_energy_than_at_first(
-    seed: int, damping: float
-) -> None:
+def test_a_rod_that_tumbles_onto_a_plane_never_has_more_energy_than_at_first(seed: int, damping: float) -> None:
     rng = np.random.default_rng(seed)
     axis = rng.normal(size=3)
     flight = fly(
@@ -227,21 +209,21 @@ def test_several_points_or_a_radius_are_refused_for_needles_and_buttons() -> Non
 def test_a_tool_whose_shaft_begins_in_an_object_is_refused_with_its_depth() -> None:
     robot = load_robot("rcrt1")
     T = robot.fk(robot.home)
-    texts = ["world=sphere", f"world.place={(T[:3, 3] - 0.03 * T[:3, 2]).tolist()}",
-             "world.sphere.radius=0.008"]  # fmt: skip
+    texts = ["world=sphere", f"world.place={(T[:3, 3] - 0.03 * T[:3, 2]).tolist()}", "world.sphere.radius=0.008"]
     VirtualTime(configure("free_motion", settings=texts))
     with pytest.raises(ParameterError, match=r"8\.0 mm inside"):
-        VirtualTime(
-            configure(
-                "free_motion", settings=[*texts, "world.tool_points=2", "world.tool_length=0.03"]
-            )
-        )
+        VirtualTime(configure("free_motion", settings=[*texts, "world.tool_points=2", "world.tool_length=0.03"]))
 
 
 def test_the_gap_to_an_object_below_is_that_of_the_whole_tool() -> None:
     tip = load_robot("rcrt1").fk(load_robot("rcrt1").start)
     for points, radius in ((1, 0.0), (1, 0.004), (3, 0.004)):
-        texts = ["world=plane", "world.gap=0.02", f"world.tool_radius={radius}",
-                 f"world.tool_points={points}", "world.tool_length=0.05"]  # fmt: skip
+        texts = [
+            "world=plane",
+            "world.gap=0.02",
+            f"world.tool_radius={radius}",
+            f"world.tool_points={points}",
+            "world.tool_length=0.05",
+        ]
         world = configure("free_motion", settings=texts).group("slave_sim").world
         assert world.distance(world.tool(tip), world.below(tip)) == pytest.approx(0.02)

@@ -35,9 +35,7 @@ def normals(name: str, places: Array) -> tuple[Array, Array]:
     return ways / distances[:, None], distances - RADIUS
 
 
-def test_the_tip_approaches_slides_in_one_touch_and_retreats(
-    session: tuple[str, tc.Recording, Array, Array],
-) -> None:
+def test_the_tip_approaches_slides_in_one_touch_and_retreats(session: tuple[str, tc.Recording, Array, Array]) -> None:
     name, _, force, place = session
     is_touching: Any = force.any(axis=1)
     begin, end = np.flatnonzero(is_touching)[[0, -1]]
@@ -62,9 +60,7 @@ def test_it_slides_along_the_surface_as_far_as_the_hand_leads_it(
         assert np.ptp(way[:, 1]) < 1e-3
 
 
-def test_the_push_is_that_of_the_surface_within_its_friction(
-    session: tuple[str, tc.Recording, Array, Array],
-) -> None:
+def test_the_push_is_that_of_the_surface_within_its_friction(session: tuple[str, tc.Recording, Array, Array]) -> None:
     name, _, force, place = session
     out, outside = normals(name, place)
     along = np.einsum("ij,ij->i", force, out)

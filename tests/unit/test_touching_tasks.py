@@ -42,9 +42,7 @@ class Judged:
         """Go towards the goal for a time [s], no faster than a speed [m/s]."""
         for _ in range(round(time / DT)):
             way = self.goal - self.tip
-            self.tip = self.tip + way * min(
-                1.0, speed * DT / max(float(np.linalg.norm(way)), 1e-12)
-            )
+            self.tip = self.tip + way * min(1.0, speed * DT / max(float(np.linalg.norm(way)), 1e-12))
             self.judge()
 
     @property
@@ -104,9 +102,7 @@ def test_pressing_too_hard_and_taking_too_long_are_errors_of_their_kind() -> Non
 
 
 def test_a_way_in_counts_where_the_tip_is_as_deep_as_asked_and_the_way_out_does_not() -> None:
-    p = InsertParameters(
-        place=(0.3, 0.1, 0.0), axis=(0.0, 0.6, 0.8), depth=0.012, outside=0.01, width=0.002
-    )
+    p = InsertParameters(place=(0.3, 0.1, 0.0), axis=(0.0, 0.6, 0.8), depth=0.012, outside=0.01, width=0.002)
     one = Judged(INSERT, p, np.array([0.3, 0.1, 0.05]), lambda _: np.zeros(3))
     axis, mouth, last = np.array(p.axis), np.array(p.place), 0.0
     for _ in range(2000):
@@ -151,15 +147,8 @@ def test_a_person_who_sees_leads_a_peg_into_its_hole_and_hard_walls_are_felt() -
         "task.insert.place": (0.258, -0.2749, -0.0512),
         "task.insert.axis": (-0.9178, 0.0, 0.3971),
     }
-    easy, hard = (
-        tc.run("peg", duration=12.0, settings={**hole, "task.insert.most": most})
-        for most in (3.0, 0.05)
-    )
-    depth = (easy["slave/true_cp"].values[:, :3] - [0.258, -0.2749, -0.0512]) @ [
-        0.9178,
-        0.0,
-        -0.3971,
-    ]
+    easy, hard = (tc.run("peg", duration=12.0, settings={**hole, "task.insert.most": most}) for most in (3.0, 0.05))
+    depth = (easy["slave/true_cp"].values[:, :3] - [0.258, -0.2749, -0.0512]) @ [0.9178, 0.0, -0.3971]
     assert depth[easy["slave/true_cp"].stamp_ns > easy.bag.start_ns + 6_000_000_000].max() > 0.008
     assert easy.score().value("task.successes") == easy.score().value("task.attempts") != 0
     assert (hard.score().value("task.forced") or 0) > 0

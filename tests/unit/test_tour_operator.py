@@ -35,9 +35,7 @@ def test_tour_rests_at_each_point_in_turn(leg: float, rest: float, trace: float)
 
 
 @given(seconds, st.floats(0.01, 5.0), seconds)
-def test_tour_goes_on_without_a_jump_and_ends_at_its_first_point(
-    leg: float, rest: float, trace: float
-) -> None:
+def test_tour_goes_on_without_a_jump_and_ends_at_its_first_point(leg: float, rest: float, trace: float) -> None:
     p = TourParameters(points=POINTS, leg_time=leg, rest_time=rest, trace_time=trace)
     end = p.visit_time + trace
     times = np.linspace(0.0, end + 1.0, 20_001)
@@ -65,25 +63,25 @@ def test_line_meets_every_point() -> None:
     assert np.abs(through(STOPS, share) - STOPS).max() < ROUNDING
 
 
-def motion(
-    leg: float = 1.0, period: float = 8.0, rotation: float = 0.3
-) -> tuple[Callable[..., Any], float]:
+def motion(leg: float = 1.0, period: float = 8.0, rotation: float = 0.3) -> tuple[Callable[..., Any], float]:
     common = build(
         OperatorParameters,
-        {"kind": "tour", "tour.points": POINTS, "tour.leg_time": leg, "period": period,
-         "rotation": rotation, "approach_time": 1.0},
-    )  # fmt: skip
+        {
+            "kind": "tour",
+            "tour.points": POINTS,
+            "tour.leg_time": leg,
+            "period": period,
+            "rotation": rotation,
+            "approach_time": 1.0,
+        },
+    )
     part = OPERATORS.find("tour")
     phases = np.random.default_rng(1).uniform(0.0, 6.0, PHASES)
     setting: Any = Setting(common=common, phases=phases, seed=1)
-    return part.make(common.kind.parameters, setting), present(part.length)(
-        common.kind.parameters, setting
-    )
+    return part.make(common.kind.parameters, setting), present(part.length)(common.kind.parameters, setting)
 
 
-def test_turning_of_the_stylus_does_not_depend_on_the_time_of_a_leg_nor_places_on_its_period() -> (
-    None
-):
+def test_turning_of_the_stylus_does_not_depend_on_the_time_of_a_leg_nor_places_on_its_period() -> None:
     times = np.linspace(0.0, 9.0, 500)
     base = motion()[0](times)
     slower, calmer = motion(leg=2.0)[0](times), motion(period=30.0)[0](times)

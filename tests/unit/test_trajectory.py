@@ -25,9 +25,7 @@ def test_cubic_passes_the_published_places_and_speeds() -> None:  # case 24
 
 
 @given(joints, joints, st.floats(0.1, 20.0))
-def test_moves_rest_at_both_ends_and_outside_them(
-    start: Array, end: Array, move_time: float
-) -> None:
+def test_moves_rest_at_both_ends_and_outside_them(start: Array, end: Array, move_time: float) -> None:
     times = np.array([-1.0, 0.0, move_time, move_time + 1.0])
     place, speed = cubic_move(start, end, move_time, times)
     assert np.allclose(place, [start, start, end, end], rtol=0.0, atol=ROUNDING)
@@ -52,9 +50,7 @@ def test_speed_is_the_slope_of_the_place() -> None:
 
 
 @given(joints, joints)
-def test_shortest_time_brings_one_joint_to_its_limit_and_none_beyond(
-    start: Array, end: Array
-) -> None:
+def test_shortest_time_brings_one_joint_to_its_limit_and_none_beyond(start: Array, end: Array) -> None:
     move_time = shortest_move_time(start, end, DRIVES.speed_limit)
     if move_time < 1e-9:
         return

@@ -78,12 +78,8 @@ def rod_matrix(damping: float, spring: float, damper: float) -> NDArray[np.compl
 
 
 @pytest.mark.parametrize("damping", [0.0, 0.5, 4.0])
-def test_a_rod_is_measured_as_it_is_and_llewellyns_number_never_falls_below_one(
-    damping: float,
-) -> None:
-    found = two_port.hybrid_matrix(
-        [rod(damping, 2000.0, 10.0, world) for world in (0.0, 300.0, 3000.0)]
-    )
+def test_a_rod_is_measured_as_it_is_and_llewellyns_number_never_falls_below_one(damping: float) -> None:
+    found = two_port.hybrid_matrix([rod(damping, 2000.0, 10.0, world) for world in (0.0, 300.0, 3000.0)])
     exact = rod_matrix(damping, 2000.0, 10.0)
     assert np.abs(found - exact).max(axis=0) == pytest.approx(0.0, abs=0.01 * (1.0 + damping))
     number = two_port.llewellyn(found)
@@ -94,9 +90,7 @@ def test_a_rod_is_measured_as_it_is_and_llewellyns_number_never_falls_below_one(
 
 
 @pytest.mark.parametrize("round_trip", [0.02, 0.1, 0.2])
-def test_a_delayed_rod_has_the_cosine_of_its_round_trip_as_llewellyns_number(
-    round_trip: float,
-) -> None:
+def test_a_delayed_rod_has_the_cosine_of_its_round_trip_as_llewellyns_number(round_trip: float) -> None:
     matrix = rod_matrix(0.0, 1e12, 0.0)
     matrix[:, :, 0] *= np.exp(-0.5 * round_trip * two_port.S)[:, None]
     matrix[:, 0, 1] *= np.exp(-0.5 * round_trip * two_port.S)
@@ -105,9 +99,7 @@ def test_a_delayed_rod_has_the_cosine_of_its_round_trip_as_llewellyns_number(
     assert (number < 1.0).all()
 
 
-def test_llewellyns_number_says_whether_some_passive_world_makes_the_hand_feel_an_active_one() -> (
-    None
-):
+def test_llewellyns_number_says_whether_some_passive_world_makes_the_hand_feel_an_active_one() -> None:
     rng = np.random.default_rng(1)
     angles = np.linspace(-0.5 * math.pi, 0.5 * math.pi, 721)
     sizes = np.geomspace(1e-3, 1e3, 241)
@@ -115,9 +107,7 @@ def test_llewellyns_number_says_whether_some_passive_world_makes_the_hand_feel_a
     told = {True: 0, False: 0}
     for _ in range(200):
         numbers = rng.normal(size=(2, 2)) + 1j * rng.normal(size=(2, 2))
-        numbers[0, 0], numbers[1, 1] = (
-            value.real + abs(value.real) + 1j * value.imag for value in np.diag(numbers)
-        )
+        numbers[0, 0], numbers[1, 1] = (value.real + abs(value.real) + 1j * value.imag for value in np.diag(numbers))
         matrix = np.broadcast_to(numbers, (len(worlds), 2, 2))
         number = float(two_port.llewellyn(matrix[:1])[0])
         if abs(number - 1.0) < 0.05:
@@ -155,9 +145,7 @@ def test_what_is_not_linear_strays_from_the_lines() -> None:
     assert two_port.Ports.of(hand, 0.0 * hand, cut, 0.0 * hand).stray > 0.1
 
 
-def test_a_spring_is_an_impedance_that_falls_with_frequency_and_turns_by_minus_ninety_degrees() -> (
-    None
-):
+def test_a_spring_is_an_impedance_that_falls_with_frequency_and_turns_by_minus_ninety_degrees() -> None:
     hand = two_port.multisine(TIMES)
     ports = two_port.Ports.of(hand, -250.0 * hand, hand, -250.0 * hand)
     for impedance in (ports.felt, ports.world):
@@ -211,8 +199,7 @@ def test_an_arm_that_lags_makes_position_force_less_than_absolutely_stable_and_a
 
 
 def test_unilateral_leaves_nothing_to_feel_and_follows_all_the_same(
-    forces: dict[tuple[tuple[str, str], float], Cell],
-    others: dict[tuple[tuple[str, str], float], Cell],
+    forces: dict[tuple[tuple[str, str], float], Cell], others: dict[tuple[tuple[str, str], float], Cell]
 ) -> None:
     cell, led = others[("unilateral", "none"), 0.0], forces[FORCE, 0.0]
     for ports in cell.ports.values():
@@ -223,8 +210,7 @@ def test_unilateral_leaves_nothing_to_feel_and_follows_all_the_same(
 
 
 def test_position_position_drags_in_the_air_by_the_lag_of_its_arm_and_the_round_trip(
-    forces: dict[tuple[tuple[str, str], float], Cell],
-    others: dict[tuple[tuple[str, str], float], Cell],
+    forces: dict[tuple[tuple[str, str], float], Cell], others: dict[tuple[tuple[str, str], float], Cell]
 ) -> None:
     ports = others[POSITION, 0.1].ports[AIR]
     law = predicted_hybrid(forces[FORCE, 0.0].hybrid, "position_position", 0.1)
@@ -233,8 +219,7 @@ def test_position_position_drags_in_the_air_by_the_lag_of_its_arm_and_the_round_
 
 
 @pytest.mark.parametrize(
-    ("name", "trip"),
-    [("impedance", 0.1), ("three_channel", 0.1), ("four_channel", 0.0), ("four_channel", 0.1)],
+    ("name", "trip"), [("impedance", 0.1), ("three_channel", 0.1), ("four_channel", 0.0), ("four_channel", 0.1)]
 )
 def test_channels_before_a_slave_that_yields_are_the_two_port_of_arm_admittance_and_delays(
     forces: dict[tuple[tuple[str, str], float], Cell],
@@ -274,8 +259,7 @@ def test_a_press_on_tissue_is_felt_through_both_springs_but_with_four_channels_t
 
 
 def test_the_fourth_channel_lets_a_tip_yield_no_more_than_the_arm_alone(
-    forces: dict[tuple[tuple[str, str], float], Cell],
-    yielding: dict[tuple[tuple[str, str], float], Cell],
+    forces: dict[tuple[tuple[str, str], float], Cell], yielding: dict[tuple[tuple[str, str], float], Cell]
 ) -> None:
     arm, whole = forces[FORCE, 0.0].hybrid, yielding[FOUR, 0.0].hybrid
     follows = two_port.LINES < 2.2
@@ -292,9 +276,7 @@ def test_a_wave_drags_in_the_air_by_one_and_a_half_times_its_impedance(
 
 
 @pytest.mark.parametrize("workers", [1, pytest.param(2, marks=pytest.mark.slow)])
-def test_work_is_done_with_the_seed_and_settings_of_the_bench_in_the_order_of_its_jobs(
-    workers: int,
-) -> None:
+def test_work_is_done_with_the_seed_and_settings_of_the_bench_in_the_order_of_its_jobs(workers: int) -> None:
     told, free = [], {"gravity_compensation": "none"}
     bench = Bench(7, lambda *each: told.append(each), free, workers)
     assert bench.map(getattr, ["seed", "runs", "seed"]) == [7, 0, 7]

@@ -83,9 +83,7 @@ def test_a_step_is_followed_to_its_end(kind: str) -> None:
     assert out[-1] == pytest.approx(0.05, abs=1e-10)
 
 
-def exact(
-    kind: str, given: dict[str, float], frequencies: Array, period: float
-) -> NDArray[np.complex128]:
+def exact(kind: str, given: dict[str, float], frequencies: Array, period: float) -> NDArray[np.complex128]:
     """What scipy says of a filter at some frequencies [Hz]."""
     rate = 1.0 / period
     if kind == "notch":
@@ -112,9 +110,7 @@ def measured(kind: str, given: dict[str, float], frequencies: Array, period: flo
         ("band_stop", {"low": 5.0, "high": 15.0}),
     ],
 )
-def test_the_frequency_response_is_that_of_scipy(
-    kind: str, given: dict[str, float], period: float
-) -> None:
+def test_the_frequency_response_is_that_of_scipy(kind: str, given: dict[str, float], period: float) -> None:
     frequencies = np.array([0.1, 0.5, 1.0, 2.0, 5.0, 7.9, 9.8, 10.0, 12.5, 20.0, 40.0])
     expected = exact(kind, given, frequencies, period)
     np.testing.assert_allclose(measured(kind, given, frequencies, period), expected, atol=1e-9)
@@ -136,9 +132,8 @@ def steady_gain(numbers: Array, period: float) -> Array:
     unit, seen = np.diag([1e5, 1e3, 1e5, 1e3]), np.array([[1.0, 0.0, 1.0, 0.0]])
     back = np.linalg.inv(unit)
     covariance = solve_discrete_are(
-        back @ transition.T @ unit, 1e5 * back @ seen.T, unit @ noise @ unit,
-        np.array([[1e10 * spread]]),
-    )  # fmt: skip
+        back @ transition.T @ unit, 1e5 * back @ seen.T, unit @ noise @ unit, np.array([[1e10 * spread]])
+    )
     predicted = back @ covariance @ back
     shared = predicted @ seen[0]
     return shared / (seen[0] @ shared + spread)
@@ -221,21 +216,17 @@ def test_the_filter_that_is_the_default_leads_the_slave_nearer_to_what_the_hand_
     assert tremor_filter.TremorFilterParameters().kind.kind == "wflc"
     off = {}
     for kind in KINDS:
-        found = tc.run(
-            "human", duration=20.0, stages=["tremor_filter"], settings={"tremor_filter.kind": kind}
-        )
+        found = tc.run("human", duration=20.0, stages=["tremor_filter"], settings={"tremor_filter.kind": kind})
         score = found.score()
-        before, after = (
-            present(score.value(f"tremor_filter.intention_{name}_um"))
-            for name in ("before", "after")
-        )
+        before, after = (present(score.value(f"tremor_filter.intention_{name}_um")) for name in ("before", "after"))
         # By the recorded streams, sample by sample, after the approach.
         measured, filtered, tremor = (
-            found[name].values[-12_000:, :3]
-            for name in ("master/measured_cp", "master/filtered_cp", "hand/tremor")
+            found[name].values[-12_000:, :3] for name in ("master/measured_cp", "master/filtered_cp", "hand/tremor")
         )
-        rms = [1e6 * float(np.sqrt(((places - measured + tremor) ** 2).sum(axis=1).mean()))
-               for places in (measured, filtered)]  # fmt: skip
+        rms = [
+            1e6 * float(np.sqrt(((places - measured + tremor) ** 2).sum(axis=1).mean()))
+            for places in (measured, filtered)
+        ]
         assert (before, after) == pytest.approx(rms, rel=0.1)
         off[kind] = after / before
     assert off["wflc"] < 0.95
@@ -258,14 +249,10 @@ def test_the_learning_filter_subtracts_a_tremor_whose_frequency_changes() -> Non
 def stage(kind: str = "band_stop", **given: object) -> tremor_filter.RunningTremorFilter:
     """The stage at work; double underscores in names stand for dots."""
     named = {name.replace("__", "."): value for name, value in given.items()}
-    return tremor_filter.RunningTremorFilter(
-        build(tremor_filter.TremorFilterParameters, {"kind": kind, **named})
-    )
+    return tremor_filter.RunningTremorFilter(build(tremor_filter.TremorFilterParameters, {"kind": kind, **named}))
 
 
-def through(
-    runner: tremor_filter.RunningTremorFilter, places: Any, period_ns: int = MS, first_ns: int = MS
-) -> Array:
+def through(runner: tremor_filter.RunningTremorFilter, places: Any, period_ns: int = MS, first_ns: int = MS) -> Array:
     """Filtered places (N, 3) of a master that is at places (N, 3), sample by sample."""
     row, found = runner.signals, []
     for i, place in enumerate(places):
@@ -341,9 +328,7 @@ def test_a_pause_begins_anew_at_the_reading_and_a_shorter_one_does_not(kind: str
 @pytest.mark.parametrize("kind", KINDS)
 @settings(max_examples=15, deadline=None)
 @given(far=st.floats(0.004, 0.5), ticks=st.integers(1, 40))
-def test_a_teleport_passes_as_it_is_and_nothing_rings_after_it(
-    kind: str, far: float, ticks: int
-) -> None:
+def test_a_teleport_passes_as_it_is_and_nothing_rings_after_it(kind: str, far: float, ticks: int) -> None:
     """There and back: each jump is that of the readings, and each beginning a fresh one."""
     places = np.zeros((300, 3))
     places[100 : 100 + ticks, 1] = far
@@ -351,15 +336,14 @@ def test_a_teleport_passes_as_it_is_and_nothing_rings_after_it(
     out = through(runner, places)
     np.testing.assert_array_equal(out, places)
     assert runner.state["begun"] == 3 if ticks > 1 else runner.state["begun"] >= 3
-    assert runner.concerns() == [f"began anew at {int(runner.state['implausible'])} samples of the "
-                                 "master that no hand can make"]  # fmt: skip
+    assert runner.concerns() == [
+        f"began anew at {int(runner.state['implausible'])} samples of the master that no hand can make"
+    ]
     assert runner.concerns() == []
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_hand_that_is_thrown_elsewhere_is_followed_from_there_as_from_the_first_reading(
-    kind: str,
-) -> None:
+def test_a_hand_that_is_thrown_elsewhere_is_followed_from_there_as_from_the_first_reading(kind: str) -> None:
     places, runner = hand(1500), stage(kind)
     places[700:] += 0.2
     out = through(runner, places)
@@ -384,9 +368,7 @@ def commands(runner: tremor_filter.RunningTremorFilter, places: Array) -> Array:
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_teleport_of_a_hand_that_moves_shifts_the_command_by_no_more_than_its_lag(
-    kind: str,
-) -> None:
+def test_a_teleport_of_a_hand_that_moves_shifts_the_command_by_no_more_than_its_lag(kind: str) -> None:
     """The slave goes on as if nothing had been, from where it is."""
     places = hand(2000)
     thrown = places.copy()
@@ -398,8 +380,10 @@ def test_a_teleport_of_a_hand_that_moves_shifts_the_command_by_no_more_than_its_
 
 @pytest.mark.parametrize("kind", KINDS)
 @settings(max_examples=30, deadline=None)
-@given(places=st.lists(st.tuples(*[st.floats()] * 3), min_size=1, max_size=20),
-       period_ns=st.sampled_from([0, -MS, MS, 40 * MS, 2**40]))  # fmt: skip
+@given(
+    places=st.lists(st.tuples(*[st.floats()] * 3), min_size=1, max_size=20),
+    period_ns=st.sampled_from([0, -MS, MS, 40 * MS, 2**40]),
+)
 def test_wild_samples_at_any_times_leave_numbers_and_no_trace(
     kind: str, places: list[tuple[float, float, float]], period_ns: int
 ) -> None:
@@ -445,9 +429,7 @@ def test_a_reset_and_a_second_run_give_the_same_bits(kind: str) -> None:
 
 
 @pytest.mark.parametrize("other", [{"kind": "notch", "notch.quality": 3.0}, {"kind": "kalman"}])
-def test_new_parameters_take_over_without_a_jump_and_then_act_alone(
-    other: Mapping[str, str | float],
-) -> None:
+def test_new_parameters_take_over_without_a_jump_and_then_act_alone(other: Mapping[str, str | float]) -> None:
     runner, places = stage("notch"), hand(4000)
     out = [through(runner, places[:1000])]
     runner.retune(build(tremor_filter.TremorFilterParameters, other))
@@ -477,8 +459,7 @@ def test_edges_that_enclose_no_band_are_refused() -> None:
 
 def test_the_mapping_reads_the_filtered_stylus_and_the_operator_the_stylus_itself() -> None:
     graph = build_graph(stages=["tremor_filter"])
-    at_port = {link.reader.name: link.topic.name for link in graph.links
-               if link.port.name == "master/measured_cp"}  # fmt: skip
+    at_port = {link.reader.name: link.topic.name for link in graph.links if link.port.name == "master/measured_cp"}
     assert at_port == {
         "operator": "master/measured_cp",
         "tremor_filter": "master/measured_cp",
@@ -491,13 +472,10 @@ def test_the_mapping_reads_the_filtered_stylus_and_the_operator_the_stylus_itsel
 
 @pytest.mark.parametrize("period", [1e-3, 6e-3, 8e-3, 0.01])
 @pytest.mark.parametrize("frequency", [3.0, 15.0, 25.0])
-def test_the_widest_notch_that_is_taken_comes_to_rest_at_any_period(
-    frequency: float, period: float
-) -> None:
+def test_the_widest_notch_that_is_taken_comes_to_rest_at_any_period(frequency: float, period: float) -> None:
     least = max(0.3, frequency * 1e-9 * LONGEST_NS / 0.45)
     with pytest.raises(ParameterError, match="quality"):
-        build(TREMOR_FILTERS.find("notch").parameters,
-              {"frequency": frequency, "quality": 0.99 * least})  # fmt: skip
+        build(TREMOR_FILTERS.find("notch").parameters, {"frequency": frequency, "quality": 0.99 * least})
     answer = response("notch", 4000, period, frequency=frequency, quality=1.0001 * least)
     assert np.abs(answer).max() < 3.0
     assert np.abs(answer[-100:]).max() < 1e-9
@@ -515,8 +493,9 @@ def test_the_slave_trembles_less_and_a_second_run_has_the_same_bits(kind: str) -
     assert (first["master_filtered_cp_ns"] == first["master_measured_cp_ns"]).all()
     both = first["master_filtered_cp"][:, :3] + first["master_filtered_out"]
     np.testing.assert_allclose(both, first["master_measured_cp"][:, :3], rtol=0, atol=1e-15)
-    trembling, calm = (tremor_power(first[f"master_{name}_cp"][8000::5, :3], 200.0)
-                       for name in ("measured", "filtered"))  # fmt: skip
+    trembling, calm = (
+        tremor_power(first[f"master_{name}_cp"][8000::5, :3], 200.0) for name in ("measured", "filtered")
+    )
     assert calm < (0.6 if kind == "wflc" else 0.4) * trembling
 
 
@@ -599,23 +578,23 @@ def test_without_motion_there_is_no_delay() -> None:
 
 
 def test_the_score_says_what_the_stage_did_and_nothing_without_it() -> None:
-    score = tc.run(
-        "human", duration=20.0, stages="tremor_filter", settings={"tremor_filter.kind": "band_stop"}
-    ).score()
+    score = tc.run("human", duration=20.0, stages="tremor_filter", settings={"tremor_filter.kind": "band_stop"}).score()
     assert 40.0 < present(score.value("tremor_filter.before_um")) < 80.0
     assert 0.2 < present(score.value("tremor_filter.left_share")) < 0.5
-    after = present(score.value("tremor_filter.before_um")) * present(
-        score.value("tremor_filter.left_share")
-    )
+    after = present(score.value("tremor_filter.before_um")) * present(score.value("tremor_filter.left_share"))
     assert score.value("tremor_filter.after_um") == pytest.approx(after)
     assert score.value("tremor_filter.delay_ms") == pytest.approx(9.5, abs=0.5)
     assert score.value("tremor_filter.gain") == pytest.approx(1.0, abs=0.01)
-    rows = {
-        row.label for result in score.results for row in result.rows if row.group == "tremor filter"
+    rows = {row.label for result in score.results for row in result.rows if row.group == "tremor filter"}
+    assert rows == {
+        "tremor before",
+        "tremor after",
+        "tremor left",
+        "delay below 2 Hz",
+        "gain below 2 Hz",
+        "stylus against intention, RMS",
+        "filtered against intention, RMS",
     }
-    assert rows == {"tremor before", "tremor after", "tremor left", "delay below 2 Hz",
-                    "gain below 2 Hz", "stylus against intention, RMS",
-                    "filtered against intention, RMS"}  # fmt: skip
     plain = tc.run("human", duration=3.0).score()
     assert plain.value("tremor_filter.left_share") is None
     assert plain.value("tremor_filter.delay_ms") is None

@@ -14,10 +14,7 @@ METRIC = "position_error_mm.rms"
 
 
 def tuning(**changes: Any) -> Tuning:
-    whole = Tuning(
-        "coarse_box", {"coarse_gain": Range(0.2, 1.0)}, (1,), METRIC,
-        settings={"teleop.duration": 0.5},
-    )  # fmt: skip
+    whole = Tuning("coarse_box", {"coarse_gain": Range(0.2, 1.0)}, (1,), METRIC, settings={"teleop.duration": 0.5})
     return replace(whole, **changes)
 
 
@@ -84,9 +81,7 @@ def test_choices_and_whole_numbers_are_kept_as_they_are() -> None:
         ({"metric": "task.tim"}, "task.time_s"),
     ],
 )
-def test_what_cannot_be_searched_is_told_before_the_first_session(
-    changes: dict[str, Any], text: str
-) -> None:
+def test_what_cannot_be_searched_is_told_before_the_first_session(changes: dict[str, Any], text: str) -> None:
     with pytest.raises(tc.TeleopError, match=text):
         tuning(**changes)
 
@@ -96,9 +91,7 @@ def test_a_file_says_the_same_as_python(tmp_path: Path) -> None:
         "scenario: coarse_box\nseeds: [1]\nduration: 0.5\n"
         f"tune:\n  coarse_gain: {{low: 0.2, high: 1.0}}\nminimize: {METRIC}\n"
     )
-    assert read_tuning(file_of(tmp_path, text)).run(trials=2, jobs=1) == tuning().run(
-        trials=2, jobs=1
-    )
+    assert read_tuning(file_of(tmp_path, text)).run(trials=2, jobs=1) == tuning().run(trials=2, jobs=1)
 
 
 @pytest.mark.parametrize(
@@ -111,9 +104,7 @@ def test_a_file_says_the_same_as_python(tmp_path: Path) -> None:
         ("[", "YAML"),
     ],
 )
-def test_a_wrong_file_is_refused_with_what_must_be_there(
-    text: str, words: str, tmp_path: Path
-) -> None:
+def test_a_wrong_file_is_refused_with_what_must_be_there(text: str, words: str, tmp_path: Path) -> None:
     with pytest.raises(tc.TeleopError, match=words):
         read_tuning(file_of(tmp_path, text))
 

@@ -21,8 +21,7 @@ STAMPED_THERE = ("network_measured_cp_ns", "network_measured_cf_ns", "network_sl
 
 def session(*given: str, scenario: str = "palpation", stages: str = "[network]") -> Any:
     """Session whose sides are 50 ms apart, there and back."""
-    settings = [f"teleop.stages={stages}", "network.there.least_delay=0.05",
-                "network.back.least_delay=0.05", *given]  # fmt: skip
+    settings = [f"teleop.stages={stages}", "network.there.least_delay=0.05", "network.back.least_delay=0.05", *given]
     return VirtualTime(configure(scenario, settings=settings))
 
 
@@ -52,9 +51,7 @@ def test_a_session_with_two_clocks_moves_as_one_with_a_single_clock_to_the_bit(
         assert (other[name][~has_come] <= stamps[~has_come]).all() or offset > 0.0
 
 
-def test_the_age_that_is_scored_is_the_true_one_whatever_the_slaves_clock_says(
-    tmp_path: Path,
-) -> None:
+def test_the_age_that_is_scored_is_the_true_one_whatever_the_slaves_clock_says(tmp_path: Path) -> None:
     given: dict[str, Any] = {"stages": "network", "duration": 5.0, "preset": "own"}
     found: Any = []
     for name, clock in (("one", {}), ("two", {"clock_offset": 0.5, "clock_drift": 100.0})):
@@ -62,8 +59,9 @@ def test_the_age_that_is_scored_is_the_true_one_whatever_the_slaves_clock_says(
         settings |= {"network.there.least_delay": 0.03, "network.back.least_delay": 0.2}
         ran = tc.run("free_motion", out=tmp_path / name, **given, settings=settings)
         score = ran.score()
-        found.append([score.value(f"network.{way}.{key}") for way in ("there", "back")
-                      for key in ("age_mean_ms", "age_p99_ms")])  # fmt: skip
+        found.append(
+            [score.value(f"network.{way}.{key}") for way in ("there", "back") for key in ("age_mean_ms", "age_p99_ms")]
+        )
     np.testing.assert_allclose(found[1], found[0], atol=0.1)
     # What is measured is two ticks old when it is sent.
     assert found[1][2] == pytest.approx(202.0, abs=0.5)

@@ -32,8 +32,7 @@ class Pair:
 
     def __init__(self, places: Any = PLACE, **thing: float) -> None:
         given = JawSimParameters(
-            second_base=tuple(BASE),
-            object=GripObjectParameters(place=tuple(np.ravel(places)), **thing),
+            second_base=tuple(BASE), object=GripObjectParameters(place=tuple(np.ravel(places)), **thing)
         )
         self.sims = JawSim(given), JawSim(given)
         self.rows = [sim.signals for sim in self.sims]
@@ -177,9 +176,13 @@ def test_the_speed_between_two_jaws_is_the_least_of_a_convex_function() -> None:
         shared(found, tip, most, other, against)
 
         def cost(
-            v: Array, own: Array = own, tip: Array = tip, other: Array = other,
-            most: float = most, against: float = against,
-        ) -> float:  # fmt: skip
+            v: Array,
+            own: Array = own,
+            tip: Array = tip,
+            other: Array = other,
+            most: float = most,
+            against: float = against,
+        ) -> float:
             far = np.linalg.norm(v - tip) * most + np.linalg.norm(v - other) * against
             return float(0.5 * np.square(v - own).sum() + far)
 

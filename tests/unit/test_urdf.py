@@ -38,9 +38,7 @@ def placed(xml: str, joints: dict[str, float], poses: dict[str, np.ndarray]) -> 
     for index in range(1, model.njoints):
         name, at = model.names[index], model.joints[index].idx_q
         if tree[name].get("type") == "floating":
-            ends = [
-                present(present(tree[name].find(end)).get("link")) for end in ("parent", "child")
-            ]
+            ends = [present(present(tree[name].find(end)).get("link")) for end in ("parent", "child")]
             q[at : at + 7] = relative(*(poses[end] for end in ends))
         elif tree[name].find("mimic") is None:
             q[at] = joints[name]
@@ -95,9 +93,7 @@ def test_our_own_reader_finds_the_same_tip_and_limits(name: str, tmp_path: Path)
     read = tc.load_robot(str(path), tip="tip")
     assert read.joint_names == robot.joint_names
     np.testing.assert_array_equal(read.limits(1.0), robot.limits(1.0))
-    np.testing.assert_array_equal(
-        present(read.drives).effort_limit, present(robot.drives).effort_limit
-    )
+    np.testing.assert_array_equal(present(read.drives).effort_limit, present(robot.drives).effort_limit)
     q = np.random.default_rng(3).uniform(robot.lower, robot.upper, (200, robot.n))
     np.testing.assert_allclose(read.fk(q), robot.fk(q), rtol=0.0, atol=1e-9)
 
@@ -190,9 +186,7 @@ def alone(link: ElementTree.Element) -> str:
 def test_no_link_of_the_rcrt1_weighs_nothing_without_a_word() -> None:
     xml = urdf_of(tc.load_robot("rcrt1"))
     links = ElementTree.fromstring(xml).findall("link")
-    assert [x.get("name") for x in links if x.find("inertial") is not None] == [
-        "link1", "link2", "link3",
-    ]  # fmt: skip
+    assert [x.get("name") for x in links if x.find("inertial") is not None] == ["link1", "link2", "link3"]
     assert "None of link4, link5, link6, tip: others hold their masses." in xml
 
 
@@ -213,14 +207,8 @@ def test_a_body_that_follows_one_joint_is_a_mimic_and_one_of_two_joints_floats()
     xml = ElementTree.fromstring(urdf_of(tc.load_robot("parallelogram")))
     followers = {j.get("name"): j.find("mimic") for j in xml.iter("joint")}
     coupler, rocker = followers["theta1_coupler"], followers["theta1_rocker"]
-    assert (present(coupler).get("joint"), float(present(present(coupler).get("multiplier")))) == (
-        "theta1",
-        -1.0,
-    )
-    assert (present(rocker).get("joint"), float(present(present(rocker).get("multiplier")))) == (
-        "theta1",
-        1.0,
-    )
+    assert (present(coupler).get("joint"), float(present(present(coupler).get("multiplier")))) == ("theta1", -1.0)
+    assert (present(rocker).get("joint"), float(present(present(rocker).get("multiplier")))) == ("theta1", 1.0)
     for name, floats in (("mma", 2), ("four_bar", 2)):
         xml = ElementTree.fromstring(urdf_of(tc.load_robot(name)))
         assert sum(j.get("type") == "floating" for j in xml.iter("joint")) == floats
@@ -246,9 +234,7 @@ def test_every_solid_of_a_body_is_drawn() -> None:
         assert len(visuals) == sum(shapes[solid.kind] for solid in body.solids)
 
 
-def test_the_command_writes_what_an_engine_reads(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_command_writes_what_an_engine_reads(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "arm.urdf"
     assert main(["robot", "rcrt1", "--geometry", "L6=0.05", "--urdf", str(out)]) == 0
     assert str(out) in capsys.readouterr().out

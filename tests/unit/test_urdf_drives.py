@@ -25,9 +25,7 @@ def arm(folder: Path, content: str | dict[str, dict[str, float]], **geometry: st
     return load_robot(URDF, tip="tool0", drives=str(path), **geometry)
 
 
-def test_entries_of_the_file_stand_above_those_of_the_urdf_and_all_others_stay(
-    tmp_path: Path,
-) -> None:
+def test_entries_of_the_file_stand_above_those_of_the_urdf_and_all_others_stay(tmp_path: Path) -> None:
     plain, found = load_robot(URDF, tip="tool0").drives, arm(tmp_path, {"elbow": FULL}).drives
     elbow = JOINTS.index("elbow")
     for name, column in present(found).entries().items():
@@ -40,9 +38,7 @@ def test_entries_of_the_file_stand_above_those_of_the_urdf_and_all_others_stay(
 def test_what_the_file_states_of_every_joint_is_assumed_no_more(tmp_path: Path) -> None:
     for entry in ENTRIES:
         before = set(present(load_robot(URDF, tip="tool0").drives).assumed)
-        after = present(
-            arm(tmp_path, {joint: {entry: FULL[entry]} for joint in JOINTS}).drives
-        ).assumed
+        after = present(arm(tmp_path, {joint: {entry: FULL[entry]} for joint in JOINTS}).drives).assumed
         assert set(after) == before - {entry}
     full = arm(tmp_path, dict.fromkeys(JOINTS, FULL))
     assert not full.drives_are_assumed
@@ -61,9 +57,7 @@ def test_a_motor_adds_its_inertia_to_that_of_the_links_in_either_model(tmp_path:
             rows = [robot.forward_dynamics(place, still, e) - rest for e in np.eye(6)]
             return np.linalg.inv(np.array(rows))
 
-        np.testing.assert_allclose(
-            inertia(found) - inertia(plain), np.diag(motors), atol=1e-9, err_msg=dynamics
-        )
+        np.testing.assert_allclose(inertia(found) - inertia(plain), np.diag(motors), atol=1e-9, err_msg=dynamics)
 
 
 WRONG = {
@@ -79,18 +73,14 @@ WRONG = {
 
 
 @pytest.mark.parametrize(("content", "kind", "told"), WRONG.values(), ids=WRONG)
-def test_a_mistake_is_told_in_one_line(
-    content: str, kind: type[tc.TeleopError], told: str, tmp_path: Path
-) -> None:
+def test_a_mistake_is_told_in_one_line(content: str, kind: type[tc.TeleopError], told: str, tmp_path: Path) -> None:
     with pytest.raises(kind, match=told) as caught:
         arm(tmp_path, content)
     assert "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize("is_gone", [False, True])
-def test_a_recording_is_replayed_with_its_drives_whatever_became_of_their_file(
-    is_gone: bool, tmp_path: Path
-) -> None:
+def test_a_recording_is_replayed_with_its_drives_whatever_became_of_their_file(is_gone: bool, tmp_path: Path) -> None:
     arm(tmp_path, {"waist": {"speed_limit": 0.05}, "shoulder": {"viscous": 30.0}})
     path = tmp_path / "drives.yaml"
     geometry = ["tip=tool0", f"drives = {path}"]
@@ -98,12 +88,9 @@ def test_a_recording_is_replayed_with_its_drives_whatever_became_of_their_file(
     recording = tc.run("coarse_box", out=tmp_path / "bag", **session)
     before = recording["slave/measured_js"].values
     assert not np.array_equal(
-        before,
-        tc.run("coarse_box", **session | {"geometry": ["tip=tool0"]})["slave/measured_js"].values,
+        before, tc.run("coarse_box", **session | {"geometry": ["tip=tool0"]})["slave/measured_js"].values
     )
     path.unlink() if is_gone else path.write_text("{}")
     again = tc.replay(present(recording.path), out=tmp_path / "again")
     np.testing.assert_array_equal(again["slave/measured_js"].values, before)
-    np.testing.assert_array_equal(
-        tc.replay(present(again.path))["slave/measured_js"].values, before
-    )
+    np.testing.assert_array_equal(tc.replay(present(again.path))["slave/measured_js"].values, before)

@@ -41,12 +41,9 @@ def ports(*energies: float) -> dict[str, float]:
 
 
 def test_a_drift_is_named_before_the_share_that_was_followed() -> None:
-    drifted = FINE | {"reach.followed_share": 0.94, "asked_error_mm.max": 67.0,
-                      "reach.joint_share": 0.06}  # fmt: skip
+    drifted = FINE | {"reach.followed_share": 0.94, "asked_error_mm.max": 67.0, "reach.joint_share": 0.06}
     found = verdict_of(drifted)
-    assert found.text == (
-        "largest lag behind the hand 67 mm; followed 94 % of the time (6.0 % at a joint's end)"
-    )
+    assert found.text == ("largest lag behind the hand 67 mm; followed 94 % of the time (6.0 % at a joint's end)")
     assert found.worst == "asked_error_mm.max"
     assert not found.is_good
 
@@ -58,23 +55,27 @@ def test_a_drift_is_named_before_the_share_that_was_followed() -> None:
         ({"asked_error_mm.max": 12.0, "command_error_mm.max": 11.0}, None, "nothing"),  # filters
         ({"latency_ms.total.p99": 80.0}, "latency_ms.total.p99", "delay p99 80 ms"),
         ({"latency_ms.total.p99": 103.0, "latency_ms.asked.p99": 100.0}, None, "nothing"),
-        ({"latency_ms.total.p99": 130.0, "latency_ms.asked.p99": 100.0}, "latency_ms.total.p99",
-         "delay p99 130 ms, hand to setpoint, 100 ms of it asked for"),
+        (
+            {"latency_ms.total.p99": 130.0, "latency_ms.asked.p99": 100.0},
+            "latency_ms.total.p99",
+            "delay p99 130 ms, hand to setpoint, 100 ms of it asked for",
+        ),
         ({"topics.network/servo_cp.gaps": 1000}, None, "nothing"),  # losses that were asked for
         ({"ticks.made_up": 300}, "ticks.made_up", "300 control ticks made up late"),
         ({"ticks.dropped": 300}, "ticks.dropped", "300 control ticks never executed (3 %)"),
-        ({"topics.slave/servo_cp.gaps": 1000, "topics.slave/servo_cp.lost": 400}, "topics",
-         "1000 messages missing (10 %), 400 of them lost on the way"),
+        (
+            {"topics.slave/servo_cp.gaps": 1000, "topics.slave/servo_cp.lost": 400},
+            "topics",
+            "1000 messages missing (10 %), 400 of them lost on the way",
+        ),
         ({"topics.slave/servo_cp.gaps": 1000}, "topics", "1000 messages missing (10 %)"),
         ({"fixture.penetration_max_mm": 2.5}, "fixture.penetration_max_mm", "fixture penetration"),
         ({"position_error_mm.rms": 4.0}, "position_error_mm.rms", "tracking error 4 mm RMS"),
         (ports(40.0, 3.0, 11.0, 64.0), "passivity.slave.out_mj", "hand and slave gave 75 mJ, 32"),
         (ports(40.0, 3.0, 11.0, 32.5), None, "nothing"),  # what is lent
     ],
-)  # fmt: skip
-def test_whatever_is_worst_comes_first(
-    changes: dict[str, float], worst: str | None, text: str
-) -> None:
+)
+def test_whatever_is_worst_comes_first(changes: dict[str, float], worst: str | None, text: str) -> None:
     found = verdict_of(FINE | changes)
     assert found.worst == worst
     assert found.text.startswith(text)
@@ -88,11 +89,16 @@ def test_an_error_that_encoders_do_not_see_is_named_where_all_else_is_well() -> 
 
 def test_every_concern_says_what_it_means_and_what_to_do() -> None:
     wrong = {
-        "reach.followed_share": 0.5, "asked_error_mm.max": 60.0, "position_error_mm.rms": 9.0,
-        "latency_ms.total.p99": 80.0, "ticks.made_up": 3000, "ticks.dropped": 3000,
-        "topics.slave/servo_cp.gaps": 900, "fixture.penetration_max_mm": 9.0,
+        "reach.followed_share": 0.5,
+        "asked_error_mm.max": 60.0,
+        "position_error_mm.rms": 9.0,
+        "latency_ms.total.p99": 80.0,
+        "ticks.made_up": 3000,
+        "ticks.dropped": 3000,
+        "topics.slave/servo_cp.gaps": 900,
+        "fixture.penetration_max_mm": 9.0,
         "contact.feeding": 3,
-    }  # fmt: skip
+    }
     alone = [verdict_of(FINE | {key: value}) for key, value in wrong.items()]
     found = [*alone, verdict_of(FINE | ports(1.0, 1.0, 9.0, 9.0))]
     assert len({one.worst for one in found}) == len(found)
@@ -104,10 +110,9 @@ def test_every_concern_says_what_it_means_and_what_to_do() -> None:
     ("stages", "asked"),
     [
         ([], {"teleop.delays": ["slave/servo_cp@inverse_kinematics=0.1"]}),
-        (["network"], {"network.there.least_delay": 0.06,
-                       "teleop.delays": ["slave/servo_jp=0.04"]}),
+        (["network"], {"network.there.least_delay": 0.06, "teleop.delays": ["slave/servo_jp=0.04"]}),
     ],
-)  # fmt: skip
+)
 def test_a_delay_that_was_asked_for_is_no_concern(stages: list[str], asked: Any) -> None:
     score = tc.run("coarse_box", duration=4.0, stages=stages, settings=asked).score()
     values = score.to_dict()
@@ -138,16 +143,12 @@ def test_one_line_opens_table_json_page_and_python(drifting: Any, tmp_path: Path
     assert json.loads(paths[0].read_text())[0]["verdict"]["text"] == text
     page = paths[1].read_text()
     opening = page[: page.index("<details")]
-    assert f'<p class="verdict bad">{text}</p><p class="advice">{advice}</p>' in opening.replace(
-        "&#x27;", "'"
-    )
+    assert f'<p class="verdict bad">{text}</p><p class="advice">{advice}</p>' in opening.replace("&#x27;", "'")
     assert opening.count("<dd>") == 5
     assert text in repr(drifting.score())
 
 
-def test_rows_that_say_nothing_and_figures_nobody_compares_stay_out(
-    drifting: Any, tmp_path: Path
-) -> None:
+def test_rows_that_say_nothing_and_figures_nobody_compares_stay_out(drifting: Any, tmp_path: Path) -> None:
     shown = io.StringIO()
     evaluate_bags([drifting.path], None, tmp_path / "page.html", Console(file=shown, width=100))
     for absent in ("0/0/0", " – ", "slave outside", "Vongbunyong", "agrees"):
@@ -236,8 +237,6 @@ def test_a_fixture_that_is_not_scored_comes_before_whatever_else_is_wrong() -> N
         (2.4e-14, "0.000"), (-24.0671, "-24.07"), (None, "–"),
     ],
 )  # fmt: skip
-def test_numbers_have_four_digits_and_no_minus_before_nothing(
-    value: float | None, text: str
-) -> None:
+def test_numbers_have_four_digits_and_no_minus_before_nothing(value: float | None, text: str) -> None:
     assert number(value) == text
     assert fixed(-0.04, 1) == "0.0"

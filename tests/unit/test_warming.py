@@ -23,9 +23,7 @@ def running(scenario: str, name: str) -> Any:
 
 
 @pytest.mark.parametrize(("scenario", "name"), STAGES)
-def test_a_stage_that_was_warmed_up_goes_on_as_a_fresh_one_to_the_bit(
-    scenario: str, name: str
-) -> None:
+def test_a_stage_that_was_warmed_up_goes_on_as_a_fresh_one_to_the_bit(scenario: str, name: str) -> None:
     fresh, warm = running(scenario, name), running(scenario, name)
     warm_up(warm)
     assert warm.signals.tobytes() == fresh.signals.tobytes()
@@ -36,9 +34,7 @@ def test_a_stage_that_was_warmed_up_goes_on_as_a_fresh_one_to_the_bit(
         assert warm.signals.tobytes() == fresh.signals.tobytes()
 
 
-def test_what_is_drawn_ahead_is_drawn_before_the_first_tick(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_what_is_drawn_ahead_is_drawn_before_the_first_tick(monkeypatch: pytest.MonkeyPatch) -> None:
     operator = running("coarse_box", "operator")
     warm_up(operator)
     drawn: list[int] = []

@@ -92,9 +92,7 @@ def test_a_process_that_was_started_by_hand_has_no_parent(monkeypatch: pytest.Mo
     assert Parent.of_environment() is None
 
 
-def test_a_parent_that_does_not_listen_holds_nobody_up(
-    pair: tuple[socket.socket, socket.socket],
-) -> None:
+def test_a_parent_that_does_not_listen_holds_nobody_up(pair: tuple[socket.socket, socket.socket]) -> None:
     parent = Parent(pair[1])
     for _ in range(100_000):
         parent.tell("at work")
@@ -154,9 +152,7 @@ def share(chances: Chances, seconds: float = 2.0, period: float = 0.05) -> float
 ENDLESS, ASLEEP = "while True: pass", "import time; time.sleep(1000)"
 
 
-def test_a_process_that_gets_no_processor_has_no_chance(
-    processor: Callable[..., subprocess.Popen[str]],
-) -> None:
+def test_a_process_that_gets_no_processor_has_no_chance(processor: Callable[..., subprocess.Popen[str]]) -> None:
     starved = processor(ENDLESS, os.SCHED_IDLE)
     processor(ENDLESS)
     assert share(Chances(starved.pid)) < 0.3
@@ -189,9 +185,7 @@ def test_what_a_thread_runs_counts_though_it_waits_for_others_in_between(
     assert had > 0.7 * ran
 
 
-def test_who_looks_late_counts_a_fifth_of_a_second_alone(
-    processor: Callable[..., subprocess.Popen[str]],
-) -> None:
+def test_who_looks_late_counts_a_fifth_of_a_second_alone(processor: Callable[..., subprocess.Popen[str]]) -> None:
     chances = Chances(processor(ASLEEP).pid)
     chances.look()
     time.sleep(1.0)  # what is measured, not a wait

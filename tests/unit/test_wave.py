@@ -126,11 +126,7 @@ def shaken(rng: np.random.Generator, count: int = 3000) -> NDArray[np.int64]:
 
 
 def driven(
-    ways: Array,
-    there: NDArray[np.int64],
-    back: NDArray[np.int64],
-    stiffness: float = 200.0,
-    preload: float = 0.0,
+    ways: Array, there: NDArray[np.int64], back: NDArray[np.int64], stiffness: float = 200.0, preload: float = 0.0
 ) -> tuple[Array, Array, Array]:
     """Ports of hand and arm (N, columns), and what is seen, of :func:`drive`."""
     hand, arm = np.zeros((2, len(ways), len(ENERGY)))
@@ -218,9 +214,7 @@ def test_half_of_all_packets_lost_leave_no_drift_in_the_air() -> None:
 
 
 @pytest.mark.parametrize("delay", [1, 100])
-def test_a_hand_at_rest_feels_the_force_of_the_tip_and_a_spring_of_impedance_over_delay(
-    delay: int,
-) -> None:
+def test_a_hand_at_rest_feels_the_force_of_the_tip_and_a_spring_of_impedance_over_delay(delay: int) -> None:
     """At rest the tip stays behind the hand by force times delay over impedance."""
     ways = np.zeros((6000, 3))
     ways[:1000, 2] = -1.1e-5
@@ -235,8 +229,13 @@ def test_a_hand_at_rest_feels_the_force_of_the_tip_and_a_spring_of_impedance_ove
 def pressing(*texts: str, ticks: int = 12_000, scenario: str = "palpation") -> NDArray[np.void]:
     """Signals of ``palpation`` with waves and both stages."""
     stages = "teleop.stages=[network,passivity]"
-    settings = (stages, "feedback_timeout=1.0", "reach_force.is_on=false", "gimbal_noise=0.0",
-                "reflection.passivity=wave")  # fmt: skip
+    settings = (
+        stages,
+        "feedback_timeout=1.0",
+        "reach_force.is_on=false",
+        "gimbal_noise=0.0",
+        "reflection.passivity=wave",
+    )
     return VirtualTime(configure(scenario, settings=[*settings, *texts])).run(ticks)
 
 
@@ -311,10 +310,7 @@ def test_a_hand_that_moves_without_leading_feels_no_drag_and_sends_no_wave() -> 
         moved = np.array([1e-4, 0.0, 0.0])
         flow = np.array([0.0, 1e-3, 0.0])
         numbers = np.array([B])
-        wave_hand(
-            numbers, memory, still, moved, leads * moved, flow, np.zeros(len(ENERGY)), port, push,
-            1.0, DT,
-        )  # fmt: skip
+        wave_hand(numbers, memory, still, moved, leads * moved, flow, np.zeros(len(ENERGY)), port, push, 1.0, DT)
         assert push.any() == port[WAVE : WAVE + 3].any() == bool(leads)
     assert push[0] < 0.0
 

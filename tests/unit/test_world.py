@@ -38,9 +38,7 @@ def test_the_push_is_stiffness_times_depth_where_the_tip_is_truly() -> None:
     assert not push[:, 3:].any()
 
 
-def after_a_tick(
-    robot: tc.Robot, joints: Array, texts: list[str], plant: str = "ideal"
-) -> tuple[Array, Array]:
+def after_a_tick(robot: tc.Robot, joints: Array, texts: list[str], plant: str = "ideal") -> tuple[Array, Array]:
     """Speeds (n,) that an arm at rest has after a tick, and what its tip felt at its begin (3,)."""
     zero = [0.0] * robot.n
     settings = [f"robot={robot.name}", f"plant={plant}", f"slave_sim.coulomb={zero}", *texts]
@@ -59,8 +57,13 @@ def test_every_arm_is_accelerated_by_the_transposed_jacobian_of_the_push(name: s
     way /= np.linalg.norm(way)
     pressed = robot.start + 1e-3 * np.linalg.pinv(J) @ way
     ball = robot.fk(robot.start)[:3, 3] + 0.0052 * way  # its surface is 0.2 mm ahead of the start
-    texts = ["world=sphere", f"world.place={ball.tolist()}", "world.sphere.radius=0.005",
-             "world.material=own", "world.stiffness=500.0"]  # fmt: skip
+    texts = [
+        "world=sphere",
+        f"world.place={ball.tolist()}",
+        "world.sphere.radius=0.005",
+        "world.material=own",
+        "world.stiffness=500.0",
+    ]
     free, _ = after_a_tick(robot, pressed, [])
     pushed, force = after_a_tick(robot, pressed, texts)
     assert force @ way == pytest.approx(-0.4, rel=0.05)
@@ -78,9 +81,7 @@ def test_the_plant_that_is_the_machine_feels_the_push_behind_its_gears() -> None
     center = (robot.fk(robot.start)[:3, 3] - [0.0, 0.0, 0.0155]).tolist()
     down = robot.start + 1e-3 * np.linalg.pinv(robot.jacobian(robot.start)[:3])[:, 2] * -2.0
     texts = ["world=box", f"world.place={center}"]
-    (free, _), (pushed, force) = (
-        after_a_tick(robot, down, more, "hardware") for more in ([], texts)
-    )
+    (free, _), (pushed, force) = (after_a_tick(robot, down, more, "hardware") for more in ([], texts))
     assert force[2] > 0.05
     assert np.abs(pushed - free).max() > 1e-9
 
@@ -100,9 +101,7 @@ def test_a_contact_gives_back_no_more_than_it_took(material: str) -> None:
     """Of the work of the push on the tip, from a moment without touch on."""
     top = -0.0801 + 4.0 / MATERIALS[material].stiffness  # pressed with some 4 N
     place = f"world.place={[*BLOCK[:2], top - 0.015]}"
-    rows = pressed(
-        f"world.material={material}", place, "reflection.architecture=unilateral", seconds=10.0
-    )
+    rows = pressed(f"world.material={material}", place, "reflection.architecture=unilateral", seconds=10.0)
     force, tip = rows["slave_measured_cf"][:, :3], rows["slave_true_cp"][:, :3]
     assert not force[0].any()
     assert 2.0 < force[:, 2].max() < 8.0
@@ -114,9 +113,14 @@ def test_a_contact_gives_back_no_more_than_it_took(material: str) -> None:
 
 
 def test_dry_friction_holds_a_tip_that_is_dragged_less_than_it_carries() -> None:
-    texts = ("world.material=own", "world.stiffness=1000.0", "reflection.architecture=unilateral",
-             "operator.kind=circle", "operator.size=[0.004,0.0,0.004]",
-             "operator.center=[0.0,-0.04,0.04]")  # fmt: skip
+    texts = (
+        "world.material=own",
+        "world.stiffness=1000.0",
+        "reflection.architecture=unilateral",
+        "operator.kind=circle",
+        "operator.size=[0.004,0.0,0.004]",
+        "operator.center=[0.0,-0.04,0.04]",
+    )
     slips = {}
     for friction in (0.0, 2.0):
         rows = pressed(f"world.friction_coefficient={friction}", *texts)
@@ -142,8 +146,13 @@ def test_an_object_that_the_tip_begins_in_is_refused_with_its_depth() -> None:
 
 
 def test_the_hand_feels_the_push_along_its_own_axes_and_no_more_than_asked() -> None:
-    rows = pressed("world.stiffness=2000.0", "world.material=own", "reflection.max_force=1.0",
-                   "position_force.force_gain=0.5", "reach_force.is_on=false")  # fmt: skip
+    rows = pressed(
+        "world.stiffness=2000.0",
+        "world.material=own",
+        "reflection.max_force=1.0",
+        "position_force.force_gain=0.5",
+        "reach_force.is_on=false",
+    )
     push, force = rows["slave_measured_cf"][:-1], rows["master_servo_cf"][1:]
     asked = 0.5 * np.column_stack((-push[:, 1], push[:, 2], -push[:, 0]))
     length = np.linalg.norm(asked, axis=1, keepdims=True)
@@ -153,10 +162,16 @@ def test_the_hand_feels_the_push_along_its_own_axes_and_no_more_than_asked() -> 
 
 def swing(stiffness: float, delay: float, passivity: str = "none") -> float:
     """Fastest that the hand gets [m/s] where it presses a block whose force comes late."""
-    texts = ["world.material=own", f"world.stiffness={stiffness}", "world.damping=0.0",
-             "world.friction_coefficient=0.0", "reflection.max_force=10.0", "feedback_timeout=1.0",
-             f"reflection.passivity={passivity}",
-             f"delays=[slave/measured_cf@motion_scaling={delay}]"]  # fmt: skip
+    texts = [
+        "world.material=own",
+        f"world.stiffness={stiffness}",
+        "world.damping=0.0",
+        "world.friction_coefficient=0.0",
+        "reflection.max_force=10.0",
+        "feedback_timeout=1.0",
+        f"reflection.passivity={passivity}",
+        f"delays=[slave/measured_cf@motion_scaling={delay}]",
+    ]
     places = pressed(*texts)["master_measured_cp"][:, :3]
     return np.linalg.norm(places[20:] - places[:-20], axis=1).max() / 0.02
 
@@ -170,9 +185,7 @@ def test_late_force_of_something_stiff_throws_the_hand_and_that_of_tissue_never_
 def test_a_tank_keeps_late_force_of_something_stiff_from_throwing_the_hand() -> None:
     calm = swing(200.0, 0.001)
     for stiffness in (1000.0, 20_000.0):
-        assert all(
-            swing(stiffness, delay, "tank") < 2.0 * calm for delay in (0.001, 0.02, 0.1, 0.3)
-        )
+        assert all(swing(stiffness, delay, "tank") < 2.0 * calm for delay in (0.001, 0.02, 0.1, 0.3))
 
 
 def test_with_a_tank_no_touch_gives_back_more_than_it_took_and_pressing_feels_the_same() -> None:
@@ -190,20 +203,27 @@ def test_with_a_tank_no_touch_gives_back_more_than_it_took_and_pressing_feels_th
 
 @settings(max_examples=6, deadline=None, derandomize=True)
 @given(
-    stiffness=st.floats(100.0, 50_000.0), delay=st.sampled_from([0.001, 0.02, 0.1, 0.35]),
-    gain=st.floats(0.3, 5.0), kind=st.sampled_from(["line", "human", "circle"]),
-)  # fmt: skip
+    stiffness=st.floats(100.0, 50_000.0),
+    delay=st.sampled_from([0.001, 0.02, 0.1, 0.35]),
+    gain=st.floats(0.3, 5.0),
+    kind=st.sampled_from(["line", "human", "circle"]),
+)
 def test_a_tank_is_passive_but_for_a_step_of_the_reading_whatever_is_touched(
     stiffness: float, delay: float, gain: float, kind: str
 ) -> None:
     """By what the tank can know: forces that were asked for, and places that were read."""
     rows = pressed(
-        "reflection.passivity=tank", f"reflection.position_force.force_gain={gain}",
-        "world.damping=0.0", "world.material=own", f"world.stiffness={stiffness}",
+        "reflection.passivity=tank",
+        f"reflection.position_force.force_gain={gain}",
+        "world.damping=0.0",
+        "world.material=own",
+        f"world.stiffness={stiffness}",
         "reach_force.is_on=false",
-        f"delays=[slave/measured_cf@motion_scaling={delay}]", "feedback_timeout=1.0",
-        f"operator.kind={kind}", seconds=3.0,
-    )  # fmt: skip
+        f"delays=[slave/measured_cf@motion_scaling={delay}]",
+        "feedback_timeout=1.0",
+        f"operator.kind={kind}",
+        seconds=3.0,
+    )
     force: Any
     force, place = rows["master_servo_cf"][:-1, :3], rows["master_measured_cp"][:, :3]
     steps = np.diff(place, axis=0)

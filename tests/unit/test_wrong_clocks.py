@@ -51,9 +51,7 @@ def memory() -> Iterator[None]:
 
 
 @pytest.mark.parametrize("late", LATER)
-def test_a_late_last_stamp_is_left_out_of_the_replay_and_told(
-    session: tc.Recording, late: str
-) -> None:
+def test_a_late_last_stamp_is_left_out_of_the_replay_and_told(session: tc.Recording, late: str) -> None:
     with pytest.warns(UserWarning, match="its 1 samples more than 60 s apart"):
         again = tc.replay(moved(session, LATER[late]))
     assert again.duration == pytest.approx(session.duration, abs=2.5)
@@ -80,9 +78,7 @@ def test_a_stamp_in_the_middle_that_is_late_does_not_move_the_others(session: tc
     assert again.duration == pytest.approx(session.duration, abs=2.5)
 
 
-def test_a_hand_that_rests_for_most_of_a_minute_is_replayed_through_the_rest(
-    tmp_path: Path,
-) -> None:
+def test_a_hand_that_rests_for_most_of_a_minute_is_replayed_through_the_rest(tmp_path: Path) -> None:
     stamps = np.array([0, 1, 2, 50_000, 50_001]) * 1_000_000
     assert replayed_span(tmp_path, MASTER_MEASURED_CP.name, stamps) == (0, 50_001_000_000)
 

@@ -22,19 +22,13 @@ PARTS = f"""<robot {XMLNS}>
 
 
 def arm(
-    folder: Path,
-    include: str = "$(find some_arm)/urdf/parts.xacro",
-    place: str = '<xacro:place x="${0.03 - 0.03}"/>',
+    folder: Path, include: str = "$(find some_arm)/urdf/parts.xacro", place: str = '<xacro:place x="${0.03 - 0.03}"/>'
 ) -> Path:
     """The example as a macro file of a package, with its shoulder from an included file."""
     (folder / "some_arm" / "urdf").mkdir(parents=True)
     text = EXAMPLE.read_text()
     assert SHOULDER in text
-    head, body = (
-        text.replace(SHOULDER, f'<child link="upper_arm"/>{place}')
-        .partition("<robot")[2]
-        .split(">", 1)
-    )
+    head, body = text.replace(SHOULDER, f'<child link="upper_arm"/>{place}').partition("<robot")[2].split(">", 1)
     name = f'<xacro:arg name="prefix" default=""/><xacro:include filename="{include}"/>'
     body = body.replace('"shoulder"', '"$(arg prefix)shoulder"')
     path = folder / "some_arm" / "urdf" / "arm.urdf.xacro"
@@ -96,9 +90,7 @@ def test_packages_are_found_where_meshes_are_and_xacro_is_left_as_it_was(
         ("<x a=\"${xacro.load_yaml('$(find nowhere)/a.yaml')}\"/>", "package is 'nowhere'"),
     ],
 )
-def test_a_mistake_in_a_xacro_is_told_in_one_line_that_names_the_file(
-    place: str, word: str, tmp_path: Path
-) -> None:
+def test_a_mistake_in_a_xacro_is_told_in_one_line_that_names_the_file(place: str, word: str, tmp_path: Path) -> None:
     path = arm(tmp_path, place=place)
     with pytest.raises(ParameterError) as told:
         load_robot(str(path), tip="tool0")

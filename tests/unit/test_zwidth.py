@@ -9,14 +9,7 @@ from teleop_lab import experiments
 from teleop_lab.experiments import zwidth
 from teleop_lab.experiments.one_axis import Grip, exact_boundary, sampled_boundary
 from teleop_lab.experiments.outcome import Outcome, Row
-from teleop_lab.experiments.sampled_wall import (
-    Loop,
-    Wall,
-    is_restless,
-    passive_boundary,
-    press_energy,
-    wall_growth,
-)
+from teleop_lab.experiments.sampled_wall import Loop, Wall, is_restless, passive_boundary, press_energy, wall_growth
 from teleop_lab.experiments.stability import GRIPS
 
 PUSHES = [1.0 + share / 8.0 for share in range(1, 8)]
@@ -41,9 +34,7 @@ def test_our_device_stands_a_late_wall_as_the_linear_law_says(outcome: Outcome) 
 
 
 @pytest.mark.parametrize("damping", zwidth.WALL_DAMPINGS)
-def test_our_device_stands_the_wall_of_the_exact_axis_with_a_damper_too(
-    outcome: Outcome, damping: float
-) -> None:
+def test_our_device_stands_the_wall_of_the_exact_axis_with_a_damper_too(outcome: Outcome, damping: float) -> None:
     found = rows(outcome, "exact sampled axis", f"B = {damping:g}")
     assert len(found) == len(zwidth.LATE)
     assert all(abs(present(row.difference)) < 0.02 * present(row.published) for row in found)
@@ -66,20 +57,14 @@ def test_more_delay_never_allows_a_stiffer_wall(outcome: Outcome) -> None:
 @pytest.mark.parametrize("damping", zwidth.WALL_DAMPINGS)
 def test_a_wall_swings_up_above_the_exact_boundary_and_down_below_it(damping: float) -> None:
     exact = sampled_boundary(zwidth.BARE, 1, damping)
-    below, above = (
-        wall_growth(zwidth.BARE, Wall(share * exact, damping, 1)) for share in (0.98, 1.02)
-    )
+    below, above = (wall_growth(zwidth.BARE, Wall(share * exact, damping, 1)) for share in (0.98, 1.02))
     assert below < 0.0 < above
 
 
 @pytest.mark.parametrize("grip", GRIPS.values(), ids=GRIPS)
 @pytest.mark.parametrize("late", [0, 1, 20, 100])
-def test_a_sampled_axis_has_the_boundary_of_one_that_is_late_by_half_a_tick_more(
-    grip: Grip, late: int
-) -> None:
-    assert sampled_boundary(grip, late) == pytest.approx(
-        exact_boundary(grip, 1e-3 * late), rel=0.02
-    )
+def test_a_sampled_axis_has_the_boundary_of_one_that_is_late_by_half_a_tick_more(grip: Grip, late: int) -> None:
+    assert sampled_boundary(grip, late) == pytest.approx(exact_boundary(grip, 1e-3 * late), rel=0.02)
 
 
 # Energy.
@@ -92,9 +77,7 @@ def test_a_passive_wall_gives_no_energy_in_any_press_and_a_stiffer_one_does(
 ) -> None:
     law = zwidth.passive_law(damping, wall_damping)
     soft, stiff = (
-        max(
-            press_energy(damping, Wall(stiffness, wall_damping), n, speed) for n in (1, 2, 3, 7, 30)
-        )
+        max(press_energy(damping, Wall(stiffness, wall_damping), n, speed) for n in (1, 2, 3, 7, 30))
         for stiffness in (0.98 * law, 1.02 * law + 20.0)
     )
     assert soft < 0.0 < stiff
@@ -119,9 +102,7 @@ def test_a_wall_gives_energy_long_before_it_diverges() -> None:
 
 
 @pytest.mark.parametrize(("friction", "resolution"), zwidth.DEVICES)
-def test_friction_holds_a_device_between_steps_up_to_its_law(
-    friction: float, resolution: float
-) -> None:
+def test_friction_holds_a_device_between_steps_up_to_its_law(friction: float, resolution: float) -> None:
     law = zwidth.quiet_law(friction, resolution)
     below, above = Wall(0.97 * law), Wall(1.03 * law)
     assert not any(is_restless(below, friction, resolution, push) for push in PUSHES)

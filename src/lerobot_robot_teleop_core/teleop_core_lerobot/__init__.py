@@ -72,13 +72,23 @@ def _give_force(p: Any, s: GivenForce, row: GivenForceRow, dt: float) -> None:
 
 
 GIVEN_JOINTS = tc.Stage(
-    "given_joints", tc.RobotParameters, reads=(SLAVE_SERVO_JP,), writes=(GIVEN_JP,),
-    step=_give_joints, state=GivenJoints, replaces=SLAVE_SERVO_JP,
-)  # fmt: skip
+    "given_joints",
+    tc.RobotParameters,
+    reads=(SLAVE_SERVO_JP,),
+    writes=(GIVEN_JP,),
+    step=_give_joints,
+    state=GivenJoints,
+    replaces=SLAVE_SERVO_JP,
+)
 GIVEN_FORCE = tc.Stage(
-    "given_force", tc.NoParameters, reads=(SLAVE_MEASURED_CF,), writes=(GIVEN_CF,),
-    step=_give_force, state=GivenForce, replaces=SLAVE_MEASURED_CF,
-)  # fmt: skip
+    "given_force",
+    tc.NoParameters,
+    reads=(SLAVE_MEASURED_CF,),
+    writes=(GIVEN_CF,),
+    step=_give_force,
+    state=GivenForce,
+    replaces=SLAVE_MEASURED_CF,
+)
 for _stage in (GIVEN_JOINTS, GIVEN_FORCE):
     tc.register_stage(_stage, replace=True)
 
@@ -102,14 +112,11 @@ class Side:
     """
 
     def __init__(
-        self, stage: tc.Stage, robot: str, scenario: str, settings: Sequence[str], fps: int,
-        bag: str = "",
-    ) -> None:  # fmt: skip
+        self, stage: tc.Stage, robot: str, scenario: str, settings: Sequence[str], fps: int, bag: str = ""
+    ) -> None:
         if not 1 <= fps <= 1000:
             raise tc.ParameterError("fps", fps, "1 to 1000 calls in a second")
-        self._configuration = tc.configuration(
-            scenario or None, robot=robot or None, stages=stage, texts=settings
-        )
+        self._configuration = tc.configuration(scenario or None, robot=robot or None, stages=stage, texts=settings)
         arms, stages = self._configuration.graph.arms, self._configuration.graph.stages
         if stage not in stages or len(arms) > 1:
             needed = f"one arm, with {stage.name} among teleop.stages"
@@ -186,9 +193,8 @@ class SlaveSide(Side):
     """
 
     def __init__(
-        self, robot: str = "", scenario: str = "", settings: Sequence[str] = (), fps: int = 30,
-        bag: str = "",
-    ) -> None:  # fmt: skip
+        self, robot: str = "", scenario: str = "", settings: Sequence[str] = (), fps: int = 30, bag: str = ""
+    ) -> None:
         super().__init__(GIVEN_JOINTS, robot, scenario, settings, fps, bag)
 
     @property
@@ -238,9 +244,8 @@ class MasterSide(Side):
     feedback_keys = _FORCE
 
     def __init__(
-        self, robot: str = "", scenario: str = "", settings: Sequence[str] = (), fps: int = 30,
-        bag: str = "",
-    ) -> None:  # fmt: skip
+        self, robot: str = "", scenario: str = "", settings: Sequence[str] = (), fps: int = 30, bag: str = ""
+    ) -> None:
         super().__init__(GIVEN_FORCE, robot, scenario, settings, fps, bag)
 
     def next_action(self) -> dict[str, float]:

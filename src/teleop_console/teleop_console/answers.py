@@ -74,10 +74,12 @@ class Answers:
         self._heard: deque[str | None] = deque(maxlen=100)  # presses, by their names
         self.start = StartPage(drivers)
         self._paths: dict[str, Callable[[Request], Response]] = {
-            "/alive": self._alive, "/stop": self._stop,
-            "/teleop.js": _script, "/teleop.css": _style,
+            "/alive": self._alive,
+            "/stop": self._stop,
+            "/teleop.js": _script,
+            "/teleop.css": _style,
             **dict.fromkeys(self.start.paths, self._start),
-        }  # fmt: skip
+        }
 
     def name(self, page: int) -> str:
         """Name by which a page gives signs of life; a new one each time."""

@@ -40,20 +40,21 @@ class Console:
     """
 
     def __init__(
-        self, server: ConsoleServer, link: Link,
+        self,
+        server: ConsoleServer,
+        link: Link,
         renew: Renew | None = None,
         of_session: Parameters | None = None,
         *,
         can_end: bool = False,
-    ) -> None:  # fmt: skip
+    ) -> None:
         self._server, self._link, drivers = server, link, server.drivers
         self._can_end = can_end
         theme(server.viser, is_dark=False)
         self.scene = Scene(server.viser, link.arms)
         self.stylus = Stylus(
-            server.viser, self.scene, on_hold=link.hold, on_let_go=self._let_go,
-            may_drive=drivers.hold,
-        )  # fmt: skip
+            server.viser, self.scene, on_hold=link.hold, on_let_go=self._let_go, may_drive=drivers.hold
+        )
         drivers.is_for_all = not link.is_live
         self._failed = set[str]()
         self.panel = Panel(server.viser, link, drivers, renew, of_session)

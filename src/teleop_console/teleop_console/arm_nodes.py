@@ -151,9 +151,7 @@ class ArmNodes:
         self._draw_ghost(view)
         self._draw_paths(time, view)
         force = view.get(MASTER_MEASURED_CF)
-        felt = self.master.draw(
-            time, view.get(MASTER_MEASURED_CP), None if force is None else force[:3]
-        )
+        felt = self.master.draw(time, view.get(MASTER_MEASURED_CP), None if force is None else force[:3])
         self._draw_fixture(view, is_touched=felt > _TOUCH)
         push = view.get(SLAVE_MEASURED_CF)
         self.world.draw(self._poses[-1][:3], None if push is None else push[:3])
@@ -170,9 +168,10 @@ class ArmNodes:
     def _draw_paths(self, time: float, view: ArmView) -> None:
         if self.recorded_path is not None and is_jump(self._last, time):
             for tail, topic in (
-                (self.measured, SLAVE_MEASURED_CP), (self.reference, SLAVE_SETPOINT_CP),
+                (self.measured, SLAVE_MEASURED_CP),
+                (self.reference, SLAVE_SETPOINT_CP),
                 (self.master.tail, MASTER_MEASURED_CP),
-            ):  # fmt: skip
+            ):
                 times, rows = self.recorded_path(topic, self._name, LENGTH)
                 tail.fill(times, rows[:, :3])
         self._last = time

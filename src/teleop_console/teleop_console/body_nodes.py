@@ -27,13 +27,7 @@ class BodyNodes:
     """
 
     def __init__(
-        self,
-        server: viser.ViserServer,
-        path: str,
-        bodies: Bodies,
-        looks: Mapping[int, Mesh],
-        *,
-        is_ghost: bool = False,
+        self, server: viser.ViserServer, path: str, bodies: Bodies, looks: Mapping[int, Mesh], *, is_ghost: bool = False
     ) -> None:
         axis = 0.08 * bodies.size
         self._server, self._path, self._bodies = server, path, bodies
@@ -73,9 +67,12 @@ class BodyNodes:
             if body not in self._halos:
                 self._halos[body] = self._server.scene.add_icosphere(
                     f"{self._path}/{self._bodies.bodies[body].name}/limit",
-                    radius=_HALO * self._bodies.size, color=HELD, opacity=0.35,
-                    cast_shadow=False, receive_shadow=False,
-                )  # fmt: skip
+                    radius=_HALO * self._bodies.size,
+                    color=HELD,
+                    opacity=0.35,
+                    cast_shadow=False,
+                    receive_shadow=False,
+                )
             self._halos[body].visible = body in bodies
         self._marked = bodies
 
@@ -113,10 +110,15 @@ def _add_mesh(
 ) -> viser.MeshHandle:
     vertices, faces = mesh
     return server.scene.add_mesh_simple(
-        f"{path}/{role}", vertices.astype(np.float32), faces.astype(np.uint32),
-        color=WANTED if is_ghost else ROLES[role], opacity=0.3 if is_ghost else opacity,
-        flat_shading=is_flat, cast_shadow=False, receive_shadow=False,
-    )  # fmt: skip
+        f"{path}/{role}",
+        vertices.astype(np.float32),
+        faces.astype(np.uint32),
+        color=WANTED if is_ghost else ROLES[role],
+        opacity=0.3 if is_ghost else opacity,
+        flat_shading=is_flat,
+        cast_shadow=False,
+        receive_shadow=False,
+    )
 
 
 def extent(bodies: Bodies, joints: Array) -> tuple[Array, Array]:

@@ -87,13 +87,18 @@ FIELDS = (
     Field("operator", "Operator", "the scenario's own, simulated", "operator", _operators),
     Field("robot", "Robot", _OF_SCENARIO, "robot", _named(ROBOTS)),
     Field("task", "Task", _OF_SCENARIO, "task.kind", _named(TASKS), "task"),
-    Field("network", "Network", _OF_SCENARIO, "network.preset",
-          _declared("network", "preset"), "network"),
-    Field("passivity", "Passivity", _OF_SCENARIO, "reflection.passivity",
-          _declared("motion_scaling", "reflection.passivity"), "passivity"),
+    Field("network", "Network", _OF_SCENARIO, "network.preset", _declared("network", "preset"), "network"),
+    Field(
+        "passivity",
+        "Passivity",
+        _OF_SCENARIO,
+        "reflection.passivity",
+        _declared("motion_scaling", "reflection.passivity"),
+        "passivity",
+    ),
     Field("controller", "Control law", _OF_SCENARIO, "controller.kind", _named(CONTROLLERS)),
     Field("plant", "Plant", _OF_SCENARIO, "plant.kind", _named(PLANTS)),
-)  # fmt: skip
+)
 """All that is chosen, in the order of the page."""
 FOLLOWED, TIP = "followed", "tip"
 """Further words: the file that an operator ``bag`` or ``file`` follows; the tip of a URDF."""

@@ -37,9 +37,7 @@ def add(commands: Any) -> None:
     parser.add_argument("--attach", action="store_true", help="show a session that runs already")
     parser.add_argument("--domain", type=int, metavar="N", help="its ROS domain, for --attach")
     parser.add_argument("--port", type=int, default=8080, help="port of the page (default: 8080)")
-    parser.add_argument(
-        "--host", default="127.0.0.1", help="address to serve at (default: this machine alone)"
-    )
+    parser.add_argument("--host", default="127.0.0.1", help="address to serve at (default: this machine alone)")
     parser.add_argument("--token", default="", help="secret of the page (default: made for --host)")
     parser.add_argument("--no-browser", action="store_true", help="open no browser")
     parser.add_argument("--scenario", help="one of `teleop scenarios`, with a person as its hand")

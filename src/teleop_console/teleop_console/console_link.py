@@ -69,9 +69,7 @@ class _Seen:
         if newest is None:
             self._find_another()
             return False
-        found: Any = self._layout.decode_one(newest) or read_any(
-            self.topic.kind, newest, self._joints
-        )
+        found: Any = self._layout.decode_one(newest) or read_any(self.topic.kind, newest, self._joints)
         if not isinstance(found, tuple) or not np.isfinite(found[1]).all():
             return False  # refused and counted by the nodes that need it
         view.stamp_ns[self.topic.name], view.streams[self.topic.name] = found[0], found[1].copy()
@@ -108,9 +106,13 @@ class LiveLink(Observer):
     is_live = True
 
     def __init__(
-        self, domain: int, title: str = "", patience: float = PATIENCE,
-        button: StopButton | None = None, world: World = ROS,
-    ) -> None:  # fmt: skip
+        self,
+        domain: int,
+        title: str = "",
+        patience: float = PATIENCE,
+        button: StopButton | None = None,
+        world: World = ROS,
+    ) -> None:
         super().__init__(domain, "teleop_console", button, world, start_parameter_services=False)
         self.domain = domain
         self._executor = self.world.executor()
@@ -152,8 +154,7 @@ class LiveLink(Observer):
         end, suffix, names = _now(self) + patience, f"/{SLAVE_OPERATION.name}", set[str]()
         while not names:
             topics = self.ros.get_topic_names_and_types()
-            names = {name.removesuffix(suffix).strip("/") for name, _ in topics
-                     if name.endswith(suffix)}  # fmt: skip
+            names = {name.removesuffix(suffix).strip("/") for name, _ in topics if name.endswith(suffix)}
             if not names and _now(self) > end:
                 raise SessionError(
                     f"no arm answers on ROS domain {self.domain}; `teleop live` says which is its "
@@ -231,9 +232,7 @@ class LiveLink(Observer):
         if recorder is not None and recorder.values.get("out"):
             is_recording = recorder.number("is_recording") > 0
             view.recording = Path(recorder.values["out"]) if is_recording else None
-        view.news = tuple(
-            f"{name}: {s.message}" for name, s in self.statuses.items() if s.level >= WARNING
-        )
+        view.news = tuple(f"{name}: {s.message}" for name, s in self.statuses.items() if s.level >= WARNING)
         slave = self.statuses.get("/".join(filter(None, (self.arms[0].name, "slave"))))
         if slave is not None:
             unknown = "delay_ms.median" not in slave.values
@@ -278,9 +277,7 @@ class LiveLink(Observer):
         """All parameters of all nodes, asked for anew."""
         found: dict[tuple[str, str], ParameterInfo] = {}
         services = [name for name, _ in self.ros.get_service_names_and_types()]
-        for node in sorted(
-            name.removesuffix(_LIST).strip("/") for name in services if name.endswith(_LIST)
-        ):
+        for node in sorted(name.removesuffix(_LIST).strip("/") for name in services if name.endswith(_LIST)):
             with suppress(SessionError):  # it may be leaving
                 found |= {(node, name): info for name, info in self._client.read(node).items()}
         self._known = found
@@ -316,9 +313,7 @@ class LiveLink(Observer):
         if recording is None:
             raise SessionError("nothing is being recorded")
         if not _NAME.fullmatch(name):
-            raise ParameterError(
-                "name", name, "letters, digits, '.', '_' and '-', no more than 100"
-            )
+            raise ParameterError("name", name, "letters, digits, '.', '_' and '-', no more than 100")
         wanted = recording.with_name(name)
         if wanted.exists():
             raise ParameterError("name", name, f"a new one; {wanted} exists already")
@@ -344,9 +339,7 @@ class _Hand:
         self._world = owner.world
         self._lock, self._pressing = self._world.lock(), self._world.lock()
         self._publishers = [
-            owner.ros.create_publisher(
-                message_type(topic.kind.ros_type), f"/{topic.of_arm(arm).name}", Qos(depth=10)
-            )
+            owner.ros.create_publisher(message_type(topic.kind.ros_type), f"/{topic.of_arm(arm).name}", Qos(depth=10))
             for topic in (OPERATOR_SERVO_CP, OPERATOR_BUTTONS)
         ]
 

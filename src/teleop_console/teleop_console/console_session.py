@@ -57,9 +57,8 @@ class ConsoleSession:
     """
 
     def __init__(
-        self, configuration: Configuration, out: Path, say: Callable[[str], None],
-        without: Collection[str] = (),
-    ) -> None:  # fmt: skip
+        self, configuration: Configuration, out: Path, say: Callable[[str], None], without: Collection[str] = ()
+    ) -> None:
         self.domain = int(environment()["ROS_DOMAIN_ID"])
         self._configuration, self._out, self._without = configuration, out, without
         self._console = Console(file=_Lines(say), width=200)  # type: ignore[arg-type]
@@ -78,10 +77,14 @@ class ConsoleSession:
     def _run(self) -> None:
         try:
             live(
-                self._configuration, self._out, self._console,
-                processes=Processes.ONE, without=self._without, interrupt=self._interrupt,
+                self._configuration,
+                self._out,
+                self._console,
+                processes=Processes.ONE,
+                without=self._without,
+                interrupt=self._interrupt,
                 domain=self.domain,
-            )  # fmt: skip
+            )
         except TeleopError as error:
             if not self._interrupt.has_come:
                 self._error = str(error)

@@ -88,24 +88,19 @@ def _is_alive(name: str, view: View) -> bool:
 
 
 def _built_in(
-    name: str, hint: str, act: Callable[[Link, str], Answers],
-    text: Callable[[ArmView], str] | None = None,
-) -> Control:  # fmt: skip
+    name: str, hint: str, act: Callable[[Link, str], Answers], text: Callable[[ArmView], str] | None = None
+) -> Control:
     known = None if name == "Initialize" else partial(_is_alive, name)
     return Control(name, hint, act, "stylus" if text else "", text, known)
 
 
-INITIALIZE = _built_in(
-    "Initialize", "release, reset, enable and home", commands("reset", "enable", "home")
-)
+INITIALIZE = _built_in("Initialize", "release, reset, enable and home", commands("reset", "enable", "home"))
 START = _built_in("Start", "follow the stylus", commands("enable"))
 PAUSE = _built_in("Pause", "hold still until Start", commands("pause"))
 HOME = _built_in("Home", "move smoothly to the home posture", commands("home"))
 RELEASE = _built_in("Release", "lets the emergency stop go; then Initialize", _release)
 MODE = _built_in("mode", "the mode button of the stylus", _pressed("mode"), mode_text)
-FIXTURE = _built_in(
-    "fixture", "the fixture button of the stylus", _pressed("fixture"), fixture_text
-)
+FIXTURE = _built_in("fixture", "the fixture button of the stylus", _pressed("fixture"), fixture_text)
 
 
 def _checked(name: str, part: object) -> Control:

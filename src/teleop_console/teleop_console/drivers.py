@@ -27,9 +27,7 @@ class Drivers:
         clock: Monotonic time [s].
     """
 
-    def __init__(
-        self, patience: float = PATIENCE, clock: Callable[[], float] = time.monotonic
-    ) -> None:
+    def __init__(self, patience: float = PATIENCE, clock: Callable[[], float] = time.monotonic) -> None:
         self._patience, self._clock = patience, clock
         self._lock = threading.RLock()
         self._heard: dict[int, float] = {}

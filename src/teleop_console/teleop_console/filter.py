@@ -154,9 +154,7 @@ class Filter:
         refused: How often a message was refused, by the reason.
     """
 
-    def __init__(
-        self, elements: Elements, may_drive: Callable[[int], bool], say: Callable[[str], None]
-    ) -> None:
+    def __init__(self, elements: Elements, may_drive: Callable[[int], bool], say: Callable[[str], None]) -> None:
         self._elements, self._may_drive, self._say = elements, may_drive, say
         self._lock = threading.Lock()
         self.refused: Counter[str] = Counter()

@@ -98,10 +98,15 @@ class OutlineNode:
         color = WRONG if is_touched else GOOD
         if self.line is None or look != self._look:
             self.line = self._server.scene.add_line_segments(
-                self._name, unit_outline(look).astype(np.float32), color, thickness=2.0,
-                thickness_units="screen", wxyz=self._turn, position=center,
+                self._name,
+                unit_outline(look).astype(np.float32),
+                color,
+                thickness=2.0,
+                thickness_units="screen",
+                wxyz=self._turn,
+                position=center,
                 scale=tuple(scale.tolist()),
-            )  # fmt: skip
+            )
             self._look, self._scale = look, scale
         if np.abs(self.line.position - center).max() > _STILL:
             self.line.position = center

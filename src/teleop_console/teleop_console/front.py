@@ -56,9 +56,8 @@ class Front:
     """
 
     def __init__(
-        self, opened: socket.socket, paths: frozenset[str], answer: Answer,
-        slow: frozenset[str] = frozenset(),
-    ) -> None:  # fmt: skip
+        self, opened: socket.socket, paths: frozenset[str], answer: Answer, slow: frozenset[str] = frozenset()
+    ) -> None:
         self._opened, self._paths, self._answer, self._slow = opened, paths, answer, slow
         self._line: queue.Queue[tuple[socket.socket, bytes] | None] = queue.Queue(_LINE)
         threading.Thread(target=self._work, name="console start", daemon=True).start()

@@ -46,10 +46,12 @@ class History:
         row, n = self._rows[self._next], self.arm.robot.n
         row[:] = np.nan
         for name, topic, width in (
-            ("wanted", topics.SLAVE_SETPOINT_JS, n), ("joints", topics.SLAVE_MEASURED_JS, n),
-            ("reference", topics.SLAVE_SERVO_CP, 3), ("place", topics.SLAVE_MEASURED_CP, 3),
+            ("wanted", topics.SLAVE_SETPOINT_JS, n),
+            ("joints", topics.SLAVE_MEASURED_JS, n),
+            ("reference", topics.SLAVE_SERVO_CP, 3),
+            ("place", topics.SLAVE_MEASURED_CP, 3),
             ("force", topics.MASTER_MEASURED_CF, 3),
-        ):  # fmt: skip
+        ):
             values = view.get(topic)
             if values is not None:
                 row[self._columns[name]] = values[:width]
@@ -121,9 +123,10 @@ class LiveScores:
     def text(self) -> str:
         """The figures as a table in Markdown."""
         rows = (
-            ("followed", f"{self.time:.1f} s"), ("path of the tip", f"{1e3 * self.way:.1f} mm"),
+            ("followed", f"{self.time:.1f} s"),
+            ("path of the tip", f"{1e3 * self.way:.1f} mm"),
             ("tracking error, RMS", f"{1e3 * self.rms:.3f} mm"),
             ("tracking error, largest", f"{1e3 * self.largest:.3f} mm"),
             ("force, largest", f"{self.force:.2f} N"),
-        )  # fmt: skip
+        )
         return "\n".join(["| so far | |", "|---|---:|", *(f"| {a} | {b} |" for a, b in rows)])

@@ -95,9 +95,7 @@ class Server(viser.ViserServer):
         filter: Decides about messages.
     """
 
-    def __init__(
-        self, opened: socket, guard: Guard, drivers: Drivers, answers: Answers, label: str
-    ) -> None:
+    def __init__(self, opened: socket, guard: Guard, drivers: Drivers, answers: Answers, label: str) -> None:
         host, port = opened.getsockname()[:2]
         answer = partial(_answered, guard, answers)
         self._front = Front(opened, answers.paths, answer, answers.slow_paths)
@@ -243,9 +241,7 @@ def _telling(tell: Callable[[int], object]) -> Callable[[int, _messages.Message]
     return handler
 
 
-def _server_at(
-    opened: socket, guard: Guard, answers: Answers, gate: Gate
-) -> Callable[..., ws.serve]:
+def _server_at(opened: socket, guard: Guard, answers: Answers, gate: Gate) -> Callable[..., ws.serve]:
     """A function that opens a server at the socket, whatever address it is told."""
 
     def serve(
@@ -278,10 +274,7 @@ class _Serving(ws.serve):
     """
 
     async def __aexit__(
-        self,
-        exc_type: type[BaseException] | None,
-        exc_value: BaseException | None,
-        traceback: TracebackType | None,
+        self, exc_type: type[BaseException] | None, exc_value: BaseException | None, traceback: TracebackType | None
     ) -> None:
         loop = asyncio.get_running_loop()
         for listens in self.server.sockets:

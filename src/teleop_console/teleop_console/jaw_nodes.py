@@ -95,9 +95,7 @@ class JawNodes:
             for node, pose in zip(self.blocks, poses, strict=True):
                 move(node, pose)
 
-    def _add(
-        self, nodes: list[viser.BoxHandle], name: str, size: tuple[float, float, float]
-    ) -> None:
+    def _add(self, nodes: list[viser.BoxHandle], name: str, size: tuple[float, float, float]) -> None:
         color = TARGET if name == "object" else ROLES["tool"]
         path = f"{self._path}/{name}{len(nodes)}"
         nodes.append(self._server.scene.add_box(path, color=color, dimensions=size))

@@ -11,16 +11,7 @@ from teleop_core.graph.topics import Topic
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots.robot import Robot
 
-Setting = (
-    bool
-    | int
-    | float
-    | str
-    | tuple[bool, ...]
-    | tuple[int, ...]
-    | tuple[float, ...]
-    | tuple[str, ...]
-)
+Setting = bool | int | float | str | tuple[bool, ...] | tuple[int, ...] | tuple[float, ...] | tuple[str, ...]
 """Value of a parameter."""
 
 

@@ -24,27 +24,34 @@ class Meaning(NamedTuple):
     dark: str
 
 
-MEANINGS: Mapping[str, Meaning] = MappingProxyType({
-    "good": Meaning((43, 138, 62), "#247a36", "#51cf66"),  # goes, is free
-    "held": Meaning((154, 87, 0), "#9a5700", "#ffb84d"),  # holds, waits, warns, is at a limit
-    "wrong": Meaning((214, 0, 28), "#d6001c", "#ff7b83"),  # stopped, touches; the stop
-    "idle": Meaning((92, 102, 112), "#5c6670", "#9aa5b1"),  # there, and no more
-    "measured": Meaning((217, 95, 2), "#b34d00", "#ff9f4d"),  # paths that were measured
-    "wanted": Meaning((28, 109, 208), "#1c6dd0", "#74a9f2"),  # what shall be; what to press next
-    "hand": Meaning((112, 72, 190), "#7048be", "#b197fc"),  # path of the stylus
-    "force": Meaning((190, 24, 132), "#a61e74", "#f06ec0"),  # on stylus and tip
-    "target": Meaning((12, 133, 153), "#0b7285", "#3bc9db"),  # points and objects of a task
-})  # fmt: skip
+MEANINGS: Mapping[str, Meaning] = MappingProxyType(
+    {
+        "good": Meaning((43, 138, 62), "#247a36", "#51cf66"),  # goes, is free
+        "held": Meaning((154, 87, 0), "#9a5700", "#ffb84d"),  # holds, waits, warns, is at a limit
+        "wrong": Meaning((214, 0, 28), "#d6001c", "#ff7b83"),  # stopped, touches; the stop
+        "idle": Meaning((92, 102, 112), "#5c6670", "#9aa5b1"),  # there, and no more
+        "measured": Meaning((217, 95, 2), "#b34d00", "#ff9f4d"),  # paths that were measured
+        "wanted": Meaning((28, 109, 208), "#1c6dd0", "#74a9f2"),  # what shall be; what to press next
+        "hand": Meaning((112, 72, 190), "#7048be", "#b197fc"),  # path of the stylus
+        "force": Meaning((190, 24, 132), "#a61e74", "#f06ec0"),  # on stylus and tip
+        "target": Meaning((12, 133, 153), "#0b7285", "#3bc9db"),  # points and objects of a task
+    }
+)
 """All colours that mean something, texts with at least 4.5 to 1 on their ground."""
 GOOD, HELD, WRONG, MEASURED, WANTED, HAND, FORCE, TARGET = (
-    MEANINGS[name].scene
-    for name in ("good", "held", "wrong", "measured", "wanted", "hand", "force", "target")
+    MEANINGS[name].scene for name in ("good", "held", "wrong", "measured", "wanted", "hand", "force", "target")
 )
 
-ROLES: Mapping[Role, Color] = MappingProxyType({
-    "base": (96, 108, 122), "link": (196, 204, 212), "joint": (104, 126, 150),
-    "leg": (150, 162, 176), "platform": (120, 140, 160), "tool": (72, 82, 94),
-})  # fmt: skip
+ROLES: Mapping[Role, Color] = MappingProxyType(
+    {
+        "base": (96, 108, 122),
+        "link": (196, 204, 212),
+        "joint": (104, 126, 150),
+        "leg": (150, 162, 176),
+        "platform": (120, 140, 160),
+        "tool": (72, 82, 94),
+    }
+)
 """Greys of solids, readable on light and on dark ground."""
 LIGHT: Color = (255, 255, 255)
 DARK: Color = (20, 20, 20)
@@ -59,20 +66,8 @@ CURVES = ("#0072b2", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#8c6d46")
 """Of plots, in the order of their series; told apart without seeing red or green (Okabe and Ito
 2008)."""
 
-_LIGHT = {
-    "ground": "#ffffff",
-    "text": "#1c2126",
-    "muted": "#5c6670",
-    "line": "#d9dee3",
-    "field": "#7d8790",
-}
-_DARK = {
-    "ground": "#1f2328",
-    "text": "#e6e9ec",
-    "muted": "#9aa5b1",
-    "line": "#343b42",
-    "field": "#7f8a95",
-}
+_LIGHT = {"ground": "#ffffff", "text": "#1c2126", "muted": "#5c6670", "line": "#d9dee3", "field": "#7d8790"}
+_DARK = {"ground": "#1f2328", "text": "#e6e9ec", "muted": "#9aa5b1", "line": "#343b42", "field": "#7f8a95"}
 
 _STYLE = """\
 :root { VARIABLES; --t-stop: STOP; --t-next: NEXT;

@@ -29,12 +29,14 @@ class ForceArrow:
     def __init__(self, server: viser.ViserServer, name: str) -> None:
         self._frame = server.scene.add_frame(name, show_axes=False, visible=False)
         self._arrow = server.scene.add_arrows(
-            f"{name}/arrow", np.zeros((1, 2, 3), np.float32), FORCE, shaft_radius=0.0025,
-            head_radius=0.006, head_length=0.014,
-        )  # fmt: skip
-        self._label = server.scene.add_label(
-            f"{name}/value", "0.0 N", font_screen_scale=0.9, anchor="bottom-left"
+            f"{name}/arrow",
+            np.zeros((1, 2, 3), np.float32),
+            FORCE,
+            shaft_radius=0.0025,
+            head_radius=0.006,
+            head_length=0.014,
         )
+        self._label = server.scene.add_label(f"{name}/value", "0.0 N", font_screen_scale=0.9, anchor="bottom-left")
         self._drawn = np.zeros(3)
 
     def draw(self, place: Array, force: Array) -> float:
@@ -69,14 +71,12 @@ class MasterNodes:
     def __init__(self, server: viser.ViserServer, path: str, stand: Stand) -> None:
         self.path = path
         self.base = server.scene.add_frame(
-            path, show_axes=False, axes_length=0.05, axes_radius=0.002, wxyz=stand.quaternion,
-            position=stand.origin,
-        )  # fmt: skip
+            path, show_axes=False, axes_length=0.05, axes_radius=0.002, wxyz=stand.quaternion, position=stand.origin
+        )
         add_solids(server, path, DEVICE, opacity=_DIM)
         self.stylus = server.scene.add_frame(
-            f"{path}/stylus", show_axes=False, axes_length=0.04, axes_radius=0.0015,
-            wxyz=REST[3:], position=REST[:3],
-        )  # fmt: skip
+            f"{path}/stylus", show_axes=False, axes_length=0.04, axes_radius=0.0015, wxyz=REST[3:], position=REST[:3]
+        )
         add_solids(server, f"{path}/stylus", STYLUS)
         self.outline = OutlineNode(server, f"{path}/fixture", np.array([1.0, 0.0, 0.0, 0.0]))
         self.tail = Tail(server, f"{path}/path", HAND, 1.5)

@@ -41,10 +41,13 @@ class Panel:
     """
 
     def __init__(
-        self, server: Server, link: Link, drivers: Drivers,
+        self,
+        server: Server,
+        link: Link,
+        drivers: Drivers,
         renew: Renew | None = None,
         of_session: Parameters | None = None,
-    ) -> None:  # fmt: skip
+    ) -> None:
         self._server, self._gui, self._link = server, server.gui, link
         self._make_public, self._may_drive = server.make_public, drivers.may_drive
         self._take, self._drivers, self._drawn = drivers.take, drivers, 0.0
@@ -90,9 +93,7 @@ class Panel:
                 self._controls.append(control)
                 self._button(control.name, control.hint, partial(self._act, control))
 
-    def _button(
-        self, label: str, hint: str, action: Callable[[int], None]
-    ) -> viser.GuiButtonHandle:
+    def _button(self, label: str, hint: str, action: Callable[[int], None]) -> viser.GuiButtonHandle:
         """Button that acts for the browser that drives, one press after the other."""
         button = self._buttons[label] = self._gui.add_button(label, hint=hint, color="gray")
         acts = threading.Lock()
@@ -168,9 +169,7 @@ class Panel:
         """Score in a process of its own, with what the session leaves of the processors."""
         self._scored.content = "scoring …"
         command = ["nice", "-n", "15", sys.executable, "-m", "teleop_core.cli", "evaluate"]
-        done = subprocess.run(
-            [*command, str(self._last)], capture_output=True, text=True, check=False
-        )
+        done = subprocess.run([*command, str(self._last)], capture_output=True, text=True, check=False)
         self._scored.content = f"```\n{done.stdout or done.stderr}\n```"
 
     # -- drawing ---------------------------------------------------------------------------------
@@ -213,8 +212,7 @@ class Panel:
         if self._link.is_live:
             self._draw_buttons(view)
         tables = [
-            (f"**{name}**\n\n" if len(self.scores) > 1 else "") + scores.text()
-            for name, scores in self.scores.items()
+            (f"**{name}**\n\n" if len(self.scores) > 1 else "") + scores.text() for name, scores in self.scores.items()
         ]
         if self._live.content != (text := "\n\n".join(tables)):
             self._live.content = text

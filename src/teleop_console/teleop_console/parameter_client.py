@@ -28,9 +28,7 @@ class ParameterEvents:
     def __init__(self, owner: Owner) -> None:
         self._lock = owner.world.lock()
         self._changed: dict[tuple[str, str], Setting] = {}
-        self._own = owner.ros.create_subscription(
-            ParameterEvent, "/parameter_events", self._hear, EVENTS
-        )
+        self._own = owner.ros.create_subscription(ParameterEvent, "/parameter_events", self._hear, EVENTS)
 
     def take(self) -> dict[tuple[str, str], Setting]:
         """Newest values of what has changed since the last call, by node and name."""
@@ -65,9 +63,7 @@ class ParameterClient:
         """
         listed = self._ask(ListParameters, name, "list_parameters", ListParameters.Request())
         names = sorted(n for n in listed.result.names if not n.startswith(_HIDDEN))
-        about = self._ask(
-            DescribeParameters, name, "describe_parameters", DescribeParameters.Request(names=names)
-        )
+        about = self._ask(DescribeParameters, name, "describe_parameters", DescribeParameters.Request(names=names))
         values = self.values(name, names)
         return {
             described.name: _info(name, described, values[described.name])
@@ -81,9 +77,7 @@ class ParameterClient:
         answer = self._ask(GetParameters, name, "get_parameters", request)
         found = zip(names, answer.values, strict=True)
         return {
-            one: _plain(from_message(value))
-            for one, value in found
-            if value.type != ParameterType.PARAMETER_NOT_SET
+            one: _plain(from_message(value)) for one, value in found if value.type != ParameterType.PARAMETER_NOT_SET
         }
 
     def change(self, name: str, parameter: str, value: Setting) -> str:
@@ -127,12 +121,16 @@ def _plain(value: Any) -> Setting:
 def _info(node: str, described: ParameterDescriptor, value: Setting) -> ParameterInfo:
     ranges = [*described.floating_point_range, *described.integer_range]
     bound: Callable[[float], float | None] = lambda v: v if abs(v) < _LARGEST else None  # noqa: E731
-    lower, upper = (
-        (bound(ranges[0].from_value), bound(ranges[0].to_value)) if ranges else (None, None)
-    )
+    lower, upper = (bound(ranges[0].from_value), bound(ranges[0].to_value)) if ranges else (None, None)
     constraints = described.additional_constraints.split("; ")
     choices = [text.removeprefix(_ONE_OF) for text in constraints if text.startswith(_ONE_OF)]
     return ParameterInfo(
-        node, described.name, value, described.description, lower, upper,
-        tuple(choices[0].split(", ")) if choices else (), described.read_only,
-    )  # fmt: skip
+        node,
+        described.name,
+        value,
+        described.description,
+        lower,
+        upper,
+        tuple(choices[0].split(", ")) if choices else (),
+        described.read_only,
+    )

@@ -49,34 +49,37 @@ class Plots:
         self._joint = gui.add_dropdown("joint", names, hint="whose reference and actual are drawn")
         self._joint_plot = self._add(gui, "joint [deg or mm], dashed: reference", 1, is_pair=True)
         self._plots = [
-            self._add(gui, plot.title, len(plot.labels), is_pair=len(plot.columns) > 1,
-                      labels=plot.labels)
+            self._add(gui, plot.title, len(plot.labels), is_pair=len(plot.columns) > 1, labels=plot.labels)
             for plot in _PLOTS
-        ]  # fmt: skip
+        ]
 
     @staticmethod
     def _add(
-        gui: viser.GuiApi, title: str, count: int, *, is_pair: bool,
-        labels: tuple[str, ...] = ("actual",),
-    ) -> viser.GuiUplotHandle:  # fmt: skip
+        gui: viser.GuiApi, title: str, count: int, *, is_pair: bool, labels: tuple[str, ...] = ("actual",)
+    ) -> viser.GuiUplotHandle:
         series = [uplot.Series(label="t [s]")]
         for dashed in (False, True) if is_pair else (False,):
             series += [
                 uplot.Series(
-                    label=f"{label} wanted" if dashed else label, stroke=CURVES[i], width=1.5,
+                    label=f"{label} wanted" if dashed else label,
+                    stroke=CURVES[i],
+                    width=1.5,
                     dash=(6.0, 4.0) if dashed else (),
                 )
                 for i, label in enumerate(labels[:count])
-            ]  # fmt: skip
+            ]
         grid = uplot.Axis_Grid(stroke=AXIS_GRID)
         axes = uplot.Axis(stroke=AXIS, grid=grid), uplot.Axis(stroke=AXIS, grid=grid, size=_NUMBERS)
         return gui.add_uplot(
-            tuple(np.zeros(1) for _ in series), tuple(series), title=title, height=170,
+            tuple(np.zeros(1) for _ in series),
+            tuple(series),
+            title=title,
+            height=170,
             padding=(10, 8, 0, 0),  # the uppermost number has room under the title
-            scales={"x": uplot.Scale(time=False, auto=False, range=(-SPAN, 0.0)),
-                    "y": uplot.Scale(auto=True)},
-            axes=axes, legend=uplot.Legend(show=count > 1, live=False),
-        )  # fmt: skip
+            scales={"x": uplot.Scale(time=False, auto=False, range=(-SPAN, 0.0)), "y": uplot.Scale(auto=True)},
+            axes=axes,
+            legend=uplot.Legend(show=count > 1, live=False),
+        )
 
     def draw(self) -> None:
         """Draw what is new, a few times a second."""

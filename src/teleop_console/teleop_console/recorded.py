@@ -62,9 +62,12 @@ class RecordedLink:
         """What was known at a time of the replay [s]; None for the present one."""
         time = self._time if time is None else time
         view = View(
-            time=time, arms={arm.name: ArmView() for arm in self.arms}, is_fresh=True,
-            news=self._news(), recording=self._bag.path,
-        )  # fmt: skip
+            time=time,
+            arms={arm.name: ArmView() for arm in self.arms},
+            is_fresh=True,
+            news=self._news(),
+            recording=self._bag.path,
+        )
         time_ns = self._start_ns + round(time * 1e9)
         for recorded in self._recorded:
             recorded.show(time_ns, view.arms[recorded.arm.name])

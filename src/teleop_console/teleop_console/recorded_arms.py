@@ -38,9 +38,14 @@ MOST = 200 << 20
 """Bytes of samples that are kept; of longer recordings every second, third ... sample is."""
 _STAMP_BYTES = 16
 _KEPT = (
-    *STREAMS, SLAVE_MEASURED_CF, SLAVE_JAW_MEASURED_JS, SLAVE_JAW_OBJECT_CP, SLAVE_JAW_BOARD,
-    MASTER_ENERGY, SLAVE_ENERGY,
-)  # fmt: skip
+    *STREAMS,
+    SLAVE_MEASURED_CF,
+    SLAVE_JAW_MEASURED_JS,
+    SLAVE_JAW_OBJECT_CP,
+    SLAVE_JAW_BOARD,
+    MASTER_ENERGY,
+    SLAVE_ENERGY,
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,11 +136,7 @@ def _size(bag: Bag, joints: int) -> int:
     """Bytes of the samples of one arm."""
     infos = [(topic, bag.topics.get(topic.name)) for topic in _KEPT]
     widths = {topic.name: topic.width(joints) for topic in _KEPT}
-    return sum(
-        info.count * (8 * widths[topic.name] + _STAMP_BYTES)
-        for topic, info in infos
-        if info is not None
-    )
+    return sum(info.count * (8 * widths[topic.name] + _STAMP_BYTES) for topic, info in infos if info is not None)
 
 
 def _tracks(bag: Bag, arm: Arm, thinning: int) -> dict[str, Series]:
@@ -143,9 +144,7 @@ def _tracks(bag: Bag, arm: Arm, thinning: int) -> dict[str, Series]:
     wanted = [
         topic
         for topic in _KEPT
-        if (info := bag.topics.get(topic.name)) is not None
-        and info.count
-        and info.type == topic.kind.ros_type
+        if (info := bag.topics.get(topic.name)) is not None and info.count and info.type == topic.kind.ros_type
     ]
     parts: dict[str, list[Series]] = {topic.name: [] for topic in wanted}
     joints = {topic.name for topic in wanted if topic.kind.has_joints}
@@ -226,7 +225,6 @@ def parameters_of(
                 doc = f"{spec.doc} [{spec.unit}]" if spec.unit else spec.doc
                 value = cast("Setting", values[spec.name])
                 found[node, spec.name] = ParameterInfo(
-                    node, spec.name, value, doc, spec.lowest, spec.upper,
-                    spec.choices, is_fixed=True,
-                )  # fmt: skip
+                    node, spec.name, value, doc, spec.lowest, spec.upper, spec.choices, is_fixed=True
+                )
     return found

@@ -84,9 +84,7 @@ class Recordings:
 
     def run(self, kind: str, names: Sequence[str]) -> str:
         """Run such a command with what is left of the processors; what it says."""
-        done = subprocess.run(
-            [*_program(), *self.words(kind, names)], capture_output=True, text=True, check=False
-        )
+        done = subprocess.run([*_program(), *self.words(kind, names)], capture_output=True, text=True, check=False)
         return done.stdout or done.stderr
 
     def judge(self) -> None:
@@ -132,6 +130,4 @@ def _judged(entry: Entry, out: Path) -> Entry:
     score = json.loads(out.read_text(encoding="utf-8"))[0]
     session, verdict = score["session"], score["verdict"]
     told = [str(session[key]) for key in ("scenario", "robot", "operator") if session.get(key)]
-    return Entry(
-        entry.name, entry.made, " · ".join(told), verdict["text"], verdict["worst"] is None
-    )
+    return Entry(entry.name, entry.made, " · ".join(told), verdict["text"], verdict["worst"] is None)

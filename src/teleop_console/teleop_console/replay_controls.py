@@ -20,15 +20,16 @@ class ReplayControls:
         self._drawn, self._text = -1.0, ""
         with gui.add_folder("replay", order=-0.5):
             self._slider = gui.add_slider(
-                "time", 0.0, max(link.duration, _STEP), _STEP, link.time,
-                hint="seconds since the recording began",
-            )  # fmt: skip
+                "time", 0.0, max(link.duration, _STEP), _STEP, link.time, hint="seconds since the recording began"
+            )
             self._play = gui.add_button("Play", hint="from here on; the P key too")
             self._steps = gui.add_button_group("step", ("−1 s", "−1", "+1", "+1 s"))
             self._speed = gui.add_dropdown(
-                "speed", [f"{speed:g}" for speed in SPEEDS], initial_value=f"{link.speed:g}",
+                "speed",
+                [f"{speed:g}" for speed in SPEEDS],
+                initial_value=f"{link.speed:g}",
                 hint="time of the recording per time that passes",
-            )  # fmt: skip
+            )
             self._loop = gui.add_checkbox("loop", link.loop, hint="begin again at the end")
             self._told = gui.add_markdown("")
         self._listen(gui)

@@ -98,9 +98,8 @@ class Scene:
         """Show the points of a task in the hand's space, as balls of 2 mm."""
         if len(points):
             self._server.scene.add_point_cloud(
-                f"{nodes.master.path}/targets", points, colors=TARGET, point_size=0.002,
-                point_shape="circle",
-            )  # fmt: skip
+                f"{nodes.master.path}/targets", points, colors=TARGET, point_size=0.002, point_shape="circle"
+            )
 
     def remember(self, path: Path) -> None:
         """Take paths from a recording wherever time jumps; without that they begin anew there."""

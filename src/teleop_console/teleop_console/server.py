@@ -36,8 +36,7 @@ def listen(host: str, port: int) -> socket.socket:
     if not 0 <= port < 1 << 16:
         raise ParameterError("port", port, "0 to 65535, 0 for any free one")
     try:
-        found = socket.getaddrinfo(host or None, port, type=socket.SOCK_STREAM,
-                                   flags=socket.AI_PASSIVE)[0]  # fmt: skip
+        found = socket.getaddrinfo(host or None, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)[0]
     except OSError as error:
         raise ParameterError("host", host, f"an address of this machine ({error})") from error
     opened = socket.socket(found[0], found[1])
@@ -129,13 +128,7 @@ class ConsoleServer:
     """
 
     def __init__(
-        self,
-        port: int = PORT,
-        host: str = "127.0.0.1",
-        token: str = "",
-        *,
-        label: str = "",
-        patience: float = PATIENCE,
+        self, port: int = PORT, host: str = "127.0.0.1", token: str = "", *, label: str = "", patience: float = PATIENCE
     ) -> None:
         opened = listen(host, port)
         self.port = int(opened.getsockname()[1])

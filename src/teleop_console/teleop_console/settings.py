@@ -47,10 +47,13 @@ class SettingsPanel:
     """
 
     def __init__(
-        self, server: viser.ViserServer, link: Link, may_drive: Guard,
+        self,
+        server: viser.ViserServer,
+        link: Link,
+        may_drive: Guard,
         renew: Renew | None = None,
         of_session: Parameters | None = None,
-    ) -> None:  # fmt: skip
+    ) -> None:
         self._gui, self._link, self._may, self._renew = server.gui, link, may_drive, renew
         self._of_session = dict(of_session or {})
         self.known: Parameters = {}
@@ -93,9 +96,7 @@ class SettingsPanel:
             return len(before) > len(self._of_session)
         groups = sorted({_group(*key) for key in self.known})
         self._choice.options = (_USED, *groups)
-        self._told.content = (
-            f"{len(self.known)} parameters; hover over one for its meaning, bounds and default"
-        )
+        self._told.content = f"{len(self.known)} parameters; hover over one for its meaning, bounds and default"
         self._show()
         return False
 
@@ -208,11 +209,7 @@ class SettingsPanel:
 
 @cache
 def _defaults() -> Mapping[tuple[str, str], Any]:
-    return {
-        (stage, spec.name): spec.default
-        for stage, group in declared_groups().items()
-        for spec in specs(group)
-    }
+    return {(stage, spec.name): spec.default for stage, group in declared_groups().items() for spec in specs(group)}
 
 
 def _default(node: str, name: str) -> Setting | None:

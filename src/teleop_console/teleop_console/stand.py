@@ -16,8 +16,7 @@ REST = np.array([0.0, -0.0655, -0.0881, 0.97918, -0.20300, 0.0, 0.0])
 _UPRIGHT = (np.sqrt(0.5), -np.sqrt(0.5), 0.0, 0.0)  # brings z of a solid to the device's y, upwards
 
 
-def _solid(kind: str, size: tuple[float, ...], at: tuple[float, ...], turn: tuple[float, ...],
-           role: str) -> Solid:  # fmt: skip
+def _solid(kind: str, size: tuple[float, ...], at: tuple[float, ...], turn: tuple[float, ...], role: str) -> Solid:
     return Solid(kind, size, np.array((*at, *turn)), role)  # type: ignore[arg-type]
 
 

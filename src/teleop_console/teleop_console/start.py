@@ -65,8 +65,11 @@ class StartPage:
         self._runs = threading.Lock()
         self._last: Mapping[str, str] | None = None
         self._acts: Mapping[str, Callable[[Query], str]] = {
-            "/begin": self._begin, "/show": self._show, "/run": self._run, "/end": self._end,
-        }  # fmt: skip
+            "/begin": self._begin,
+            "/show": self._show,
+            "/run": self._run,
+            "/end": self._end,
+        }
 
     @property
     def paths(self) -> frozenset[str]:
@@ -125,16 +128,24 @@ class StartPage:
         chosen = choices.checked(_words(query)) or dict(self._last or choices.START)
         until = time.monotonic() + _TRY
         fields = [
-            {"name": f.name, "label": f.label,
-             "options": [asdict(option) for option in choices.options(f, chosen, until)]}
+            {
+                "name": f.name,
+                "label": f.label,
+                "options": [asdict(option) for option in choices.options(f, chosen, until)],
+            }
             for f in choices.FIELDS
-        ]  # fmt: skip
+        ]
         return {
-            "chosen": chosen, "fields": fields, "refusal": choices.refusal(chosen),
-            "command": choices.command_line(chosen), "is_repeat": chosen == self._last,
+            "chosen": chosen,
+            "fields": fields,
+            "refusal": choices.refusal(chosen),
+            "command": choices.command_line(chosen),
+            "is_repeat": chosen == self._last,
             "recordings": [asdict(entry) for entry in self.recordings.entries()],
-            "folder": str(self._folder), "told": self.told, "is_busy": self._runs.locked(),
-        }  # fmt: skip
+            "folder": str(self._folder),
+            "told": self.told,
+            "is_busy": self._runs.locked(),
+        }
 
     def _begin(self, query: Query) -> str:
         from teleop_console import choices

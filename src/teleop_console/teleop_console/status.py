@@ -7,9 +7,7 @@ from teleop_console.answers import Situation
 from teleop_console.link import ArmView, View
 from teleop_core.slave.operation import Fault, State
 
-_SIGNALS = {
-    State.ENABLED: "good", State.PAUSED: "held", State.DISABLED: "idle", State.FAULT: "wrong",
-}  # fmt: skip
+_SIGNALS = {State.ENABLED: "good", State.PAUSED: "held", State.DISABLED: "idle", State.FAULT: "wrong"}
 _PRESSED = (
     "All arms are stopped, latched. Next: when nobody is in danger, press Initialize: it releases "
     "the stop, resets, enables and homes. Release alone lets the arms stay where they are."
@@ -24,8 +22,7 @@ def situation(view: View) -> Situation:
     """What every page shows of a live session, whatever is scrolled or folded."""
     is_pressed = any(arm.operation.get("is_stopped") for arm in view.arms.values())
     is_latched = any(
-        State(int(arm.operation["state"])) is State.FAULT
-        and Fault(int(arm.operation["fault"])) is Fault.STOP
+        State(int(arm.operation["state"])) is State.FAULT and Fault(int(arm.operation["fault"])) is Fault.STOP
         for arm in view.arms.values()
         if arm.operation
     )
@@ -43,8 +40,10 @@ def alive(view: View) -> dict[str, bool]:
         "Start": may_move and bool(states & {State.PAUSED, State.DISABLED}),
         "Pause": may_move and State.ENABLED in states,
         "Home": may_move and State.ENABLED in states,
-        "mode": may_move, "fixture": may_move, "steps": may_move,
-    }  # fmt: skip
+        "mode": may_move,
+        "fixture": may_move,
+        "steps": may_move,
+    }
 
 
 def next_button(view: View) -> str:
@@ -56,10 +55,13 @@ def next_button(view: View) -> str:
 
 
 _LEADERS = {
-    "human": "a simulated person leads", "observer": "a simulated person leads",
-    "gamepad": "the gamepad leads", "spacemouse": "the 3-D mouse leads",
-    "bag": "a recording leads", "file": "a recording leads",
-}  # fmt: skip
+    "human": "a simulated person leads",
+    "observer": "a simulated person leads",
+    "gamepad": "the gamepad leads",
+    "spacemouse": "the 3-D mouse leads",
+    "bag": "a recording leads",
+    "file": "a recording leads",
+}
 
 
 def leader(kind: str) -> str:
@@ -76,9 +78,7 @@ def next_step(view: View, *, is_led_here: bool) -> str:
     """
     button = next_button(view)
     if button:
-        return {"Initialize": "Initialize: reset, enable and home", "Start": "Start: follow again"}[
-            button
-        ]
+        return {"Initialize": "Initialize: reset, enable and home", "Start": "Start: follow again"}[button]
     rests = any(arm.state.get("is_clutched") for arm in view.arms.values())
     return "drag the stylus by its arrows; to let go is the clutch" if is_led_here and rests else ""
 

@@ -71,11 +71,7 @@ class Stylus:
         self._may_drive, self._on_hold, self._on_let_go = may_drive, on_hold, on_let_go
         self._lock = threading.RLock()
         self._hands = {
-            arm: _Hand(
-                server.scene.add_transform_controls(
-                    f"{node}/grip", scale=_SIZE, depth_test=False, opacity=0.8
-                )
-            )
+            arm: _Hand(server.scene.add_transform_controls(f"{node}/grip", scale=_SIZE, depth_test=False, opacity=0.8))
             for arm, node in scene.masters.items()
         }
         for arm, hand in self._hands.items():
@@ -217,9 +213,13 @@ def stepped(pose: Array, axis: str, sign: int) -> Array:
 
 Key = Literal["arrowup", "arrowdown", "arrowleft", "arrowright", "pageup", "pagedown"]
 _KEYS: dict[Key, tuple[str, int]] = {
-    "arrowright": ("x", 1), "arrowleft": ("x", -1), "arrowup": ("y", 1), "arrowdown": ("y", -1),
-    "pageup": ("z", 1), "pagedown": ("z", -1),
-}  # fmt: skip
+    "arrowright": ("x", 1),
+    "arrowleft": ("x", -1),
+    "arrowup": ("y", 1),
+    "arrowdown": ("y", -1),
+    "pageup": ("z", 1),
+    "pagedown": ("z", -1),
+}
 """Keys and the step that each is, in the master's base."""
 
 
@@ -234,9 +234,8 @@ class Steps:
     """
 
     def __init__(
-        self, server: viser.ViserServer, stylus: Stylus, arms: tuple[str, ...],
-        may_drive: Callable[[int], bool],
-    ) -> None:  # fmt: skip
+        self, server: viser.ViserServer, stylus: Stylus, arms: tuple[str, ...], may_drive: Callable[[int], bool]
+    ) -> None:
         self._stylus, self._may_drive, self._arm = stylus, may_drive, arms[0]
         if len(arms) > 1:
             choice = server.gui.add_dropdown("arm", [arm or "first" for arm in arms])
@@ -253,14 +252,10 @@ class Steps:
             self._add_key(server, key, axis, sign)
 
     def _add_key(self, server: viser.ViserServer, key: Key, axis: str, sign: int) -> None:
-        for modifier, moved, word in (
-            (None, axis, "1 mm along"),
-            ("shift", f"r{axis}", "1° about"),
-        ):
+        for modifier, moved, word in ((None, axis, "1 mm along"), ("shift", f"r{axis}", "1° about")):
             command = server.gui.add_command(
-                f"Stylus {word} {'+' if sign > 0 else '−'}{axis}", hotkey=key,
-                modifier="shift" if modifier else None,
-            )  # fmt: skip
+                f"Stylus {word} {'+' if sign > 0 else '−'}{axis}", hotkey=key, modifier="shift" if modifier else None
+            )
             command.on_trigger(
                 lambda event, moved=moved: self._step(event.client_id, moved, sign)  # type: ignore[misc]
             )

@@ -30,9 +30,7 @@ class Tail:
         thickness: Of the line [px].
     """
 
-    def __init__(
-        self, server: viser.ViserServer, name: str, color: Color, thickness: float = 2.5
-    ) -> None:
+    def __init__(self, server: viser.ViserServer, name: str, color: Color, thickness: float = 2.5) -> None:
         self._times = np.full(_POINTS + 1, -np.inf)
         self._points = np.zeros((_POINTS + 1, 3))
         self._color = np.array(color, np.float64)
@@ -40,9 +38,13 @@ class Tail:
         self._background = np.full(3, 255.0)
         self._is_hidden = False
         self._line = server.scene.add_line_segments(
-            name, np.zeros((_POINTS, 2, 3), np.float32), np.zeros((_POINTS, 2, 3), np.uint8),
-            thickness=thickness, thickness_units="screen", visible=False,
-        )  # fmt: skip
+            name,
+            np.zeros((_POINTS, 2, 3), np.float32),
+            np.zeros((_POINTS, 2, 3), np.uint8),
+            thickness=thickness,
+            thickness_units="screen",
+            visible=False,
+        )
 
     def set_background(self, color: Color) -> None:
         """Colour that it fades into."""

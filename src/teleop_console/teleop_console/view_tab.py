@@ -62,9 +62,8 @@ class ViewTab:
 def theme(server: viser.ViserServer, *, is_dark: bool) -> None:
     """Take colours and layout of the page; what would reach other hosts is left out."""
     server.gui.configure_theme(
-        control_layout="floating", control_width="medium", dark_mode=is_dark, show_logo=False,
-        show_share_button=False,
-    )  # fmt: skip
+        control_layout="floating", control_width="medium", dark_mode=is_dark, show_logo=False, show_share_button=False
+    )
 
 
 PERIOD = 0.5
@@ -83,18 +82,15 @@ class Insets:
     def __init__(self, server: viser.ViserServer, scene: Scene) -> None:
         self._server, gui = server, server.gui
         self._cameras: Mapping[str, Callable[[], Camera]] = {
-            "from the tool": scene.tool, "microscope": scene.microscope
-        }  # fmt: skip
+            "from the tool": scene.tool,
+            "microscope": scene.microscope,
+        }
         blank = np.full((*PICTURE, 3), 128, np.uint8)
         self._ends = threading.Event()
         self._thread: threading.Thread | None = None
         with gui.add_folder("picture in picture"):
-            self._is_on = gui.add_checkbox(
-                "show", False, hint="twice a second, rendered by one of the browsers"
-            )
-            self._images = {
-                name: gui.add_image(blank, label=name, visible=False) for name in self._cameras
-            }
+            self._is_on = gui.add_checkbox("show", False, hint="twice a second, rendered by one of the browsers")
+            self._images = {name: gui.add_image(blank, label=name, visible=False) for name in self._cameras}
         self._is_on.on_update(lambda event: self.show(event.target.value))
 
     def show(self, is_shown: bool) -> None:
@@ -106,9 +102,7 @@ class Insets:
             self._thread = None
         if is_shown:
             self._ends = threading.Event()
-            self._thread = threading.Thread(
-                target=self._render, args=(self._ends,), name="console insets", daemon=True
-            )
+            self._thread = threading.Thread(target=self._render, args=(self._ends,), name="console insets", daemon=True)
             self._thread.start()
 
     def _render(self, ends: threading.Event) -> None:
@@ -120,9 +114,13 @@ class Insets:
                 camera = find()
                 try:
                     picture = client.get_render(
-                        *PICTURE, wxyz=camera.quaternion, position=camera.position, fov=FIELD,
-                        timeout=_PATIENCE, transport_format="png",
-                    )  # fmt: skip
+                        *PICTURE,
+                        wxyz=camera.quaternion,
+                        position=camera.position,
+                        fov=FIELD,
+                        timeout=_PATIENCE,
+                        transport_format="png",
+                    )
                 except (TimeoutError, RuntimeError, OSError, ValueError, SyntaxError):
                     break  # the browser sleeps, has gone, or sends no picture
                 if not ends.is_set():

@@ -27,9 +27,8 @@ def object_outline(values: Mapping[str, Setting], robot: Robot) -> Array:
     nothing, kind = np.empty((0, 2, 3)), values.get("kind", "empty")
     of_object = ("tool_", f"{kind}.")
     own = {
-        name: value for name, value in values.items()
-        if name in {"kind", "place", "gap"} or name.startswith(of_object)
-    }  # fmt: skip
+        name: value for name, value in values.items() if name in {"kind", "place", "gap"} or name.startswith(of_object)
+    }
     with suppress(Exception):  # of another's kind anything may fail, and the page goes on
         world = build(WorldParameters, own)
         if world.kind.kind == "empty":
@@ -66,9 +65,8 @@ class WorldNodes:
         outline = object_outline(values, self._robot)
         if len(outline):
             self.line = self._server.scene.add_line_segments(
-                f"{self._path}/world", outline.astype(np.float32), TARGET, thickness=2.0,
-                thickness_units="screen",
-            )  # fmt: skip
+                f"{self._path}/world", outline.astype(np.float32), TARGET, thickness=2.0, thickness_units="screen"
+            )
 
     def draw(self, tip: Array, force: Array | None) -> None:
         """Draw the push (3,) [N] at a tip (3,) [m]; None where it is unknown."""

@@ -22,14 +22,8 @@ from .evaluation import (
     register_metric as register_metric,
 )
 from .chain.passivity import Passivity as Passivity, register_passivity as register_passivity
-from .chain.architectures import (
-    Architecture as Architecture,
-    register_architecture as register_architecture,
-)
-from .chain.filters import (
-    TremorFilter as TremorFilter,
-    register_tremor_filter as register_tremor_filter,
-)
+from .chain.architectures import Architecture as Architecture, register_architecture as register_architecture
+from .chain.filters import TremorFilter as TremorFilter, register_tremor_filter as register_tremor_filter
 from .graph.graph import Graph as Graph, build_graph as build_graph
 from .kernels import kernel as kernel
 from .kernels.fields import Fields as Fields, Vector3 as Vector3
@@ -47,11 +41,7 @@ from .base.parameters import NoParameters as NoParameters, parameter as paramete
 from .slave.bridges import Bridge as Bridge, Command as Command, register_bridge as register_bridge
 from .shapes import Shape as Shape, register_shape as register_shape
 from .slave.plants import Physics as Physics, Plant as Plant, register_plant as register_plant
-from .session.recording import (
-    Recording as Recording,
-    Stream as Stream,
-    open_recording as open_recording,
-)
+from .session.recording import Recording as Recording, Stream as Stream, open_recording as open_recording
 from .robots import (
     Robot as Robot,
     list_robots as list_robots,

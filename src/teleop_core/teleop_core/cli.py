@@ -130,9 +130,13 @@ def _core() -> tuple[argparse.ArgumentParser, Any]:
     from teleop_core import __version__
 
     parser.add_argument(
-        "--parts", type=Path, action="append", default=[], metavar="FILE.py",
+        "--parts",
+        type=Path,
+        action="append",
+        default=[],
+        metavar="FILE.py",
         help="Python file that registers parts of your own, which --set then takes by name",
-    )  # fmt: skip
+    )
     parser.add_argument("--version", action="version", version=__version__)
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     for add in (_add_sim, _add_live, _add_replay, _add_play, _add_evaluate, _add_lookups):
@@ -152,14 +156,15 @@ def _add_live(commands: Any) -> None:
     live = command(commands, "live", _live, "run and record a session as ROS 2 nodes")
     session_arguments(live)
     live.add_argument(
-        "--processes", choices=("sides", "nodes", "one"), default="sides",
+        "--processes",
+        choices=("sides", "nodes", "one"),
+        default="sides",
         help="the hand's side and the slave's side (default), a process for each node, to replace "
         "or kill one, or one for all, which is fastest; the recorder is always apart",
-    )  # fmt: skip
+    )
     live.add_argument(
-        "--composed", action="store_const", dest="processes", const="one",
-        help="the same as --processes one",
-    )  # fmt: skip
+        "--composed", action="store_const", dest="processes", const="one", help="the same as --processes one"
+    )
     without_argument(live)
 
 
@@ -168,10 +173,13 @@ def _add_replay(commands: Any) -> None:
     again = command(commands, "replay", _replay, text)
     again.add_argument("bag", type=Path, help="recording whose master is replayed")
     again.add_argument(
-        "--from", dest="begin", choices=("device", "hand"), default="device",
+        "--from",
+        dest="begin",
+        choices=("device", "hand"),
+        default="device",
         help="play what the device measured (default), or where the hand wanted it: the device is "
         "simulated again, and feels the forces of the new session",
-    )  # fmt: skip
+    )
     out_argument(again)
     setting_arguments(again)
 
@@ -180,13 +188,16 @@ def _add_play(commands: Any) -> None:
     play = command(commands, "play", _play, "publish a recording on live ROS 2 topics")
     play.add_argument("bag", type=Path, help="recording to publish")
     play.add_argument("--topics", nargs="+", metavar="TOPIC", help="only these (default: all)")
+    play.add_argument("--rate", type=float, default=1.0, help="speed, as a multiple of real time (default: 1)")
     play.add_argument(
-        "--rate", type=float, default=1.0, help="speed, as a multiple of real time (default: 1)"
-    )
-    play.add_argument(
-        "--clock", type=float, nargs="?", const=100.0, default=0.0, metavar="HZ",
+        "--clock",
+        type=float,
+        nargs="?",
+        const=100.0,
+        default=0.0,
+        metavar="HZ",
         help="publish the recording's time on /clock as well (default: 100 times a second)",
-    )  # fmt: skip
+    )
 
 
 def _add_evaluate(commands: Any) -> None:
@@ -195,9 +206,12 @@ def _add_evaluate(commands: Any) -> None:
     score.add_argument("--json", type=Path, metavar="FILE", help="write the scores as JSON")
     score.add_argument("--html", type=Path, metavar="FILE", help="write one page with plots")
     score.add_argument(
-        "--span", type=float, nargs=2, metavar=("FROM", "TO"),
+        "--span",
+        type=float,
+        nargs=2,
+        metavar=("FROM", "TO"),
         help="score only what was recorded between two times [s] since the first message",
-    )  # fmt: skip
+    )
 
 
 def _add_lookups(commands: Any) -> None:
@@ -215,21 +229,20 @@ def _add_lookups(commands: Any) -> None:
     robot.add_argument("name", nargs="?", help="robot; without one, all are listed")
     geometry_argument(robot)
     robot.add_argument(
-        "--from", type=Path, dest="table", metavar="TABLE.yaml",
+        "--from",
+        type=Path,
+        dest="table",
+        metavar="TABLE.yaml",
         help="chain from a Denavit-Hartenberg table, as in config/robots",
-    )  # fmt: skip
-    robot.add_argument(
-        "--urdf", type=Path, metavar="FILE", help="write its links and joints for other tools"
     )
+    robot.add_argument("--urdf", type=Path, metavar="FILE", help="write its links and joints for other tools")
     text = "draw where a robot's tip can be"
     space = command(commands, "workspace", _workspace, text)
     space.add_argument("name", metavar="ROBOT", help="one of `teleop robot`")
     geometry_argument(space)
     space.add_argument("--html", type=Path, metavar="FILE", help="page with the picture")
     space.add_argument("--csv", type=Path, metavar="FILE", help="x, y, z, manipulability")
-    space.add_argument(
-        "--samples", type=int, default=20_000, help="number of joint vectors to draw"
-    )
+    space.add_argument("--samples", type=int, default=20_000, help="number of joint vectors to draw")
     space.add_argument("--seed", type=int, default=1, help="seed of the draws")
 
 
@@ -251,9 +264,13 @@ def _replay(arguments: argparse.Namespace) -> int:
 
     with shown_progress("replaying") as progress:
         api.replay(
-            arguments.bag, out=arguments.out, progress=progress,
-            files=arguments.config, texts=arguments.settings, begin=arguments.begin,
-        )  # fmt: skip
+            arguments.bag,
+            out=arguments.out,
+            progress=progress,
+            files=arguments.config,
+            texts=arguments.settings,
+            begin=arguments.begin,
+        )
     print(done(arguments.out, f"{progress.seconds:g} s replayed"))
     return 0
 
@@ -265,9 +282,7 @@ def _live(arguments: argparse.Namespace) -> int:
     module = ros_module("live")
     processes = module.Processes(arguments.processes)
     try:
-        module.live(
-            configuration, arguments.out, Console(), processes=processes, without=arguments.without
-        )
+        module.live(configuration, arguments.out, Console(), processes=processes, without=arguments.without)
     except SessionError:
         if (arguments.out / "metadata.yaml").exists():
             print(done(arguments.out, "recorded until it ended"))

@@ -56,9 +56,7 @@ class PoseReader:
         taken: Parent and child frame of the poses taken; None before the first.
     """
 
-    def __init__(
-        self, typestore: Any, ros_type: str, *, is_ros2: bool, frame: str = "", parent: str = ""
-    ) -> None:
+    def __init__(self, typestore: Any, ros_type: str, *, is_ros2: bool, frame: str = "", parent: str = "") -> None:
         self._types, self._type, self._is_ros2 = typestore, ros_type, is_ros2
         self._frame, self._parent = frame, parent
         self.taken: Frames | None = None

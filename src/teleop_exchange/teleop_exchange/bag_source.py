@@ -13,17 +13,7 @@ from teleop_core.base.damage import damage_told
 from teleop_core.base.errors import ParameterError, RecordingError, UnknownNameError
 from teleop_core.graph.topics import MASTER_BUTTONS, MASTER_MEASURED_CP
 from teleop_core.kernels.geometry import Array
-from teleop_exchange.bag_messages import (
-    JOY,
-    POSES,
-    TRANSFORMS,
-    Frames,
-    JoyReader,
-    PoseReader,
-    Rows,
-    frames,
-    plain,
-)
+from teleop_exchange.bag_messages import JOY, POSES, TRANSFORMS, Frames, JoyReader, PoseReader, Rows, frames, plain
 from teleop_exchange.options import BUTTONS, ORIENTATIONS, ImportOptions, button_map
 from teleop_exchange.orientation import Attitudes
 from teleop_exchange.ros_bags import OurBag, RosBag, is_plain_mcap, opened_by_rosbags
@@ -104,9 +94,7 @@ class BagSource:
             return wanted
         if not found:
             listed = ", ".join(f"{n} ({kind})" for n, kind in sorted(self._types.items()))
-            raise RecordingError(
-                self.path, f"holds no topic of poses; it has {listed or 'nothing'}"
-            )
+            raise RecordingError(self.path, f"holds no topic of poses; it has {listed or 'nothing'}")
         stamped = [name for name in found if self._types[name] not in TRANSFORMS]
         for few in ([n for n in found if n == MASTER_MEASURED_CP.name], found, stamped):
             if len(few) == 1:
@@ -178,9 +166,7 @@ class BagSource:
 
     # -- messages --------------------------------------------------------------------------------
 
-    def _pose_reader(
-        self, bag: RosBag, topic: str, frame: str = "", parent: str = ""
-    ) -> PoseReader:
+    def _pose_reader(self, bag: RosBag, topic: str, frame: str = "", parent: str = "") -> PoseReader:
         kind = self._types[topic]
         return PoseReader(bag.typestore, kind, is_ros2=bag.is_ros2, frame=frame, parent=parent)
 
@@ -218,9 +204,7 @@ class BagSource:
                 yield self._block(*rows)
         parent, child = poses.taken or ("", "")
         if poses.taken is None:
-            chosen = (
-                f"--frame {self._frame or '(any)'} in --parent {self._options.parent or '(any)'}"
-            )
+            chosen = f"--frame {self._frame or '(any)'} in --parent {self._options.parent or '(any)'}"
             raise RecordingError(self.path, f"{self._topic} holds no pose of {chosen}")
         if child:
             self.told.append(f"poses of {child} in {parent or 'a frame without a name'}")

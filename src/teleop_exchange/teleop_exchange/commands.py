@@ -38,9 +38,13 @@ def add_import(commands: Any) -> None:
     parser.add_argument("file", type=Path, metavar="FILE", help="file or directory to import")
     out_argument(parser)
     parser.add_argument(
-        "--arm", nargs=2, action="append", default=[], metavar=("NAME", "OPTIONS"),
+        "--arm",
+        nargs=2,
+        action="append",
+        default=[],
+        metavar=("NAME", "OPTIONS"),
         help="one of several hands in the file, with options for it alone",
-    )  # fmt: skip
+    )
     _options(parser)
 
 
@@ -56,29 +60,19 @@ def _options(parser: argparse.ArgumentParser) -> None:
     bags.add_argument("--topic", metavar="TOPIC", help="topic of the poses, if there are several")
     bags.add_argument("--frame", metavar="NAME", help="child frame, if a topic has several")
     bags.add_argument("--parent", metavar="NAME", help="frame of the poses, if there are several")
-    bags.add_argument(
-        "--stamps", choices=("header", "log"), help="times of the messages (default: header)"
-    )
+    bags.add_argument("--stamps", choices=("header", "log"), help="times of the messages (default: header)")
 
 
 def _time(group: Any) -> None:
-    group.add_argument(
-        "--time", nargs="+", metavar="COL", help="column of the time, or seconds and nanoseconds"
-    )
-    group.add_argument(
-        "--rate", type=float, metavar="HZ", help="samples per second, for a file without times"
-    )
-    group.add_argument(
-        "--time-unit", choices=("auto", *TIMES_NS), help="unit of the time (default: guessed)"
-    )
+    group.add_argument("--time", nargs="+", metavar="COL", help="column of the time, or seconds and nanoseconds")
+    group.add_argument("--rate", type=float, metavar="HZ", help="samples per second, for a file without times")
+    group.add_argument("--time-unit", choices=("auto", *TIMES_NS), help="unit of the time (default: guessed)")
 
 
 def _place(group: Any) -> None:
     group.add_argument("--position", nargs="+", metavar="COL", help="columns of x, y, z")
     group.add_argument(
-        "--unit",
-        choices=("auto", *LENGTHS),
-        help="unit of the position (default: by the names, else m)",
+        "--unit", choices=("auto", *LENGTHS), help="unit of the position (default: by the names, else m)"
     )
     group.add_argument("--quaternion", nargs="+", metavar="COL", help="four columns")
     group.add_argument(
@@ -87,42 +81,32 @@ def _place(group: Any) -> None:
         help="order of these columns (default: as their names say, else wxyz)",
     )
     group.add_argument("--matrix", nargs="+", metavar="COL", help="nine columns of a rotation")
+    group.add_argument("--matrix-order", choices=("row", "column"), help="row by row (default) or column by column")
     group.add_argument(
-        "--matrix-order", choices=("row", "column"), help="row by row (default) or column by column"
-    )
-    group.add_argument(
-        "--euler", nargs="+", metavar="COL",
+        "--euler",
+        nargs="+",
+        metavar="COL",
         help="order and three columns: xyz about fixed axes, XYZ about axes that turn along",
-    )  # fmt: skip
+    )
     group.add_argument("--rotation-vector", nargs="+", metavar="COL", help="three columns")
-    group.add_argument(
-        "--angles", choices=("auto", "rad", "deg"), help="unit of --euler and --rotation-vector"
-    )
-    group.add_argument(
-        "--orientation", choices=("auto", "none"), help="none: constant, nothing is guessed"
-    )
+    group.add_argument("--angles", choices=("auto", "rad", "deg"), help="unit of --euler and --rotation-vector")
+    group.add_argument("--orientation", choices=("auto", "none"), help="none: constant, nothing is guessed")
 
 
 def _buttons(group: Any) -> None:
     for button in BUTTONS:
         group.add_argument(f"--{button}", metavar="COL", help=f"column of the {button} button")
     group.add_argument(
-        "--threshold",
-        type=float,
-        metavar="X",
-        help="a button is pressed above this value (default: 0.5)",
+        "--threshold", type=float, metavar="X", help="a button is pressed above this value (default: 0.5)"
     )
     group.add_argument("--buttons-topic", metavar="TOPIC", help="topic of Joy messages in a bag")
-    group.add_argument(
-        "--buttons", metavar="MAP", help="buttons of the Joy, such as clutch=0,mode=2; or none"
-    )
+    group.add_argument("--buttons", metavar="MAP", help="buttons of the Joy, such as clutch=0,mode=2; or none")
 
 
 def _changes(group: Any) -> None:
     group.add_argument(
-        "--axes", nargs=3, metavar=("X", "Y", "Z"),
-        help="the master's x, y, z as axes of the file, such as +y -x +z",
-    )  # fmt: skip
+        "--axes", nargs=3, metavar=("X", "Y", "Z"), help="the master's x, y, z as axes of the file, such as +y -x +z"
+    )
     group.add_argument(
         "--handedness",
         choices=("right", "left"),
@@ -139,18 +123,18 @@ def _changes(group: Any) -> None:
 def _damage(group: Any) -> None:
     group.add_argument("--skip", type=int, metavar="N", help="lines to leave out at the beginning")
     group.add_argument(
-        "--episode", type=_episode, metavar="N|all",
+        "--episode",
+        type=_episode,
+        metavar="N|all",
         help="which recording of a table that holds several; all: each, into a folder of them, of "
         "the folder of a LeRobot data set too",
-    )  # fmt: skip
+    )
     group.add_argument(
         "--backwards",
         choices=("auto", "refuse", "drop", "sort"),
         help="rows whose time goes back (default: drop up to 1 %%, refuse more)",
     )
-    group.add_argument(
-        "--gap", type=float, metavar="N", help="report gaps longer than N periods (default: 5)"
-    )
+    group.add_argument("--gap", type=float, metavar="N", help="report gaps longer than N periods (default: 5)")
 
 
 _EXPORT = """\
@@ -173,38 +157,45 @@ def add_export(commands: Any) -> None:
     parser.description = _EXPORT
     parser.add_argument("bags", type=Path, nargs="+", metavar="BAG", help="recordings to export")
     parser.add_argument(
-        "--out", type=Path, required=True, metavar="X",
+        "--out",
+        type=Path,
+        required=True,
+        metavar="X",
         help="file or directory to make: .csv, .csv.gz, .parquet, or no ending for a data set",
-    )  # fmt: skip
+    )
     parser.add_argument(
-        "--format",
-        choices=("csv", "parquet", "lerobot"),
-        help="format (default: by the ending of --out)",
+        "--format", choices=("csv", "parquet", "lerobot"), help="format (default: by the ending of --out)"
     )
     parser.add_argument("--topics", nargs="+", default=(), metavar="TOPIC", help="only these")
     parser.add_argument(
-        "--rate", type=float, metavar="HZ",
+        "--rate",
+        type=float,
+        metavar="HZ",
         help="rows per second, each with the newest values (default: every message; lerobot: 50)",
-    )  # fmt: skip
-    parser.add_argument(
-        "--units", action="store_true", help="put the unit behind each column: 'tip.x [m]'"
     )
+    parser.add_argument("--units", action="store_true", help="put the unit behind each column: 'tip.x [m]'")
     parser.add_argument(
-        "--action", choices=("joints", "tip"), default="joints",
+        "--action",
+        choices=("joints", "tip"),
+        default="joints",
         help="lerobot: what the actions are, slave/servo_jp (default) or slave/servo_cp",
-    )  # fmt: skip
-    parser.add_argument(
-        "--task", default="teleoperation", metavar="TEXT", help="lerobot: what is done, in words"
     )
+    parser.add_argument("--task", default="teleoperation", metavar="TEXT", help="lerobot: what is done, in words")
 
 
 def _export(arguments: argparse.Namespace) -> int:
     from teleop_exchange import export_recording
 
     report = export_recording(
-        arguments.bags, arguments.out, arguments.format, topics=arguments.topics,
-        rate=arguments.rate, units=arguments.units, action=arguments.action, task=arguments.task,
-    )  # fmt: skip
+        arguments.bags,
+        arguments.out,
+        arguments.format,
+        topics=arguments.topics,
+        rate=arguments.rate,
+        units=arguments.units,
+        action=arguments.action,
+        task=arguments.task,
+    )
     print(printable(str(report)))
     return 0
 
@@ -222,15 +213,20 @@ def _import(arguments: argparse.Namespace) -> int:
     if arguments.episode == "all":
         arguments.episode = None
         episodes = import_episodes(
-            arguments.file, arguments.out, arms=arms,
-            say=lambda line: print(printable(line), flush=True), **_given(arguments),
-        )  # fmt: skip
+            arguments.file,
+            arguments.out,
+            arms=arms,
+            say=lambda line: print(printable(line), flush=True),
+            **_given(arguments),
+        )
         print(printable(str(episodes)))
         return 2 if episodes.refused else 0
     report = import_recording(arguments.file, arguments.out, arms=arms, **_given(arguments))
     print(printable(str(report)))
-    print(f"{arguments.out}: {report.duration:.1f} s imported; next: "
-          f"teleop replay {arguments.out} --out {arguments.out}_replayed")  # fmt: skip
+    print(
+        f"{arguments.out}: {report.duration:.1f} s imported; next: "
+        f"teleop replay {arguments.out} --out {arguments.out}_replayed"
+    )
     return 0
 
 

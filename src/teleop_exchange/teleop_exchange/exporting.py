@@ -76,9 +76,7 @@ class ExportReport:
 
     def __str__(self) -> str:
         if self.episodes > 1 or self.out.is_dir():
-            return f"{self.out}: {self.episodes} episodes, {self.rows} frames of " + ", ".join(
-                self.columns
-            )
+            return f"{self.out}: {self.episodes} episodes, {self.rows} frames of " + ", ".join(self.columns)
         return f"{self.out}: {self.rows} rows, {len(self.columns)} columns"
 
 
@@ -156,13 +154,14 @@ def _by_name(path: Path) -> str:
             return chosen
     if not path.suffix:
         return "lerobot"
-    raise ParameterError("--out", path.name, "a name that ends with .csv, .csv.gz or .parquet, or "
-                         "a directory for lerobot; else give --format")  # fmt: skip
+    raise ParameterError(
+        "--out",
+        path.name,
+        "a name that ends with .csv, .csv.gz or .parquet, or a directory for lerobot; else give --format",
+    )
 
 
-def _data_set(
-    recordings: list[Recording], path: Path, rate: float | None, action: str, task: str
-) -> ExportReport:
+def _data_set(recordings: list[Recording], path: Path, rate: float | None, action: str, task: str) -> ExportReport:
     from teleop_exchange.lerobot import FPS, write_data_set
 
     if action not in ACTIONS:
@@ -207,16 +206,14 @@ def _schema(streams: Streams, *, units: bool) -> pa.Schema:
     for topic, columns in streams.columns.items():
         found += [(f"{topic}.{column}", unit_of(topic, column)) for column in columns]
     return pa.schema(
-        pa.field(f"{name} [{unit}]" if units and unit else name, pa.float64(),
-                 metadata={"unit": unit})
+        pa.field(f"{name} [{unit}]" if units and unit else name, pa.float64(), metadata={"unit": unit})
         for name, unit in found
-    )  # fmt: skip
+    )
 
 
 def _write(
-    streams: Streams, rows: Iterable[Joined], schema: pa.Schema, draft: Path, chosen: str, *,
-    is_packed: bool,
-) -> int:  # fmt: skip
+    streams: Streams, rows: Iterable[Joined], schema: pa.Schema, draft: Path, chosen: str, *, is_packed: bool
+) -> int:
     """Write all rows; their number."""
     written = 0
     packed = "gzip" if is_packed and chosen == "csv" else None
@@ -236,6 +233,4 @@ def _table(streams: Streams, piece: Joined, schema: pa.Schema) -> pa.Table:
     for topic in streams.columns:
         columns += list(np.ascontiguousarray(piece.values[topic].T))
     # What is NaN becomes an empty cell.
-    return pa.Table.from_arrays(
-        [pa.array(column, pa.float64(), from_pandas=True) for column in columns], schema=schema
-    )
+    return pa.Table.from_arrays([pa.array(column, pa.float64(), from_pandas=True) for column in columns], schema=schema)

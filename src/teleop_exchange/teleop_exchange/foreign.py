@@ -57,9 +57,14 @@ def columns_of(path: Path) -> ImportOptions:
         return ImportOptions()
     turn = COLUMNS[4:7] if set(COLUMNS[4:7]) <= set(head) else ()
     return ImportOptions(
-        time=COLUMNS[:1], time_unit="s", position=COLUMNS[1:4], unit="m", rotation_vector=turn,
-        angles="rad", orientation="none",
-    ).changed(**{name: name for name in COLUMNS[7:] if name in head})  # fmt: skip
+        time=COLUMNS[:1],
+        time_unit="s",
+        position=COLUMNS[1:4],
+        unit="m",
+        rotation_vector=turn,
+        angles="rad",
+        orientation="none",
+    ).changed(**{name: name for name in COLUMNS[7:] if name in head})
 
 
 def _of_arm(bag: Bag, prefix: str, options: ImportOptions) -> ImportOptions:
@@ -68,9 +73,7 @@ def _of_arm(bag: Bag, prefix: str, options: ImportOptions) -> ImportOptions:
     topic = options.topic or (poses if poses in bag.topics else "")
     known = bag.topics.get(buttons)
     is_joy = known is not None and known.count and known.type == Kind.BUTTONS.ros_type
-    return replace(
-        options, topic=topic, buttons_topic=options.buttons_topic or (buttons if is_joy else "")
-    )
+    return replace(options, topic=topic, buttons_topic=options.buttons_topic or (buttons if is_joy else ""))
 
 
 def _read(path: Path, arm: str, options: ImportOptions) -> dict[Topic, Series]:

@@ -124,8 +124,10 @@ def _check(source: Source, parts: _Parts, count: int) -> None:
     attitudes = source.attitudes
     if attitudes.strange > MOST_STRANGE * count:
         share = 100.0 * attitudes.strange / count
-        raise RecordingError(source.path, f"{_strange(attitudes.kind)} in {share:.3g} % of the rows"
-                             f"{_hint(attitudes.kind, attitudes.mirrored)}")  # fmt: skip
+        raise RecordingError(
+            source.path,
+            f"{_strange(attitudes.kind)} in {share:.3g} % of the rows{_hint(attitudes.kind, attitudes.mirrored)}",
+        )
     source.check(parts.finite)
     check("farthest place from the origin", parts.farthest, "m")
     if parts.farthest > FARTHEST and not source.is_unit_said:

@@ -145,16 +145,18 @@ def _warnings(motion: Motion, steps: Array, largest: float, rate: float) -> list
         out.append(f"the hand moves {1e6 * largest:.3g} µm at most: is the unit right? (--unit)")
     if fast := int((steps > FAST).sum()):
         at = float(motion.stamp_ns[steps.argmax()] - motion.stamp_ns[0]) * 1e-9
-        out.append(f"{fast} steps faster than {FAST:g} m/s, up to {steps.max():.3g} m/s at "
-                   f"{at:.3f} s: a wrong unit, or the tracking jumps")  # fmt: skip
+        out.append(
+            f"{fast} steps faster than {FAST:g} m/s, up to {steps.max():.3g} m/s at "
+            f"{at:.3f} s: a wrong unit, or the tracking jumps"
+        )
     if rate < SLOW_HZ:
-        out.append(f"{rate:.3g} Hz is slow for a hand (below {SLOW_HZ:g} Hz): is the unit of the "
-                   "time right? (--time-unit)")  # fmt: skip
+        out.append(
+            f"{rate:.3g} Hz is slow for a hand (below {SLOW_HZ:g} Hz): is the unit of the time right? (--time-unit)"
+        )
     if c.missing > 0.1 * c.rows:
         out.append(f"{100.0 * c.missing / c.rows:.3g} % of the rows lack numbers")
     if c.doubled > 0.1 * c.rows:
-        out.append(f"{100.0 * c.doubled / c.rows:.3g} % of the times are doubled: are they too "
-                   "coarse? (else --rate)")  # fmt: skip
+        out.append(f"{100.0 * c.doubled / c.rows:.3g} % of the times are doubled: are they too coarse? (else --rate)")
     if motion.strange:
         out.append(f"{motion.strange} rows have an orientation that is none; they are left out")
     return out

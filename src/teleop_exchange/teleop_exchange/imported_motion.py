@@ -81,10 +81,13 @@ class Motion:
         self._rows = usable[order.rows]
         self.stamp_ns: Stamps = stamps[order.rows]
         self.counts = Counts(
-            rows=len(gathered.rows) + gathered.bad_rows, samples=len(self._rows),
-            missing=len(gathered.rows) - len(usable), doubled=order.doubled,
-            backwards=order.backwards, damaged=gathered.bad_rows,
-        )  # fmt: skip
+            rows=len(gathered.rows) + gathered.bad_rows,
+            samples=len(self._rows),
+            missing=len(gathered.rows) - len(usable),
+            doubled=order.doubled,
+            backwards=order.backwards,
+            damaged=gathered.bad_rows,
+        )
         self._check()
         self.gaps = gaps(self.stamp_ns, options.gap)
         self._shift_ns = 0
@@ -100,9 +103,7 @@ class Motion:
         if len(rows := restarts(stamps)):
             listed = ", ".join(str(row + 1) for row in rows[:5]) + (", …" if len(rows) > 5 else "")
             reason = f"holds {len(rows) + 1} recordings: the time begins anew in row {listed}"
-            raise RecordingError(
-                self._path, f"{reason}; give a file for each, or --stamps log for a bag"
-            )
+            raise RecordingError(self._path, f"{reason}; give a file for each, or --stamps log for a bag")
 
     def _check(self) -> None:
         """Refuse what is no motion.
@@ -116,13 +117,11 @@ class Motion:
         if c.backwards > most * timed:
             share = 100.0 * c.backwards / timed
             hint = "is --time the right column? Else give --backwards sort or drop"
-            raise RecordingError(self._path, f"the time goes back in {c.backwards} rows "
-                                 f"({share:.3g} %): {hint}")  # fmt: skip
+            raise RecordingError(self._path, f"the time goes back in {c.backwards} rows ({share:.3g} %): {hint}")
         if c.doubled > MOST_DOUBLED * timed:
             share = 100.0 * c.doubled / timed
             hint = "it is too coarse; give --rate HZ, or --stamps log for a bag"
-            raise RecordingError(self._path, f"the time stands still in {share:.3g} % of the rows: "
-                                 f"{hint}")  # fmt: skip
+            raise RecordingError(self._path, f"the time stands still in {share:.3g} % of the rows: {hint}")
         if c.samples < 2:
             what = f"{c.samples} usable rows of {c.rows}; a motion needs two"
             raise RecordingError(self._path, f"holds {what}")
@@ -140,9 +139,10 @@ class Motion:
         c = self.counts
         parts = [
             (c.missing, "with missing numbers left out"),
-            (c.doubled, "doubled left out"), (c.backwards, "going back in time"),
+            (c.doubled, "doubled left out"),
+            (c.backwards, "going back in time"),
             (c.damaged, "with a wrong number of cells left out"),
-        ]  # fmt: skip
+        ]
         return [f"{count} {text}" for count, text in parts if count]
 
     def _in_axes_of_master(self, rows: geometry.Array) -> geometry.Array:

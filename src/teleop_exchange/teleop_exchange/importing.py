@@ -90,9 +90,7 @@ def write(motions: Mapping[str, Motion], out: Path, metadata: dict[str, str]) ->
         raise
 
 
-def _blocks(
-    streams: Mapping[Topic, tuple[Stamps, Array]],
-) -> Iterator[dict[Topic, tuple[Stamps, Array, Stamps]]]:
+def _blocks(streams: Mapping[Topic, tuple[Stamps, Array]]) -> Iterator[dict[Topic, tuple[Stamps, Array, Stamps]]]:
     """Stretches of time, each with the samples of every stream."""
     ends = np.sort(np.concatenate([s[ROWS - 1 :: ROWS] for s, _ in streams.values()]))
     written = dict.fromkeys(streams, 0)
@@ -114,9 +112,7 @@ def command_of(path: Path, out: Path, options: Mapping[str, ImportOptions]) -> s
     return shlex.join(words)
 
 
-def _about(
-    path: Path, out: Path, options: Mapping[str, ImportOptions], report: ImportReport
-) -> dict[str, str]:
+def _about(path: Path, out: Path, options: Mapping[str, ImportOptions], report: ImportReport) -> dict[str, str]:
     """Names and texts by which an import can be repeated."""
     from teleop_core import __version__
 

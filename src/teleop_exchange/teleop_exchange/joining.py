@@ -55,10 +55,7 @@ class Streams:
         self._reports = {name: recording[name] for name in wanted if is_report(self._bag, name)}
         self._names = [name for name in wanted if name not in self._reports]
         first = self._first()
-        self.columns = {
-            name: self._reports[name].columns if name in self._reports else first[name]
-            for name in wanted
-        }
+        self.columns = {name: self._reports[name].columns if name in self._reports else first[name] for name in wanted}
         self.start_ns = self._bag.start_ns
 
     def _first(self) -> dict[str, tuple[str, ...]]:
@@ -158,9 +155,7 @@ def _numbers(since_ns: Stamps, step: float, first: int) -> Stamps:
     if not len(ends):
         return np.arange(first, int(since_ns[-1] // step) + 1)
     warnings.warn(
-        f"no rows where no message came for more than {LONGEST_GAP_NS / SECOND_NS:g} s",
-        TeleopWarning,
-        stacklevel=4,
+        f"no rows where no message came for more than {LONGEST_GAP_NS / SECOND_NS:g} s", TeleopWarning, stacklevel=4
     )
     low = np.ceil(since_ns[np.append(0, ends + 1)] / step).astype(np.int64)
     high = np.floor(since_ns[np.append(ends, len(since_ns) - 1)] / step).astype(np.int64) + 1

@@ -19,12 +19,7 @@ from numpy.typing import NDArray
 
 from teleop_core.bags.arms import topic_prefix
 from teleop_core.base.errors import RecordingError
-from teleop_core.graph.topics import (
-    SLAVE_MEASURED_CP,
-    SLAVE_MEASURED_JS,
-    SLAVE_SERVO_CP,
-    SLAVE_SERVO_JP,
-)
+from teleop_core.graph.topics import SLAVE_MEASURED_CP, SLAVE_MEASURED_JS, SLAVE_SERVO_CP, SLAVE_SERVO_JP
 from teleop_core.kernels.geometry import Array
 from teleop_core.session.recording import Recording
 from teleop_exchange.joining import Streams
@@ -113,9 +108,7 @@ def write_data_set(
             all_numbers.append(numbers)
     finally:
         files.close()
-    whole: Numbers = {
-        key: np.concatenate([one[key] for one in all_numbers]) for key in all_numbers[0]
-    }
+    whole: Numbers = {key: np.concatenate([one[key] for one in all_numbers]) for key in all_numbers[0]}
     _write_meta(out, episodes, statistics(whole), task)
     info = _info(recordings[0], names, fps, len(episodes), frames)
     (out / "meta" / "info.json").write_text(json.dumps(info, indent=4), encoding="utf-8")
@@ -181,34 +174,36 @@ def statistics(numbers: Numbers) -> Statistics:
         rows = values.reshape(len(values), -1)
         wide = rows.astype(np.float64)
         found = {
-            "min": rows.min(axis=0).tolist(), "max": rows.max(axis=0).tolist(),
-            "mean": wide.mean(axis=0).tolist(), "std": wide.std(axis=0).tolist(),
+            "min": rows.min(axis=0).tolist(),
+            "max": rows.max(axis=0).tolist(),
+            "mean": wide.mean(axis=0).tolist(),
+            "std": wide.std(axis=0).tolist(),
             "count": [len(rows)],
-        }  # fmt: skip
+        }
         for name, share in _QUANTILES.items():
             found[name] = np.quantile(wide, share, axis=0).tolist()
         out[key] = found
     return out
 
 
-def _about(
-    numbers: Numbers, episode: int, before: int, task: str, place: tuple[int, int]
-) -> dict[str, object]:
+def _about(numbers: Numbers, episode: int, before: int, task: str, place: tuple[int, int]) -> dict[str, object]:
     """Row of an episode."""
     count = len(numbers[STATE])
     row: dict[str, object] = {
-        "episode_index": episode, "tasks": [task], "length": count,
-        "data/chunk_index": place[0], "data/file_index": place[1],
-        "dataset_from_index": before, "dataset_to_index": before + count,
-    }  # fmt: skip
+        "episode_index": episode,
+        "tasks": [task],
+        "length": count,
+        "data/chunk_index": place[0],
+        "data/file_index": place[1],
+        "dataset_from_index": before,
+        "dataset_to_index": before + count,
+    }
     for key, found in statistics(numbers).items():
         row |= {f"stats/{key}/{name}": values for name, values in found.items()}
     return row | {"meta/episodes/chunk_index": 0, "meta/episodes/file_index": 0}
 
 
-def _write_meta(
-    out: Path, episodes: Sequence[dict[str, object]], found: Statistics, task: str
-) -> None:
+def _write_meta(out: Path, episodes: Sequence[dict[str, object]], found: Statistics, task: str) -> None:
     path = out / "meta" / "episodes" / _path(0, 0)
     path.parent.mkdir(parents=True, exist_ok=True)
     pq.write_table(pa.Table.from_pylist(list(episodes)), path)
@@ -222,8 +217,7 @@ def _info(
 ) -> dict[str, object]:
     """Content of ``meta/info.json``."""
     features: dict[str, object] = {
-        key: {"dtype": "float32", "shape": [len(found)], "names": list(found)}
-        for key, found in names.items()
+        key: {"dtype": "float32", "shape": [len(found)], "names": list(found)} for key, found in names.items()
     }
     for key in _COUNTERS:
         kind = "float32" if key == "timestamp" else "int64"

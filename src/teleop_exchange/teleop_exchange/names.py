@@ -102,10 +102,7 @@ def find_matrix(names: Sequence[str]) -> tuple[int, ...]:
     whole = [plain(name) for name in names]
     for start in ("r", "r_", "rot", "rot_", "m", "m_", "rotation_", "matrix_", "rotation_matrix_"):
         for first in (0, 1):
-            cells = [
-                [f"{start}{i}{gap}{j}" for i in _three(first) for j in _three(first)]
-                for gap in ("", "_")
-            ]
+            cells = [[f"{start}{i}{gap}{j}" for i in _three(first) for j in _three(first)] for gap in ("", "_")]
             for wanted in cells:
                 if all(name in whole for name in wanted):
                     return tuple(whole.index(name) for name in wanted)

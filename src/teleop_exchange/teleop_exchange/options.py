@@ -38,9 +38,13 @@ CHOICES = {
     "handedness": ("right", "left"),
 }
 _COUNTS = {
-    "time": (0, 1, 2), "position": (0, 3), "quaternion": (0, 4), "matrix": (0, 9),
-    "euler": (0, 4), "rotation_vector": (0, 3),
-}  # fmt: skip
+    "time": (0, 1, 2),
+    "position": (0, 3),
+    "quaternion": (0, 4),
+    "matrix": (0, 9),
+    "euler": (0, 4),
+    "rotation_vector": (0, 3),
+}
 _TUPLES = (*_COUNTS, "axes")
 
 
@@ -156,9 +160,7 @@ class ImportOptions:
             return axis_map("--axes", (x, *others))
         mirror = np.array([[-1.0], [1.0], [1.0]])  # of the first row
         try:
-            return np.asarray(
-                mirror * axis_map("--axes", (x.translate(str.maketrans("+-", "-+")), *others))
-            )
+            return np.asarray(mirror * axis_map("--axes", (x.translate(str.maketrans("+-", "-+")), *others)))
         except ParameterError:
             needed = "three axes at right angles that mirror, for --handedness left"
             raise ParameterError("--axes", self.axes, needed) from None
@@ -217,9 +219,7 @@ class ImportOptions:
         return words
 
 
-def options_of(
-    base: ImportOptions, arms: Mapping[str, Changes], changes: Changes
-) -> dict[str, ImportOptions]:
+def options_of(base: ImportOptions, arms: Mapping[str, Changes], changes: Changes) -> dict[str, ImportOptions]:
     """Options of each arm, the default one first; ``{"": ...}`` if there is one without a name.
 
     Args:

@@ -51,18 +51,13 @@ class Attitudes:
             return self._unit(turned)
         if self.kind == "matrix":
             matrices = rows.reshape(-1, 3, 3)
-            return self._of_matrices(
-                matrices.transpose(0, 2, 1) if self.order == "column" else matrices
-            )
+            return self._of_matrices(matrices.transpose(0, 2, 1) if self.order == "column" else matrices)
         return self._of_angles(np.radians(rows) if self.degrees else rows)
 
     def _of_angles(self, angles: Array) -> Array:
         from scipy.spatial.transform import Rotation
 
-        if self.kind == "euler":
-            turns = Rotation.from_euler(self.order, angles)
-        else:
-            turns = Rotation.from_rotvec(angles)
+        turns = Rotation.from_euler(self.order, angles) if self.kind == "euler" else Rotation.from_rotvec(angles)
         return np.asarray(turns.as_quat(scalar_first=True))
 
     def _unit(self, quaternions: Array) -> Array:

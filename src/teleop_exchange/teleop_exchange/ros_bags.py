@@ -76,11 +76,7 @@ class ForeignBag:
             count += 1
             yield log_ns, data
         if count != listed:
-            warnings.warn(
-                f"{topic}: {count} messages of {listed} that are listed",
-                TeleopWarning,
-                stacklevel=2,
-            )
+            warnings.warn(f"{topic}: {count} messages of {listed} that are listed", TeleopWarning, stacklevel=2)
 
 
 def is_plain_mcap(path: Path) -> bool:

@@ -117,9 +117,7 @@ class TableSource:
         if not found and 0 not in position and self._is_rising(0):
             found = (0,)
         if not found:
-            reason = (
-                "has no column that looks like a time: give --time COL, or --rate HZ; there are "
-            )
+            reason = "has no column that looks like a time: give --time COL, or --rate HZ; there are "
             raise RecordingError(self.path, reason + self._listed())
         return self._told("time", found)
 

@@ -134,17 +134,18 @@ class TextTable:
     def _read(self, columns: Sequence[int]) -> Iterator[list[Numbers]]:
         form = self._form
         names = [f"c{i}" for i in range(form.width)]
-        read = pc.ReadOptions(
-            column_names=names, skip_rows=form.head, encoding=self._encoding, block_size=1 << 20
-        )
+        read = pc.ReadOptions(column_names=names, skip_rows=form.head, encoding=self._encoding, block_size=1 << 20)
         separator = " " if form.separator == _BLANK else form.separator
         parse = pc.ParseOptions(delimiter=separator, invalid_row_handler=self._bad_row)
         wanted = list(dict.fromkeys(names[column] for column in columns))
         convert = pc.ConvertOptions(
-            include_columns=wanted, null_values=list(_MISSING), strings_can_be_null=True,
-            quoted_strings_can_be_null=True, decimal_point=form.decimal,
+            include_columns=wanted,
+            null_values=list(_MISSING),
+            strings_can_be_null=True,
+            quoted_strings_can_be_null=True,
+            decimal_point=form.decimal,
             column_types={names[c]: self._type(c) for c in columns},
-        )  # fmt: skip
+        )
         with self._rows() as stream, pc.open_csv(stream, read, parse, convert) as reader:
             for batch in reader:
                 yield [numbers(batch.column(names[column])) for column in columns]
@@ -193,9 +194,7 @@ def recognised(path: Path, text: str, skip: int = 0) -> Form:
     """
     lines = text.splitlines()
     first, comment = skip, ""
-    while first < len(lines) and (
-        not lines[first].strip() or lines[first].lstrip().startswith(_COMMENTS)
-    ):
+    while first < len(lines) and (not lines[first].strip() or lines[first].lstrip().startswith(_COMMENTS)):
         comment = lines[first].strip().lstrip("#%/").strip() or comment
         first += 1
     body = [line for line in lines[first:] if line.strip()][: SAMPLE + 2]
@@ -241,10 +240,7 @@ def _head(rows: list[list[str]], width: int) -> tuple[str, ...]:
         return ()
     units = [cell.strip().strip("[]()") for cell in fitting[-1]]
     if len(fitting) > 1 and all(len(unit) <= 4 for unit in units):
-        return tuple(
-            f"{name} [{unit}]" if unit else name
-            for name, unit in zip(fitting[-2], units, strict=True)
-        )
+        return tuple(f"{name} [{unit}]" if unit else name for name, unit in zip(fitting[-2], units, strict=True))
     return tuple(fitting[-1])
 
 

@@ -18,10 +18,15 @@ Layout = dict[str, Any]
 def published_points(x: Numbers, y: Numbers, name: str, unit: str = "mm") -> Trace:
     """Trace of what a source printed."""
     return {
-        "type": "scatter", "mode": "markers", "name": name, "legendgroup": name, "x": x, "y": y,
+        "type": "scatter",
+        "mode": "markers",
+        "name": name,
+        "legendgroup": name,
+        "x": x,
+        "y": y,
         "marker": {"color": PUBLISHED, "size": 9, "symbol": _MARKS[0]},
         "hovertemplate": f"%{{y:.4g}} {unit}",
-    }  # fmt: skip
+    }
 
 
 def points(x: Numbers, y: Numbers, name: str, color: str, unit: str = "mm", mark: int = 1) -> Trace:
@@ -40,8 +45,7 @@ def joined(x: Numbers, y: Numbers, name: str, color: str, unit: str = "mm") -> T
 def level(value: float, text: str, axis: str = "y") -> tuple[Layout, Layout]:
     """Shape and annotation of a published number, across a plot."""
     look = {"color": PUBLISHED, "width": 1.2, "dash": "dot"}
-    shape = {"type": "line", "xref": "paper", "yref": axis, "x0": 0, "x1": 1, "y0": value,
-             "y1": value, "line": look}  # fmt: skip
+    shape = {"type": "line", "xref": "paper", "yref": axis, "x0": 0, "x1": 1, "y0": value, "y1": value, "line": look}
     note = {"xref": "paper", "yref": axis, "x": 1, "y": value, "xanchor": "right",
             "yanchor": "bottom", "showarrow": False, "text": text,
             "font": {"size": 11, "color": PUBLISHED},
@@ -74,29 +78,27 @@ def in_planes(names: str, groups: Sequence[tuple[Numbers, str, str, float]], uni
         for path, name, color, width in groups:
             trace = line(path[:, across], path[:, up], name, color, width, unit)
             shown = plot == 0
-            traces.append(
-                {**trace, "xaxis": f"x{suffix}", "yaxis": f"y{suffix}", "showlegend": shown}
-            )
-        layout[f"xaxis{suffix}"] = axis(
-            names[across], unit, range=ranges[across], constrain="domain"
-        )
-        layout[f"yaxis{suffix}"] = axis(
-            names[up], unit, range=ranges[up], constrain="domain", scaleanchor=f"x{suffix}"
-        )
+            traces.append({**trace, "xaxis": f"x{suffix}", "yaxis": f"y{suffix}", "showlegend": shown})
+        layout[f"xaxis{suffix}"] = axis(names[across], unit, range=ranges[across], constrain="domain")
+        layout[f"yaxis{suffix}"] = axis(names[up], unit, range=ranges[up], constrain="domain", scaleanchor=f"x{suffix}")
     return traces, layout
 
 
-def in_space(
-    path: Numbers, name: str, color: str, width: float, mode: str = "lines", **marker: object
-) -> Trace:
+def in_space(path: Numbers, name: str, color: str, width: float, mode: str = "lines", **marker: object) -> Trace:
     """Trace of a path or of points in space (N, 3)."""
     x, y, z = np.asarray(path, dtype=np.float64).T
     return {
-        "type": "scatter3d", "mode": mode, "name": name, "legendgroup": name,
-        "x": x, "y": y, "z": z, "line": {"color": color, "width": width},
+        "type": "scatter3d",
+        "mode": mode,
+        "name": name,
+        "legendgroup": name,
+        "x": x,
+        "y": y,
+        "z": z,
+        "line": {"color": color, "width": width},
         "marker": {"color": color, "size": 2, **marker},
         "hovertemplate": "x %{x:.3f}<br>y %{y:.3f}<br>z %{z:.3f}",
-    }  # fmt: skip
+    }
 
 
 def scene(unit: str) -> Layout:

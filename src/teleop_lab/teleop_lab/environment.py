@@ -36,9 +36,7 @@ class _TaskEnv(gymnasium.Env[Observed, Observed]):
 
     metadata = {"render_modes": []}  # noqa: RUF012 - gymnasium's own declaration
 
-    def __init__(
-        self, scenario: str, given: Mapping[str, Setting], reach: float, *, has_jaw: bool
-    ) -> None:
+    def __init__(self, scenario: str, given: Mapping[str, Setting], reach: float, *, has_jaw: bool) -> None:
         self._session = tc.Session(scenario, settings=given)
         made, self._reach, self._has_jaw = self._session.runner.configuration, reach, has_jaw
         self._task = values_of(made.group("task"))
@@ -145,13 +143,12 @@ class PegTransferEnv(_TaskEnv):
     def __init__(self, settings: Mapping[str, Setting] | None = None, reach: float = 0.001) -> None:
         stages = ["jaw_command", "jaw", "jaw_sim", "display", "task"]
         given: dict[str, Setting] = {
-            "teleop.stages": stages, "task.kind": "peg_transfer",
+            "teleop.stages": stages,
+            "task.kind": "peg_transfer",
             "coarse_gain": 2.0,  # the board is wider than the device's room
             # The nearest block first: on its way to another one the jaw would push it over.
-            "jaw_sim.object.place": [
-                0.281, -0.2357, -0.0911, 0.256, -0.2357, -0.0911, 0.231, -0.2357, -0.0911,
-            ],
-        }  # fmt: skip
+            "jaw_sim.object.place": [0.281, -0.2357, -0.0911, 0.256, -0.2357, -0.0911, 0.231, -0.2357, -0.0911],
+        }
         super().__init__("peg_transfer", given | dict(settings or {}), reach, has_jaw=True)
 
     def _judged(

@@ -39,10 +39,7 @@ _CLOSE = 1e-15  # m, where going further down makes no difference
 _FOLLOWED, _LIMITED = int(kinematics.IkStatus.FOLLOWED), int(kinematics.IkStatus.LIMITED)
 _CLOSED, _NOT_CLOSED = int(kinematics.FkStatus.CLOSED), int(kinematics.FkStatus.NOT_CLOSED)
 _NEAR_SINGULAR_FK = int(kinematics.FkStatus.NEAR_SINGULAR)
-_NEAR_SINGULAR, _UNREACHABLE = (
-    int(kinematics.IkStatus.NEAR_SINGULAR),
-    int(kinematics.IkStatus.UNREACHABLE),
-)
+_NEAR_SINGULAR, _UNREACHABLE = (int(kinematics.IkStatus.NEAR_SINGULAR), int(kinematics.IkStatus.UNREACHABLE))
 
 
 class Directions(NamedTuple):

@@ -67,9 +67,7 @@ def _bent(r: float, z: float, links: Triple, is_positive: bool) -> tuple[float, 
 
 
 @kernel
-def finger_branch(
-    p: Triple, links: Triple, branch: int, seed: float
-) -> tuple[float, float, float, bool]:
+def finger_branch(p: Triple, links: Triple, branch: int, seed: float) -> tuple[float, float, float, bool]:
     """Angles theta, psi, phi of one of four branches; whether the finger reaches p at all.
 
     Branches 0 and 1 turn towards p, 2 and 3 away from it; even ones bend with phi > 0. On the
@@ -138,9 +136,7 @@ def _is_held(angle: float, i: int, seed: Array, limits: Array, q: Array) -> bool
 
 
 @inner
-def finger_joints(
-    p: Triple, links: Triple, seed: Array, limits: Array, first: int, q: Array
-) -> bool:
+def finger_joints(p: Triple, links: Triple, seed: Array, limits: Array, first: int, q: Array) -> bool:
     """Write theta, psi, phi for a contact point; whether the finger reaches it at all.
 
     In a path (finite steps) the finger stays on its branch. Where a joint is held back, the

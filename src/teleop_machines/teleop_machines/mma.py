@@ -86,9 +86,7 @@ def make(model: str = "C", **geometry: float) -> Robot:
     )
 
 
-def holding_torques(
-    robot: Robot, q: object, wrench: object, spring: ShoulderSpring | None = None
-) -> Array:
+def holding_torques(robot: Robot, q: object, wrench: object, spring: ShoulderSpring | None = None) -> Array:
     """Joint torques with which the handle stands still and pushes on the hand.
 
     Gravity is known for joint 2 only (the source weighs the links but prints no mass centres), in

@@ -105,9 +105,13 @@ def matching_rate(torque_difference: float, deflection: float, lever: float) -> 
 
 
 def coil(
-    *, free_length: float = 0.05173, diameter: float = 0.014, wire: float = 0.0015,
-    rate: float = 754.57, shear_modulus: float = 42.5e9,
-) -> Coil:  # fmt: skip
+    *,
+    free_length: float = 0.05173,
+    diameter: float = 0.014,
+    wire: float = 0.0015,
+    rate: float = 754.57,
+    shear_modulus: float = 42.5e9,
+) -> Coil:
     """Helical spring of a given rate.
 
     The source prints 13 turns and no material; 13 turns need 40.9 to 44.2 GPa (as phosphor bronze
@@ -126,16 +130,19 @@ def coil(
     Source:
         Singh 2014, table 5.2: N = G d⁴ / (8 D³ k).
     """
-    given = {"free_length": free_length, "diameter": diameter, "wire": wire, "rate": rate,
-             "shear_modulus": shear_modulus}  # fmt: skip
+    given = {
+        "free_length": free_length,
+        "diameter": diameter,
+        "wire": wire,
+        "rate": rate,
+        "shear_modulus": shear_modulus,
+    }
     for name, value in given.items():
         _positive(name, value)
     turns = round(shear_modulus * wire**4 / (8.0 * diameter**3 * rate))
     if turns < 2:
         raise ParameterError("rate", rate, "small enough for two turns")
-    return Coil(
-        turns, free_length / diameter, turns * wire, diameter / wire, free_length / (turns - 1)
-    )
+    return Coil(turns, free_length / diameter, turns * wire, diameter / wire, free_length / (turns - 1))
 
 
 def shoulder_load(theta2: float | Array, spring: ShoulderSpring | None = None) -> ShoulderLoad:

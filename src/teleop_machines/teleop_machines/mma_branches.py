@@ -69,9 +69,7 @@ def _wrist(wrist: Array, is_flipped: bool, seed: Array, q: Array) -> float:
     q[4] = math.atan2(s1 * K[0] - c1 * K[1], -c6 if is_flipped else c6)
     c, s = math.cos(pitch), math.sin(pitch)
     x, y, z = c1 * c, s1 * c, -s
-    q[5] = math.atan2(
-        column1[0] * x + column1[1] * y + column1[2] * z, X[0] * x + X[1] * y + X[2] * z
-    )
+    q[5] = math.atan2(column1[0] * x + column1[1] * y + column1[2] * z, X[0] * x + X[1] * y + X[2] * z)
     return float(pitch)
 
 
@@ -85,9 +83,7 @@ def _miss(radius: float, height: float, geometry: Array) -> float:
 
 
 @inner
-def _elbow(
-    radius: float, height: float, is_other: bool, geometry: Array, seed: Array, q: Array
-) -> None:
+def _elbow(radius: float, height: float, is_other: bool, geometry: Array, seed: Array, q: Array) -> None:
     """Write θ2 and θ3' of the two long links, stretched or folded if the point is out of reach."""
     a2, a3 = geometry[1], geometry[2]
     square = radius * radius + height * height
@@ -190,9 +186,7 @@ def nearest_branch(
 
 
 @inner
-def least_miss(
-    T: Array, turn: float, seed: Array, geometry: Array, least: float, found: Array
-) -> float:
+def least_miss(T: Array, turn: float, seed: Array, geometry: Array, least: float, found: Array) -> float:
     """Look at the branches with θ10 = ``turn`` for one that stays away less than ``least`` [m].
 
     Returns:

@@ -85,9 +85,7 @@ def fk(q: Array, geometry: Array, T: Array) -> None:
 
 
 @inner
-def _turn(
-    J: Array, column: int, axis: tuple[float, float, float], x: float, y: float, z: float
-) -> None:
+def _turn(J: Array, column: int, axis: tuple[float, float, float], x: float, y: float, z: float) -> None:
     """Write the column of a joint that turns about ``axis``, the tip at lever x, y, z [m]."""
     a, b, c = axis
     J[0, column], J[1, column], J[2, column] = b * z - c * y, c * x - a * z, a * y - b * x

@@ -99,9 +99,7 @@ def _approach(T: Array, box: Array, geometry: Array, rounds: int, q: Array) -> f
 
 
 @inner
-def _cost(
-    T: Array, turn: float, choice: int, seed: Array, limits: Array, geometry: Array, q: Array
-) -> float:
+def _cost(T: Array, turn: float, choice: int, seed: Array, limits: Array, geometry: Array, q: Array) -> float:
     """Write one branch; its largest joint move, infinity when it does not reach or is outside."""
     if branch(T, turn, choice, geometry, seed, q) > 0.0:
         return math.inf
@@ -109,9 +107,7 @@ def _cost(
 
 
 @kernel
-def _scan(
-    T: Array, seed: Array, limits: Array, geometry: Array, bound: float, found: Array
-) -> float:
+def _scan(T: Array, seed: Array, limits: Array, geometry: Array, bound: float, found: Array) -> float:
     """Look for branches nearer to the seed than ``bound``, in steps of θ10 away from it.
 
     No joint moves less than θ10, so the search ends where θ10 alone has moved by the best so far.
@@ -176,9 +172,7 @@ def _can_reach(T: Array, q: Array, geometry: Array) -> bool:
 
 
 @inner
-def _search_branches(
-    T: Array, seed: Array, limits: Array, geometry: Array, left: float, q: Array
-) -> None:
+def _search_branches(T: Array, seed: Array, limits: Array, geometry: Array, left: float, q: Array) -> None:
     """Replace ``q`` by joints that reach the pose and lie nearer to the seed, where there are any.
 
     Args:

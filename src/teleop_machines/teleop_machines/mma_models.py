@@ -85,14 +85,10 @@ def model_table(model: str, g: Mapping[str, float], short_side: float = SHORT_SI
     return DhTable(name=model, convention="modified", rows=rows)
 
 
-def _row(
-    joint: str = "", *, a: float = 0.0, alpha: float = 0.0, d: float = 0.0, theta: float = 0.0
-) -> DhRow:
+def _row(joint: str = "", *, a: float = 0.0, alpha: float = 0.0, d: float = 0.0, theta: float = 0.0) -> DhRow:
     return DhRow(
         constants={"a": a, "alpha": alpha, "d": d, "theta": theta},
-        joint=DhJoint(name=joint, symbol="theta", sign=1.0, lower=-math.pi, upper=math.pi, home=0.0)
-        if joint
-        else None,
+        joint=DhJoint(name=joint, symbol="theta", sign=1.0, lower=-math.pi, upper=math.pi, home=0.0) if joint else None,
     )
 
 

@@ -5,9 +5,7 @@ from teleop_core.base.errors import ParameterError
 SPATIAL, PLANAR = 6, 3
 
 
-def degrees_of_freedom(
-    links: int, joints: int, joint_freedoms: int, *, space: int = SPATIAL
-) -> int:
+def degrees_of_freedom(links: int, joints: int, joint_freedoms: int, *, space: int = SPATIAL) -> int:
     """Mobility by counting: ``space (links - joints - 1) + joint_freedoms``.
 
     It assumes constraints in general position: mechanisms with special geometry, such as parallel

@@ -32,33 +32,16 @@ from teleop_core.robots.robot import Robot, geometry_of
 from teleop_machines.bodies.parallel import rps3_bodies
 from teleop_machines.drives import electric_cylinders
 from teleop_machines.rps3_loop import COSINES, SINES, constraints, frame, points, settle
-from teleop_machines.rps3_modes import (
-    Assembly,
-    AssemblyModes,
-    assembly_modes,
-    joint_points,
-    leg_coordinates,
-)
+from teleop_machines.rps3_modes import Assembly, AssemblyModes, assembly_modes, joint_points, leg_coordinates
 from teleop_machines.rps3_search import angles_of, assemble, assemblies, is_near_singular, lean
 from teleop_machines.stewart_legs import invert
 
-__all__ = [
-    "GEOMETRY",
-    "Assembly",
-    "AssemblyModes",
-    "assembly_modes",
-    "joint_points",
-    "leg_coordinates",
-    "make",
-]
+__all__ = ["GEOMETRY", "Assembly", "AssemblyModes", "assembly_modes", "joint_points", "leg_coordinates", "make"]
 
 # No lengths are published: hinges, ball joints, legs at home [m].
 GEOMETRY = {"b": 1.0, "a": 0.5, "l_home": 1.2}
 _FOLLOWED, _LIMITED = int(kinematics.IkStatus.FOLLOWED), int(kinematics.IkStatus.LIMITED)
-_NEAR_SINGULAR, _UNREACHABLE = (
-    int(kinematics.IkStatus.NEAR_SINGULAR),
-    int(kinematics.IkStatus.UNREACHABLE),
-)
+_NEAR_SINGULAR, _UNREACHABLE = (int(kinematics.IkStatus.NEAR_SINGULAR), int(kinematics.IkStatus.UNREACHABLE))
 
 
 @inner

@@ -78,9 +78,7 @@ def loop(lengths: Array, theta: Array, b: float, a: float, gap: Array, G: Array)
 
 
 @kernel
-def constraints(
-    lengths: Array, theta: Array, b: float, a: float, gap: Array, G: Array, H: Array
-) -> None:
+def constraints(lengths: Array, theta: Array, b: float, a: float, gap: Array, G: Array, H: Array) -> None:
     """Write the loop equations and their slopes, one row for each pair of legs.
 
     Args:
@@ -110,11 +108,7 @@ def _damped_turn(G: Array, gap: Array, damping: float, turn: Array) -> None:
     """
     g00, g01, g11, g12 = G[0, 0], G[0, 1], G[1, 1], G[1, 2]
     g22, g20 = G[2, 2], G[2, 0]
-    x, y, z = (
-        -g00 * gap[0] - g20 * gap[2],
-        -g11 * gap[1] - g01 * gap[0],
-        -g22 * gap[2] - g12 * gap[1],
-    )
+    x, y, z = (-g00 * gap[0] - g20 * gap[2], -g11 * gap[1] - g01 * gap[0], -g22 * gap[2] - g12 * gap[1])
     xy, xz, yz = g00 * g01, g20 * g22, g11 * g12
     share = 1.0 / (g00 * g00 + g20 * g20 + damping)
     yy = g11 * g11 + g01 * g01 + damping - share * xy * xy

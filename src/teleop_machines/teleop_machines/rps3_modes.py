@@ -123,10 +123,12 @@ def _eliminant(x: Array, legs: Array, b: float, a: float) -> Array:
     for i in range(2):
         for j in range(2):
             product *= (
-                3.0 * (b * b - a * a) + l2**2 + l3**2
+                3.0 * (b * b - a * a)
+                + l2**2
+                + l3**2
                 - 3.0 * b * (l2 * cosine2[i] + l3 * cosine3[j])
                 + l2 * l3 * (cosine2[i] * cosine3[j] - 2.0 * sine2[i] * sine3[j])
-            )  # fmt: skip
+            )
     for other in legs[1:]:
         P, Q, _ = _pair(x, legs[0], other, b, a)
         product *= (P * P + Q * Q) ** 2

@@ -207,9 +207,7 @@ def _at_seed(g: Array, ask: Array, T: Array, first: Array, theta: Array) -> floa
 
 
 @inner
-def _far(
-    q: Array, first: Array, g: Array, starts: int, side: float, T: Array, seed: Array, theta: Array
-) -> int:
+def _far(q: Array, first: Array, g: Array, starts: int, side: float, T: Array, seed: Array, theta: Array) -> int:
     """Replace leg angles (3,) by the end of the way from the seed, else by the nearest found."""
     if _lead(q, first, g[0], g[1], side, seed):
         theta[:] = seed

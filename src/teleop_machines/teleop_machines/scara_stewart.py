@@ -51,10 +51,7 @@ _SWING = 1.25 * math.pi  # rad, of a joint that a path sends round the other way
 _STRAIGHT = 1e-8
 _NOT_CLOSED = int(kinematics.FkStatus.NOT_CLOSED)
 _FOLLOWED, _LIMITED = int(kinematics.IkStatus.FOLLOWED), int(kinematics.IkStatus.LIMITED)
-_NEAR_SINGULAR, _UNREACHABLE = (
-    int(kinematics.IkStatus.NEAR_SINGULAR),
-    int(kinematics.IkStatus.UNREACHABLE),
-)
+_NEAR_SINGULAR, _UNREACHABLE = (int(kinematics.IkStatus.NEAR_SINGULAR), int(kinematics.IkStatus.UNREACHABLE))
 
 
 @kernel

@@ -45,10 +45,7 @@ def is_similar(sigma_b: float, sigma_m: float) -> bool:
 def _joint(i: int, radius: float, c: float, s: float) -> tuple[float, float]:
     """Place of a leg's joint on its circle [m]; shifted back by the angle of c, s for odd legs."""
     sign = 1.0 if i % 2 == 0 else -1.0
-    return (
-        radius * (_COSINES[i] * c + sign * _SINES[i] * s),
-        radius * (_SINES[i] * c - sign * _COSINES[i] * s),
-    )
+    return (radius * (_COSINES[i] * c + sign * _SINES[i] * s), radius * (_SINES[i] * c - sign * _COSINES[i] * s))
 
 
 @kernel

@@ -40,10 +40,7 @@ from teleop_machines.stewart_search import NEAR, close_legs, closing_poses
 # Smallest over largest singular value of the leg Jacobian that counts as zero in every pose.
 _RANK = 1e-10
 _FOLLOWED, _LIMITED = int(kinematics.IkStatus.FOLLOWED), int(kinematics.IkStatus.LIMITED)
-_NEAR_SINGULAR, _UNREACHABLE = (
-    int(kinematics.IkStatus.NEAR_SINGULAR),
-    int(kinematics.IkStatus.UNREACHABLE),
-)
+_NEAR_SINGULAR, _UNREACHABLE = (int(kinematics.IkStatus.NEAR_SINGULAR), int(kinematics.IkStatus.UNREACHABLE))
 
 
 class DirectStatus(IntEnum):
@@ -82,9 +79,7 @@ class Layout:
             raise ParameterError("platform", self.platform.tolist(), "points apart from the origin")
 
     @classmethod
-    def circular(
-        cls, r_b: float, base_angles: Array, r_m: float, platform_angles: Array
-    ) -> "Layout":
+    def circular(cls, r_b: float, base_angles: Array, r_m: float, platform_angles: Array) -> "Layout":
         """Joints on circles of radius ``r_b``, ``r_m`` [m] at angles (6,) [rad]."""
         return cls(*(_circle(r, a) for r, a in ((r_b, base_angles), (r_m, platform_angles))))
 

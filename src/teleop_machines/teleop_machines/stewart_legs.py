@@ -111,9 +111,7 @@ def _gaps(
 
 
 @kernel
-def direct(
-    wanted: Array, base: Array, platform: Array, size: float, is_pinned: bool, T: Array
-) -> float:
+def direct(wanted: Array, base: Array, platform: Array, size: float, is_pinned: bool, T: Array) -> float:
     """Move T from where it is to the platform pose with these leg lengths.
 
     Damping shrinks with success, so that convergence ends quadratic; lengths that no pose near

@@ -88,9 +88,7 @@ def _away(T: Array, other: Array, size: float) -> float:
 
 
 @kernel
-def closing_poses(
-    legs: Array, base: Array, platform: Array, size: float, starts: int, found: Array
-) -> int:
+def closing_poses(legs: Array, base: Array, platform: Array, size: float, starts: int, found: Array) -> int:
     """Write all poses with these leg lengths that the search finds.
 
     Args:
@@ -134,9 +132,7 @@ def _nearest(legs: Array, base: Array, platform: Array, size: float, starts: int
 
 
 @inner
-def _is_singular(
-    T: Array, base: Array, platform: Array, size: float, lengths: Array, J: Array
-) -> tuple[bool, float]:
+def _is_singular(T: Array, base: Array, platform: Array, size: float, lengths: Array, J: Array) -> tuple[bool, float]:
     """Write leg lengths (6,) [m]; whether legs hardly fix the pose, and the pose's side."""
     leg_system(T, base, platform, lengths, J)
     is_near = bool(is_near_singular(J.T, 1.0 / size, NEAR * 2.0 * size))
@@ -168,14 +164,7 @@ def _lead(legs: Array, base: Array, platform: Array, size: float, side: float, T
 
 @kernel
 def close_legs(
-    legs: Array,
-    base: Array,
-    platform: Array,
-    size: float,
-    starts: int,
-    side: float,
-    T: Array,
-    out: Array,
+    legs: Array, base: Array, platform: Array, size: float, starts: int, side: float, T: Array, out: Array
 ) -> int:
     """Move a pose from where it is to the assembly with these leg lengths next to it.
 

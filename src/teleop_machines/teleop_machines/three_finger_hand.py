@@ -45,10 +45,7 @@ _LIMITS = np.radians([80.0, 110.0, 150.0])  # assumed, either way
 _NEAR = 0.02  # sine of phi, and reach over full reach, that count as near singular
 _CLOSED, _NOT_CLOSED = int(kinematics.FkStatus.CLOSED), int(kinematics.FkStatus.NOT_CLOSED)
 _FOLLOWED, _LIMITED = int(kinematics.IkStatus.FOLLOWED), int(kinematics.IkStatus.LIMITED)
-_NEAR_SINGULAR, _UNREACHABLE = (
-    int(kinematics.IkStatus.NEAR_SINGULAR),
-    int(kinematics.IkStatus.UNREACHABLE),
-)
+_NEAR_SINGULAR, _UNREACHABLE = (int(kinematics.IkStatus.NEAR_SINGULAR), int(kinematics.IkStatus.UNREACHABLE))
 
 
 @kernel
@@ -162,9 +159,7 @@ def make(**geometry: float | str) -> Robot:
     row = checked_geometry(geometry)
     home, T, side = np.empty(9), np.empty((4, 4)), row["side"]
     reach = row["l11"] + 2.0 / 3.0 * (row["l12"] + row["l13"])
-    corners = np.array(
-        [[0.0, -0.5, 0.5 / 3**0.5], [0.0, 0.5, 0.5 / 3**0.5], [0.0, 0.0, -1 / 3**0.5]]
-    )
+    corners = np.array([[0.0, -0.5, 0.5 / 3**0.5], [0.0, 0.5, 0.5 / 3**0.5], [0.0, 0.0, -1 / 3**0.5]])
     frame(side * corners + [reach, 0.0, 0.5 * row["h"]], T)
     hand = Hand(row)
     for i, point in enumerate(hand.contacts_of(T)):
@@ -181,9 +176,7 @@ def make(**geometry: float | str) -> Robot:
         upper=np.tile(_LIMITS, FINGERS),
         home=home,
         geometry=row,
-        kernels=kinematics.Kernels(
-            fk=fk, jacobian=jacobian, ik=ik, ik_all=ik_all, assemble=assemble
-        ),
+        kernels=kinematics.Kernels(fk=fk, jacobian=jacobian, ik=ik, ik_all=ik_all, assemble=assemble),
         drives=drives,
         describe=hand_bodies,
     )

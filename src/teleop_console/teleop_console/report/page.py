@@ -45,8 +45,7 @@ def report_page(studies: Sequence[Study]) -> str:
     data = json.dumps(found, allow_nan=False)
     scores = [study.score for study in studies]
     table = (  # page.js folds it; without scripts it stays open
-        f'<details class="card table" open><summary>All figures</summary>{_note(scores)}'
-        f"{html_table(scores)}</details>"
+        f'<details class="card table" open><summary>All figures</summary>{_note(scores)}{html_table(scores)}</details>'
     )
     return PAGE.format(
         policy=POLICY,
@@ -62,11 +61,7 @@ def report_page(studies: Sequence[Study]) -> str:
 
 def _recording(study: Study) -> dict[str, Any]:
     bands = [
-        {
-            "cause": band.cause,
-            "color": band.color,
-            "stretches": np.round(band.stretches, 6).tolist(),
-        }
+        {"cause": band.cause, "color": band.color, "stretches": np.round(band.stretches, 6).tolist()}
         for band in study.bands
     ]
     duration_s = study.score.session.duration_s
@@ -106,8 +101,7 @@ def _section(number: int, study: Study, plots: list[Figure], places: list[str]) 
 def _legend(bands: Sequence[Band]) -> str:
     """What the bands mean; how much of the time it was stands in the table."""
     entries = "".join(
-        f'<span><i style="background:{escape(band.color)}"></i>{escape(band.cause)}</span>'
-        for band in bands
+        f'<span><i style="background:{escape(band.color)}"></i>{escape(band.cause)}</span>' for band in bands
     )
     return f'<p class="bands">In the state: {entries}</p>' if entries else ""
 

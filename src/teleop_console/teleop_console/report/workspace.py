@@ -27,18 +27,17 @@ def write_workspace_page(robot: Robot, points: Array, values: Array, file: Path)
     """
     titles = ("in space", "from above: x, y", "from the side: x, z")
     figure = make_subplots(
-        rows=2, cols=2, column_widths=[0.62, 0.38], subplot_titles=titles,
+        rows=2,
+        cols=2,
+        column_widths=[0.62, 0.38],
+        subplot_titles=titles,
         specs=[[{"type": "scene", "rowspan": 2}, {"type": "xy"}], [None, {"type": "xy"}]],
-    )  # fmt: skip
+    )
     x, y, z = points[:DRAWN].T
-    marker: dict[str, Any] = {
-        "size": 2, "color": values[:DRAWN], "colorscale": "Viridis", "opacity": 0.7
-    }  # fmt: skip
+    marker: dict[str, Any] = {"size": 2, "color": values[:DRAWN], "colorscale": "Viridis", "opacity": 0.7}
     bar = {"title": "manipulability", "x": -0.08}
     figure.add_trace(
-        plots.Scatter3d(
-            x=x, y=y, z=z, mode="markers", marker={**marker, "colorbar": bar, "showscale": True}
-        ),
+        plots.Scatter3d(x=x, y=y, z=z, mode="markers", marker={**marker, "colorbar": bar, "showscale": True}),
         row=1,
         col=1,
     )
@@ -51,6 +50,9 @@ def write_workspace_page(robot: Robot, points: Array, values: Array, file: Path)
     axes = {f"{axis}axis": {"title": f"{axis} [m]"} for axis in "xyz"}
     figure.update_layout(
         title=f"Workspace of {robot.name}: {len(points):,} joint vectors drawn within the limits",
-        showlegend=False, height=820, template="plotly_white", scene={**axes, "aspectmode": "data"},
-    )  # fmt: skip
+        showlegend=False,
+        height=820,
+        template="plotly_white",
+        scene={**axes, "aspectmode": "data"},
+    )
     figure.write_html(file, include_plotlyjs=True, full_html=True)

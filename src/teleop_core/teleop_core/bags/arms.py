@@ -24,9 +24,7 @@ ARMS_KEY = "arms"
 NAMESPACE_KEY = "namespace"
 PLAYED_KEY = "played"
 """Entry with the stage up to which topics were taken from a file, as a replay does."""
-_OF_ONE_ARM = {
-    "robot", "robot_file", "robot_meshes", "seed", "mesh", "mesh_file", "drives", "drives_file"
-}  # fmt: skip
+_OF_ONE_ARM = {"robot", "robot_file", "robot_meshes", "seed", "mesh", "mesh_file", "drives", "drives_file"}
 
 
 def arm_names(bag: Bag) -> tuple[str, ...]:
@@ -149,9 +147,7 @@ class _ArmBag(Bag):
             arm = f"arm {self._prefix.rstrip('/')}" if self._prefix else "the default arm"
             raise RecordingError(self.path, f"{arm} {error.reason}") from None
 
-    def read_many(
-        self, topics: Iterable[Topic | str], joint_names: tuple[str, ...] | None = None
-    ) -> dict[str, Series]:
+    def read_many(self, topics: Iterable[Topic | str], joint_names: tuple[str, ...] | None = None) -> dict[str, Series]:
         """As for the whole recording."""
         return self._renamed(self._bag.read_many(self._wanted(topics), joint_names))
 
@@ -170,9 +166,7 @@ class _ArmBag(Bag):
         named = [(self._plain(report.name.strip("/")), report) for report in found]
         return [report._replace(name=name) for name, report in named if name is not None]
 
-    def raw(
-        self, topics: Iterable[Topic | str] | None = None
-    ) -> Iterator[tuple[str, str, int, bytes]]:
+    def raw(self, topics: Iterable[Topic | str] | None = None) -> Iterator[tuple[str, str, int, bytes]]:
         """As for the whole recording."""
         if topics is None:
             topics = [name for name, info in self.topics.items() if info.count]

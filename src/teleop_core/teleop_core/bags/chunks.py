@@ -151,9 +151,7 @@ class Assembly:
                 yield _chunk(data[begin:end], begin, own)
             first, begin = last, end
 
-    def _merged(
-        self, table: "_Table", singles: Sequence[Single]
-    ) -> tuple[Bytes, dict[int, Entries]]:
+    def _merged(self, table: "_Table", singles: Sequence[Single]) -> tuple[Bytes, dict[int, Entries]]:
         """Records of all messages in their order, and for each channel where its own are."""
         loose = table.loose + [_Loose(s[2], table.width, s[0], _record(*s)) for s in singles]
         loose.sort(key=_order)

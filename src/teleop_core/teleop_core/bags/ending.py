@@ -8,9 +8,7 @@ from teleop_core.bags.mcap_file import McapFile
 from teleop_core.base.errors import RecordingError
 
 
-def end(
-    path: Path, file: McapFile, start_ns: int, stopped: OSError | None, given: int = 0
-) -> Exception | None:
+def end(path: Path, file: McapFile, start_ns: int, stopped: OSError | None, given: int = 0) -> Exception | None:
     """Finish file and directory, wherever they are now.
 
     Args:

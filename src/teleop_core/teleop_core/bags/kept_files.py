@@ -83,9 +83,7 @@ class KeptFiles:
         if self._left_out:
             names = ", ".join(path.name for path in self._left_out.values())
             limit = f"keeps {_MOST / 2**20:g} MiB of files"
-            warnings.warn(
-                f"the recording {limit}, and only digests of {names}", TeleopWarning, stacklevel=3
-            )
+            warnings.warn(f"the recording {limit}, and only digests of {names}", TeleopWarning, stacklevel=3)
         return dict(self._texts)
 
     def _name(self, key: str, name: str) -> None:
@@ -160,9 +158,7 @@ def recorded_geometry(settings: Iterable[str], files: Mapping[str, str]) -> tupl
     return tuple(found)
 
 
-def _robot_now(
-    name: str, text: str, digests: Mapping[str, str], metadata: Mapping[str, str]
-) -> str:
+def _robot_now(name: str, text: str, digests: Mapping[str, str], metadata: Mapping[str, str]) -> str:
     """Path of a robot's file, with the meshes of its links as they were recorded."""
     path = Path(name).expanduser()
     files = meshes_of(text, path)
@@ -186,11 +182,7 @@ def _robot_now(
 
 def _tell(name: str, path: Path | None) -> None:
     change = "another by now" if _digest_now(path) else "gone"
-    warnings.warn(
-        f"{name}: this file is {change}; the recording has no copy of it",
-        TeleopWarning,
-        stacklevel=4,
-    )
+    warnings.warn(f"{name}: this file is {change}; the recording has no copy of it", TeleopWarning, stacklevel=4)
 
 
 def _text(path: Path) -> str | None:

@@ -47,12 +47,14 @@ class Layout:
         self._dtype = np.dtype(
             {
                 "names": ["sec", "nanosec", *(f"part{i}" for i in range(len(self._columns)))],
-                "formats": [f"<{count}{NUMPY_CODES[code]}" if i > 1 else f"<{NUMPY_CODES[code]}"
-                            for i, (_, code, count, _) in enumerate(cdr.gaps)],
+                "formats": [
+                    f"<{count}{NUMPY_CODES[code]}" if i > 1 else f"<{NUMPY_CODES[code]}"
+                    for i, (_, code, count, _) in enumerate(cdr.gaps)
+                ],
                 "offsets": [at for at, *_ in cdr.gaps],
                 "itemsize": self.size,
             }
-        )  # fmt: skip
+        )
         self._prepare_single(cdr)
 
     def _prepare_single(self, cdr: Template) -> None:
@@ -62,9 +64,7 @@ class Layout:
         for begin, end in cdr.constants():
             if end > begin:
                 form, index = f"{form}{end - begin}s", index + 1
-                fixed.append(
-                    (index - 1, bytes(cdr.template[begin:end]), bytes(cdr.mask[begin:end]))
-                )
+                fixed.append((index - 1, bytes(cdr.template[begin:end]), bytes(cdr.mask[begin:end])))
             if end in gaps:
                 code, count = gaps[end]
                 form, index = f"{form}{count}{code}", index + count

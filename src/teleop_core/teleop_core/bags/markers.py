@@ -15,10 +15,7 @@ from teleop_core.bags.layouts import SECOND_NS
 from teleop_core.graph.topics import Kind, Quality, Topic
 from teleop_core.kernels.geometry import Array
 
-MARKERS = Topic(
-    "teleop/markers", Kind.REPORT, quality=Quality.REPORT,
-    message="visualization_msgs/msg/MarkerArray",
-)  # fmt: skip
+MARKERS = Topic("teleop/markers", Kind.REPORT, quality=Quality.REPORT, message="visualization_msgs/msg/MarkerArray")
 """Fixture, forces and paths of an arm, drawn."""
 Color = tuple[float, float, float, float]
 """Red, green, blue, opacity, 0 to 1."""

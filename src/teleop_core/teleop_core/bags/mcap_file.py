@@ -150,12 +150,16 @@ class McapFile:
     def statistics(self) -> Statistics:
         """Numbers and times of the messages in whole chunks."""
         return Statistics(
-            attachment_count=0, channel_count=len(self.channels),
-            channel_message_counts=dict(self._counts), chunk_count=self._chunk_count,
-            message_count=sum(self._counts.values()), message_start_time=self._start_ns,
-            message_end_time=self._end_ns, metadata_count=len(self._metadata),
+            attachment_count=0,
+            channel_count=len(self.channels),
+            channel_message_counts=dict(self._counts),
+            chunk_count=self._chunk_count,
+            message_count=sum(self._counts.values()),
+            message_start_time=self._start_ns,
+            message_end_time=self._end_ns,
+            metadata_count=len(self._metadata),
             schema_count=len(self.schemas),
-        )  # fmt: skip
+        )
 
     def finish(self) -> None:
         """Write index and footer behind the last whole chunk.

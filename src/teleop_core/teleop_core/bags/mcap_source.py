@@ -13,16 +13,7 @@ from typing import BinaryIO, NamedTuple
 import numpy as np
 from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
-from mcap.records import (
-    Channel,
-    Chunk,
-    ChunkIndex,
-    Footer,
-    Metadata,
-    MetadataIndex,
-    Schema,
-    Statistics,
-)
+from mcap.records import Channel, Chunk, ChunkIndex, Footer, Metadata, MetadataIndex, Schema, Statistics
 
 from teleop_core.bags import walk
 from teleop_core.bags.compression import decompress
@@ -191,9 +182,7 @@ def _stream(data: Bytes, begin: int, size: int) -> ReadDataStream:
 def _place(index: ChunkIndex) -> Place:
     """Where a chunk is, by the file's index."""
     channels = frozenset(index.message_index_offsets) or None
-    return Place(
-        index.chunk_start_offset, index.message_start_time, index.message_end_time, channels
-    )
+    return Place(index.chunk_start_offset, index.message_start_time, index.message_end_time, channels)
 
 
 def _chunk_at(file: BinaryIO, offset: int) -> Chunk:
@@ -217,9 +206,7 @@ def _uncompressed(chunk: Chunk) -> Bytes:
 
 def _table(data: Bytes, rows: walk.Rows) -> Records:
     rows = rows[rows[:, walk.OPCODE] == Opcode.MESSAGE]
-    return Records(
-        data, rows[:, walk.CHANNEL], rows[:, walk.LOG], rows[:, walk.BEGIN], rows[:, walk.SIZE]
-    )
+    return Records(data, rows[:, walk.CHANNEL], rows[:, walk.LOG], rows[:, walk.BEGIN], rows[:, walk.SIZE])
 
 
 def _windows(data: Bytes, place: Place, window: int) -> Iterator[Records]:

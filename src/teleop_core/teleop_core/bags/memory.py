@@ -50,9 +50,7 @@ class MemoryBag(Bag):
         self.start_ns = min(int(log[0]) for log in logs)
         self.end_ns = max(int(log[-1]) for log in logs)
 
-    def read_many(
-        self, topics: Iterable[Topic | str], joint_names: tuple[str, ...] | None = None
-    ) -> dict[str, Series]:
+    def read_many(self, topics: Iterable[Topic | str], joint_names: tuple[str, ...] | None = None) -> dict[str, Series]:
         """As of any recording."""
         wanted = [topic.name if isinstance(topic, Topic) else topic.strip("/") for topic in topics]
         self.require(wanted)
@@ -60,10 +58,7 @@ class MemoryBag(Bag):
             if name not in self._series:
                 raise RecordingError(self.path, f"{name} is a report, which is not read as numbers")
         kinds = {topic.name: topic.kind for topic in self.streams}
-        return {
-            name: _ordered(self._series[name], joint_names if kinds[name].has_joints else None)
-            for name in wanted
-        }
+        return {name: _ordered(self._series[name], joint_names if kinds[name].has_joints else None) for name in wanted}
 
     def blocks(
         self, topics: Iterable[Topic | str], joint_names: tuple[str, ...] | None = None
@@ -77,9 +72,7 @@ class MemoryBag(Bag):
         name = topic.name if isinstance(topic, Topic) else topic.strip("/")
         return [one for _, data in self._reports.get(name, ()) for one in read_reports(data)]
 
-    def raw(
-        self, topics: Iterable[Topic | str] | None = None
-    ) -> Iterator[tuple[str, str, int, bytes]]:
+    def raw(self, topics: Iterable[Topic | str] | None = None) -> Iterator[tuple[str, str, int, bytes]]:
         """As of any recording; the bytes are made as they are asked for."""
         given = self.topics if topics is None else topics
         names = [topic.name if isinstance(topic, Topic) else topic.strip("/") for topic in given]

@@ -181,13 +181,7 @@ def read_joints(message: Any, part: str, joint_names: tuple[str, ...]) -> Values
 
 
 def write_values(
-    kind: Kind,
-    message: Any,
-    stamp_ns: int,
-    values: Values,
-    *,
-    frame_id: str = "",
-    joint_names: tuple[str, ...] = (),
+    kind: Kind, message: Any, stamp_ns: int, values: Values, *, frame_id: str = "", joint_names: tuple[str, ...] = ()
 ) -> Any:
     """Fill a message with a stamp [ns] and values, shape (width,); returns the message."""
     header, row = message.header, values.tolist()

@@ -164,9 +164,7 @@ class Bag:
         """All messages of one topic; see :meth:`read_many`."""
         return self.read_many([topic], joint_names)[_name(topic)]
 
-    def read_many(
-        self, topics: Iterable[Topic | str], joint_names: tuple[str, ...] | None = None
-    ) -> dict[str, Series]:
+    def read_many(self, topics: Iterable[Topic | str], joint_names: tuple[str, ...] | None = None) -> dict[str, Series]:
         """All messages of some topics, in one pass over the file.
 
         Args:
@@ -195,9 +193,7 @@ class Bag:
         """
         yield from self._blocks(self._columns(topics, joint_names))
 
-    def _columns(
-        self, topics: Iterable[Topic | str], joint_names: tuple[str, ...] | None
-    ) -> dict[str, Column]:
+    def _columns(self, topics: Iterable[Topic | str], joint_names: tuple[str, ...] | None) -> dict[str, Column]:
         wanted = list(topics)
         self.require(wanted)
         columns = {}
@@ -222,9 +218,7 @@ class Bag:
                 if not len(own):
                     continue
                 try:
-                    block[name] = column.read(
-                        records.data, records.begin[own], records.size[own], records.log_ns[own]
-                    )
+                    block[name] = column.read(records.data, records.begin[own], records.size[own], records.log_ns[own])
                 except ValueError as error:
                     raise RecordingError(self.path, f"{name} {error}") from error
             yield block
@@ -237,11 +231,7 @@ class Bag:
     def _records(self, names: Iterable[str]) -> Iterator[tuple[McapSource, Records]]:
         for source, channels in self._numbers.items():
             numbers = {number for name in names for number in channels.get(name, [])}
-            places = [
-                place
-                for place in source.contents.places
-                if place.channels is None or place.channels & numbers
-            ]
+            places = [place for place in source.contents.places if place.channels is None or place.channels & numbers]
             for records in source.records(places):
                 yield source, records
 
@@ -272,15 +262,11 @@ class Bag:
         """Log time [ns] and bytes of a topic's messages in the order in which they are stored."""
         for source, records in self._records([topic]):
             own = np.flatnonzero(np.isin(records.channel, self._numbers[source].get(topic, [])))
-            begins, sizes, logs = (
-                c[own].tolist() for c in (records.begin, records.size, records.log_ns)
-            )
+            begins, sizes, logs = (c[own].tolist() for c in (records.begin, records.size, records.log_ns))
             for begin, size, log_ns in zip(begins, sizes, logs, strict=True):
                 yield log_ns, records.data[begin : begin + size].tobytes()
 
-    def raw(
-        self, topics: Iterable[Topic | str] | None = None
-    ) -> Iterator[tuple[str, str, int, bytes]]:
+    def raw(self, topics: Iterable[Topic | str] | None = None) -> Iterator[tuple[str, str, int, bytes]]:
         """Topic name, ROS type, log time [ns] and CDR bytes of messages in log-time order.
 
         Args:

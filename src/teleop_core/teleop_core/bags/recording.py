@@ -14,23 +14,23 @@ from teleop_core.graph.topics import BY_NAME, Kind, Quality, Stamp, Topic
 class RecordingParameters:
     """Parameters of :class:`~teleop_core.bags.writer.BagWriter`."""
 
-    compression: str = parameter(
-        "zstd", doc="compression of the bag", choices=compression.NAMES, fixed=True
-    )
+    compression: str = parameter("zstd", doc="compression of the bag", choices=compression.NAMES, fixed=True)
     compression_level: int = parameter(
         1, doc="effort of the compression: more is slower", lower=1, upper=16, fixed=True
     )
     topics: tuple[str, ...] = parameter((), doc="topics to record; empty for all", fixed=True)
-    every: int = parameter(
-        1, doc="record every n-th sample of the streams", lower=1, upper=1_000_000, fixed=True
-    )
+    every: int = parameter(1, doc="record every n-th sample of the streams", lower=1, upper=1_000_000, fixed=True)
     every_of: tuple[str, ...] = parameter(
         (), doc="exceptions from every, as topic=n, e.g. slave/measured_js=10", fixed=True
     )
     tf_rate: float = parameter(
-        50.0, unit="1/s", lower=0.0, upper=1000.0, fixed=True,
+        50.0,
+        unit="1/s",
+        lower=0.0,
+        upper=1000.0,
+        fixed=True,
         doc="messages of /tf a second, with the robot's model beside them; 0: neither",
-    )  # fmt: skip
+    )
 
     def __post_init__(self) -> None:
         """Refuse unknown names and entries that are not topic=n."""
@@ -65,6 +65,5 @@ class RecordingParameters:
 
 MARKS = Topic("recorder/marks", Kind.REPORT, Stamp("time of the mark"), quality=Quality.REPORT)
 """Marks that somebody set during a live recording: one text each."""
-RECORDER = Stage("recorder", RecordingParameters, reads=(), writes=(),
-                 node="teleop_core.nodes.recorder:RecorderNode")  # fmt: skip
+RECORDER = Stage("recorder", RecordingParameters, reads=(), writes=(), node="teleop_core.nodes.recorder:RecorderNode")
 """The recorder; it reads every topic of its graph, of all arms."""

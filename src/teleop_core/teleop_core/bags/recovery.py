@@ -30,11 +30,7 @@ def recover(path: Path | str, out: Path | str | None = None) -> tuple[Path, int]
     found = source.contents
     if not found.places:
         raise RecordingError(path, "holds no whole chunk of messages; nothing can be recovered")
-    target = (
-        Path(out)
-        if out
-        else path.with_name((path.stem if path.is_file() else path.name) + "_recovered")
-    )
+    target = Path(out) if out else path.with_name((path.stem if path.is_file() else path.name) + "_recovered")
     with rosbag2.new_directory(target) as file:
         return target, _copy(source, file)
 
@@ -53,10 +49,13 @@ def _copy(source: McapSource, target: Path) -> int:
     found = source.contents
     schemas, channels = list(found.schemas.values()), list(found.channels.values())
     file = McapFile(
-        target, schemas, channels,
+        target,
+        schemas,
+        channels,
         {record.name: record.metadata for record in found.metadata},
-        "zstd", compression.compressor("zstd", 1),
-    )  # fmt: skip
+        "zstd",
+        compression.compressor("zstd", 1),
+    )
     try:
         for records in source.records(found.places):
             is_sound = np.isin(records.channel, list(found.channels)) & (records.log_ns >= 0)

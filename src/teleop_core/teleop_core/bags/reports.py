@@ -19,14 +19,7 @@ class Report(NamedTuple):
     values: dict[str, str]
 
 
-def report(
-    stamp_ns: int,
-    name: str,
-    level: int,
-    message: str,
-    values: Mapping[str, str],
-    hardware: str = "",
-) -> bytes:
+def report(stamp_ns: int, name: str, level: int, message: str, values: Mapping[str, str], hardware: str = "") -> bytes:
     """CDR bytes of a report with one status.
 
     Args:
@@ -56,8 +49,11 @@ def read_reports(data: bytes) -> list[Report]:
     stamp_ns = stamp.sec * SECOND_NS + stamp.nanosec
     return [
         Report(
-            stamp_ns, printable(s.name), s.level, printable(s.message),
+            stamp_ns,
+            printable(s.name),
+            s.level,
+            printable(s.message),
             {printable(pair.key): printable(pair.value) for pair in s.values},
         )
         for s in array.status
-    ]  # fmt: skip
+    ]

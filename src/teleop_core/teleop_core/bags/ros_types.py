@@ -8,8 +8,7 @@ from rosbags.serde import SerdeError
 from rosbags.typesys import Stores, get_typestore
 
 DISTRIBUTION = "jazzy"
-_UNREADABLE = (SerdeError, AssertionError, IndexError, ValueError, OverflowError, MemoryError,
-               struct.error)  # fmt: skip
+_UNREADABLE = (SerdeError, AssertionError, IndexError, ValueError, OverflowError, MemoryError, struct.error)
 """What the rosbags library raises about bytes that are no such message."""
 
 

@@ -28,11 +28,16 @@ def offered_qos(quality: Quality) -> list[dict[str, Any]]:
     """Quality of service of a topic's publisher, as rosbag2 writes it since version 9."""
     reliability, durability, depth = _QUALITIES[quality]
     profile = {
-        "history": "keep_last", "depth": depth, "reliability": reliability,
-        "durability": durability, "deadline": dict(_FOREVER), "lifespan": dict(_FOREVER),
-        "liveliness": "automatic", "liveliness_lease_duration": dict(_FOREVER),
+        "history": "keep_last",
+        "depth": depth,
+        "reliability": reliability,
+        "durability": durability,
+        "deadline": dict(_FOREVER),
+        "lifespan": dict(_FOREVER),
+        "liveliness": "automatic",
+        "liveliness_lease_duration": dict(_FOREVER),
         "avoid_ros_namespace_conventions": False,
-    }  # fmt: skip
+    }
     return [profile]
 
 
@@ -80,11 +85,7 @@ def _topic_entry(channel: Channel, type_name: str, count: int) -> dict[str, Any]
 
 
 def metadata_text(
-    file: Path,
-    schemas: list[Schema],
-    channels: list[Channel],
-    statistics: Statistics,
-    start_ns: int,
+    file: Path, schemas: list[Schema], channels: list[Channel], statistics: Statistics, start_ns: int
 ) -> str:
     """Content of ``metadata.yaml`` of a directory with one finished file.
 

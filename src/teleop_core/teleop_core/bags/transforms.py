@@ -11,9 +11,8 @@ from teleop_core.graph.topics import Kind, Quality, Stamp, Topic
 from teleop_core.kernels.geometry import Array
 
 ROBOT_DESCRIPTION = Topic(
-    "robot_description", Kind.REPORT, Stamp("none"), quality=Quality.LATCHED,
-    message="std_msgs/msg/String",
-)  # fmt: skip
+    "robot_description", Kind.REPORT, Stamp("none"), quality=Quality.LATCHED, message="std_msgs/msg/String"
+)
 """URDF of the slave."""
 TF = Topic("tf", Kind.REPORT, quality=Quality.REPORT, message="tf2_msgs/msg/TFMessage")
 """Where the frames of all arms are; one topic for all, since frames carry the arm's name."""

@@ -108,10 +108,7 @@ class BagWriter:
         compress = compressions.compressor(name, self.parameters.compression_level)
         schemas, channels = rosbag2.records_of(self._topics)
         with rosbag2.new_directory(self.path) as file:
-            return McapFile(
-                file, schemas, channels, metadata, "" if name == "none" else name, compress,
-                background,
-            )  # fmt: skip
+            return McapFile(file, schemas, channels, metadata, "" if name == "none" else name, compress, background)
 
     # -- what callers do -------------------------------------------------------------------------
 
@@ -210,10 +207,7 @@ class BagWriter:
         return self
 
     def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         if error is not None and error is self._failure:
             self._failure = None  # on its way already
@@ -262,9 +256,7 @@ class BagWriter:
             pass
 
 
-def _stretch(
-    topic: Topic, channel: _Channel, stamp_ns: Stamps, values: Values, log_ns: Stamps
-) -> Stretch:
+def _stretch(topic: Topic, channel: _Channel, stamp_ns: Stamps, values: Values, log_ns: Stamps) -> Stretch:
     """Copy of the samples that are recorded."""
     form = channel.layout
     if form is None:

@@ -104,8 +104,7 @@ class MessageTypeError(TeleopError, ImportError):
         self.ros_type, self.package = ros_type, package
         build = "run `make crtk_msgs`, or " if package == "crtk_msgs" else ""
         super().__init__(
-            f"{ros_type} needs the package {package}, which is not installed: {build}source a "
-            "workspace that has it"
+            f"{ros_type} needs the package {package}, which is not installed: {build}source a workspace that has it"
         )
 
 

@@ -50,8 +50,7 @@ def _load(path: Path) -> None:
     except Exception as error:  # whatever a user's file raises, one line names it
         del sys.modules[name]
         reason = " ".join(str(error).split())
-        line = next((f.lineno for f in reversed(extract_tb(error.__traceback__))
-                     if f.filename == str(path)), None)  # fmt: skip
+        line = next((f.lineno for f in reversed(extract_tb(error.__traceback__)) if f.filename == str(path)), None)
         place = f" (line {line})" if line else ""
         text = f"a file that can be loaded; it raises {type(error).__name__}: {reason}{place}"
         raise PartError("file of parts", str(path), text) from error

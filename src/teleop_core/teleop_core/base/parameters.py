@@ -92,12 +92,7 @@ class Choice:
 
 
 def choice(
-    registry: "Registry[Any]",
-    default: str,
-    *,
-    doc: str,
-    fixed: bool = False,
-    usual: Mapping[str, Value] | None = None,
+    registry: "Registry[Any]", default: str, *, doc: str, fixed: bool = False, usual: Mapping[str, Value] | None = None
 ) -> Any:
     """Dataclass field, to be called ``kind``, that chooses a part by name.
 
@@ -112,16 +107,12 @@ def choice(
         usual: Dotted names of parts' parameters that have another default here.
     """
     usual = usual or {}
-    meta = {
-        "registry": registry, "default": default, "doc": doc, "fixed": fixed, "usual": usual,
-    }  # fmt: skip
+    meta = {"registry": registry, "default": default, "doc": doc, "fixed": fixed, "usual": usual}
     return field(default_factory=lambda: _make_choice(registry, default, usual), metadata=meta)
 
 
 def _make_choice(registry: "Registry[Any]", kind: str, values: Mapping[str, object]) -> Choice:
-    groups = {
-        name: _make(registry.find(name).parameters, _below(name, values)) for name in registry
-    }
+    groups = {name: _make(registry.find(name).parameters, _below(name, values)) for name in registry}
     return Choice(kind, groups)
 
 
@@ -193,10 +184,7 @@ class Spec:
 
     def _is_inside(self, value: float) -> bool:
         is_off = self.off is not None and value == self.off
-        return is_off or (
-            (self.lower is None or value >= self.lower)
-            and (self.upper is None or value <= self.upper)
-        )
+        return is_off or ((self.lower is None or value >= self.lower) and (self.upper is None or value <= self.upper))
 
     def bounds(self) -> str:
         """Allowed range in words, with the unit."""
@@ -243,10 +231,7 @@ def _choice_specs(entry: Any, prefix: str) -> Iterator[Spec]:
     meta = entry.metadata
     names, kind = meta["registry"].names(), prefix + entry.name
     text: dict[str, Any] = {"unit": "", "doc": meta["doc"], "lower": None, "upper": None}
-    yield Spec(
-        kind, str, str, meta["default"], **text, choices=names, length=None, fixed=meta["fixed"],
-        is_part=True,
-    )  # fmt: skip
+    yield Spec(kind, str, str, meta["default"], **text, choices=names, length=None, fixed=meta["fixed"], is_part=True)
     for name in names:
         for spec in specs(meta["registry"].find(name).parameters, f"{prefix}{name}."):
             usual = meta["usual"].get(spec.name.removeprefix(prefix), spec.default)

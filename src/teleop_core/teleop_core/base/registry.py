@@ -144,9 +144,7 @@ class Registry(Generic[Part]):
                 if entry.name in self._builtin or entry.name in found:
                     package = self.group.partition(".")[0]
                     other = found[entry.name].value if entry.name in found else package
-                    raise PartError(
-                        self.kind, entry.name, f"named once; {entry.value} and {other} both use it"
-                    )
+                    raise PartError(self.kind, entry.name, f"named once; {entry.value} and {other} both use it")
                 found[entry.name] = entry
             self._installed = found
         return self._installed
@@ -222,6 +220,4 @@ def tried(kind: str, name: str, needs: str) -> Iterator[None]:
         raise
     except Exception as error:
         reason = " ".join(str(error).split())
-        raise PartError(
-            kind, name, f"{needs}; it raises {type(error).__name__}: {reason}"
-        ) from error
+        raise PartError(kind, name, f"{needs}; it raises {type(error).__name__}: {reason}") from error

@@ -14,54 +14,57 @@ if TYPE_CHECKING:
 def geometry_argument(parser: argparse.ArgumentParser) -> None:
     """Let a command take lengths in place of the published ones."""
     parser.add_argument(
-        "--geometry", nargs="+", default=[], metavar="SYMBOL=VALUE",
+        "--geometry",
+        nargs="+",
+        default=[],
+        metavar="SYMBOL=VALUE",
         help="lengths and options in place of the published ones [m, rad]",
-    )  # fmt: skip
+    )
 
 
 def command(
-    commands: Any, name: str, run: Callable[[argparse.Namespace], int], text: str,
-    examples: str | None = None,
-) -> argparse.ArgumentParser:  # fmt: skip
+    commands: Any, name: str, run: Callable[[argparse.Namespace], int], text: str, examples: str | None = None
+) -> argparse.ArgumentParser:
     """Parser of a command, which calls ``run``; its help says ``text``, and last the examples."""
-    parser: argparse.ArgumentParser = commands.add_parser(
-        name, help=text, description=text, epilog=examples
-    )
+    parser: argparse.ArgumentParser = commands.add_parser(name, help=text, description=text, epilog=examples)
     if examples is not None:  # line by line, as they stand in the source
         parser.formatter_class = argparse.RawDescriptionHelpFormatter
     parser.set_defaults(run=run)
     parser.add_argument(
-        "--parts", type=Path, action="append", default=[], metavar="FILE.py", dest="more_parts",
+        "--parts",
+        type=Path,
+        action="append",
+        default=[],
+        metavar="FILE.py",
+        dest="more_parts",
         help="Python file that registers parts of your own",
-    )  # fmt: skip
+    )
     return parser
 
 
 def out_argument(parser: argparse.ArgumentParser) -> None:
     """Let a command write a recording; interrupted, it keeps what it has recorded."""
     parser.set_defaults(records=True)
-    parser.add_argument(
-        "--out", type=Path, required=True, help="directory for the recording; it must not exist yet"
-    )
+    parser.add_argument("--out", type=Path, required=True, help="directory for the recording; it must not exist yet")
 
 
 def without_argument(parser: argparse.ArgumentParser) -> None:
     """Let a command leave out nodes for which others stand."""
     parser.add_argument(
-        "--without", action="append", default=[], metavar="NODE",
+        "--without",
+        action="append",
+        default=[],
+        metavar="NODE",
         help="start no such node: another stands in its place, as arm_bridge in that of slave_sim, "
         "on the same ROS_DOMAIN_ID; may be repeated",
-    )  # fmt: skip
+    )
 
 
 def session_arguments(parser: argparse.ArgumentParser) -> None:
     """Let a command configure a session, from a scenario on."""
     parser.add_argument("--scenario", help="one of `teleop scenarios`")
     parser.add_argument(
-        "--duration",
-        type=float,
-        metavar="S",
-        help="time that the hand moves [s] (default: the scenario's)",
+        "--duration", type=float, metavar="S", help="time that the hand moves [s] (default: the scenario's)"
     )
     out_argument(parser)
     setting_arguments(parser)
@@ -70,13 +73,22 @@ def session_arguments(parser: argparse.ArgumentParser) -> None:
 def setting_arguments(parser: argparse.ArgumentParser) -> None:
     """Let a command take files and values of parameters."""
     parser.add_argument(
-        "--config", type=Path, action="append", default=[], metavar="FILE",
+        "--config",
+        type=Path,
+        action="append",
+        default=[],
+        metavar="FILE",
         help="ROS 2 parameter file that overrides the scenario; may be repeated",
-    )  # fmt: skip
+    )
     parser.add_argument(
-        "--set", nargs="+", action="extend", default=[], metavar="KEY=VALUE", dest="settings",
+        "--set",
+        nargs="+",
+        action="extend",
+        default=[],
+        metavar="KEY=VALUE",
+        dest="settings",
         help="set a parameter, over all files, e.g. fine_gain=0.2 or slave.command_timeout=0.2",
-    )  # fmt: skip
+    )
 
 
 def settings(arguments: argparse.Namespace) -> list[str]:

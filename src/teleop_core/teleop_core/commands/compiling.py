@@ -68,9 +68,7 @@ def phases_of(*, is_all: bool) -> Iterator[Sequence[Job]]:
     if is_all:
         named = [name for name in SHAPES if find_spec("trimesh") or not _reads_a_file(name)]
         shapes = {SHAPES.find(name).distance: name for name in named}.values()  # one per kernel
-        for key, parts in (
-            ("robot", ROBOTS), ("controller", CONTROLLERS), ("plant", PLANTS), ("fixture", shapes),
-        ):  # fmt: skip
+        for key, parts in (("robot", ROBOTS), ("controller", CONTROLLERS), ("plant", PLANTS), ("fixture", shapes)):
             yield [(_FIRST, f"{key}={name}", "") for name in parts]
 
 

@@ -38,9 +38,11 @@ def add(commands: Any) -> None:
     operate.add_argument("--arm", help="namespace of one arm (default: all)")
     for parser in (stop, operate):
         parser.add_argument(
-            "--domain", type=int, metavar="N",
+            "--domain",
+            type=int,
+            metavar="N",
             help="ROS domain (default: ROS_DOMAIN_ID, or those of all sessions of this machine)",
-        )  # fmt: skip
+        )
 
 
 def _domains(arguments: argparse.Namespace) -> tuple[int, ...]:

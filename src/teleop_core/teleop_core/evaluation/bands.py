@@ -15,9 +15,11 @@ _STRETCHES = 20_000  # per cause; more than a screen has pixels
 _FINEST_S = 1e-3
 # Told apart without seeing red or green too; none is the colour of a curve.
 LIMIT_COLORS = {
-    Limit.JOINT: "#e8590c", Limit.WORKSPACE: "#7048e8", Limit.SINGULARITY: "#d6336c",
+    Limit.JOINT: "#e8590c",
+    Limit.WORKSPACE: "#7048e8",
+    Limit.SINGULARITY: "#d6336c",
     Limit.SPEED: "#15aabf",
-}  # fmt: skip
+}
 """Colour of each cause on every page, as in CSS."""
 _COLORS = {
     Limit.JOINT: ("joint limit", LIMIT_COLORS[Limit.JOINT]),
@@ -63,9 +65,7 @@ def bands_of(context: Context) -> tuple[Band, ...]:
     return tuple(found)
 
 
-def stretches_of(
-    history: StateHistory, is_so: NDArray[np.bool_], start_ns: int, end_ns: int
-) -> Array:
+def stretches_of(history: StateHistory, is_so: NDArray[np.bool_], start_ns: int, end_ns: int) -> Array:
     """Stretches in which something that rows of a history say holds, shape (M, 2), [s].
 
     Args:
@@ -104,8 +104,4 @@ def _named(cause: str, history: StateHistory, is_so: NDArray[np.bool_]) -> str:
         return cause
     joints = np.unique(history.rows[is_so, STATE["limited_joint"]])
     names = [str(int(joint) + 1) for joint in joints if joint >= 0.0]
-    return (
-        f"{cause} ({'joint' if len(names) == 1 else 'joints'} {', '.join(names)})"
-        if names
-        else cause
-    )
+    return f"{cause} ({'joint' if len(names) == 1 else 'joints'} {', '.join(names)})" if names else cause

@@ -20,11 +20,7 @@ PAGES = "teleop_core.pages"
 
 
 def evaluate_bags(
-    paths: Sequence[Path],
-    json_file: Path | None,
-    html_file: Path | None,
-    console: Console,
-    span: Seconds | None = None,
+    paths: Sequence[Path], json_file: Path | None, html_file: Path | None, console: Console, span: Seconds | None = None
 ) -> list[Score]:
     """Score recordings, show the table, and write JSON and page if wanted.
 

@@ -38,9 +38,7 @@ class Context:
         span: What is scored; None for all of it.
     """
 
-    def __init__(
-        self, bag: Bag, arm: str, history: StateHistory, origin: Origin, span: Span | None = None
-    ) -> None:
+    def __init__(self, bag: Bag, arm: str, history: StateHistory, origin: Origin, span: Span | None = None) -> None:
         self.bag, self.arm, self.history, self.origin = bag, arm, history, origin
         self.span = span
         self.robot = bag.metadata.get("robot") or None

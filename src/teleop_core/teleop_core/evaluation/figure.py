@@ -33,14 +33,18 @@ class Figure:
     height: int = 420
 
 
-def line(
-    x: Numbers, y: Numbers, name: str, color: str, width: float, unit: str = "mm"
-) -> dict[str, Any]:
+def line(x: Numbers, y: Numbers, name: str, color: str, width: float, unit: str = "mm") -> dict[str, Any]:
     """Trace of a line in a plane; ``unit`` is that of y."""
     return {
-        "type": "scatter", "mode": "lines", "name": name, "legendgroup": name, "x": x, "y": y,
-        "line": {"color": color, "width": width}, "hovertemplate": f"%{{y:.4g}} {unit}",
-    }  # fmt: skip
+        "type": "scatter",
+        "mode": "lines",
+        "name": name,
+        "legendgroup": name,
+        "x": x,
+        "y": y,
+        "line": {"color": color, "width": width},
+        "hovertemplate": f"%{{y:.4g}} {unit}",
+    }
 
 
 def time_axis() -> dict[str, Any]:

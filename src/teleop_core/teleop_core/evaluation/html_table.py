@@ -47,10 +47,7 @@ def compact_table(score: "Score") -> str:
     """Table for a notebook, which brings no style of its own."""
     session = score.session
     head = f"<b>{escape(session.place)}</b> · {escape(' · '.join(session.facts))}"
-    lines = [
-        f'<tr><th colspan="4" style="text-align:left">{head}<br>{escape(score.verdict.text)}</th>'
-        "</tr>"
-    ]
+    lines = [f'<tr><th colspan="4" style="text-align:left">{head}<br>{escape(score.verdict.text)}</th></tr>']
     for group, members in groupby(side_by_side([score]), key=lambda line: line.group):
         lines.append(f'<tr><th colspan="4" style="text-align:left">{escape(group)}</th></tr>')
         lines += (_compact_line(line.rows[0]) for line in members)

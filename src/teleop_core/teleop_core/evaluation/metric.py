@@ -38,8 +38,7 @@ class Key(NamedTuple):
         """Whether a value's path is one of this key's."""
         choices = self._choices()
         return len(choices) == len(path) and all(
-            choice[0].startswith("<") or name in choice
-            for choice, name in zip(choices, path, strict=True)
+            choice[0].startswith("<") or name in choice for choice, name in zip(choices, path, strict=True)
         )
 
     def _choices(self) -> list[list[str]]:

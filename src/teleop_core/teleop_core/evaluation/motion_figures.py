@@ -33,40 +33,24 @@ Mask = NDArray[np.bool_]
 class MotionFigures:
     """How something moved; None where there is too little motion to say."""
 
-    time_s: float = figure(
-        "s", "time without the approach; in_fixture: hand while a fixture was on"
-    )
+    time_s: float = figure("s", "time without the approach; in_fixture: hand while a fixture was on")
     path_mm: float = figure("mm", "way of the tip")
-    speed_median_mm_s: float | None = figure(
-        "mm/s", "median speed, at 30 Hz as all but the tremor", default=None
-    )
-    speed_p95_mm_s: float | None = figure(
-        "mm/s", "speed that is exceeded for 5 % of the time", default=None
-    )
+    speed_median_mm_s: float | None = figure("mm/s", "median speed, at 30 Hz as all but the tremor", default=None)
+    speed_p95_mm_s: float | None = figure("mm/s", "speed that is exceeded for 5 % of the time", default=None)
     acceleration_p95_m_s2: float | None = figure(
         "m/s^2", "acceleration that is exceeded for 5 % of the time", default=None
     )
     idle_share: float | None = figure("1", "share of the time below 5 mm/s", default=None)
-    submovements: int = figure(
-        "1", "peaks of speed with a prominence of 10 mm/s or more", default=0
-    )
+    submovements: int = figure("1", "peaks of speed with a prominence of 10 mm/s or more", default=0)
     peaks_per_s: float | None = figure("1/s", "the same per second", default=None)
-    reversals: int = figure(
-        "1", "turning points of x, y and z with 2 mm or more on both sides", default=0
-    )
+    reversals: int = figure("1", "turning points of x, y and z with 2 mm or more on both sides", default=0)
     frequency_50_hz: float | None = figure(
         "Hz", "half of the velocity's power is below (Welch, bins of 0.12 Hz)", default=None
     )
-    frequency_95_hz: float | None = figure(
-        "Hz", "95 % of the velocity's power are below", default=None
-    )
-    power_1_3: float | None = figure(
-        "1", "share of the velocity's power in 1 to 3 Hz", default=None
-    )
+    frequency_95_hz: float | None = figure("Hz", "95 % of the velocity's power are below", default=None)
+    power_1_3: float | None = figure("1", "share of the velocity's power in 1 to 3 Hz", default=None)
     sparc: float | None = figure(
-        "1",
-        "spectral arc length of speed, median of windows of 5 s (Balasubramanian 2015)",
-        default=None,
+        "1", "spectral arc length of speed, median of windows of 5 s (Balasubramanian 2015)", default=None
     )
     ldlj: float | None = figure(
         "1", "log dimensionless jerk, median of windows of 5 s (Balasubramanian 2015)", default=None
@@ -80,9 +64,7 @@ class MotionFigures:
     turn_median_deg_s: float | None = figure(
         "deg/s", "median angular speed, with the noise of the device's gimbal", default=None
     )
-    turn_p95_deg_s: float | None = figure(
-        "deg/s", "angular speed that is exceeded for 5 % of the time", default=None
-    )
+    turn_p95_deg_s: float | None = figure("deg/s", "angular speed that is exceeded for 5 % of the time", default=None)
 
 
 NAMES = tuple(field.name for field in fields(MotionFigures))
@@ -134,8 +116,11 @@ class Kinematics:
         time = len(speed) / RATE
         if not len(speed):
             return MotionFigures(0.0, 0.0)
-        windows = [slice(part.start + one.start, part.start + one.stop)
-                   for part in parts for one in cut(part.stop - part.start)]  # fmt: skip
+        windows = [
+            slice(part.start + one.start, part.start + one.stop)
+            for part in parts
+            for one in cut(part.stop - part.start)
+        ]
         peaks = sum(len(submovements(self.speed[part])) for part in parts)
         frequency, density = self.spectrum(mask)
         acceleration = np.linalg.norm(self._acceleration[mask], axis=1)

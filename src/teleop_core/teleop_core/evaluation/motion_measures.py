@@ -80,9 +80,7 @@ def turn_rates(attitude: Array) -> Array:
     return found
 
 
-def sparc(
-    speed: Array, rate: float, cutoff: float = 10.0, threshold: float = 0.05, padding: int = 4
-) -> float | None:
+def sparc(speed: Array, rate: float, cutoff: float = 10.0, threshold: float = 0.05, padding: int = 4) -> float | None:
     """Spectral arc length of a profile of speed: 0 at best, lower where motion is less smooth.
 
     The length of the normalised magnitude spectrum, taken up to the last frequency that is not
@@ -162,9 +160,7 @@ def velocity_spectrum(parts: Iterable[Array]) -> tuple[Array, Array]:
         window = 0.5 - 0.5 * np.cos(2.0 * np.pi * np.arange(size) / size)
         for begin in range(0, len(velocity) - size + 1, size - size // 2):
             segment = velocity[begin : begin + size]
-            spectrum = np.fft.rfft(
-                (segment - segment.mean(axis=0)) * window[:, None], SPECTRUM_SAMPLES, axis=0
-            )
+            spectrum = np.fft.rfft((segment - segment.mean(axis=0)) * window[:, None], SPECTRUM_SAMPLES, axis=0)
             total += (np.abs(spectrum) ** 2).sum(axis=1) * (size / np.sum(window**2))
             weight += size
     frequency = np.asarray(np.fft.rfftfreq(SPECTRUM_SAMPLES, 1.0 / RATE), np.float64)

@@ -5,14 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from teleop_core.evaluation.motion_measures import (
-    GAP,
-    RATE,
-    SLOWEST_FOR_TREMOR,
-    WINDOW,
-    resampled,
-    tremor_power,
-)
+from teleop_core.evaluation.motion_measures import GAP, RATE, SLOWEST_FOR_TREMOR, WINDOW, resampled, tremor_power
 from teleop_core.kernels.geometry import Array
 
 REST = 1e-3
@@ -166,9 +159,7 @@ class TremorWindows:
         return _mean(self._windows, spans), _mean(self._rests, spans)
 
 
-def _mean(
-    windows: Sequence[tuple[float, float, float]], spans: Sequence[tuple[float, float]]
-) -> float | None:
+def _mean(windows: Sequence[tuple[float, float, float]], spans: Sequence[tuple[float, float]]) -> float | None:
     table = np.array(windows).reshape(-1, 3)
     is_in = np.zeros(len(table), np.bool_)
     for begin, end in spans:

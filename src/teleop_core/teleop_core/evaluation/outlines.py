@@ -44,9 +44,7 @@ class Outline:
         """From end to end along the three axes, [mm]; empty for what is open on a side."""
         if not np.isfinite(self.walls).all():
             return []
-        extent: list[float] = (
-            np.nanmax(self.points, axis=0) - np.nanmin(self.points, axis=0)
-        ).tolist()
+        extent: list[float] = (np.nanmax(self.points, axis=0) - np.nanmin(self.points, axis=0)).tolist()
         return extent
 
     @property
@@ -58,13 +56,18 @@ class Outline:
         """Lines of its walls on an axis, against time."""
         return [
             {
-                "type": "line", "xref": "x", "yref": f"y{suffix}", "x0": self.begin_s,
-                "x1": self.end_s, "y0": wall, "y1": wall,
+                "type": "line",
+                "xref": "x",
+                "yref": f"y{suffix}",
+                "x0": self.begin_s,
+                "x1": self.end_s,
+                "y0": wall,
+                "y1": wall,
                 "line": {"color": FIXTURE, "width": 1.5, "dash": "dash"},
             }
             for wall in self.walls[axis].tolist()
             if math.isfinite(wall)
-        ]  # fmt: skip
+        ]
 
 
 def outlines_of(context: Context) -> list[Outline]:

@@ -77,11 +77,7 @@ def same_stamp(stamp_ns: Integers, other_stamp_ns: Integers) -> Integers:
 def mean_wait_s(begins_ns: Sequence[int], ends_ns: Sequence[int]) -> float | None:
     """Mean time [s] from the last beginning, not after an end, to it; None without any."""
     before = np.searchsorted(begins_ns, ends_ns, side="right")
-    waits = [
-        1e-9 * (end - begins_ns[i - 1])
-        for end, i in zip(ends_ns, before.tolist(), strict=True)
-        if i
-    ]
+    waits = [1e-9 * (end - begins_ns[i - 1]) for end, i in zip(ends_ns, before.tolist(), strict=True) if i]
     return float(np.mean(waits)) if waits else None
 
 

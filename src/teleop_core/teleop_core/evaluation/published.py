@@ -40,9 +40,7 @@ BOX_OVERSHOOT_MM = 1.0
 """How far the source's paths went beyond each wall, about [mm] (section 7.6)."""
 
 
-def published_for(
-    gain: float | None, robot: str | None = "rcrt1", plant: str | None = "hardware"
-) -> Published | None:
+def published_for(gain: float | None, robot: str | None = "rcrt1", plant: str | None = "hardware") -> Published | None:
     """Figures of the mode whose gain is nearer, on a scale of ratios.
 
     Returns:
@@ -78,9 +76,7 @@ class Gains:
         """Take one window."""
         column = window.states(SLAVE_MEASURED_CP).column("gain")
         gains, counts = np.unique(column, return_counts=True)
-        self._counts.update(
-            {g: n for g, n in zip(gains.tolist(), counts.tolist(), strict=True) if g}
-        )
+        self._counts.update({g: n for g, n in zip(gains.tolist(), counts.tolist(), strict=True) if g})
 
     @property
     def gain(self) -> float | None:

@@ -30,8 +30,13 @@ def check_metric(name: str, part: object) -> type[Metric]:
     own = getattr(part, "name", None)
     if own != name or name == SESSION or not name or "." in name:
         raise _refusal(name, f"registered under its own name without dots, which is {own!r}")
-    for method, names in (("__init__", "self, context"), ("add", "self, window"),
-                          ("values", "self"), ("rows", "self"), ("figures", "self")):  # fmt: skip
+    for method, names in (
+        ("__init__", "self, context"),
+        ("add", "self, window"),
+        ("values", "self"),
+        ("rows", "self"),
+        ("figures", "self"),
+    ):
         if not _takes(getattr(part, method, None), names.count(",") + 1):
             raise _refusal(name, f"a class with {method}({names})")
     _check_keys(name, part.keys)
@@ -88,9 +93,7 @@ METRICS: Registry[type[Metric]] = Registry(
         "orientation_error_deg": f"{_FOLDER}.orientation_error:OrientationErrorMetric",
         "true_error_mm": f"{_FOLDER}.position_error:TrueErrorMetric",
         "command_error_mm": f"{_FOLDER}.position_error:CommandErrorMetric",
-        "command_orientation_error_deg": (
-            f"{_FOLDER}.orientation_error:CommandOrientationErrorMetric"
-        ),
+        "command_orientation_error_deg": (f"{_FOLDER}.orientation_error:CommandOrientationErrorMetric"),
         "fixture": f"{_FOLDER}.fixture:FixtureMetric",
         "force_n": f"{_FOLDER}.force:ForceMetric",
         "contact": f"{_FOLDER}.contact:ContactMetric",

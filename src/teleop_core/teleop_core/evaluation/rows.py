@@ -30,12 +30,7 @@ class Row:
 
 
 def row(
-    group: str,
-    label: str,
-    unit: str,
-    value: float | None,
-    published: float | None = None,
-    agrees: bool | None = None,
+    group: str, label: str, unit: str, value: float | None, published: float | None = None, agrees: bool | None = None
 ) -> Row:
     """Row of a number, beside what was published, and whether both agree if that is asked."""
     return Row(group, label, unit, number(value), number(published, ""), agrees)
@@ -63,10 +58,7 @@ def spread_rows(
 
 def error_rows(group: str, label: str, unit: str, spread: Spread) -> list[Row]:
     """Root mean square and maximum of a spread of which nothing was published."""
-    return [
-        row(group, f"{label}, RMS", unit, spread.rms),
-        row(group, f"{label}, max", unit, spread.max),
-    ]
+    return [row(group, f"{label}, RMS", unit, spread.rms), row(group, f"{label}, max", unit, spread.max)]
 
 
 def number(value: float | None, missing: str = MISSING) -> str:
@@ -117,10 +109,7 @@ def side_by_side(scores: "Sequence[Score]") -> list[Line]:
     """
     found = [{_place(row): row for row in summary(score)} for score in scores]
     places = dict.fromkeys(place for rows in found for place in rows)
-    lines = [
-        Line(*place, tuple(rows.get(place) or Row(*place, MISSING) for rows in found))
-        for place in places
-    ]
+    lines = [Line(*place, tuple(rows.get(place) or Row(*place, MISSING) for rows in found)) for place in places]
     return [line for line in lines if any(row.value not in _NOTHING for row in line.rows)]
 
 

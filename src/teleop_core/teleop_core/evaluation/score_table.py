@@ -36,9 +36,7 @@ def score_table(scores: Sequence[Score]) -> Table:
     """One column per score; each figure beside what was published, with a tick if both agree."""
     lines = side_by_side(scores)
     caption = CAPTION if is_compared(lines) else None
-    table = Table(
-        box=SIMPLE, caption=caption, caption_justify="left", pad_edge=False, padding=(0, 1, 0, 0)
-    )
+    table = Table(box=SIMPLE, caption=caption, caption_justify="left", pad_edge=False, padding=(0, 1, 0, 0))
     table.add_column("", no_wrap=True)
     for score in scores:
         table.add_column(escape(printable(heading(score.session))), justify="left", no_wrap=True)

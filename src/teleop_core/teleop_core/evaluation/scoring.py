@@ -24,15 +24,7 @@ from teleop_core.evaluation.registry import METRICS, all_metrics
 from teleop_core.evaluation.rows import Row
 from teleop_core.evaluation.score import Result, Score, Session
 from teleop_core.evaluation.state_history import StateHistory, read_history
-from teleop_core.evaluation.windows import (
-    DisorderError,
-    Seconds,
-    Span,
-    Window,
-    span_of,
-    whole,
-    windows,
-)
+from teleop_core.evaluation.windows import DisorderError, Seconds, Span, Window, span_of, whole, windows
 from teleop_core.graph.topics import SLAVE_MEASURED_CP, SLAVE_SERVO_CP, SLAVE_SETPOINT_CP, Topic
 
 REQUIRED = (SLAVE_MEASURED_CP, SLAVE_SETPOINT_CP, SLAVE_SERVO_CP)
@@ -61,9 +53,7 @@ class Study(NamedTuple):
         return found
 
 
-def evaluate(
-    bag: Bag, arm: str = "", further: Sequence[type[Metric]] = (), span: Seconds | None = None
-) -> Score:
+def evaluate(bag: Bag, arm: str = "", further: Sequence[type[Metric]] = (), span: Seconds | None = None) -> Score:
     """Score of one arm of a recording.
 
     Args:
@@ -83,9 +73,7 @@ def evaluate(
     return study(bag, arm, further, span).score
 
 
-def scores(
-    bag: Bag, further: Sequence[type[Metric]] = (), span: Seconds | None = None
-) -> list[Score]:
+def scores(bag: Bag, further: Sequence[type[Metric]] = (), span: Seconds | None = None) -> list[Score]:
     """Scores of all arms of a recording, the default arm first; as :func:`evaluate`."""
     return [found.score for found in studies(bag, further, span)]
 
@@ -125,9 +113,7 @@ def measure(bag: Bag, keys: Iterable[str], arm: str = "") -> dict[str, float | N
     return found
 
 
-def study(
-    bag: Bag, arm: str = "", further: Sequence[type[Metric]] = (), span: Seconds | None = None
-) -> Study:
+def study(bag: Bag, arm: str = "", further: Sequence[type[Metric]] = (), span: Seconds | None = None) -> Study:
     """Score of one arm with its metrics; raises as :func:`evaluate`."""
     makers = all_metrics(further)
     view = of_arm(bag, arm)
@@ -144,9 +130,7 @@ def study(
     return Study(score, tuple(metrics), bands_of(context))
 
 
-def studies(
-    bag: Bag, further: Sequence[type[Metric]] = (), span: Seconds | None = None
-) -> list[Study]:
+def studies(bag: Bag, further: Sequence[type[Metric]] = (), span: Seconds | None = None) -> list[Study]:
     """All arms of a recording, the default arm first; as :func:`evaluate`."""
     return [study(bag, arm, further, span) for arm in arm_names(bag)]
 
@@ -154,9 +138,7 @@ def studies(
 Cut = Callable[[Bag, Iterable[Topic], StateHistory, int], Iterable[Window]]
 
 
-def _run(
-    bag: Bag, arm: str, makers: Sequence[type[Metric]], span: Span | None
-) -> tuple[Context, list[Metric]]:
+def _run(bag: Bag, arm: str, makers: Sequence[type[Metric]], span: Span | None) -> tuple[Context, list[Metric]]:
     """Metrics after the whole recording, or its span."""
     history, origin = read_history(bag), read_origin(bag, arm)
     try:
@@ -211,9 +193,7 @@ def _compared(results: tuple[Result, ...]) -> tuple[Result, ...]:
 
     Otherwise the rows say so in words: what it tracked well is not what it was asked for.
     """
-    reach = next(
-        (result.values for result in results if isinstance(result.values, ReachScore)), None
-    )
+    reach = next((result.values for result in results if isinstance(result.values, ReachScore)), None)
     share = reach.followed_share if reach is not None else None
     if share is not None and share >= COMPARABLE:
         return results
@@ -226,9 +206,7 @@ def _compared(results: tuple[Result, ...]) -> tuple[Result, ...]:
     if all(old is new or old.rows == new.rows for old, new in zip(results, found, strict=True)):
         return results  # there was nothing to compare
     return tuple(
-        replace(result, rows=(*result.rows, note))
-        if isinstance(result.values, ReachScore)
-        else result
+        replace(result, rows=(*result.rows, note)) if isinstance(result.values, ReachScore) else result
         for result in found
     )
 

@@ -28,8 +28,7 @@ def sketch(recording: "Recording") -> str:
         except TeleopError:
             continue
         panels = "".join(
-            _panel(column, axes, wanted[axes] * 1e3, reached[axes] * 1e3)
-            for column, axes in enumerate(_PANELS)
+            _panel(column, axes, wanted[axes] * 1e3, reached[axes] * 1e3) for column, axes in enumerate(_PANELS)
         )
         size = f'width="{3 * _WIDTH}" height="{_HEIGHT}" viewBox="0 0 {3 * _WIDTH} {_HEIGHT}"'
         head = f"<p>{escape(arm)}</p>" if arm else ""
@@ -54,9 +53,7 @@ def _panel(column: int, axes: tuple[str, str], wanted: Array, reached: Array) ->
         x = left + (thin[:, 0] - middle[0]) * scale
         y = 0.5 * _HEIGHT - (thin[:, 1] - middle[1]) * scale
         path = " ".join(f"{a:.1f},{b:.1f}" for a, b in zip(x, y, strict=True) if np.isfinite(a + b))
-        lines.append(
-            f'<polyline points="{path}" fill="none" stroke="{color}" stroke-width="{width}"/>'
-        )
+        lines.append(f'<polyline points="{path}" fill="none" stroke="{color}" stroke-width="{width}"/>')
     text = f"{axes[0]} {low[0]:.0f} … {high[0]:.0f}, {axes[1]} {low[1]:.0f} … {high[1]:.0f} mm"
     label = f'<text x="{left}" y="{_HEIGHT - 6}" font-size="11" text-anchor="middle">{text}</text>'
     return "".join(lines) + label

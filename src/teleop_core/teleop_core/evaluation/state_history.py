@@ -132,9 +132,7 @@ def read_history(bag: Bag) -> StateHistory:
 
 
 def _row(bag: Bag, report: Report) -> Array:
-    return np.array(
-        [_number(bag, name, report.values.get(name, _SINCE.get(name))) for name in STATE_FIELDS]
-    )
+    return np.array([_number(bag, name, report.values.get(name, _SINCE.get(name))) for name in STATE_FIELDS])
 
 
 def _number(bag: Bag, name: str, text: str | None) -> float:

@@ -11,13 +11,7 @@ from teleop_core.evaluation.context import Context
 from teleop_core.evaluation.pairing import NONE, latest, same_tick
 from teleop_core.evaluation.traces import Envelope
 from teleop_core.evaluation.windows import Window
-from teleop_core.graph.topics import (
-    NO_COMMAND_NS,
-    SLAVE_MEASURED_CP,
-    SLAVE_SERVO_CP,
-    SLAVE_SETPOINT_CP,
-    Topic,
-)
+from teleop_core.graph.topics import NO_COMMAND_NS, SLAVE_MEASURED_CP, SLAVE_SERVO_CP, SLAVE_SETPOINT_CP, Topic
 from teleop_core.kernels.geometry import Array, roll_pitch_yaw, rotations_from_quaternions
 
 DEGENERATE_DEG = 1.0
@@ -136,9 +130,15 @@ def _track(window: Window) -> Tracked:
     poses, setpoints = measured.values, rows_of(setpoint, partner)
     commands = rows_of(command, latest(measured.stamp_ns, command.stamp_ns))
     return Tracked(
-        measured.log_ns, measured.stamp_ns, poses, setpoints, commands, partner != NONE,
-        pose_errors(poses, setpoints), pose_errors(poses, commands),
-    )  # fmt: skip
+        measured.log_ns,
+        measured.stamp_ns,
+        poses,
+        setpoints,
+        commands,
+        partner != NONE,
+        pose_errors(poses, setpoints),
+        pose_errors(poses, commands),
+    )
 
 
 def rows_of(series: Series, index: Integers) -> Array:

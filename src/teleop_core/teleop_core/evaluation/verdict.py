@@ -17,26 +17,26 @@ _FOLLOWED, _DRIFT_MM, _ERROR_MM, _LATENCY_MS, _SHARE = 0.99, 5.0, 1.0, 20.0, 1e-
 _CREATED_MJ = 1.0
 """More than passivity lends, and the last touch before a recording ends."""
 _CAUSES = {
-    "joint": "at a joint's end", "workspace": "beyond the workspace", "speed": "joints too slow",
-    "singularity": "near a singularity", "aligning": "aligned anew",
-}  # fmt: skip
+    "joint": "at a joint's end",
+    "workspace": "beyond the workspace",
+    "speed": "joints too slow",
+    "singularity": "near a singularity",
+    "aligning": "aligned anew",
+}
 _BUSY = "the machine was busy: close other programs, or give the session real-time priority"
 _ADVICE = {
     SHARE: "the slave could not go where the hand led: keep to its reach, or lead it more slowly",
     "asked_error_mm.max": "the tip fell behind the hand: lead it more slowly, or lower the gain",
     "position_error_mm.rms": "the drives do not hold the setpoint: lead it more slowly, or give "
     "the controller other gains",
-    "topics": "stages or the recorder were too late to take them: the machine or the network was "
-    "busy",
+    "topics": "stages or the recorder were too late to take them: the machine or the network was busy",
     "ticks.made_up": _BUSY,
     "ticks.dropped": _BUSY,
     "latency_ms.total.p99": "commands came late: the table of latencies names the stage",
-    "passivity.slave.out_mj": "delayed forces gave energy, which makes touches bounce: choose "
-    "reflection.passivity",
+    "passivity.slave.out_mj": "delayed forces gave energy, which makes touches bounce: choose reflection.passivity",
     "contact.feeding": "a wall pushed the hand harder on its way out than in: lower its stiffness "
     "or the delay, or choose reflection.passivity",
-    "fixture.penetration_max_mm": "the hand pushed through the fixture: raise its stiffness, or "
-    "push less",
+    "fixture.penetration_max_mm": "the hand pushed through the fixture: raise its stiffness, or push less",
 }
 Values = Mapping[str, Leaf]
 """Numbers of a score by their keys."""
@@ -154,9 +154,11 @@ def _of_topics(values: Values, name: str) -> int:
     return sum(
         int(value)
         for key, value in values.items()
-        if key.startswith("topics.") and not key.startswith("topics.network/")
-        and key.endswith(f".{name}") and isinstance(value, int | float)
-    )  # fmt: skip
+        if key.startswith("topics.")
+        and not key.startswith("topics.network/")
+        and key.endswith(f".{name}")
+        and isinstance(value, int | float)
+    )
 
 
 def _delay(values: Values) -> Iterator[Concern]:
@@ -180,8 +182,7 @@ def _ticks(values: Values) -> Iterator[Concern]:
 
 def _created(values: Values) -> Iterator[Concern]:
     """Energy that came out of hand and slave beyond what went in, where both were recorded."""
-    into, out = ([_number(values, f"passivity.{side}.{way}_mj") for side in ("hand", "slave")]
-                 for way in ("in", "out"))  # fmt: skip
+    into, out = ([_number(values, f"passivity.{side}.{way}_mj") for side in ("hand", "slave")] for way in ("in", "out"))
     if None not in (*into, *out):
         taken, given = (sum(part or 0.0 for part in parts) for parts in (into, out))
         text = f"hand and slave gave {given:.3g} mJ, {given - taken:.3g} mJ more than they took"
@@ -193,8 +194,14 @@ _UNTIMELY = {
     "ticks.dropped": (_SHARE, "{:.0f} control ticks never executed"),
 }
 _CONCERNS: tuple[Callable[[Values], Iterator[Concern]], ...] = (
-    _missing, _drift, _following, _messages, _ticks, _created, _delay,
+    _missing,
+    _drift,
+    _following,
+    _messages,
+    _ticks,
+    _created,
+    _delay,
     _beyond("position_error_mm.rms", _ERROR_MM, "tracking error {:.3g} mm RMS"),
     _beyond("fixture.penetration_max_mm", BOX_OVERSHOOT_MM, "fixture penetration {:.3g} mm"),
     _beyond("contact.feeding", 0.5, "non-passive contacts: {:.0f}"),
-)  # fmt: skip
+)

@@ -55,9 +55,7 @@ class Window:
 
     def states(self, topic: Topic) -> States:
         """State in force at the stamp of each of a topic's samples inside of the window."""
-        return self._once(
-            ("states", topic.name), lambda: self.history.at(self.samples(topic).stamp_ns)
-        )
+        return self._once(("states", topic.name), lambda: self.history.at(self.samples(topic).stamp_ns))
 
     def once(self, compute: Callable[["Window"], Found]) -> Found:
         """What a function finds in this window; computed for the first metric that asks."""
@@ -134,9 +132,8 @@ def _since(series: Series, until_ns: int) -> Series:
     )
     kept = slice(first, None)
     return Series(
-        series.stamp_ns[kept].copy(), logs[kept].copy(), series.values[kept].copy(),
-        series.names, series.frame_id,
-    )  # fmt: skip
+        series.stamp_ns[kept].copy(), logs[kept].copy(), series.values[kept].copy(), series.names, series.frame_id
+    )
 
 
 class Span(NamedTuple):

@@ -10,9 +10,10 @@ from typing import Any
 
 _KEPT_OUT, _FIXTURE, _KIND = "keep_out_", "fixture.", "fixture.kind"
 _OF_WORLD = {
-    "world.box.edges": "world.box.size", "world.cylinder.height": "world.cylinder.length",
+    "world.box.edges": "world.box.size",
+    "world.cylinder.height": "world.cylinder.length",
     "world.button.height": "world.button.length",
-}  # fmt: skip
+}
 _OF_FIXTURE = ("place", "keep_out")  # not of its shape
 _DIAMETER = re.compile(r"\bdiameter\s*=\s*([^\s,]+)")
 

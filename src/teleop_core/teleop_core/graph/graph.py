@@ -12,21 +12,9 @@ from teleop_core.base.errors import ParameterError, PartError, UnknownNameError
 from teleop_core.graph.stage import STAGES, Stage
 from teleop_core.graph.topics import BY_NAME, Kind, Topic
 
-__all__ = [
-    "BUILT_IN",
-    "DEVICE",
-    "HAND",
-    "RECORDER_NAME",
-    "Delay",
-    "Graph",
-    "Link",
-    "Member",
-    "build_graph",
-]
+__all__ = ["BUILT_IN", "DEVICE", "HAND", "RECORDER_NAME", "Delay", "Graph", "Link", "Member", "build_graph"]
 
-BUILT_IN = (
-    "operator", "haptic_master", "motion_scaling", "inverse_kinematics", "slave", "slave_sim"
-)  # fmt: skip
+BUILT_IN = ("operator", "haptic_master", "motion_scaling", "inverse_kinematics", "slave", "slave_sim")
 """Names of the stages that every arm has."""
 HAND, DEVICE = BUILT_IN[:2]
 """Stages with whose recorded output a replay may begin."""
@@ -185,9 +173,7 @@ class Graph:
                 raise UnknownNameError("delayed topic", delay.topic, sorted(known))
             if delay.reader and delay.reader not in readers:
                 raise UnknownNameError("reader of a delayed topic", delay.reader, sorted(readers))
-            if not any(link.delay for link in self.links if link.topic.name == delay.topic) and (
-                delay.seconds > 0.0
-            ):
+            if not any(link.delay for link in self.links if link.topic.name == delay.topic) and (delay.seconds > 0.0):
                 text = f"one that reads {delay.topic}"
                 raise PartError("delayed stage", delay.reader or "?", text)
 
@@ -211,10 +197,7 @@ class Graph:
         ``second/topic`` of the first by the second's; of other arms nothing feeds them.
         """
         return tuple(
-            link
-            for member in self._all()
-            for port in member.stage.reads
-            for link in self._links_to(member, port)
+            link for member in self._all() for port in member.stage.reads for link in self._links_to(member, port)
         )
 
     def _links_to(self, reader: Member, port: Topic) -> Iterator[Link]:
@@ -345,14 +328,11 @@ class Graph:
     def _goes_on(self, topic: Topic) -> bool:
         """Whether a topic leads to the slave, not back to the master."""
         return topic.kind is not Kind.REPORT and (
-            topic.stamp.is_in_force
-            or any(link.topic == topic and not link.is_late for link in self.links)
+            topic.stamp.is_in_force or any(link.topic == topic and not link.is_late for link in self.links)
         )
 
 
-def build_graph(
-    arms: Iterable[str] = (), stages: Iterable[str] = (), delays: Iterable[str] = ()
-) -> Graph:
+def build_graph(arms: Iterable[str] = (), stages: Iterable[str] = (), delays: Iterable[str] = ()) -> Graph:
     """Graph of the built-in stages and some more.
 
     Args:
@@ -375,14 +355,9 @@ def build_graph(
 
 def _demanded(stages: tuple[Stage, ...]) -> tuple[Stage, ...]:
     """The stages without those of their outputs on demand for which there is none."""
-    needed = {
-        topic.name for stage in stages for topic in stage.reads if topic not in stage.optional
-    }
+    needed = {topic.name for stage in stages for topic in stage.reads if topic not in stage.optional}
     written = {
-        topic.name
-        for stage in stages
-        for topic in stage.writes
-        if topic not in stage.on_demand or topic.name in needed
+        topic.name for stage in stages for topic in stage.writes if topic not in stage.on_demand or topic.name in needed
     }
     return tuple(_pruned(stage, needed, written) for stage in stages)
 
@@ -390,9 +365,7 @@ def _demanded(stages: tuple[Stage, ...]) -> tuple[Stage, ...]:
 def _pruned(stage: Stage, needed: set[str], written: set[str]) -> Stage:
     old = dict(zip(stage.writes, stage.replaced, strict=False))
     left = {
-        topic
-        for topic in stage.on_demand
-        if topic.name not in needed and old.get(topic, topic).name not in written
+        topic for topic in stage.on_demand if topic.name not in needed and old.get(topic, topic).name not in written
     }
     if not left:
         return stage

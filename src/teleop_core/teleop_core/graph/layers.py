@@ -19,22 +19,27 @@ class RealTimeParameters:
     """What a live node asks of the system; a refusal is reported and the node works on."""
 
     priority: int = parameter(
-        -1, lower=-1, upper=98, fixed=True,
+        -1,
+        lower=-1,
+        upper=98,
+        fixed=True,
         doc="SCHED_FIFO priority of the loop, and 1 for the threads beside it; 0: fair shares; -1: "
         "20 in sessions by side or in one process where the system grants it, else fair shares",
-    )  # fmt: skip
-    cpus: tuple[int, ...] = parameter(
-        (), lower=0, fixed=True, doc="processors that the loop may use; empty: all"
     )
+    cpus: tuple[int, ...] = parameter((), lower=0, fixed=True, doc="processors that the loop may use; empty: all")
     patience: float = parameter(
-        0.8, unit="s", lower=0.01, upper=60.0, off=0.0, fixed=True, source="assumed",
+        0.8,
+        unit="s",
+        lower=0.01,
+        upper=60.0,
+        off=0.0,
+        fixed=True,
+        source="assumed",
         doc="a loop of which nothing came for longer hangs, and ends its process; time for which "
         "it waited for a processor does not count; 0: never",
-    )  # fmt: skip
-    lock_memory: bool = parameter(False, fixed=True, doc="keep all memory out of swap")
-    freeze_gc: bool = parameter(
-        True, fixed=True, doc="keep what exists at the start out of garbage collections"
     )
+    lock_memory: bool = parameter(False, fixed=True, doc="keep all memory out of swap")
+    freeze_gc: bool = parameter(True, fixed=True, doc="keep what exists at the start out of garbage collections")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,20 +47,12 @@ class SessionParameters:
     """Parameters of a session as a whole."""
 
     description: str = parameter("", doc="what happens in it, in one sentence")
-    duration: float = parameter(
-        10.0, unit="s", lower=0.001, upper=86400.0, doc="simulated or live time"
-    )
+    duration: float = parameter(10.0, unit="s", lower=0.001, upper=86400.0, doc="simulated or live time")
     arms: tuple[str, ...] = parameter(
-        (),
-        fixed=True,
-        doc="names of the arms, the first of which keeps the plain topics; empty: one without name",
+        (), fixed=True, doc="names of the arms, the first of which keeps the plain topics; empty: one without name"
     )
-    stages: tuple[str, ...] = parameter(
-        (), fixed=True, doc="further stages of every arm, beside the built-in ones"
-    )
-    delays: tuple[str, ...] = parameter(
-        (), fixed=True, doc="delays on links, topic=seconds or topic@reader=seconds"
-    )
+    stages: tuple[str, ...] = parameter((), fixed=True, doc="further stages of every arm, beside the built-in ones")
+    delays: tuple[str, ...] = parameter((), fixed=True, doc="delays on links, topic=seconds or topic@reader=seconds")
     real_time: RealTimeParameters = field(default_factory=RealTimeParameters)
 
 
@@ -76,11 +73,16 @@ RENAMED = {
     **{
         f"slave_sim.{name}": f"slave.{name}"
         for name in (
-            "operation.", "reference_filter.", "command_timeout", "interpolation", "start",
-            "starts_at_home", "start_speed",
+            "operation.",
+            "reference_filter.",
+            "command_timeout",
+            "interpolation",
+            "start",
+            "starts_at_home",
+            "start_speed",
         )
     },
-}  # fmt: skip
+}
 """Former names, which recordings and files may still have, or their beginnings."""
 _READER = ("slave/servo_jp@slave_sim=", "slave/servo_jp@slave=")  # of commands, before and now
 _OF_ROBOT = ("robot", "geometry")
@@ -184,9 +186,7 @@ def _owners(name: str, where: str) -> list[str]:
     Raises:
         UnknownNameError: None has.
     """
-    names = {
-        stage: {spec.name for spec in specs(group)} for stage, group in declared_groups().items()
-    }
+    names = {stage: {spec.name for spec in specs(group)} for stage, group in declared_groups().items()}
     if not (owners := [stage for stage, own in names.items() if name in own]):
         known = sorted(set[str]().union(*names.values()))
         raise UnknownNameError(f"{where}: parameter of {_EVERY}", name, known)
@@ -262,9 +262,7 @@ def _hits(key: str) -> list[tuple[str, Spec]]:
         UnknownNameError: None, or several of different names.
     """
     declared = {
-        f"{stage}.{spec.name}": (stage, spec)
-        for stage, group in declared_groups().items()
-        for spec in specs(group)
+        f"{stage}.{spec.name}": (stage, spec) for stage, group in declared_groups().items() for spec in specs(group)
     }
     for wanted in (key, f"{key}.kind"):
         if hits := [e for full, e in declared.items() if wanted in {full, e[1].name}]:

@@ -136,9 +136,7 @@ class Stage:
         for word in ("reads", "writes", "late", "optional", "needs"):
             found = getattr(self, word)
             is_right = isinstance(found, tuple) and all(isinstance(t, Topic) for t in found)
-            text = (
-                f"with {word} as a tuple of Topic, such as (topics.SLAVE_SERVO_CP,), not {found!r}"
-            )
+            text = f"with {word} as a tuple of Topic, such as (topics.SLAVE_SERVO_CP,), not {found!r}"
             self._insist(is_right, text)
         for word in ("spares", "serves"):
             found = getattr(self, word)
@@ -239,9 +237,7 @@ class RunningStage:
 
     def __init__(self, stage: Stage, joints: int, dt: float) -> None:
         self.stage, self.dt = stage, dt
-        self.signals: Any = make_signals(
-            stage.ports, joints, (*stage.notes, ("answered_ns", "i8"))
-        )[0]
+        self.signals: Any = make_signals(stage.ports, joints, (*stage.notes, ("answered_ns", "i8")))[0]
         self.kernel: Callable[..., None] = _nothing
         self.arguments: tuple[Any, ...] = ()
         self.ahead, self.changes_itself = 1000, False
@@ -305,9 +301,7 @@ class _Plain(RunningStage):
         assert stage.step is not None
         self.kernel = stage.step
         declared = [(spec, value) for spec, value in _numbers(parameters)]
-        self._parameters = records(
-            [_field(name, value) for name, value in declared] or [("none", "i8")]
-        )[0]
+        self._parameters = records([_field(name, value) for name, value in declared] or [("none", "i8")])[0]
         self._state = records(stage.remembered(joints) or [("none", "i8")])[0]
         self.arguments = (self._parameters, self._state)
         self._begin = self.signals.copy()

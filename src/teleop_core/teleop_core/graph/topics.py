@@ -50,10 +50,12 @@ def limit_text(limit: int, joint: int, joint_names: tuple[str, ...] = ()) -> str
         name = joint_names[joint] if joint < len(joint_names) else str(joint + 1)
         return f"joint {name} is at its limit"
     return {
-        Limit.NONE: "nothing", Limit.JOINT: "a joint is at its limit",
-        Limit.WORKSPACE: "out of reach", Limit.SINGULARITY: "a singularity",
+        Limit.NONE: "nothing",
+        Limit.JOINT: "a joint is at its limit",
+        Limit.WORKSPACE: "out of reach",
+        Limit.SINGULARITY: "a singularity",
         Limit.SPEED: "faster than its joints",
-    }[Limit(limit)]  # fmt: skip
+    }[Limit(limit)]
 
 
 class Kind(Enum):
@@ -114,8 +116,7 @@ class Kind(Enum):
 
     def width(self, joints: int) -> int:
         """Number of columns for a robot with this many joints, or a topic with so many names."""
-        fixed = {Kind.POSE: 7, Kind.TWIST: 6, Kind.WRENCH: 6, Kind.BUTTONS: 3, Kind.REPORT: 0,
-                 Kind.JAW: 3}  # fmt: skip
+        fixed = {Kind.POSE: 7, Kind.TWIST: 6, Kind.WRENCH: 6, Kind.BUTTONS: 3, Kind.REPORT: 0, Kind.JAW: 3}
         return {Kind.NUMBERS: joints, Kind.JOINTS: joints, Kind.STATE: 3 * joints, **fixed}[self]
 
 
@@ -237,16 +238,10 @@ class Topic:
 
 
 MASTER_MEASURED_CP = Topic("master/measured_cp", Kind.POSE, SAMPLED, "master_base")
-MASTER_FILTERED_CP = Topic(
-    "master/filtered_cp", Kind.POSE, passed_on("master/measured_cp"), "master_base"
-)
+MASTER_FILTERED_CP = Topic("master/filtered_cp", Kind.POSE, passed_on("master/measured_cp"), "master_base")
 """The stylus without tremor, of a session with a tremor filter."""
 MASTER_FILTERED_OUT = Topic(
-    "master/filtered_out",
-    Kind.NUMBERS,
-    passed_on("master/measured_cp"),
-    "master_base",
-    columns=("x", "y", "z"),
+    "master/filtered_out", Kind.NUMBERS, passed_on("master/measured_cp"), "master_base", columns=("x", "y", "z")
 )
 """What a tremor filter took away [m]: the stylus is at filtered_cp and this much further."""
 MASTER_MEASURED_CV = Topic("master/measured_cv", Kind.TWIST, SAMPLED, "master_base")
@@ -262,13 +257,9 @@ MASTER_CONTACT = Topic(
 """Energy of the present contact, or the last one: how many there were, what the motors' force took
 from the hand and gave back, what dry friction took meanwhile [J], all of the true motion, which a
 simulator knows; and the largest force that the warmth of the motors allows [N]."""
-MASTER_SERVO_CF = Topic(
-    "master/servo_cf", Kind.WRENCH, passed_on("master/measured_cp"), "master_base"
-)
+MASTER_SERVO_CF = Topic("master/servo_cf", Kind.WRENCH, passed_on("master/measured_cp"), "master_base")
 SLAVE_SERVO_CP = Topic("slave/servo_cp", Kind.POSE, passed_on("master/measured_cp"), "slave_base")
-SLAVE_SERVO_CF = Topic(
-    "slave/servo_cf", Kind.WRENCH, passed_on("master/measured_cp"), "slave_base", is_seldom=True
-)
+SLAVE_SERVO_CF = Topic("slave/servo_cf", Kind.WRENCH, passed_on("master/measured_cp"), "slave_base", is_seldom=True)
 """Force with which the hand leads the tip, of a session with a stage ``impedance``: what the hand
 bears of the push that answers the slave, times the gain of the architecture; no torque."""
 SLAVE_SERVO_JP = Topic("slave/servo_jp", Kind.JOINTS, passed_on("slave/servo_cp"), "slave_base")
@@ -283,14 +274,10 @@ SLAVE_REACH = Topic(
 :class:`~teleop_core.robots.kinematics.IkStatus`, :class:`Limit`, the joint at its limit (-1: none),
 what the answer leaves [m, rad], and by what the command would have to be moved, in slave_base
 [m, rad], to be one that the arm can reach given time."""
-SLAVE_SETPOINT_JS = Topic(
-    "slave/setpoint_js", Kind.JOINTS, in_force("slave/servo_jp"), "slave_base"
-)
+SLAVE_SETPOINT_JS = Topic("slave/setpoint_js", Kind.JOINTS, in_force("slave/servo_jp"), "slave_base")
 SLAVE_SETPOINT_CP = Topic("slave/setpoint_cp", Kind.POSE, in_force("slave/servo_jp"), "slave_base")
 SLAVE_MEASURED_JS = Topic("slave/measured_js", Kind.STATE, SAMPLED, "slave_base")
-SLAVE_MEASURED_CP = Topic(
-    "slave/measured_cp", Kind.POSE, passed_on("slave/measured_js"), "slave_base"
-)
+SLAVE_MEASURED_CP = Topic("slave/measured_cp", Kind.POSE, passed_on("slave/measured_js"), "slave_base")
 SLAVE_MEASURED_CF = Topic("slave/measured_cf", Kind.WRENCH, SAMPLED, "slave_base", is_seldom=True)
 """What the sensor tells of the force on the tip, along slave_base, and of the torque about it."""
 SLAVE_ESTIMATED_CF = Topic("slave/estimated_cf", Kind.WRENCH, SAMPLED, "slave_base", is_seldom=True)
@@ -301,9 +288,7 @@ SLAVE_TRUE_CP = Topic("slave/true_cp", Kind.POSE, SAMPLED, "slave_base")
 SLAVE_TRUE_CF = Topic("slave/true_cf", Kind.WRENCH, SAMPLED, "slave_base", is_seldom=True)
 """The world's force on the tip, along slave_base, and no torque about the tip: what an ideal sensor
 would tell. Only a simulator knows."""
-SLAVE_OPERATION = Topic(
-    "slave/operation", Kind.REPORT, SAMPLED, quality=Quality.LATCHED, columns=OPERATION
-)
+SLAVE_OPERATION = Topic("slave/operation", Kind.REPORT, SAMPLED, quality=Quality.LATCHED, columns=OPERATION)
 """Whether the slave may move, what stopped it, and what it takes to go on; sent where it changes.
 See :mod:`teleop_core.slave.operation`."""
 TELEOP_STATE = Topic(
@@ -316,25 +301,18 @@ TELEOP_STATE = Topic(
 )  # fmt: skip
 NETWORK_SERVO_CP = Topic("network/servo_cp", Kind.POSE, arrived("slave/servo_cp"), "slave_base")
 """What arrived of slave/servo_cp, as the four that follow of what the slave says of itself."""
-NETWORK_SETPOINT_CP = Topic(
-    "network/setpoint_cp", Kind.POSE, arrived("slave/setpoint_cp"), "slave_base"
-)
-NETWORK_MEASURED_CP = Topic(
-    "network/measured_cp", Kind.POSE, arrived("slave/measured_cp"), "slave_base"
-)
-NETWORK_MEASURED_CF = Topic(
-    "network/measured_cf", Kind.WRENCH, arrived("slave/measured_cf"), "slave_base"
-)
-NETWORK_REACH = Topic(
-    "network/reach", Kind.NUMBERS, arrived("slave/reach"), "slave_base", columns=SLAVE_REACH.columns
-)
+NETWORK_SETPOINT_CP = Topic("network/setpoint_cp", Kind.POSE, arrived("slave/setpoint_cp"), "slave_base")
+NETWORK_MEASURED_CP = Topic("network/measured_cp", Kind.POSE, arrived("slave/measured_cp"), "slave_base")
+NETWORK_MEASURED_CF = Topic("network/measured_cf", Kind.WRENCH, arrived("slave/measured_cf"), "slave_base")
+NETWORK_REACH = Topic("network/reach", Kind.NUMBERS, arrived("slave/reach"), "slave_base", columns=SLAVE_REACH.columns)
 NETWORK_STATE = Topic(
-    "network/state", Kind.NUMBERS, SAMPLED, "slave_base", is_seldom=True,
-    columns=(
-        "sent_there", "lost_there", "behind_there", "sent_back", "lost_back", "behind_back",
-        "clock_ahead",
-    ),
-)  # fmt: skip
+    "network/state",
+    Kind.NUMBERS,
+    SAMPLED,
+    "slave_base",
+    is_seldom=True,
+    columns=("sent_there", "lost_there", "behind_there", "sent_back", "lost_back", "behind_back", "clock_ahead"),
+)
 """Packets sent, lost, and by how many the newest that arrived is behind, of both directions; by how
 much the slave's clock is ahead of the master's [s]."""
 ENERGY = (
@@ -348,31 +326,26 @@ other side was told that it may give, and how much it told; what is left to be g
 from going out; what torques took in and gave out; by how much a command is held
 back [m]; of waves, their impedance [N s/m], and the integral of what was told [√W s]."""
 MASTER_ENERGY = Topic(
-    "master/energy", Kind.NUMBERS, passed_on("master/measured_cp"), "master_base", columns=ENERGY,
-    is_seldom=True,
-)  # fmt: skip
+    "master/energy", Kind.NUMBERS, passed_on("master/measured_cp"), "master_base", columns=ENERGY, is_seldom=True
+)
 """Energies at the hand, of a session with a stage ``passivity``: push times way of the hand."""
-SLAVE_ENERGY = Topic(
-    "slave/energy", Kind.NUMBERS, SAMPLED, "slave_base", columns=ENERGY, is_seldom=True
-)
+SLAVE_ENERGY = Topic("slave/energy", Kind.NUMBERS, SAMPLED, "slave_base", columns=ENERGY, is_seldom=True)
 """The same at the slave: force on the tip times way of the tip."""
-PASSIVITY_SERVO_CP = Topic(
-    "passivity/servo_cp", Kind.POSE, passed_on("slave/servo_cp"), "slave_base"
-)
+PASSIVITY_SERVO_CP = Topic("passivity/servo_cp", Kind.POSE, passed_on("slave/servo_cp"), "slave_base")
 """The slave's command as passivity lets it through."""
 NETWORK_SERVO_CF = Topic("network/servo_cf", Kind.WRENCH, arrived("slave/servo_cf"), "slave_base")
-IMPEDANCE_SERVO_CP = Topic(
-    "impedance/servo_cp", Kind.POSE, passed_on("slave/servo_cp"), "slave_base"
-)
+IMPEDANCE_SERVO_CP = Topic("impedance/servo_cp", Kind.POSE, passed_on("slave/servo_cp"), "slave_base")
 """The slave's command, yielding to the force on its tip."""
-REMOTE_CENTRE_SERVO_CP = Topic(
-    "remote_centre/servo_cp", Kind.POSE, passed_on("slave/servo_cp"), "slave_base"
-)
+REMOTE_CENTRE_SERVO_CP = Topic("remote_centre/servo_cp", Kind.POSE, passed_on("slave/servo_cp"), "slave_base")
 """The slave's command, turned so that the tool passes through its remote centre."""
 REMOTE_CENTRE = Topic(
-    "remote_centre/place", Kind.NUMBERS, passed_on("slave/servo_cp"), "slave_base",
-    columns=("x", "y", "z", "shaft_x", "shaft_y", "shaft_z"), is_seldom=True,
-)  # fmt: skip
+    "remote_centre/place",
+    Kind.NUMBERS,
+    passed_on("slave/servo_cp"),
+    "slave_base",
+    columns=("x", "y", "z", "shaft_x", "shaft_y", "shaft_z"),
+    is_seldom=True,
+)
 """The remote centre [m], and the shaft that passes through it, in the tip's frame."""
 SLAVE_JAW_SERVO_JP = Topic(
     "slave/jaw/servo_jp", Kind.NUMBERS, passed_on("master/measured_cp"), "slave_base", columns=JAW
@@ -383,9 +356,13 @@ SLAVE_JAW_SETPOINT_JS = Topic(
 )
 SLAVE_JAW_MEASURED_JS = Topic("slave/jaw/measured_js", Kind.JAW, SAMPLED, "slave_base")
 SLAVE_JAW_GRIP = Topic(
-    "slave/jaw/grip", Kind.NUMBERS, SAMPLED, "slave_base", is_seldom=True,
+    "slave/jaw/grip",
+    Kind.NUMBERS,
+    SAMPLED,
+    "slave_base",
+    is_seldom=True,
     columns=("force", "is_gripped", "slid", "grips", "slips", "drops"),
-)  # fmt: skip
+)
 """What only a simulator knows: the push of each finger [N], whether the object is between them, and
 how far it slid in the present grip or the last one [m]. Then, how often it was gripped, slid by
 more than a millimetre, and was lost above the table."""
@@ -394,12 +371,13 @@ SLAVE_JAW_OBJECT_CP = Topic("slave/jaw/object_cp", Kind.POSE, SAMPLED, "slave_ba
 JAW_OBJECTS = 6
 """Most objects that stand on a board at once."""
 SLAVE_JAW_BOARD = Topic(
-    "slave/jaw/board", Kind.NUMBERS, SAMPLED, "slave_base", is_seldom=True,
-    columns=(
-        "transferred", "dropped", "pull",
-        *(f"{axis}{i}" for i in range(JAW_OBJECTS) for axis in "xyz"),
-    ),
-)  # fmt: skip
+    "slave/jaw/board",
+    Kind.NUMBERS,
+    SAMPLED,
+    "slave_base",
+    is_seldom=True,
+    columns=("transferred", "dropped", "pull", *(f"{axis}{i}" for i in range(JAW_OBJECTS) for axis in "xyz")),
+)
 """What only a simulator knows: how many objects came onto another peg, how many came to rest on
 none, and the pull of a peg on the gripped one, across [N]. Then the middle of each object [m], all
 zeros for one that is not there."""
@@ -422,17 +400,11 @@ HAND_SERVO_CP = Topic("hand/servo_cp", Kind.POSE, SAMPLED, "master_base")
 """Where the operator wants the stylus; silence lets go of it."""
 HAND_BUTTONS = Topic("hand/buttons", Kind.BUTTONS, SAMPLED, "master_base", is_seldom=True)
 """Which buttons of the stylus the operator presses."""
-HAND_TREMOR = Topic(
-    "hand/tremor", Kind.NUMBERS, SAMPLED, "master_base", columns=("x", "y", "z"), is_seldom=True
-)
+HAND_TREMOR = Topic("hand/tremor", Kind.NUMBERS, SAMPLED, "master_base", columns=("x", "y", "z"), is_seldom=True)
 """By how much the tip is off [m], whatever the device's friction swallows of the hand's motion."""
-HAND_JAW = Topic(
-    "hand/jaw", Kind.NUMBERS, SAMPLED, "master_base", columns=("closing",), is_seldom=True
-)
+HAND_JAW = Topic("hand/jaw", Kind.NUMBERS, SAMPLED, "master_base", columns=("closing",), is_seldom=True)
 """How far the operator closes the jaw: 0 open, 1 closed."""
-DISPLAY_MEASURED_CP = Topic(
-    "display/measured_cp", Kind.POSE, arrived("slave/measured_cp"), "slave_base"
-)
+DISPLAY_MEASURED_CP = Topic("display/measured_cp", Kind.POSE, arrived("slave/measured_cp"), "slave_base")
 """Where the operator sees the slave, of a session with a display: the newest frame."""
 TASK_STATE = Topic(
     "task/state", Kind.NUMBERS, SAMPLED, "slave_base", is_seldom=True,
@@ -450,9 +422,7 @@ OPERATOR_SERVO_CP = Topic("operator/servo_cp", Kind.POSE, SAMPLED, "master_base"
 """Where a person who is elsewhere wants the stylus, at any rate: ``operator=remote`` leads the hand
 there. Silence lets go. As ``operator/buttons`` it comes from outside: no stage writes it, and it is
 not recorded."""
-OPERATOR_BUTTONS = Topic(
-    "operator/buttons", Kind.BUTTONS, SAMPLED, "master_base", quality=Quality.REPORT
-)
+OPERATOR_BUTTONS = Topic("operator/buttons", Kind.BUTTONS, SAMPLED, "master_base", quality=Quality.REPORT)
 """Buttons that this person presses and releases: each message counts, so it is sent reliably."""
 DIAGNOSTICS = Topic("diagnostics", Kind.REPORT, Stamp("time of the report"), quality=Quality.REPORT)
 
@@ -467,29 +437,34 @@ STREAMS = (
 REPORTS = (SLAVE_OPERATION, TELEOP_STATE)
 """Topics of the built-in stages that are sent where they change."""
 NETWORK_TOPICS = (
-    NETWORK_SERVO_CP, NETWORK_SETPOINT_CP, NETWORK_MEASURED_CP, NETWORK_MEASURED_CF, NETWORK_REACH,
+    NETWORK_SERVO_CP,
+    NETWORK_SETPOINT_CP,
+    NETWORK_MEASURED_CP,
+    NETWORK_MEASURED_CF,
+    NETWORK_REACH,
     NETWORK_STATE,
-)  # fmt: skip
+)
 """Topics of a session with a network between both sides."""
-PASSIVITY_TOPICS = (
-    MASTER_ENERGY, SLAVE_ENERGY, PASSIVITY_SERVO_CP, NETWORK_MASTER_ENERGY, NETWORK_SLAVE_ENERGY,
-)  # fmt: skip
+PASSIVITY_TOPICS = (MASTER_ENERGY, SLAVE_ENERGY, PASSIVITY_SERVO_CP, NETWORK_MASTER_ENERGY, NETWORK_SLAVE_ENERGY)
 """Topics of a session with a stage ``passivity``, the last two with a network too."""
 IMPEDANCE_TOPICS = (SLAVE_SERVO_CF, NETWORK_SERVO_CF, IMPEDANCE_SERVO_CP)
 """Topics of a session with a stage ``impedance``, the second with a network too."""
 JAW_TOPICS = (
-    HAND_JAW, SLAVE_JAW_SERVO_JP, NETWORK_JAW_SERVO_JP, SLAVE_JAW_SETPOINT_JS,
-    SLAVE_JAW_MEASURED_JS, SLAVE_JAW_GRIP, SLAVE_JAW_OBJECT_CP, SLAVE_JAW_BOARD,
-)  # fmt: skip
+    HAND_JAW,
+    SLAVE_JAW_SERVO_JP,
+    NETWORK_JAW_SERVO_JP,
+    SLAVE_JAW_SETPOINT_JS,
+    SLAVE_JAW_MEASURED_JS,
+    SLAVE_JAW_GRIP,
+    SLAVE_JAW_OBJECT_CP,
+    SLAVE_JAW_BOARD,
+)
 """Topics of a session with a jaw, the third with a network too."""
 PORTS_BETWEEN_ARMS = (FIRST_JAW_BOARD, FIRST_JAW_GRIP, SECOND_TRUE_CP, SECOND_JAW_GRIP)
 """Ports of one arm for topics of another; no stage writes topics of these names."""
 TASK_TOPICS = (DISPLAY_MEASURED_CP, TASK_STATE)
 """Topics of a session with a display, and of one with a task."""
-ALL = (
-    *STREAMS, HAND_BUTTONS, HAND_TREMOR,
-    SLAVE_MEASURED_CF, SLAVE_ESTIMATED_CF, SLAVE_TRUE_CF, *REPORTS, DIAGNOSTICS,
-)  # fmt: skip
+ALL = (*STREAMS, HAND_BUTTONS, HAND_TREMOR, SLAVE_MEASURED_CF, SLAVE_ESTIMATED_CF, SLAVE_TRUE_CF, *REPORTS, DIAGNOSTICS)
 BY_NAME = {
     topic.name: topic
     for topic in (

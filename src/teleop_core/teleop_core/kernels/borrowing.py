@@ -54,9 +54,7 @@ class Pipeline(Compiler):
 
 def _takes_room(state: Any) -> bool:
     """Whether a function has room of its own."""
-    calls = (
-        call for block in state.func_ir.blocks.values() for call in block.find_exprs(op="call")
-    )
+    calls = (call for block in state.func_ir.blocks.values() for call in block.find_exprs(op="call"))
     return any(_called(state, call) is room for call in calls)
 
 

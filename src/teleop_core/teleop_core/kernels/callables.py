@@ -22,11 +22,7 @@ from teleop_core.kernels.mistakes import place_of
 Array = NDArray[np.float64]
 
 _MOST_VIEWS = 256  # arrays remembered for each callable
-_SCALARS: dict[Any, Any] = {
-    types.float64: ctypes.c_double,
-    types.int64: ctypes.c_int64,
-    types.boolean: ctypes.c_bool,
-}
+_SCALARS: dict[Any, Any] = {types.float64: ctypes.c_double, types.int64: ctypes.c_int64, types.boolean: ctypes.c_bool}
 _ARRAYS = (types.float64[::1], types.float64[:, ::1])
 _TAKEN = "float64, int64, bool or a C-contiguous array of float64, 1-D or 2-D"
 _RESULTS: dict[Any, tuple[Any, Callable[[Any], Any]]] = {
@@ -90,9 +86,12 @@ def entry_of(function: Callable[..., Any], arguments: tuple[Any, ...], result: A
     lists = {"flat": flat, "seen": seen, "passed": passed}
     lists["names"] = [f"a{i}" for i in range(len(arguments))]
     space = {
-        "function": function, "converted": converted, "keep": _keep, "view": _views(),
+        "function": function,
+        "converted": converted,
+        "keep": _keep,
+        "view": _views(),
         "c_type": ctypes.CFUNCTYPE(c_result, *c_arguments),
-    }  # fmt: skip
+    }
     exec(_TEXT.format(**{key: ", ".join(items) for key, items in lists.items()}), space)
     return space["entry"]
 

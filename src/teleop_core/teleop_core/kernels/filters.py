@@ -5,13 +5,7 @@ from teleop_core.kernels import kernel
 
 @kernel
 def lag_step(
-    value: float,
-    last_input: float,
-    last_output: float,
-    gain: float,
-    zero: float,
-    pole: float,
-    dt: float,
+    value: float, last_input: float, last_output: float, gain: float, zero: float, pole: float, dt: float
 ) -> float:
     """Next output of the first-order lag ``gain (s + zero) / (s + pole)`` by forward Euler.
 

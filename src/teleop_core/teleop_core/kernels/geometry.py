@@ -231,11 +231,7 @@ def roll_pitch_yaw(rotations: Array) -> Array:
     r = rotations
     cosine = np.hypot(r[..., 0, 0], r[..., 1, 0])
     is_degenerate = cosine < 1e-9
-    roll = np.where(
-        is_degenerate,
-        arctangent(-r[..., 0, 1], r[..., 1, 1]),
-        arctangent(r[..., 1, 0], r[..., 0, 0]),
-    )
+    roll = np.where(is_degenerate, arctangent(-r[..., 0, 1], r[..., 1, 1]), arctangent(r[..., 1, 0], r[..., 0, 0]))
     pitch = arctangent(-r[..., 2, 0], cosine)
     yaw = np.where(is_degenerate, 0.0, arctangent(r[..., 2, 1], r[..., 2, 2]))
     return np.stack((roll, pitch, yaw), axis=-1)
@@ -257,9 +253,11 @@ def quaternion_products(a: Array, b: Array) -> Array:
     w, x, y, z = np.moveaxis(np.asarray(a), -1, 0)
     p, q, r, s = np.moveaxis(np.asarray(b), -1, 0)
     rows = (
-        w * p - x * q - y * r - z * s, w * q + x * p + y * s - z * r,
-        w * r - x * s + y * p + z * q, w * s + x * r - y * q + z * p,
-    )  # fmt: skip
+        w * p - x * q - y * r - z * s,
+        w * q + x * p + y * s - z * r,
+        w * r - x * s + y * p + z * q,
+        w * s + x * r - y * q + z * p,
+    )
     return np.stack(rows, axis=-1)
 
 

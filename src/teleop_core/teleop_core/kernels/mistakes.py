@@ -23,9 +23,7 @@ _REJECTED = re.compile(r"raised a specific error:\s+\w+: (.*?)\n")
 _UNBOUND = re.compile(r'Cannot bind .* due to "\w+: (.*?)"\.')
 
 
-def kernel_error(
-    error: BaseException, function: Callable[..., Any], arguments: Sequence[Any]
-) -> KernelError:
+def kernel_error(error: BaseException, function: Callable[..., Any], arguments: Sequence[Any]) -> KernelError:
     """Error that says in one line what is wrong with a kernel, and where.
 
     Args:
@@ -81,9 +79,7 @@ def _unknown_field(error: BaseException) -> str | None:
     """Reason for a field that a record does not have: with the fields it has."""
     if not isinstance(error, KeyError):
         return None
-    record = next(
-        (f["self"] for f in _frames(error) if isinstance(f.get("self"), types.Record)), None
-    )
+    record = next((f["self"] for f in _frames(error) if isinstance(f.get("self"), types.Record)), None)
     if record is None:
         return None
     wanted, fields = str(error.args[0]), list(record.fields)

@@ -20,12 +20,7 @@ import numpy as np
 from numba.core import cgutils, types
 from numba.core.caching import FunctionCache, IndexDataCacheFile, NullCache
 from numba.core.ccallback import CFunc
-from numba.core.errors import (
-    ForceLiteralArg,
-    NumbaError,
-    NumbaExperimentalFeatureWarning,
-    UnsupportedBytecodeError,
-)
+from numba.core.errors import ForceLiteralArg, NumbaError, NumbaExperimentalFeatureWarning, UnsupportedBytecodeError
 from numba.core.imputils import lower_cast
 from numba.core.pythonapi import NativeValue, _unboxers
 from numba.core.registry import CPUDispatcher
@@ -53,9 +48,15 @@ _OPTIONS = {"nopython": True, "nogil": True, "no_cfunc_wrapper": True, "_nrt": T
 
 # What numba raises about a function that it cannot compile: seldom one of its own errors alone.
 _MISTAKES = (
-    NumbaError, UnsupportedBytecodeError, LookupError, AttributeError, TypeError, ValueError,
-    NotImplementedError, AssertionError,
-)  # fmt: skip
+    NumbaError,
+    UnsupportedBytecodeError,
+    LookupError,
+    AttributeError,
+    TypeError,
+    ValueError,
+    NotImplementedError,
+    AssertionError,
+)
 
 _generated: set[FunctionType] = set()
 
@@ -104,9 +105,7 @@ class Dispatcher(CPUDispatcher):
     def get_call_template(self, args: Any, kws: Any) -> Any:
         """Type of a call from another kernel."""
         plain = [_general(kind) for kind in args]
-        return super().get_call_template(
-            plain, {name: _general(kind) for name, kind in kws.items()}
-        )
+        return super().get_call_template(plain, {name: _general(kind) for name, kind in kws.items()})
 
 
 def _general(kind: Any) -> Any:
@@ -160,9 +159,7 @@ class InnerDispatcher(Dispatcher):
 
     def __call__(self, *_: Any, **__: Any) -> Any:
         """Refuse."""
-        raise TypeError(
-            f"{self.py_func.__name__} is called by kernels only: decorate it with kernel"
-        )
+        raise TypeError(f"{self.py_func.__name__} is called by kernels only: decorate it with kernel")
 
 
 def dispatcher(function: Callable[..., Any], *, is_inner: bool = False) -> Any:
@@ -206,9 +203,7 @@ def c_function(function: Any, signature: Any) -> Any:
     if (arguments, result) in made:
         return made[arguments, result]
     target = function.py_func if is_compiled else entry_of(function, arguments, result)
-    callback: Any = Pointer(
-        target, (arguments, result), locals={}, options=_ERRORS, pipeline_class=Pipeline
-    )
+    callback: Any = Pointer(target, (arguments, result), locals={}, options=_ERRORS, pipeline_class=Pipeline)
     if is_compiled:
         callback._cache = _cache(target)
     try:
@@ -229,9 +224,7 @@ class Code(types.WrapperAddressProtocol):  # type: ignore[misc]
     def __init__(self, kernel: Any, arguments: tuple[Any, ...]) -> None:
         kernel.compile(arguments)
         self._made = kernel.overloads[arguments]  # keeps the code alive
-        self._code_address = self._made.library.get_pointer_to_function(
-            self._made.fndesc.llvm_func_name
-        )
+        self._code_address = self._made.library.get_pointer_to_function(self._made.fndesc.llvm_func_name)
 
     def __wrapper_address__(self) -> int:
         """Address for a call from C, which there is none of."""

@@ -44,8 +44,7 @@ def _cpus(cpus: tuple[int, ...]) -> list[str]:
         os.sched_setaffinity(0, cpus)
     except OSError as error:
         allowed = sorted(os.sched_getaffinity(0))
-        return [f"real_time.cpus {list(cpus)} refused: {error.strerror}; this process may use "
-                f"{allowed}"]  # fmt: skip
+        return [f"real_time.cpus {list(cpus)} refused: {error.strerror}; this process may use {allowed}"]
     return []
 
 
@@ -57,8 +56,10 @@ def is_priority_granted(priority: int) -> bool:
 
 def _priority(priority: int) -> list[str]:
     if refusal := _take(priority):
-        return [f"real_time.priority {priority} refused: {refusal}; allow it with an "
-                "rtprio line in /etc/security/limits.conf or CAP_SYS_NICE"]  # fmt: skip
+        return [
+            f"real_time.priority {priority} refused: {refusal}; allow it with an "
+            "rtprio line in /etc/security/limits.conf or CAP_SYS_NICE"
+        ]
     for thread in map(int, os.listdir("/proc/self/task")):
         with suppress(ProcessLookupError):
             if os.sched_getscheduler(thread) == os.SCHED_OTHER:

@@ -46,18 +46,14 @@ class RosLifecycleNode(RosNode):
         ParameterError: It is to use simulated time.
     """
 
-    def __init__(
-        self, name: str, hooks: Hooks, values: Mapping[str, Value] | None = None, **options: Any
-    ) -> None:
+    def __init__(self, name: str, hooks: Hooks, values: Mapping[str, Value] | None = None, **options: Any) -> None:
         given = [Parameter(key, value=_listed(value)) for key, value in (values or {}).items()]
         super().__init__(_Own(name, hooks, parameter_overrides=given, **options))
         own = self.own
         if own.get_parameter(_SIM_TIME).value:
             raise _sim_time(own.full_name)
         self.given: Mapping[str, Any] = {
-            key: entry.value
-            for key, entry in own._parameter_overrides.items()
-            if not own.has_parameter(key)
+            key: entry.value for key, entry in own._parameter_overrides.items() if not own.has_parameter(key)
         }
         self.create_lifecycle_publisher = self._create_lifecycle_publisher
         self._shows = False
@@ -66,10 +62,7 @@ class RosLifecycleNode(RosNode):
         return RosPublisher(self.own.create_lifecycle_publisher(kind, name, profile_of(qos)))
 
     def declare(
-        self,
-        specs: Iterable[Spec],
-        values: Mapping[str, Value],
-        accept: Callable[[Mapping[str, Value]], str],
+        self, specs: Iterable[Spec], values: Mapping[str, Value], accept: Callable[[Mapping[str, Value]], str]
     ) -> None:
         """Declare parameters, and have their changes accepted."""
         self._specs, self._accept = {spec.name: spec for spec in specs}, accept

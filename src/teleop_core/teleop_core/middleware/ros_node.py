@@ -33,12 +33,8 @@ def profile_of(qos: Qos) -> QoSProfile:
     return QoSProfile(
         history=HistoryPolicy.KEEP_ALL if qos.keeps_all else HistoryPolicy.KEEP_LAST,
         depth=qos.depth,
-        reliability=(
-            ReliabilityPolicy.RELIABLE if qos.is_reliable else ReliabilityPolicy.BEST_EFFORT
-        ),
-        durability=(
-            DurabilityPolicy.TRANSIENT_LOCAL if qos.is_latched else DurabilityPolicy.VOLATILE
-        ),
+        reliability=(ReliabilityPolicy.RELIABLE if qos.is_reliable else ReliabilityPolicy.BEST_EFFORT),
+        durability=(DurabilityPolicy.TRANSIENT_LOCAL if qos.is_latched else DurabilityPolicy.VOLATILE),
     )
 
 
@@ -98,9 +94,7 @@ class RosNode:
         """Subscription whose messages are taken by hand."""
         return RosTaker(self.own, kind, name, profile_of(qos))
 
-    def create_subscription(
-        self, kind: Any, name: str, callback: Callable[[Any], None], qos: Qos
-    ) -> Any:
+    def create_subscription(self, kind: Any, name: str, callback: Callable[[Any], None], qos: Qos) -> Any:
         """Subscription whose messages the executor hands over."""
         return self.own.create_subscription(kind, name, callback, profile_of(qos))
 

@@ -25,30 +25,32 @@ _GID = 16
 class _Allocator(ctypes.Structure):
     """rcutils_allocator_t."""
 
-    _fields_ = [(name, ctypes.c_void_p) for name in (
-        "allocate", "deallocate", "reallocate", "zero_allocate", "state"
-    )]  # fmt: skip
+    _fields_ = [(name, ctypes.c_void_p) for name in ("allocate", "deallocate", "reallocate", "zero_allocate", "state")]
 
 
 class _Bytes(ctypes.Structure):
     """rcutils_uint8_array_t."""
 
     _fields_ = [
-        ("buffer", ctypes.c_void_p), ("length", ctypes.c_size_t), ("capacity", ctypes.c_size_t),
+        ("buffer", ctypes.c_void_p),
+        ("length", ctypes.c_size_t),
+        ("capacity", ctypes.c_size_t),
         ("allocator", _Allocator),
-    ]  # fmt: skip
+    ]
 
 
 class _Info(ctypes.Structure):
     """rmw_message_info_t of ROS 2 Jazzy."""
 
     _fields_ = [
-        ("source_timestamp", ctypes.c_int64), ("received_timestamp", ctypes.c_int64),
+        ("source_timestamp", ctypes.c_int64),
+        ("received_timestamp", ctypes.c_int64),
         ("publication_sequence_number", ctypes.c_uint64),
         ("reception_sequence_number", ctypes.c_uint64),
-        ("implementation", ctypes.c_char_p), ("gid", ctypes.c_uint8 * _GID),
+        ("implementation", ctypes.c_char_p),
+        ("gid", ctypes.c_uint8 * _GID),
         ("from_intra_process", ctypes.c_bool),
-    ]  # fmt: skip
+    ]
 
 
 class Unattended(CallbackGroup):
@@ -83,22 +85,22 @@ class RosTaker:
     def __init__(self, node: Node, kind: Any, name: str, profile: QoSProfile) -> None:
         self.type, self._node = kind, node
         self._own = node.create_subscription(
-            kind, name, _ignore, profile, raw=True, callback_group=Unattended(),
+            kind,
+            name,
+            _ignore,
+            profile,
+            raw=True,
+            callback_group=Unattended(),
             event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=False),
-        )  # fmt: skip
+        )
         self.handle: Any = self._own.handle
         # With the interpreter's lock held, so that no thread destroys what is being taken from.
         rcl, rcutils = ctypes.PyDLL("librcl.so"), ctypes.PyDLL("librcutils.so")
         self._bytes, self._info = _Bytes(), _Info()
         rcutils.rcutils_get_default_allocator.restype = _Allocator
         allocator = rcutils.rcutils_get_default_allocator()
-        self._free, self._forget_error = (
-            rcutils.rcutils_uint8_array_fini,
-            rcutils.rcutils_reset_error,
-        )
-        rcutils.rcutils_uint8_array_init(
-            ctypes.byref(self._bytes), ctypes.c_size_t(_ROOM), ctypes.byref(allocator)
-        )
+        self._free, self._forget_error = (rcutils.rcutils_uint8_array_fini, rcutils.rcutils_reset_error)
+        rcutils.rcutils_uint8_array_init(ctypes.byref(self._bytes), ctypes.c_size_t(_ROOM), ctypes.byref(allocator))
         self._take = rcl.rcl_take_serialized_message
         self._take.argtypes, self._take.restype = [ctypes.c_void_p] * 4, ctypes.c_int
         self._places = ctypes.addressof(self._bytes), ctypes.addressof(self._info)

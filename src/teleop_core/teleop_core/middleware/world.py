@@ -260,9 +260,7 @@ class Node(Protocol):
     def create_taker(self, kind: Any, name: str, qos: Qos) -> Taker:
         """Subscription whose messages are taken by hand."""
 
-    def create_subscription(
-        self, kind: Any, name: str, callback: Callable[[Any], None], qos: Qos
-    ) -> object:
+    def create_subscription(self, kind: Any, name: str, callback: Callable[[Any], None], qos: Qos) -> object:
         """Subscription whose messages the executor hands over."""
 
     def create_service(self, kind: Any, name: str, callback: Callable[[Any, Any], Any]) -> object:
@@ -337,10 +335,7 @@ class LifecycleNode(Node, Protocol):
         """Publisher that is silent unless the node is active."""
 
     def declare(
-        self,
-        specs: Iterable[Spec],
-        values: Mapping[str, Value],
-        accept: Callable[[Mapping[str, Value]], str],
+        self, specs: Iterable[Spec], values: Mapping[str, Value], accept: Callable[[Mapping[str, Value]], str]
     ) -> None:
         """Declare parameters.
 

@@ -66,9 +66,7 @@ class ArmBridgeNode(TickingNode):
             stamp_ns = stamp.sec * 1_000_000_000 + stamp.nanosec
             if self.parameters.stamps == "sent":
                 stamp_ns = taken.sent_ns
-            sample = Sample(
-                message.name, message.position, message.velocity, message.effort, stamp_ns
-            )
+            sample = Sample(message.name, message.position, message.velocity, message.effort, stamp_ns)
             if self.stage.hear(sample, self.world.time_ns()) and self._has_server:
                 self._output.send(stamp_ns)
 

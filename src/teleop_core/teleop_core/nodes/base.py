@@ -74,9 +74,15 @@ class CoreNode(TunedNode):
         self.stage = self.runner = self.description.run(parameters, TICK_NS / 1e9)
         warm_up(self.runner)
         self.ports = Ports(
-            self, self.arm, self.description, self.stage.signals, joints_of(parameters),
-            self.options.feeds, self.open_publisher, self.options.joy_buttons,
-        )  # fmt: skip
+            self,
+            self.arm,
+            self.description,
+            self.stage.signals,
+            joints_of(parameters),
+            self.options.feeds,
+            self.open_publisher,
+            self.options.joy_buttons,
+        )
         self.row = self.ports.row
         self._open_report()
 
@@ -235,9 +241,7 @@ class CoreNode(TunedNode):
             self._open_feed()
             self.schedule.start()
             turn = self._fed_turn if self._feed is not None else self.turn
-            self._loop = Loop(
-                self.world, self.ros.get_name(), turn, self.fail, self.prepare, self.patience
-            )
+            self._loop = Loop(self.world, self.ros.get_name(), turn, self.fail, self.prepare, self.patience)
             self._loop.start()
 
     def _open_feed(self) -> None:
@@ -336,9 +340,7 @@ class CoreNode(TunedNode):
     # -- diagnostics -----------------------------------------------------------------------------
 
     def _fresh_counts(self) -> None:
-        self.schedule = Schedule(
-            self.world.monotonic_ns, self.world.sleep, self.options.max_catch_up
-        )
+        self.schedule = Schedule(self.world.monotonic_ns, self.world.sleep, self.options.max_catch_up)
         self.delay = Recent()  # from the master's sample to what was made of it, [ns]
 
     @property
@@ -357,9 +359,7 @@ class CoreNode(TunedNode):
         try:
             self.report()
         except Exception:
-            self.ros.get_logger().error(
-                f"cannot report:\n{traceback.format_exc()}", throttle_duration_sec=60.0
-            )
+            self.ros.get_logger().error(f"cannot report:\n{traceback.format_exc()}", throttle_duration_sec=60.0)
 
     def report(self) -> None:
         """Publish how the node is."""

@@ -98,9 +98,14 @@ class Child:
     """
 
     def __init__(
-        self, name: str, parameters: IO[Any], env: dict[str, str], starter: Starter,
-        command: Sequence[str] = (), nodes: Sequence[str] = (),
-    ) -> None:  # fmt: skip
+        self,
+        name: str,
+        parameters: IO[Any],
+        env: dict[str, str],
+        starter: Starter,
+        command: Sequence[str] = (),
+        nodes: Sequence[str] = (),
+    ) -> None:
         arm, _, stage = name.rpartition("/")
         self.name, self.doing = name, "starting"
         self.is_told = self._is_asked = False
@@ -117,9 +122,8 @@ class Child:
         files = {"out": log, "err": log, "line": theirs.fileno(), "parameters": parameters.fileno()}
         with theirs:
             self._process = starter.start(
-                command or ["teleop_core.nodes", *ours], env | {VARIABLE: "<line>"}, files,
-                main="" if command else NODE,
-            )  # fmt: skip
+                command or ["teleop_core.nodes", *ours], env | {VARIABLE: "<line>"}, files, main="" if command else NODE
+            )
         self._chances, self._silent = Chances(self._process.pid), 0.0
 
     @property

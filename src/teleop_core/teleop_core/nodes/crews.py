@@ -23,9 +23,7 @@ class Processes(StrEnum):
     """All stages in one process: the fastest session."""
 
 
-def crews(
-    graph: Graph, processes: Processes = Processes.SIDES, without: Collection[str] = ()
-) -> tuple[Crew, ...]:
+def crews(graph: Graph, processes: Processes = Processes.SIDES, without: Collection[str] = ()) -> tuple[Crew, ...]:
     """Processes of a graph: the recorder before the others.
 
     Args:
@@ -41,10 +39,7 @@ def crews(
         if name not in names:
             raise UnknownNameError("node of the session", name, names)
     own = {name: _process_of(graph, name, processes) for name in names if name not in without}
-    shared = {
-        process: tuple(name for name in own if own[name] == process)
-        for process in dict.fromkeys(own.values())
-    }
+    shared = {process: tuple(name for name in own if own[name] == process) for process in dict.fromkeys(own.values())}
     return ({RECORDER_NAME: (RECORDER_NAME,)}, shared)
 
 
@@ -54,8 +49,6 @@ def _process_of(graph: Graph, name: str, processes: Processes) -> str:
         return name
     if processes is Processes.ONE:
         return SESSION
-    stages = [
-        member.stage.name for member in graph.members if member.arm == name.rpartition("/")[0]
-    ]
+    stages = [member.stage.name for member in graph.members if member.arm == name.rpartition("/")[0]]
     place = stages.index(name.rpartition("/")[2])
     return _SIDES[place >= stages.index("slave")]

@@ -55,18 +55,12 @@ class OperatingState:
     """
 
     def __init__(
-        self,
-        node: Any,
-        arm: str,
-        request: Callable[[str], tuple[Answer, str]],
-        condition: Callable[[], Condition],
+        self, node: Any, arm: str, request: Callable[[str], tuple[Answer, str]], condition: Callable[[], Condition]
     ) -> None:
         self._node, self._request, self._condition = node, request, condition
         self._kind = message_type(OPERATING_STATE)
         self._changes: deque[tuple[int, Condition]] = deque(maxlen=100)
-        self._publisher = node.ros.create_lifecycle_publisher(
-            self._kind, f"{arm}/operating_state", _LATCHED
-        )
+        self._publisher = node.ros.create_lifecycle_publisher(self._kind, f"{arm}/operating_state", _LATCHED)
         self._commands = node.ros.create_subscription(
             message_type(STATE_COMMAND), f"{arm}/state_command", self._take, SINGLE
         )

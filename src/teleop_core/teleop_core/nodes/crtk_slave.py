@@ -14,20 +14,8 @@ import numpy as np
 from teleop_core.bags.messages import Refusal, layout, read_joints, read_values
 from teleop_core.base.errors import TeleopError
 from teleop_core.graph.topics import SLAVE_MEASURED_CF, SLAVE_MEASURED_CP, Kind, Topic
-from teleop_core.kernels.geometry import (
-    Array,
-    framed_wrenches,
-    pose_from_transform,
-    transform_from_pose,
-)
-from teleop_core.nodes.crtk import (
-    SINGLE,
-    STREAMED,
-    Condition,
-    OperatingState,
-    Refusals,
-    is_installed,
-)
+from teleop_core.kernels.geometry import Array, framed_wrenches, pose_from_transform, transform_from_pose
+from teleop_core.nodes.crtk import SINGLE, STREAMED, Condition, OperatingState, Refusals, is_installed
 from teleop_core.nodes.streams import message_type, profile
 from teleop_core.slave.motion_commands import Told
 from teleop_core.slave.operation.states import Answer, State
@@ -100,28 +88,25 @@ class CrtkSlave:
             ("move_jr", _JOINTS, False, lambda m: self._locked(motion.move_by, self._of(m))),
             ("move_cp", _POSE, False, self._move_cp),
             ("hold", _EMPTY, False, lambda _: self._locked(motion.hold)),
-            ("interpolate_jp", _JOINTS, True,
-             lambda m: self._locked(motion.servo, self._of(m), now())),
+            ("interpolate_jp", _JOINTS, True, lambda m: self._locked(motion.servo, self._of(m), now())),
             ("interpolate_cp", _POSE, True, self._interpolate_cp),
-            ("servo_jr", _JOINTS, False,  # each counts
-             lambda m: self._locked(motion.servo_by, self._of(m), now())),
-            ("servo_jv", _JOINTS, True,
-             lambda m: self._locked(motion.drive_joints, self._of(m, "velocity"), now())),
-            ("servo_cv", _TWIST, True,
-             lambda m: self._locked(motion.drive_tip, _twist(m), now())),
-        ]  # fmt: skip
+            (
+                "servo_jr",
+                _JOINTS,
+                False,  # each counts
+                lambda m: self._locked(motion.servo_by, self._of(m), now()),
+            ),
+            ("servo_jv", _JOINTS, True, lambda m: self._locked(motion.drive_joints, self._of(m, "velocity"), now())),
+            ("servo_cv", _TWIST, True, lambda m: self._locked(motion.drive_tip, _twist(m), now())),
+        ]
 
-    def _listen(
-        self, name: str, kind: str, is_streamed: bool, command: Callable[[Any], Told]
-    ) -> Any:
+    def _listen(self, name: str, kind: str, is_streamed: bool, command: Callable[[Any], Told]) -> Any:
         quality = STREAMED if is_streamed else SINGLE
 
         def take(message: Any) -> None:
             self._take(name, command, message)
 
-        return self._node.ros.create_subscription(
-            message_type(kind), f"slave/{name}", take, quality
-        )
+        return self._node.ros.create_subscription(message_type(kind), f"slave/{name}", take, quality)
 
     def _take(self, name: str, command: Callable[[Any], Told], message: Any) -> None:
         if not self._node.is_at_work:
@@ -199,15 +184,11 @@ class Measured:
         self._node, self._stage = node, stage
         names = stage.robot.joint_names
         self._publishers = {
-            topic: node.ros.create_lifecycle_publisher(
-                message_type(topic.kind.ros_type), topic.name, profile(topic)
-            )
+            topic: node.ros.create_lifecycle_publisher(message_type(topic.kind.ros_type), topic.name, profile(topic))
             for topic in (MEASURED_CV, GOAL_JS, GOAL_CP, BODY_CF, SPATIAL_CF)
         }
         self._layouts = {t: layout(t.of_arm(node.arm), names) for t in self._publishers}
-        self._jacobian = node.ros.create_lifecycle_publisher(
-            message_type(_MATRIX), JACOBIAN, profile(MEASURED_CV)
-        )
+        self._jacobian = node.ros.create_lifecycle_publisher(message_type(_MATRIX), JACOBIAN, profile(MEASURED_CV))
         self._force: Any = None  # newest message of it
         self._forces: Any = None  # subscription, as long as somebody reads them in other frames
         self._timer = node.ros.create_timer(_PERIOD, self._send)
@@ -235,9 +216,7 @@ class Measured:
         """Begin to take what the force sensor tells, or end it."""
         if is_read and self._forces is None:
             kind = message_type(SLAVE_MEASURED_CF.kind.ros_type)
-            self._forces = self._node.ros.create_subscription(
-                kind, SLAVE_MEASURED_CF.name, self._take, STREAMED
-            )
+            self._forces = self._node.ros.create_subscription(kind, SLAVE_MEASURED_CF.name, self._take, STREAMED)
         elif not is_read and self._forces is not None:
             self._node.ros.destroy(self._forces)
             self._forces = self._force = None

@@ -50,10 +50,7 @@ class LiveDisplay:
     def __init__(self, node: CoreNode, arm: str) -> None:
         topics = [topic.of_arm(arm) for topic in SEEN]
         self._publishers = {topic: node.open_publisher(displayed(topic)) for topic in topics}
-        self._cadence, self._said = (
-            Cadence(node.world.monotonic_ns, PERIOD_NS),
-            dict.fromkeys(topics, b""),
-        )
+        self._cadence, self._said = (Cadence(node.world.monotonic_ns, PERIOD_NS), dict.fromkeys(topics, b""))
 
     def show(self, newest: Newest) -> None:
         """Say again what is due and new."""

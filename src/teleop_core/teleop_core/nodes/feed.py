@@ -74,9 +74,7 @@ class Feed:
         self.waiting, self.is_open = bytearray(), False
         self.channels = {name: Channel(self, index) for index, name in enumerate(self._names)}
 
-    def put(
-        self, index: int, word: int, data: bytes = b"", number: int = 0, time_ns: int = 0
-    ) -> None:
+    def put(self, index: int, word: int, data: bytes = b"", number: int = 0, time_ns: int = 0) -> None:
         """Append a frame to what waits."""
         self.waiting += _HEAD.pack(len(data), index, word, number, time_ns)
         self.waiting += data

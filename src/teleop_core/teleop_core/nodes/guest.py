@@ -23,9 +23,7 @@ class Guest:
         ros: The node.
     """
 
-    def __init__(
-        self, name: str, domain: int | None = None, world: World = ROS, **options: Any
-    ) -> None:
+    def __init__(self, name: str, domain: int | None = None, world: World = ROS, **options: Any) -> None:
         self.world = world.guest(domain)
         self.ros = self.world.node(name, use_global_arguments=False, enable_rosout=False, **options)
 

@@ -27,10 +27,7 @@ COMMON = {
     "processes": ("sides", "sides: the hand's and the slave's; nodes: one each; one: for all"),
     "record": ("true", "whether the recorder records from the start"),
     "out": ("", "directory of the recording; empty: bags/ and the time"),
-    "respawn": (
-        "true",
-        "whether a process that ends is started again; never that of the slave or the recorder",
-    ),
+    "respawn": ("true", "whether a process that ends is started again; never that of the slave or the recorder"),
     "log_level": ("info", "one of " + ", ".join(LOG_LEVELS)),
 }
 """Arguments of all launch files: name to default and meaning."""
@@ -144,9 +141,15 @@ def describe(own: Mapping[str, tuple[str, str]]) -> "LaunchDescription":
 
 def _action(node: Any, process: Process) -> Any:
     return node(
-        package="teleop_core", executable=process.executable, arguments=[*process.arguments],
-        exec_name=process.name or process.executable, name=process.name or None,
-        namespace=process.namespace, parameters=[process.parameters],
-        respawn=process.respawns, respawn_delay=_RESPAWN_DELAY, output="screen",
+        package="teleop_core",
+        executable=process.executable,
+        arguments=[*process.arguments],
+        exec_name=process.name or process.executable,
+        name=process.name or None,
+        namespace=process.namespace,
+        parameters=[process.parameters],
+        respawn=process.respawns,
+        respawn_delay=_RESPAWN_DELAY,
+        output="screen",
         ros_arguments=["--log-level", process.log_level],
-    )  # fmt: skip
+    )

@@ -51,10 +51,15 @@ _NEWS_PERIOD = 5.0  # from line to line about a node that is long in starting [s
 
 
 def live(
-    configuration: Configuration, out: Path, console: Console, *,
-    processes: Processes = Processes.SIDES, without: Collection[str] = (),
-    interrupt: Interrupt | None = None, domain: int | None = None,
-) -> None:  # fmt: skip
+    configuration: Configuration,
+    out: Path,
+    console: Console,
+    *,
+    processes: Processes = Processes.SIDES,
+    without: Collection[str] = (),
+    interrupt: Interrupt | None = None,
+    domain: int | None = None,
+) -> None:
     """Run and record a session as ROS 2 nodes, for the configured duration or until Ctrl-C.
 
     Args:
@@ -189,9 +194,7 @@ class _Session:
 
     def _start(self, crew: Crew) -> None:
         for name in crew:
-            self._children[name] = Child(
-                name, self._parameters, self._env, self._starter, nodes=crew[name]
-            )
+            self._children[name] = Child(name, self._parameters, self._env, self._starter, nodes=crew[name])
         waiting = [node for nodes in crew.values() for node in nodes]
         home = {node: name for name, nodes in crew.items() for node in nodes}
         progress = _Progress(self._children)
@@ -307,8 +310,7 @@ class _Session:
             f"late {slave.number('late'):.0f}",
             f"missed {slave.number('missed'):.0f}",
             f"dropped {slave.number('dropped_time_ms'):g} ms",
-            f"master to slave {slave.number('delay_ms.median'):.1f} ms"
-            f" (p99 {slave.number('delay_ms.p99'):.1f})",
+            f"master to slave {slave.number('delay_ms.median'):.1f} ms (p99 {slave.number('delay_ms.p99'):.1f})",
         ]
 
     def say(self, text: str) -> None:
@@ -352,9 +354,13 @@ class _Progress:
 
 
 def parameter_file(
-    configuration: Configuration, out: str, namespace: str = "", *, starts_recorder: bool = True,
+    configuration: Configuration,
+    out: str,
+    namespace: str = "",
+    *,
+    starts_recorder: bool = True,
     priority: int | None = None,
-) -> str:  # fmt: skip
+) -> str:
     """Parameters of all nodes as a ROS 2 parameter file; ``out`` is that of the recorder.
 
     Every node is named with its namespace. What feeds its ports, where that is not the topic of

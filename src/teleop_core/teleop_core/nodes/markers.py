@@ -22,9 +22,7 @@ from teleop_core.session.markers import ArmMarkers
 
 PERIOD_NS = 50_000_000
 """Time from one message to the next [ns]."""
-_READ = (
-    MASTER_MEASURED_CF, MASTER_MEASURED_CP, SLAVE_MEASURED_CP, SLAVE_SERVO_CP, TELEOP_STATE,
-)  # fmt: skip
+_READ = (MASTER_MEASURED_CF, MASTER_MEASURED_CP, SLAVE_MEASURED_CP, SLAVE_SERVO_CP, TELEOP_STATE)
 
 
 class LiveMarkers:
@@ -38,10 +36,7 @@ class LiveMarkers:
 
     def __init__(self, node: CoreNode, arm: str, axes: Array | None = None) -> None:
         self._topics = {topic: topic.of_arm(arm) for topic in _READ}
-        self._drawn, self._cadence = (
-            ArmMarkers(arm, axes),
-            Cadence(node.world.monotonic_ns, PERIOD_NS),
-        )
+        self._drawn, self._cadence = (ArmMarkers(arm, axes), Cadence(node.world.monotonic_ns, PERIOD_NS))
         self._publisher = node.open_publisher(absolute(MARKERS.of_arm(arm)))
         self._time_ns = node.world.time_ns
 

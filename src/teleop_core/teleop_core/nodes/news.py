@@ -54,9 +54,7 @@ class Commanders:
         return found
 
     def _is_command(self, name: str) -> bool:
-        return name.rpartition("/")[2].startswith(_COMMANDS) or (
-            self._trigger != "" and name.endswith(self._trigger)
-        )
+        return name.rpartition("/")[2].startswith(_COMMANDS) or (self._trigger != "" and name.endswith(self._trigger))
 
 
 class Trouble:

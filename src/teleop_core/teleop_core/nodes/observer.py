@@ -85,9 +85,7 @@ class Observer(Guest):
                 self.malformed += 1
                 continue
             for one in reports:
-                self.statuses[one.name] = Status(
-                    one.level, one.message, one.values, 1e-9 * self.world.monotonic_ns()
-                )
+                self.statuses[one.name] = Status(one.level, one.message, one.values, 1e-9 * self.world.monotonic_ns())
                 is_new = True
         return is_new
 

@@ -20,11 +20,7 @@ _BEAT_NS = 100_000_000
 """A button of this package that has spoken says its state again so often [ns]."""
 _BYTES = 5
 """A Bool as CDR: four bytes of encapsulation, one of data."""
-READERS = (
-    Qos(keeps_all=True),
-    Qos(keeps_all=True, is_latched=True),
-    Qos(keeps_all=True, is_reliable=False),
-)
+READERS = (Qos(keeps_all=True), Qos(keeps_all=True, is_latched=True), Qos(keeps_all=True, is_reliable=False))
 """Readers of the stop: for all who send reliably; for the state that a button had before it was
 found; for those who send at best effort, whom a reliable reader does not hear. They keep all, for a
 press must not make room for a release."""
@@ -113,9 +109,7 @@ class StopInput:
                 if taker is best_effort:
                     found += presses.overhear(taken.sender, now_ns, is_pressed=is_pressed)
                 else:
-                    found += presses.take(
-                        taken.sender, taken.number, now_ns, is_pressed=is_pressed, is_idle=is_idle
-                    )
+                    found += presses.take(taken.sender, taken.number, now_ns, is_pressed=is_pressed, is_idle=is_idle)
         return [*presses.lose(self._takers[0].lost), *found]
 
     @property
@@ -140,10 +134,7 @@ class StopInput:
     def names(self, buttons: Iterable[bytes]) -> str:
         """Names of buttons, for people; takes longer than a tick."""
         there = self._look_up()
-        return " and ".join(
-            self._names.get(one, "a button") + ("" if one in there else " (gone)")
-            for one in buttons
-        )  # fmt: skip
+        return " and ".join(self._names.get(one, "a button") + ("" if one in there else " (gone)") for one in buttons)
 
     def unheard(self) -> str:
         """Names of buttons whose state nobody knows; takes longer than a tick.
@@ -151,9 +142,7 @@ class StopInput:
         They are there, have said nothing yet, and do not repeat their state for late readers.
         """
         return " and ".join(
-            name
-            for one, (name, is_latched) in self._look_up().items()
-            if not (is_latched or self._presses.knows(one))
+            name for one, (name, is_latched) in self._look_up().items() if not (is_latched or self._presses.knows(one))
         )
 
     def release(self) -> None:
@@ -195,9 +184,7 @@ class CommandServices:
         holders: Which buttons hold the stop now.
     """
 
-    def __init__(
-        self, node: Any, arm: Commanded, stop: StopInput, holders: Callable[[], tuple[bytes, ...]]
-    ) -> None:
+    def __init__(self, node: Any, arm: Commanded, stop: StopInput, holders: Callable[[], tuple[bytes, ...]]) -> None:
         self._node, self._arm, self._stop, self._holders = node, arm, stop, holders
         calls = {name: partial(self._command, name) for name in COMMANDS}
         self._own = [
@@ -205,9 +192,7 @@ class CommandServices:
             for name, call in (calls | {RELEASE: self._release}).items()
         ]
 
-    def _command(
-        self, name: str, _: Trigger.Request, response: Trigger.Response
-    ) -> Trigger.Response:
+    def _command(self, name: str, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         with self._node.lock:
             found, text = self._arm.request(name)
             holders = self._holders() if found is Answer.STOPPED else ()

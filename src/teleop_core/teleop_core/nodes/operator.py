@@ -46,9 +46,7 @@ class HandInput:
     def _open(self, topic: Topic, target: Any) -> Input:
         name, delay = self._node.options.feeds(topic.name)[0]
         of_arm = replace(topic, name=name).of_arm(self._node.arm)
-        entry = Input(
-            self._node, of_arm, name, (), target, delay, self._node.options.joy_buttons
-        )  # fmt: skip
+        entry = Input(self._node, of_arm, name, (), target, delay, self._node.options.joy_buttons)
         self._node.ports.inputs[topic.name] = [entry]
         return entry
 

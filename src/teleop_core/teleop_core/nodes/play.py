@@ -32,9 +32,7 @@ DISCOVERY_TIME = 1.0
 """Time for subscribers to be found before the first message [s]."""
 
 
-def play(
-    bag: Bag, topics: Iterable[str] | None, rate: float, console: Console, clock: float = 0.0
-) -> int:
+def play(bag: Bag, topics: Iterable[str] | None, rate: float, console: Console, clock: float = 0.0) -> int:
     """Publish a recording with its own bytes and spacing, until its end or Ctrl-C.
 
     Args:

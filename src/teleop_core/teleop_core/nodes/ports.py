@@ -64,15 +64,7 @@ class Ports:
             own = signals[port.field]
             targets = [own] if len(given) == 1 else [own.copy() for _ in given]
             self.inputs[port.name] = [
-                Input(
-                    owner,
-                    _heard(port, name, arm),
-                    _name_for(owner, name),
-                    joint_names,
-                    target,
-                    delay,
-                    buttons,
-                )
+                Input(owner, _heard(port, name, arm), _name_for(owner, name), joint_names, target, delay, buttons)
                 for (name, delay), target in zip(given, targets, strict=True)
             ]
             if len(targets) > 1:
@@ -188,7 +180,5 @@ def _nothing(*_: object) -> Any:
     """Stand in for feeds and publishers that nobody asks for."""
 
 
-NO_PORTS = Ports(
-    None, "", Stage("none", NoParameters, (), ()), make_signals((), 0)[0], (), _nothing, _nothing
-)
+NO_PORTS = Ports(None, "", Stage("none", NoParameters, (), ()), make_signals((), 0)[0], (), _nothing, _nothing)
 """Ports of a node that is not configured."""

@@ -95,9 +95,7 @@ def _spin_once(executor: Executor, node: CoreNode) -> None:
     except WorldEndedError:
         node.end(1)
     except Exception:  # of a request that cannot be read, such as one that others forged
-        node.ros.get_logger().error(
-            f"a request failed:\n{traceback.format_exc()}", throttle_duration_sec=10.0
-        )
+        node.ros.get_logger().error(f"a request failed:\n{traceback.format_exc()}", throttle_duration_sec=10.0)
 
 
 def _begin_end(crew: Crew, watch: Watching) -> None:

@@ -55,9 +55,7 @@ class QualityOverrides:
     """
 
     def __init__(self, given: Mapping[str, object]) -> None:
-        self._values = {
-            name: _checked(name, value) for name, value in given.items() if name.startswith(PREFIX)
-        }
+        self._values = {name: _checked(name, value) for name, value in given.items() if name.startswith(PREFIX)}
         self._used: set[str] = set()
 
     def apply(self, name: str, side: Side, base: Qos) -> Qos:

@@ -164,9 +164,7 @@ class RecorderNode(CoreNode):
     def setup(self, parameters: RecorderParameters) -> None:
         """Make the recording's directory."""
         configuration = self._configuration(parameters)
-        graph = self._graph or (
-            configuration.graph if parameters.configuration else graph_of(sys.argv)
-        )
+        graph = self._graph or (configuration.graph if parameters.configuration else graph_of(sys.argv))
         self._path = Path(parameters.out or time.strftime("bags/live_%Y%m%d_%H%M%S"))
         topics = (*(topic.of_arm(self.arm) for topic in graph.topics), DIAGNOSTICS)
         self._model = self._model_of(configuration, parameters)
@@ -182,10 +180,14 @@ class RecorderNode(CoreNode):
         self._mark_topic, self._part, self._marks = MARKS.of_arm(self.arm), 0, 0
         self._last.clear()
         self._open = partial(
-            BagWriter, topics=(*topics, self._mark_topic, *self._model.topics), joint_names={},
-            parameters=parameters, metadata=self._about(configuration), hold_ns=HOLD_NS,
+            BagWriter,
+            topics=(*topics, self._mark_topic, *self._model.topics),
+            joint_names={},
+            parameters=parameters,
+            metadata=self._about(configuration),
+            hold_ns=HOLD_NS,
             background=self.world.background,
-        )  # fmt: skip
+        )
         self._begin_recording(self._path)
         self._is_broken = False
 

@@ -73,9 +73,7 @@ class RemoteControl(Guest):
         Raises:
             SessionError: There is none on this domain.
         """
-        self._until(
-            lambda: bool(self.arms) and all(arm.values for arm in self.arms.values()), must=False
-        )
+        self._until(lambda: bool(self.arms) and all(arm.values for arm in self.arms.values()), must=False)
         if not self.arms:
             raise SessionError(
                 f"no arm answers on ROS domain {self.domain}; `teleop live` says which is its own, "
@@ -97,14 +95,11 @@ class RemoteControl(Guest):
                 if arm.values.get("is_stopped") and arm.stopped_after < 0.0:
                     arm.stopped_after = self._now() - begin
             return bool(self.arms) and all(
-                arm.values.get("is_stopped") and arm.values["rest_time"] > 0.0
-                for arm in self.arms.values()
+                arm.values.get("is_stopped") and arm.values["rest_time"] > 0.0 for arm in self.arms.values()
             )
 
         if not self._until(is_stopped, must=False):
-            missing = [
-                name or "the arm" for name, a in self.arms.items() if not a.stopped_after >= 0
-            ]
+            missing = [name or "the arm" for name, a in self.arms.items() if not a.stopped_after >= 0]
             what = f"{', '.join(missing)} did not confirm" if missing else "no arm confirmed"
             raise SessionError(f"{what} the stop on ROS domain {self.domain}")
         return self.arms
@@ -116,9 +111,7 @@ class RemoteControl(Guest):
         is waited for; one whose stop stays pressed says who presses it.
         """
         self.look()
-        self._until(
-            lambda: not any(arm.values["is_pressed"] for arm in self.arms.values()), must=False
-        )
+        self._until(lambda: not any(arm.values["is_pressed"] for arm in self.arms.values()), must=False)
         told = []
         for arm, state in self.arms.items():
             words = ["resume"] if state.values["state"] == State.PAUSED else ["reset", "enable"]

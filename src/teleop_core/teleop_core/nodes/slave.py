@@ -96,9 +96,7 @@ class SlaveNode(TickingNode):
             is_idle = self._state[0] == State.DISABLED
             for is_pressed in self._stop.take(now_ns, is_idle=is_idle):
                 heard_ns = self._stop.heard_ns
-                self.stage.press(
-                    is_pressed=is_pressed, heard_ns=now_ns if heard_ns is None else heard_ns
-                )
+                self.stage.press(is_pressed=is_pressed, heard_ns=now_ns if heard_ns is None else heard_ns)
             self.stage.step()
 
     def _look(self) -> None:

@@ -96,9 +96,7 @@ def help_text(name: str) -> str:
     lines = [f"usage: {name} {nodes}[--ros-args ...]", ""]
     if name == SESSION:
         lines.append("  a whole session in one process; its parameters are those of its stages")
-        lines.append(
-            "  with names of nodes, these alone, without the recorder: one side of several"
-        )
+        lines.append("  with names of nodes, these alone, without the recorder: one side of several")
     else:
         stage = STAGES.find(name)
         for verb, topics in (("reads", stage.reads), ("writes", stage.writes)):

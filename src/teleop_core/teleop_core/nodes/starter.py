@@ -56,9 +56,7 @@ class Starter:
         patience: Time for which it may get no further before it is given up [s].
     """
 
-    def __init__(
-        self, configuration: str, env: Mapping[str, str], patience: float = START_TIMEOUT
-    ) -> None:
+    def __init__(self, configuration: str, env: Mapping[str, str], patience: float = START_TIMEOUT) -> None:
         self._patience, self._last = patience, time.monotonic()
         self._line, theirs = socket.socketpair(type=_KIND)
         self._log = cast("IO[bytes]", tempfile.TemporaryFile())  # noqa: SIM115
@@ -68,10 +66,14 @@ class Starter:
             file.flush()
             numbers = (theirs.fileno(), file.fileno())
             self._process = subprocess.Popen(
-                [sys.executable, "-m", __name__, *map(str, numbers)], pass_fds=numbers,
-                stdin=subprocess.DEVNULL, stdout=self._log, stderr=self._log, env=dict(env),
+                [sys.executable, "-m", __name__, *map(str, numbers)],
+                pass_fds=numbers,
+                stdin=subprocess.DEVNULL,
+                stdout=self._log,
+                stderr=self._log,
+                env=dict(env),
                 start_new_session=True,
-            )  # fmt: skip
+            )
 
     @property
     def pid(self) -> int:
@@ -96,15 +98,12 @@ class Starter:
             self._is_ready, self.doing = word == "ready", word
             timeout = 0.0
         if not self._is_ready and time.monotonic() - self._last > self._patience:
-            raise SessionError(
-                f"what the nodes share got no further for {self._patience:g} s: {self.doing}"
-            )
+            raise SessionError(f"what the nodes share got no further for {self._patience:g} s: {self.doing}")
         return self._is_ready
 
     def start(
-        self, command: Sequence[str], env: Mapping[str, str], files: Mapping[str, int],
-        main: str = "",
-    ) -> "Started":  # fmt: skip
+        self, command: Sequence[str], env: Mapping[str, str], files: Mapping[str, int], main: str = ""
+    ) -> "Started":
         """Start a process in a session of its own; nothing is on its standard input.
 
         Args:
@@ -122,9 +121,12 @@ class Starter:
         while not self.is_ready(1.0):
             pass
         request = {
-            "command": list(command), "env": dict(env), "files": list(files), "main": main,
+            "command": list(command),
+            "env": dict(env),
+            "files": list(files),
+            "main": main,
             "folder": os.getcwd(),
-        }  # fmt: skip
+        }
         ours, theirs = socket.socketpair(type=_KIND)
         try:
             with theirs, self._lock:

@@ -261,9 +261,7 @@ class Input:
         """Take a sound sample from a sender in this process."""
         self.received += 1
         if self._delay_ns:
-            self._held.append(
-                (self._world.monotonic_ns() + self._delay_ns, stamp_ns, values.copy())
-            )
+            self._held.append((self._world.monotonic_ns() + self._delay_ns, stamp_ns, values.copy()))
             return
         self._target[:] = values
         self.stamp_ns, self.arrival_ns = stamp_ns, self._world.monotonic_ns()
@@ -294,9 +292,7 @@ class Output:
         pending: Where messages wait for :meth:`publish` of their session; None to publish at once.
     """
 
-    def __init__(
-        self, owner: Owner, publisher: Publisher, form: Layout, source: Array, name: str = ""
-    ) -> None:
+    def __init__(self, owner: Owner, publisher: Publisher, form: Layout, source: Array, name: str = "") -> None:
         self.name, self._time_ns, self._send = name, owner.world.time_ns, publisher.send
         self._encode, self._source = form.encode_one, source
         self.sent = 0

@@ -49,11 +49,7 @@ class TeleopSession:
     """
 
     def __init__(
-        self,
-        namespace: str = "",
-        names: Sequence[str] = (),
-        world: World = ROS,
-        graph: Graph | None = None,
+        self, namespace: str = "", names: Sequence[str] = (), world: World = ROS, graph: Graph | None = None
     ) -> None:
         self._world = world
         graph = graph or graph_of(sys.argv)
@@ -74,9 +70,11 @@ class TeleopSession:
             node.has_own_loop, node.gate = False, self._gate
         last = self._stages[-1]
         self._schedule = Schedule(
-            world.monotonic_ns, world.sleep, last.options.max_catch_up,
+            world.monotonic_ns,
+            world.sleep,
+            last.options.max_catch_up,
             phase_ns=0 if members[0] is graph.members[0] else _AFTER_NS,
-        )  # fmt: skip
+        )
         self._at_work: tuple[bool, ...] = ()
         self._pending: list[tuple[Output, bytes, int]] = []
         self._ticks = 0
@@ -169,9 +167,11 @@ class TeleopSession:
 def _fed(stages: Sequence[CoreNode]) -> list[str]:
     """Names of the topics that nodes feed to a recorder: reports go by the middleware alone."""
     return [
-        topic.of_arm(node.arm).name for node in stages for topic in node.description.writes
+        topic.of_arm(node.arm).name
+        for node in stages
+        for topic in node.description.writes
         if topic.kind is not Kind.REPORT
-    ]  # fmt: skip
+    ]
 
 
 def _recorder(graph: Graph, namespace: str, world: World) -> RecorderNode:

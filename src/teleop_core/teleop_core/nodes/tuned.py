@@ -23,36 +23,54 @@ spare_generator()  # before the first node
 class NodeParameters:
     """Parameters that every node has beside those of its stage."""
 
-    autostart: bool = parameter(
-        True, fixed=True, doc="node configures and activates itself; false: a supervisor does"
-    )
+    autostart: bool = parameter(True, fixed=True, doc="node configures and activates itself; false: a supervisor does")
     max_catch_up: int = parameter(
-        1000, unit="ticks", lower=0, upper=10_000, fixed=True,
+        1000,
+        unit="ticks",
+        lower=0,
+        upper=10_000,
+        fixed=True,
         doc="missed ticks that one late wake-up makes up for; beyond them time is dropped",
-    )  # fmt: skip
+    )
     links: tuple[str, ...] = parameter(
-        (), fixed=True,
+        (),
+        fixed=True,
         doc="what feeds a port in place of the topic of its name, port=topic or port=topic@delay, "
         "with the delay in seconds; topics of one port are added",
-    )  # fmt: skip
+    )
     joy_buttons: tuple[int, ...] = parameter(
-        BUTTONS, lower=-1, upper=255, length=3, fixed=True,
-        doc="which buttons of an incoming Joy are clutch, fixture and mode, counted from 0; "
-        "-1: it has none",
-    )  # fmt: skip
+        BUTTONS,
+        lower=-1,
+        upper=255,
+        length=3,
+        fixed=True,
+        doc="which buttons of an incoming Joy are clutch, fixture and mode, counted from 0; -1: it has none",
+    )
     second_publisher: str = parameter(
-        "refuse", choices=("refuse", "fault"), fixed=True,
+        "refuse",
+        choices=("refuse", "fault"),
+        fixed=True,
         doc="when a second publisher sends on a topic that is read: its messages are refused and "
         "counted, or that is a fault too",
-    )  # fmt: skip
+    )
     owner_silence: float = parameter(
-        0.5, unit="s", lower=0.0, upper=60.0, fixed=True, source="assumed",
+        0.5,
+        unit="s",
+        lower=0.0,
+        upper=60.0,
+        fixed=True,
+        source="assumed",
         doc="who owns a topic must be silent for longer before another publisher may take it",
-    )  # fmt: skip
+    )
     flood_rate: int = parameter(
-        5000, unit="1/s", lower=1, upper=1_000_000, fixed=True, source="assumed",
+        5000,
+        unit="1/s",
+        lower=1,
+        upper=1_000_000,
+        fixed=True,
+        source="assumed",
         doc="messages of one topic beyond so many a second are refused",
-    )  # fmt: skip
+    )
     real_time: RealTimeParameters = field(default_factory=RealTimeParameters)
 
     def sender(self) -> Sender:
@@ -96,9 +114,7 @@ class TunedNode(Hooks):
         TeleopError: A given parameter is unknown or not allowed.
     """
 
-    def __init__(
-        self, stage: Stage, group: type | None = None, world: World = ROS, **options: Any
-    ) -> None:
+    def __init__(self, stage: Stage, group: type | None = None, world: World = ROS, **options: Any) -> None:
         self.world = world
         self.ros: LifecycleNode = world.lifecycle_node(stage.name, self, **options)
         self.runner: Runner | None = None

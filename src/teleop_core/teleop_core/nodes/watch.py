@@ -19,9 +19,7 @@ from teleop_core.nodes.chances import Chances
 from teleop_core.nodes.loop import Loop
 from teleop_core.nodes.parent import Parent
 
-ENDS = tuple(
-    number for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
-)  # fmt: skip
+ENDS = tuple(number for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT))
 """Signals that ask for an orderly end: Ctrl-C, a supervisor, a closed terminal, Ctrl-\\."""
 _PERIOD = 0.1
 _END_PATIENCE = 4.0  # until the main thread turns to the end

@@ -36,16 +36,7 @@ from teleop_core.robots.kinematics import (
     IkStatus,
     Kernels,
 )
-from teleop_core.robots.parts import (
-    ARGUMENT,
-    ROBOTS,
-    Part,
-    RobotPart,
-    built,
-    from_file,
-    is_urdf,
-    part_name,
-)
+from teleop_core.robots.parts import ARGUMENT, ROBOTS, Part, RobotPart, built, from_file, is_urdf, part_name
 from teleop_core.robots.robot import Robot
 
 if TYPE_CHECKING:

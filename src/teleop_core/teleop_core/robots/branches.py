@@ -90,9 +90,7 @@ def turn(q: Array, seed: Array, limits: Array, first: int, last: int) -> None:
 
 
 @inner
-def cost_of(
-    q: Array, seed: Array, limits: Array, first: int, last: int, do_limits_count: bool
-) -> float:
+def cost_of(q: Array, seed: Array, limits: Array, first: int, last: int, do_limits_count: bool) -> float:
     """Largest move of joints first..last-1 from the seed, the metric that orders branches.
 
     Branches outside the limits come after all others if the limits count.

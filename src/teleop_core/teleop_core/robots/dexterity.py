@@ -82,9 +82,7 @@ def manipulability(robot: Robot, q: object, length: float = 1.0) -> float:
     return float(np.prod(singular_values(robot, q, length)))
 
 
-def sample_workspace(
-    robot: Robot, count: int, rng: np.random.Generator, length: float = 1.0
-) -> tuple[Array, Array]:
+def sample_workspace(robot: Robot, count: int, rng: np.random.Generator, length: float = 1.0) -> tuple[Array, Array]:
     """Tip positions and manipulability of joint vectors drawn evenly inside the limits.
 
     Even in the joints is not even in space: the density of points says how many postures reach a
@@ -112,9 +110,7 @@ def sample_workspace(
     is_closed = answer.status < FkStatus.OTHER_MODE
     kept = is_closed if is_closed.any() else np.ones(count, dtype=bool)
     points = np.ascontiguousarray(answer.T[kept, :3, 3])
-    jacobians = np.stack(
-        [_controlled(robot, _kernel_jacobian(robot, q), length) for q in joints[kept]]
-    )
+    jacobians = np.stack([_controlled(robot, _kernel_jacobian(robot, q), length) for q in joints[kept]])
     values = np.linalg.svd(jacobians, compute_uv=False).prod(axis=-1)
     return points, np.asarray(values, dtype=np.float64)
 

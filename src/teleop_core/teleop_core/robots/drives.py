@@ -21,9 +21,15 @@ AccelerationKernel: TypeAlias = Callable[[Array, Array, Array, Array, Array], No
 GravityKernel: TypeAlias = Callable[[Array, Array, Array], None]
 
 ENTRIES = (
-    "inertia", "viscous", "coulomb", "friction_speed", "effort_limit", "speed_limit",
-    "encoder_step", "bandwidth",
-)  # fmt: skip
+    "inertia",
+    "viscous",
+    "coulomb",
+    "friction_speed",
+    "effort_limit",
+    "speed_limit",
+    "encoder_step",
+    "bandwidth",
+)
 MAY_BE_ZERO = ("viscous", "coulomb")
 
 
@@ -139,9 +145,7 @@ def _frozen(values: object, dtype: type = np.float64) -> NDArray[Any]:
 
 
 @kernel
-def independent_acceleration(
-    q: Array, dq: Array, effort: Array, inertia: Array, ddq: Array
-) -> None:
+def independent_acceleration(q: Array, dq: Array, effort: Array, inertia: Array, ddq: Array) -> None:
     """Write accelerations of axes that are dominated by their motors."""
     for i in range(ddq.shape[0]):
         ddq[i] = effort[i] / inertia[i]

@@ -31,9 +31,7 @@ def solved_one(robot: Arm, q: Array, seed: object, *, search: bool = True) -> Fk
     return FkResult(T, _STATUS[status], float(numbers[0]), int(numbers[1]))
 
 
-def solved(
-    robot: Arm, joints: Array, seed: object, *, search: bool = True, is_path: bool = False
-) -> FkBatch:
+def solved(robot: Arm, joints: Array, seed: object, *, search: bool = True, is_path: bool = False) -> FkBatch:
     """Poses of joint vectors (N, n), by the rules of :meth:`Robot.solve_fk`.
 
     Raises:
@@ -51,9 +49,15 @@ def solved(
         kinematics.fk_batch(robot.fk_pointer, joints, robot._row, transforms)
     else:
         kinematics.assemble_batch(
-            robot.assemble_pointer, joints, robot._row, _ask(seed is not None or is_path, search),
-            is_path, transforms, numbers, statuses,
-        )  # fmt: skip
+            robot.assemble_pointer,
+            joints,
+            robot._row,
+            _ask(seed is not None or is_path, search),
+            is_path,
+            transforms,
+            numbers,
+            statuses,
+        )
     raise_pending()
     return FkResult(transforms, statuses, numbers[:, 0], numbers[:, 1].astype(np.int64))
 

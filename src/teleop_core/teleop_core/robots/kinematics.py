@@ -162,12 +162,7 @@ def pose_residual(reached: Array, wanted: Array, residual: Array) -> bool:
 
 def is_ready(value: object, shape: tuple[int, ...]) -> TypeGuard[Array]:
     """Whether a kernel can take the value as it is; the kernels check that it is finite."""
-    return (
-        type(value) is np.ndarray
-        and value.shape == shape
-        and value.dtype is _FLOAT64
-        and value.flags.carray
-    )
+    return type(value) is np.ndarray and value.shape == shape and value.dtype is _FLOAT64 and value.flags.carray
 
 
 @kernel

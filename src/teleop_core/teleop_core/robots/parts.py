@@ -16,9 +16,7 @@ from teleop_core.robots.robot import Robot
 _BUILT_IN = {"rcrt1": "arms.rcrt1:make"} | {
     name: f"arms.textbook:{name}" for name in ("puma560", "scara", "planar_3r", "five_axis")
 }
-_OF_MACHINES = (
-    "four_bar", "mma", "parallelogram", "rps3", "scara_stewart", "stewart", "three_finger_hand",
-)  # fmt: skip
+_OF_MACHINES = ("four_bar", "mma", "parallelogram", "rps3", "scara_stewart", "stewart", "three_finger_hand")
 _TABLE_ENDINGS = (".yaml", ".yml")
 _URDF_ENDINGS = (".urdf", ".xacro")
 DESCRIPTION = "_description"
@@ -127,9 +125,7 @@ def _checked(name: str, part: object) -> RobotPart:
     try:
         inspect.signature(part).bind()
     except TypeError as error:
-        raise PartError(
-            "robot", name, f"a function whose parameters all have defaults ({error})"
-        ) from error
+        raise PartError("robot", name, f"a function whose parameters all have defaults ({error})") from error
     except ValueError:  # built into Python: no signature to look at
         pass
     return part
@@ -154,9 +150,7 @@ def _try(part: RobotPart) -> None:
         raise
     except Exception as error:  # whatever a foreign kernel raises, one line names it
         reason = " ".join(str(error).split())[:_MOST_CHARACTERS]
-        raise PartError(
-            "robot", name, f"one whose kernels run at home; {type(error).__name__}: {reason}"
-        ) from error
+        raise PartError("robot", name, f"one whose kernels run at home; {type(error).__name__}: {reason}") from error
 
 
 def _try_dynamics(robot: Robot) -> None:

@@ -328,9 +328,7 @@ class Robot:
         self.kernels.jacobian(joints, self._row, out)
         return out
 
-    def forward_dynamics(
-        self, q: object, dq: object, effort: object, wrench: object = None
-    ) -> Array:
+    def forward_dynamics(self, q: object, dq: object, effort: object, wrench: object = None) -> Array:
         """Joint accelerations (n,) [rad/s² or m/s²] under efforts, and a wrench on the tip.
 
         Args:
@@ -429,9 +427,7 @@ class Robot:
         count = len(poses)
         q, residual = np.empty((count, self.n)), np.empty((count, 2))
         status = np.zeros(count, np.int64)
-        kinematics.ik_batch(
-            self.ik_pointer, poses, seeds, is_path, limits, self._row, q, residual, status
-        )
+        kinematics.ik_batch(self.ik_pointer, poses, seeds, is_path, limits, self._row, q, residual, status)
         raise_pending()
         if count and status.min() < 0:
             bad = int(status.argmin())
@@ -462,9 +458,7 @@ _ASKABLE = "a finite right-handed rigid transform with last row 0, 0, 0, 1, and 
 _STATUS = tuple(IkStatus)
 
 
-def geometry_of(
-    defaults: Mapping[str, float], given: Mapping[str, float | str]
-) -> dict[str, float]:
+def geometry_of(defaults: Mapping[str, float], given: Mapping[str, float | str]) -> dict[str, float]:
     """Published geometry with the given symbols in its place.
 
     Raises:

@@ -202,13 +202,9 @@ def _moved(begin: Array, offsets: Array, is_turn: bool) -> Array:
     return poses.reshape(-1, 4, 4)
 
 
-def _solve(
-    robot: Arm, poses: Array, seeds: Array, limits: Array
-) -> tuple[Array, NDArray[np.int64]]:
+def _solve(robot: Arm, poses: Array, seeds: Array, limits: Array) -> tuple[Array, NDArray[np.int64]]:
     q, residual = np.empty_like(seeds), np.empty((len(seeds), 2))
     status = np.zeros(len(seeds), np.int64)
-    kinematics.ik_batch(
-        robot.ik_pointer, poses, seeds, False, limits, robot.geometry_row, q, residual, status
-    )
+    kinematics.ik_batch(robot.ik_pointer, poses, seeds, False, limits, robot.geometry_row, q, residual, status)
     raise_pending()
     return q, status

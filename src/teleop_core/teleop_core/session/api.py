@@ -21,15 +21,7 @@ from teleop_core.bags.series import Series
 from teleop_core.base.errors import ParameterError, TeleopError, TeleopWarning
 from teleop_core.chain.operators import OPERATORS, Motion, Operator, following
 from teleop_core.graph.graph import DEVICE, HAND
-from teleop_core.graph.layers import (
-    SESSION,
-    Layer,
-    config_folder,
-    load_file,
-    parse_setting,
-    scenario_file,
-    setting,
-)
+from teleop_core.graph.layers import SESSION, Layer, config_folder, load_file, parse_setting, scenario_file, setting
 from teleop_core.graph.stage import STAGES, Stage
 from teleop_core.graph.topics import Topic
 from teleop_core.kernels.geometry import Array
@@ -275,9 +267,7 @@ class _Memory:
     def __init__(self, session: VirtualTime) -> None:
         self._session, self._reports = session, runner.StateReports(session)
         self._is_new = runner.NewSamples()
-        self._parts: dict[Topic, list[Sequence[NDArray[Any]]]] = {
-            topic: [] for topic in session.graph.streams
-        }
+        self._parts: dict[Topic, list[Sequence[NDArray[Any]]]] = {topic: [] for topic in session.graph.streams}
         self._messages: dict[Topic, list[Message]] = {
             topic: [] for topic in session.graph.topics if topic not in self._parts
         }

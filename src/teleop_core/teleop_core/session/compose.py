@@ -85,10 +85,7 @@ class Tick:
         self._is_whole = len(text.parts) == 1
         self._size = size if self._is_whole else 1
         self._clock = kernels.records(_CLOCK)[0]
-        self._samples, self._rows = (
-            kernels.records(dtype, self._size),
-            kernels.records(dtype, self._size),
-        )
+        self._samples, self._rows = (kernels.records(dtype, self._size), kernels.records(dtype, self._size))
         given = tuple(text.objects.values())
         known = {"copy": copy, "add": add}
         sources = [_source(text.objects, part) for part in text.parts if isinstance(part, list)]
@@ -96,12 +93,12 @@ class Tick:
         made = iter(sources)
         self._calls: list[Callable[[], object]] = [
             kernels.bound(
-                kernels.kernel_from_source(next(made), "tick", known),
-                given, self._clock, dt, self._samples, self._rows,
+                kernels.kernel_from_source(next(made), "tick", known), given, self._clock, dt, self._samples, self._rows
             )
-            if isinstance(part, list) else part
+            if isinstance(part, list)
+            else part
             for part in text.parts
-        ]  # fmt: skip
+        ]
 
     def run(self, first_ns: int, tick_ns: int, samples: Any, block: Any) -> None:
         """Make one tick for each row of ``block``, which is filled.
@@ -161,13 +158,7 @@ def _source(given: Iterable[str], lines: Sequence[str]) -> str:
 
 
 def compose(
-    graph: Graph,
-    runners: Mapping[str, Runner],
-    dtype: Any,
-    dt: float,
-    size: int,
-    played: frozenset[str],
-    rings: Rings,
+    graph: Graph, runners: Mapping[str, Runner], dtype: Any, dt: float, size: int, played: frozenset[str], rings: Rings
 ) -> Tick:
     """Tick of a graph.
 
@@ -190,9 +181,7 @@ def compose(
         text.objects |= {f"r{number}": runner.signals, f"a{number}": runner.arguments}
         is_compiled = kernels.is_kernel(runner.kernel)
         if is_compiled:
-            text.objects[f"k{number}"] = kernels.apart(
-                runner.kernel, *runner.arguments, runner.signals, dt
-            )
+            text.objects[f"k{number}"] = kernels.apart(runner.kernel, *runner.arguments, runner.signals, dt)
         for link in graph.links_of(member):
             _say_link(text, link, places, runners, played, dt, rings)
         text.say(f"r{number}.now_ns = now_ns")
@@ -204,16 +193,18 @@ def compose(
 
 def _say_played(text: _Text, member: Member) -> None:
     for topic in member.writes:
-        text.say(
-            f"copy(sample.{topic.field}, row.{topic.field})",
-            f"row.{topic.field}_ns = sample.{topic.field}_ns",
-        )
+        text.say(f"copy(sample.{topic.field}, row.{topic.field})", f"row.{topic.field}_ns = sample.{topic.field}_ns")
 
 
 def _say_link(
-    text: _Text, link: Link, places: Mapping[str, int], runners: Mapping[str, Runner],
-    played: frozenset[str], dt: float, rings: Rings,
-) -> None:  # fmt: skip
+    text: _Text,
+    link: Link,
+    places: Mapping[str, int],
+    runners: Mapping[str, Runner],
+    played: frozenset[str],
+    dt: float,
+    rings: Rings,
+) -> None:
     """Lead a value to the port of its reader, through a ring of past ones if it is delayed."""
     reader, port = f"r{places[link.reader.name]}", link.port.field
     writer, plain = places[link.writer.name], _plain_field(link)
@@ -245,9 +236,7 @@ def _say_link(
 
 def _plain_field(link: Link) -> str:
     """Field of the topic in its writer's record, which knows no namespaces."""
-    own = {
-        t.name: plain for t, plain in zip(link.writer.writes, link.writer.stage.writes, strict=True)
-    }
+    own = {t.name: plain for t, plain in zip(link.writer.writes, link.writer.stage.writes, strict=True)}
     return own[link.topic.name].field
 
 
@@ -281,10 +270,7 @@ def _say_step(text: _Text, number: int, member: Member, count: int, *, is_compil
         text.say(*lines)
     prefix = f"{member.arm}_" if member.arm else ""
     for topic, plain in zip(member.writes, stage.writes, strict=True):
-        text.say(
-            f"copy({row}.{plain.field}, row.{topic.field})",
-            f"row.{topic.field}_ns = {row}.{plain.field}_ns",
-        )
+        text.say(f"copy({row}.{plain.field}, row.{topic.field})", f"row.{topic.field}_ns = {row}.{plain.field}_ns")
     for note in stage.notes:
         value = f"{row}.{note[0]}"
         is_row = len(note) > 2

@@ -66,9 +66,7 @@ class Configuration:
             values = _values_for(member, merged, graph)
             groups[member.name] = build(member.stage.parameters, values, f"{member.name}.")
         recorder = STAGES.find(RECORDER_NAME)
-        groups[RECORDER_NAME] = build(
-            recorder.parameters, merged.get(RECORDER_NAME, {}), f"{RECORDER_NAME}."
-        )
+        groups[RECORDER_NAME] = build(recorder.parameters, merged.get(RECORDER_NAME, {}), f"{RECORDER_NAME}.")
         for arm in graph.namespaces:
             _check_robots(graph, groups, arm)
             _check_sides(graph, groups, arm)
@@ -93,9 +91,7 @@ class Configuration:
         """All values as a ROS 2 parameter file, which :func:`parse_layer` reads back."""
         plain = {
             name: {
-                "ros__parameters": {
-                    k: (list(v) if isinstance(v, tuple) else v) for k, v in values_of(group).items()
-                }
+                "ros__parameters": {k: (list(v) if isinstance(v, tuple) else v) for k, v in values_of(group).items()}
             }
             for name, group in self.groups.items()
         }
@@ -218,9 +214,7 @@ def _check_order(stages: Iterable[str]) -> None:
         raise PartError("stage", IMPEDANCE.name, text)
 
 
-def configure(
-    scenario: str | None = None, files: Iterable[Path] = (), settings: Iterable[str] = ()
-) -> Configuration:
+def configure(scenario: str | None = None, files: Iterable[Path] = (), settings: Iterable[str] = ()) -> Configuration:
     """Configuration as the command line gives it: scenario, then files, then settings.
 
     Raises:

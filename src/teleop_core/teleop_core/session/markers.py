@@ -51,9 +51,7 @@ class ArmMarkers:
         for tail in self._tails.values():
             tail.clear()
 
-    def fixture(
-        self, state: Mapping[str, float], told: Mapping[str, str], force: float = 0.0
-    ) -> Marker:
+    def fixture(self, state: Mapping[str, float], told: Mapping[str, str], force: float = 0.0) -> Marker:
         """Virtual fixture around the slave, red while it is touched; taken away when it is off.
 
         A box and a sphere are bodies, other shapes are lines along their edges. What is not known
@@ -89,8 +87,7 @@ class ArmMarkers:
         ends = np.stack((stylus[:3], stylus[:3] + FORCE_SCALE * force))
         is_shown = float(length(force)) > _TOUCH
         scale = (0.004, 0.009, 0.01)
-        return Marker("force", self._master, Shape.ARROW, scale=scale, color=_FORCE,
-                      points=ends, is_shown=is_shown)  # fmt: skip
+        return Marker("force", self._master, Shape.ARROW, scale=scale, color=_FORCE, points=ends, is_shown=is_shown)
 
     def path(self, name: str, point: Array) -> Marker:
         """Path of the tip, ``measured`` or ``commanded``, longer by a point (3,) [m]."""

@@ -100,6 +100,4 @@ def _are_sound(bag: Bag, name: str) -> bool:
         stamps = bag.read(name).stamp_ns
     except RecordingError:  # more or fewer buttons
         return False
-    return not (len(stamps) > 1 and (stamps == stamps[0]).all()) and bool(
-        (np.diff(stamps) >= 0).all()
-    )
+    return not (len(stamps) > 1 and (stamps == stamps[0]).all()) and bool((np.diff(stamps) >= 0).all())

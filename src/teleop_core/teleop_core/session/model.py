@@ -12,13 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from teleop_core.bags.reader import Bag
-from teleop_core.bags.transforms import (
-    ROBOT_DESCRIPTION,
-    TF,
-    WORLD,
-    TransformMessages,
-    text_message,
-)
+from teleop_core.bags.transforms import ROBOT_DESCRIPTION, TF, WORLD, TransformMessages, text_message
 from teleop_core.bags.writer import BagWriter
 from teleop_core.chain.mapping.parameters import axis_map
 from teleop_core.graph.graph import RECORDER_NAME
@@ -107,9 +101,7 @@ class Model:
         TeleopError: A robot cannot be loaded.
     """
 
-    def __init__(
-        self, configuration: Configuration, rate: float | None = None, namespace: str = ""
-    ) -> None:
+    def __init__(self, configuration: Configuration, rate: float | None = None, namespace: str = "") -> None:
         if rate is None:
             rate = configuration.groups[RECORDER_NAME].tf_rate
         self.arms: tuple[ArmModel, ...] = _arms(configuration, namespace) if rate else ()

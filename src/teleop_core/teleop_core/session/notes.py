@@ -27,14 +27,9 @@ def notes_of(configuration: Configuration, transport: float = 0.0) -> list[str]:
     found = list(configuration.graph.notes)
     for arm in configuration.graph.namespaces:
         master, mapping = (configuration.group(name, arm) for name in BUILT_IN[1:3])
-        if isinstance(master, HapticMasterParameters) and isinstance(
-            mapping, MotionScalingParameters
-        ):
+        if isinstance(master, HapticMasterParameters) and isinstance(mapping, MotionScalingParameters):
             delay = transport + _delay(configuration, arm)
-            told = (
-                rendered_note(master.device, mapping.fixture),
-                passive_note(master.device, mapping.fixture, delay),
-            )
+            told = (rendered_note(master.device, mapping.fixture), passive_note(master.device, mapping.fixture, delay))
             found += [f"arm {arm!r}: {note}" if arm else note for note in told if note]
         slave = configuration.group(SLAVE.name, arm)
         if isinstance(slave, SlaveParameters) and is_urdf(slave.robot):
@@ -53,9 +48,7 @@ def _delay(configuration: Configuration, arm: str) -> float:
     return sum(
         link.delay
         for link in configuration.graph.links
-        if link.port.name in around
-        and link.reader.arm == arm
-        and link.reader.stage.name == ends[link.port.name]
+        if link.port.name in around and link.reader.arm == arm and link.reader.stage.name == ends[link.port.name]
     )
 
 
@@ -73,15 +66,10 @@ def passive_note(device: DeviceParameters, fixture: FixtureParameters, delay: fl
     most = passive_stiffness(damping, DT, delay, device.friction, device.position_resolution)
     if stiffness <= most * (1.0 + 1e-9) or not fixture.pushes:
         return ""
-    until = (
-        f"with {1e3 * (DT + delay):.3g} ms from sample to force it is passive up to {most:.0f} N/m"
-    )
+    until = f"with {1e3 * (DT + delay):.3g} ms from sample to force it is passive up to {most:.0f} N/m"
     if not wall.is_damped:
         until = "it is not damped"
-    return (
-        f"the {fixture.wall} wall of {stiffness:.0f} N/m may give back more energy than it took: "
-        f"{until}"
-    )
+    return f"the {fixture.wall} wall of {stiffness:.0f} N/m may give back more energy than it took: {until}"
 
 
 def rendered_note(device: DeviceParameters, fixture: FixtureParameters) -> str:

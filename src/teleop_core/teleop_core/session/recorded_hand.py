@@ -35,10 +35,11 @@ class FileParameters:
     """A table of what the hand wants."""
 
     path: str = parameter(
-        "", fixed=True,
+        "",
+        fixed=True,
         doc="CSV or Parquet file, best with a head of t, x, y, z and, if wanted, rx, ry, rz, "
         "clutch, fixture, mode [s, m, rad]",
-    )  # fmt: skip
+    )
 
 
 class Samples(NamedTuple):

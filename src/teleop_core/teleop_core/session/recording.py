@@ -190,9 +190,7 @@ class Recording:
             UnknownNameError: There is no such topic.
         """
         names = topics or tuple(
-            name
-            for name in self.topics
-            if kind_of(name, self._bag.topics[name].type) not in {None, Kind.REPORT}
+            name for name in self.topics if kind_of(name, self._bag.topics[name].type) not in {None, Kind.REPORT}
         )
         frames = []
         for name in names:
@@ -203,10 +201,7 @@ class Recording:
         return pandas.concat(frames, axis=1)
 
     def score(
-        self,
-        arm: str = "",
-        further: "Sequence[type[Metric]]" = (),
-        span: tuple[float, float] | None = None,
+        self, arm: str = "", further: "Sequence[type[Metric]]" = (), span: tuple[float, float] | None = None
     ) -> "Score":
         """Score of one arm.
 
@@ -222,9 +217,7 @@ class Recording:
 
         return evaluate(self._bag, arm, further, span)
 
-    def scores(
-        self, further: "Sequence[type[Metric]]" = (), span: tuple[float, float] | None = None
-    ) -> "list[Score]":
+    def scores(self, further: "Sequence[type[Metric]]" = (), span: tuple[float, float] | None = None) -> "list[Score]":
         """Scores of all arms, the default one first; as :meth:`score`."""
         from teleop_core.evaluation import scores
 
@@ -250,9 +243,8 @@ class Recording:
         topics = [*bag.streams, *(t for t in reports if t.name in bag.topics)]
         model = _model_of(bag)
         with BagWriter(
-            path, (*topics, *model.topics), names, parameters=RecordingParameters(),
-            metadata=bag.metadata,
-        ) as writer:  # fmt: skip
+            path, (*topics, *model.topics), names, parameters=RecordingParameters(), metadata=bag.metadata
+        ) as writer:
             for begin, end in _seconds(bag.start_ns, [s.log_ns for s in bag.streams.values()]):
                 writer.write_block({t: _between(s, begin, end) for t, s in bag.streams.items()})
             for topic in topics[len(bag.streams) :]:
@@ -315,9 +307,7 @@ def _seconds(start_ns: int, logs: list[NDArray[np.int64]]) -> list[tuple[int, in
     return [(begin, begin + SECOND_NS) for begin in begins]
 
 
-def _between(
-    series: Series, begin_ns: int, end_ns: int
-) -> tuple[NDArray[np.int64], Array, NDArray[np.int64]]:
+def _between(series: Series, begin_ns: int, end_ns: int) -> tuple[NDArray[np.int64], Array, NDArray[np.int64]]:
     """Stamps, values and log times of a second of a stream."""
     first, last = np.searchsorted(series.log_ns, (begin_ns, end_ns))
     part = slice(int(first), int(last))

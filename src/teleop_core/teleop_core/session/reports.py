@@ -9,9 +9,7 @@ from teleop_core.kernels.geometry import Array
 from teleop_core.slave.operation import operation_level, operation_text
 
 
-def report_of(
-    topic: Topic, stamp_ns: int, row: Array, described: Mapping[str, str] | None = None
-) -> bytes:
+def report_of(topic: Topic, stamp_ns: int, row: Array, described: Mapping[str, str] | None = None) -> bytes:
     """Message of a report's topic, as CDR bytes.
 
     Args:

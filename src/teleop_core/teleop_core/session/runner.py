@@ -65,10 +65,7 @@ def run_blocks(session: VirtualTime, ticks: int) -> Iterator[Any]:
         yield session.run(count, rows[:count])
 
 
-def replay(
-    bag: Bag, configuration: Configuration, out: Path, progress: Progress = silent,
-    begin: str = DEVICE,
-) -> int:  # fmt: skip
+def replay(bag: Bag, configuration: Configuration, out: Path, progress: Progress = silent, begin: str = DEVICE) -> int:
     """Run recorded masters, or hands, through the graph again, in virtual time, and record it.
 
     Ticks are 1 ms apart, from the first to the last recorded sample; each sample is answered once,

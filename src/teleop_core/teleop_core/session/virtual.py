@@ -43,9 +43,7 @@ class VirtualTime:
 
     plays_file = False
 
-    def __init__(
-        self, configuration: Configuration, tick_ns: int = TICK_NS, *, played: str = ""
-    ) -> None:
+    def __init__(self, configuration: Configuration, tick_ns: int = TICK_NS, *, played: str = "") -> None:
         self.configuration, self.graph = configuration, configuration.graph
         self._tick_ns, self._last_played = tick_ns, played
         groups, dt = configuration.groups, tick_ns / 1e9
@@ -72,9 +70,7 @@ class VirtualTime:
         """The tick of the stages as they are now."""
         self._arguments = [stage.arguments for stage in self.stages.values()]
         dt = self._tick_ns / 1e9
-        return compose(
-            self.graph, self.stages, self._dtype, dt, self._ahead, self._played, self._rings
-        )
+        return compose(self.graph, self.stages, self._dtype, dt, self._ahead, self._played, self._rings)
 
     def _is_stale(self) -> bool:
         """Whether a stage was given other arguments, as by another kind of fixture."""

@@ -75,15 +75,11 @@ def moved(value: Any, files: Mapping[str, str]) -> Any:
         return type(value)(moved(element, files) for element in value)
     if not isinstance(value, str):
         return value
-    return files.get(value) or _FILE.sub(
-        lambda said: said[0].replace(said[1], files.get(said[1], said[1])), value
-    )
+    return files.get(value) or _FILE.sub(lambda said: said[0].replace(said[1], files.get(said[1], said[1])), value)
 
 
 _STEP = 1e-6  # along the way out, over which the distance must grow by as much [m]
-_TRIED = np.array(
-    [(0.31, 0.02, 0.05), (0.01, 0.43, -0.03), (-0.02, 0.04, 0.37), (-0.29, 0.23, -0.41)]
-)
+_TRIED = np.array([(0.31, 0.02, 0.05), (0.01, 0.43, -0.03), (-0.02, 0.04, 0.37), (-0.29, 0.23, -0.41)])
 """Offsets at which a shape is tried [m]."""
 
 

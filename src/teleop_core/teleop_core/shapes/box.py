@@ -15,10 +15,14 @@ class BoxParameters:
     """A cuboid."""
 
     size: tuple[float, ...] = parameter(
-        (0.03, 0.03, 0.03), unit="m", lower=1e-4, upper=2.0, length=3,
+        (0.03, 0.03, 0.03),
+        unit="m",
+        lower=1e-4,
+        upper=2.0,
+        length=3,
         doc="wall to wall along x, y, z",
         source="published: Vongbunyong 2008, section 6.3: 30 mm on the slave at gain 1",
-    )  # fmt: skip
+    )
 
 
 @kernel

@@ -20,18 +20,25 @@ class ConeParameters:
     """A cone, open without end on the side away from its tip."""
 
     apex: tuple[float, ...] = parameter(
-        (0.0, -0.03, 0.0), unit="m", lower=-0.5, upper=0.5, length=3,
+        (0.0, -0.03, 0.0),
+        unit="m",
+        lower=-0.5,
+        upper=0.5,
+        length=3,
         doc="from the middle to the tip",
         source="assumed: as far as the published box is wide",
-    )  # fmt: skip
+    )
     axis: tuple[float, ...] = parameter(
-        (0.0, 1.0, 0.0), lower=-1.0, upper=1.0, length=3,
-        doc="from the tip into the cone, of any length",
-    )  # fmt: skip
+        (0.0, 1.0, 0.0), lower=-1.0, upper=1.0, length=3, doc="from the tip into the cone, of any length"
+    )
     half_angle: float = parameter(
-        0.4, unit="rad", lower=0.01, upper=1.5, doc="from the axis to the wall",
+        0.4,
+        unit="rad",
+        lower=0.01,
+        upper=1.5,
+        doc="from the axis to the wall",
         source="assumed: so that the funnel is nearly as wide as the published box at the middle",
-    )  # fmt: skip
+    )
 
     def __post_init__(self) -> None:
         directions.require_direction("cone.axis", self.axis)

@@ -18,13 +18,21 @@ class CylinderParameters:
     """A tube or a post."""
 
     radius: float = parameter(
-        0.015, unit="m", lower=5e-5, upper=1.0, doc="from the axis to the wall",
+        0.015,
+        unit="m",
+        lower=5e-5,
+        upper=1.0,
+        doc="from the axis to the wall",
         source="assumed: as wide as the published box",
-    )  # fmt: skip
+    )
     length: float = parameter(
-        0.03, unit="m", lower=0.0, upper=2.0, doc="from end to end; 0: without ends",
+        0.03,
+        unit="m",
+        lower=0.0,
+        upper=2.0,
+        doc="from end to end; 0: without ends",
         source="assumed: as long as the published box",
-    )  # fmt: skip
+    )
     direction: tuple[float, ...] = parameter(
         (0.0, 1.0, 0.0), lower=-1.0, upper=1.0, length=3, doc="of its axis, of any length"
     )
@@ -66,6 +74,4 @@ def cylinder_outline(parameters: CylinderParameters) -> Array:
     return drawing.with_lifts([*ends, *sides])
 
 
-CYLINDER = Shape(
-    "cylinder", CylinderParameters, cylinder_distance, cylinder_outline, endless_if_zero
-)
+CYLINDER = Shape("cylinder", CylinderParameters, cylinder_distance, cylinder_outline, endless_if_zero)

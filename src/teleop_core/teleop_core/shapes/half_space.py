@@ -16,13 +16,16 @@ class HalfSpaceParameters:
     """What is in front of a plane."""
 
     normal: tuple[float, ...] = parameter(
-        (0.0, 1.0, 0.0), lower=-1.0, upper=1.0, length=3,
-        doc="from the plane into the half-space, of any length",
-    )  # fmt: skip
+        (0.0, 1.0, 0.0), lower=-1.0, upper=1.0, length=3, doc="from the plane into the half-space, of any length"
+    )
     room: float = parameter(
-        0.01, unit="m", lower=0.0, upper=0.5, doc="from the middle down to the plane",
+        0.01,
+        unit="m",
+        lower=0.0,
+        upper=0.5,
+        doc="from the middle down to the plane",
         source="assumed: less than half of the published box",
-    )  # fmt: skip
+    )
 
     def __post_init__(self) -> None:
         directions.require_direction("half_space.normal", self.normal)
@@ -40,6 +43,4 @@ def half_space_outline(parameters: HalfSpaceParameters) -> Array:
     return drawn
 
 
-HALF_SPACE = Shape(
-    "half_space", HalfSpaceParameters, plane_distance, half_space_outline, half_space_numbers
-)
+HALF_SPACE = Shape("half_space", HalfSpaceParameters, plane_distance, half_space_outline, half_space_numbers)

@@ -13,16 +13,16 @@ from teleop_core.shapes.mesh import mesh_distance
 class HeightFieldParameters:
     """A table of heights above the middle."""
 
-    file: str = parameter(
-        "", fixed=True, doc="CSV or .npy: heights [m], a row for each x, a column for each y"
-    )
-    spacing: float = parameter(
-        2e-3, unit="m", lower=1e-5, upper=0.1, fixed=True, doc="between heights"
-    )
+    file: str = parameter("", fixed=True, doc="CSV or .npy: heights [m], a row for each x, a column for each y")
+    spacing: float = parameter(2e-3, unit="m", lower=1e-5, upper=0.1, fixed=True, doc="between heights")
     step: float = parameter(
-        1e-3, unit="m", lower=5e-5, upper=5e-3, fixed=True,
+        1e-3,
+        unit="m",
+        lower=5e-5,
+        upper=5e-3,
+        fixed=True,
         doc="between nodes of the grid of distances: what is smaller than that is rounded off",
-    )  # fmt: skip
+    )
 
 
 def _grid(p: HeightFieldParameters) -> DistanceGrid:
@@ -39,6 +39,4 @@ def height_field_outline(parameters: HeightFieldParameters) -> Array:
     return _grid(parameters).outline
 
 
-HEIGHT_FIELD = Shape(
-    "height_field", HeightFieldParameters, mesh_distance, height_field_outline, height_field_numbers
-)
+HEIGHT_FIELD = Shape("height_field", HeightFieldParameters, mesh_distance, height_field_outline, height_field_numbers)

@@ -19,13 +19,11 @@ class HoleParameters:
     thickness: float = parameter(0.03, unit="m", lower=1e-3, upper=1.0, doc="of the plate")
     plate_radius: float = parameter(0.025, unit="m", lower=1e-3, upper=2.0, doc="of the plate")
     chamfer: float = parameter(
-        0.002, unit="m", lower=0.0, upper=0.5,
-        doc="width and depth of the chamfer of 45° around the mouth",
-    )  # fmt: skip
+        0.002, unit="m", lower=0.0, upper=0.5, doc="width and depth of the chamfer of 45° around the mouth"
+    )
     axis: tuple[float, ...] = parameter(
-        (0.0, 0.0, 1.0), lower=-1.0, upper=1.0, length=3,
-        doc="of the hole, out of its mouth, of any length",
-    )  # fmt: skip
+        (0.0, 0.0, 1.0), lower=-1.0, upper=1.0, length=3, doc="of the hole, out of its mouth, of any length"
+    )
 
     def __post_init__(self) -> None:
         directions.require_direction("hole.axis", self.axis)
@@ -120,8 +118,13 @@ def hole_distance(offset: Array, numbers: Array, out: Array) -> float:
 def hole_outline(parameters: HoleParameters) -> Array:
     """Both ends of the chamfer, of the hole and of the plate, (N, 3) [m] around the middle."""
     p, axis = parameters, drawing.unit_vector(parameters.axis)
-    rings = ((p.radius + p.chamfer, 0.0), (p.radius, p.chamfer), (p.radius, p.thickness),
-             (p.plate_radius, 0.0), (p.plate_radius, p.thickness))  # fmt: skip
+    rings = (
+        (p.radius + p.chamfer, 0.0),
+        (p.radius, p.chamfer),
+        (p.radius, p.thickness),
+        (p.plate_radius, 0.0),
+        (p.plate_radius, p.thickness),
+    )
     return drawing.with_lifts([drawing.ring(-deep * axis, axis, wide) for wide, deep in rings])
 
 

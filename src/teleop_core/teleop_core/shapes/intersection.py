@@ -20,8 +20,7 @@ class IntersectionParameters:
     """Shapes that share it."""
 
     parts: tuple[str, ...] = combined.parts_parameter(
-        ("box size=[0.03, 0.03, 0.03]", "not sphere radius=0.01 at=[0.0, 0.02, 0.0]"),
-        "shapes whose common part it is",
+        ("box size=[0.03, 0.03, 0.03]", "not sphere radius=0.01 at=[0.0, 0.02, 0.0]"), "shapes whose common part it is"
     )
 
     def __post_init__(self) -> None:
@@ -80,9 +79,5 @@ def intersection_distance(offset: Array, numbers: Array, out: Array) -> float:
 
 
 INTERSECTION = Shape(
-    "intersection",
-    IntersectionParameters,
-    intersection_distance,
-    combined.outline_of_parts,
-    combined.numbers_of_parts,
+    "intersection", IntersectionParameters, intersection_distance, combined.outline_of_parts, combined.numbers_of_parts
 )

@@ -18,13 +18,16 @@ class LineParameters:
     """A line."""
 
     radius: float = parameter(
-        0.001, unit="m", lower=0.0, upper=0.1, doc="distance from the line that is inside",
+        0.001,
+        unit="m",
+        lower=0.0,
+        upper=0.1,
+        doc="distance from the line that is inside",
         source="assumed: what a hand at ease strays without a push",
-    )  # fmt: skip
+    )
     length: float = parameter(
-        0.0, unit="m", lower=0.0, upper=2.0,
-        doc="from end to end, the middle halfway; 0: without ends",
-    )  # fmt: skip
+        0.0, unit="m", lower=0.0, upper=2.0, doc="from end to end, the middle halfway; 0: without ends"
+    )
     direction: tuple[float, ...] = parameter(
         (1.0, 0.0, 0.0), lower=-1.0, upper=1.0, length=3, doc="of the line, of any length"
     )

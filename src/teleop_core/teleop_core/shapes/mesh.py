@@ -12,13 +12,7 @@ from teleop_core.kernels import inner, kernel
 from teleop_core.kernels.geometry import Array
 from teleop_core.shapes import Shape
 from teleop_core.shapes.basis.directions import length_of, make_unit
-from teleop_core.shapes.basis.distance_grid import (
-    EDGE,
-    HEADER,
-    DistanceGrid,
-    GridRequest,
-    distance_grid,
-)
+from teleop_core.shapes.basis.distance_grid import EDGE, HEADER, DistanceGrid, GridRequest, distance_grid
 from teleop_core.shapes.basis.spline import slopes, weights
 
 
@@ -27,17 +21,24 @@ class MeshParameters:
     """A mesh from a file."""
 
     file: str = parameter("", fixed=True, doc="STL, OBJ, PLY, OFF, or what else trimesh reads")
-    scale: float = parameter(
-        1e-3, unit="m", lower=1e-6, upper=1e3, fixed=True, doc="length of the file's unit"
-    )
+    scale: float = parameter(1e-3, unit="m", lower=1e-6, upper=1e3, fixed=True, doc="length of the file's unit")
     angles: tuple[float, ...] = parameter(
-        (0.0, 0.0, 0.0), unit="rad", lower=-2.0 * math.pi, upper=2.0 * math.pi, length=3,
-        fixed=True, doc="turns of the mesh about its middle: about x, then y, then z of the base",
-    )  # fmt: skip
+        (0.0, 0.0, 0.0),
+        unit="rad",
+        lower=-2.0 * math.pi,
+        upper=2.0 * math.pi,
+        length=3,
+        fixed=True,
+        doc="turns of the mesh about its middle: about x, then y, then z of the base",
+    )
     step: float = parameter(
-        1e-3, unit="m", lower=5e-5, upper=0.05, fixed=True,
+        1e-3,
+        unit="m",
+        lower=5e-5,
+        upper=0.05,
+        fixed=True,
         doc="between nodes of the grid of distances: what is smaller than that is rounded off",
-    )  # fmt: skip
+    )
 
 
 @inner
@@ -55,9 +56,7 @@ def _cell(offset: float, shape: Array, axis: int) -> tuple[int, float, float]:
 
 
 @inner
-def _gradient(
-    shape: Array, at: tuple[int, int, int], share: tuple[float, float, float], gradient: Array
-) -> float:
+def _gradient(shape: Array, at: tuple[int, int, int], share: tuple[float, float, float], gradient: Array) -> float:
     """Write the gradient (3,) of the spline behind a node; returns its value [m]."""
     wx, wy, wz = weights(share[0]), weights(share[1]), weights(share[2])
     sx, sy, sz = slopes(share[0]), slopes(share[1]), slopes(share[2])
@@ -77,9 +76,7 @@ def _gradient(
         along_x += sx[i] * plane
         along_y += wx[i] * across
         along_z += wx[i] * upwards
-    gradient[0], gradient[1], gradient[2] = (
-        along_x / shape[3], along_y / shape[3], along_z / shape[3]
-    )  # fmt: skip
+    gradient[0], gradient[1], gradient[2] = (along_x / shape[3], along_y / shape[3], along_z / shape[3])
     return value
 
 

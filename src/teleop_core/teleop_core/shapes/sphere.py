@@ -16,9 +16,13 @@ class SphereParameters:
     """A ball."""
 
     radius: float = parameter(
-        0.015, unit="m", lower=5e-5, upper=1.0, doc="from the middle to the surface",
+        0.015,
+        unit="m",
+        lower=5e-5,
+        upper=1.0,
+        doc="from the middle to the surface",
         source="assumed: as wide as the published box",
-    )  # fmt: skip
+    )
 
 
 @kernel

@@ -27,6 +27,4 @@ def union_distance(offset: Array, numbers: Array, out: Array) -> float:
     return combined.extreme_part(offset, numbers, -1.0, out)
 
 
-UNION = Shape(
-    "union", UnionParameters, union_distance, combined.outline_of_parts, combined.numbers_of_parts
-)
+UNION = Shape("union", UnionParameters, union_distance, combined.outline_of_parts, combined.numbers_of_parts)

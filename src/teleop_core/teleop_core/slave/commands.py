@@ -126,9 +126,11 @@ def advance_move(s: SlaveState) -> None:
     share = s.moved_ticks / s.move_ticks
     share = share * share * (3.0 - 2.0 * share)
     for i in range(s.setpoint.shape[0]):
-        place = s.move_to[i] if s.moved_ticks == s.move_ticks else (
-            s.move_from[i] + share * (s.move_to[i] - s.move_from[i])
-        )  # fmt: skip
+        place = (
+            s.move_to[i]
+            if s.moved_ticks == s.move_ticks
+            else (s.move_from[i] + share * (s.move_to[i] - s.move_from[i]))
+        )
         s.step[i] = place - s.setpoint[i]
         s.command[i] = s.target[i] = s.filtered[i] = s.setpoint[i] = place
 
@@ -249,9 +251,8 @@ def advance_setpoint(p: SlaveNumbers, s: SlaveState, before: Array, dt: float) -
         lagged = s.filtered[i]
         if p.is_filtered:
             s.filtered[i] = lag_step(
-                s.command[i], before[i], s.filtered[i], p.filter_gain, p.filter_zero,
-                p.filter_pole, dt,
-            )  # fmt: skip
+                s.command[i], before[i], s.filtered[i], p.filter_gain, p.filter_zero, p.filter_pole, dt
+            )
         else:
             s.filtered[i] = s.command[i]
         reach = p.speed_limit[i] * dt

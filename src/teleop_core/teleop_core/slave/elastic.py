@@ -36,13 +36,7 @@ class ElasticState(FrictionState):
 
 @inner
 def _accelerate_links(
-    acceleration: Any,
-    dynamics: Array,
-    p: ElasticNumbers,
-    q: Array,
-    dq: Array,
-    effort: Array,
-    ddq: Array,
+    acceleration: Any, dynamics: Array, p: ElasticNumbers, q: Array, dq: Array, effort: Array, ddq: Array
 ) -> None:
     """Write link accelerations (n,): the rigid model without the motors of elastic joints."""
     n = q.shape[0]
@@ -136,10 +130,7 @@ def integrate_elastic(
                 for i in range(n):
                     at[side, i] = place[side, i] + share * going[last, side, i]
                     going[stage, side, i] = speed[side, i] + share * push[last, side, i]
-            _derivative(
-                acceleration, dynamics, p, s, contacts, effort, start, at, going[stage], net,
-                push[stage],
-            )  # fmt: skip
+            _derivative(acceleration, dynamics, p, s, contacts, effort, start, at, going[stage], net, push[stage])
         _sum_up(place, going, h)
         _sum_up(speed, push, h)
         for i in range(n):

@@ -140,9 +140,7 @@ def forget(s: ObserverState, wrench: Array) -> None:
 
 
 @inner
-def estimate(
-    p: ObserverNumbers, s: ObserverState, arm: Arm, lag: float, dt: float, wrench: Array
-) -> None:
+def estimate(p: ObserverNumbers, s: ObserverState, arm: Arm, lag: float, dt: float, wrench: Array) -> None:
     """Write the force on the tip along the slave's base, without torque, as the joints tell it.
 
     It knows what an encoder, an amplifier and the control law's model know, and the plant's mean

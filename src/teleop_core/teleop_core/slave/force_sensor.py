@@ -44,44 +44,67 @@ class ForceSensorParameters:
     """The force sensor behind the tip, an ideal one by default, and the estimate without one."""
 
     force_noise: float = parameter(
-        0.0, unit="N", lower=0.0, upper=100.0,
+        0.0,
+        unit="N",
+        lower=0.0,
+        upper=100.0,
         doc="standard deviation of each sample, of every axis",
         source="assumed: none, an ideal sensor",
-    )  # fmt: skip
+    )
     torque_noise: float = parameter(
-        0.0, unit="N·m", lower=0.0, upper=10.0,
+        0.0,
+        unit="N·m",
+        lower=0.0,
+        upper=10.0,
         doc="standard deviation of each sample, of every axis",
         source="assumed: none, an ideal sensor",
-    )  # fmt: skip
+    )
     force_bias: tuple[float, ...] = parameter(
-        (0.0, 0.0, 0.0), unit="N", lower=-100.0, upper=100.0, length=3,
+        (0.0, 0.0, 0.0),
+        unit="N",
+        lower=-100.0,
+        upper=100.0,
+        length=3,
         doc="what it tells of no force, along the slave's base",
         source="assumed: none, an ideal sensor",
-    )  # fmt: skip
+    )
     torque_bias: tuple[float, ...] = parameter(
-        (0.0, 0.0, 0.0), unit="N·m", lower=-10.0, upper=10.0, length=3,
+        (0.0, 0.0, 0.0),
+        unit="N·m",
+        lower=-10.0,
+        upper=10.0,
+        length=3,
         doc="what it tells of no torque, along the slave's base",
         source="assumed: none, an ideal sensor",
-    )  # fmt: skip
+    )
     force_bandwidth: float = parameter(
-        0.0, unit="Hz", lower=0.0, upper=500.0,
+        0.0,
+        unit="Hz",
+        lower=0.0,
+        upper=500.0,
         doc="of its low-pass of first order, before the noise; 0: it passes everything at once",
         source="assumed: none, an ideal sensor",
-    )  # fmt: skip
+    )
     tool_mass: float = parameter(
-        0.0, unit="kg", lower=0.0, upper=10.0,
+        0.0,
+        unit="kg",
+        lower=0.0,
+        upper=10.0,
         doc="of what hangs behind the sensor, at the tip: its weight is measured, its inertia not",
         source="assumed: none, an ideal sensor",
-    )  # fmt: skip
+    )
 
     estimate: bool = parameter(
-        False,
-        doc="whether slave/estimated_cf tells what drive efforts and joint motion say of the force",
+        False, doc="whether slave/estimated_cf tells what drive efforts and joint motion say of the force"
     )
     estimate_bandwidth: float = parameter(
-        10.0, unit="Hz", lower=0.1, upper=200.0, doc="of the estimate",
+        10.0,
+        unit="Hz",
+        lower=0.1,
+        upper=200.0,
+        doc="of the estimate",
         source="assumed: faster than a hand moves, slower than what steps of encoders blur",
-    )  # fmt: skip
+    )
 
     def write(self, p: SensorNumbers, dt: float) -> None:
         """Write the record of a simulated arm that makes ticks of ``dt`` [s]."""

@@ -78,10 +78,7 @@ def integrate(
                 position[i] = q[i] + share * slope
             for i in range(n):
                 speed[i] = dq[i] + share * k[stage - 1, i]
-            _derivative(
-                acceleration, dynamics, p, s, contacts, effort, start, position, speed, net,
-                k[stage],
-            )  # fmt: skip
+            _derivative(acceleration, dynamics, p, s, contacts, effort, start, position, speed, net, k[stage])
         for i in range(n):
             # Sum of the four stage speeds, written with the accelerations they came from.
             q[i] += h * dq[i] + h * h / 6.0 * (k[0, i] + k[1, i] + k[2, i])

@@ -63,10 +63,7 @@ class SimulatedArm(RunningStage):
         for stage in (self.server, self.simulated):
             stage.signals = self.signals
         server, simulated = self.server.arguments, self.simulated.arguments
-        steps = (
-            apart(slave_step, *server, self.signals, dt),
-            apart(simulation_step, *simulated, self.signals, dt),
-        )
+        steps = (apart(slave_step, *server, self.signals, dt), apart(simulation_step, *simulated, self.signals, dt))
         self.kernel, self.arguments = arm_step, (steps, server, simulated)
         self._begin = self.signals.copy()
         self.reset()

@@ -59,10 +59,7 @@ def _control(p: SimulationNumbers, s: SimulationState, arm: Arm, dt: float) -> N
     if arm.feedforward.shape[0] > n:
         copy(s.speed, arm.joints)
         write_model(arm.acceleration, arm.model, arm.measured, arm.joints, arm.feedforward[n:])
-    arm.control(
-        arm.gains, arm.memory, arm.setpoint, arm.measured, arm.feedforward, arm.limit, dt,
-        arm.effort,
-    )  # fmt: skip
+    arm.control(arm.gains, arm.memory, arm.setpoint, arm.measured, arm.feedforward, arm.limit, dt, arm.effort)
 
 
 @inner
@@ -116,21 +113,13 @@ def _move_on(p: SimulationNumbers, s: SimulationState, arm: Arm, braked: bool, d
             s.link[i] += arm.dq[i] * dt
             s.link_speed[i] = arm.dq[i]
     elif p.has_gears:
-        integrate_elastic(
-            arm.acceleration, arm.dynamics, p, s, arm.contacts, p.steps, arm.effort, arm.q, arm.dq,
-            dt,
-        )  # fmt: skip
+        integrate_elastic(arm.acceleration, arm.dynamics, p, s, arm.contacts, p.steps, arm.effort, arm.q, arm.dq, dt)
     else:
-        integrate(
-            arm.acceleration, arm.dynamics, p, s, arm.contacts, p.steps, arm.effort, arm.q, arm.dq,
-            dt,
-        )  # fmt: skip
+        integrate(arm.acceleration, arm.dynamics, p, s, arm.contacts, p.steps, arm.effort, arm.q, arm.dq, dt)
 
 
 @kernel
-def simulation_step(
-    p: SimulationNumbers, s: SimulationState, arm: Arm, row: Row, dt: float
-) -> None:
+def simulation_step(p: SimulationNumbers, s: SimulationState, arm: Arm, row: Row, dt: float) -> None:
     """One control tick of a simulated arm: write what its encoders say, and where its tip is.
 
     What is measured is sampled at the start of the tick, together with the setpoint it is held

@@ -25,14 +25,7 @@ from teleop_core.robots.robot import Robot
 from teleop_core.slave.arm import ArmModel
 from teleop_core.slave.commands import SlaveNumbers, SlaveState
 from teleop_core.slave.motion_commands import MotionCommands
-from teleop_core.slave.operation import (
-    Answer,
-    Event,
-    Fault,
-    OperationParameters,
-    State,
-    command_event,
-)
+from teleop_core.slave.operation import Answer, Event, Fault, OperationParameters, State, command_event
 from teleop_core.slave.operation.states import answer_text, change
 from teleop_core.slave.operation.watch import fail
 from teleop_core.slave.simulation import SPEED_LAG
@@ -40,9 +33,12 @@ from teleop_core.slave.step import slave_step
 from teleop_core.slave.trajectory import shortest_move_time
 
 _TIMES = {
-    "heartbeat": "heartbeat_ns", "longest_outage": "outage_ns", "longest_silence": "silence_ns",
-    "effort_time": "effort_ns", "pressing_time": "pressing_ns",
-}  # fmt: skip
+    "heartbeat": "heartbeat_ns",
+    "longest_outage": "outage_ns",
+    "longest_silence": "silence_ns",
+    "effort_time": "effort_ns",
+    "pressing_time": "pressing_ns",
+}
 _STOP, _PRESSED = int(Event.STOP), int(Fault.STOP)
 _FILTER_SOURCE = "published: Vongbunyong 2008, eq. 6.2.8"
 _NEAR = 1e-3  # rad or m, beside an encoder step: who is farther from home is elsewhere
@@ -54,15 +50,9 @@ class ReferenceFilterParameters:
     """First-order lag on every joint reference; at rest its output is its input."""
 
     is_on: bool = parameter(True, doc="whether references pass the filter")
-    gain: float = parameter(
-        0.1, lower=0.0, upper=1.0, doc="gain for fast motion", source=_FILTER_SOURCE
-    )
-    zero: float = parameter(
-        100.0, unit="rad/s", lower=0.0, upper=1000.0, doc="zero", source=_FILTER_SOURCE
-    )
-    pole: float = parameter(
-        10.0, unit="rad/s", lower=0.01, upper=1000.0, doc="pole", source=_FILTER_SOURCE
-    )
+    gain: float = parameter(0.1, lower=0.0, upper=1.0, doc="gain for fast motion", source=_FILTER_SOURCE)
+    zero: float = parameter(100.0, unit="rad/s", lower=0.0, upper=1000.0, doc="zero", source=_FILTER_SOURCE)
+    pole: float = parameter(10.0, unit="rad/s", lower=0.01, upper=1000.0, doc="pole", source=_FILTER_SOURCE)
 
     def __post_init__(self) -> None:
         if not math.isclose(self.gain * self.zero, self.pole, rel_tol=1e-9):
@@ -75,17 +65,20 @@ class SlaveParameters(RobotParameters):
     """Parameters of :class:`Slave`."""
 
     command_timeout: float = parameter(
-        0.1, unit="s", lower=0.002, upper=5.0,
+        0.1,
+        unit="s",
+        lower=0.002,
+        upper=5.0,
         doc="the last reference is held when no command came for longer than this",
-    )  # fmt: skip
+    )
     start: tuple[float, ...] = parameter(
-        (), unit="rad or m", fixed=True,
-        doc="joints to which the slave moves from home before it follows; empty: the robot's start",
-    )  # fmt: skip
-    starts_at_home: bool = parameter(
-        False,
+        (),
+        unit="rad or m",
         fixed=True,
-        doc="whether it starts where it is, at home, if no start is given; a URDF states no home",
+        doc="joints to which the slave moves from home before it follows; empty: the robot's start",
+    )
+    starts_at_home: bool = parameter(
+        False, fixed=True, doc="whether it starts where it is, at home, if no start is given; a URDF states no home"
     )
     start_speed: float = parameter(
         0.5, lower=0.01, upper=1.0, fixed=True, doc="share of the speed limits used on that move"
@@ -319,12 +312,7 @@ SLAVE = Stage(
     "slave",
     SlaveParameters,
     reads=(topics.SLAVE_SERVO_JP, topics.SLAVE_MEASURED_JS),
-    writes=(
-        topics.SLAVE_SETPOINT_JS,
-        topics.SLAVE_SETPOINT_CP,
-        topics.SLAVE_MEASURED_CP,
-        topics.SLAVE_OPERATION,
-    ),
+    writes=(topics.SLAVE_SETPOINT_JS, topics.SLAVE_SETPOINT_CP, topics.SLAVE_MEASURED_CP, topics.SLAVE_OPERATION),
     late=(topics.SLAVE_MEASURED_JS,),
     notes=(("command_status", "i8"),),
     make=Slave,

@@ -59,9 +59,7 @@ class SlaveSimParameters(RobotParameters):
         choices=("published", "all", "none"),
         doc="axes whose gravity is fed forward: those of the source (axis 2), all, none",
     )
-    integration_steps: int = parameter(
-        2, lower=1, upper=50, doc="Runge-Kutta steps in each control tick"
-    )
+    integration_steps: int = parameter(2, lower=1, upper=50, doc="Runge-Kutta steps in each control tick")
     viscous: tuple[float, ...] = parameter(
         (), unit="N·m·s/rad or N·s/m", lower=0.0, doc="friction of each joint; empty: the plant's"
     )
@@ -107,29 +105,34 @@ class SlaveSim(RunningStage):
         touched = WORLD_OBJECTS.find(parameters.world.kind.kind)
         self.arm = Arm(
             tip_fk=self.robot.fk_pointer if is_as_drawn else pointer(dh_kernels.fk, FK),
-            jacobian=pointer(
-                self.robot.kernels.jacobian if is_as_drawn else dh_kernels.jacobian, FK
-            ),
+            jacobian=pointer(self.robot.kernels.jacobian if is_as_drawn else dh_kernels.jacobian, FK),
             distance=touched.pointer,
             acceleration=pointer(model.acceleration, ACCELERATION),
             gravity=pointer(model.gravity, GRAVITY),
             control=self._law.control_pointer,
-            tip_geometry=(
-                self.robot.geometry_row if is_as_drawn else physics.tip_geometry
-            ).copy(),
+            tip_geometry=(self.robot.geometry_row if is_as_drawn else physics.tip_geometry).copy(),
             coupling=np.array(physics.coupling, dtype=np.float64, order="C"),
             dynamics=self._dynamics(physics).copy(),
             model=model.parameters.copy(),
             gains=gains,
             memory=np.zeros((n, max(self._law.memory, 1))),
-            q=np.zeros(n), dq=np.zeros(n), effort=np.zeros(n), setpoint=np.zeros(n),
-            measured=np.zeros(n), feedforward=np.zeros(self._law.feedforward(n)), limit=np.zeros(n),
-            joints=np.zeros(n), tip=np.zeros(n), T=np.zeros((4, 4)),
+            q=np.zeros(n),
+            dq=np.zeros(n),
+            effort=np.zeros(n),
+            setpoint=np.zeros(n),
+            measured=np.zeros(n),
+            feedforward=np.zeros(self._law.feedforward(n)),
+            limit=np.zeros(n),
+            joints=np.zeros(n),
+            tip=np.zeros(n),
+            T=np.zeros((4, 4)),
             shape=parameters.world.shape.copy(),
             contacts=record_array(ContactState, parameters.world.tool_points, n),
-            offset=np.zeros(3), normal=np.zeros(3),
-            J=np.zeros((6, n)), noises=self._noise.rows,
-        )  # fmt: skip
+            offset=np.zeros(3),
+            normal=np.zeros(3),
+            J=np.zeros((6, n)),
+            noises=self._noise.rows,
+        )
         self.kernel, self.arguments = simulation_step, (self.parameters, self.state, self.arm)
         self._take(parameters)
         self.reset()
@@ -152,16 +155,12 @@ class SlaveSim(RunningStage):
         s["measured"], s["speed"] = np.round(home / step) * step, 0.0
         arm.q[:], arm.dq[:], arm.effort[:], arm.memory[:] = home, 0.0, 0.0, 0.0
         s["grip"], s["carried"] = 1.0, home
-        s["noise"] = (
-            np.random.SeedSequence(self._seed).generate_state(self.robot.n) % 2147483646 + 1
-        )
+        s["noise"] = np.random.SeedSequence(self._seed).generate_state(self.robot.n) % 2147483646 + 1
         relieved = self._gravity(arm.model) * self.parameters["compensated"]
         held = self._gravity(arm.dynamics) - relieved - self.parameters["bias"]
         self._law.begin(arm.memory, np.array(s["measured"]), held)
         stiffness = self.parameters["gear_stiffness"]
-        bent = np.divide(
-            self._gravity(arm.dynamics), stiffness, out=np.zeros_like(home), where=stiffness > 0.0
-        )
+        bent = np.divide(self._gravity(arm.dynamics), stiffness, out=np.zeros_like(home), where=stiffness > 0.0)
         s["link"] = home - bent
         row = self.signals
         row["slave_setpoint_js"], row["slave_measured_js"] = home, 0.0
@@ -241,10 +240,7 @@ class SlaveSim(RunningStage):
         relieved = self._gravity(self.arm.model)
         self._law.shift(self.arm.memory, relieved * (p["compensated"] - compensated))
         p["compensated"] = compensated
-        p["steps"], p["braking"] = (
-            parameters.integration_steps,
-            drives.effort_limit / drives.inertia,
-        )
+        p["steps"], p["braking"] = (parameters.integration_steps, drives.effort_limit / drives.inertia)
 
     def _take_world(self, world: WorldParameters) -> None:
         """Write where the object is, and what it is made of."""

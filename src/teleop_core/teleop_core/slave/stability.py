@@ -114,9 +114,7 @@ def loop_key(p: SimulationNumbers, arm: Arm) -> tuple[bytes, ...]:
     return tuple(field.tobytes() for field in fields)
 
 
-def check_stable(
-    law: Controller, robot: Robot, loop: Loop, *, are_large_tried: bool = True
-) -> None:
+def check_stable(law: Controller, robot: Robot, loop: Loop, *, are_large_tried: bool = True) -> None:
     """Refuse a loop in which small errors grow, or that does not come back from large ones.
 
     Small errors: two copies of the arm are held at the present setpoint, one of them with a small
@@ -222,9 +220,7 @@ def _left(robot: Robot, loop: Loop, joint: int) -> float:
             found = max(found, abs(float(arm.setpoint[joint] - arm.q[joint])))
         return found if np.isfinite(arm.q[joint]) else np.nan
 
-    path = dash(
-        robot.lower[joint], robot.upper[joint], setpoint[joint], loop.p.speed_limit[joint], loop.dt
-    )
+    path = dash(robot.lower[joint], robot.upper[joint], setpoint[joint], loop.p.speed_limit[joint], loop.dt)
     most = largest(path)
     for rest in range(_LAST, _LONGEST + 1, _LAST):
         left = largest(np.full(_LAST, path[-1])) / most

@@ -105,9 +105,7 @@ def _take_measured(p: SlaveNumbers, s: SlaveState, arm: ArmModel, row: SlaveRow)
 
 
 @inner
-def _go_on(
-    p: SlaveNumbers, s: SlaveState, arm: ArmModel, row: SlaveRow, before: Array, dt: float
-) -> None:
+def _go_on(p: SlaveNumbers, s: SlaveState, arm: ArmModel, row: SlaveRow, before: Array, dt: float) -> None:
     """Move the setpoint: to a goal, at a speed, after the command, or to rest."""
     if s.state != _FAULT:
         s.must_join = 0

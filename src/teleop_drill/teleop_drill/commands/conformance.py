@@ -33,18 +33,16 @@ def add(commands: Any) -> None:
     choice.add_argument("--read-only", action="store_true", help="command nothing")
     choice.add_argument("--yes", action="store_true", help="move it without asking")
     parser.add_argument("--json", action="store_true", help="print JSON in place of the table")
+    parser.add_argument("--domain", type=int, metavar="N", help="ROS domain (default: ROS_DOMAIN_ID)")
     parser.add_argument(
-        "--domain", type=int, metavar="N", help="ROS domain (default: ROS_DOMAIN_ID)"
-    )
-    parser.add_argument(
-        "--robot", metavar="NAME",
+        "--robot",
+        metavar="NAME",
         help="what it is, one of `teleop robot` or a Denavit-Hartenberg table: its forward "
         "kinematics are held against measured_cp",
-    )  # fmt: skip
+    )
     parser.add_argument(
-        "--wait", type=float, default=5.0, metavar="S",
-        help="longest time to wait for the arm [s] (default: 5)",
-    )  # fmt: skip
+        "--wait", type=float, default=5.0, metavar="S", help="longest time to wait for the arm [s] (default: 5)"
+    )
 
 
 def _run(arguments: argparse.Namespace) -> int:

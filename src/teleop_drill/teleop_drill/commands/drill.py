@@ -39,33 +39,37 @@ def add(commands: Any) -> None:
     parser.add_argument("--composed", action="store_true", help="all nodes in one process")
     parser.add_argument("--short", action="store_true", help="the most telling five faults")
     parser.add_argument(
-        "--simulated", action="store_true",
+        "--simulated",
+        action="store_true",
         help="processes, clocks, disk and middleware are simulated, drawn from --seed",
-    )  # fmt: skip
-    parser.add_argument(
-        "--seed", type=int, default=0, metavar="N", help="of the simulated machine (default 0)"
     )
+    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of the simulated machine (default 0)")
     parser.add_argument(
-        "--seeds", type=int, default=0, metavar="N",
+        "--seeds",
+        type=int,
+        default=0,
+        metavar="N",
         help="run so many random schedules of faults, simulated, from --seed on",
-    )  # fmt: skip
-    parser.add_argument(
-        "--faults", metavar="I,K", help="of one schedule, these faults alone; -: none"
     )
+    parser.add_argument("--faults", metavar="I,K", help="of one schedule, these faults alone; -: none")
     parser.add_argument("--list", action="store_true", dest="is_list", help="list the faults")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write all numbers as JSON")
     parser.add_argument("--markdown", type=Path, metavar="FILE", help="write the table as Markdown")
     parser.add_argument(
-        "--drives", metavar="COMMAND", type=shlex.split, default=(),
+        "--drives",
+        metavar="COMMAND",
+        type=shlex.split,
+        default=(),
         help="command that starts drives in place of the simulated ones",
-    )  # fmt: skip
-    parser.add_argument(
-        "--arm", metavar="COMMAND", type=shlex.split, default=(),
-        help="command that starts what these lead; nothing is done to it",
-    )  # fmt: skip
-    parser.add_argument(
-        "--out", type=Path, metavar="DIR", help="keep the recordings here; must not exist"
     )
+    parser.add_argument(
+        "--arm",
+        metavar="COMMAND",
+        type=shlex.split,
+        default=(),
+        help="command that starts what these lead; nothing is done to it",
+    )
+    parser.add_argument("--out", type=Path, metavar="DIR", help="keep the recordings here; must not exist")
     setting_arguments(parser)
 
 
@@ -117,16 +121,24 @@ def _outcomes(exercises: "tuple[Exercise, ...]", arguments: argparse.Namespace) 
             from teleop_core.nodes.crews import Processes
 
             return ros_module("drill", "teleop_drill.simulation").simulated_drill(  # type: ignore[no-any-return]
-                exercises, folder, say, seed=arguments.seed,
+                exercises,
+                folder,
+                say,
+                seed=arguments.seed,
                 processes=Processes.ONE if arguments.composed else Processes.NODES,
-                files=arguments.config, texts=arguments.settings,
-            )  # fmt: skip
+                files=arguments.config,
+                texts=arguments.settings,
+            )
         return ros_module("drill", "teleop_drill.nodes").drill(  # type: ignore[no-any-return]
-            exercises, folder,
+            exercises,
+            folder,
             say,
-            is_composed=arguments.composed, files=arguments.config, texts=arguments.settings,
-            drives=arguments.drives, arm=arguments.arm,
-        )  # fmt: skip
+            is_composed=arguments.composed,
+            files=arguments.config,
+            texts=arguments.settings,
+            drives=arguments.drives,
+            arm=arguments.arm,
+        )
 
 
 def _write(outcomes: "list[Outcome]", arguments: argparse.Namespace) -> None:

@@ -3,6 +3,4 @@
 from teleop_drill.conformance.findings_table import findings_json, findings_table
 from teleop_drill.conformance.rows import ROWS, Finding, Group, Row, Verdict
 
-__all__ = [
-    "ROWS", "Finding", "Group", "Row", "Verdict", "findings_json", "findings_table",
-]  # fmt: skip
+__all__ = ["ROWS", "Finding", "Group", "Row", "Verdict", "findings_json", "findings_table"]

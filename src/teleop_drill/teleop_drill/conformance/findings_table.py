@@ -10,9 +10,12 @@ from teleop_core.base.texts import one_line
 from teleop_drill.conformance.rows import Finding, Verdict
 
 _STYLES = {
-    Verdict.OK: "green", Verdict.ABSENT: "dim", Verdict.SKIPPED: "yellow",
-    Verdict.NOTED: "yellow", Verdict.FAILED: "bold red",
-}  # fmt: skip
+    Verdict.OK: "green",
+    Verdict.ABSENT: "dim",
+    Verdict.SKIPPED: "yellow",
+    Verdict.NOTED: "yellow",
+    Verdict.FAILED: "bold red",
+}
 
 
 def findings_table(namespace: str, findings: Iterable[Finding]) -> Table:

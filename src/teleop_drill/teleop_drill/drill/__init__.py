@@ -27,9 +27,7 @@ def _checked(name: str, part: object) -> Exercise:
     return part
 
 
-FURTHER: Registry[Exercise] = Registry(
-    "exercise", "exercises", {}, _checked, package="teleop_drill"
-)
+FURTHER: Registry[Exercise] = Registry("exercise", "exercises", {}, _checked, package="teleop_drill")
 """Those of installed packages and of the program."""
 
 

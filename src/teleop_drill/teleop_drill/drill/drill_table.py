@@ -10,10 +10,15 @@ from teleop_drill.drill.exercise import Cure, Motion
 from teleop_drill.drill.outcome import Outcome
 
 _COLUMNS = (
-    ("fault", "left"), ("detected after, ms", "right"), ("state", "left"),
-    ("travel of the tip, mm", "right"), ("step / limit", "right"), ("recording", "left"),
-    ("recovered after, s", "left"), ("", "center"),
-)  # fmt: skip
+    ("fault", "left"),
+    ("detected after, ms", "right"),
+    ("state", "left"),
+    ("travel of the tip, mm", "right"),
+    ("step / limit", "right"),
+    ("recording", "left"),
+    ("recovered after, s", "left"),
+    ("", "center"),
+)
 
 
 def rows(outcomes: Sequence[Outcome]) -> list[list[str]]:

@@ -62,9 +62,7 @@ class Rig(Protocol):
         """Bytes of the present recording that have reached the disk."""
         ...
 
-    def freeze(
-        self, node: str, seconds: float, meanwhile: Callable[[], None] = lambda: None
-    ) -> None:
+    def freeze(self, node: str, seconds: float, meanwhile: Callable[[], None] = lambda: None) -> None:
         """Stop a node's process for a time [s], do something, then let it go on."""
 
     def limit_files(self, node: str, room: int | None) -> None:

@@ -17,14 +17,7 @@ from weakref import WeakKeyDictionary, WeakSet
 from teleop_core.base.errors import PartError
 from teleop_core.base.parameters import NoParameters
 from teleop_core.graph.stage import STAGES, RunningStage, Stage, register_stage
-from teleop_core.graph.topics import (
-    OPERATION,
-    SLAVE_OPERATION,
-    SLAVE_SERVO_CP,
-    Kind,
-    Topic,
-    passed_on,
-)
+from teleop_core.graph.topics import OPERATION, SLAVE_OPERATION, SLAVE_SERVO_CP, Kind, Topic, passed_on
 from teleop_core.kernels.geometry import Array
 from teleop_core.slave.slave_sim import SlaveSim
 
@@ -176,9 +169,14 @@ def register() -> None:
     if STAGE_NAME in STAGES:
         return
     stage = Stage(
-        STAGE_NAME, NoParameters, reads=(SLAVE_SERVO_CP,), writes=(DRILLED_CP,),
-        trigger=SLAVE_SERVO_CP, replaces=SLAVE_SERVO_CP, make=_make,
-    )  # fmt: skip
+        STAGE_NAME,
+        NoParameters,
+        reads=(SLAVE_SERVO_CP,),
+        writes=(DRILLED_CP,),
+        trigger=SLAVE_SERVO_CP,
+        replaces=SLAVE_SERVO_CP,
+        make=_make,
+    )
     register_stage(stage)
 
 

@@ -225,8 +225,9 @@ def _held(exercise: Exercise, seen: Seen, numbers: Numbers) -> Measured:
     since_ns = seen.begin_ns + round(1e9 * (settling + late(seen, numbers)))
     left = math.exp(-_SETTLED) * OVERSHOOT * numbers.tip_speed
     held = measure.tip_speed(seen.true_cp.within(since_ns, seen.end_ns))
-    return Measured("held_speed_m_s", "the tip held still moves at {0:.1f} mm/s, at most {1:.1f}",
-                    held, left + measure.RESOLUTION)  # fmt: skip
+    return Measured(
+        "held_speed_m_s", "the tip held still moves at {0:.1f} mm/s, at most {1:.1f}", held, left + measure.RESOLUTION
+    )
 
 
 def _speed(exercise: Exercise, seen: Seen, numbers: Numbers) -> Measured:
@@ -246,9 +247,7 @@ def _goes_on(exercise: Exercise, seen: Seen, numbers: Numbers) -> Iterator[Measu
     yield _speed(exercise, seen, numbers)
     elapsed, stands = 1e-9 * (end_ns - begin_ns), exercise.stands(numbers)
     speed = numbers.tip_speed
-    lag = measure.lag(
-        measure.tips(numbers.robot.fk, seen.setpoint_js, numbers.robot.n), seen.true_cp, begin_ns
-    )
+    lag = measure.lag(measure.tips(numbers.robot.fk, seen.setpoint_js, numbers.robot.n), seen.true_cp, begin_ns)
     # On its circle the hand gets no farther than the diameter; what it goes while the arm stands,
     # the circle of the arm is shifted by. Behind a filter of first order the setpoint trails the
     # command by its speed times the time constant: while it comes up from rest, by so much less.

@@ -46,9 +46,7 @@ class Trace:
 
     def only(self, chosen: NDArray[np.bool_]) -> "Trace":
         """Some of them; ``chosen`` has the shape (N,)."""
-        return Trace(
-            self.sent_ns[chosen], self.number[chosen], self.values[chosen], self.stamp_ns[chosen]
-        )
+        return Trace(self.sent_ns[chosen], self.number[chosen], self.values[chosen], self.stamp_ns[chosen])
 
     def __len__(self) -> int:
         return len(self.sent_ns)
@@ -118,9 +116,7 @@ def follows(setpoints: Array, measured: Array, speed_limit: Array) -> bool:
         return False
     if np.mean(np.any(np.diff(setpoints, axis=0) != 0.0, axis=1)) <= _MOVING:
         return False
-    asked, went = (
-        float(np.linalg.norm(np.ptp(rows, axis=0) / speed_limit)) for rows in (setpoints, measured)
-    )
+    asked, went = (float(np.linalg.norm(np.ptp(rows, axis=0) / speed_limit)) for rows in (setpoints, measured))
     return went > _FOLLOWED * asked
 
 

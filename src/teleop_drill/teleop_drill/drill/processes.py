@@ -4,18 +4,7 @@ from collections.abc import Callable
 from functools import partial
 
 from teleop_core.slave.operation import Fault, State
-from teleop_drill.drill.exercise import (
-    Cure,
-    Exercise,
-    Master,
-    Motion,
-    Rig,
-    after,
-    at_once,
-    outage,
-    silence,
-    unheard,
-)
+from teleop_drill.drill.exercise import Cure, Exercise, Master, Motion, Rig, after, at_once, outage, silence, unheard
 from teleop_drill.drill.inside import HANGS, RAISES, WORKS
 from teleop_drill.drill.numbers import Numbers
 from teleop_drill.drill.recordings import LONGEST_LOSS
@@ -95,10 +84,16 @@ def _killed(node: str) -> Exercise:
 
 def _frozen(node: str) -> Exercise:
     return Exercise(
-        name=f"freeze_{node}", text=f"{node} stopped for {FREEZE:g} s",
-        inject=partial(_freeze, node), states=(State.PAUSED,), faults=(Fault.SILENCE,),
-        cures=(Cure.RESUME,), master=Master.DEVICE, told=outage, ways=(False,),
-    )  # fmt: skip
+        name=f"freeze_{node}",
+        text=f"{node} stopped for {FREEZE:g} s",
+        inject=partial(_freeze, node),
+        states=(State.PAUSED,),
+        faults=(Fault.SILENCE,),
+        cures=(Cure.RESUME,),
+        master=Master.DEVICE,
+        told=outage,
+        ways=(False,),
+    )
 
 
 def _let_go(numbers: Numbers) -> float:
@@ -112,9 +107,15 @@ def _broken(name: str, text: str, inject: Callable[[Rig], None]) -> tuple[Exerci
         faults=(Fault.SILENCE,), cures=(Cure.RESTART,), told=outage, watch=2.6, ways=(False,),
     )  # fmt: skip
     together = Exercise(
-        name=name, text=f"{text}: ends the session", inject=inject, undo=_mend, states=(None,),
-        cures=(Cure.RESTART,), watch=4.0, ways=(True,),
-    )  # fmt: skip
+        name=name,
+        text=f"{text}: ends the session",
+        inject=inject,
+        undo=_mend,
+        states=(None,),
+        cures=(Cure.RESTART,),
+        watch=4.0,
+        ways=(True,),
+    )
     return alone, together
 
 

@@ -39,15 +39,26 @@ def _straighten(rig: Rig) -> None:
 
 
 def _disturbed(
-    name: str, text: str, distortion: Distortion, *, motion: Motion = Motion.GOES_ON,
-    stands: Time = never, warns: bool = False,
-) -> Exercise:  # fmt: skip
+    name: str,
+    text: str,
+    distortion: Distortion,
+    *,
+    motion: Motion = Motion.GOES_ON,
+    stands: Time = never,
+    warns: bool = False,
+) -> Exercise:
     """A hand whose samples do not arrive as they are: it is followed, or held as if clutched."""
     is_going = motion is Motion.GOES_ON
     return Exercise(
-        name=name, text=text, inject=partial(_distort, distortion), undo=_straighten,
-        motion=motion, stands=stands, warns=warns, watch=_WATCH if is_going else 0.0,
-    )  # fmt: skip
+        name=name,
+        text=text,
+        inject=partial(_distort, distortion),
+        undo=_straighten,
+        motion=motion,
+        stands=stands,
+        warns=warns,
+        watch=_WATCH if is_going else 0.0,
+    )
 
 
 def _shake(rig: Rig) -> None:
@@ -127,8 +138,7 @@ def _garble(topic: Topic, rig: Rig) -> None:
 
 
 def _garble_all(rig: Rig) -> None:
-    for topic in (MASTER_MEASURED_CP, MASTER_BUTTONS, SLAVE_SERVO_JP, SLAVE_SETPOINT_JS,
-                  TELEOP_STATE):  # fmt: skip
+    for topic in (MASTER_MEASURED_CP, MASTER_BUTTONS, SLAVE_SERVO_JP, SLAVE_SETPOINT_JS, TELEOP_STATE):
         _garble(topic, rig)
 
 

@@ -117,9 +117,7 @@ def _hold_fast(fault: Fault, rig: Rig) -> None:
 
 def _run_away(rig: Rig) -> None:
     """A drive that obeys nobody: one joint races, and its speed alone may stop the arm."""
-    rig.set(
-        "slave", "operation.reported", [one.word for one in _STUCK if one is not Fault.OVERSPEED]
-    )
+    rig.set("slave", "operation.reported", [one.word for one in _STUCK if one is not Fault.OVERSPEED])
     rig.mark()
     rig.control(RACES)
 

@@ -23,9 +23,7 @@ NEVER_TRIED = {
 }
 
 
-def examine(
-    arm: Arm, *, may_move: bool, report: Report = lambda _: None, robot: Robot | None = None
-) -> list[Finding]:
+def examine(arm: Arm, *, may_move: bool, report: Report = lambda _: None, robot: Robot | None = None) -> list[Finding]:
     """Findings of all rows.
 
     Args:
@@ -92,10 +90,7 @@ def _try(arm: Arm, findings: dict[str, Finding], report: Report, robot: Robot | 
         if name in NEVER_TRIED:
             verdict, note = Verdict.SKIPPED, NEVER_TRIED[name]
         elif arm.others(name):
-            verdict, note = (
-                Verdict.SKIPPED,
-                f"{arm.others(name)} others command it: stop them first",
-            )
+            verdict, note = (Verdict.SKIPPED, f"{arm.others(name)} others command it: stop them first")
         else:
             report(f"trying {name}")
             verdict, note = _watched(trials, name, findings, robot)
@@ -103,9 +98,7 @@ def _try(arm: Arm, findings: dict[str, Finding], report: Report, robot: Robot | 
         findings[name] = Finding(row, verdict, findings[name].found, note)
 
 
-def _watched(
-    trials: Trials, name: str, findings: dict[str, Finding], robot: Robot | None
-) -> Outcome:
+def _watched(trials: Trials, name: str, findings: dict[str, Finding], robot: Robot | None) -> Outcome:
     """Try a command; what the arm measures meanwhile must be what it was told.
 
     A command that moved the setpoint alone moved nothing. Which of the two lies is not known from

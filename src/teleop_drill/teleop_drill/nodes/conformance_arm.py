@@ -124,8 +124,9 @@ class Arm(Guest):
 
     def others(self, name: str) -> int:
         """How many others command the arm on a topic: those who do not sit in its own nodes."""
-        own = {end.node_name for query in ("setpoint_js", "measured_js", "measured_cp")
-               for end in self.publishers(query)}  # fmt: skip
+        own = {
+            end.node_name for query in ("setpoint_js", "measured_js", "measured_cp") for end in self.publishers(query)
+        }
         own |= {end.node_name for end in self.readers("servo_cp")}
         return sum(end.node_name not in own for end in self.publishers(name))
 

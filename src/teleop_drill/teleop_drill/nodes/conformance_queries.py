@@ -50,9 +50,7 @@ def _listen(arm: Arm, row: Row, ends: list[Any]) -> Finding:
     if faults:
         return Finding(row, Verdict.FAILED, found, faults[0])
     if len(ends) > 1:
-        return Finding(
-            row, Verdict.NOTED, found, f"{len(ends)} publishers: who speaks for the arm?"
-        )
+        return Finding(row, Verdict.NOTED, found, f"{len(ends)} publishers: who speaks for the arm?")
     if all(end.qos_profile.reliability is ReliabilityPolicy.BEST_EFFORT for end in ends):
         note = "offered best effort: stock clients, which are reliable, get nothing"
         return Finding(row, Verdict.FAILED, found, note)

@@ -37,10 +37,7 @@ class Trials:
     def __init__(self, arm: Arm) -> None:
         self.arm = arm
         self._start = np.empty(0)
-        self._joint, self._axis = (
-            (-1, 0.0),
-            (-1, 0.0),
-        )  # of which the direction is free, and its sign
+        self._joint, self._axis = ((-1, 0.0), (-1, 0.0))  # of which the direction is free, and its sign
 
     def unfit(self) -> str:
         """Why nothing can be tried; empty if it can."""
@@ -158,9 +155,7 @@ class Trials:
     def _off(self, where: Callable[[], Array], goal: Array) -> float:
         return float(np.abs(where() - goal).max())
 
-    def _watch_move(
-        self, name: str, message: Any, off: Callable[[], float], way: float
-    ) -> Outcome | None:
+    def _watch_move(self, name: str, message: Any, off: Callable[[], float], way: float) -> Outcome | None:
         tap, busy = self.arm.tap("operating_state"), [False]
         tap.read()
 
@@ -187,9 +182,7 @@ class Trials:
         for joint, sign in self._candidates(self._joint, len(self._start)):
             begin = self.joints()
 
-            def sent(
-                share: float, last: float, p: Array = begin, i: int = joint, s: float = sign
-            ) -> Any:
+            def sent(share: float, last: float, p: Array = begin, i: int = joint, s: float = sign) -> Any:
                 base = 0.0 * p if is_relative else p.copy()
                 base[i] += s * TURN * (share - last if is_relative else share)
                 return self.arm.message(name, position=base.tolist())
@@ -209,9 +202,7 @@ class Trials:
         for axis, sign in self._candidates(self._axis, 3):
             p, q = self.place()
 
-            def sent(
-                share: float, _: float, p: Array = p, q: Array = q, i: int = axis, s: float = sign
-            ) -> Any:
+            def sent(share: float, _: float, p: Array = p, q: Array = q, i: int = axis, s: float = sign) -> Any:
                 goal = p.copy()
                 goal[i] += s * WAY * share
                 return _filled(self.arm.message(name), goal, q)
@@ -226,9 +217,8 @@ class Trials:
         return float(sign * (self.place()[0] - begin)[axis] / WAY)
 
     def _stream(
-        self, name: str, rate: float, sent: Callable[[float, float], Any],
-        where: Callable[[], float],
-    ) -> Outcome | None:  # fmt: skip
+        self, name: str, rate: float, sent: Callable[[float, float], Any], where: Callable[[], float]
+    ) -> Outcome | None:
         """What became of a stream whose share of the way rises to 1 and falls to 0."""
         self.arm.publisher_of(name)
         count, last, farthest = round(2.0 * rate), 0.0, 0.0
@@ -269,9 +259,7 @@ class Trials:
                 return outcome
         return Verdict.FAILED, "the tip runs along no axis, neither way"
 
-    def _run(
-        self, name: str, message: Any, halt: Any, where: Callable[[], float]
-    ) -> Outcome | None:
+    def _run(self, name: str, message: Any, halt: Any, where: Callable[[], float]) -> Outcome | None:
         """What became of half a second at twice the way per second."""
         self.arm.publisher_of(name)
         for _ in range(25):

@@ -36,8 +36,7 @@ class Watch:
         joints, tip = trails.get(JOINTS, none), trails.get(TIP, none)
         twist = trails.get("measured_cv", none)
         found = {
-            JOINTS: follows(JOINTS, joints, trails.get("setpoint_js", none), _JOINT_WAY)
-            or adds_up(joints, _JOINT_WAY),
+            JOINTS: follows(JOINTS, joints, trails.get("setpoint_js", none), _JOINT_WAY) or adds_up(joints, _JOINT_WAY),
             TIP: follows(TIP, tip, trails.get("setpoint_cp", none), _TIP_WAY),
             "measured_cv": adds_up(_with_places(twist, tip), _TIP_WAY),
         }
@@ -50,8 +49,7 @@ def _trail(messages: list[tuple[int, object]]) -> Trail:
     """Trail of messages, each with the time at which it was sent [ns]."""
     rows = [(sent_ns, stamp_of(one), numbers_of(one)) for sent_ns, one in messages]
     places = [n["position"] if "position" in n else n["twist"][:3] for *_, n in rows]
-    rates = [n["velocity"] if "velocity" in n else n.get("twist", np.empty(0))[:3]
-             for *_, n in rows]  # fmt: skip
+    rates = [n["velocity"] if "velocity" in n else n.get("twist", np.empty(0))[:3] for *_, n in rows]
     return Trail(
         np.array([sent_ns for sent_ns, *_ in rows]) / SECOND_NS,
         np.array([stamp_ns for _, stamp_ns, _ in rows]) / SECOND_NS,

@@ -28,10 +28,13 @@ _PRIORITY = 30
 _BEFORE = 0.2  # motion that is seen before a fault [s]
 _FOLLOWS = 90.0  # until it follows after the start [s]
 _CIRCLE = (
-    "operator.kind=circle", f"operator.size=[{2 * hand.RADIUS}, 0.0, {2 * hand.RADIUS}]",
-    f"operator.period={hand.ROUND}", "operator.approach_time=1.0", "operator.patience=0.0",
+    "operator.kind=circle",
+    f"operator.size=[{2 * hand.RADIUS}, 0.0, {2 * hand.RADIUS}]",
+    f"operator.period={hand.ROUND}",
+    "operator.approach_time=1.0",
+    "operator.patience=0.0",
     "operator.rotation=0.0",
-)  # fmt: skip
+)
 _MEASURED = 2.0  # time in which this machine's own lateness is measured [s]
 _STOOD_STILL = 0.5  # of the command timeout: nobody can judge an arm on a machine that does
 _MORE = 2  # times that an exercise is done again for that reason
@@ -122,9 +125,7 @@ def drill_at(
 class _Drill:
     """Exercises with one master."""
 
-    def __init__(
-        self, site: Sites, master: Master, configuration: Configuration, folder: Path, say: Say
-    ) -> None:
+    def __init__(self, site: Sites, master: Master, configuration: Configuration, folder: Path, say: Say) -> None:
         self._site, self._master, self._folder, self._say = site, master, folder, say
         self._configuration = configuration
         self._numbers, self._scheduling = Numbers.of(configuration), Scheduling()
@@ -159,10 +160,12 @@ class _Drill:
         finally:
             self._close()
         for path, recorded in self._open.items():
-            judge_recording(Recorded(
-                path, recorded, self._counted[path], self._sessions_of[path].until_ns(path),
-                self._killed.get(path),
-            ), self._numbers.tick)  # fmt: skip
+            judge_recording(
+                Recorded(
+                    path, recorded, self._counted[path], self._sessions_of[path].until_ns(path), self._killed.get(path)
+                ),
+                self._numbers.tick,
+            )
         return outcomes
 
     # -- sessions --------------------------------------------------------------------------------
@@ -234,9 +237,7 @@ class _Drill:
             is_fair = late < _STOOD_STILL * self._numbers.command_timeout
             if not outcome.failures() or is_fair or math.isnan(outcome.recovered):
                 break
-            self._say(
-                f"{_line(outcome)}; but this machine stood still for {1e3 * late:.0f} ms: again"
-            )
+            self._say(f"{_line(outcome)}; but this machine stood still for {1e3 * late:.0f} ms: again")
             try:
                 self._ready()
             except SessionError:
@@ -258,9 +259,7 @@ class _Drill:
         if not worst.failures():
             worst = max(found, key=lambda one: one.measured("travel_m").value)
         for name in ("still_s", "rest_s"):
-            worst.extra[f"{name}_median"] = float(
-                np.median([m.measured(name).value for m in found])
-            )
+            worst.extra[f"{name}_median"] = float(np.median([m.measured(name).value for m in found]))
         worst.extra["repeats"] = len(found)
         return worst
 

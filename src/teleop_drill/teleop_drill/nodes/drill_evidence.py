@@ -43,9 +43,7 @@ def note_state(outcome: Outcome, rig: LiveRig, before: dict[str, float]) -> None
         outcome.state = State(int(rig.operation()["state"]))
 
 
-def seen_of(
-    outcome: Outcome, rig: LiveRig, time_ns: tuple[int, int], scheduling: Scheduling
-) -> Seen:
+def seen_of(outcome: Outcome, rig: LiveRig, time_ns: tuple[int, int], scheduling: Scheduling) -> Seen:
     """What the tap has heard of a fault, beside what the slave says of itself.
 
     Args:

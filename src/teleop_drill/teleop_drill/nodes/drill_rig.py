@@ -13,13 +13,7 @@ from std_srvs.srv import Trigger
 
 from teleop_core.bags.messages import layout
 from teleop_core.graph.layers import SESSION
-from teleop_core.graph.topics import (
-    SLAVE_MEASURED_JS,
-    SLAVE_OPERATION,
-    SLAVE_SETPOINT_JS,
-    TELEOP_STATE,
-    Topic,
-)
+from teleop_core.graph.topics import SLAVE_MEASURED_JS, SLAVE_OPERATION, SLAVE_SETPOINT_JS, TELEOP_STATE, Topic
 from teleop_core.kernels.geometry import Array
 from teleop_core.middleware.ros_parameters import to_message
 from teleop_core.middleware.world import Qos
@@ -70,24 +64,18 @@ class LiveRig:
         self._executor.add_node(self._node.ros)
         # As anybody's, which keep no state. Made long before they are pressed: a message sent while
         # a button and the slave discover each other arrives a tenth of a second later.
-        self._buttons = [
-            self._node.ros.create_publisher(Bool, STOP_TOPIC, Qos(depth=100)) for _ in range(2)
-        ]
+        self._buttons = [self._node.ros.create_publisher(Bool, STOP_TOPIC, Qos(depth=100)) for _ in range(2)]
         self._speeds = self._node.ros.create_publisher(JointState, "/slave/servo_jv", Qos())
-        self._services = {
-            name: self._node.ros.create_client(Trigger, f"/slave/{name}") for name in COMMANDS
-        }
+        self._services = {name: self._node.ros.create_client(Trigger, f"/slave/{name}") for name in COMMANDS}
         self._settings = {
-            node: self._node.ros.create_client(SetParameters, f"/{node}/set_parameters")
-            for node in _SLAVE
+            node: self._node.ros.create_client(SetParameters, f"/{node}/set_parameters") for node in _SLAVE
         }
         self._intruders: dict[str, Any] = {}
         self.begin_ns, self.warned, self.said = 0, dict[str, int](), ""
         self.woken_ns, self._warned_before = 0, dict[str, str]()
         self.tap = Tap(
-            self._own, robot.joint_names, configuration.groups[SESSION].real_time,
-            has_hand=site.master is Master.DRILL,
-        )  # fmt: skip
+            self._own, robot.joint_names, configuration.groups[SESSION].real_time, has_hand=site.master is Master.DRILL
+        )
 
     def close(self) -> None:
         """End the processes and leave."""
@@ -194,10 +182,7 @@ class LiveRig:
         """What nodes complain of, in one line."""
         age = self.tap.age(SLAVE_SETPOINT_JS)
         told = [f"{n}: {s.message}" for n, s in self.observer.statuses.items()]
-        moved, went = (
-            int(np.sum(np.any(np.diff(rows, axis=0) != 0.0, axis=1)))
-            for rows in self._recent_joints()
-        )
+        moved, went = (int(np.sum(np.any(np.diff(rows, axis=0) != 0.0, axis=1))) for rows in self._recent_joints())
         seen = f"newest setpoint {age:.2f} s old, {moved} of the last 60 moved, the arm in {went}"
         return "; ".join((f"{seen}; {self.operation()}", *told))
 
@@ -213,9 +198,7 @@ class LiveRig:
         """Bytes of the present recording that have reached the disk."""
         return sum(file.stat().st_size for file in self.session.recordings[-1].glob("*.mcap"))
 
-    def freeze(
-        self, node: str, seconds: float, meanwhile: Callable[[], None] = lambda: None
-    ) -> None:
+    def freeze(self, node: str, seconds: float, meanwhile: Callable[[], None] = lambda: None) -> None:
         """Stop a node's process for a time [s], do something, then let it go on."""
         self.mark()
         self.session.send(node, signal.SIGSTOP)

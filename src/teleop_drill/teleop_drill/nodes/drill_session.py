@@ -247,9 +247,15 @@ class LiveSite:
     world: World = ROS
 
     def __init__(
-        self, configuration: Configuration, folder: Path, master: Master, interrupt: Interrupt,
-        *, is_composed: bool, foreign: Mapping[str, Sequence[str]],
-    ) -> None:  # fmt: skip
+        self,
+        configuration: Configuration,
+        folder: Path,
+        master: Master,
+        interrupt: Interrupt,
+        *,
+        is_composed: bool,
+        foreign: Mapping[str, Sequence[str]],
+    ) -> None:
         self.is_composed, self.master = is_composed, master
         self.interrupt = interrupt
         self._configuration, self._folder, self._foreign = configuration, folder, foreign
@@ -268,6 +274,12 @@ class LiveSite:
     def session(self, observer: Observer) -> DrillSession:
         """Processes of a session, of which an observer hears."""
         return DrillSession(
-            self._configuration, self._folder, self._env, observer, is_composed=self.is_composed,
-            master=self.master, foreign=self._foreign, interrupt=self.interrupt,
-        )  # fmt: skip
+            self._configuration,
+            self._folder,
+            self._env,
+            observer,
+            is_composed=self.is_composed,
+            master=self.master,
+            foreign=self._foreign,
+            interrupt=self.interrupt,
+        )

@@ -6,15 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from teleop_core.bags.messages import (
-    SECOND_NS,
-    Layout,
-    Refusal,
-    Values,
-    layout,
-    read_any,
-    read_numbers,
-)
+from teleop_core.bags.messages import SECOND_NS, Layout, Refusal, Values, layout, read_any, read_numbers
 from teleop_core.graph.layers import RealTimeParameters
 from teleop_core.graph.topics import (
     MASTER_BUTTONS,
@@ -64,9 +56,8 @@ class Tap:
     """
 
     def __init__(
-        self, owner: Owner, joint_names: tuple[str, ...], real_time: RealTimeParameters, *,
-        has_hand: bool,
-    ) -> None:  # fmt: skip
+        self, owner: Owner, joint_names: tuple[str, ...], real_time: RealTimeParameters, *, has_hand: bool
+    ) -> None:
         self._real_time, self._world = real_time, owner.world
         self.distortion: Distortion = hand.faithful
         self.is_mute, self._joint_names = False, joint_names
@@ -179,9 +170,7 @@ class Tap:
             self._listen()
             due += hand.PERIOD
             now = self._now()
-            if (
-                due <= now
-            ):  # its own work took longer than a period: nothing is known of the machine
+            if due <= now:  # its own work took longer than a period: nothing is known of the machine
                 due = now if due < now - _FAR_BEHIND else due
                 continue
             self._world.sleep(due - now)
@@ -232,13 +221,9 @@ class _Hand:
         self._count += 1
 
 
-def sender(
-    owner: Owner, topic: Topic, joint_names: tuple[str, ...]
-) -> Callable[[int, Array], None]:
+def sender(owner: Owner, topic: Topic, joint_names: tuple[str, ...]) -> Callable[[int, Array], None]:
     """Sender of stamps [ns] and values as a message of a topic."""
-    publisher = owner.ros.create_publisher(
-        message_type(topic.kind.ros_type), f"/{topic.name}", profile(topic)
-    )
+    publisher = owner.ros.create_publisher(message_type(topic.kind.ros_type), f"/{topic.name}", profile(topic))
     form = layout(topic, joint_names)
     return lambda stamp_ns, values: publisher.publish(form.encode_one(stamp_ns, values))
 

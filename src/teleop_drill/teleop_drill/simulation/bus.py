@@ -164,10 +164,7 @@ class Bus:
 
     def topics(self) -> list[str]:
         """Topics that have writers or readers."""
-        names = {
-            *(t for t, w in self.writers.items() if w),
-            *(t for t, r in self.readers.items() if r),
-        }
+        names = {*(t for t, w in self.writers.items() if w), *(t for t, r in self.readers.items() if r)}
         return sorted(names)
 
     def _match(self, writer: Writer, reader: Reader) -> None:

@@ -64,9 +64,8 @@ class SimulatedSite:
         if self.is_composed:  # the recorder too, as of `ros2 run teleop_core teleop_session`
             shared = {SESSION: (RECORDER_NAME, *(member.name for member in graph.members))}
         made = SimulatedSession(
-            self._bus, self._owner, self._configuration, shared, self._folder, observer,
-            self.master, self._foreign,
-        )  # fmt: skip
+            self._bus, self._owner, self._configuration, shared, self._folder, observer, self.master, self._foreign
+        )
         self._steering.session = made
         return made
 

@@ -43,9 +43,8 @@ class Writer:
     """
 
     def __init__(
-        self, bus: "Bus", process: Process, node: str, topic: str, qos: Qos,
-        encode: Callable[[Any], bytes],
-    ) -> None:  # fmt: skip
+        self, bus: "Bus", process: Process, node: str, topic: str, qos: Qos, encode: Callable[[Any], bytes]
+    ) -> None:
         self._bus, self.process, self.node, self.topic, self.qos = bus, process, node, topic, qos
         self._encode = encode
         self.sender, self.born_ns = bus.next_gid(), bus.scheduler.now_ns
@@ -95,16 +94,12 @@ class Reader:
         node: Name of its node, with the namespace.
     """
 
-    def __init__(
-        self, bus: "Bus", process: Process, kind: Any, topic: str, qos: Qos, node: str
-    ) -> None:
+    def __init__(self, bus: "Bus", process: Process, kind: Any, topic: str, qos: Qos, node: str) -> None:
         self._bus, self.process, self.type, self.topic, self.qos = bus, process, kind, topic, qos
         self.node = node
         self.lost, self.born_ns, self.is_open = 0, bus.scheduler.now_ns, True
         self.coming: deque[tuple[int, int, Taken]] = deque()
-        self._ready: deque[tuple[int, int, Taken]] = deque(
-            maxlen=None if qos.keeps_all else qos.depth
-        )
+        self._ready: deque[tuple[int, int, Taken]] = deque(maxlen=None if qos.keeps_all else qos.depth)
         self.waiting: Strand | None = None
         self.told: Callable[[], None] | None = None
         """Called where a message comes, for those that an executor serves."""
@@ -200,7 +195,5 @@ class Service:
         born_ns: When it was made [ns].
     """
 
-    def __init__(
-        self, process: Process, answer: Callable[[Any, Callable[[Any], None]], object], born_ns: int
-    ) -> None:
+    def __init__(self, process: Process, answer: Callable[[Any, Callable[[Any], None]], object], born_ns: int) -> None:
         self.process, self.answer, self.born_ns, self.is_open = process, answer, born_ns, True

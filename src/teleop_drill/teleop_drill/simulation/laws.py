@@ -43,10 +43,7 @@ _AFTER_STEP_NS = 5_000_000_000
 """Time for which stamps of before a step of the clock may come [ns]."""
 _QUEUES = 2500
 """Messages that may wait anywhere: what the recorder's longest queue holds, and some."""
-LAWS = (
-    "speed", "tool speed", "motion", "told", "stop", "owner", "age", "ends", "queues", "recorded",
-    "recovery",
-)  # fmt: skip
+LAWS = ("speed", "tool speed", "motion", "told", "stop", "owner", "age", "ends", "queues", "recorded", "recovery")
 """Names of all laws."""
 
 
@@ -158,9 +155,10 @@ class Laws:
         if (speed > self._numbers.speed_limit * (1.0 + _SLACK)).any():
             joint = int(np.argmax(speed / self._numbers.speed_limit))
             self._break(
-                "speed", f"joint {joint + 1} was sent at {speed[joint]:.3g}, beyond its drive's "
-                f"{self._numbers.speed_limit[joint]:.3g}"
-            )  # fmt: skip
+                "speed",
+                f"joint {joint + 1} was sent at {speed[joint]:.3g}, beyond its drive's "
+                f"{self._numbers.speed_limit[joint]:.3g}",
+            )
         if speed.max() > _SLACK:
             self._moved_at = self._worked
 
@@ -296,9 +294,7 @@ class Laws:
         begin_ns, end_ns = int(kept_ns[0]) + _FOUND_NS, int(sent_ns[-1]) - _ON_THE_WAY_NS
         if saved is not None:
             end_ns = int(kept_ns[-1]) - _ON_THE_WAY_NS
-        kept, sent = (
-            int(np.sum((begin_ns < times) & (times < end_ns))) for times in (kept_ns, sent_ns)
-        )
+        kept, sent = (int(np.sum((begin_ns < times) & (times < end_ns))) for times in (kept_ns, sent_ns))
         lost = int(told.get(f"lost.{SLAVE_SETPOINT_JS.name}", 0))
         if sent - kept > lost + 1:
             self._break("recorded", f"{sent} setpoints were sent, {kept} recorded, {lost} counted")

@@ -7,13 +7,7 @@ from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState, GetState
 from rcl_interfaces.msg import Parameter as ParameterMessage
 from rcl_interfaces.msg import SetParametersResult
-from rcl_interfaces.srv import (
-    DescribeParameters,
-    GetParameters,
-    ListParameters,
-    SetParameters,
-    SetParametersAtomically,
-)
+from rcl_interfaces.srv import DescribeParameters, GetParameters, ListParameters, SetParameters, SetParametersAtomically
 
 from teleop_core.base.parameters import Spec, Value
 from teleop_core.middleware.ros_parameters import descriptor, from_message, to_message
@@ -83,10 +77,7 @@ class SimulatedLifecycleNode(SimulatedNode):
         return made
 
     def declare(
-        self,
-        specs: Iterable[Spec],
-        values: Mapping[str, Value],
-        accept: Callable[[Mapping[str, Value]], str],
+        self, specs: Iterable[Spec], values: Mapping[str, Value], accept: Callable[[Mapping[str, Value]], str]
     ) -> None:
         """Declare parameters, and have their changes accepted."""
         self._specs = {spec.name: spec for spec in specs}
@@ -143,9 +134,7 @@ class SimulatedLifecycleNode(SimulatedNode):
         return SetParametersResult(successful=not reason, reason=reason)
 
     def _describe(self, request: Any, response: Any) -> Any:
-        response.descriptors = [
-            descriptor(self._specs[name]) for name in request.names if name in self._specs
-        ]
+        response.descriptors = [descriptor(self._specs[name]) for name in request.names if name in self._specs]
         return response
 
     def _list(self, _: Any, response: Any) -> Any:
@@ -167,9 +156,5 @@ class SimulatedLifecycleNode(SimulatedNode):
 
     def _get(self, request: Any, response: Any) -> Any:
         known = [self._values.get(name) for name in request.names]
-        response.values = [
-            to_message(n, v).value
-            for n, v in zip(request.names, known, strict=True)
-            if v is not None
-        ]
+        response.values = [to_message(n, v).value for n, v in zip(request.names, known, strict=True) if v is not None]
         return response

@@ -193,9 +193,7 @@ class SimulatedNode:
         namespace: Where its names are.
     """
 
-    def __init__(
-        self, bus: Bus, process: Process, name: str, namespace: str = "", **_: object
-    ) -> None:
+    def __init__(self, bus: Bus, process: Process, name: str, namespace: str = "", **_: object) -> None:
         self.bus, self.process, self.machine = bus, process, process.machine
         self._name, self._namespace = name, "/" + namespace.strip("/")
         self.executor: SimulatedExecutor | None = None
@@ -233,13 +231,9 @@ class SimulatedNode:
     def create_taker(self, kind: Any, name: str, qos: Qos) -> Reader:
         """Subscription whose messages are taken by hand."""
         topic = self.resolve_topic_name(name)
-        return self.bus.open_reader(
-            Reader(self.bus, self.process, kind, topic, qos, self.full_name)
-        )
+        return self.bus.open_reader(Reader(self.bus, self.process, kind, topic, qos, self.full_name))
 
-    def create_subscription(
-        self, kind: Any, name: str, callback: Callable[[Any], None], qos: Qos
-    ) -> Reader:
+    def create_subscription(self, kind: Any, name: str, callback: Callable[[Any], None], qos: Qos) -> Reader:
         """Subscription whose messages the executor hands over."""
         reader, turns = self.create_taker(kind, name, qos), 0
 

@@ -53,19 +53,18 @@ class Coverage:
         counts: Counter[tuple[str, str]] = Counter()
         for (kind, _, law), count in self.under.items():
             counts[kind, law] += count
-        return [
-            ["fault", *LAWS],
-            *([kind, *(str(counts[kind, law]) for law in LAWS)] for kind in sorted(KINDS)),
-        ]
+        return [["fault", *LAWS], *([kind, *(str(counts[kind, law]) for law in LAWS)] for kind in sorted(KINDS))]
 
     def plain(self) -> dict[str, object]:
         """All counts, as for JSON; pairs and triples with `` / `` between their names."""
         return {
-            "sessions": self.sessions, "seconds": self.seconds, "looks": dict(self.looks),
+            "sessions": self.sessions,
+            "seconds": self.seconds,
+            "looks": dict(self.looks),
             "broken": dict(self.broken),
             "met": {" / ".join(key): count for key, count in sorted(self.met.items())},
             "under": {" / ".join(key): count for key, count in sorted(self.under.items())},
-        }  # fmt: skip
+        }
 
     def lines(self) -> list[str]:
         """What was found, in a few lines."""
@@ -87,6 +86,5 @@ def told(found: Found, shortest: Found, law: str) -> list[str]:
     return [
         f"seed {found.seed} breaks `{law}`, {one.at:.3f} s after the arm followed: {one.text}",
         *(f"    {fault.text()}" for fault in shortest.faults),
-        f"    again: teleop drill --seeds 1 --seed {found.seed}{way} --faults {kept or '-'} "
-        "--out DIR",
+        f"    again: teleop drill --seeds 1 --seed {found.seed}{way} --faults {kept or '-'} --out DIR",
     ]

@@ -70,9 +70,7 @@ class Strand:
 
     _numbers = count(1)
 
-    def __init__(
-        self, scheduler: "Scheduler", process: "Turns", name: str, work: Callable[[], object]
-    ) -> None:
+    def __init__(self, scheduler: "Scheduler", process: "Turns", name: str, work: Callable[[], object]) -> None:
         self.name, self.process, self._work, self._scheduler = name, process, work, scheduler
         self.ident: int | None = next(self._numbers)
         self.native_id = self.ident

@@ -25,19 +25,20 @@ from teleop_drill.simulation.scheduler import BEGIN_NS, Scheduler
 from teleop_drill.simulation.schedules import KINDS, Fault, draw
 from teleop_drill.simulation.stage import Stage
 
-PROCESSES = {
-    Processes.SIDES: ("hand_side", "slave_side", RECORDER_NAME),
-    Processes.ONE: (SESSION, RECORDER_NAME),
-}
+PROCESSES = {Processes.SIDES: ("hand_side", "slave_side", RECORDER_NAME), Processes.ONE: (SESSION, RECORDER_NAME)}
 """What a schedule may befall, by how the nodes are shared out."""
 _START, _CURED = 20.0, 15.0
 """Time in which the arm must follow, at first and after all is cured [s]."""
 _CIRCLE = (
-    "operator.kind=circle", f"operator.size=[{2 * hand.RADIUS}, 0.0, {2 * hand.RADIUS}]",
-    f"operator.period={hand.ROUND}", "operator.approach_time=1.0", "operator.patience=0.0",
-    "operator.rotation=0.0", "slave.operation.tool_speed=0.5",
+    "operator.kind=circle",
+    f"operator.size=[{2 * hand.RADIUS}, 0.0, {2 * hand.RADIUS}]",
+    f"operator.period={hand.ROUND}",
+    "operator.approach_time=1.0",
+    "operator.patience=0.0",
+    "operator.rotation=0.0",
+    "slave.operation.tool_speed=0.5",
     "slave.start_speed=1.0",
-)  # fmt: skip
+)
 _ROUND = 20  # schedules that are chosen at once
 _PER_CHILD = 25  # sessions of one process of this machine: what was killed in them stays
 
@@ -68,9 +69,8 @@ class Found:
 
 
 def run_seed(
-    seed: int, faults: Sequence[Fault] | None = None, folder: Path | None = None,
-    processes: Processes = Processes.SIDES,
-) -> Found:  # fmt: skip
+    seed: int, faults: Sequence[Fault] | None = None, folder: Path | None = None, processes: Processes = Processes.SIDES
+) -> Found:
     """Run one schedule.
 
     Args:
@@ -85,9 +85,7 @@ def run_seed(
         bus = Bus(machine.scheduler)
         try:
             found: Found = machine.run(
-                lambda owner: _Run(
-                    bus, owner, Found(seed, planned, processes), folder or Path(place)
-                ).run()
+                lambda owner: _Run(bus, owner, Found(seed, planned, processes), folder or Path(place)).run()
             )
         except Exception as error:  # of one schedule, which must not end all others
             at = 1e-9 * (machine.scheduler.now_ns - BEGIN_NS)
@@ -203,10 +201,7 @@ def run_seeds(
     context = get_context("forkserver")
     with ProcessPoolExecutor(workers, context, max_tasks_per_child=_PER_CHILD) as pool:
         for begin in range(0, count, _ROUND):
-            threes = (
-                range(first + 3 * k, first + 3 * k + 3)
-                for k in range(begin, min(begin + _ROUND, count))
-            )
+            threes = (range(first + 3 * k, first + 3 * k + 3) for k in range(begin, min(begin + _ROUND, count)))
             seeds = [min(three, key=lambda s: _known(s, met, processes)) for three in threes]
             for found in pool.map(partial(run_seed, processes=processes), seeds):
                 met.update(found.met)

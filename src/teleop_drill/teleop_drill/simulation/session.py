@@ -61,8 +61,7 @@ class SimulatedSession:
         self._folder, self.observer, self._master = folder, observer, master
         left_out = () if master is Master.DEVICE else _DRILLED
         self._processes = {
-            name: tuple(node for node in nodes if node not in left_out)
-            for name, nodes in processes.items()
+            name: tuple(node for node in nodes if node not in left_out) for name, nodes in processes.items()
         }
         self._processes = {name: nodes for name, nodes in self._processes.items() if nodes}
         self._foreign = dict(foreign or {})
@@ -226,9 +225,7 @@ class SimulatedSession:
 
     def start_bystander(self) -> None:
         """Start a process of others that listens to all streams."""
-        self._bystander = self._machine.start(
-            "bystander", lambda process: stand_by(SimulatedWorld(self._bus, process))
-        )
+        self._bystander = self._machine.start("bystander", lambda process: stand_by(SimulatedWorld(self._bus, process)))
         self._bus.watch(self._bystander)
         self._machine.scheduler.sleep(0.5)
 
@@ -239,9 +236,7 @@ class SimulatedSession:
             self._bystander = None
 
 
-def parameters_of(
-    configuration: Configuration, out: str, namespace: str = ""
-) -> dict[str, dict[str, Any]]:
+def parameters_of(configuration: Configuration, out: str, namespace: str = "") -> dict[str, dict[str, Any]]:
     """Parameters of all nodes of a session, by their full names, as their file has them.
 
     Args:
@@ -249,14 +244,13 @@ def parameters_of(
         out: Directory of the recording.
         namespace: Where all nodes are, without slashes before and after it.
     """
-    content: dict[str, Any] = yaml.load(
-        parameter_file(configuration, out, namespace), Loader=_LOADER
-    )
+    content: dict[str, Any] = yaml.load(parameter_file(configuration, out, namespace), Loader=_LOADER)
     content.pop(SESSION, None)
     return {
         name.strip("/"): flattened(node["ros__parameters"])
-        for name, node in content.items() if "ros__parameters" in node
-    }  # fmt: skip
+        for name, node in content.items()
+        if "ros__parameters" in node
+    }
 
 
 def flattened(values: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:

@@ -48,9 +48,14 @@ class Stage:
     """
 
     def __init__(
-        self, bus: Bus, owner: Process, configuration: Configuration, robot: Robot, folder: Path,
+        self,
+        bus: Bus,
+        owner: Process,
+        configuration: Configuration,
+        robot: Robot,
+        folder: Path,
         processes: Processes = Processes.SIDES,
-    ) -> None:  # fmt: skip
+    ) -> None:
         self.bus, self.machine, self.robot = bus, owner.machine, robot
         self.world = SimulatedWorld(bus, owner)
         self._executor = self.world.executor()
@@ -58,15 +63,9 @@ class Stage:
         self._executor.add_node(self._node)
         self.world.thread("executor", self._spin).start()
         observer = Observer(0, world=self.world)
-        shared = {
-            name: nodes
-            for crew in crews(configuration.graph, processes)
-            for name, nodes in crew.items()
-        }
+        shared = {name: nodes for crew in crews(configuration.graph, processes) for name, nodes in crew.items()}
         self.names = tuple(shared)
-        self.session = SimulatedSession(
-            bus, owner, configuration, shared, folder, observer, Master.DEVICE
-        )
+        self.session = SimulatedSession(bus, owner, configuration, shared, folder, observer, Master.DEVICE)
         self.killed: set[Process] = set()
         """Processes that were told to end."""
         self.kills = 0
@@ -77,14 +76,9 @@ class Stage:
         """Processes that were stopped, each with the time [ns]."""
         self.presses: list[int] = []
         """When a stop was pressed [ns]."""
-        self._buttons = [
-            self._node.create_publisher(Bool, STOP_TOPIC, Qos(depth=100)) for _ in range(2)
-        ]
+        self._buttons = [self._node.create_publisher(Bool, STOP_TOPIC, Qos(depth=100)) for _ in range(2)]
         self._speeds = self._node.create_publisher(JointState, "/slave/servo_jv", Qos())
-        self._clients = {
-            name: self._node.create_client(Trigger, f"/slave/{name}")
-            for name in (*COMMANDS, _RELEASE)
-        }
+        self._clients = {name: self._node.create_client(Trigger, f"/slave/{name}") for name in (*COMMANDS, _RELEASE)}
         self._hand = self._node.create_client(ChangeState, "/inverse_kinematics/change_state")
         self._publishers: dict[str, Any] = {}
         self.operation: dict[str, float] = {}
@@ -165,9 +159,7 @@ class Stage:
         """Send bytes on a topic, as another publisher of it."""
         if topic.name not in self._publishers:
             kind = message_type(topic.kind.ros_type)
-            self._publishers[topic.name] = self._node.create_publisher(
-                kind, f"/{topic.name}", Qos(depth=1)
-            )
+            self._publishers[topic.name] = self._node.create_publisher(kind, f"/{topic.name}", Qos(depth=1))
         self._publishers[topic.name].publish(data)
 
     def every(self, period: float, work: Callable[[], None]) -> Callable[[], None]:
@@ -204,11 +196,13 @@ class Stage:
         """Whether the arm says that it goes where the hand leads."""
         told = self.operation
         return bool(
-            not self.session.dead() and self.is_following
+            not self.session.dead()
+            and self.is_following
             and self.machine.scheduler.now_ns - self.commanded_ns < _FRESH_NS
             and told.get("state") == State.ENABLED
-            and told["is_homed"] and not told["is_busy"]
-        )  # fmt: skip
+            and told["is_homed"]
+            and not told["is_busy"]
+        )
 
     @property
     def recorder(self) -> Process:

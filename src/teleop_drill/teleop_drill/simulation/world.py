@@ -28,9 +28,7 @@ class SimulatedWorld:
         process: As given.
     """
 
-    def __init__(
-        self, bus: Bus, process: Process, given: Mapping[str, Mapping[str, Any]] | None = None
-    ) -> None:
+    def __init__(self, bus: Bus, process: Process, given: Mapping[str, Mapping[str, Any]] | None = None) -> None:
         self._bus, self.process, self._given = bus, process, given or {}
         self._scheduler = process.machine.scheduler
         self.monotonic_ns: Callable[[], int] = self._scheduler.look_ns
@@ -80,9 +78,7 @@ class SimulatedWorld:
     def lifecycle_node(self, name: str, hooks: Hooks, **options: Any) -> SimulatedLifecycleNode:
         """A node with parameters and a lifecycle."""
         full = f"{str(options.get('namespace', '')).strip('/')}/{name}".strip("/")
-        return SimulatedLifecycleNode(
-            self._bus, self.process, name, hooks, self._given.get(full, {}), **options
-        )
+        return SimulatedLifecycleNode(self._bus, self.process, name, hooks, self._given.get(full, {}), **options)
 
     def executor(self) -> SimulatedExecutor:
         """Executor of the nodes of this process."""

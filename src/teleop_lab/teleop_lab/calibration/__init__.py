@@ -24,14 +24,7 @@ from teleop_lab.calibration.identify import Found, identify
 from teleop_lab.calibration.measured import CalibrationError, Measured, read_measured
 from teleop_lab.calibration.model import FRAME, Model
 from teleop_lab.calibration.poses import random_poses
-from teleop_lab.calibration.simulate import (
-    RULER,
-    chosen_poses,
-    default_errors,
-    ruled,
-    tracked,
-    true_errors,
-)
+from teleop_lab.calibration.simulate import RULER, chosen_poses, default_errors, ruled, tracked, true_errors
 
 if TYPE_CHECKING:
     from teleop_lab.calibration.corrected import Table
@@ -118,9 +111,7 @@ def calibrate(
     """
     model = Model.of(robot)
     found = identify(model, measured, fit, finds_frame=finds_frame, keeps_all=keeps_all)
-    return Calibration(
-        robot, measured, found, at_measured(found, measured), left_out(found, measured)
-    )
+    return Calibration(robot, measured, found, at_measured(found, measured), left_out(found, measured))
 
 
 def simulate(
@@ -168,10 +159,14 @@ def simulate(
     found = identify(model, measured, wanted, finds_frame=finds_frame, keeps_all=keeps_all)
     sums = found.equivalent(truth, random_poses(robot, FRESH, rng))
     return Calibration(
-        robot, measured, found, at_measured(found, measured),
-        _tried(found, truth, measured, finds_frame, rng), truth,
+        robot,
+        measured,
+        found,
+        at_measured(found, measured),
+        _tried(found, truth, measured, finds_frame, rng),
+        truth,
         {name: value for name, value in sums.items() if name not in FRAME},
-    )  # fmt: skip
+    )
 
 
 def _tried(

@@ -65,9 +65,7 @@ def of_points(errors: Array) -> dict[str, Spread]:
 def of_distances(errors: Array, labels: tuple[str, ...]) -> dict[str, Spread]:
     """Spreads of errors (N,) by their labels; the total is of all of them."""
     names = np.array(labels)
-    return {name: spread(errors[names == name]) for name in dict.fromkeys(labels)} | {
-        TOTAL: spread(errors)
-    }
+    return {name: spread(errors[names == name]) for name in dict.fromkeys(labels)} | {TOTAL: spread(errors)}
 
 
 def _spreads(measured: Measured, rest: Array) -> dict[str, Spread]:

@@ -43,9 +43,7 @@ def published(robot: Robot) -> Measured:
         raise CalibrationError(f"appendix E measured the rcrt1, not {robot.name}")
     moves = ruler_moves(robot, 30)
     readings = 1e-3 * np.concatenate([READ[axis] for axis in "xyz"])
-    return Measured(
-        joints=moves.joints, origins=moves.origins, distances=readings, labels=moves.labels
-    )
+    return Measured(joints=moves.joints, origins=moves.origins, distances=readings, labels=moves.labels)
 
 
 def ruler_moves(robot: Robot, count: int) -> Measured:
@@ -69,9 +67,7 @@ def ruler_moves(robot: Robot, count: int) -> Measured:
     q = np.concatenate(joints)
     origins = np.broadcast_to(robot.home, q.shape)
     way = robot.fk(q)[:, :3, 3] - robot.fk(robot.home)[:3, 3]
-    return Measured(
-        joints=q, origins=origins, distances=np.linalg.norm(way, axis=1), labels=tuple(labels)
-    )
+    return Measured(joints=q, origins=origins, distances=np.linalg.norm(way, axis=1), labels=tuple(labels))
 
 
 def _move(robot: Robot, axis: int, count: int, escapes: list[Array]) -> tuple[Array, Array]:

@@ -36,8 +36,7 @@ def corrected_table(robot: Robot, errors: LinkErrors) -> Table:
     if robot.drives is not None:
         entries = robot.drives.entries()
         table["drives"] = {
-            joint: {name: float(entries[name][i]) for name in _STATED}
-            for i, joint in enumerate(robot.joint_names)
+            joint: {name: float(entries[name][i]) for name in _STATED} for i, joint in enumerate(robot.joint_names)
         }
     return table
 
@@ -84,7 +83,9 @@ def _with_joint(constant: float, is_against: bool) -> str:
 def _joint(robot: Robot, i: int) -> Row:
     """Name, limits and postures of a joint."""
     return {
-        "name": robot.joint_names[i], "lower": float(robot.lower[i]),
-        "upper": float(robot.upper[i]), "home": float(robot.home[i]),
+        "name": robot.joint_names[i],
+        "lower": float(robot.lower[i]),
+        "upper": float(robot.upper[i]),
+        "home": float(robot.home[i]),
         "start": float(robot.start[i]),
-    }  # fmt: skip
+    }

@@ -69,9 +69,7 @@ def condition(columns: Array) -> float:
 def _weakest(model: Model, column: dict[str, Array], kept: list[str]) -> str:
     """Entry that has the largest part in the combination that readings tell the least of."""
     _, _, Vt = np.linalg.svd(_unit_columns(np.column_stack([column[k] for k in kept])))
-    ease = [
-        _FRAME if name in FRAME else _OFFSET if name in model.offsets else _LINK for name in kept
-    ]
+    ease = [_FRAME if name in FRAME else _OFFSET if name in model.offsets else _LINK for name in kept]
     return kept[int(np.argmax(np.abs(Vt[-1]) * ease))]
 
 

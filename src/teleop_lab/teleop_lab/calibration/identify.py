@@ -147,9 +147,7 @@ def identify(
         told = "; ".join(f"{entry.name} {entry.reason}" for entry in left)
         raise CalibrationError(f"not identifiable from these {len(measured)} poses: {told}")
     if not kept:
-        raise CalibrationError(
-            f"not identifiable from these {len(measured)} poses: none of {', '.join(names)}"
-        )
+        raise CalibrationError(f"not identifiable from these {len(measured)} poses: none of {', '.join(names)}")
     _check_count(measured, len(kept))
     found = _solved(model, measured, kept, left)
     return found if is_named or keeps_all else _pruned(found, measured)
@@ -194,9 +192,7 @@ def _check_count(measured: Measured, entries: int) -> None:
         )
 
 
-def _solved(
-    model: Model, measured: Measured, names: tuple[str, ...], left: tuple[Left, ...]
-) -> Found:
+def _solved(model: Model, measured: Measured, names: tuple[str, ...], left: tuple[Left, ...]) -> Found:
     at = [model.names.index(name) for name in names]
     vector = np.zeros(len(model.names))
 
@@ -211,8 +207,12 @@ def _solved(
         lambda x: residuals(model, measured, of(x)),
         np.zeros(len(at)),
         jac=lambda x: slopes(model, measured, of(x))[:, at],
-        x_scale=scale, xtol=1e-13, ftol=1e-13, gtol=1e-15, max_nfev=100,
-    )  # fmt: skip
+        x_scale=scale,
+        xtol=1e-13,
+        ftol=1e-13,
+        gtol=1e-15,
+        max_nfev=100,
+    )
     _check_answer(names, answer.x, scale, int(answer.status), str(answer.message))
     of(answer.x)
     J, freedom = slopes(model, measured, vector)[:, at], measured.readings - len(at)
@@ -220,9 +220,8 @@ def _solved(
     spread = np.sqrt(variance * np.diag(np.linalg.inv(J.T @ J)))
     half_widths = float(student.ppf(0.5 * (1.0 + LEVEL), freedom)) * spread
     return Found(
-        names, answer.x.copy(), half_widths, vector.copy(), left, condition(J),
-        float(np.sqrt(variance)), freedom, model,
-    )  # fmt: skip
+        names, answer.x.copy(), half_widths, vector.copy(), left, condition(J), float(np.sqrt(variance)), freedom, model
+    )
 
 
 def _drawn(model: Model, measured: Measured, left: tuple[Left, ...]) -> Found:
@@ -233,9 +232,7 @@ def _drawn(model: Model, measured: Measured, left: tuple[Left, ...]) -> Found:
     return Found((), none, none, vector, left, 1.0, spread, len(rest), model)
 
 
-def _check_answer(
-    names: tuple[str, ...], x: Array, scale: Array, status: int, message: str
-) -> None:
+def _check_answer(names: tuple[str, ...], x: Array, scale: Array, status: int, message: str) -> None:
     """Refuse a search that did not end, or ended far from the drawing."""
     if status <= 0:
         raise CalibrationError(f"least squares did not converge: {message}")

@@ -59,9 +59,11 @@ class Measured:
             raise ParameterError("measured", "both or none", "either points or distances")
         count = len(joints)
         for name, shape in (
-            ("joints", joints.shape), ("points", (count, 3)), ("distances", (count,)),
+            ("joints", joints.shape),
+            ("points", (count, 3)),
+            ("distances", (count,)),
             ("origins", joints.shape),
-        ):  # fmt: skip
+        ):
             value = getattr(self, name)
             if value is None:
                 continue
@@ -146,12 +148,7 @@ def _missing(path: Path, what: str, columns: Iterable[str]) -> CalibrationError:
 
 
 def _numbers(
-    path: Path,
-    frame: "pd.DataFrame",
-    column: str,
-    units: dict[str, float],
-    *,
-    may_miss: bool = False,
+    path: Path, frame: "pd.DataFrame", column: str, units: dict[str, float], *, may_miss: bool = False
 ) -> Array:
     """Column in SI units; NaN only where cells may miss."""
     import pandas as pd

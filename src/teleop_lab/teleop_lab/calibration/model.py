@@ -75,10 +75,7 @@ class Model:
     @property
     def offsets(self) -> tuple[str, ...]:
         """Names of the joint offsets, from the base on."""
-        return tuple(
-            f"{'theta' if abs(kind) < 1.5 else 'd'}{i + 1}"
-            for i, kind in enumerate(self.chain.kinds)
-        )
+        return tuple(f"{'theta' if abs(kind) < 1.5 else 'd'}{i + 1}" for i, kind in enumerate(self.chain.kinds))
 
     @property
     def size(self) -> float:
@@ -96,8 +93,9 @@ class Model:
     def jacobian(self, q: Array, vector: Array) -> Array:
         """Slopes of :meth:`tips` by the vector, (N, 3, 4n + 6); of the frame's turn at zero."""
         tip, along, about, alpha_place, theta_place = self._frames(q, vector)
-        turns = np.concatenate((np.cross(along, tip[:, None] - alpha_place),
-                                np.cross(about, tip[:, None] - theta_place)), axis=1)  # fmt: skip
+        turns = np.concatenate(
+            (np.cross(along, tip[:, None] - alpha_place), np.cross(about, tip[:, None] - theta_place)), axis=1
+        )
         n = self.chain.n
         columns = np.concatenate((along, turns[:, :n], about, turns[:, n:]), axis=1)
         eye = np.broadcast_to(np.eye(3), (len(tip), 3, 3))

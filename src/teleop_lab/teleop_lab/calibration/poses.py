@@ -18,9 +18,7 @@ def random_poses(robot: Robot, count: int, rng: np.random.Generator) -> Array:
     return rng.uniform(robot.lower, robot.upper, (count, robot.n))
 
 
-def optimal_poses(
-    model: Model, count: int, names: Sequence[str], rng: np.random.Generator
-) -> Array:
+def optimal_poses(model: Model, count: int, names: Sequence[str], rng: np.random.Generator) -> Array:
     """Joint vectors (count, n) at which points of the tip tell most about some entries.
 
     Out of :data:`CANDIDATES` random ones, each the one that raises the determinant of the

@@ -36,9 +36,7 @@ def _errors(calibration: "Calibration") -> Iterator[str]:
     if not found.names:
         yield "no error is told from zero: the arm is as drawn, as far as these readings tell"
         return
-    yield f"{'found':12}{'error':>12}{f'± {100 * LEVEL:.0f} %':>10}" + (
-        f"{'true':>10}" if known else ""
-    )
+    yield f"{'found':12}{'error':>12}{f'± {100 * LEVEL:.0f} %':>10}" + (f"{'true':>10}" if known else "")
     for name, value, half in zip(found.names, found.values, found.half_widths, strict=True):
         unit = "m" + found.model.unit(name)
         cells = f"  {name:10}{1e3 * value:12.4f}{1e3 * half:10.4f}"
@@ -53,9 +51,7 @@ def _table(accuracy: "Accuracy") -> Iterator[str]:
     yield f"{'':8}{'before: RMS':>14}{'S.D.':>9}{'max':>9}{'after: RMS':>14}{'S.D.':>9}{'max':>9}"
     for name, before in accuracy.before.items():
         after = accuracy.after[name]
-        cells = [
-            f"{1e3 * v:{w}.4f}" for v, w in zip((*before, *after), (14, 9, 9) * 2, strict=True)
-        ]
+        cells = [f"{1e3 * v:{w}.4f}" for v, w in zip((*before, *after), (14, 9, 9) * 2, strict=True)]
         yield f"  {name:6}" + "".join(cells)
 
 

@@ -73,9 +73,7 @@ def _number(text: str, value: str) -> float:
         raise ParameterError("errors", text, "NAME=NUMBER, such as d3=5.5e-3 [m, rad]") from None
 
 
-def chosen_poses(
-    model: Model, count: int, choose: str, fit: str | Sequence[str], rng: np.random.Generator
-) -> Array:
+def chosen_poses(model: Model, count: int, choose: str, fit: str | Sequence[str], rng: np.random.Generator) -> Array:
     """Joint vectors (count, n) for a tracker: "random", or "optimal" for what is to be found.
 
     Raises:
@@ -95,9 +93,8 @@ def chosen_poses(
 
 
 def tracked(
-    model: Model, errors: LinkErrors, q: Array, noise: float, rng: np.random.Generator,
-    *, is_elsewhere: bool = False,
-) -> Measured:  # fmt: skip
+    model: Model, errors: LinkErrors, q: Array, noise: float, rng: np.random.Generator, *, is_elsewhere: bool = False
+) -> Measured:
     """What a tracker says of the tip at poses: its place plus noise on each axis.
 
     Args:

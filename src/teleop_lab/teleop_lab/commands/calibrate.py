@@ -36,51 +36,45 @@ def add(commands: Any) -> None:
     parser.add_argument("--robot", default="rcrt1", help="a chain of links (default: rcrt1)")
     geometry_argument(parser)
     parser.add_argument(
-        "--data",
-        metavar="FILE.csv",
-        help=f"measured poses in place of simulated ones, or {PUBLISHED!r}",
+        "--data", metavar="FILE.csv", help=f"measured poses in place of simulated ones, or {PUBLISHED!r}"
     )
     _add_simulation(parser)
     parser.add_argument(
-        "--fit", nargs="+", metavar="NAME",
-        help="`all` link errors, joint `offsets`, or names such as d3 theta2 (default: all; with "
-        "a ruler offsets)",
-    )  # fmt: skip
-    parser.add_argument(
-        "--frame", choices=("known", "unknown"), default="known",
-        help="whether x, y, z are in the robot's base, or its place is to be found too",
-    )  # fmt: skip
-    parser.add_argument(
-        "--keep-all", action="store_true", help="keep errors that cannot be told from zero"
+        "--fit",
+        nargs="+",
+        metavar="NAME",
+        help="`all` link errors, joint `offsets`, or names such as d3 theta2 (default: all; with a ruler offsets)",
     )
+    parser.add_argument(
+        "--frame",
+        choices=("known", "unknown"),
+        default="known",
+        help="whether x, y, z are in the robot's base, or its place is to be found too",
+    )
+    parser.add_argument("--keep-all", action="store_true", help="keep errors that cannot be told from zero")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write all numbers as JSON")
     parser.add_argument(
-        "--out", type=Path, metavar="FILE.yaml",
-        help="the arm as found, as a table for --set robot=FILE.yaml",
-    )  # fmt: skip
+        "--out", type=Path, metavar="FILE.yaml", help="the arm as found, as a table for --set robot=FILE.yaml"
+    )
 
 
 def _add_simulation(parser: argparse.ArgumentParser) -> None:
     """Options of a simulated measurement; None where not given."""
     parser.add_argument("--poses", type=int, metavar="N", help="poses to measure (default: 40)")
     parser.add_argument(
-        "--noise",
-        metavar="M|ruler",
-        help="standard deviation of a tracker [m], or a ruler of 0.5 mm (default: 0.1e-3)",
+        "--noise", metavar="M|ruler", help="standard deviation of a tracker [m], or a ruler of 0.5 mm (default: 0.1e-3)"
     )
     parser.add_argument(
-        "--errors", nargs="+", metavar="NAME=VALUE",
+        "--errors",
+        nargs="+",
+        metavar="NAME=VALUE",
         help="how the arm was built: cnc (±20 µm), prototype (±100 µm), and errors [m, rad] such "
         "as d3=5.5e-3 (default: cnc, of the rcrt1 with d3=5.5e-3)",
-    )  # fmt: skip
-    parser.add_argument(
-        "--choose",
-        metavar="optimal|random",
-        help="poses that tell most, or random ones (default: optimal)",
     )
     parser.add_argument(
-        "--seed", type=int, metavar="N", help="of poses, errors, noise (default: 1)"
+        "--choose", metavar="optimal|random", help="poses that tell most, or random ones (default: optimal)"
     )
+    parser.add_argument("--seed", type=int, metavar="N", help="of poses, errors, noise (default: 1)")
 
 
 def _run(arguments: argparse.Namespace) -> int:
@@ -89,9 +83,7 @@ def _run(arguments: argparse.Namespace) -> int:
 
     check_places(arguments.json, arguments.out)
     robot = load_robot_set(arguments.robot, arguments.geometry)
-    calibration = (
-        _simulated(robot, arguments) if arguments.data is None else _real(robot, arguments)
-    )
+    calibration = _simulated(robot, arguments) if arguments.data is None else _real(robot, arguments)
     print(calibration)
     _write(calibration, arguments)
     return 0
@@ -113,9 +105,8 @@ def _simulated(robot: "Robot", arguments: argparse.Namespace) -> "Calibration":
     if "noise" in options:
         options["noise"] = _noise(options["noise"])
     return simulate(
-        robot, fit=_fit(arguments), finds_frame=arguments.frame == "unknown",
-        keeps_all=arguments.keep_all, **options,
-    )  # fmt: skip
+        robot, fit=_fit(arguments), finds_frame=arguments.frame == "unknown", keeps_all=arguments.keep_all, **options
+    )
 
 
 def _noise(text: str) -> float | str:
@@ -136,13 +127,9 @@ def _real(robot: "Robot", arguments: argparse.Namespace) -> "Calibration":
     if given:
         raise TeleopError(f"--data has measured poses; {', '.join(given)} are of simulated ones")
     is_published = arguments.data == PUBLISHED
-    measured = (
-        appendix_e.published(robot) if is_published else read_measured(Path(arguments.data), robot)
-    )
+    measured = appendix_e.published(robot) if is_published else read_measured(Path(arguments.data), robot)
     fit = _fit(arguments) or ("offsets" if is_published else "all")
-    return calibrate(
-        robot, measured, fit, finds_frame=arguments.frame == "unknown", keeps_all=arguments.keep_all
-    )
+    return calibrate(robot, measured, fit, finds_frame=arguments.frame == "unknown", keeps_all=arguments.keep_all)
 
 
 def _write(calibration: "Calibration", arguments: argparse.Namespace) -> None:

@@ -23,21 +23,17 @@ def add(commands: Any) -> None:
     """Add the command's parser."""
     text = "fit friction, bias and weights of the hardware plant to where a machine came to rest"
     parser = command(commands, "fit", _run, text, _EPILOG)
-    parser.add_argument(
-        "table", nargs="?", type=Path, help="CSV of rests (default: the published ones)"
-    )
+    parser.add_argument("table", nargs="?", type=Path, help="CSV of rests (default: the published ones)")
     parser.add_argument("--robot", default="rcrt1", help="robot of the table (default: rcrt1)")
+    parser.add_argument("--free", nargs="+", metavar="NAME", help="what to fit (default: what the table can tell)")
     parser.add_argument(
-        "--free", nargs="+", metavar="NAME", help="what to fit (default: what the table can tell)"
-    )
-    parser.add_argument(
-        "--loss", default="cauchy", metavar="NAME",
+        "--loss",
+        default="cauchy",
+        metavar="NAME",
         help="cauchy, huber, soft_l1 or linear: how little weight an outlier gets",
-    )  # fmt: skip
-    parser.add_argument("--json", type=Path, metavar="FILE", help="write all numbers as JSON")
-    parser.add_argument(
-        "--out", type=Path, metavar="FILE.yaml", help="write the plant as parameters, for --config"
     )
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write all numbers as JSON")
+    parser.add_argument("--out", type=Path, metavar="FILE.yaml", help="write the plant as parameters, for --config")
     setting_arguments(parser)
 
 
@@ -49,10 +45,14 @@ def _run(arguments: argparse.Namespace) -> int:
     check_places(arguments.json, arguments.out)
     with shown_progress("fitting") as progress:
         found = fit_plant(
-            arguments.table, robot=arguments.robot, free=arguments.free, files=arguments.config,
-            texts=arguments.settings, loss=arguments.loss,
+            arguments.table,
+            robot=arguments.robot,
+            free=arguments.free,
+            files=arguments.config,
+            texts=arguments.settings,
+            loss=arguments.loss,
             progress=lambda share: progress(round(100.0 * share), 100),
-        )  # fmt: skip
+        )
     print(found)
     if arguments.json is not None:
         arguments.json.write_text(json.dumps(found.to_json(), indent=1) + "\n", encoding="utf-8")

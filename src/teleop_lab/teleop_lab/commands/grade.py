@@ -22,9 +22,7 @@ def add(commands: Any) -> None:
     text = "figures of motion of every episode of a data set, the oddest first"
     parser = command(commands, "grade", _run, text, _EPILOG)
     parser.add_argument("data", type=Path, metavar="DATASET", help="folder or table")
-    parser.add_argument(
-        "--position", nargs=3, metavar=("X", "Y", "Z"), help="columns of the place, if not x, y, z"
-    )
+    parser.add_argument("--position", nargs=3, metavar=("X", "Y", "Z"), help="columns of the place, if not x, y, z")
     parser.add_argument("--unit", default="auto", help="of the place: m, cm, mm, in, or auto")
     parser.add_argument("--csv", type=Path, metavar="FILE", help="write all figures")
     parser.add_argument("--html", type=Path, metavar="FILE", help="write a page")

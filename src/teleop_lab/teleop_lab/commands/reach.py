@@ -23,24 +23,26 @@ def add(commands: Any) -> None:
     text = "say how much of a hand's motion a slave can follow, and propose where to put it"
     parser = command(commands, "reach", _run, text, _EPILOG)
     parser.add_argument(
-        "sources", nargs="+", metavar="BAG|SCENARIO",
-        help="recording, ours or of others, or one of `teleop scenarios`",
-    )  # fmt: skip
+        "sources", nargs="+", metavar="BAG|SCENARIO", help="recording, ours or of others, or one of `teleop scenarios`"
+    )
     parser.add_argument("--robot", help="slave, in place of the recording's; see `teleop robot`")
     geometry_argument(parser)
     parser.add_argument("--arm", default="", help="namespace of the arm (default: the first)")
     parser.add_argument(
-        "--share", type=float, default=99.0, metavar="PERCENT",
+        "--share",
+        type=float,
+        default=99.0,
+        metavar="PERCENT",
         help="share of the time that the slave should follow (default: 99)",
-    )  # fmt: skip
-    parser.add_argument(
-        "--keep-axes", action="store_true", help="leave the map of axes from hand to slave as it is"
     )
+    parser.add_argument("--keep-axes", action="store_true", help="leave the map of axes from hand to slave as it is")
     parser.add_argument("--html", type=Path, metavar="FILE", help="page with pictures")
     parser.add_argument(
-        "--out", type=Path, metavar="FILE.yaml",
+        "--out",
+        type=Path,
+        metavar="FILE.yaml",
         help="proposal as a ROS 2 parameter file, for --config; of one recording alone",
-    )  # fmt: skip
+    )
     setting_arguments(parser)
 
 
@@ -71,7 +73,13 @@ def _reach(source: str, arguments: argparse.Namespace) -> "Reach":
 
     with shown_progress(f"searching, {Path(source).name}") as progress:
         return reach(
-            source, robot=arguments.robot, geometry=arguments.geometry, arm=arguments.arm,
-            share=arguments.share / 100.0, keeps_axes=arguments.keep_axes, progress=progress,
-            files=arguments.config, texts=arguments.settings,
-        )  # fmt: skip
+            source,
+            robot=arguments.robot,
+            geometry=arguments.geometry,
+            arm=arguments.arm,
+            share=arguments.share / 100.0,
+            keeps_axes=arguments.keep_axes,
+            progress=progress,
+            files=arguments.config,
+            texts=arguments.settings,
+        )

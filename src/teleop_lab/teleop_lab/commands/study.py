@@ -31,13 +31,9 @@ def add(commands: Any) -> None:
     text = "run sessions over named values of parameters and seeds, and compare their scores"
     parser = command(commands, "study", _run, text, _EPILOG)
     parser.add_argument("file", type=Path, metavar="FILE.yaml", help="what is compared")
-    parser.add_argument(
-        "--store", type=Path, metavar="DIR", help="keep results there, and run only what is not"
-    )
+    parser.add_argument("--store", type=Path, metavar="DIR", help="keep results there, and run only what is not")
     parser.add_argument("--jobs", type=int, metavar="N", help="processes (default: processors)")
-    parser.add_argument(
-        "--scheduler", metavar="ADDRESS", help="run on the workers of this Dask scheduler"
-    )
+    parser.add_argument("--scheduler", metavar="ADDRESS", help="run on the workers of this Dask scheduler")
     parser.add_argument("--recordings", type=Path, metavar="DIR", help="record each session there")
     parser.add_argument("--explain", action="store_true", help="say what it costs, and run nothing")
     parser.add_argument("--html", type=Path, metavar="FILE", help="write a page with plots")
@@ -62,9 +58,8 @@ def _run(arguments: argparse.Namespace) -> int:
     client = _client(arguments.scheduler) if arguments.scheduler else None
     with shown_progress(arguments.file.stem) as progress:
         found = study.run(
-            arguments.store, jobs=arguments.jobs, client=client, recordings=arguments.recordings,
-            progress=progress,
-        )  # fmt: skip
+            arguments.store, jobs=arguments.jobs, client=client, recordings=arguments.recordings, progress=progress
+        )
     print(study_table(study, found))
     failed = [str(error) for error in found["error"].values.ravel() if error]
     if failed:

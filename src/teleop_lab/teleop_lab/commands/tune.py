@@ -30,9 +30,7 @@ def add(commands: Any) -> None:
     text = "search the values of parameters with which a score is best"
     parser = command(commands, "tune", _run, text, _EPILOG)
     parser.add_argument("file", type=Path, metavar="FILE.yaml", help="what is searched")
-    parser.add_argument(
-        "--store", type=Path, metavar="DIR", help="keep results there, and run only what is not"
-    )
+    parser.add_argument("--store", type=Path, metavar="DIR", help="keep results there, and run only what is not")
     parser.add_argument("--trials", type=int, default=30, metavar="N", help="values (default: 30)")
     parser.add_argument("--jobs", type=int, metavar="N", help="processes (default: processors)")
     parser.add_argument("--html", type=Path, metavar="FILE", help="write a page with plots")
@@ -47,9 +45,7 @@ def _run(arguments: argparse.Namespace) -> int:
     tuning = read_tuning(arguments.file)
     check_places(arguments.html, arguments.csv)
     with shown_progress(arguments.file.stem) as progress:
-        tuned = tuning.run(
-            arguments.store, trials=arguments.trials, jobs=arguments.jobs, progress=progress
-        )
+        tuned = tuning.run(arguments.store, trials=arguments.trials, jobs=arguments.jobs, progress=progress)
     print(_table(tuning, tuned))
     failed = [trial.error for trial in tuned.trials if trial.error]
     if failed:
@@ -78,8 +74,7 @@ def _table(tuning: "Tuning", tuned: "Tuned") -> str:
     sign = -1.0 if tuning.is_largest else 1.0
     scored.sort(key=lambda pair: sign * (pair[1].score or 0.0))
     rows = [
-        [str(n), *(_text(value) for value in trial.values.values()), _text(trial.score)]
-        for n, trial in scored[:_SHOWN]
+        [str(n), *(_text(value) for value in trial.values.values()), _text(trial.score)] for n, trial in scored[:_SHOWN]
     ]
     return table_text(["trial", *tuning.searched, tuning.metric], rows)
 

@@ -146,24 +146,35 @@ def _measure(bench: Bench) -> Findings:
     for name, which in AXES.items():
         error = _errors(which, as_read(exact[name], which.step_mm))
         rows += [
-            Row(quantity=quantity, unit="mm", published=printed, predicted=value,
-                within=absolute(0.5 * RULER_MM), group=f"summary of {name}, table E.4")
+            Row(
+                quantity=quantity,
+                unit="mm",
+                published=printed,
+                predicted=value,
+                within=absolute(0.5 * RULER_MM),
+                group=f"summary of {name}, table E.4",
+            )
             for quantity, printed, value in (
                 ("RMS", which.rms, _rms(error)),
                 ("S.D.", which.deviation, float(np.std(error, ddof=1))),
                 ("largest", which.largest, float(np.abs(error).max())),
             )
-        ]  # fmt: skip
+        ]
         figures.append(_figure(name, which, exact[name], longer[name]))
     rows += _total_rows(robot, longer, exact)
     for number, (name, which) in enumerate(AXES.items(), start=1):
         error = _errors(which, as_read(exact[name], which.step_mm))
         rows += [
-            Row(quantity=f"error at {way:g} mm", unit="mm", published=was,
-                predicted=is_now, within=absolute(RULER_MM),
-                group=f"moves along {name}, table E.{number}")
+            Row(
+                quantity=f"error at {way:g} mm",
+                unit="mm",
+                published=was,
+                predicted=is_now,
+                within=absolute(RULER_MM),
+                group=f"moves along {name}, table E.{number}",
+            )
             for way, was, is_now in zip(DESIRED_MM, which.error_mm, error, strict=True)
-        ]  # fmt: skip
+        ]
     return Findings(tuple(rows), tuple(figures), _NOTES)
 
 
@@ -191,13 +202,18 @@ def _total_rows(robot: Robot, longer: dict[str, Array], exact: dict[str, Array])
     drawn = {name: readings(robot, which, longer_d3(robot, 0.0)) for name, which in AXES.items()}
     group = "all readings of the ruler, less what is expected of it"
     return [
-        Row(quantity=f"RMS, {text}", unit="mm", group=group,
-            predicted=_rms(read - np.concatenate(list(expected.values()))))
+        Row(
+            quantity=f"RMS, {text}",
+            unit="mm",
+            group=group,
+            predicted=_rms(read - np.concatenate(list(expected.values()))),
+        )
         for text, expected in (
-            ("arm as drawn", drawn), (f"d3 longer by {D3_OFFSET_MM} mm alone", longer),
+            ("arm as drawn", drawn),
+            (f"d3 longer by {D3_OFFSET_MM} mm alone", longer),
             ("the plant", exact),
         )
-    ]  # fmt: skip
+    ]
 
 
 def _figure(name: str, which: Axis, exact: Array, longer: Array) -> Figure:

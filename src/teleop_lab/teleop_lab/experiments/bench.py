@@ -29,10 +29,16 @@ SEEDS = 3
 """Sessions with different hands of which figures are the mean."""
 # What experiments look at; the rest of a recording, most of its memory, is let go.
 _KEPT = (
-    "master/measured_cp", "slave/servo_cp", "slave/servo_jp", "slave/setpoint_js",
-    "slave/setpoint_cp", "slave/measured_js", "slave/measured_cp", "slave/true_cp",
+    "master/measured_cp",
+    "slave/servo_cp",
+    "slave/servo_jp",
+    "slave/setpoint_js",
+    "slave/setpoint_cp",
+    "slave/measured_js",
+    "slave/measured_cp",
+    "slave/true_cp",
     "teleop/state",
-)  # fmt: skip
+)
 _OF_SLAVE = ("slave/setpoint_js", "slave/setpoint_cp", "slave/measured_js", "slave/true_cp")
 
 
@@ -98,11 +104,7 @@ class Bench:
     """
 
     def __init__(
-        self,
-        seed: int = 1,
-        progress: Progress = silent,
-        settings: Settings | None = None,
-        workers: int = 1,
+        self, seed: int = 1, progress: Progress = silent, settings: Settings | None = None, workers: int = 1
     ) -> None:
         if seed < 0:
             raise ParameterError("seed", seed, "0 or more")
@@ -121,9 +123,7 @@ class Bench:
         """How many sessions ran so far."""
         return len(self._known)
 
-    def session(
-        self, scenario: str, seed: int | None = None, settings: Settings | None = None
-    ) -> Session:
+    def session(self, scenario: str, seed: int | None = None, settings: Settings | None = None) -> Session:
         """Run a session, unless the same one ran before.
 
         Args:
@@ -172,11 +172,7 @@ class Bench:
         return ArmParameters.of(made.group("slave"), made.group("slave_sim"))
 
     def signals(
-        self,
-        scenario: str,
-        seconds: float,
-        settings: Settings | None = None,
-        motion: Motion | None = None,
+        self, scenario: str, seconds: float, settings: Settings | None = None, motion: Motion | None = None
     ) -> Mapping[str, Array]:
         """What the stages of a session say, a row for each tick, without its score: faster.
 
@@ -215,9 +211,7 @@ class Bench:
             self.progress(done, total)
             yield result
 
-    def _run(
-        self, scenario: str, seed: int, settings: Settings
-    ) -> tuple[Score, Mapping[str, Stream]]:
+    def _run(self, scenario: str, seed: int, settings: Settings) -> tuple[Score, Mapping[str, Stream]]:
         from teleop_core.session.api import run
 
         recording = run(scenario, seed=seed, settings=settings, progress=self.progress)

@@ -5,16 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from teleop_core.evaluation.figure import (
-    COMMAND,
-    FIRST,
-    FIXTURE,
-    MEASURED,
-    SECOND,
-    THIRD,
-    Figure,
-    time_axis,
-)
+from teleop_core.evaluation.figure import COMMAND, FIRST, FIXTURE, MEASURED, SECOND, THIRD, Figure, time_axis
 from teleop_core.evaluation.published import COARSE, FINE
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot
@@ -41,9 +32,11 @@ RESOLUTION_UM = 11.4
 """Resolution of the tip, by the encoders [µm] (Vongbunyong 2008, table 3.8)."""
 GOAL_UM = 3.0 * RESOLUTION_UM
 _STEPS: Settings = {
-    "reference_filter.is_on": False, "slave.interpolation": "none",
-    "slave.starts_at_home": True, "robot": "rcrt1",
-}  # fmt: skip
+    "reference_filter.is_on": False,
+    "slave.interpolation": "none",
+    "slave.starts_at_home": True,
+    "robot": "rcrt1",
+}
 _CURVE = 10
 
 
@@ -71,16 +64,18 @@ def tracking_of(session: Session) -> Tracking:
     """What is compared of a session of the RCRT-1, from when its slave follows."""
     kept = session.is_followed
     wanted, seen, true = (
-        1e3 * session.places_mm(f"slave/{name}")[kept]
-        for name in ("setpoint_cp", "measured_cp", "true_cp")
+        1e3 * session.places_mm(f"slave/{name}")[kept] for name in ("setpoint_cp", "measured_cp", "true_cp")
     )
     error, off = np.linalg.norm(seen - wanted, axis=1), true - wanted
     share = _effort_shares(session)[kept]
     return Tracking(
-        _rms(error), float(error.max()), _rms(np.linalg.norm(off, axis=1)),
+        _rms(error),
+        float(error.max()),
+        _rms(np.linalg.norm(off, axis=1)),
         _rms(np.linalg.norm(off - off.mean(axis=0), axis=1)),
-        100.0 * _rms(share), 100.0 * _rms(np.diff(share, axis=0)),
-    )  # fmt: skip
+        100.0 * _rms(share),
+        100.0 * _rms(np.diff(share, axis=0)),
+    )
 
 
 def _effort_shares(session: Session) -> Array:
@@ -124,29 +119,29 @@ def _tracking_rows(scenario: str, found: Mapping[str, list[Tracking]]) -> list[R
             value, is_judged = together(values), field == "rms" and law == "source_pid"
             is_reached = field == "rms" and value <= GOAL_UM
             rows.append(
-                Row(quantity=law, unit=unit, predicted=value, lowest=min(values),
-                    highest=max(values), group=f"{printed.mode}: {text}",
+                Row(
+                    quantity=law,
+                    unit=unit,
+                    predicted=value,
+                    lowest=min(values),
+                    highest=max(values),
+                    group=f"{printed.mode}: {text}",
                     published=1e3 * printed.position_mm[0] if is_judged else None,
                     within=percent(15.0) if is_judged else None,
-                    note=f"≤ {GOAL_UM:.0f} µm" if is_reached else "")
-            )  # fmt: skip
+                    note=f"≤ {GOAL_UM:.0f} µm" if is_reached else "",
+                )
+            )
     return rows
 
 
 def _step_rows(answers: Mapping[str, StepAnswer]) -> list[Row]:
     rows = []
     for text, unit, value in (
-        ("step of a joint, no filter: overshoot, largest of the joints", "%",
-         lambda one: 100.0 * one.overshoot.max()),
-        ("rest after it: error of the tip at the encoders, RMS", "µm",
-         lambda one: 1e6 * one.rest_error),
-        ("rest after it: largest travel of an encoder in 2 s", "counts",
-         lambda one: one.rest_travel.max()),
-    ):  # fmt: skip
-        rows += [
-            Row(quantity=law, unit=unit, predicted=value(answer), group=text)
-            for law, answer in answers.items()
-        ]
+        ("step of a joint, no filter: overshoot, largest of the joints", "%", lambda one: 100.0 * one.overshoot.max()),
+        ("rest after it: error of the tip at the encoders, RMS", "µm", lambda one: 1e6 * one.rest_error),
+        ("rest after it: largest travel of an encoder in 2 s", "counts", lambda one: one.rest_travel.max()),
+    ):
+        rows += [Row(quantity=law, unit=unit, predicted=value(answer), group=text) for law, answer in answers.items()]
     return rows
 
 
@@ -171,8 +166,7 @@ _NOTES = (
     "laws as its fitted mean, not as it wanders.",
     "The true tip is 5.5 mm off by the d3 offset that calibration finds (teleop calibrate); no law "
     "at the encoders sees it, nor play and tendons. About its mean is what would be left.",
-    "The plant has no elastic joints and no delay of drives beyond the tick; a machine that has "
-    "needs slower laws.",
+    "The plant has no elastic joints and no delay of drives beyond the tick; a machine that has needs slower laws.",
     "Learning, and knowing friction, win; their price is effort that follows the jitter of the "
     "setpoint. The weight of 1/3 removes the overshoot of steps, and tracks worst of our laws.",
 )
@@ -180,12 +174,9 @@ _NOTES = (
 
 def _trade_figure(scenario: str, found: Mapping[str, list[Tracking]]) -> Figure:
     traces = [
-        points(
-            np.array([one.chatter for one in several]), np.array([one.rms for one in several]),
-            law, color, "µm", k,
-        )
+        points(np.array([one.chatter for one in several]), np.array([one.rms for one in several]), law, color, "µm", k)
         for k, ((law, several), color) in enumerate(zip(found.items(), _COLORS, strict=True))
-    ]  # fmt: skip
+    ]
     shape, note = level(GOAL_UM, "3 × resolution")
     layout = {
         "xaxis": axis("change of effort from tick to tick, RMS", "% of the limit", type="log"),

@@ -24,7 +24,7 @@ _KEYS = ("task.time_s", "task.error_share", "task.effective_width_mm", "task.thr
 _FIXED: Settings = {
     "teleop.stages": ("network", "display", "task"),
     "feedback_timeout": 5.0,  # the line is late, not broken
-}  # fmt: skip
+}
 Scores = Callable[[str], "DataArray"]
 """Means over the seeds by the key of a score."""
 
@@ -35,9 +35,7 @@ def _study(bench: Bench, kind: str, delays: tuple[float, ...], gains: tuple[floa
 
     swept = {LATE: delays, GAIN: gains}
     fixed = {**_FIXED, "task.kind": kind}
-    found = Study("point", swept, tuple(bench.seeds), _KEYS, fixed).run(
-        jobs=bench.workers, progress=bench.progress
-    )
+    found = Study("point", swept, tuple(bench.seeds), _KEYS, fixed).run(jobs=bench.workers, progress=bench.progress)
     return lambda key: found[key].mean("seed")
 
 
@@ -45,9 +43,7 @@ def _rises(quantity: str, low: float, high: float, group: str) -> Row:
     """Whether a figure is larger in the second case, as the source says; 1 for yes."""
     is_so = float(high > low)
     note = f"{low:.3g} and {high:.3g}"
-    return Row(
-        quantity=quantity, published=1.0, predicted=is_so, within=EXACT, group=group, note=note
-    )
+    return Row(quantity=quantity, published=1.0, predicted=is_so, within=EXACT, group=group, note=note)
 
 
 def _delays(bench: Bench) -> Findings:
@@ -57,18 +53,21 @@ def _delays(bench: Bench) -> Findings:
     looks = (some - none) / DELAYS[1]
     pressing, group = "press in targets on a ring", "follow a point that wanders: order"
     rows = [
-        Row(quantity="looks in an attempt: its lengthening per delay", predicted=looks,
-            group=pressing),
+        Row(quantity="looks in an attempt: its lengthening per delay", predicted=looks, group=pressing),
         Row(quantity="time of an attempt, not late", unit="s", predicted=none, group=pressing),
-    ]  # fmt: skip
+    ]
     for delay, time in zip(DELAYS[2:], pressed[2:], strict=True):
         rows.append(
             Row(
-                quantity=f"time of an attempt, {1e3 * delay:g} ms late", unit="s",
-                published=none + looks * delay, predicted=float(time), basis="law",
-                within=percent(15.0), group=pressing,
+                quantity=f"time of an attempt, {1e3 * delay:g} ms late",
+                unit="s",
+                published=none + looks * delay,
+                predicted=float(time),
+                basis="law",
+                within=percent(15.0),
+                group=pressing,
             )
-        )  # fmt: skip
+        )
     for key, what in (("task.error_share", "errors"), ("task.effective_width_mm", "deviation")):
         values = followed(key).values[:, 0]
         for i, delay in enumerate(FOLLOWED[1:], start=1):
@@ -91,8 +90,7 @@ def _scaling(bench: Bench) -> Findings:
     score = _study(bench, "point", (0.0, SCALED), GAINS)
     late, rows = f"{1e3 * SCALED:g} ms late: order", []
     for larger, smaller in pairwise(GAINS):
-        for key, what in (("task.effective_width_mm", "spread of the end points"),
-                          ("task.error_share", "errors")):  # fmt: skip
+        for key, what in (("task.effective_width_mm", "spread of the end points"), ("task.error_share", "errors")):
             values = score(key).sel({LATE: SCALED})
             low, high = (float(values.sel({GAIN: gain})) for gain in (smaller, larger))
             if high > 0.0 or key != "task.error_share":
@@ -116,11 +114,14 @@ def _figure(score: Scores) -> Figure:
     widths = score("task.effective_width_mm")
     traces = [
         {
-            "type": "scatter", "mode": "lines+markers", "name": f"{1e3 * delay:g} ms late",
-            "x": list(GAINS), "y": widths.sel({LATE: delay}).values,
+            "type": "scatter",
+            "mode": "lines+markers",
+            "name": f"{1e3 * delay:g} ms late",
+            "x": list(GAINS),
+            "y": widths.sel({LATE: delay}).values,
         }
         for delay in (0.0, SCALED)
-    ]  # fmt: skip
+    ]
     layout = {
         "xaxis": {"title": {"text": "scale from hand to slave"}},
         "yaxis": {"title": {"text": "effective width [mm]"}},

@@ -71,9 +71,11 @@ def measure_drift(bench: Bench, job: Job) -> Drift:
     """
     material, passivity, round_trip = job
     settings = {
-        **far_settings(round_trip), "stages": ("network", "passivity"),
-        "reflection.passivity": passivity, "world.material": material,
-    }  # fmt: skip
+        **far_settings(round_trip),
+        "stages": ("network", "passivity"),
+        "reflection.passivity": passivity,
+        "world.material": material,
+    }
     seconds = _READY + _APPROACH + CONTACTS * _PERIOD + round_trip + _REST
     rows = bench.signals("palpation", seconds, settings, _motion)
     wanted, given = (rows[f"{name}_servo_cp"][:, :3] for name in ("network", "passivity"))
@@ -90,9 +92,13 @@ def measure_drift(bench: Bench, job: Job) -> Drift:
     off = rows["slave_measured_cp"][-_STILL:, :3].mean(0) - wanted[-_STILL:].mean(0)
     ports = rows["master_energy"][-1] + rows["slave_energy"][-1]
     return Drift(
-        np.array(leaving), np.array(left), float(drift.max()), float(np.linalg.norm(off)),
-        float(ports[OUT] - ports[IN]), float(force.max()),
-    )  # fmt: skip
+        np.array(leaving),
+        np.array(left),
+        float(drift.max()),
+        float(np.linalg.norm(off)),
+        float(ports[OUT] - ports[IN]),
+        float(force.max()),
+    )
 
 
 def _rows(found: Mapping[Job, Drift]) -> tuple[Row, ...]:
@@ -101,9 +107,13 @@ def _rows(found: Mapping[Job, Drift]) -> tuple[Row, ...]:
         group = f"{material}, passivity {passivity}, round trip {1e3 * round_trip:.0f} ms"
         ended = len(drift.left)
         rows.append(
-            Row(quantity=f"contacts that ended, of {CONTACTS}", predicted=float(ended),
-                note="" if ended == CONTACTS else "the arm was stopped", group=group)
-        )  # fmt: skip
+            Row(
+                quantity=f"contacts that ended, of {CONTACTS}",
+                predicted=float(ended),
+                note="" if ended == CONTACTS else "the arm was stopped",
+                group=group,
+            )
+        )
         if ended == CONTACTS:
             rows += [
                 Row(quantity="drift as the tip leaves", unit="mm", group=group,
@@ -119,10 +129,9 @@ def _rows(found: Mapping[Job, Drift]) -> tuple[Row, ...]:
             ]  # fmt: skip
         rows += [
             Row(quantity="drift, peak", unit="mm", predicted=1e3 * drift.peak, group=group),
-            Row(quantity="energy out less in, both ports", unit="mJ", predicted=1e3 * drift.given,
-                group=group),
+            Row(quantity="energy out less in, both ports", unit="mJ", predicted=1e3 * drift.given, group=group),
             Row(quantity="force on the tip, peak", unit="N", predicted=drift.force, group=group),
-        ]  # fmt: skip
+        ]
     return tuple(rows)
 
 
@@ -137,11 +146,8 @@ def _figure(found: Mapping[Job, Drift]) -> Figure:
                 trace["line"]["dash"] = "dot" if when == "leaving" else "solid"
                 traces.append(trace)
     shape, note = level(GOAL_MM, "goal")
-    layout = {"xaxis": axis("contact"), "yaxis": axis("drift", "mm"), "shapes": [shape],
-              "annotations": [note]}  # fmt: skip
-    sentence = (
-        f"Drift over a round trip of {1e3 * ROUND_TRIPS[-1]:.0f} ms; dotted as the tip leaves."
-    )
+    layout = {"xaxis": axis("contact"), "yaxis": axis("drift", "mm"), "shapes": [shape], "annotations": [note]}
+    sentence = f"Drift over a round trip of {1e3 * ROUND_TRIPS[-1]:.0f} ms; dotted as the tip leaves."
     return Figure("Drift, contact after contact", sentence, traces, layout, 420)
 
 
@@ -164,8 +170,7 @@ def report(found: Mapping[Job, Drift]) -> Findings:
 
 
 def _measure(bench: Bench) -> Findings:
-    jobs = [(material, passivity, late) for material in MATERIALS for passivity in PASSIVITIES
-            for late in ROUND_TRIPS]  # fmt: skip
+    jobs = [(material, passivity, late) for material in MATERIALS for passivity in PASSIVITIES for late in ROUND_TRIPS]
     return report(dict(zip(jobs, bench.map(measure_drift, jobs), strict=True)))
 
 

@@ -38,9 +38,8 @@ class Experiment:
             text = f"one whose measure returns Findings, not a {type(found).__name__}"
             raise PartError("experiment", self.name, text)
         return Outcome(
-            self.name, self.title, self.source, bench.seed,
-            tuple(found.rows), tuple(found.figures), tuple(found.notes),
-        )  # fmt: skip
+            self.name, self.title, self.source, bench.seed, tuple(found.rows), tuple(found.figures), tuple(found.notes)
+        )
 
 
 def _checked(name: str, part: object) -> Experiment:

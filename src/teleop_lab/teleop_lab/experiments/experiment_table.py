@@ -92,9 +92,12 @@ def outcome_table(outcome: "Outcome") -> Table:
     has_ours = any(row.ours is not None for row in outcome.rows)
     has_spread = any(spread(row) for row in outcome.rows)
     table = Table(
-        box=SIMPLE, title=f"[bold]{escape(outcome.name)}[/bold]: {escape(outcome.title)}",
-        title_justify="left", pad_edge=False, padding=(0, 1, 0, 0),
-    )  # fmt: skip
+        box=SIMPLE,
+        title=f"[bold]{escape(outcome.name)}[/bold]: {escape(outcome.title)}",
+        title_justify="left",
+        pad_edge=False,
+        padding=(0, 1, 0, 0),
+    )
     table.add_column("", min_width=20)
     table.add_column("unit", style="dim", no_wrap=True)
     heads = ["published", "predicted", *["seeds"] * has_spread, *["ours"] * has_ours, "difference"]
@@ -112,9 +115,13 @@ def outcome_table(outcome: "Outcome") -> Table:
             cells = [published, predicted, *[spread(row)] * has_spread, *[ours] * has_ours]
             note = f" [dim]({escape(row.note)})[/dim]" if row.note else ""
             table.add_row(
-                f"{escape(row.quantity)}{note}", escape(row.unit), *map(escape, cells),
-                escape(difference), escape(within(row)), mark,
-            )  # fmt: skip
+                f"{escape(row.quantity)}{note}",
+                escape(row.unit),
+                *map(escape, cells),
+                escape(difference),
+                escape(within(row)),
+                mark,
+            )
     return table
 
 

@@ -25,10 +25,13 @@ def _laws() -> list[Row]:
         found = [movement_time(way, width, lag)[0] for way in WAYS for width in WIDTHS]
         rows.append(
             Row(
-                quantity=f"time of movement, {1e3 * lag:g} ms late", unit="s", published=time,
-                predicted=sum(found) / len(found), group="pointing",
+                quantity=f"time of movement, {1e3 * lag:g} ms late",
+                unit="s",
+                published=time,
+                predicted=sum(found) / len(found),
+                group="pointing",
             )
-        )  # fmt: skip
+        )
     return rows
 
 
@@ -43,11 +46,15 @@ def _sessions(bench: Bench) -> list[Row]:
         law = times[0] * (CYCLE + latency) / (CYCLE + LATENCIES[0])
         rows.append(
             Row(
-                quantity=f"time of an attempt, display {1e3 * latency:g} ms late", unit="s",
-                published=law, predicted=time, basis="law", within=percent(15.0),
+                quantity=f"time of an attempt, display {1e3 * latency:g} ms late",
+                unit="s",
+                published=law,
+                predicted=time,
+                basis="law",
+                within=percent(15.0),
                 group="through master, mapping, arm and display",
             )
-        )  # fmt: skip
+        )
     return rows
 
 

@@ -28,12 +28,18 @@ def _measure(bench: Bench) -> Findings:
         ours = _rms(bench.sessions(name, OURS))
         ours_off = _rms(bench.sessions(name, {**OURS, **_OFF}))
         rows += [
-            Row(quantity="with compensation", unit="mm", published=printed.position_mm[0],
-                predicted=with_it, ours=ours, within=percent(15.0), group=group),
+            Row(
+                quantity="with compensation",
+                unit="mm",
+                published=printed.position_mm[0],
+                predicted=with_it,
+                ours=ours,
+                within=percent(15.0),
+                group=group,
+            ),
             Row(quantity="without", unit="mm", predicted=without, ours=ours_off, group=group),
-            Row(quantity="without over with", predicted=without / with_it,
-                ours=ours_off / ours, group=group),
-        ]  # fmt: skip
+            Row(quantity="without over with", predicted=without / with_it, ours=ours_off / ours, group=group),
+        ]
         figures.append(_figure(printed.mode, on[0], off[0]))
     return Findings((*rows, *_effort_rows()), tuple(figures), _NOTES)
 
@@ -53,16 +59,19 @@ def _effort_rows() -> list[Row]:
     level[1] = 0.5 * np.pi
     group = "efforts that hold the arm (eqs. 4.6.6-4.6.8, computed, not printed)"
     rows = []
-    for q, where, values in (
-        (robot.home, "at home", (-1.4084, -3.0740)),
-        (level, "arm level", (-1.8141, 0.0)),
-    ):
+    for q, where, values in ((robot.home, "at home", (-1.4084, -3.0740)), (level, "arm level", (-1.8141, 0.0))):
         robot.dynamics.gravity(q, robot.dynamics.parameters, held)
         for k, value, name, unit in ((1, values[0], "C2", "N·m"), (2, values[1], "C3", "N")):
             rows.append(
-                Row(quantity=f"{name} {where}", unit=unit, published=value, predicted=held[k],
-                    within=percent(0.1), group=group)
-            )  # fmt: skip
+                Row(
+                    quantity=f"{name} {where}",
+                    unit=unit,
+                    published=value,
+                    predicted=held[k],
+                    within=percent(0.1),
+                    group=group,
+                )
+            )
     return rows
 
 

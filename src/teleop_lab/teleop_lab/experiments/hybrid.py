@@ -29,29 +29,40 @@ def _measure(_: Bench) -> Findings:
     offset = np.array([0.0, 0.0, _HEIGHT_CM]) + _TOOL_CM * turned[:, 2]
     back = 1e2 * robot.fk(q)[:3, 3]
     rows = [
-        Row(quantity=f"leg {k}", unit="cm", published=printed, predicted=1e2 * found,
-            within=_LENGTH, group="inverse kinematics")
+        Row(
+            quantity=f"leg {k}",
+            unit="cm",
+            published=printed,
+            predicted=1e2 * found,
+            within=_LENGTH,
+            group="inverse kinematics",
+        )
         for k, (printed, found) in enumerate(zip(_LEGS_CM, q[3:], strict=True), start=1)
-    ]  # fmt: skip
+    ]
     rows += [
-        Row(quantity=name, unit=unit, published=printed, predicted=found, within=within,
-            group="inverse kinematics")
+        Row(quantity=name, unit=unit, published=printed, predicted=found, within=within, group="inverse kinematics")
         for name, unit, printed, found, within in (
             ("theta1", "°", 0.0, math.degrees(q[0]), _ANGLE),
             ("theta2", "°", 30.0, math.degrees(q[1]), _ANGLE),
             ("d3", "cm", 15.0, 1e2 * q[2], _LENGTH),
         )
-    ]  # fmt: skip
+    ]
     for name, printed, found in (
         ("tool from the SCARA's tip", _OFFSET_CM, offset),
         ("tip of the SCARA", _WRIST_CM, np.array(_PLACE_CM) - offset),
         ("tool, forward again", _PLACE_CM, back),
     ):
         rows += [
-            Row(quantity=f"{name}, {letter}", unit="cm", published=printed[k],
-                predicted=float(found[k]), within=_LENGTH, group="places")
+            Row(
+                quantity=f"{name}, {letter}",
+                unit="cm",
+                published=printed[k],
+                predicted=float(found[k]),
+                within=_LENGTH,
+                group="places",
+            )
             for k, letter in enumerate("xyz")
-        ]  # fmt: skip
+        ]
     return Findings(tuple(rows), (_figure(q, turned),), _NOTES)
 
 
@@ -73,9 +84,7 @@ def _figure(q: Array, turned: Array) -> Figure:
     top = tip + _HEIGHT_CM * up + _PLATFORM_CM * circle @ turned.T
     arm = np.vstack((np.zeros(3), elbow, reach, tip))
     tool = np.vstack((tip + _HEIGHT_CM * up, _PLACE_CM))
-    legs = np.vstack(
-        [np.vstack((b, t, np.full(3, np.nan))) for b, t in zip(base, top, strict=True)]
-    )
+    legs = np.vstack([np.vstack((b, t, np.full(3, np.nan))) for b, t in zip(base, top, strict=True)])
     rings = [np.vstack((ring, ring[:1])) for ring in (base, top)]
     traces = [
         in_space(arm, "SCARA", FIRST, 6),

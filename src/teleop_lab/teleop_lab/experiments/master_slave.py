@@ -16,14 +16,7 @@ from teleop_core.evaluation.figure import (
     stacked_axes,
     time_axis,
 )
-from teleop_core.evaluation.published import (
-    ANGLE_FACTOR,
-    BOX_OVERSHOOT_MM,
-    COARSE,
-    FINE,
-    POSITION_SHARE,
-    Published,
-)
+from teleop_core.evaluation.published import ANGLE_FACTOR, BOX_OVERSHOOT_MM, COARSE, FINE, POSITION_SHARE, Published
 from teleop_core.kernels.geometry import Array, roll_pitch_yaw, rotations_from_quaternions
 from teleop_core.shapes.basis.drawing import edges_of
 from teleop_lab.drawing import FIXTURE, axis, in_planes, in_space, level, line, scene
@@ -72,10 +65,15 @@ def figures_of(session: Session) -> Figures:
     off = (session.places_mm("slave/measured_cp") - session.places_mm("slave/setpoint_cp"))[kept]
     about = off - off.mean(axis=0)
     return Figures(
-        position, roll, pitch, yaw, beyond or 0.0, float(np.linalg.norm(off, axis=1).min()),
+        position,
+        roll,
+        pitch,
+        yaw,
+        beyond or 0.0,
+        float(np.linalg.norm(off, axis=1).min()),
         float(np.linalg.norm(off.mean(axis=0))),
         float(np.sqrt((about**2).sum(axis=1).mean())),
-    )  # fmt: skip
+    )
 
 
 def _row(
@@ -95,9 +93,11 @@ def _mode_rows(name: str, found: list[Figures], ours: list[Figures]) -> list[Row
     group = f"{printed.mode}, gain {printed.gain:g}"
     rows = []
     for field, text, unit, within in (
-        ("position_mm", "position", "mm", _RMS), ("roll_deg", "roll", "°", _TURN_RMS),
-        ("pitch_deg", "pitch", "°", _TURN_RMS), ("yaw_deg", "yaw", "°", _TURN_RMS),
-    ):  # fmt: skip
+        ("position_mm", "position", "mm", _RMS),
+        ("roll_deg", "roll", "°", _TURN_RMS),
+        ("pitch_deg", "pitch", "°", _TURN_RMS),
+        ("yaw_deg", "yaw", "°", _TURN_RMS),
+    ):
         for k, kind in enumerate(("RMS", "max")):
             values, others = ([getattr(f, field)[k] for f in which] for which in (found, ours))
             rows.append(
@@ -125,10 +125,7 @@ def _measure(bench: Bench) -> Findings:
     ours = {name: [figures_of(s) for s in bench.sessions(name, OURS)] for name in MODES}
     rows = [row for name in MODES for row in _mode_rows(name, found[name], ours[name])]
     ratios, others = (_ratios(which) for which in (found, ours))
-    rows.append(
-        _row("position RMS, fine over coarse", "", round(_RATIO, 3), ratios, others,
-             absolute(0.12), "both")
-    )  # fmt: skip
+    rows.append(_row("position RMS, fine over coarse", "", round(_RATIO, 3), ratios, others, absolute(0.12), "both"))
     drawn = [figure for name in MODES for figure in _figures(name, sessions[name][0])]
     drawn.append(_both_boxes({name: several[0] for name, several in sessions.items()}))
     return Findings(tuple(rows), tuple(drawn), _NOTES)
@@ -173,10 +170,7 @@ def drawn_of(session: Session) -> Drawn:
     """Samples of a session from when its box came on."""
     state = session["teleop/state"]
     on = int(np.argmax(state["is_fixture_on"] > 0.0))
-    center, size = (
-        1e3 * state[[f"fixture_{kind}_{letter}" for letter in "xyz"]][on]
-        for kind in ("center", "size")
-    )
+    center, size = (1e3 * state[[f"fixture_{kind}_{letter}" for letter in "xyz"]][on] for kind in ("center", "size"))
     kept = session.time >= state.time[on]
     turned = [
         roll_pitch_yaw(rotations_from_quaternions(session[topic][_QUATERNION][kept]))
@@ -184,9 +178,13 @@ def drawn_of(session: Session) -> Drawn:
     ]
     turns = np.degrees((turned[0] - turned[1] + np.pi) % (2.0 * np.pi) - np.pi)
     return Drawn(
-        session.time[kept] - session.time[kept][0], session.places_mm("slave/measured_cp")[kept],
-        session.places_mm("slave/setpoint_cp")[kept], turns, center, size,
-    )  # fmt: skip
+        session.time[kept] - session.time[kept][0],
+        session.places_mm("slave/measured_cp")[kept],
+        session.places_mm("slave/setpoint_cp")[kept],
+        turns,
+        center,
+        size,
+    )
 
 
 def _figures(name: str, session: Session) -> list[Figure]:
@@ -243,12 +241,14 @@ def _error_figure(name: str, found: Drawn) -> Figure:
     whole = np.linalg.norm(off, axis=1)
     traces.append(line(found.times[::_CURVE], whole[::_CURVE], "distance", MEASURED, 1.4))
     shapes, notes = zip(
-        level(printed.position_mm[0], "published RMS"),
-        level(printed.position_mm[1], "published max"),
-        strict=True,
+        level(printed.position_mm[0], "published RMS"), level(printed.position_mm[1], "published max"), strict=True
     )
-    layout = {"xaxis": time_axis(), "yaxis": axis("position error", "mm"), "shapes": list(shapes),
-              "annotations": list(notes)}  # fmt: skip
+    layout = {
+        "xaxis": time_axis(),
+        "yaxis": axis("position error", "mm"),
+        "shapes": list(shapes),
+        "annotations": list(notes),
+    }
     sentence = (
         f"Measured less reference: {np.sqrt(np.mean(whole**2)):.3f} mm RMS, {whole.max():.3f} mm "
         "at most in this session."
@@ -259,9 +259,7 @@ def _error_figure(name: str, found: Drawn) -> Figure:
 def _turn_figure(name: str, found: Drawn) -> Figure:
     printed, layout, traces = MODES[name], stacked_axes(("roll", "pitch", "yaw"), "°"), []
     shapes = []
-    for row, (text, color) in enumerate(
-        zip(("roll", "pitch", "yaw"), (FIRST, SECOND, THIRD), strict=True)
-    ):
+    for row, (text, color) in enumerate(zip(("roll", "pitch", "yaw"), (FIRST, SECOND, THIRD), strict=True)):
         place = {"yaxis": f"y{axis_suffix(row)}"}
         curve = line(found.times[::_CURVE], found.turns[::_CURVE, row], text, color, 1.0, "°")
         traces.append({**curve, **place})
@@ -269,8 +267,7 @@ def _turn_figure(name: str, found: Drawn) -> Figure:
         shapes += [level(sign * rms, "", place["yaxis"])[0] for sign in (-1.0, 1.0)]
     layout["shapes"] = shapes
     sentence = (
-        "Measured less reference; dotted: the published root mean squares. The source calls roll "
-        "yaw and yaw roll."
+        "Measured less reference; dotted: the published root mean squares. The source calls roll yaw and yaw roll."
     )
     return Figure(f"Roll, pitch and yaw errors, {printed.mode}", sentence, traces, layout, 440)
 
@@ -281,10 +278,7 @@ def _both_boxes(sessions: dict[str, Session]) -> Figure:
     for name, color in (("coarse_box", COMMAND), ("fine_box", MEASURED)):
         found, mode = drawn_of(sessions[name]), MODES[name].mode
         path = found.measured[::_PATH] - found.center
-        traces += [
-            in_space(path, mode, color, 2),
-            in_space(edges_of(found.size), f"box, {mode}", FIXTURE, 3),
-        ]
+        traces += [in_space(path, mode, color, 2), in_space(edges_of(found.size), f"box, {mode}", FIXTURE, 3)]
     sentence = "Paths of both modes around the centres of their boxes."
     return Figure("Both boxes", sentence, traces, scene("mm"), 480)
 

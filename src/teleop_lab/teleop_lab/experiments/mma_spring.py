@@ -20,30 +20,39 @@ def _measure(_: Bench) -> Findings:
     total = sum(mma_balance.MASSES.values())
     spring = mma_balance.ShoulderSpring()
     rows = [
-        Row(quantity="total mass", unit="g", published=310.36, predicted=1e3 * total,
-            within=EXACT, group="masses, table 5.1",
-            note="not the sum of its rows, 307.36, with which it computes")
-    ]  # fmt: skip
+        Row(
+            quantity="total mass",
+            unit="g",
+            published=310.36,
+            predicted=1e3 * total,
+            within=EXACT,
+            group="masses, table 5.1",
+            note="not the sum of its rows, 307.36, with which it computes",
+        )
+    ]
     first, second = (
-        float(mma_balance.gravity_torque(total, arm))
-        for arm in (mma_balance.ARM_AT_45_DEGREES, mma_balance.ARM_LEVEL)
+        float(mma_balance.gravity_torque(total, arm)) for arm in (mma_balance.ARM_AT_45_DEGREES, mma_balance.ARM_LEVEL)
     )
     group = "torque about the shoulder"
     rows += [
-        Row(quantity=name, unit="N·m", published=printed, predicted=value, within=absolute(1e-4),
-            group=group)
+        Row(quantity=name, unit="N·m", published=printed, predicted=value, within=absolute(1e-4), group=group)
         for name, printed, value in (
-            ("link 2 at 45°", 1.0349, first), ("link 2 level", 1.1926, second),
+            ("link 2 at 45°", 1.0349, first),
+            ("link 2 level", 1.1926, second),
             ("difference", 0.1577, second - first),
         )
-    ]  # fmt: skip
+    ]
     rows += [*_spring_rows(spring, second - first), *_coil_rows()]
     load = mma_balance.shoulder_load(np.radians([-45.0, 0.0]), spring)
     rows += [
-        Row(quantity=f"left for the hand, link 2 {pose}", unit="N·m", predicted=float(left),
-            group="what the spring does")
+        Row(
+            quantity=f"left for the hand, link 2 {pose}",
+            unit="N·m",
+            predicted=float(left),
+            group="what the spring does",
+        )
         for pose, left in zip(("at 45°", "level"), load.residual, strict=True)
-    ]  # fmt: skip
+    ]
     return Findings(tuple(rows), (_figure(spring),), _NOTES)
 
 
@@ -66,10 +75,9 @@ def _spring_rows(spring: mma_balance.ShoulderSpring, difference: float) -> list[
         ("rate with safety 1.15", "N/m", 754.57, _SAFETY * rate),
     )
     return [
-        Row(quantity=name, unit=unit, published=printed, predicted=value, within=_CLOSE,
-            group="spring, eqs. 5.22-5.33")
+        Row(quantity=name, unit=unit, published=printed, predicted=value, within=_CLOSE, group="spring, eqs. 5.22-5.33")
         for name, unit, printed, value in found
-    ]  # fmt: skip
+    ]
 
 
 def _coil_rows() -> list[Row]:
@@ -82,11 +90,17 @@ def _coil_rows() -> list[Row]:
         ("pitch", "mm", 4.31, 1e3 * wound.pitch),
     )
     return [
-        Row(quantity=name, unit=unit, published=printed, predicted=value, within=percent(0.2),
+        Row(
+            quantity=name,
+            unit=unit,
+            published=printed,
+            predicted=value,
+            within=percent(0.2),
             group="coil, table 5.2",
-            note="needs 42.5 GPa, which is not printed; steel would need 24" * (name == "turns"))
+            note="needs 42.5 GPa, which is not printed; steel would need 24" * (name == "turns"),
+        )
         for name, unit, printed, value in found
-    ]  # fmt: skip
+    ]
 
 
 def _figure(spring: mma_balance.ShoulderSpring) -> Figure:

@@ -226,14 +226,21 @@ def boundary_from_below(rate_at: Callable[[float], float], start: float) -> floa
 
 
 _MAPPING = {
-    "reflection.architecture": "position_force", "reflection.max_force": 10.0,
-    "feedback_timeout": 5.0, "reach_force.is_on": False,
-}  # fmt: skip
+    "reflection.architecture": "position_force",
+    "reflection.max_force": 10.0,
+    "feedback_timeout": 5.0,
+    "reach_force.is_on": False,
+}
 _IDEAL_DEVICE = {
-    "device.friction": 0.0, "device.position_resolution": 0.0, "device.gimbal_noise": 0.0,
-    "device.stiffness": (1e7,) * 3, "device.structure_damping": 1e3, "device.peak_force": 50.0,
-    "device.continuous_force": 50.0, "force_range": 1000.0,
-}  # fmt: skip
+    "device.friction": 0.0,
+    "device.position_resolution": 0.0,
+    "device.gimbal_noise": 0.0,
+    "device.stiffness": (1e7,) * 3,
+    "device.structure_damping": 1e3,
+    "device.peak_force": 50.0,
+    "device.continuous_force": 50.0,
+    "force_range": 1000.0,
+}
 
 
 def ideal_device(grip: Grip, **own: float) -> HapticMasterParameters:
@@ -245,8 +252,14 @@ def ideal_device(grip: Grip, **own: float) -> HapticMasterParameters:
     """
     parameters = build(HapticMasterParameters, _IDEAL_DEVICE)
     device = min(parameters.device.apparent_mass, grip.mass - _LEAST_HAND)
-    return build(HapticMasterParameters, _IDEAL_DEVICE | {
-        "device.apparent_mass": device, "hand.mass": grip.mass - device,
-        "hand.stiffness": grip.stiffness, "hand.damping": grip.damping,
-        **{f"device.{name}": value for name, value in own.items()},
-    })  # fmt: skip
+    return build(
+        HapticMasterParameters,
+        _IDEAL_DEVICE
+        | {
+            "device.apparent_mass": device,
+            "hand.mass": grip.mass - device,
+            "hand.stiffness": grip.stiffness,
+            "hand.damping": grip.damping,
+            **{f"device.{name}": value for name, value in own.items()},
+        },
+    )

@@ -222,10 +222,15 @@ class Outcome:
     def to_json(self) -> dict[str, Plain]:
         """The outcome as plain values, without its plots; numbers are exact."""
         return {
-            "name": self.name, "title": self.title, "source": self.source, "seed": self.seed,
-            "judged": self.judged, "agreeing": self.agreeing,
-            "rows": [row.to_json() for row in self.rows], "notes": list(self.notes),
-        }  # fmt: skip
+            "name": self.name,
+            "title": self.title,
+            "source": self.source,
+            "seed": self.seed,
+            "judged": self.judged,
+            "agreeing": self.agreeing,
+            "rows": [row.to_json() for row in self.rows],
+            "notes": list(self.notes),
+        }
 
     def __str__(self) -> str:
         from teleop_lab.experiments.experiment_table import text

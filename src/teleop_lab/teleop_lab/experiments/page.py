@@ -92,9 +92,7 @@ def _counts(outcome: Outcome) -> str:
     """Of published figures, laws and goals, those that there are."""
     found = {basis: outcome.count(basis) for basis in BASES}
     return "; ".join(
-        f"{kept} of {of}" + f" {basis}s" * (basis != "printed")
-        for basis, (kept, of) in found.items()
-        if of
+        f"{kept} of {of}" + f" {basis}s" * (basis != "printed") for basis, (kept, of) in found.items() if of
     )
 
 
@@ -129,10 +127,7 @@ def _table(outcome: Outcome) -> str:
     has_spread = any(spread(row) for row in outcome.rows)
     heads = ["published", "predicted", *["seeds"] * has_spread, *["ours"] * has_ours]
     cells = "".join(f"<th{_wide(head == 'seeds')}>{head}</th>" for head in heads)
-    lines = [
-        f"<thead><tr><th></th><th></th>{cells}<th>difference</th>"
-        '<th class="wide">within</th></tr></thead>'
-    ]
+    lines = [f'<thead><tr><th></th><th></th>{cells}<th>difference</th><th class="wide">within</th></tr></thead>']
     columns = len(heads) + 4
     for group, rows in groupby(outcome.rows, key=lambda row: row.group):
         if group:

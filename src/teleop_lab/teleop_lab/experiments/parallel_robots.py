@@ -23,17 +23,26 @@ _LOOP = FourBar(4.0, 1.0, 3.5, 2.5)
 def _count_rows() -> list[Row]:
     group = "mobility, eq. 1"
     rows = [
-        Row(quantity=f"freedoms, {name}", published=float(printed),
+        Row(
+            quantity=f"freedoms, {name}",
+            published=float(printed),
             predicted=float(mobility.degrees_of_freedom(links, joints, freedoms, space=space)),
-            within=EXACT, group=group,
-            note="spoken as three; the formula gives six" * (name == "three-fingered hand"))
+            within=EXACT,
+            group=group,
+            note="spoken as three; the formula gives six" * (name == "three-fingered hand"),
+        )
         for name, (space, links, joints, freedoms, printed) in _COUNTS.items()
-    ]  # fmt: skip
+    ]
     return rows + [
-        Row(quantity=f"passive joints, {name}", published=float(printed),
-            predicted=float(mobility.passive_joints(joints, freedoms)), within=EXACT, group=group)
+        Row(
+            quantity=f"passive joints, {name}",
+            published=float(printed),
+            predicted=float(mobility.passive_joints(joints, freedoms)),
+            within=EXACT,
+            group=group,
+        )
         for name, joints, freedoms, printed in (("4-bar", 4, 1, 3), ("3-RPS", 9, 3, 6))
-    ]  # fmt: skip
+    ]
 
 
 def _measure(_: Bench) -> Findings:
@@ -44,18 +53,12 @@ def _figure() -> Figure:
     around = np.linspace(-180.0, 180.0, 361)
     closure = _LOOP.close(np.radians(around))
     first, second = np.degrees(closure.phi1).T
-    traces = [
-        line(around, first, "one assembly", FIRST, 2.0, "°"),
-        line(around, second, "the other", SECOND, 2.0, "°"),
-    ]
+    traces = [line(around, first, "one assembly", FIRST, 2.0, "°"), line(around, second, "the other", SECOND, 2.0, "°")]
     layout = {"xaxis": axis("theta1", "°"), "yaxis": axis("phi1", "°")}
     sentence = "Rocker over crank of the 4-bar, in both assemblies."
     return Figure("4-bar", sentence, traces, layout, 320)
 
 
 PARALLEL_ROBOTS = Experiment(
-    "parallel_robots",
-    "mobility of four mechanisms, loop of the 4-bar",
-    "Ghosal 2020, lecture 11, eqs. 1-5",
-    _measure,
+    "parallel_robots", "mobility of four mechanisms, loop of the 4-bar", "Ghosal 2020, lecture 11, eqs. 1-5", _measure
 )

@@ -77,11 +77,14 @@ def visits_of(session: Session, p: TourParameters, center: Array, approach_s: fl
     drawing = path[(times > p.visit_time) & (times < p.visit_time + p.trace_time)]
     is_visiting = (times > 0.0) & (times <= p.visit_time)
     return Visits(
-        targets, means - targets, np.array([row.max() for row in away]),
+        targets,
+        means - targets,
+        np.array([row.max() for row in away]),
         np.array([row.mean() for row in away]),
         np.array([_in_plane(drawing - target).min() for target in targets]),
-        path[is_visiting], drawing,
-    )  # fmt: skip
+        path[is_visiting],
+        drawing,
+    )
 
 
 def _in_plane(off: Array) -> Array:
@@ -123,10 +126,7 @@ def _measure(bench: Bench) -> Findings:
     seen = _visits(bench, PREDICTED, seeing=True)
     ours = {"blind": _visits(bench, OURS, seeing=False), "seen": _visits(bench, OURS, seeing=True)}
 
-    def add(
-        which: str, text: str, unit: str, value: Callable[[Visits], float],
-        published: float | None = None,
-    ) -> None:  # fmt: skip
+    def add(which: str, text: str, unit: str, value: Callable[[Visits], float], published: float | None = None) -> None:
         values = [value(v) for v in (seen if which == "seen" else blind)]
         others = [value(v) for v in ours[which]]
         rows.append(
@@ -141,12 +141,7 @@ def _measure(bench: Bench) -> Findings:
     add("blind", "points with the tip inside the inner circle", "", _held)
     add("blind", "distance from a point at rest, mean", "mm", lambda v: float(v.mean_mm.mean()))
     add("blind", "points that the line meets within it", "", _met)
-    add(
-        "blind",
-        "distance of the line from a point, largest",
-        "mm",
-        lambda v: float(v.line_mm.max()),
-    )
+    add("blind", "distance of the line from a point, largest", "mm", lambda v: float(v.line_mm.max()))
     figures = _figure(seen[0], seeing=True), _figure(blind[0], seeing=False)
     return Findings(tuple(rows), figures, _NOTES)
 
@@ -177,9 +172,7 @@ def _figure(visits: Visits, *, seeing: bool) -> Figure:
     ]
     if not seeing:  # one that sees corrects each stop, of which the line knows nothing
         drawn.append((visits.tracing[::5], "line", MEASURED, 1.5))
-    traces = [
-        line(-path[:, 1], path[:, 0], name, color, width) for path, name, color, width in drawn
-    ]
+    traces = [line(-path[:, 1], path[:, 0], name, color, width) for path, name, color, width in drawn]
     for trace in traces:
         trace["hovertemplate"] = "%{x:.3f}, %{y:.3f} mm"
     layout = {"xaxis": axis("-y", "mm"), "yaxis": axis("x", "mm", scaleanchor="x")}

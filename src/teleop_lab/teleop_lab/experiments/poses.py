@@ -62,10 +62,10 @@ def _rows_of(number: int, target: Target, robot: Robot) -> list[Row]:
         for name, printed, found in zip("xyz", target.place_mm, pose[:3, 3], strict=True)
     ]  # fmt: skip
     rows += [
-        Row(quantity=f"{column}{name}", published=target.turn[i][j], predicted=pose[i, j],
-            within=_TURN, group=group)
-        for j, column in enumerate("noa") for i, name in enumerate("xyz")
-    ]  # fmt: skip
+        Row(quantity=f"{column}{name}", published=target.turn[i][j], predicted=pose[i, j], within=_TURN, group=group)
+        for j, column in enumerate("noa")
+        for i, name in enumerate("xyz")
+    ]
     return rows
 
 
@@ -75,13 +75,15 @@ def _measure(_: Bench) -> Findings:
     home = 1e3 * robot.fk(robot.home)[:3, 3]
     group = "home, table 6.1 against the joints of table 6.2"
     rows += [
-        Row(quantity=name, unit="mm", published=printed, predicted=found, within=_PLACE,
-            group=group, note=note)
+        Row(quantity=name, unit="mm", published=printed, predicted=found, within=_PLACE, group=group, note=note)
         for name, printed, found, note in zip(
-            "xyz", (416.901, 0.0, -194.414), home,
-            ("printed with a wrong sign", "", "both tables differ by 3.4 and 12.5 mm"), strict=True,
+            "xyz",
+            (416.901, 0.0, -194.414),
+            home,
+            ("printed with a wrong sign", "", "both tables differ by 3.4 and 12.5 mm"),
+            strict=True,
         )
-    ]  # fmt: skip
+    ]
     return Findings(tuple(rows), (_figure(robot),), _NOTES)
 
 

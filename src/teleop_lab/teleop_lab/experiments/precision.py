@@ -22,9 +22,13 @@ from teleop_lab.fitting.rests import rest_positions
 _RUNS = 10
 # Table 7.7, mm: RMS, S.D., largest, smallest of each point.
 _SUMMARY = (
-    (0.098, 0.039, 0.152, 0.053), (0.432, 0.025, 0.459, 0.373), (0.387, 0.050, 0.514, 0.341),
-    (0.138, 0.033, 0.184, 0.073), (0.143, 0.025, 0.177, 0.112), (0.076, 0.017, 0.105, 0.054),
-)  # fmt: skip
+    (0.098, 0.039, 0.152, 0.053),
+    (0.432, 0.025, 0.459, 0.373),
+    (0.387, 0.050, 0.514, 0.341),
+    (0.138, 0.033, 0.184, 0.073),
+    (0.143, 0.025, 0.177, 0.112),
+    (0.076, 0.017, 0.105, 0.054),
+)
 _PRECISION_MM, _REPEATABILITY_MM = 0.514, 0.050  # table 8.1; the latter is printed as 0.005
 _SOURCE = "Vongbunyong 2008, tables 7.1-7.7 and 8.1, misprints corrected"
 
@@ -96,9 +100,7 @@ def _measure_precision(bench: Bench) -> Findings:
             Row(quantity="largest", unit="mm", published=largest,
                 predicted=predicted.errors_mm[k].max(), ours=ours.errors_mm[k].max(), group=group),
         ]  # fmt: skip
-    return Findings(
-        tuple(rows), (_error_figure(predicted, ours), *_joint_figures(predicted)), _NOTES
-    )
+    return Findings(tuple(rows), (_error_figure(predicted, ours), *_joint_figures(predicted)), _NOTES)
 
 
 _NOTES = (
@@ -117,8 +119,7 @@ def _error_figure(predicted: Rests, ours: Rests) -> Figure:
         points(place, predicted.errors_mm.ravel(), "predicted, source's PID", MEASURED),
         points(place, ours.errors_mm.ravel(), "ours, same plant", FIRST, mark=2),
     ]
-    layout = {"xaxis": axis("point; ten runs to each"),
-              "yaxis": axis("error of the tip", "mm", rangemode="tozero")}  # fmt: skip
+    layout = {"xaxis": axis("point; ten runs to each"), "yaxis": axis("error of the tip", "mm", rangemode="tozero")}
     sentence = "Error of the tip at rest, from encoder angles, in all sixty runs."
     return Figure("Errors at rest (figures 7.3-7.14)", sentence, traces, layout, 400)
 
@@ -131,12 +132,8 @@ def _joint_figures(predicted: Rests) -> list[Figure]:
     for joint in (0, 1, 3):
         step = robot.drives.encoder_step[joint]
         traces = [
-            published_points(
-                place, printed.off[..., joint].mean(axis=1) / step, "published", "counts"
-            ),
-            points(
-                place, predicted.off[..., joint].mean(axis=1) / step, "predicted", SECOND, "counts"
-            ),
+            published_points(place, printed.off[..., joint].mean(axis=1) / step, "published", "counts"),
+            points(place, predicted.off[..., joint].mean(axis=1) / step, "predicted", SECOND, "counts"),
         ]
         layout = {"xaxis": axis("point"), "yaxis": axis("rest less target", "counts")}
         name = robot.joint_names[joint]
@@ -149,9 +146,15 @@ def _measure_repeatability(bench: Bench) -> Findings:
     predicted, ours = simulated_rests(bench, PREDICTED), simulated_rests(bench, OURS)
     spread, spread_ours = (2.0 * r.errors_mm.std(axis=1, ddof=1) for r in (predicted, ours))
     rows = [
-        Row(quantity="repeatability: 2 S.D. of point 2", unit="mm", published=_REPEATABILITY_MM,
-            predicted=spread[1], ours=spread_ours[1], within=factor(2.0)),
-    ]  # fmt: skip
+        Row(
+            quantity="repeatability: 2 S.D. of point 2",
+            unit="mm",
+            published=_REPEATABILITY_MM,
+            predicted=spread[1],
+            ours=spread_ours[1],
+            within=factor(2.0),
+        )
+    ]
     rows += [
         Row(quantity=f"2 S.D. of point {k + 1}", unit="mm", published=2.0 * sd,
             predicted=spread[k], ours=spread_ours[k], within=factor(2.0))
@@ -164,19 +167,22 @@ def _measure_repeatability(bench: Bench) -> Findings:
     ):
         printed, simulated, own = (float(values.max()) for values in found)
         rows.append(
-            Row(quantity=f"ISO 9283, {name}: largest of the points", unit="mm", published=printed,
-                predicted=simulated, ours=own)
-        )  # fmt: skip
+            Row(
+                quantity=f"ISO 9283, {name}: largest of the points",
+                unit="mm",
+                published=printed,
+                predicted=simulated,
+                ours=own,
+            )
+        )
     text = "The source calls 2 S.D. of point 2 its repeatability; table 8.1 prints it as 0.005."
     also = "It has no figures of ISO 9283; those in its column follow from its tables of rests."
     return Findings(tuple(rows), (), (text, also))
 
 
 PRECISION = Experiment(
-    "precision", "six points, ten moves from home to each: how far the tip rests off", _SOURCE,
-    _measure_precision,
-)  # fmt: skip
+    "precision", "six points, ten moves from home to each: how far the tip rests off", _SOURCE, _measure_precision
+)
 REPEATABILITY = Experiment(
-    "repeatability", "the same moves: how much the rests of ten runs differ", _SOURCE,
-    _measure_repeatability,
-)  # fmt: skip
+    "repeatability", "the same moves: how much the rests of ten runs differ", _SOURCE, _measure_repeatability
+)

@@ -18,10 +18,15 @@ from teleop_lab.experiments.outcome import Findings, Row, absolute
 from teleop_lab.experiments.transmission import CHANNELS, Way, far_settings
 
 WAYS: tuple[Way, ...] = (
-    ("position_force", "none"), ("position_force", "tank"), ("position_force", "tdpa"),
-    ("position_force", "wave"), ("position_position", "none"), ("impedance", "none"),
-    ("three_channel", "none"), ("four_channel", "none"),
-)  # fmt: skip
+    ("position_force", "none"),
+    ("position_force", "tank"),
+    ("position_force", "tdpa"),
+    ("position_force", "wave"),
+    ("position_position", "none"),
+    ("impedance", "none"),
+    ("three_channel", "none"),
+    ("four_channel", "none"),
+)
 """Architectures and passivities, as of the experiment ``transparency``."""
 ROUND_TRIPS = (0.0, 0.1, 0.2, 0.4)
 """Half of it each way [s]."""
@@ -69,11 +74,13 @@ def _settings(way: Way, round_trip: float) -> Settings:
     channels = CHANNELS[architecture]
     ports = ("passivity",) if passivity in ("tdpa", "wave") else ()
     return {
-        **far_settings(round_trip), "coarse_gain": 1.0, "tremor_amplitude": 0.0,
+        **far_settings(round_trip),
+        "coarse_gain": 1.0,
+        "tremor_amplitude": 0.0,
         "stages": ("network", *channels.stages, *ports),
         "reflection.architecture": channels.architecture or architecture,
         "reflection.passivity": passivity,
-    }  # fmt: skip
+    }
 
 
 def measure_puncture(bench: Bench, job: Job) -> Puncture:
@@ -102,9 +109,7 @@ def measure_puncture(bench: Bench, job: Job) -> Puncture:
         return Puncture(float(falls[begin]), drop, math.inf, math.inf)
     noticed = hears + int(fell[0])
     stop = 1e-3 * (noticed - led) + _REACTION
-    stopped = bench.signals(
-        "puncture", seconds + _REACTION + late, settings, partial(_motion, stop=stop)
-    )
+    stopped = bench.signals("puncture", seconds + _REACTION + late, settings, partial(_motion, stop=stop))
     height = stopped["slave_true_cp"][:, 2]
     deepest = float(height[begin] - height[begin:].min())
     return Puncture(float(falls[begin]), drop, 1e-3 * (noticed - begin), deepest)
@@ -116,16 +121,26 @@ def _rows(found: Mapping[Job, Puncture]) -> tuple[Row, ...]:
         group, told = f"{architecture}, passivity {passivity}", f", {1e3 * late:.0f} ms"
         if math.isnan(each.notice):
             rows.append(
-                Row(quantity=f"fall of the force on the tip{told}", unit="N", group=group,
-                    predicted=each.tip_drop, note="the membrane holds")
-            )  # fmt: skip
+                Row(
+                    quantity=f"fall of the force on the tip{told}",
+                    unit="N",
+                    group=group,
+                    predicted=each.tip_drop,
+                    note="the membrane holds",
+                )
+            )
             continue
         is_noticed = math.isfinite(each.notice)
         rows.append(
-            Row(quantity=f"fall of the force at the hand{told}", unit="N", group=group,
-                published=each.tip_drop, predicted=each.hand_drop,
-                note="" if is_noticed else "the hand does not notice")
-        )  # fmt: skip
+            Row(
+                quantity=f"fall of the force at the hand{told}",
+                unit="N",
+                group=group,
+                published=each.tip_drop,
+                predicted=each.hand_drop,
+                note="" if is_noticed else "the hand does not notice",
+            )
+        )
         if not is_noticed:
             continue
         rows += [
@@ -150,8 +165,11 @@ def _figure(found: Mapping[Job, Puncture]) -> Figure:
     least = 1e3 * np.array([least_overshoot(each) for each in ROUND_TRIPS])
     traces = [joined(late, least, "least", PUBLISHED, "mm")]
     for way, color in _COLORS.items():
-        kept = [(1e3 * job[1], 1e3 * each.overshoot) for job, each in found.items()
-                if job[0] == way and math.isfinite(each.overshoot)]  # fmt: skip
+        kept = [
+            (1e3 * job[1], 1e3 * each.overshoot)
+            for job, each in found.items()
+            if job[0] == way and math.isfinite(each.overshoot)
+        ]
         if kept:
             trips, overshoots = np.array(kept).T
             traces.append(joined(trips, overshoots, f"{way[0]}, {way[1]}", color, "mm"))
@@ -161,10 +179,12 @@ def _figure(found: Mapping[Job, Puncture]) -> Figure:
 
 
 _COLORS = {
-    ("position_force", "none"): FIRST, ("position_force", "wave"): SECOND,
-    ("position_position", "none"): FIXTURE, ("impedance", "none"): MEASURED,
+    ("position_force", "none"): FIRST,
+    ("position_force", "wave"): SECOND,
+    ("position_position", "none"): FIXTURE,
+    ("impedance", "none"): MEASURED,
     ("four_channel", "none"): THIRD,
-}  # fmt: skip
+}
 _NOTES = (
     f"The hand pushes on with {1e3 * SPEED:g} mm/s through the membrane of the scenario puncture. "
     f"It notices when its force fell by {100.0 * NOTICED:g} % and stops {1e3 * _REACTION:g} ms "
@@ -172,8 +192,7 @@ _NOTES = (
     "Published: of the force at the hand, the fall on the tip; of the time until it is noticed, "
     "the way of the news, half a round trip; of the overshoot, speed times round trip and "
     "reaction. These are laws; no number that a source measured is here.",
-    "An overshoot is larger than the least one, for hand and tissue spring forward as the "
-    "membrane gives way.",
+    "An overshoot is larger than the least one, for hand and tissue spring forward as the membrane gives way.",
     "Where the membrane holds, passivity holds the arm back before it.",
 )
 

@@ -19,9 +19,12 @@ _COEFFICIENTS = {"of the last output": 0.99, "of the last input": -0.09, "of the
 _STEP = (0.1, 0.109, 0.11791)
 _BEFORE, _AFTER = 2e-3, 5e-4
 _RESTS: Settings = {
-    "operator.kind": "hold", "operator.rotation": 0.0, "operator.tremor_amplitude": 0.0,
-    "buttons.fixture": (), "duration": 16.0,
-}  # fmt: skip
+    "operator.kind": "hold",
+    "operator.rotation": 0.0,
+    "operator.tremor_amplitude": 0.0,
+    "buttons.fixture": (),
+    "duration": 16.0,
+}
 _JUDGED = "theta5"  # which the gimbal turns one to one; near the home pose theta4 and 6 turn more
 _WRIST = ("theta4", "theta5", "theta6")
 _QUIET_S = 6.0  # after the approach, and after the filter has settled
@@ -53,32 +56,54 @@ def gain_at(frequency: Array) -> Array:
 def _measure(bench: Bench) -> Findings:
     found = (lag(0.0, 0.0, 1.0), lag(0.0, 1.0, 0.0), lag(1.0, 0.0, 0.0))
     rows = [
-        Row(quantity=f"coefficient {name}", published=printed, predicted=value,
-            within=EXACT, group="difference equation at 1 kHz")
+        Row(
+            quantity=f"coefficient {name}",
+            published=printed,
+            predicted=value,
+            within=EXACT,
+            group="difference equation at 1 kHz",
+        )
         for (name, printed), value in zip(_COEFFICIENTS.items(), found, strict=True)
-    ]  # fmt: skip
+    ]
     rows += [
-        Row(quantity=f"unit step after {k} ticks", published=printed, predicted=value,
-            within=EXACT, basis="law", group=rows[0].group)
+        Row(
+            quantity=f"unit step after {k} ticks",
+            published=printed,
+            predicted=value,
+            within=EXACT,
+            basis="law",
+            group=rows[0].group,
+        )
         for k, (printed, value) in enumerate(zip(_STEP, step_response(3), strict=True), start=1)
-    ]  # fmt: skip
+    ]
     rows += [
-        Row(quantity="gain at rest", published=1.0, predicted=float(gain_at(np.zeros(1))[0]),
-            within=EXACT, group="gain"),
-        Row(quantity="gain at 50 Hz", published=0.1, predicted=float(gain_at(np.array([50.0]))[0]),
-            within=absolute(0.01), group="gain"),
+        Row(
+            quantity="gain at rest", published=1.0, predicted=float(gain_at(np.zeros(1))[0]), within=EXACT, group="gain"
+        ),
+        Row(
+            quantity="gain at 50 Hz",
+            published=0.1,
+            predicted=float(gain_at(np.array([50.0]))[0]),
+            within=absolute(0.01),
+            group="gain",
+        ),
         Row(quantity="lag behind a ramp", unit="ms", predicted=_ramp_lag_ms(), group="gain"),
-    ]  # fmt: skip
+    ]
     session = bench.session("coarse_box", settings=_RESTS)
     jitter = {name: _jitter(session, name) for name in _WRIST}
     group = "jitter of the references with the stylus at rest, half of peak to peak"
     for when, printed, which in (("before", _BEFORE, 0), ("after", _AFTER, 1)):
         rows += [
-            Row(quantity=f"{when} the filter, {name}", unit="rad", predicted=pair[which],
+            Row(
+                quantity=f"{when} the filter, {name}",
+                unit="rad",
+                predicted=pair[which],
                 published=printed if name == _JUDGED else None,
-                within=factor(1.5) if name == _JUDGED else None, group=group)
+                within=factor(1.5) if name == _JUDGED else None,
+                group=group,
+            )
             for name, pair in jitter.items()
-        ]  # fmt: skip
+        ]
     return Findings(tuple(rows), (_jitter_figure(session), _gain_figure()), _NOTES)
 
 

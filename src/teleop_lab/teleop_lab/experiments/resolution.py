@@ -15,10 +15,8 @@ from teleop_lab.experiments.outcome import EXACT, Findings, Row, percent
 _DEGREE, _UM = math.pi / 180.0, 1e-6
 # Printed steps of the joints [°] and of the screw [µm]; the source's own appendix A.4 has the
 # screw's, where table 3.6 prints 13.161 µm.
-_JOINTS = {"theta1": 1.0e-3, "theta2": 1.0e-3, "theta4": 1.247e-3, "theta5": 2.313e-3,
-           "theta6": 2.313e-3}  # fmt: skip
-_SPEEDS_RPM = {"theta1": 30.0, "theta2": 30.0, "theta4": 70.213, "theta5": 130.263,
-               "theta6": 130.263}  # fmt: skip
+_JOINTS = {"theta1": 1.0e-3, "theta2": 1.0e-3, "theta4": 1.247e-3, "theta5": 2.313e-3, "theta6": 2.313e-3}
+_SPEEDS_RPM = {"theta1": 30.0, "theta2": 30.0, "theta4": 70.213, "theta5": 130.263, "theta6": 130.263}
 _SCREW_UM, _SCREW_RPM, _LEAD_MM = 0.1316, 3719.677, 1.0
 # Reach of the prismatic link and the tip as the source rounds it [m], and its tip steps [µm].
 _REACH, _TIP_UM, _TIP_ALL_UM = 0.460, 8.029, 11.355
@@ -35,10 +33,16 @@ def _measure(_: Bench) -> Findings:
     steps = dict(zip(robot.joint_names, robot.drives.encoder_step, strict=True))
     speeds = dict(zip(robot.joint_names, robot.drives.speed_limit, strict=True))
     rows = [
-        Row(quantity=f"step of {name}", unit="°", published=printed,
-            predicted=steps[name] / _DEGREE, within=percent(0.1), group="encoders, table 3.6")
+        Row(
+            quantity=f"step of {name}",
+            unit="°",
+            published=printed,
+            predicted=steps[name] / _DEGREE,
+            within=percent(0.1),
+            group="encoders, table 3.6",
+        )
         for name, printed in _JOINTS.items()
-    ]  # fmt: skip
+    ]
     rows += [
         Row(quantity="step of d3", unit="µm", published=_SCREW_UM, predicted=steps["d3"] / _UM,
             within=percent(0.1), group=rows[0].group, note="table 3.6 misprints 13.161"),
@@ -47,26 +51,41 @@ def _measure(_: Bench) -> Findings:
     each = np.array([*turning, steps["d3"] / _UM])
     group = "tip at a reach of 460 mm, ΔS = L Δθ"
     rows += [
-        Row(quantity="tip, theta1", unit="µm", published=_TIP_UM, predicted=each[0],
-            within=percent(0.1), group=group),
-        Row(quantity="tip, theta2", unit="µm", published=_TIP_UM, predicted=each[1],
-            within=percent(0.1), group=group),
-        Row(quantity="tip, d3", unit="µm", published=_SCREW_UM, predicted=each[2],
-            within=percent(0.1), group=group),
-        Row(quantity="tip, all axes", unit="µm", published=_TIP_ALL_UM,
-            predicted=float(np.linalg.norm(each)), within=percent(0.1), group=group,
-            note="root of the sum of squares"),
-    ]  # fmt: skip
+        Row(quantity="tip, theta1", unit="µm", published=_TIP_UM, predicted=each[0], within=percent(0.1), group=group),
+        Row(quantity="tip, theta2", unit="µm", published=_TIP_UM, predicted=each[1], within=percent(0.1), group=group),
+        Row(quantity="tip, d3", unit="µm", published=_SCREW_UM, predicted=each[2], within=percent(0.1), group=group),
+        Row(
+            quantity="tip, all axes",
+            unit="µm",
+            published=_TIP_ALL_UM,
+            predicted=float(np.linalg.norm(each)),
+            within=percent(0.1),
+            group=group,
+            note="root of the sum of squares",
+        ),
+    ]
     group = "speeds of the drives, table 3.6"
     rows += [
-        Row(quantity=f"speed of {name}", unit="rpm", published=printed,
-            predicted=speeds[name] * 60.0 / (2.0 * math.pi), within=percent(0.1), group=group)
+        Row(
+            quantity=f"speed of {name}",
+            unit="rpm",
+            published=printed,
+            predicted=speeds[name] * 60.0 / (2.0 * math.pi),
+            within=percent(0.1),
+            group=group,
+        )
         for name, printed in _SPEEDS_RPM.items()
-    ]  # fmt: skip
+    ]
     rows.append(
-        Row(quantity="speed of the screw", unit="rpm", published=_SCREW_RPM,
-            predicted=speeds["d3"] * 60.0 / (1e-3 * _LEAD_MM), within=EXACT, group=group)
-    )  # fmt: skip
+        Row(
+            quantity="speed of the screw",
+            unit="rpm",
+            published=_SCREW_RPM,
+            predicted=speeds["d3"] * 60.0 / (1e-3 * _LEAD_MM),
+            within=EXACT,
+            group=group,
+        )
+    )
     return Findings(tuple(rows), (_figure(steps),), _NOTES)
 
 
@@ -80,14 +99,11 @@ def _figure(steps: dict[str, float]) -> Figure:
     traces = [
         joined(reach * 1e3, each["theta1"], "theta1 or theta2 alone", FIRST, "µm"),
         joined(reach * 1e3, total, "theta1, theta2 and d3", SECOND, "µm"),
-        points(
-            np.array([460.0, 460.0]), np.array([_TIP_UM, _TIP_ALL_UM]), "published", "#111", "µm", 0
-        ),
+        points(np.array([460.0, 460.0]), np.array([_TIP_UM, _TIP_ALL_UM]), "published", "#111", "µm", 0),
     ]
     for trace in traces[:2]:
         trace["mode"] = "lines"
-    layout = {"xaxis": axis("reach", "mm"),
-              "yaxis": axis("way of one step", "µm", rangemode="tozero")}  # fmt: skip
+    layout = {"xaxis": axis("reach", "mm"), "yaxis": axis("way of one step", "µm", rangemode="tozero")}
     sentence = "What one encoder step moves the tip, over its distance from the shoulder."
     return Figure("Resolution of the tip", sentence, traces, layout, 340)
 

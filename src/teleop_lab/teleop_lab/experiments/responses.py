@@ -109,31 +109,45 @@ def _transient(found: Response) -> tuple[float, float, float]:
 def _measure(bench: Bench) -> Findings:
     predicted, ours = _responses(bench, PREDICTED), _responses(bench, OURS)
     rows = [
-        Row(quantity=f"error at rest, point {k}", unit="mm", published=printed,
-            predicted=_rest_mm(found), ours=_rest_mm(other), within=factor(1.6),
+        Row(
+            quantity=f"error at rest, point {k}",
+            unit="mm",
+            published=printed,
+            predicted=_rest_mm(found),
+            ours=_rest_mm(other),
+            within=factor(1.6),
             group="read from its plots",
-            note="text repeats that of point 2; table 7.7 has 0.387" * (k == 3))
-        for k, (printed, found, other) in enumerate(
-            zip(_AT_REST_MM, predicted, ours, strict=True), start=1)
-    ]  # fmt: skip
+            note="text repeats that of point 2; table 7.7 has 0.387" * (k == 3),
+        )
+        for k, (printed, found, other) in enumerate(zip(_AT_REST_MM, predicted, ours, strict=True), start=1)
+    ]
     rows.append(
-        Row(quantity="error at rest along z, point 3", unit="mm", published=_POINT_3_Z_MM,
+        Row(
+            quantity="error at rest along z, point 3",
+            unit="mm",
+            published=_POINT_3_Z_MM,
             predicted=abs(float(predicted[2].error_mm[-1, 2])),
-            ours=abs(float(ours[2].error_mm[-1, 2])), within=factor(1.6),
-            group="read from its plots")
-    )  # fmt: skip
+            ours=abs(float(ours[2].error_mm[-1, 2])),
+            within=factor(1.6),
+            group="read from its plots",
+        )
+    )
     for text, unit, printed_of, number in (
         ("largest error", "mm", _LARGEST_MM, 0),
         ("time of it", "s", _PEAK_S, 1),
         ("settled at", "s", _SETTLED_S, 2),
     ):
         rows += [
-            Row(quantity=f"{text}, point {k}", unit=unit, group="on the way, of figures 7.4-7.14",
-                published=printed, predicted=_transient(found)[number],
-                ours=_transient(other)[number])
-            for k, (printed, found, other) in enumerate(
-                zip(printed_of, predicted, ours, strict=True), start=1)
-        ]  # fmt: skip
+            Row(
+                quantity=f"{text}, point {k}",
+                unit=unit,
+                group="on the way, of figures 7.4-7.14",
+                published=printed,
+                predicted=_transient(found)[number],
+                ours=_transient(other)[number],
+            )
+            for k, (printed, found, other) in enumerate(zip(printed_of, predicted, ours, strict=True), start=1)
+        ]
     figures = [
         figure
         for k, found in enumerate(predicted, start=1)
@@ -152,14 +166,10 @@ _NOTES = (
 
 def _error_figure(point: int, found: Response) -> Figure:
     off, times = found.error_mm[::_CURVE], found.times[::_CURVE]
-    traces = [
-        line(times, off[:, k], "xyz"[k], color, 1.2)
-        for k, color in enumerate((FIRST, SECOND, THIRD))
-    ]
+    traces = [line(times, off[:, k], "xyz"[k], color, 1.2) for k, color in enumerate((FIRST, SECOND, THIRD))]
     traces.append(line(times, np.linalg.norm(off, axis=1), "distance", MEASURED, 1.6))
     shape, note = level(_AT_REST_MM[point - 1], "published, at rest")
-    layout = {"xaxis": time_axis(), "yaxis": axis("error of the tip", "mm"), "shapes": [shape],
-              "annotations": [note]}  # fmt: skip
+    layout = {"xaxis": time_axis(), "yaxis": axis("error of the tip", "mm"), "shapes": [shape], "annotations": [note]}
     sentence = f"Reached less wanted: {_rest_mm(found):.3f} mm at rest."
     title = f"Point {point}: error (of figures 7.3-7.15)"
     return Figure(title, sentence, traces, layout, 320)
@@ -173,13 +183,9 @@ def _place_figure(point: int, found: Response) -> Figure:
             (found.wanted_mm, "wanted", REFERENCE, 4.0),
             (found.reached_mm, "reached", MEASURED, 1.2),
         ):
-            traces.append(
-                {**line(found.times[::_CURVE], path[::_CURVE, row], name, color, width), **place}
-            )
+            traces.append({**line(found.times[::_CURVE], path[::_CURVE, row], name, color, width), **place})
     sentence = "Way of the tip from home."
-    return Figure(
-        f"Point {point}: displacement (of figures 7.3-7.15)", sentence, traces, layout, 400
-    )
+    return Figure(f"Point {point}: displacement (of figures 7.3-7.15)", sentence, traces, layout, 400)
 
 
 def _joint_figure(point: int, found: Response) -> Figure:
@@ -194,9 +200,7 @@ def _joint_figure(point: int, found: Response) -> Figure:
             (found.measured, "measured", MEASURED, 1.2),
         ):
             values = _SCALES[row] * joints[::_CURVE, row]
-            traces.append(
-                {**line(found.times[::_CURVE], values, text, color, width, unit), **place}
-            )
+            traces.append({**line(found.times[::_CURVE], values, text, color, width, unit), **place})
     title = f"Point {point}: joints (figure E.{point})"
     return Figure(title, "References and encoders of all joints.", traces, layout, 760)
 

@@ -34,10 +34,7 @@ _COLORS = (COMMAND, DARK, FIRST, SECOND, THIRD, MEASURED, FIXTURE)
 _FAULTS = faults_of(load_robot("rcrt1"))
 _DELAY, _GAIN = "plant.hardware.effort_delay", "plant.hardware.drive_gain"
 _GEARS: Settings = {"plant.hardware.gear_stiffness": (5000.0, 5000.0, 0.0, 0.0, 0.0, 0.0)}
-_LIGHT: Settings = {
-    **_GEARS,
-    "plant.hardware.motor_inertia": tuple((0.5 * _FAULTS.motors).tolist()),
-}
+_LIGHT: Settings = {**_GEARS, "plant.hardware.motor_inertia": tuple((0.5 * _FAULTS.motors).tolist())}
 _TWICE: Settings = {"plant.hardware.coulomb": tuple((2.0 * _FAULTS.coulomb).tolist())}
 DISTURBANCES: Mapping[str, Settings] = {
     "the plant as it is": {},
@@ -110,19 +107,33 @@ def _measure(bench: Bench) -> Findings:
             found[disturbance, law] = error
             note = "refused" if error is None else f"max {error[1]:.0f}"
             rows.append(
-                Row(quantity=law, unit="µm", predicted=None if error is None else error[0],
-                    group=f"tracking error, RMS: {disturbance}", note=note)
-            )  # fmt: skip
+                Row(
+                    quantity=law,
+                    unit="µm",
+                    predicted=None if error is None else error[0],
+                    group=f"tracking error, RMS: {disturbance}",
+                    note=note,
+                )
+            )
     for law in LAWS:
         rows.append(
-            Row(quantity=law, unit="ms", predicted=delay_margin(bench, law),
-                group="delay margin: efforts may be so late")
-        )  # fmt: skip
+            Row(
+                quantity=law,
+                unit="ms",
+                predicted=delay_margin(bench, law),
+                group="delay margin: efforts may be so late",
+            )
+        )
     rows += [
-        Row(quantity=law, unit="", predicted=gain_margin(bench, law),
-            group="gain margin: drives may give so many times as much", note="at most 10 tried")
+        Row(
+            quantity=law,
+            unit="",
+            predicted=gain_margin(bench, law),
+            group="gain margin: drives may give so many times as much",
+            note="at most 10 tried",
+        )
         for law in LAWS
-    ]  # fmt: skip
+    ]
     return Findings(tuple(rows), (_figure(found),), _NOTES)
 
 
@@ -139,13 +150,17 @@ _NOTES = (
 def _figure(found: Mapping[tuple[str, str], tuple[float, float] | None]) -> Figure:
     names = list(DISTURBANCES)
     traces = [
-        {"type": "bar", "name": law, "x": names, "marker": {"color": color},
-         "y": [None if (e := found[name, law]) is None else e[0] for name in names],
-         "hovertemplate": "%{y:.0f} µm"}
+        {
+            "type": "bar",
+            "name": law,
+            "x": names,
+            "marker": {"color": color},
+            "y": [None if (e := found[name, law]) is None else e[0] for name in names],
+            "hovertemplate": "%{y:.0f} µm",
+        }
         for law, color in zip(LAWS, _COLORS, strict=True)
-    ]  # fmt: skip
-    layout = {"barmode": "group", "xaxis": {"automargin": True},
-              "yaxis": axis("tracking error, RMS", "µm", type="log")}  # fmt: skip
+    ]
+    layout = {"barmode": "group", "xaxis": {"automargin": True}, "yaxis": axis("tracking error, RMS", "µm", type="log")}
     sentence = "Tracking error of each law on plants that differ; what has no bar is refused."
     return Figure("Laws on other plants", sentence, traces, layout, 460)
 

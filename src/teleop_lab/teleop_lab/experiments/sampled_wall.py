@@ -130,9 +130,7 @@ def wall_boundary(grip: one_axis.Grip, damping: float, late: int) -> float:
         late: Periods by which its force comes late.
     """
     start = 0.3 * one_axis.sampled_boundary(grip, late, damping)
-    return one_axis.boundary_from_below(
-        lambda stiffness: wall_growth(grip, Wall(stiffness, damping, late)), start
-    )
+    return one_axis.boundary_from_below(lambda stiffness: wall_growth(grip, Wall(stiffness, damping, late)), start)
 
 
 def press_energy(damping: float, wall: Wall, length: int, speed: float) -> float:
@@ -164,10 +162,7 @@ def press_energy(damping: float, wall: Wall, length: int, speed: float) -> float
 def passive_boundary(damping: float, wall_damping: float, length: int, speed: float) -> float:
     """Stiffness [N/m] above which a press gives energy; the wall's work is linear in it."""
     tried = 1000.0
-    soft, stiff = (
-        press_energy(damping, Wall(stiffness, wall_damping), length, speed)
-        for stiffness in (0.0, tried)
-    )
+    soft, stiff = (press_energy(damping, Wall(stiffness, wall_damping), length, speed) for stiffness in (0.0, tried))
     return tried * soft / (soft - stiff)
 
 

@@ -29,8 +29,7 @@ def _measure(bench: Bench) -> Findings:
     for k, group in enumerate(("at the encoders, RMS", "at the true tip, RMS")):
         rows.append(Row(quantity="all faults", unit="mm", predicted=whole[k], group=group))
         rows += [
-            Row(quantity=f"without {name}", unit="mm", predicted=found[k], group=group)
-            for name, found in alone.items()
+            Row(quantity=f"without {name}", unit="mm", predicted=found[k], group=group) for name, found in alone.items()
         ]
         rows.append(Row(quantity="without any", unit="mm", predicted=none[k], group=group))
     return Findings(tuple(rows), (_figure(whole, alone),), _NOTES)
@@ -50,8 +49,7 @@ def _figure(whole: tuple[float, float], alone: dict[str, tuple[float, float]]) -
         less = np.array([whole[k] - alone[name][k] for name in names])
         traces.append({"type": "bar", "orientation": "h", "name": place, "x": less, "y": names,
                        "marker": {"color": color}, "hovertemplate": "%{x:.3f} mm"})  # fmt: skip
-    layout = {"xaxis": axis("error that goes with it", "mm"), "yaxis": {"automargin": True},
-              "barmode": "group"}  # fmt: skip
+    layout = {"xaxis": axis("error that goes with it", "mm"), "yaxis": {"automargin": True}, "barmode": "group"}
     sentence = "By how much the RMS error of coarse_box falls when one fault is switched off."
     return Figure("What each fault adds", sentence, traces, layout, 380)
 

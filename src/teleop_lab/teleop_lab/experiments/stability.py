@@ -26,9 +26,11 @@ DELAYS = (0.0, 0.02, 0.05, 0.1, 0.2)
 SOFTEST, STIFFEST = 20.0, 50_000.0
 """Objects that are tried [N/m]: softer than tissue, and steel."""
 _WAYS: tuple[Way, ...] = (
-    ("position_force", "none"), ("position_force", "tank"), ("position_position", "none"),
+    ("position_force", "none"),
+    ("position_force", "tank"),
+    ("position_position", "none"),
     ("position_force", "tdpa"),
-)  # fmt: skip
+)
 _TWO_PORTS = ("tdpa",)
 """Passivities that need the slave's port."""
 _ROUNDS = 8
@@ -47,16 +49,22 @@ def _settings(grip: Grip, delay: float, stiffness: float, way: Way) -> Settings:
     late = [f"slave/measured_{kind}@motion_scaling={delay + 1e-3}" for kind in ("cf", "cp")]
     late += [f"slave/energy@motion_scaling={delay + 1e-3}" for _ in ports]
     return {
-        "world.material": "own", "world.stiffness": stiffness, "world.damping": 0.0,
-        "world.friction_coefficient": 0.0, "reflection.max_force": 10.0, "feedback_timeout": 1.0,
+        "world.material": "own",
+        "world.stiffness": stiffness,
+        "world.damping": 0.0,
+        "world.friction_coefficient": 0.0,
+        "reflection.max_force": 10.0,
+        "feedback_timeout": 1.0,
         "reflection.architecture": channels.architecture or architecture,
         "reflection.passivity": passivity,
-        "hand.mass": grip.mass - _APPARENT_MASS, "hand.stiffness": grip.stiffness,
+        "hand.mass": grip.mass - _APPARENT_MASS,
+        "hand.stiffness": grip.stiffness,
         "hand.damping": grip.damping,
         # An arm that is pressed into steel goes on: one that its fault stops would look calm.
         "operation.reported": ("effort",),
-        "delays": tuple(late), "stages": (*channels.stages, *ports),
-    }  # fmt: skip
+        "delays": tuple(late),
+        "stages": (*channels.stages, *ports),
+    }
 
 
 def fastest(bench: Bench, grip: Grip, delay: float, stiffness: float, way: Way) -> float:
@@ -102,21 +110,31 @@ def _measure(bench: Bench) -> Findings:
             told = f"force {1e3 * delay:.0f} ms later"
             exact = exact_boundary(grip, delay + DT)
             rows.append(
-                Row(quantity=told, unit="N/m", published=exact, basis="law",
-                    predicted=found_boundary(grip, delay), within=percent(2.0),
-                    group=f"one axis before a spring, {name} grip")
-            )  # fmt: skip
+                Row(
+                    quantity=told,
+                    unit="N/m",
+                    published=exact,
+                    basis="law",
+                    predicted=found_boundary(grip, delay),
+                    within=percent(2.0),
+                    group=f"one axis before a spring, {name} grip",
+                )
+            )
             found[name, delay] = tuple(chain_boundary(bench, grip, delay, way) for way in _WAYS)
             done += 1
             bench.progress(done, total)
     for k, (architecture, passivity) in enumerate(_WAYS):
         rows += [
-            Row(quantity=f"force {1e3 * delay:.0f} ms later", unit="N/m",
+            Row(
+                quantity=f"force {1e3 * delay:.0f} ms later",
+                unit="N/m",
                 predicted=found[name, delay][k],
                 group=f"whole chain, {name} grip, {architecture}, passivity {passivity}",
-                note="stiffest tried" if found[name, delay][k] == STIFFEST else "")
-            for name in GRIPS for delay in DELAYS
-        ]  # fmt: skip
+                note="stiffest tried" if found[name, delay][k] == STIFFEST else "",
+            )
+            for name in GRIPS
+            for delay in DELAYS
+        ]
     return Findings(tuple(rows), (_figure(found),), _NOTES)
 
 
@@ -139,16 +157,17 @@ def _figure(found: Mapping[tuple[str, float], tuple[float, ...]]) -> Figure:
         exact = np.array([exact_boundary(grip, delay + DT) for delay in smooth])
         whole, tank, spring, tdpa = np.array([found[name, delay] for delay in DELAYS]).T
         traces += [
-            {**line(1e3 * smooth, exact, f"{name}, one exact axis", color, 1.2, "N/m"),
-             "line": {"color": color, "width": 1.2, "dash": "dot"}},
+            {
+                **line(1e3 * smooth, exact, f"{name}, one exact axis", color, 1.2, "N/m"),
+                "line": {"color": color, "width": 1.2, "dash": "dot"},
+            },
             joined(delays, whole, f"{name}, whole chain", color, "N/m"),
-        ]  # fmt: skip
+        ]
         if name == "medium":
             traces.append(joined(delays, tank, "with a tank, stiffest tried", PUBLISHED, "N/m"))
             traces.append(joined(delays, tdpa, "with TDPA, stiffest tried", DARK, "N/m"))
             traces.append(joined(delays, spring, "medium, position_position", THIRD, "N/m"))
-    layout = {"xaxis": axis("the force comes later by", "ms"),
-              "yaxis": axis("stiffness", "N/m", type="log")}  # fmt: skip
+    layout = {"xaxis": axis("the force comes later by", "ms"), "yaxis": axis("stiffness", "N/m", type="log")}
     sentence = "Below its line a hand stays calm, above it it is thrown by what it feels late."
     return Figure("How stiff a thing may be", sentence, traces, layout, 460)
 

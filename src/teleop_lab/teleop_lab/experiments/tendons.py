@@ -45,9 +45,7 @@ def _measure(_: Bench) -> Findings:
     return Findings(rows, (_figure(),), _NOTES)
 
 
-_NOTES = (
-    "The stars on the printed radii are lost: which of them are the motors' is an inference.",
-)
+_NOTES = ("The stars on the printed radii are lost: which of them are the motors' is an inference.",)
 
 
 def _figure() -> Figure:

@@ -96,8 +96,10 @@ def far_settings(round_trip: float) -> Settings:
     return {
         "network.there.least_delay": 0.5 * round_trip,
         "network.back.least_delay": 0.5 * round_trip,
-        "feedback_timeout": 1.0, "reach_force.is_on": False, "gimbal_noise": 0.0,
-    }  # fmt: skip
+        "feedback_timeout": 1.0,
+        "reach_force.is_on": False,
+        "gimbal_noise": 0.0,
+    }
 
 
 def settings(way: Way, round_trip: float, world: str) -> Settings:
@@ -132,9 +134,11 @@ def measure_ports(bench: Bench, job: Job) -> Ports:
     """
     rows = bench.signals("palpation", _SECONDS, settings(*job), _motion)
     return Ports.of(
-        rows["master_measured_cp"][:, 1], rows["master_servo_cf"][:, 1],
-        rows["slave_measured_cp"][:, 2], rows["slave_measured_cf"][:, 2],
-    )  # fmt: skip
+        rows["master_measured_cp"][:, 1],
+        rows["master_servo_cf"][:, 1],
+        rows["slave_measured_cp"][:, 2],
+        rows["slave_measured_cf"][:, 2],
+    )
 
 
 def measure_cells(

@@ -13,22 +13,21 @@ from teleop_lab.experiments.bench import Bench
 from teleop_lab.experiments.experiment import Experiment
 from teleop_lab.experiments.outcome import Findings, Row, absolute, percent
 from teleop_lab.experiments.transmission import AIR, Cell, Way, measure_cells, predicted_hybrid
-from teleop_lab.experiments.two_port import (
-    LINES,
-    Complex,
-    Lag,
-    bandwidth,
-    felt_impedance,
-    llewellyn,
-)
+from teleop_lab.experiments.two_port import LINES, Complex, Lag, bandwidth, felt_impedance, llewellyn
 
 WAYS = (
     ("unilateral", "none"),
-    ("position_force", "none"), ("position_force", "tank"), ("position_force", "tdpa"),
+    ("position_force", "none"),
+    ("position_force", "tank"),
+    ("position_force", "tdpa"),
     ("position_force", "wave"),
-    ("position_position", "none"), ("position_position", "tank"), ("position_position", "tdpa"),
-    ("impedance", "none"), ("three_channel", "none"), ("four_channel", "none"),
-)  # fmt: skip
+    ("position_position", "none"),
+    ("position_position", "tank"),
+    ("position_position", "tdpa"),
+    ("impedance", "none"),
+    ("three_channel", "none"),
+    ("four_channel", "none"),
+)
 """Architectures and passivities. With ``wave`` the architecture says nothing; ``impedance`` is
 position-force before a slave that yields."""
 ROUND_TRIPS = (0.0, 0.02, 0.1, 0.2)
@@ -84,10 +83,7 @@ def numbers(cell: Cell, hybrid: Complex) -> list[Number]:
         if world != AIR:
             own = abs(ports.world[_AT])
             shares = [abs(ports.felt[_AT]), abs(felt_impedance(hybrid, ports.world)[_AT])]
-            found.append(
-                Number(f"felt of {world}, share {hz}", "", shares[0] / own, shares[1] / own,
-                       ports.stray)
-            )  # fmt: skip
+            found.append(Number(f"felt of {world}, share {hz}", "", shares[0] / own, shares[1] / own, ports.stray))
     both = [float(llewellyn(matrix)[_AT]) for matrix in (cell.hybrid, hybrid)]
     found.append(Number(f"Llewellyn's number {hz}", "", both[0], both[1], cell.stray))
     return found
@@ -103,10 +99,16 @@ def _rows(found: list[Number], group: str, told: str, *, is_judged: bool) -> lis
         # Where the law is 0 there is no share of it; Llewellyn's number is one of a few.
         within = _NEAR if not each.law or "Llewellyn" in each.quantity else _WITHIN
         rows.append(
-            Row(quantity=each.quantity + told, unit=each.unit, published=law,
-                basis="law", predicted=each.measured, within=None if law is None else within,
-                group=group)
-        )  # fmt: skip
+            Row(
+                quantity=each.quantity + told,
+                unit=each.unit,
+                published=law,
+                basis="law",
+                predicted=each.measured,
+                within=None if law is None else within,
+                group=group,
+            )
+        )
     return rows
 
 
@@ -119,9 +121,14 @@ def _cell_rows(way: Way, round_trip: float, cell: Cell, arm: Complex) -> list[Ro
     for world, ports in cell.ports.items():
         if ports.stray > STRAY:
             rows.append(
-                Row(quantity=f"off the lines, {world}{told}", unit="%",
-                    predicted=100.0 * ports.stray, group=group, note="not linear")
-            )  # fmt: skip
+                Row(
+                    quantity=f"off the lines, {world}{told}",
+                    unit="%",
+                    predicted=100.0 * ports.stray,
+                    group=group,
+                    note="not linear",
+                )
+            )
     return rows
 
 
@@ -137,10 +144,16 @@ def _lag_rows(cell: Cell) -> list[Row]:
         size = np.abs(exact[:, i, k])
         off = np.abs(cell.hybrid[:, i, k] - exact[:, i, k]) / size
         rows.append(
-            Row(quantity=f"h{i + 1}{k + 1}, farthest from the exact one", unit="%",
-                published=0.0, basis="law", predicted=100.0 * float(off.max()),
-                within=absolute(5.0), group=group)
-        )  # fmt: skip
+            Row(
+                quantity=f"h{i + 1}{k + 1}, farthest from the exact one",
+                unit="%",
+                published=0.0,
+                basis="law",
+                predicted=100.0 * float(off.max()),
+                within=absolute(5.0),
+                group=group,
+            )
+        )
     return rows + _rows(numbers(cell, exact), group, "", is_judged=True)
 
 
@@ -187,8 +200,7 @@ _NOTES = (
 
 
 def _curve(y: Array, name: str, color: str, dash: str, unit: str = "") -> Trace:
-    return {**line(LINES, y, name, color, 1.5, unit),
-            "line": {"color": color, "width": 1.5, "dash": dash}}  # fmt: skip
+    return {**line(LINES, y, name, color, 1.5, unit), "line": {"color": color, "width": 1.5, "dash": dash}}
 
 
 def _felt_figure(cells: Cells, world: str) -> Figure:
@@ -202,8 +214,7 @@ def _felt_figure(cells: Cells, world: str) -> Figure:
         if is_drawn and ports.stray <= STRAY and np.abs(ports.felt).max() > 1e-6:
             name, dash = _told(way, late), "dash" if late else "solid"
             traces.append(_curve(np.abs(ports.felt), name, _COLORS[way], dash, "N·s/m"))
-    layout = {"xaxis": axis("frequency", "Hz", type="log"),
-              "yaxis": axis("force over speed", "N·s/m", type="log")}  # fmt: skip
+    layout = {"xaxis": axis("frequency", "Hz", type="log"), "yaxis": axis("force over speed", "N·s/m", type="log")}
     sentence = (
         "Impedance that the hand feels; dotted the world's own."
         if world != AIR
@@ -227,16 +238,19 @@ def _stability_figure(cells: Cells, arm: Complex) -> Figure:
                 _curve(llewellyn(cell.hybrid), name, color, "solid" if way == _FORCE else "dash"),
             ]
     shape, note = level(1.0, "absolutely stable from here on")
-    layout = {"xaxis": axis("frequency", "Hz", type="log"), "yaxis": axis("Llewellyn's number"),
-              "shapes": [shape], "annotations": [note]}  # fmt: skip
+    layout = {
+        "xaxis": axis("frequency", "Hz", type="log"),
+        "yaxis": axis("Llewellyn's number"),
+        "shapes": [shape],
+        "annotations": [note],
+    }
     sentence = "Below 1 some passive hand and world swing up; no passivity is on."
     return Figure("Absolute stability", sentence, traces, layout, 460)
 
 
 def _known_figure(known: Cell) -> Figure:
     exact, traces = LAG.hybrid(), []
-    for (i, k), color, unit in (((0, 1), FIRST, ""), ((1, 0), SECOND, ""),
-                                ((1, 1), THIRD, "m/N·s")):  # fmt: skip
+    for (i, k), color, unit in (((0, 1), FIRST, ""), ((1, 0), SECOND, ""), ((1, 1), THIRD, "m/N·s")):
         name = f"h{i + 1}{k + 1}"
         traces.append(_curve(np.abs(exact[:, i, k]), f"{name}, exact", color, "dot", unit))
         measured = np.abs(known.hybrid[:, i, k])

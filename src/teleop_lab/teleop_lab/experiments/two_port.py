@@ -126,12 +126,8 @@ def hybrid_matrix(experiments: Sequence[Ports]) -> Complex:
     Source:
         Hannaford 1989 for the matrix of teleoperators. Each row by least squares.
     """
-    given = np.stack(
-        [np.stack((ports.hand_speed, ports.tip_force), axis=-1) for ports in experiments], axis=1
-    )
-    answers = np.stack(
-        [np.stack((ports.hand_force, -ports.tip_speed), axis=-1) for ports in experiments], axis=1
-    )
+    given = np.stack([np.stack((ports.hand_speed, ports.tip_force), axis=-1) for ports in experiments], axis=1)
+    answers = np.stack([np.stack((ports.hand_force, -ports.tip_speed), axis=-1) for ports in experiments], axis=1)
     sizes = np.linalg.norm(given, axis=1, keepdims=True)  # of speed and force
     scaled = given / np.where(sizes > 0.0, sizes, 1.0)
     if (np.linalg.matrix_rank(scaled, tol=1e-6) < 2).any():

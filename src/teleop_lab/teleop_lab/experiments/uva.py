@@ -58,12 +58,16 @@ class Level(NamedTuple):
 
 LEVELS = (
     Level("normal"),
-    Level("loss 10 %", loss=0.1), Level("loss 30 %", loss=0.3), Level("loss 50 %", loss=0.5),
-    Level("delay 100 ms", delay=0.1), Level("delay 300 ms", delay=0.3),
+    Level("loss 10 %", loss=0.1),
+    Level("loss 30 %", loss=0.3),
+    Level("loss 50 %", loss=0.5),
+    Level("delay 100 ms", delay=0.1),
+    Level("delay 300 ms", delay=0.3),
     Level("delay 500 ms", delay=0.5),
-    Level("outages 1", outage=1.5, pause=8.5), Level("outages 2", outage=0.5, pause=1.0),
+    Level("outages 1", outage=1.5, pause=8.5),
+    Level("outages 2", outage=0.5, pause=1.0),
     Level("outages 3", outage=1.0, pause=1.0),
-)  # fmt: skip
+)
 
 
 def _plain(primitive: Primitive, level: Level) -> float:
@@ -102,9 +106,7 @@ def predict() -> dict[str, dict[str, dict[str, float]]]:
     found = {}
     for name, model in models.items():
         scale = TOTAL / sum(model(p, normal) for p in PRIMITIVES)
-        found[name] = {
-            level.name: {p.name: scale * model(p, level) for p in PRIMITIVES} for level in LEVELS
-        }
+        found[name] = {level.name: {p.name: scale * model(p, level) for p in PRIMITIVES} for level in LEVELS}
     return found
 
 
@@ -165,13 +167,16 @@ def _rows(table: Table, group: str, levels: Iterable[Level]) -> list[Row]:
     means, halves = published()
     return [
         Row(
-            quantity=p.name, unit="s", published=means[level.name][p.name],
-            predicted=table[level.name][p.name], within=absolute(halves[level.name][p.name]),
+            quantity=p.name,
+            unit="s",
+            published=means[level.name][p.name],
+            predicted=table[level.name][p.name],
+            within=absolute(halves[level.name][p.name]),
             group=f"{group}: {level.name}",
         )
         for level in levels
         for p in PRIMITIVES
-    ]  # fmt: skip
+    ]
 
 
 def _measure(_: Bench) -> Findings:

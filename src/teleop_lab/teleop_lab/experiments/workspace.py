@@ -67,16 +67,11 @@ def _sections(places: Array, robot: Robot) -> Figure:
         traces += [{**dots, **place}]
         traces += [{**line(edge[:, 0], edge[:, 1], "edge of the wrist centre", SECOND, 2), **place}]
         layout[f"xaxis{suffix}"] = axis("xyz"[axes[0]], "mm", constrain="domain")
-        layout[f"yaxis{suffix}"] = axis(
-            "xyz"[axes[1]], "mm", scaleanchor=f"x{suffix}", constrain="domain"
-        )
+        layout[f"yaxis{suffix}"] = axis("xyz"[axes[1]], "mm", scaleanchor=f"x{suffix}", constrain="domain")
     sentence = f"Cuts of {2 * _SLICE_MM:g} mm through the shoulder: upright (left), level (right)."
     return Figure("Sections of the workspace", sentence, traces, layout, 420)
 
 
 WORKSPACE = Experiment(
-    "workspace",
-    "reach, and where the tip can be",
-    "Vongbunyong 2008, section 4.2, table 6.2, figure 4.1",
-    _measure,
+    "workspace", "reach, and where the tip can be", "Vongbunyong 2008, section 4.2, table 6.2, figure 4.1", _measure
 )

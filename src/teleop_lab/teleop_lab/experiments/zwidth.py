@@ -102,11 +102,15 @@ def _stability(found: Boundaries) -> list[Row]:
         law = linear_law(BARE.damping, wall_damping, 1e-3 * late)
         where = f"B = {wall_damping:g} N·s/m"
         row = Row(
-            quantity=f"force {late} ms later", unit="N/m", published=round(law, 1),
-            basis="law", predicted=predicted, within=_WITHIN,
+            quantity=f"force {late} ms later",
+            unit="N/m",
+            published=round(law, 1),
+            basis="law",
+            predicted=predicted,
+            within=_WITHIN,
             group=f"stable, linear law of Gil 2009, {where}",
             note=f"exact {axis_:.0f}",
-        )  # fmt: skip
+        )
         laws.append(row)
         group = f"stable, exact sampled axis, {where}"
         exact.append(replace(row, published=round(axis_, 1), within=_EXACT, group=group, note=""))
@@ -133,20 +137,27 @@ def _energy(found: Bounds) -> list[Row]:
 def _divergence() -> Row:
     grip = GRIPS["loose"]  # b of 5 N·s/m and 0.25 kg
     return Row(
-        quantity="b = B = 5 N·s/m, 0.25 kg", unit="N/m",
-        published=round(sampled_boundary(grip, 0, grip.damping), 1), basis="law",
-        predicted=wall_boundary(grip, grip.damping, 0), within=_EXACT,
-        group="diverges, exact sampled axis", note="passive: 0",
-    )  # fmt: skip
+        quantity="b = B = 5 N·s/m, 0.25 kg",
+        unit="N/m",
+        published=round(sampled_boundary(grip, 0, grip.damping), 1),
+        basis="law",
+        predicted=wall_boundary(grip, grip.damping, 0),
+        within=_EXACT,
+        group="diverges, exact sampled axis",
+        note="passive: 0",
+    )
 
 
 def _quiet(friction: float, resolution: float) -> Row:
     return Row(
-        quantity=f"friction {friction:g} N, steps of {1e3 * resolution:g} mm", unit="N/m",
-        published=round(quiet_law(friction, resolution), 1), basis="law",
-        predicted=restless_boundary(friction, resolution), within=_WITHIN,
+        quantity=f"friction {friction:g} N, steps of {1e3 * resolution:g} mm",
+        unit="N/m",
+        published=round(quiet_law(friction, resolution), 1),
+        basis="law",
+        predicted=restless_boundary(friction, resolution),
+        within=_WITHIN,
         group="rests under a loose hand, Abbott and Okamura 2005",
-    )  # fmt: skip
+    )
 
 
 def _measure(bench: Bench) -> Findings:
@@ -199,16 +210,15 @@ def _delay_figure(found: Boundaries) -> Figure:
         exact = np.array([sampled_boundary(BARE, late, wall_damping) for late in LATE])
         name = f"B = {wall_damping:g} N·s/m"
         traces += [
-            {**line(smooth, law, f"{name}, linear law", color, 1.2, "N/m"),
-             "line": {"color": color, "width": 1.2, "dash": "dot"}},
+            {
+                **line(smooth, law, f"{name}, linear law", color, 1.2, "N/m"),
+                "line": {"color": color, "width": 1.2, "dash": "dot"},
+            },
             line(np.array(LATE, dtype=float), exact, f"{name}, exact", color, 1.5, "N/m"),
-        ]  # fmt: skip
+        ]
         ys = np.array([found[wall_damping, late] for late in LATE])
-        traces.append(
-            points(np.array(LATE, dtype=float), ys, f"{name}, our device", color, "N/m", 1)
-        )
-    layout = {"xaxis": axis("the force comes later by", "ms"),
-              "yaxis": axis("stiffness", "N/m", type="log")}  # fmt: skip
+        traces.append(points(np.array(LATE, dtype=float), ys, f"{name}, our device", color, "N/m", 1))
+    layout = {"xaxis": axis("the force comes later by", "ms"), "yaxis": axis("stiffness", "N/m", type="log")}
     sentence = "Below its line a wall is stable. Our device's marks lie on the exact line."
     return Figure("How stiff a sampled wall may be", sentence, traces, layout, 460)
 
@@ -223,11 +233,13 @@ def _press_figure(found: Bounds, diverging: Row) -> Figure:
         line(np.array(lengths, dtype=float), law, "gives energy, exact", FIRST, 1.5, "N/m"),
         points(np.array(PRESSES, dtype=float), ours, "gives energy, our device", FIXTURE, "N/m"),
     ]
-    layout = {"xaxis": axis("press, in and as long out", "ms"), "yaxis": axis("stiffness", "N/m"),
-              "shapes": [shape], "annotations": [note]}  # fmt: skip
-    sentence = (
-        "Passive is what gives energy in no press, the shortest too; a wall diverges far above it."
-    )
+    layout = {
+        "xaxis": axis("press, in and as long out", "ms"),
+        "yaxis": axis("stiffness", "N/m"),
+        "shapes": [shape],
+        "annotations": [note],
+    }
+    sentence = "Passive is what gives energy in no press, the shortest too; a wall diverges far above it."
     return Figure("Passivity and divergence, b = B = 5 N·s/m", sentence, traces, layout, 460)
 
 

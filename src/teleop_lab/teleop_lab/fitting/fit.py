@@ -107,13 +107,16 @@ class FitResult:
     def to_json(self) -> dict[str, object]:
         """All of it as plain values; numbers are exact, [SI]."""
         return {
-            "robot": self.robot, "table": self.table, "joints": list(self.joint_names),
+            "robot": self.robot,
+            "table": self.table,
+            "joints": list(self.joint_names),
             "numbers": [vars(number) for number in self.numbers],
-            "measured": self.measured.tolist(), "predicted": self.predicted.tolist(),
+            "measured": self.measured.tolist(),
+            "predicted": self.predicted.tolist(),
             "measured_spread": self.measured_spread.tolist(),
             "predicted_spread": self.predicted_spread.tolist(),
             "one_sided": self.one_sided.tolist(),
-        }  # fmt: skip
+        }
 
     def parameter_file(self) -> str:
         """ROS 2 parameter file of a slave on the fitted plant."""
@@ -125,9 +128,7 @@ class FitResult:
 class _Problem:
     """Rests of a robot as a function of scaled numbers; 1 is of the size that the table shows."""
 
-    def __init__(
-        self, robot: Robot, parameters: ArmParameters, table: RestTable, free: Sequence[str]
-    ) -> None:
+    def __init__(self, robot: Robot, parameters: ArmParameters, table: RestTable, free: Sequence[str]) -> None:
         self.robot, self.parameters, self.table, self.free = robot, parameters, table, tuple(free)
         stiffness = np.abs(SlaveSim(parameters).arm.gains[:, 0])
         off = np.abs(table.mean).mean(axis=0)
@@ -212,9 +213,7 @@ def default_free(robot: Robot, table: RestTable) -> tuple[str, ...]:
 
     model, loaded, single = robot.dynamics, loaded_axes(robot), one_sided(robot, table)
     assert model is not None
-    stuck = [
-        name for name, is_loaded in zip(robot.joint_names, loaded, strict=True) if not is_loaded
-    ]
+    stuck = [name for name, is_loaded in zip(robot.joint_names, loaded, strict=True) if not is_loaded]
     free_of_weight = ~(loaded | model.compensated)
     both = [
         name
@@ -270,13 +269,17 @@ def fit(
     _insist_on_identifiable(names, slopes)
     progress(0.1)
     found = least_squares(
-        problem.residuals, start, jac=problem.slopes, bounds=(lower, np.inf),  # type: ignore[arg-type]
-        loss=loss, max_nfev=_ROUNDS, xtol=1e-4, ftol=1e-4,
-    )  # fmt: skip
+        problem.residuals,
+        start,
+        jac=problem.slopes,
+        bounds=(lower, np.inf),  # type: ignore[arg-type]
+        loss=loss,
+        max_nfev=_ROUNDS,
+        xtol=1e-4,
+        ftol=1e-4,
+    )
     if not found.success:
-        raise FitError(
-            f"the fit did not converge in {_ROUNDS} rounds; its cost is {found.cost:.3g}"
-        )
+        raise FitError(f"the fit did not converge in {_ROUNDS} rounds; its cost is {found.cost:.3g}")
     progress(0.7)
     return _result(problem, found.x, problem.slopes(found.x), LOSSES[loss], progress)
 
@@ -310,11 +313,7 @@ def _insist_on_identifiable(names: Sequence[str], slopes: Array) -> None:
 
 
 def _result(
-    problem: _Problem,
-    x: Array,
-    slopes: Array,
-    weigh: Callable[[Array], Array],
-    progress: Callable[[float], None],
+    problem: _Problem, x: Array, slopes: Array, weigh: Callable[[Array], Array], progress: Callable[[float], None]
 ) -> FitResult:
     residuals = problem.residuals(x)
     used = np.abs(slopes).max(axis=1) > 0.0
@@ -339,9 +338,7 @@ def _result(
     )  # fmt: skip
 
 
-def _wander(
-    problem: _Problem, x: Array, progress: Callable[[float], None]
-) -> tuple[list[Fitted], Array]:
+def _wander(problem: _Problem, x: Array, progress: Callable[[float], None]) -> tuple[list[Fitted], Array]:
     """How much friction wanders about the fitted one, from the spread of the runs (n,)."""
     runs = max(10, *(len(rests) for rests in problem.table.rests))
     robot, measured = problem.robot, problem.table.spread
@@ -353,15 +350,15 @@ def _wander(
 
     answered = spread(np.full(robot.n, _WANDER), _TIMES * runs)
     progress(0.85)
-    share = {name: _WANDER * measured[i] / answered[i] for i, name in enumerate(robot.joint_names)
-             if f"coulomb.{name}" in problem.free and answered[i] > 0.0}  # fmt: skip
+    share = {
+        name: _WANDER * measured[i] / answered[i]
+        for i, name in enumerate(robot.joint_names)
+        if f"coulomb.{name}" in problem.free and answered[i] > 0.0
+    }
     wander = np.array([share.get(name, 0.0) for name in robot.joint_names])
     freedom = sum(len(rests) - 1 for rests in problem.table.rests)
     low, high = np.sqrt(freedom / chi2.ppf([0.5 + 0.5 * _SHARE, 0.5 - 0.5 * _SHARE], freedom))
-    numbers = [
-        Fitted(f"wander.{name}", "", float(w), float(w * low), float(w * high))
-        for name, w in share.items()
-    ]
+    numbers = [Fitted(f"wander.{name}", "", float(w), float(w * low), float(w * high)) for name, w in share.items()]
     predicted = spread(wander, runs)
     progress(1.0)
     return numbers, predicted

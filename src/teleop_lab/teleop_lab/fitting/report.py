@@ -17,19 +17,15 @@ def text(found: "FitResult") -> str:
     width = max(len(number.name) for number in found.numbers)
     lines = [f"{found.robot} from {found.table}, 95 % intervals", ""]
     lines += [
-        f"  {n.name:{width}}  {n.value:10.4g}  [{n.low:9.4g}, {n.high:9.4g}] {n.unit}".rstrip()
-        for n in found.numbers
+        f"  {n.name:{width}}  {n.value:10.4g}  [{n.low:9.4g}, {n.high:9.4g}] {n.unit}".rstrip() for n in found.numbers
     ]
     lines += ["", "rest less target, mean of the runs in encoder counts: measured / simulated"]
     lines.append("  point  " + "".join(f"{name:>16}" for name in found.joint_names))
-    pairs = zip(
-        found.measured / found.encoder_step, found.predicted / found.encoder_step, strict=True
-    )
+    pairs = zip(found.measured / found.encoder_step, found.predicted / found.encoder_step, strict=True)
     for k, (measured, predicted) in enumerate(pairs):
         cells = (f"{m:7.1f} /{p:7.1f}" for m, p in zip(measured, predicted, strict=True))
         lines.append(f"  {k + 1:5}  " + "".join(f"{cell:>16}" for cell in cells))
-    spreads = zip(found.measured_spread / found.encoder_step,
-                  found.predicted_spread / found.encoder_step, strict=True)  # fmt: skip
+    spreads = zip(found.measured_spread / found.encoder_step, found.predicted_spread / found.encoder_step, strict=True)
     cells = (f"{m:7.1f} /{p:7.1f}" for m, p in spreads)
     lines.append("  S.D.   " + "".join(f"{cell:>16}" for cell in cells))
     if found.one_sided.any():
@@ -53,8 +49,7 @@ def parameter_file(found: "FitResult") -> str:
         ]
         for kind in ("coulomb", "bias", "wander")
     }
-    weights = [f"{name.partition('.')[2]}={value}" for name, value in values.items()
-               if name.startswith("weight.")]  # fmt: skip
+    weights = [f"{name.partition('.')[2]}={value}" for name, value in values.items() if name.startswith("weight.")]
     if weights:
         given["plant.hardware.weights"] = weights
     slave = {"robot": found.robot, "plant.kind": "hardware", "controller.kind": "source_pid"}

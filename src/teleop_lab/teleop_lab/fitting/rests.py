@@ -19,9 +19,7 @@ _FINE = 1e-4  # of an encoder step
 
 
 @kernel
-def _drive(
-    steps: Any, server: Any, simulated: Any, row: SlaveRow, way: Array, begin_ns: int, dt: float
-) -> None:
+def _drive(steps: Any, server: Any, simulated: Any, row: SlaveRow, way: Array, begin_ns: int, dt: float) -> None:
     """Command a way (N, n), a joint vector a tick, from the tick after ``begin_ns`` on."""
     for k in range(way.shape[0]):
         row.now_ns = begin_ns + (k + 1) * TICK_NS
@@ -89,12 +87,7 @@ class Mover:
 
 
 def rest_positions(
-    parameters: ArmParameters,
-    targets: Array,
-    runs: int,
-    faults: Hardware | None = None,
-    *,
-    is_smooth: bool = False,
+    parameters: ArmParameters, targets: Array, runs: int, faults: Hardware | None = None, *, is_smooth: bool = False
 ) -> Array:
     """Joints at rest (k, runs, n) [rad or m] of ``runs`` moves from home to each target (k, n).
 

@@ -74,9 +74,7 @@ def write_reach_page(reaches: "Sequence[Reach]", file: Path) -> None:
         for name, followed in kinds:
             drawn = reach_figure(reach, followed, name)
             is_first = not any("plotly.js" in part for part in parts)
-            html = drawn.to_html(
-                full_html=False, include_plotlyjs=is_first, config={"responsive": True}
-            )
+            html = drawn.to_html(full_html=False, include_plotlyjs=is_first, config={"responsive": True})
             parts.append(f"<div>{html}</div>")
         parts.append("</div>")
     file.write_text("\n".join([*parts, _TAIL]), encoding="utf-8")
@@ -90,18 +88,23 @@ def reach_figure(reach: "Reach", followed: "Followed", name: str) -> plots.Figur
         "",
     )
     figure = make_subplots(
-        rows=3, cols=1, row_heights=[0.56, 0.22, 0.22], vertical_spacing=0.06,
+        rows=3,
+        cols=1,
+        row_heights=[0.56, 0.22, 0.22],
+        vertical_spacing=0.06,
         specs=[[{"type": "scene"}], [{"secondary_y": True}], [{"secondary_y": True}]],
         subplot_titles=titles,
-    )  # fmt: skip
+    )
     figure.add_traces([*_workspace(reach), *_in_space(followed)], rows=1, cols=1)
     _add_times(figure, reach.path, followed.session)
     axes = {f"{axis}axis": {"title": f"{axis} [m]"} for axis in "xyz"}
     figure.update_layout(
-        height=980, template="plotly_white", scene={**axes, "aspectmode": "data"},
+        height=980,
+        template="plotly_white",
+        scene={**axes, "aspectmode": "data"},
         legend={"orientation": "h", "y": -0.06, "itemsizing": "constant"},
         margin={"l": 60, "r": 10, "t": 60, "b": 40},
-    )  # fmt: skip
+    )
     return figure
 
 
@@ -109,11 +112,7 @@ def _workspace(reach: "Reach") -> list[Any]:
     points, _ = sample_workspace(reach.robot, _WORKSPACE, np.random.default_rng(1))
     x, y, z = points.T
     marker = {"size": 1.5, "color": "#adb5bd", "opacity": 0.4}
-    return [
-        plots.Scatter3d(
-            x=x, y=y, z=z, mode="markers", marker=marker, name="workspace", hoverinfo="skip"
-        )
-    ]
+    return [plots.Scatter3d(x=x, y=y, z=z, mode="markers", marker=marker, name="workspace", hoverinfo="skip")]
 
 
 def _in_space(followed: "Followed") -> list[Any]:
@@ -125,11 +124,8 @@ def _in_space(followed: "Followed") -> list[Any]:
         x, y, z = places[limits == cause].T
         if len(x):
             traces.append(
-                plots.Scatter3d(
-                    x=x, y=y, z=z, mode="markers", marker={"size": 2, "color": color},
-                    name=_label(cause),
-                )
-            )  # fmt: skip
+                plots.Scatter3d(x=x, y=y, z=z, mode="markers", marker={"size": 2, "color": color}, name=_label(cause))
+            )
     x, y, z = ([value] for value in walked.asked[0, :3])
     marker = {"size": 6, "color": "#111", "symbol": "cross"}
     traces.append(plots.Scatter3d(x=x, y=y, z=z, mode="markers", marker=marker, name="start"))
@@ -148,15 +144,19 @@ def _add_times(figure: Any, path: AskedPath, walked: Walked) -> None:
         for column, (axis, color) in enumerate(_AXES):
             figure.add_trace(
                 plots.Scatter(
-                    x=time[kept], y=values[kept, column], mode="lines", name=axis,
-                    line={"width": 1.2, "color": color}, legendgroup=axis,
+                    x=time[kept],
+                    y=values[kept, column],
+                    mode="lines",
+                    name=axis,
+                    line={"width": 1.2, "color": color},
+                    legendgroup=axis,
                     showlegend=row == _ROWS[0],
                 ),
-                row=row, col=1, secondary_y=True,
-            )  # fmt: skip
-        figure.update_yaxes(
-            title_text=unit, side="left", tickmode="auto", row=row, col=1, secondary_y=True
-        )
+                row=row,
+                col=1,
+                secondary_y=True,
+            )
+        figure.update_yaxes(title_text=unit, side="left", tickmode="auto", row=row, col=1, secondary_y=True)
         figure.update_yaxes(range=[0, 1], visible=False, row=row, col=1, secondary_y=False)
     figure.update_xaxes(matches="x", row=_ROWS[1], col=1, title_text="time [s]")
 

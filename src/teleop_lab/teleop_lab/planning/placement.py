@@ -37,9 +37,7 @@ class Placement:
     tool_roll: float
 
     @staticmethod
-    def of(
-        parameters: MotionScalingParameters, slave: RobotParameters, start: tuple[float, ...]
-    ) -> "Placement":
+    def of(parameters: MotionScalingParameters, slave: RobotParameters, start: tuple[float, ...]) -> "Placement":
         """Placement that parameters of motion scaling, a slave and its start make."""
         return Placement(
             robot=slave.robot,

@@ -197,13 +197,7 @@ def _of_scenario(name: str, changes: list[Layer]) -> Configuration:
 
 
 def _reach(
-    path: AskedPath,
-    made: Configuration,
-    goal: float,
-    arm: str,
-    progress: Progress,
-    *,
-    keeps_axes: bool,
+    path: AskedPath, made: Configuration, goal: float, arm: str, progress: Progress, *, keeps_axes: bool
 ) -> Reach:
     scaling, solving = made.group("motion_scaling", arm), made.group("inverse_kinematics", arm)
     whole = Walker(path.limited(_WHOLE), scaling, solving)

@@ -29,10 +29,7 @@ def text(reach: "Reach") -> str:
     lines = [f"{'':{_WIDTH}}" + "".join(f"{name:>12}" for name in names)]
     for label, cells in _rows(columns):
         lines.append(f"{label:{_WIDTH}}" + "".join(f"{cell:>12}" for cell in cells))
-    lines += [
-        f"start [rad, m]{'':3}{name}: {_start(c.placement)}"
-        for name, c in zip(names, columns, strict=True)
-    ]
+    lines += [f"start [rad, m]{'':3}{name}: {_start(c.placement)}" for name, c in zip(names, columns, strict=True)]
     return "\n".join([head, *lines, *_advice(reach)])
 
 
@@ -65,9 +62,7 @@ def _advice(reach: "Reach") -> list[str]:
         return [f"The parameters as given reach {_percent(reach.goal)}: nothing to change."]
     lines = []
     if reach.proposed.share < reach.goal:
-        lines.append(
-            f"No placement was found that reaches {_percent(reach.goal)}; this is the best."
-        )
+        lines.append(f"No placement was found that reaches {_percent(reach.goal)}; this is the best.")
     gain = reach.given.placement.coarse_gain
     if reach.proposed.placement.coarse_gain < gain:
         share = _percent(reach.proposed.at_given_gain)

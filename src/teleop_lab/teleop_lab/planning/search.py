@@ -51,13 +51,7 @@ class Search:
     """
 
     def __init__(
-        self,
-        walker: Walker,
-        given: Placement,
-        aim: Aim,
-        tell: Callable[[], None],
-        *,
-        keeps_axes: bool = False,
+        self, walker: Walker, given: Placement, aim: Aim, tell: Callable[[], None], *, keeps_axes: bool = False
     ) -> None:
         self._turns = () if keeps_axes else turns()
         self._walker, self._given, self._aim, self._tell = walker, given, aim, tell
@@ -116,9 +110,7 @@ class Search:
         pool = list(found)
         for i in range(_BISECTIONS + 1):
             middle = high if i == 0 else 0.5 * (low + high)  # first what is given
-            tried = self._sorted(
-                self._scaled(self._given, math.exp(middle), placement) for _, placement in pool
-            )
+            tried = self._sorted(self._scaled(self._given, math.exp(middle), placement) for _, placement in pool)
             reached = self._first(tried)
             if reached is None:
                 high = middle
@@ -172,9 +164,7 @@ class Search:
                 starts.append(replace(placement, start=start))
         return starts
 
-    def _start_at(
-        self, whole: Array, cut: Array, at: int, start: tuple[float, ...]
-    ) -> tuple[float, ...] | None:
+    def _start_at(self, whole: Array, cut: Array, at: int, start: tuple[float, ...]) -> tuple[float, ...] | None:
         """Joints from which the whole path passes through the pose ``cut`` at sample ``at``."""
         pose, inverse, T = np.empty(7), whole[at, 3:] * (1.0, -1.0, -1.0, -1.0), np.empty((4, 4))
         pose[:3] = whole[0, :3] + cut[:3] - whole[at, :3]

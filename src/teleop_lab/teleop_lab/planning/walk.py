@@ -11,10 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from teleop_core.chain.mapping.inverse_kinematics import (
-    InverseKinematics,
-    InverseKinematicsParameters,
-)
+from teleop_core.chain.mapping.inverse_kinematics import InverseKinematics, InverseKinematicsParameters
 from teleop_core.chain.mapping.motion_scaling import MotionScaling
 from teleop_core.chain.mapping.parameters import MotionScalingParameters
 from teleop_core.graph.signals import DT, assign, copy
@@ -96,12 +93,7 @@ class Walker:
         solving: Parameters of inverse kinematics, with the robot.
     """
 
-    def __init__(
-        self,
-        path: AskedPath,
-        scaling: MotionScalingParameters,
-        solving: InverseKinematicsParameters,
-    ) -> None:
+    def __init__(self, path: AskedPath, scaling: MotionScalingParameters, solving: InverseKinematicsParameters) -> None:
         self.path = path
         self._parameters = scaling
         self._scaling, self._solving = MotionScaling(scaling), InverseKinematics(solving)

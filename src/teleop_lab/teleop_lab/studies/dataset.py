@@ -34,8 +34,7 @@ def dataset_of(study: "Study", points: Sequence[Point], store: Store) -> "xarray
     variables = {}
     for metric in study.metrics:
         numbers = [
-            np.nan if result is None or (value := result.scores.get(metric)) is None else value
-            for result in results
+            np.nan if result is None or (value := result.scores.get(metric)) is None else value for result in results
         ]
         shaped = np.array(numbers, np.float64).reshape(sizes)
         variables[metric] = (study.names, shaped, {"units": units.get(metric, "1")})
@@ -44,7 +43,9 @@ def dataset_of(study: "Study", points: Sequence[Point], store: Store) -> "xarray
     variables["error"] = (study.names, errors, {})
     variables["seconds"] = (study.names, took, {"units": "s"})
     about = {
-        "scenario": study.scenario or "", "code": code_digest(),
-        "settings": str(dict(study.settings)), "sessions": len(points),
-    }  # fmt: skip
+        "scenario": study.scenario or "",
+        "code": code_digest(),
+        "settings": str(dict(study.settings)),
+        "sessions": len(points),
+    }
     return xarray.Dataset(variables, coordinates, about)

@@ -36,9 +36,7 @@ def study_page(study: "Study", found: "xarray.Dataset", title: str) -> str:
     errors = sorted({str(error) for error in found["error"].values.ravel() if error})
     parts += [f"<p>failed: {escape(error)}</p>" for error in errors]
     facts = ", ".join(f"{name} {value}" for name, value in found.attrs.items() if value)
-    return _page(
-        title, f"{facts}. Means over the seeds, with 95 % intervals by the bootstrap.", parts
-    )
+    return _page(title, f"{facts}. Means over the seeds, with 95 % intervals by the bootstrap.", parts)
 
 
 def tuning_page(tuning: "Tuning", tuned: "Tuned", title: str) -> str:
@@ -49,11 +47,14 @@ def tuning_page(tuning: "Tuning", tuned: "Tuned", title: str) -> str:
     parts = []
     for name, values in columns.items():
         trace = {
-            "type": "scatter", "mode": "markers", "marker": {"color": FIRST}, "text": numbers,
+            "type": "scatter",
+            "mode": "markers",
+            "marker": {"color": FIRST},
+            "text": numbers,
             "x": [x if is_number(x) else str(x) for x in values],
             "y": [trial.score for trial in tuned.trials],
             "hovertemplate": "trial %{text}: %{y:.4g}<extra></extra>",
-        }  # fmt: skip
+        }
         where = tuning.searched.get(name)
         kind = {"type": "log"} if isinstance(where, Range) and where.is_log else {}
         layout = {"xaxis": axis(name, **kind), "yaxis": axis(tuning.metric), "height": 300}
@@ -103,17 +104,20 @@ def _lines(study: "Study", found: "xarray.Dataset", metric: str) -> tuple[Any, A
         means = [mean for _, mean in points]
         traces.append(
             {
-                "type": "scatter", "mode": "lines+markers", "name": others or metric,
+                "type": "scatter",
+                "mode": "lines+markers",
+                "name": others or metric,
                 "x": [x if is_number(x) else str(x) for x, _ in points],
                 "y": [mean.value for mean in means],
                 "error_y": {
-                    "type": "data", "symmetric": False,
+                    "type": "data",
+                    "symmetric": False,
                     "array": [mean.high - mean.value for mean in means],
                     "arrayminus": [mean.value - mean.low for mean in means],
                 },
                 "line": {"color": _COLORS[number % len(_COLORS)]},
             }
-        )  # fmt: skip
+        )
     layout = {"xaxis": axis(name), "yaxis": _label(found, metric), "height": 340}
     return traces, layout
 
@@ -126,11 +130,13 @@ def _heat(study: "Study", found: "xarray.Dataset", metric: str) -> tuple[Any, An
     others = [name for name in (*study.swept, SEED) if name not in {first, second}]
     means = found[metric].mean(others).transpose(second, first)
     trace = {
-        "type": "heatmap", "z": np.asarray(means.values), "colorscale": "Viridis",
+        "type": "heatmap",
+        "z": np.asarray(means.values),
+        "colorscale": "Viridis",
         "x": [str(value) for value in study.swept[first]],
         "y": [str(value) for value in study.swept[second]],
         "colorbar": {"title": {"text": metric}},
-    }  # fmt: skip
+    }
     layout = {"xaxis": axis(first), "yaxis": axis(second), "height": 280}
     return [trace], layout
 

@@ -157,10 +157,7 @@ class Study:
                 left += point.length
         wall = left / _SPEED / (jobs or len(sched_getaffinity(0)))
         total = sum(point.length for point in points)
-        return Explained(
-            len(points), sum(why.values()), why, left, wall, _RESULT * len(points),
-            round(_SECOND * total),
-        )  # fmt: skip
+        return Explained(len(points), sum(why.values()), why, left, wall, _RESULT * len(points), round(_SECOND * total))
 
     def run(
         self,
@@ -252,9 +249,7 @@ def _study(
     """Study in which lists are swept."""
     swept = {name: tuple(v) for name, v in given.items() if isinstance(v, list | range)}
     fixed = {name: value for name, value in given.items() if name not in swept}
-    return Study(
-        scenario, swept, tuple(seeds), tuple(metrics), fixed, tuple(Path(part) for part in parts)
-    )
+    return Study(scenario, swept, tuple(seeds), tuple(metrics), fixed, tuple(Path(part) for part in parts))
 
 
 def read_study(path: Path | str) -> Study:
@@ -272,8 +267,9 @@ def read_study(path: Path | str) -> Study:
             raise ParameterError(f"sweep of {name}", values, "a list of values")
     return Study(
         swept={name: tuple(values) for name, values in swept.items()},
-        metrics=tuple(map(str, listed(content, "metrics"))), **common(content, Path(path)),
-    )  # fmt: skip
+        metrics=tuple(map(str, listed(content, "metrics"))),
+        **common(content, Path(path)),
+    )
 
 
 def read_entries(path: Path | str, known: Sequence[str]) -> dict[str, Any]:
@@ -300,10 +296,11 @@ def common(content: Mapping[str, Any], path: Path) -> dict[str, Any]:
     if "duration" in content:
         fixed = {f"{SESSION}.duration": content["duration"], **fixed}
     return {
-        "scenario": content.get("scenario"), "settings": fixed,
+        "scenario": content.get("scenario"),
+        "settings": fixed,
         "seeds": tuple(range(1, seeds + 1)) if is_count else tuple(seeds),
         "parts": tuple(path.parent / str(part) for part in listed(content, "parts")),
-    }  # fmt: skip
+    }
 
 
 def listed(content: Mapping[str, Any], name: str) -> list[Any]:

@@ -91,9 +91,7 @@ class Tuning:
         if not self.searched:
             raise ParameterError("tune", {}, "at least one parameter")
         for name, where in self.searched.items():
-            if isinstance(where, Range) and not (
-                math.isfinite(where.high - where.low) and where.low < where.high
-            ):
+            if isinstance(where, Range) and not (math.isfinite(where.high - where.low) and where.low < where.high):
                 raise ParameterError(f"tune of {name}", tuple(where[:2]), "low below high")
             if isinstance(where, Range) and where.is_log and where.low <= 0.0:
                 raise ParameterError(f"low of {name}", where.low, "above 0 with log")
@@ -105,13 +103,8 @@ class Tuning:
 
     def _study(self) -> Study:
         """Study of the ends of all ranges, whose store is this search's."""
-        ends = {
-            name: where[:2] if isinstance(where, Range) else tuple(where)
-            for name, where in self.searched.items()
-        }
-        return Study(
-            self.scenario, ends, self.seeds, (self.metric,), self.settings, self.parts
-        )  # fmt: skip
+        ends = {name: where[:2] if isinstance(where, Range) else tuple(where) for name, where in self.searched.items()}
+        return Study(self.scenario, ends, self.seeds, (self.metric,), self.settings, self.parts)
 
     def run(
         self,
@@ -143,8 +136,7 @@ class Tuning:
         kept = Store.open(store, study)
         # Its numbers are drawn anew in each call: with the same results it asks for the same.
         search = optuna.create_study(
-            direction="maximize" if self.is_largest else "minimize",
-            sampler=optuna.samplers.TPESampler(seed=0),
+            direction="maximize" if self.is_largest else "minimize", sampler=optuna.samplers.TPESampler(seed=0)
         )
         done: list[Trial] = []
         while len(done) < trials:
@@ -175,9 +167,7 @@ class Tuning:
                 found[name] = trial.suggest_float(name, where.low, where.high, log=where.is_log)
         return found
 
-    def _scores(
-        self, study: Study, chosen: list[dict[str, Setting]], kept: Store, jobs: int | None
-    ) -> list[Trial]:
+    def _scores(self, study: Study, chosen: list[dict[str, Setting]], kept: Store, jobs: int | None) -> list[Trial]:
         """What some values are worth; sessions that the store does not have are run."""
         points, refused = [], []
         for values in chosen:
@@ -229,10 +219,7 @@ def read_tuning(path: Path | str) -> Tuning:
     for name, where in named(content, "tune").items():
         searched[name] = _range(name, where)
     ((word, metric),) = metrics
-    return Tuning(
-        searched=searched, metric=str(metric), is_largest=word == "maximize",
-        **common(content, Path(path)),
-    )  # fmt: skip
+    return Tuning(searched=searched, metric=str(metric), is_largest=word == "maximize", **common(content, Path(path)))
 
 
 def _range(name: str, where: object) -> Range | Sequence[Setting]:

@@ -26,11 +26,7 @@ _TRIES = 3
 
 
 def in_processes(
-    study: "Study",
-    points: Sequence[Point],
-    jobs: int | None,
-    store: Path | None,
-    recordings: Path | str | None,
+    study: "Study", points: Sequence[Point], jobs: int | None, store: Path | None, recordings: Path | str | None
 ) -> Iterator[Result]:
     """Results as they come, of processes of this machine with a session at a time each.
 
@@ -45,9 +41,7 @@ def in_processes(
         return
     left = {point.name: point for point in points}
     for _ in range(_TRIES):
-        with ProcessPoolExecutor(
-            count, get_context("spawn"), load_own_parts, (tuple(study.parts),)
-        ) as pool:
+        with ProcessPoolExecutor(count, get_context("spawn"), load_own_parts, (tuple(study.parts),)) as pool:
             try:
                 for result in _as_they_come(pool, do, list(left.values()), 2 * count):
                     del left[result.name]
@@ -59,9 +53,7 @@ def in_processes(
         yield Result(point.name, point.key, {}, f"its process died {_TRIES} times", 0.0)
 
 
-def _as_they_come(
-    pool: ProcessPoolExecutor, do: "partial[Result]", points: list[Point], most: int
-) -> Iterator[Result]:
+def _as_they_come(pool: ProcessPoolExecutor, do: "partial[Result]", points: list[Point], most: int) -> Iterator[Result]:
     waiting: set[Future[Result]] = set()
     rest = iter(points)
     while True:
@@ -74,9 +66,7 @@ def _as_they_come(
             yield future.result()
 
 
-def _computed(
-    point: Point, metrics: tuple[str, ...], store: Path | None, recordings: Path | None
-) -> Result:
+def _computed(point: Point, metrics: tuple[str, ...], store: Path | None, recordings: Path | None) -> Result:
     result = compute(point, metrics, recordings)
     if store is not None:
         write_result(store, result)
@@ -119,9 +109,7 @@ def on_dask(client: "Client", study: "Study", points: Sequence[Point]) -> Iterat
         client.cancel(list(futures))
 
 
-def _batch(
-    points: Sequence[Point], metrics: tuple[str, ...], parts: tuple[tuple[str, str], ...]
-) -> list[Result]:
+def _batch(points: Sequence[Point], metrics: tuple[str, ...], parts: tuple[tuple[str, str], ...]) -> list[Result]:
     """Results of some points on a worker; parts of a user travel as texts."""
     with tempfile.TemporaryDirectory() as folder:
         for name, text in parts:

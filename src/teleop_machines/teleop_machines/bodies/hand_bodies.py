@@ -19,11 +19,7 @@ _UP = np.array([0.0, 0.0, 1.0])
 def hand_bodies(robot: Robot) -> Bodies:
     """Palm, three fingers of three links, and the object at the contact points."""
     g = robot.geometry
-    roots = (
-        pose(0.0, -g["d"], g["h"]),
-        pose(0.0, g["d"], g["h"]),
-        pose(axis="y", angle=g["gamma"]),
-    )
+    roots = (pose(0.0, -g["d"], g["h"]), pose(0.0, g["d"], g["h"]), pose(axis="y", angle=g["gamma"]))
     radius = 0.05 * max(g["h"], g["d"], g["l11"] + g["l12"] + g["l13"])
     feet = [root[:3] for root in roots]
     palm = rim(np.array(feet), radius, "base")
@@ -43,9 +39,7 @@ def hand_bodies(robot: Robot) -> Bodies:
     return Bodies((*bodies, held, tip), robot.n, coordinates, moved, size)
 
 
-def _finger(
-    finger: int, root: Array, lengths: tuple[float, ...], radius: float
-) -> tuple[Body, ...]:
+def _finger(finger: int, root: Array, lengths: tuple[float, ...], radius: float) -> tuple[Body, ...]:
     """Links of a finger: theta turns about z of its root, psi and phi lift."""
     first, name, shin = 3 * finger, f"finger{finger + 1}", 0.8 * radius
     start = capsule(np.zeros(3), np.array([lengths[0], 0.0, 0.0]), radius, "link")

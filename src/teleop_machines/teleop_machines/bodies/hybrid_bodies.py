@@ -40,9 +40,7 @@ def scara_stewart_bodies(robot: Robot) -> Bodies:
     tool = capsule(np.zeros(3), robot.geometry["e_eff"] * _UP, 2.0 * radius, "platform")
     bodies.append(Body("platform", (*plate(points[1], radius), tool), 0, Joint.FREE, HERE, count))
     origin = pose(z=robot.geometry["e_eff"])
-    bodies.append(
-        Body("tip", (ball(np.zeros(3), 3.0 * radius, "tool"),), len(bodies) - 1, origin=origin)
-    )
+    bodies.append(Body("tip", (ball(np.zeros(3), 3.0 * radius, "tool"),), len(bodies) - 1, origin=origin))
     upper = tuple(len(arm) + (leg + 1) * legs.tubes - 1 for leg in range(6))
     size = robot.geometry["l1"] + robot.geometry["l2"] + robot.geometry["w_z"]
     return Bodies(tuple(bodies), 9, _coordinates(robot, legs, points), (1, 2, 3, *upper), size)

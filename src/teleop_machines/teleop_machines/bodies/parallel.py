@@ -108,9 +108,7 @@ def _platform_on_legs(robot: Robot, base: Array, platform: Array) -> Bodies:
     count = robot.n * legs.tubes
     bodies = [Body("base", plate(base, radius, is_base=True), -1), *legs.bodies(robot.n)]
     bodies.append(Body("platform", plate(platform, radius), 0, Joint.FREE, HERE, count))
-    bodies.append(
-        Body("tip", (ball(np.zeros(3), 1.5 * radius, "tool"),), 0, Joint.FREE, HERE, count)
-    )
+    bodies.append(Body("tip", (ball(np.zeros(3), 1.5 * radius, "tool"),), 0, Joint.FREE, HERE, count))
     moved = tuple((leg + 1) * legs.tubes for leg in range(robot.n))
     size = float(length(base).max() + robot.upper.max())
     return Bodies(tuple(bodies), robot.n, coordinates, moved, size)

@@ -40,9 +40,7 @@ def parallelogram_bodies(robot: Robot) -> Bodies:
     return _loop((g["l0"], g["l1"], g["l0"], g["l1"]), g["a"], coordinates)
 
 
-def _loop(
-    lengths: tuple[float, float, float, float], tip: float, coordinates: Coordinates
-) -> Bodies:
+def _loop(lengths: tuple[float, float, float, float], tip: float, coordinates: Coordinates) -> Bodies:
     """Bodies of a loop of ground, crank, coupler, rocker [m], the tip on the coupler."""
     ground, crank, coupler, rocker = lengths
     radius = 0.03 * max(lengths)

@@ -75,10 +75,7 @@ class Architecture:
 
 def _try(part: Architecture) -> None:
     """Push for some samples, so that what cannot work is told before anything runs."""
-    needs = (
-        "one with push(numbers, memory, felt, away, period, out) and parameters that all have "
-        "defaults"
-    )
+    needs = "one with push(numbers, memory, felt, away, period, out) and parameters that all have defaults"
     with tried("architecture", part.name, needs):
         numbers = part.numbers(part.parameters())
         memory, fence = fenced(np.zeros(MEMORY))
@@ -93,10 +90,7 @@ def _try(part: Architecture) -> None:
 ARCHITECTURES: Registry[Architecture] = Registry(
     "architecture",
     "architectures",
-    places(
-        "teleop_core.chain.architectures",
-        "unilateral position_force position_position three_channel four_channel",
-    ),
+    places("teleop_core.chain.architectures", "unilateral position_force position_position three_channel four_channel"),
     part_check("architecture", Architecture, "push"),
     _try,
 )

@@ -4,11 +4,7 @@ from dataclasses import dataclass
 
 from teleop_core.base.parameters import parameter
 from teleop_core.chain.architectures import Architecture
-from teleop_core.chain.architectures.three_channel import (
-    ThreeChannelParameters,
-    channels_push,
-    force_gain,
-)
+from teleop_core.chain.architectures.three_channel import ThreeChannelParameters, channels_push, force_gain
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -16,10 +12,13 @@ class FourChannelParameters(ThreeChannelParameters):
     """What comes back, and what the slave gets of the hand's force."""
 
     hand_gain: float = parameter(
-        1.0, unit="N/N", lower=0.0, upper=10.0,
+        1.0,
+        unit="N/N",
+        lower=0.0,
+        upper=10.0,
         doc="force that leads the slave over the hand's; with 1/force_gain a press that lasts "
         "moves the tip no way from its command",
-    )  # fmt: skip
+    )
 
 
 def _lead(parameters: FourChannelParameters) -> float:
@@ -27,6 +26,5 @@ def _lead(parameters: FourChannelParameters) -> float:
 
 
 FOUR_CHANNEL = Architecture(
-    "four_channel", FourChannelParameters, channels_push, force_scale=force_gain, lead_gain=_lead,
-    needs_impedance=True,
-)  # fmt: skip
+    "four_channel", FourChannelParameters, channels_push, force_scale=force_gain, lead_gain=_lead, needs_impedance=True
+)

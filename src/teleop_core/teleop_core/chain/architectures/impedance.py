@@ -32,24 +32,35 @@ class ImpedanceParameters:
     """The mass, spring and damper between where the hand leads the tip and where it goes."""
 
     mass: float = parameter(
-        1.0, unit="kg", lower=0.0, upper=100.0, doc="of the tip as it yields",
+        1.0,
+        unit="kg",
+        lower=0.0,
+        upper=100.0,
+        doc="of the tip as it yields",
         source="assumed: with spring and damper it does not swing",
-    )  # fmt: skip
+    )
     damping: float = parameter(
-        100.0, unit="N·s/m", lower=1.0, upper=10_000.0, doc="force over the speed of yielding",
+        100.0,
+        unit="N·s/m",
+        lower=1.0,
+        upper=10_000.0,
+        doc="force over the speed of yielding",
         source="assumed: what keeps an arm that lags by 50 ms calm before silicone of 1000 N/m",
-    )  # fmt: skip
+    )
     stiffness: float = parameter(
-        1000.0, unit="N/m", lower=10.0, upper=100_000.0, doc="force over the way of yielding",
+        1000.0,
+        unit="N/m",
+        lower=10.0,
+        upper=100_000.0,
+        doc="force over the way of yielding",
         source="assumed: five times that of tissue, as much as silicone's",
-    )  # fmt: skip
+    )
     force_gain: float = parameter(
         1.0, unit="N/N", lower=0.0, upper=10.0, doc="force that it yields to over slave/measured_cf"
     )
     largest_way: float = parameter(
-        0.02, unit="m", lower=0.0, upper=0.5, doc="how far it yields at most, whatever the force",
-        source="assumed",
-    )  # fmt: skip
+        0.02, unit="m", lower=0.0, upper=0.5, doc="how far it yields at most, whatever the force", source="assumed"
+    )
 
 
 class ImpedanceState(Fields):

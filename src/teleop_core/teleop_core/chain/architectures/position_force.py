@@ -18,9 +18,7 @@ class PositionForceParameters:
 
 
 @kernel
-def position_force_push(
-    numbers: Array, memory: Array, felt: Array, away: Array, period: float, out: Array
-) -> None:
+def position_force_push(numbers: Array, memory: Array, felt: Array, away: Array, period: float, out: Array) -> None:
     """Write the push (3,) [N]: the force on the tip times the gain.
 
     Source:
@@ -34,6 +32,4 @@ def _scale(parameters: PositionForceParameters) -> float:
     return max(parameters.force_gain, 1e-3)
 
 
-POSITION_FORCE = Architecture(
-    "position_force", PositionForceParameters, position_force_push, force_scale=_scale
-)
+POSITION_FORCE = Architecture("position_force", PositionForceParameters, position_force_push, force_scale=_scale)

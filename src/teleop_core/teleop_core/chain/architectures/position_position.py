@@ -13,17 +13,17 @@ class PositionPositionParameters:
     """The spring that the hand feels."""
 
     stiffness: float = parameter(
-        150.0, unit="N/m", lower=0.0, upper=5000.0,
+        150.0,
+        unit="N/m",
+        lower=0.0,
+        upper=5000.0,
         doc="force at the hand over the way from its command to slave/measured_cp",
-        source="assumed: half of the stiffness of a medium grip, so that no delay makes it throw "
-        "the hand",
-    )  # fmt: skip
+        source="assumed: half of the stiffness of a medium grip, so that no delay makes it throw the hand",
+    )
 
 
 @kernel
-def position_position_push(
-    numbers: Array, memory: Array, felt: Array, away: Array, period: float, out: Array
-) -> None:
+def position_position_push(numbers: Array, memory: Array, felt: Array, away: Array, period: float, out: Array) -> None:
     """Write the push (3,) [N]: a spring towards where the tip is.
 
     Source:
@@ -33,6 +33,4 @@ def position_position_push(
         out[i] = numbers[0] * away[i]
 
 
-POSITION_POSITION = Architecture(
-    "position_position", PositionPositionParameters, position_position_push
-)
+POSITION_POSITION = Architecture("position_position", PositionPositionParameters, position_position_push)

@@ -19,16 +19,17 @@ class ThreeChannelParameters:
         1.0, unit="N/N", lower=0.0, upper=10.0, doc="force at the hand over slave/measured_cf"
     )
     stiffness: float = parameter(
-        150.0, unit="N/m", lower=0.0, upper=5000.0,
+        150.0,
+        unit="N/m",
+        lower=0.0,
+        upper=5000.0,
         doc="force at the hand over the way from its command to slave/measured_cp",
         source="assumed: that of position_position",
-    )  # fmt: skip
+    )
 
 
 @kernel
-def channels_push(
-    numbers: Array, memory: Array, felt: Array, away: Array, period: float, out: Array
-) -> None:
+def channels_push(numbers: Array, memory: Array, felt: Array, away: Array, period: float, out: Array) -> None:
     """Write the push (3,) [N]: the force on the tip times its gain, and a spring towards the tip.
 
     Source:
@@ -44,6 +45,5 @@ def force_gain(parameters: ThreeChannelParameters) -> float:
 
 
 THREE_CHANNEL = Architecture(
-    "three_channel", ThreeChannelParameters, channels_push, force_scale=force_gain,
-    needs_impedance=True,
-)  # fmt: skip
+    "three_channel", ThreeChannelParameters, channels_push, force_scale=force_gain, needs_impedance=True
+)

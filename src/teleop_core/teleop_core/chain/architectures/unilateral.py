@@ -7,9 +7,7 @@ from teleop_core.kernels.geometry import Array
 
 
 @kernel
-def unilateral_push(
-    numbers: Array, memory: Array, felt: Array, away: Array, period: float, out: Array
-) -> None:
+def unilateral_push(numbers: Array, memory: Array, felt: Array, away: Array, period: float, out: Array) -> None:
     """Write no push (3,) [N]."""
     for i in range(3):
         out[i] = 0.0

@@ -29,13 +29,13 @@ _HINTS = {
 class GamepadParameters(PilotParameters):
     """How a gamepad moves the stylus, and how it tells the force."""
 
-    rumble: float = parameter(
-        1.0, lower=0.0, upper=1.0, fixed=True, doc="rumble at the device's peak force; 0: none"
-    )
+    rumble: float = parameter(1.0, lower=0.0, upper=1.0, fixed=True, doc="rumble at the device's peak force; 0: none")
     triggers: str = parameter(
-        "roll", choices=("roll", "jaw"), fixed=True,
+        "roll",
+        choices=("roll", "jaw"),
+        fixed=True,
         doc="what they do: they roll the stylus, or the right one closes the jaw and nothing rolls",
-    )  # fmt: skip
+    )
 
 
 class Sdl:
@@ -101,14 +101,16 @@ class Gamepad:
             raise SessionError(f"gamepad {self.name} is gone")
         pad, axis, button = self._sdl.pygame, self._axis, self._button
         right, left = map(axis, (pad.CONTROLLER_AXIS_TRIGGERRIGHT, pad.CONTROLLER_AXIS_TRIGGERLEFT))
-        rates = np.array([
-            axis(pad.CONTROLLER_AXIS_LEFTX),
-            -axis(pad.CONTROLLER_AXIS_RIGHTY),  # pushed away is negative
-            axis(pad.CONTROLLER_AXIS_LEFTY),
-            button(pad.CONTROLLER_BUTTON_DPAD_DOWN) - button(pad.CONTROLLER_BUTTON_DPAD_UP),
-            -axis(pad.CONTROLLER_AXIS_RIGHTX),
-            0.0 if self._leads_jaw else left - right,
-        ])  # fmt: skip
+        rates = np.array(
+            [
+                axis(pad.CONTROLLER_AXIS_LEFTX),
+                -axis(pad.CONTROLLER_AXIS_RIGHTY),  # pushed away is negative
+                axis(pad.CONTROLLER_AXIS_LEFTY),
+                button(pad.CONTROLLER_BUTTON_DPAD_DOWN) - button(pad.CONTROLLER_BUTTON_DPAD_UP),
+                -axis(pad.CONTROLLER_AXIS_RIGHTX),
+                0.0 if self._leads_jaw else left - right,
+            ]
+        )
         shoulders = pad.CONTROLLER_BUTTON_LEFTSHOULDER, pad.CONTROLLER_BUTTON_RIGHTSHOULDER
         return Reading(
             rates,
@@ -141,6 +143,4 @@ def open_gamepad(parameters: GamepadParameters) -> Gamepad:
     return Gamepad(parameters.device, leads_jaw=parameters.triggers == "jaw")
 
 
-GAMEPAD = Operator(
-    "gamepad", make_remote, GamepadParameters, ahead=AHEAD, trembles=True, opens=open_gamepad
-)
+GAMEPAD = Operator("gamepad", make_remote, GamepadParameters, ahead=AHEAD, trembles=True, opens=open_gamepad)

@@ -19,26 +19,38 @@ class RateParameters:
     """How fast a device that says rates moves the stylus."""
 
     speed: float = parameter(
-        0.04, unit="m/s", lower=1e-3, upper=0.5, fixed=True, doc="speed at full deflection",
+        0.04,
+        unit="m/s",
+        lower=1e-3,
+        upper=0.5,
+        fixed=True,
+        doc="speed at full deflection",
         source="assumed: through the Phantom's workspace in four seconds",
-    )  # fmt: skip
+    )
     turn_speed: float = parameter(
-        0.6, unit="rad/s", lower=0.01, upper=6.0, fixed=True,
-        doc="speed of the turn at full deflection", source="assumed: a right angle in 2.6 s",
-    )  # fmt: skip
+        0.6,
+        unit="rad/s",
+        lower=0.01,
+        upper=6.0,
+        fixed=True,
+        doc="speed of the turn at full deflection",
+        source="assumed: a right angle in 2.6 s",
+    )
     dead_zone: float = parameter(
-        0.12, lower=0.0, upper=0.9, fixed=True, doc="share of the deflection that counts as none",
+        0.12,
+        lower=0.0,
+        upper=0.9,
+        fixed=True,
+        doc="share of the deflection that counts as none",
         source="assumed: sticks of gamepads rest within a tenth of the middle",
-    )  # fmt: skip
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
 class PilotParameters(RateParameters):
     """How a device that says rates moves the stylus."""
 
-    device: str = parameter(
-        "", fixed=True, doc="part of the device's name; empty: the first that is found"
-    )
+    device: str = parameter("", fixed=True, doc="part of the device's name; empty: the first that is found")
 
 
 def beyond(rates: Array, dead_zone: float) -> Array:

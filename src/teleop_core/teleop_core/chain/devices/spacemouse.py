@@ -150,6 +150,5 @@ def open_space_mouse(parameters: SpaceMouseParameters) -> SpaceMouse:
 
 
 SPACEMOUSE = Operator(
-    "spacemouse", make_remote, SpaceMouseParameters, ahead=AHEAD, trembles=True,
-    opens=open_space_mouse,
-)  # fmt: skip
+    "spacemouse", make_remote, SpaceMouseParameters, ahead=AHEAD, trembles=True, opens=open_space_mouse
+)

@@ -58,10 +58,7 @@ class TremorFilter:
 
 def _try(part: TremorFilter) -> None:
     """Filter some values, so that what cannot work is told before anything runs."""
-    needs = (
-        "one with filter(numbers, memory, value, period) -> float and parameters that all have "
-        "defaults"
-    )
+    needs = "one with filter(numbers, memory, value, period) -> float and parameters that all have defaults"
     with tried("tremor filter", part.name, needs):
         numbers = part.numbers(part.parameters())
         memory, fence = fenced(np.zeros(MEMORY))

@@ -15,12 +15,8 @@ from teleop_core.kernels.geometry import Array
 class BandStopParameters:
     """Edges of the band."""
 
-    low: float = parameter(
-        8.0, unit="Hz", lower=3.0, upper=25.0, doc="lower edge, of which 3 dB are taken out"
-    )
-    high: float = parameter(
-        12.0, unit="Hz", lower=3.0, upper=25.0, doc="upper edge, of which 3 dB are taken out"
-    )
+    low: float = parameter(8.0, unit="Hz", lower=3.0, upper=25.0, doc="lower edge, of which 3 dB are taken out")
+    high: float = parameter(12.0, unit="Hz", lower=3.0, upper=25.0, doc="upper edge, of which 3 dB are taken out")
 
     def __post_init__(self) -> None:
         """Refuse edges that enclose no band."""
@@ -29,9 +25,7 @@ class BandStopParameters:
 
 
 @inner
-def _section(
-    memory: Array, at: int, value: float, real: float, imaginary: float, center: float
-) -> float:
+def _section(memory: Array, at: int, value: float, real: float, imaginary: float, center: float) -> float:
     """Section with a pair of poles (real ± imaginary j) and zeros at ``± j sqrt(center)``."""
     square = real * real + imaginary * imaginary
     slope = math.sqrt(square)

@@ -18,14 +18,14 @@ _WIDEST = 0.45
 class NotchParameters:
     """Where the notch is, and how narrow."""
 
-    frequency: float = parameter(
-        10.0, unit="Hz", lower=3.0, upper=25.0, doc="frequency that is taken out"
-    )
+    frequency: float = parameter(10.0, unit="Hz", lower=3.0, upper=25.0, doc="frequency that is taken out")
     quality: float = parameter(
-        1.0, lower=0.3, upper=30.0,
+        1.0,
+        lower=0.3,
+        upper=30.0,
         doc="frequency over the width in which more than 3 dB are taken out; slow motion is late "
         "by 1/(2π frequency quality)",
-    )  # fmt: skip
+    )
 
     def __post_init__(self) -> None:
         """Refuse a notch so wide that slow samples cannot show it."""

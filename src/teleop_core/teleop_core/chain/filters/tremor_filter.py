@@ -32,9 +32,12 @@ class TremorFilterParameters:
 
     kind: Choice = choice(TREMOR_FILTERS, "wflc", doc="how tremor is taken out")
     longest_pause: float = parameter(
-        0.3, unit="s", lower=0.002, upper=5.0,
+        0.3,
+        unit="s",
+        lower=0.002,
+        upper=5.0,
         doc="after a longer pause of the master the filter begins anew at the reading",
-    )  # fmt: skip
+    )
     plausible: plausibility.HandLimits = field(default_factory=plausibility.HandLimits)
 
 
@@ -113,9 +116,7 @@ def _follow(s: FilterState, part: Part, pose: Array, elapsed_ns: int, filtered: 
 
 
 @kernel
-def tremor_filter_step(
-    p: plausibility.PlausibilityNumbers, s: FilterState, part: Part, row: Row, dt: float
-) -> None:
+def tremor_filter_step(p: plausibility.PlausibilityNumbers, s: FilterState, part: Part, row: Row, dt: float) -> None:
     """One master sample: write master_filtered_cp and master_filtered_out.
 
     The position is filtered coordinate by coordinate, over the time between stamps; the orientation

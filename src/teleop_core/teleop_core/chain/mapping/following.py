@@ -50,9 +50,7 @@ def hear(s: FollowingState, row: Row) -> None:
         s.felt_at_ns = now_ns
     if row.slave_measured_cp_ns > s.seen_ns:
         s.seen_at_ns = now_ns
-    s.in_force_ns, s.felt_ns, s.seen_ns = (
-        stamp_ns, row.slave_measured_cf_ns, row.slave_measured_cp_ns
-    )  # fmt: skip
+    s.in_force_ns, s.felt_ns, s.seen_ns = (stamp_ns, row.slave_measured_cf_ns, row.slave_measured_cp_ns)
 
 
 @inner

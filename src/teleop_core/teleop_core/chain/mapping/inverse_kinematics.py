@@ -35,22 +35,31 @@ class InverseKinematicsParameters(RobotParameters):
         1.0, lower=0.01, upper=1.0, doc="share of the drives' speed limits that references may use"
     )
     position_tolerance: float = parameter(
-        1e-3, unit="m", lower=0.0, upper=1.0,
+        1e-3,
+        unit="m",
+        lower=0.0,
+        upper=1.0,
         doc="an arm that lags behind by less than this, for want of speed, still follows",
-    )  # fmt: skip
+    )
     rotation_tolerance: float = parameter(
         math.radians(1.0), unit="rad", lower=0.0, upper=1.0, doc="the same for its orientation"
     )
     longest_pause: float = parameter(
-        0.3, unit="s", lower=0.002, upper=5.0,
+        0.3,
+        unit="s",
+        lower=0.002,
+        upper=5.0,
         doc="time between commands of one stream, at most; for one that comes alone, after a "
         "longer pause, joints go as far as 0.45 s of full speed",
-    )  # fmt: skip
+    )
     feedback_timeout: float = parameter(
-        0.1, unit="s", lower=0.002, upper=5.0,
+        0.1,
+        unit="s",
+        lower=0.002,
+        upper=5.0,
         doc="with an older slave setpoint, solutions start from the slave's joints again; of slow "
         "commands twice their period counts",
-    )  # fmt: skip
+    )
 
 
 class SolverNumbers(Fields):
@@ -163,7 +172,7 @@ def _has_own_way(s: SolverState, solver: Solver, row: Row, timeout_ns: int) -> b
 @inner
 def _goes_far(p: SolverNumbers, solver: Solver) -> bool:
     """Whether the answer turns a joint farther than small motions of the tip need."""
-    for i in range(solver.q.shape[0]):
+    for i in range(solver.q.shape[0]):  # noqa: SIM110 - compiled
         if abs(solver.q[i] - solver.seed[i]) > _FAR * p.speed[i]:
             return True
     return False
@@ -181,9 +190,7 @@ def _solve(p: SolverNumbers, solver: Solver, time: float, is_alone: bool) -> int
     for attempt in range(3):
         for i in range(solver.q.shape[0]):
             solver.limits[2, i] = p.speed[i] * longest
-        status = solver.ik(
-            solver.T, solver.seed, solver.limits, solver.geometry, solver.q, solver.residual
-        )
+        status = solver.ik(solver.T, solver.seed, solver.limits, solver.geometry, solver.q, solver.residual)
         near = solver.residual[0] <= p.tolerance[0] and solver.residual[1] <= p.tolerance[1]
         if attempt == 0 and is_alone and _goes_far(p, solver):
             longest = time
@@ -195,9 +202,7 @@ def _solve(p: SolverNumbers, solver: Solver, time: float, is_alone: bool) -> int
 
 
 @kernel
-def inverse_kinematics_step(
-    p: SolverNumbers, s: SolverState, solver: Solver, row: Row, dt: float
-) -> None:
+def inverse_kinematics_step(p: SolverNumbers, s: SolverState, solver: Solver, row: Row, dt: float) -> None:
     """One slave pose: write slave_servo_jp and slave_reach.
 
     The answer is the neighbour of the last one; while the slave does not follow, of the slave's

@@ -28,17 +28,18 @@ class JawCommandParameters:
         choices=SOURCES,
         doc="what closes it: hand/jaw, by its share, or a button, which keeps its own meaning too",
     )
-    toggles: bool = parameter(
-        False, doc="whether each press closes or opens it, not the button as long as it is held"
-    )
+    toggles: bool = parameter(False, doc="whether each press closes or opens it, not the button as long as it is held")
     open_angle: float = parameter(
-        0.8, unit="rad", lower=0.0, upper=3.0, doc="between the fingers of the open jaw",
-        source="assumed",
-    )  # fmt: skip
+        0.8, unit="rad", lower=0.0, upper=3.0, doc="between the fingers of the open jaw", source="assumed"
+    )
     closed_angle: float = parameter(
-        0.0, unit="rad", lower=-0.5, upper=3.0, source="assumed",
+        0.0,
+        unit="rad",
+        lower=-0.5,
+        upper=3.0,
+        source="assumed",
         doc="asked for when it is closed; less presses harder on what is thin",
-    )  # fmt: skip
+    )
 
     def __post_init__(self) -> None:
         if not self.closed_angle < self.open_angle:

@@ -53,11 +53,7 @@ from teleop_core.kernels.room import room
 
 
 class ScalingNumbers(
-    walls.WallNumbers,
-    SideNumbers,
-    ReflectionNumbers,
-    plausibility.PlausibilityNumbers,
-    following.FollowingNumbers,
+    walls.WallNumbers, SideNumbers, ReflectionNumbers, plausibility.PlausibilityNumbers, following.FollowingNumbers
 ):
     """Parameter record of the motion scaling."""
 
@@ -104,9 +100,7 @@ _LONG = 1e-3
 @kernel
 def to_slave_axes(p: ScalingNumbers, master: Array, slave: Array) -> None:
     """Write a vector (3,) of the master's base in the slave's axes."""
-    x, y, z = (
-        p.sign[0] * master[p.axis[0]], p.sign[1] * master[p.axis[1]], p.sign[2] * master[p.axis[2]]
-    )  # fmt: skip
+    x, y, z = (p.sign[0] * master[p.axis[0]], p.sign[1] * master[p.axis[1]], p.sign[2] * master[p.axis[2]])
     slave[0], slave[1], slave[2] = x, y, z
 
 
@@ -160,9 +154,7 @@ def _latch(s: ScalingState, stylus: Array) -> None:
 
 
 @inner
-def _move(
-    p: ScalingNumbers, s: ScalingState, fixture: Walled, gain: float, position: Array, turn: Array
-) -> None:
+def _move(p: ScalingNumbers, s: ScalingState, fixture: Walled, gain: float, position: Array, turn: Array) -> None:
     """Add the scaled step of the hand to the command; turn the tool as the stylus."""
     step = room(3)
     for i in range(3):
@@ -189,9 +181,7 @@ def _move(
 
 
 @inner
-def _wall(
-    p: ScalingNumbers, s: ScalingState, fixture: Walled, period: float, stylus: Array, force: Array
-) -> None:
+def _wall(p: ScalingNumbers, s: ScalingState, fixture: Walled, period: float, stylus: Array, force: Array) -> None:
     """Write the push (3,) [N] of the fixture's wall; after a pause it begins anew."""
     length = 0.0
     if s.is_fixture_on and p.holds_hand:
@@ -265,13 +255,7 @@ def _refuse(
 
 @kernel
 def motion_scaling_step(
-    p: ScalingNumbers,
-    s: ScalingState,
-    sent: Sequence[limits.Sent],
-    fixture: Walled,
-    law: Law,
-    row: Row,
-    dt: float,
+    p: ScalingNumbers, s: ScalingState, sent: Sequence[limits.Sent], fixture: Walled, law: Law, row: Row, dt: float
 ) -> None:
     """One master sample: write slave_servo_cp, master_servo_cf and teleop_state.
 
@@ -352,9 +336,7 @@ class MotionScaling(RunningStage):
         self.kernel = motion_scaling_step
         nothing = Held(None, np.empty(0), np.empty(4))
         self._walled = Walled(nothing, np.zeros(3), np.zeros(3))
-        self._law = make_law(
-            ARCHITECTURES.find("unilateral"), np.empty(0), PASSIVITIES.find("none"), np.empty(0)
-        )
+        self._law = make_law(ARCHITECTURES.find("unilateral"), np.empty(0), PASSIVITIES.find("none"), np.empty(0))
         self.reset()
         self.retune(parameters)
 
@@ -432,10 +414,10 @@ class MotionScaling(RunningStage):
         numbers = part.numbers(chosen.parameters)
         kept = passivity.numbers_of(reflection.passivity.parameters)
         law = self._law
-        if (part.push_pointer, passivity.hand_pointer) == (law.push, law.hand) and (
-            len(numbers),
-            len(kept),
-        ) == (len(law.numbers), len(law.kept)):
+        if (part.push_pointer, passivity.hand_pointer) == (law.push, law.hand) and (len(numbers), len(kept)) == (
+            len(law.numbers),
+            len(law.kept),
+        ):
             law.numbers[:], law.kept[:] = numbers, kept  # the tick that is composed already goes on
             return
         if part.push_pointer is not law.push:

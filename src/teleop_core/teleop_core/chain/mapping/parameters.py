@@ -28,12 +28,14 @@ class FixtureParameters:
 
     kind: Choice = choice(SHAPES, "box", doc="shape of the fixture")
     place: tuple[float, ...] = parameter(
-        (0.0, 0.0, 0.0), unit="m", lower=-0.5, upper=0.5, length=3,
+        (0.0, 0.0, 0.0),
+        unit="m",
+        lower=-0.5,
+        upper=0.5,
+        length=3,
         doc="from the middle, where the hand was, to that of the shape, in the master's base",
-    )  # fmt: skip
-    keep_out: bool = parameter(
-        False, doc="whether the hand stays outside of the shape in place of inside"
     )
+    keep_out: bool = parameter(False, doc="whether the hand stays outside of the shape in place of inside")
     side: str = parameter(
         "hand",
         choices=SIDES,
@@ -48,19 +50,30 @@ class FixtureParameters:
         "1 mm; soft: a spring; step: max_force at once, which buzzes",
     )
     stiffness: float = parameter(
-        1000.0, unit="N/m", lower=1.0, upper=5000.0, doc="spring of the damped and the soft wall",
+        1000.0,
+        unit="N/m",
+        lower=1.0,
+        upper=5000.0,
+        doc="spring of the damped and the soft wall",
         source="assumed: below the least stiffness of the device, 1020 N/m; none is published",
-    )  # fmt: skip
+    )
     damping: float = parameter(
-        10.0, unit="N·s/m", lower=0.0, upper=50.0,
+        10.0,
+        unit="N·s/m",
+        lower=0.0,
+        upper=50.0,
         doc="damper of the damped and the hard wall; at least stiffness times period is taken",
         source="assumed: what keeps slow contacts of a trembling hand passive too, twenty times "
         "K T / 2 of 1000 N/m at 1 kHz (Colgate and Schenkel 1997)",
-    )  # fmt: skip
+    )
     max_force: float = parameter(
-        3.3, unit="N", lower=0.0, upper=10.0, doc="largest push; the device limits it further",
+        3.3,
+        unit="N",
+        lower=0.0,
+        upper=10.0,
+        doc="largest push; the device limits it further",
         source="published: Vongbunyong 2008, section 6.3, the peak force of the device",
-    )  # fmt: skip
+    )
 
     @property
     def pushes(self) -> bool:
@@ -84,26 +97,36 @@ class ReachForceParameters:
 
     is_on: bool = parameter(True, doc="whether the hand feels the slave's limits as a wall")
     stiffness: float = parameter(
-        500.0, unit="N/m", lower=1.0, upper=5000.0, doc="spring of it",
+        500.0,
+        unit="N/m",
+        lower=1.0,
+        upper=5000.0,
+        doc="spring of it",
         source="assumed: half of the fixture's, so that one feels which of the two it is",
-    )  # fmt: skip
+    )
     max_force: float = parameter(
-        1.5, unit="N", lower=0.0, upper=10.0, doc="largest push",
+        1.5,
+        unit="N",
+        lower=0.0,
+        upper=10.0,
+        doc="largest push",
         source="assumed: half of the fixture's, for the same reason",
-    )  # fmt: skip
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
 class ReflectionParameters:
     """What the hand feels of the slave, and of what that touches."""
 
-    architecture: Choice = choice(
-        ARCHITECTURES, "unilateral", doc="what the hand feels of the slave"
-    )
+    architecture: Choice = choice(ARCHITECTURES, "unilateral", doc="what the hand feels of the slave")
     max_force: float = parameter(
-        3.3, unit="N", lower=0.0, upper=10.0, doc="largest push; the device limits it further",
+        3.3,
+        unit="N",
+        lower=0.0,
+        upper=10.0,
+        doc="largest push; the device limits it further",
         source="published: Vongbunyong 2008, section 6.3, the peak force of the device",
-    )  # fmt: skip
+    )
     passivity: Choice = choice(
         PASSIVITIES,
         "none",
@@ -126,30 +149,43 @@ class MotionScalingParameters:
     )
     mode: str = parameter("coarse", choices=MODES, doc="mode; the mode button changes it too")
     tool_roll: float = parameter(
-        math.pi / 2, unit="rad", lower=-math.pi, upper=math.pi,
+        math.pi / 2,
+        unit="rad",
+        lower=-math.pi,
+        upper=math.pi,
         doc="turn of the slave's tool about its axis; π/2 aligns it with the home pose",
-    )  # fmt: skip
+    )
     axes: tuple[str, ...] = parameter(
-        ("-z", "-x", "+y"), choices=AXES, length=3,
+        ("-z", "-x", "+y"),
+        choices=AXES,
+        length=3,
         doc="the slave's x, y, z as axes of the master's base; the default is that of the source",
-    )  # fmt: skip
+    )
     tool_axes: tuple[str, ...] = parameter(
-        ("+x", "-y", "-z"), choices=AXES, length=3,
-        doc="the tool's x, y, z as axes of the stylus, before tool_roll",
-    )  # fmt: skip
+        ("+x", "-y", "-z"), choices=AXES, length=3, doc="the tool's x, y, z as axes of the stylus, before tool_roll"
+    )
     rotation_gain: float = parameter(
-        1.0, unit="rad/rad", lower=0.0, upper=1.0,
+        1.0,
+        unit="rad/rad",
+        lower=0.0,
+        upper=1.0,
         doc="tool turn per stylus turn; below 1 the tool keeps no fixed relation to the stylus",
-    )  # fmt: skip
+    )
     longest_pause: float = parameter(
-        0.3, unit="s", lower=0.002, upper=5.0,
+        0.3,
+        unit="s",
+        lower=0.002,
+        upper=5.0,
         doc="after a longer pause of the master the slave is aligned anew and does not jump",
-    )  # fmt: skip
+    )
     feedback_timeout: float = parameter(
-        0.1, unit="s", lower=0.002, upper=5.0,
+        0.1,
+        unit="s",
+        lower=0.002,
+        upper=5.0,
         doc="slave counts as not following when its setpoint lags behind the last command by more, "
         "and no newer one was heard of for as long; of slow masters twice their period counts",
-    )  # fmt: skip
+    )
     fixture: FixtureParameters = field(default_factory=FixtureParameters)
     reach_force: ReachForceParameters = field(default_factory=ReachForceParameters)
     reflection: ReflectionParameters = field(default_factory=ReflectionParameters)
@@ -190,9 +226,7 @@ def tool_maps(parameters: MotionScalingParameters) -> tuple[Array, Array]:
     Source:
         Vongbunyong 2008, section 6.2.
     """
-    tool = product(
-        axis_map("tool_axes", parameters.tool_axes).T, rotation("z", parameters.tool_roll)
-    )
+    tool = product(axis_map("tool_axes", parameters.tool_axes).T, rotation("z", parameters.tool_roll))
     found = np.empty(4), np.empty(4)
     for matrix, quaternion in zip((axis_map("axes", parameters.axes), tool), found, strict=True):
         quaternion_from_rotation(np.ascontiguousarray(matrix), quaternion)

@@ -21,21 +21,37 @@ class HandLimits:
     """What a hand on the master can do."""
 
     speed: float = parameter(
-        3.0, unit="m/s", lower=0.01, upper=1000.0, doc="largest speed of the stylus",
+        3.0,
+        unit="m/s",
+        lower=0.01,
+        upper=1000.0,
+        doc="largest speed of the stylus",
         source="assumed: across the Phantom's workspace in a twentieth of a second",
-    )  # fmt: skip
+    )
     acceleration: float = parameter(
-        1000.0, unit="m/s²", lower=1.0, upper=1e6, doc="largest acceleration of the stylus",
+        1000.0,
+        unit="m/s²",
+        lower=1.0,
+        upper=1e6,
+        doc="largest acceleration of the stylus",
         source="assumed: ten times that of a fast arm, for one reading step in 1 ms is 55 m/s²",
-    )  # fmt: skip
+    )
     turn: float = parameter(
-        60.0, unit="rad/s", lower=0.1, upper=1e4, doc="largest speed of its turn",
+        60.0,
+        unit="rad/s",
+        lower=0.1,
+        upper=1e4,
+        doc="largest speed of its turn",
         source="assumed: three times that of a fast wrist",
-    )  # fmt: skip
+    )
     reach: float = parameter(
-        2.0, unit="m", lower=0.01, upper=100.0, doc="farthest stylus from the master's base",
+        2.0,
+        unit="m",
+        lower=0.01,
+        upper=100.0,
+        doc="farthest stylus from the master's base",
         source="assumed: longer than an arm",
-    )  # fmt: skip
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,9 +59,13 @@ class PlausibilityParameters(HandLimits):
     """What a hand on the master can do, and how long its buttons may be silent."""
 
     button_silence: float = parameter(
-        0.5, unit="s", lower=0.01, upper=60.0, off=0.0,
+        0.5,
+        unit="s",
+        lower=0.01,
+        upper=60.0,
+        off=0.0,
         doc="a stream of buttons that fell silent for longer counts as a pressed clutch; 0: never",
-    )  # fmt: skip
+    )
 
 
 class PlausibilityNumbers(Fields):
@@ -113,9 +133,11 @@ def is_plausible(p: PlausibilityNumbers, s: PlausibilityState, pose: Array, stam
     turn = 0.0 if is_first else _turn(s.raw[3:7], pose[3:7]) / period
     share = min(1.0, max(_GAP, 2e-9 * s.raw_elapsed_ns) / period)
     is_sound = (
-        math.sqrt(far) <= p.hand_reach and math.sqrt(fast) <= p.hand_speed * share
-        and math.sqrt(sudden) <= p.hand_acceleration and turn <= p.hand_turn * share
-    )  # fmt: skip
+        math.sqrt(far) <= p.hand_reach
+        and math.sqrt(fast) <= p.hand_speed * share
+        and math.sqrt(sudden) <= p.hand_acceleration
+        and turn <= p.hand_turn * share
+    )
     for i in range(7):
         s.raw[i] = pose[i]
     s.raw_ns, s.raw_elapsed_ns = stamp_ns, 0 if is_first else elapsed_ns

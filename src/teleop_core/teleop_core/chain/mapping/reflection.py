@@ -105,13 +105,7 @@ def make_law(part: Architecture, numbers: Array, passivity: Passivity, kept: Arr
 
 @inner
 def reflect(
-    p: ReflectionNumbers,
-    s: ReflectionState,
-    law: Law,
-    is_following: bool,
-    period: float,
-    stylus: Array,
-    row: Row,
+    p: ReflectionNumbers, s: ReflectionState, law: Law, is_following: bool, period: float, stylus: Array, row: Row
 ) -> None:
     """Add to the hand's force (3,) [N] what it feels of the slave; what falls silent fades.
 
@@ -189,9 +183,7 @@ def _bound(push: Array, most: float, rounding: float) -> None:
 
 
 @inner
-def _count(
-    p: ReflectionNumbers, s: ReflectionState, law: Law, is_following: bool, stylus: Array, row: Row
-) -> None:
+def _count(p: ReflectionNumbers, s: ReflectionState, law: Law, is_following: bool, stylus: Array, row: Row) -> None:
     """Count what the last push did on the way of the hand; what begins anew has no energy.
 
     Energies begin anew with another law or scale, and while the hand does not lead the slave.
@@ -219,16 +211,11 @@ def _count(
 
 
 @inner
-def _make_passive(
-    p: ReflectionNumbers, s: ReflectionState, law: Law, period: float, row: Row
-) -> None:
+def _make_passive(p: ReflectionNumbers, s: ReflectionState, law: Law, period: float, row: Row) -> None:
     """Make of the push that is asked for the one that is given, and tell the energies."""
     for i in range(3):
         law.last[i], s.push[i] = s.push[i], law.asked[i]
-    law.hand(
-        law.kept, law.left, law.last, law.moved, law.led, law.flow, law.heard, law.port, s.push,
-        s.scale, period,
-    )  # fmt: skip
+    law.hand(law.kept, law.left, law.last, law.moved, law.led, law.flow, law.heard, law.port, s.push, s.scale, period)
     _bound(s.push, p.reflected_most, _ROUNDING)
     for i in range(3):
         lost = (s.push[i] - law.asked[i]) * law.moved[i] / s.scale

@@ -115,13 +115,7 @@ def _along(rate: Array, depth: Array, length: float) -> float:
 
 @kernel
 def damped_wall(
-    p: WallNumbers,
-    s: WallState,
-    place: Array,
-    depth: Array,
-    length: float,
-    period: float,
-    force: Array,
+    p: WallNumbers, s: WallState, place: Array, depth: Array, length: float, period: float, force: Array
 ) -> None:
     """Write the force (3,) [N] of a damped wall: dissipative, if the wall is soft enough.
 
@@ -158,9 +152,7 @@ def damped_wall(
         force[i] = -push * depth[i] / length if length > 0.0 else 0.0
 
 
-def passive_stiffness(
-    damping: float, period: float, delay: float, friction: float, step: float
-) -> float:
+def passive_stiffness(damping: float, period: float, delay: float, friction: float, step: float) -> float:
     """Stiffness up to which contacts with a damped wall give back no more than they took [N/m].
 
     On the safe side of what the simulated device shows: 1000 N/m at 1 kHz without delay, where

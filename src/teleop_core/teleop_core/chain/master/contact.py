@@ -20,9 +20,7 @@ class ContactState(Fields):
 
 
 @inner
-def account(
-    s: ContactState, force: Array, friction: float, moved: float, place: Array, contact: Array
-) -> None:
+def account(s: ContactState, force: Array, friction: float, moved: float, place: Array, contact: Array) -> None:
     """Add the energy of a tick to the present contact; a new one begins where force begins.
 
     The force is constant within a tick, so force times the way of the device is its work, without

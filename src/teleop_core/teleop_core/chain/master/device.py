@@ -28,55 +28,78 @@ class DeviceParameters:
     """The Phantom Omni: what its maker publishes, and what follows or is assumed beside it."""
 
     workspace: tuple[float, ...] = parameter(
-        (0.16, 0.12, 0.07), unit="m", lower=0.01, upper=1.0, length=3,
-        doc="width, height, depth within which the tip can move", source=_OMNI,
-    )  # fmt: skip
+        (0.16, 0.12, 0.07),
+        unit="m",
+        lower=0.01,
+        upper=1.0,
+        length=3,
+        doc="width, height, depth within which the tip can move",
+        source=_OMNI,
+    )
     start: tuple[float, ...] = parameter(
-        (0.0, 0.0, -0.03), unit="m", lower=-0.5, upper=0.5, length=3, fixed=True,
+        (0.0, 0.0, -0.03),
+        unit="m",
+        lower=-0.5,
+        upper=0.5,
+        length=3,
+        fixed=True,
         doc="place of the inkwell relative to the middle of the workspace",
         source="assumed: the inkwell is behind the middle; no source says how far",
-    )  # fmt: skip
+    )
     position_resolution: float = parameter(
-        0.055e-3, unit="m", lower=0.0, upper=1e-2, doc="step of the position reading; 0: none",
-        source=_OMNI,
-    )  # fmt: skip
+        0.055e-3, unit="m", lower=0.0, upper=1e-2, doc="step of the position reading; 0: none", source=_OMNI
+    )
     gimbal_noise: float = parameter(
-        2e-3, unit="rad", lower=0.0, upper=0.1, doc="largest noise of each gimbal potentiometer",
+        2e-3,
+        unit="rad",
+        lower=0.0,
+        upper=0.1,
+        doc="largest noise of each gimbal potentiometer",
         source="derived: raw fluctuation of the slave's reference at rest (Vongbunyong 2008, "
         "section 6.2), not a specification of the potentiometers",
-    )  # fmt: skip
+    )
     peak_force: float = parameter(
         3.3, unit="N", lower=0.0, upper=50.0, doc="largest force, for a short time", source=_OMNI
     )
     continuous_force: float = parameter(
-        0.88, unit="N", lower=1e-3, upper=50.0,
+        0.88,
+        unit="N",
+        lower=1e-3,
+        upper=50.0,
         doc="root mean square of the force that its motors bear; peak_force or more: no limit",
         source=_OMNI,
-    )  # fmt: skip
+    )
     thermal_time: float = parameter(
-        60.0, unit="s", lower=0.1, upper=1e4, doc="time constant with which its motors grow warm",
+        60.0,
+        unit="s",
+        lower=0.1,
+        upper=1e4,
+        doc="time constant with which its motors grow warm",
         source="assumed: between the winding (some 10 s) and the housing (some 100 s) of coreless "
         "motors of this size, by their makers' data sheets",
-    )  # fmt: skip
+    )
     stiffness: tuple[float, ...] = parameter(
-        (1260.0, 2310.0, 1020.0), unit="N/m", lower=10.0, upper=1e7, length=3,
+        (1260.0, 2310.0, 1020.0),
+        unit="N/m",
+        lower=10.0,
+        upper=1e7,
+        length=3,
         doc="of the tip against its motors and encoders, on x, y, z; in series with every wall",
         source=_OMNI,
-    )  # fmt: skip
+    )
     structure_damping: float = parameter(
-        5.0, unit="N·s/m", lower=0.0, upper=1e4, doc="of the same, beside the stiffness",
+        5.0,
+        unit="N·s/m",
+        lower=0.0,
+        upper=1e4,
+        doc="of the same, beside the stiffness",
         source="assumed: a quarter to a third of critical for apparent_mass on this stiffness",
-    )  # fmt: skip
-    apparent_mass: float = parameter(
-        0.045, unit="kg", lower=1e-3, upper=5.0, doc="mass at the tip", source=_OMNI
     )
+    apparent_mass: float = parameter(0.045, unit="kg", lower=1e-3, upper=5.0, doc="mass at the tip", source=_OMNI)
     friction: float = parameter(
-        0.26, unit="N", lower=0.0, upper=5.0, doc="backdrive friction: it sticks below",
-        source=_OMNI,
-    )  # fmt: skip
-    handle: str = parameter(
-        "", fixed=True, doc="robot whose joints read the hand, such as mma; empty: the Phantom's"
+        0.26, unit="N", lower=0.0, upper=5.0, doc="backdrive friction: it sticks below", source=_OMNI
     )
+    handle: str = parameter("", fixed=True, doc="robot whose joints read the hand, such as mma; empty: the Phantom's")
     handle_geometry: tuple[str, ...] = parameter(
         (), fixed=True, doc="symbol=value in place of the handle's lengths and options [m, rad]"
     )
@@ -116,9 +139,7 @@ class ReadingState(Fields):
 
 
 @kernel
-def read_phantom(
-    p: ReadingNumbers, position: Array, attitude: Array, noise: Array, pose: Array
-) -> None:
+def read_phantom(p: ReadingNumbers, position: Array, attitude: Array, noise: Array, pose: Array) -> None:
     """Write the pose (7,) that the Phantom reads: place in steps, attitude with noise (3,)."""
     wobble = room(3)
     for i in range(3):

@@ -23,19 +23,27 @@ class DisplayParameters:
     """How often and how late the operator sees the slave."""
 
     rate: float = parameter(
-        60.0, unit="Hz", lower=1.0, upper=240.0, doc="frames a second",
+        60.0,
+        unit="Hz",
+        lower=1.0,
+        upper=240.0,
+        doc="frames a second",
         source="published: UVA-DSA telesurgery QoS analysis 2026 draws at 60 Hz",
-    )  # fmt: skip
+    )
     latency: float = parameter(
-        0.033, unit="s", lower=0.0, upper=2.0,
+        0.033,
+        unit="s",
+        lower=0.0,
+        upper=2.0,
         doc="from when a frame is taken to when it is on the screen, beside any network",
         source="assumed: two frames at 60 Hz",
-    )  # fmt: skip
+    )
     shows: str = parameter(
-        "slave", choices=SHOWS,
+        "slave",
+        choices=SHOWS,
         doc="slave: what it says of itself; command: where it is told to go, which no network "
         "delays: a predictive display",
-    )  # fmt: skip
+    )
 
     def __post_init__(self) -> None:
         if self.rate * self.latency > _FRAMES - 2:

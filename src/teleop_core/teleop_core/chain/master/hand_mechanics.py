@@ -25,20 +25,32 @@ class HandParameters:
     """The operator's hand: a mass on a spring and damper that wants to follow the path."""
 
     mass: float = parameter(
-        0.15, unit="kg", lower=0.01, upper=5.0, doc="mass moved with the tip",
+        0.15,
+        unit="kg",
+        lower=0.01,
+        upper=5.0,
+        doc="mass moved with the tip",
         source="assumed: fingers and a part of the hand of some 0.4 kg; a fingertip alone "
         "has some grams (Hajian and Howe 1997)",
-    )  # fmt: skip
+    )
     stiffness: float = parameter(
-        300.0, unit="N/m", lower=1.0, upper=5000.0, doc="how firmly the hand holds its path",
+        300.0,
+        unit="N/m",
+        lower=1.0,
+        upper=5000.0,
+        doc="how firmly the hand holds its path",
         source="assumed: some 100 to 1000 N/m by grip, as of fingertips (Hajian and Howe 1997) and "
         "wrists that hold a stylus (Kuchenbecker, Park and Niemeyer 2003)",
-    )  # fmt: skip
+    )
     damping: float = parameter(
-        12.0, unit="N·s/m", lower=0.1, upper=200.0, doc="damping of the arm",
+        12.0,
+        unit="N·s/m",
+        lower=0.1,
+        upper=200.0,
+        doc="damping of the arm",
         source="assumed: 0.8 of critical with the masses and the stiffness here; fingertips have "
         "some 5 N·s/m (Hajian and Howe 1997), a firm grip more",
-    )  # fmt: skip
+    )
 
 
 class HandNumbers(Fields):

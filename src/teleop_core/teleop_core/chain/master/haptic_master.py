@@ -62,16 +62,22 @@ class HapticMasterParameters:
         0.1, unit="s", lower=0.002, upper=5.0, doc="without a newer servo_cf the force is zero"
     )
     force_range: float = parameter(
-        30.0, unit="N", lower=0.1, upper=1000.0,
+        30.0,
+        unit="N",
+        lower=0.1,
+        upper=1000.0,
         doc="a servo_cf beyond it comes from a broken sensor: no force until it was within for 1 s",
         source="assumed: no stage asks for more than 20 N, no such device gives more than 10",
-    )  # fmt: skip
+    )
     hand_timeout: float = parameter(
-        0.5, unit="s", lower=0.02, upper=60.0,
+        0.5,
+        unit="s",
+        lower=0.02,
+        upper=60.0,
         doc="a hand/servo_cp that is silent for longer lets go: the stylus stays, the clutch is "
         "pressed; if it comes back elsewhere, until 0.3 s later",
         source="assumed: as of buttons, longer than a busy machine keeps a process waiting",
-    )  # fmt: skip
+    )
     device: DeviceParameters = field(default_factory=DeviceParameters)
     hand: hand_mechanics.HandParameters = field(default_factory=hand_mechanics.HandParameters)
 
@@ -135,9 +141,7 @@ def _holds(p: MasterNumbers, s: MasterState, row: Row) -> bool:
 
 
 @kernel
-def haptic_master_step(
-    p: MasterNumbers, s: MasterState, handle: Handle, noises: Array, row: Row, dt: float
-) -> None:
+def haptic_master_step(p: MasterNumbers, s: MasterState, handle: Handle, noises: Array, row: Row, dt: float) -> None:
     """One tick: feel master_servo_cf, move, and write what the device measures and the contact.
 
     Args:
@@ -256,10 +260,8 @@ HAPTIC_MASTER = Stage(
     "haptic_master",
     HapticMasterParameters,
     reads=(HAND_SERVO_CP, HAND_BUTTONS, HAND_TREMOR, MASTER_SERVO_CF, SLAVE_OPERATION),
-    writes=(
-        MASTER_MEASURED_CP, MASTER_MEASURED_CV, MASTER_MEASURED_CF, MASTER_BUTTONS, MASTER_CONTACT,
-    ),
+    writes=(MASTER_MEASURED_CP, MASTER_MEASURED_CV, MASTER_MEASURED_CF, MASTER_BUTTONS, MASTER_CONTACT),
     late=(MASTER_SERVO_CF, SLAVE_OPERATION),
     make=HapticMaster,
     node="teleop_core.nodes.haptic_master:HapticMasterNode",
-)  # fmt: skip
+)

@@ -18,16 +18,23 @@ class JoyParameters(RateParameters):
     """How a device that says rates as a Joy moves the stylus, in the device's own frame."""
 
     axes: tuple[int, ...] = parameter(
-        (0, 1, 2, 3, 4, 5), lower=-1, upper=63, length=6, fixed=True,
+        (0, 1, 2, 3, 4, 5),
+        lower=-1,
+        upper=63,
+        length=6,
+        fixed=True,
         doc="which axes of the Joy move along x, y, z and turn about x, y, z; -1: none does",
-    )  # fmt: skip
-    held_button: int = parameter(
-        -1, lower=-1, upper=63, fixed=True, doc="button that must be held to move; -1: none"
     )
+    held_button: int = parameter(-1, lower=-1, upper=63, fixed=True, doc="button that must be held to move; -1: none")
     reach: float = parameter(
-        0.1, unit="m", lower=0.001, upper=1.0, fixed=True, source="assumed",
+        0.1,
+        unit="m",
+        lower=0.001,
+        upper=1.0,
+        fixed=True,
+        source="assumed",
         doc="largest way from the start along each axis",
-    )  # fmt: skip
+    )
 
 
 class JoyRates:
@@ -52,9 +59,7 @@ class JoyRates:
         said = np.array([axes[place] if place >= 0 else 0.0 for place in p.axes], np.float64)
         if not np.isfinite(said).all():
             return "an axis of its Joy is not a finite number"
-        time = (
-            min(max(1e-9 * (stamp_ns - self._stamp_ns), 0.0), _LONGEST) if self._stamp_ns else 0.0
-        )
+        time = min(max(1e-9 * (stamp_ns - self._stamp_ns), 0.0), _LONGEST) if self._stamp_ns else 0.0
         self._stamp_ns = max(stamp_ns, self._stamp_ns)
         if p.held_button >= 0 and not buttons[p.held_button]:
             return ""

@@ -25,9 +25,11 @@ from teleop_core.slave.bridges.hearing import wrong_stamp
 from teleop_core.slave.bridges.names import JointMap
 
 POSE_MESSAGES = (
-    "geometry_msgs/msg/PoseStamped", "geometry_msgs/msg/TransformStamped",
-    "geometry_msgs/msg/Pose", "sensor_msgs/msg/JointState",
-)  # fmt: skip
+    "geometry_msgs/msg/PoseStamped",
+    "geometry_msgs/msg/TransformStamped",
+    "geometry_msgs/msg/Pose",
+    "sensor_msgs/msg/JointState",
+)
 """Messages in which devices say where their stylus is; the last one says where their joints are."""
 RATE_MESSAGE = "sensor_msgs/msg/Joy"
 """Message in which gamepads and 3-D mice say how fast the stylus goes."""
@@ -39,30 +41,31 @@ _THREE = ("+x", "+y", "+z")
 class MasterBridgeParameters:
     """Parameters of :class:`MasterBridge`."""
 
-    pose_topic: str = parameter(
-        "device/measured_cp", fixed=True, doc="where the device says where its stylus is"
-    )
+    pose_topic: str = parameter("device/measured_cp", fixed=True, doc="where the device says where its stylus is")
     pose_message: str = parameter(
-        POSE_MESSAGES[0], choices=(*POSE_MESSAGES, RATE_MESSAGE), fixed=True,
-        doc="type of these messages",
-    )  # fmt: skip
+        POSE_MESSAGES[0], choices=(*POSE_MESSAGES, RATE_MESSAGE), fixed=True, doc="type of these messages"
+    )
     joy: JoyParameters = field(default_factory=JoyParameters)
     device_axes: tuple[str, ...] = parameter(
-        _THREE, choices=AXES, length=3, fixed=True,
-        doc="the x (right), y (up), z (towards the person) of master_base as axes of the device",
-    )  # fmt: skip
-    stylus_axes: tuple[str, ...] = parameter(
-        _THREE, choices=AXES, length=3, fixed=True,
-        doc="the x, y, z of our stylus as axes of that of the device",
-    )  # fmt: skip
-    unit: float = parameter(
-        1.0, unit="m", lower=1e-6, upper=10.0, fixed=True,
-        doc="length in which the device counts: 0.001 for millimetres",
-    )  # fmt: skip
-    handle: str = parameter(
-        "",
+        _THREE,
+        choices=AXES,
+        length=3,
         fixed=True,
-        doc="robot whose tip is the stylus, by name or file, where the device says its joints",
+        doc="the x (right), y (up), z (towards the person) of master_base as axes of the device",
+    )
+    stylus_axes: tuple[str, ...] = parameter(
+        _THREE, choices=AXES, length=3, fixed=True, doc="the x, y, z of our stylus as axes of that of the device"
+    )
+    unit: float = parameter(
+        1.0,
+        unit="m",
+        lower=1e-6,
+        upper=10.0,
+        fixed=True,
+        doc="length in which the device counts: 0.001 for millimetres",
+    )
+    handle: str = parameter(
+        "", fixed=True, doc="robot whose tip is the stylus, by name or file, where the device says its joints"
     )
     handle_geometry: tuple[str, ...] = parameter(
         (), fixed=True, doc="symbol=value in place of its lengths and options [m, rad]"
@@ -71,9 +74,12 @@ class MasterBridgeParameters:
         (), fixed=True, doc="ours=theirs for each joint that the device calls otherwise"
     )
     handle_signs: tuple[float, ...] = parameter(
-        (), lower=-1.0, upper=1.0, fixed=True,
+        (),
+        lower=-1.0,
+        upper=1.0,
+        fixed=True,
         doc="1.0 or -1.0 for each of our joints: ours = sign * theirs + offset; empty: 1.0",
-    )  # fmt: skip
+    )
     handle_offsets: tuple[float, ...] = parameter(
         (), unit="rad or m", fixed=True, doc="of each of our joints; empty: 0.0"
     )
@@ -81,34 +87,49 @@ class MasterBridgeParameters:
         "", fixed=True, doc="where the device says its buttons, as sensor_msgs/Joy; empty: nowhere"
     )
     button_places: tuple[int, ...] = parameter(
-        (0, 1, 2), lower=-1, upper=63, length=3, fixed=True,
+        (0, 1, 2),
+        lower=-1,
+        upper=63,
+        length=3,
+        fixed=True,
         doc="which of them are clutch, fixture and mode, counted from 0; -1: it has none",
-    )  # fmt: skip
+    )
     pose_stamps: str = parameter(
-        "header", choices=("header", "sent"), fixed=True,
+        "header",
+        choices=("header", "sent"),
+        fixed=True,
         doc="when a pose was taken: as its header says, or when it was sent, for devices on a "
         "clock of their own; a Pose has no header",
-    )  # fmt: skip
+    )
     oldest_pose: float = parameter(
-        0.1, unit="s", lower=0.001, upper=1.0, fixed=True, source="assumed",
-        doc="poses whose stamps differ by more from our clock are refused",
-    )  # fmt: skip
-    force_topic: str = parameter(
-        "",
+        0.1,
+        unit="s",
+        lower=0.001,
+        upper=1.0,
         fixed=True,
-        doc="where the device takes forces, as geometry_msgs/WrenchStamped; empty: it has none",
+        source="assumed",
+        doc="poses whose stamps differ by more from our clock are refused",
     )
-    force_gain: float = parameter(
-        1.0, lower=0.0, upper=10.0, doc="force of the device over the one that is asked for"
+    force_topic: str = parameter(
+        "", fixed=True, doc="where the device takes forces, as geometry_msgs/WrenchStamped; empty: it has none"
     )
+    force_gain: float = parameter(1.0, lower=0.0, upper=10.0, doc="force of the device over the one that is asked for")
     largest_force: float = parameter(
-        3.3, unit="N", lower=0.0, upper=100.0, doc="the device is asked for no more",
+        3.3,
+        unit="N",
+        lower=0.0,
+        upper=100.0,
+        doc="the device is asked for no more",
         source="published: peak force of the Phantom Omni",
-    )  # fmt: skip
+    )
     force_timeout: float = parameter(
-        0.1, unit="s", lower=0.002, upper=5.0, source="assumed",
+        0.1,
+        unit="s",
+        lower=0.002,
+        upper=5.0,
+        source="assumed",
         doc="without master/servo_cf for longer, or a pose of the device, it is given no force",
-    )  # fmt: skip
+    )
 
     def __post_init__(self) -> None:
         """Refuse axes that mirror, and joints without a robot."""
@@ -153,9 +174,12 @@ class MasterBridge(RunningStage):
         if p.says_joints:
             self._robot = load_robot_set(p.handle, p.handle_geometry)
             self._joints = JointMap(
-                self._robot.joint_names, p.handle_joints, p.handle_signs, p.handle_offsets,
+                self._robot.joint_names,
+                p.handle_joints,
+                p.handle_signs,
+                p.handle_offsets,
                 owner="master_bridge.handle_",
-            )  # fmt: skip
+            )
 
     def retune(self, parameters: MasterBridgeParameters) -> None:
         """Take another gain, bound or timeout of the force."""
@@ -182,9 +206,7 @@ class MasterBridge(RunningStage):
         self._stamp_ns, self.heard_ns = stamp_ns, now_ns
         return True
 
-    def hear_joints(
-        self, names: Sequence[str], position: Sequence[float], stamp_ns: int, now_ns: int
-    ) -> bool:
+    def hear_joints(self, names: Sequence[str], position: Sequence[float], stamp_ns: int, now_ns: int) -> bool:
         """Take where the joints of a jointed device are [rad or m]; otherwise as :meth:`hear`."""
         places = self._joints.places(names)
         if isinstance(places, str) or len(position) != len(names):
@@ -197,9 +219,7 @@ class MasterBridge(RunningStage):
             geometry.pose_from_transform(self._robot.fk(self._joints.position(theirs)), pose)
         return self.hear(pose, stamp_ns, now_ns)
 
-    def hear_joy(
-        self, axes: Sequence[float], buttons: Sequence[int], stamp_ns: int, now_ns: int
-    ) -> bool:
+    def hear_joy(self, axes: Sequence[float], buttons: Sequence[int], stamp_ns: int, now_ns: int) -> bool:
         """Take the axes of a Joy, as rates of the stylus; otherwise as :meth:`hear`."""
         if text := self._rates.step(axes, buttons, stamp_ns):
             self.wrong = text

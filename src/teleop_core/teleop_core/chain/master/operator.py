@@ -85,12 +85,7 @@ def tremble(p: OperatorNumbers, s: OperatorState, noise: Array, tremor: Array, d
 
 @kernel
 def operator_step(
-    p: OperatorNumbers,
-    s: OperatorState,
-    wanted: Sequence[Wanted],
-    noises: Array,
-    row: Row,
-    dt: float,
+    p: OperatorNumbers, s: OperatorState, wanted: Sequence[Wanted], noises: Array, row: Row, dt: float
 ) -> None:
     """One tick: write where the hand is wanted, its tremor and the buttons.
 

@@ -42,9 +42,7 @@ def largest_force(p: RenderingNumbers, s: RenderingState) -> float:
     if p.continuous >= p.peak_force:
         return p.peak_force
     left = max(bearable - s.heat, 0.0)
-    square = bearable + (p.peak_force * p.peak_force - bearable) * min(
-        left / (_LAST * bearable), 1.0
-    )
+    square = bearable + (p.peak_force * p.peak_force - bearable) * min(left / (_LAST * bearable), 1.0)
     # Long ticks beside a short time constant: no more than fills what is left.
     return math.sqrt(min(square, s.heat + left / p.warming))
 

@@ -57,10 +57,7 @@ class Network:
 
 def _try(part: Network) -> None:
     """Draw for some packets, so that what cannot work is told before anything runs."""
-    needs = (
-        "one with draw(numbers, memory, chances, now) -> float and parameters that all have "
-        "defaults"
-    )
+    needs = "one with draw(numbers, memory, chances, now) -> float and parameters that all have defaults"
     with tried("network", part.name, needs):
         numbers = part.numbers(part.parameters())
         memory, fence = fenced(np.zeros(MEMORY))

@@ -43,26 +43,25 @@ class DeadbandParameters:
     """What must change before a packet is sent: place, turn or force, whichever does first."""
 
     is_on: bool = parameter(False, doc="whether packets wait for a change")
-    place: float = parameter(
-        2e-4, unit="m", lower=0.0, upper=0.1, doc="way of the tip before a packet is sent"
-    )
-    turn: float = parameter(
-        0.01, unit="rad", lower=0.0, upper=1.0, doc="turn of the tip before a packet is sent"
-    )
+    place: float = parameter(2e-4, unit="m", lower=0.0, upper=0.1, doc="way of the tip before a packet is sent")
+    turn: float = parameter(0.01, unit="rad", lower=0.0, upper=1.0, doc="turn of the tip before a packet is sent")
     force: float = parameter(
-        0.1, lower=0.0, upper=1.0,
+        0.1,
+        lower=0.0,
+        upper=1.0,
         doc="share of the force that was sent last by which it must change",
         source="assumed: about what people feel",
-    )  # fmt: skip
+    )
     least_force: float = parameter(
-        0.02, unit="N", lower=0.0, upper=10.0,
-        doc="change of a force that is not sent, however small the force is",
-    )  # fmt: skip
+        0.02, unit="N", lower=0.0, upper=10.0, doc="change of a force that is not sent, however small the force is"
+    )
     longest_pause: float = parameter(
-        0.02, unit="s", lower=1e-3, upper=1.0,
-        doc="time after which a packet is sent though nothing changed; below command_timeout and "
-        "feedback_timeout",
-    )  # fmt: skip
+        0.02,
+        unit="s",
+        lower=1e-3,
+        upper=1.0,
+        doc="time after which a packet is sent though nothing changed; below command_timeout and feedback_timeout",
+    )
 
 
 def take_deadband(p: DeadbandNumbers, parameters: DeadbandParameters, dt: float) -> None:
@@ -81,9 +80,7 @@ def take_deadband(p: DeadbandNumbers, parameters: DeadbandParameters, dt: float)
 
 
 @inner
-def is_worth_telling(
-    p: DeadbandNumbers, s: DeadbandState, k: int, pose: Array, force: Array
-) -> bool:
+def is_worth_telling(p: DeadbandNumbers, s: DeadbandState, k: int, pose: Array, force: Array) -> bool:
     """Whether a packet of direction ``k`` shall go with this pose (7,) and force (3,).
 
     Args:

@@ -15,25 +15,21 @@ class GilbertElliottParameters:
     """Good times and bad ones, each with bursts of lost packets of its own length."""
 
     to_bad: float = parameter(
-        0.05, lower=0.0, upper=1.0, source=_LEVEL,
-        doc="chance at every packet that a bad time begins",
-    )  # fmt: skip
+        0.05, lower=0.0, upper=1.0, source=_LEVEL, doc="chance at every packet that a bad time begins"
+    )
     stay_bad: float = parameter(
-        0.9, lower=0.0, upper=1.0, doc="chance at every packet that a bad time goes on",
-        source=_LEVEL,
-    )  # fmt: skip
+        0.9, lower=0.0, upper=1.0, doc="chance at every packet that a bad time goes on", source=_LEVEL
+    )
     good: tuple[float, ...] = parameter(
-        (4.428, 1.638), lower=1e-3, upper=100.0, length=2, source=_LEVEL,
-        doc="shape and scale of the length of bursts in good times, a Pareto II distribution "
-        "rounded down [packets]",
-    )  # fmt: skip
-    bad: tuple[float, ...] = parameter(
-        (4.966, 0.271),
+        (4.428, 1.638),
         lower=1e-3,
         upper=100.0,
         length=2,
         source=_LEVEL,
-        doc="the same in bad times",
+        doc="shape and scale of the length of bursts in good times, a Pareto II distribution rounded down [packets]",
+    )
+    bad: tuple[float, ...] = parameter(
+        (4.966, 0.271), lower=1e-3, upper=100.0, length=2, source=_LEVEL, doc="the same in bad times"
     )
 
 

@@ -13,16 +13,17 @@ from teleop_core.kernels.geometry import Array
 class JitterParameters:
     """Time beside the least one: of most packets about one mean, of some another."""
 
-    mean: float = parameter(
-        0.02, unit="s", lower=0.0, upper=5.0, doc="mean of most packets, exponentially distributed"
-    )
+    mean: float = parameter(0.02, unit="s", lower=0.0, upper=5.0, doc="mean of most packets, exponentially distributed")
     slow_mean: float = parameter(0.05, unit="s", lower=0.0, upper=5.0, doc="mean of the slow ones")
     slow_share: float = parameter(0.0, lower=0.0, upper=1.0, doc="share of the slow ones")
     hold: float = parameter(
-        0.0, unit="s", lower=0.0, upper=60.0,
+        0.0,
+        unit="s",
+        lower=0.0,
+        upper=60.0,
         doc="time for which the same delay lasts, on average; 0: every packet has its own, and one "
         "that is late is overtaken",
-    )  # fmt: skip
+    )
 
 
 @kernel

@@ -188,9 +188,7 @@ def _take_back(s: NetworkState, back: link.Way, row: Row) -> None:
 
 
 @kernel
-def network_step(
-    p: NetworkNumbers, s: NetworkState, there: link.Way, back: link.Way, row: Row, dt: float
-) -> None:
+def network_step(p: NetworkNumbers, s: NetworkState, there: link.Way, back: link.Way, row: Row, dt: float) -> None:
     """One tick: send what is new on either side, and write what arrives at the other.
 
     Args:

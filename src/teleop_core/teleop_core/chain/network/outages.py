@@ -18,16 +18,22 @@ class OutagesParameters:
     """
 
     pause: float = parameter(
-        8.5, unit="s", lower=1e-3, upper=1e6, source=_LEVEL,
+        8.5,
+        unit="s",
+        lower=1e-3,
+        upper=1e6,
+        source=_LEVEL,
         doc="from the end of an outage to the beginning of the next; in packets with in_packets",
-    )  # fmt: skip
-    longest: float = parameter(
-        3.0, unit="s", lower=0.0, upper=1e6, source=_LEVEL,
-        doc="longest outage; each lasts for any time up to it; in packets with in_packets",
-    )  # fmt: skip
-    in_packets: bool = parameter(
-        False, doc="count pause and longest in packets that are sent, in place of seconds"
     )
+    longest: float = parameter(
+        3.0,
+        unit="s",
+        lower=0.0,
+        upper=1e6,
+        source=_LEVEL,
+        doc="longest outage; each lasts for any time up to it; in packets with in_packets",
+    )
+    in_packets: bool = parameter(False, doc="count pause and longest in packets that are sent, in place of seconds")
 
 
 @kernel

@@ -20,9 +20,12 @@ def _bursts(good: tuple[float, float], bad: tuple[float, float]) -> dict[str, An
 
 def _delays(least: float, mean: float, slow_mean: float, slow_share: float) -> dict[str, Any]:
     late = {
-        "kind": "jitter", "least_delay": least, "jitter.mean": mean,
-        "jitter.slow_mean": slow_mean, "jitter.slow_share": slow_share,
-    }  # fmt: skip
+        "kind": "jitter",
+        "least_delay": least,
+        "jitter.mean": mean,
+        "jitter.slow_mean": slow_mean,
+        "jitter.slow_share": slow_share,
+    }
     return {"there": late, "back": {}}
 
 
@@ -69,28 +72,27 @@ class WayParameters:
     least_delay: float = parameter(
         0.0, unit="s", lower=0.0, upper=LONGEST_DELAY, doc="least time of a packet on the way"
     )
-    loss: float = parameter(
-        0.0, lower=0.0, upper=1.0, doc="share of packets that are lost, each by itself"
-    )
+    loss: float = parameter(0.0, lower=0.0, upper=1.0, doc="share of packets that are lost, each by itself")
     packet_order: str = parameter(
         "newest",
         choices=("newest", "kept"),
-        doc="newest: a packet that was overtaken is thrown away; kept: the packets behind a late "
-        "one wait for it",
+        doc="newest: a packet that was overtaken is thrown away; kept: the packets behind a late one wait for it",
     )
-    packet_rate: float = parameter(
-        1000.0, unit="Hz", lower=1.0, upper=1e6, doc="packets sent in a second, at most"
-    )
+    packet_rate: float = parameter(1000.0, unit="Hz", lower=1.0, upper=1e6, doc="packets sent in a second, at most")
     bandwidth: float = parameter(
-        0.0, unit="bit/s", lower=0.0, upper=1e12,
+        0.0,
+        unit="bit/s",
+        lower=0.0,
+        upper=1e12,
         doc="bits that the line carries in a second; packets wait while it is busy; 0: no bound",
-    )  # fmt: skip
+    )
     queue: int = parameter(
-        100, lower=1, upper=QUEUE,
-        doc="packets that wait for the line at most; one more costs the oldest of them, or where "
-        "order is kept itself",
+        100,
+        lower=1,
+        upper=QUEUE,
+        doc="packets that wait for the line at most; one more costs the oldest of them, or where order is kept itself",
         source="assumed",
-    )  # fmt: skip
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -111,13 +113,15 @@ class NetworkParameters:
         "that a lost packet is lost motion",
     )
     clock_offset: float = parameter(
-        0.0, unit="s", lower=-3600.0, upper=3600.0,
+        0.0,
+        unit="s",
+        lower=-3600.0,
+        upper=3600.0,
         doc="by how much the slave's clock is ahead of the master's at the start",
-    )  # fmt: skip
+    )
     clock_drift: float = parameter(
-        0.0, unit="ppm", lower=-1000.0, upper=1000.0,
-        doc="by how much the slave's clock is faster than the master's",
-    )  # fmt: skip
+        0.0, unit="ppm", lower=-1000.0, upper=1000.0, doc="by how much the slave's clock is faster than the master's"
+    )
     deadband: DeadbandParameters = field(default_factory=DeadbandParameters)
     there: WayParameters = field(default_factory=WayParameters)
     back: WayParameters = field(default_factory=WayParameters)

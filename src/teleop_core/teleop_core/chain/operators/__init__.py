@@ -123,9 +123,7 @@ def sampled_motion(name: str, times: object, rows: object) -> Motion:
     """Motion through samples; see :func:`following`."""
     at, wanted = np.array(times, np.float64), np.array(rows, np.float64)
     if at.ndim != 1 or wanted.ndim != 2 or len(at) != len(wanted) or not len(at):
-        text = (
-            f"given as times (N,) and rows (N, 3), (N, 6) or (N, 9), not {at.shape}, {wanted.shape}"
-        )
+        text = f"given as times (N,) and rows (N, 3), (N, 6) or (N, 9), not {at.shape}, {wanted.shape}"
         raise PartError("operator", name, text)
     if wanted.shape[1] not in {3, 6, 9}:
         raise PartError("operator", name, f"given in 3, 6 or 9 columns, not {wanted.shape[1]}")
@@ -166,8 +164,10 @@ OPERATORS: Registry[Operator] = Registry(
     "operator",
     "operators",
     {
-        **{kind: f"teleop_core.chain.operators.shapes:{kind.upper()}"
-           for kind in ("random", "line", "circle", "points", "hold", "elsewhere")},
+        **{
+            kind: f"teleop_core.chain.operators.shapes:{kind.upper()}"
+            for kind in ("random", "line", "circle", "points", "hold", "elsewhere")
+        },
         "tour": "teleop_core.chain.operators.tour:TOUR",
         "human": "teleop_core.chain.operators.human:HUMAN",
         "observer": "teleop_core.chain.operators.observer:OBSERVER",
@@ -178,7 +178,7 @@ OPERATORS: Registry[Operator] = Registry(
         "file": "teleop_core.session.recorded_hand:FILE",
     },
     _checked,
-)  # fmt: skip
+)
 """All operators by name."""
 
 

@@ -86,9 +86,7 @@ def follow(b: Bounds, s: FollowerState, rows: Any) -> None:
 
 
 @inner
-def _approach(
-    gap: Array, velocity: Array, rate: float, fastest: float, hardest: float, h: float
-) -> None:
+def _approach(gap: Array, velocity: Array, rate: float, fastest: float, hardest: float, h: float) -> None:
     """Change a velocity (3,) over ``h`` [s] so that it closes a gap (3,) at critical damping.
 
     Half of the acceleration allowed can end the velocity that it goes for in time.

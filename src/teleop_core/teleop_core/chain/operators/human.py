@@ -35,87 +35,159 @@ class HumanParameters:
     """How the hand reaches, errs, corrects, rests and trembles."""
 
     reach: float = parameter(
-        0.0105, unit="m", lower=1e-3, upper=0.3, fixed=True,
+        0.0105,
+        unit="m",
+        lower=1e-3,
+        upper=0.3,
+        fixed=True,
         doc="median distance from target to target, within the region of operator.size",
         source="assumed: how far apart things are is the task's",
-    )  # fmt: skip
+    )
     reach_spread: float = parameter(
-        0.72, lower=0.0, upper=2.0, fixed=True, doc="standard deviation of its logarithm",
+        0.72,
+        lower=0.0,
+        upper=2.0,
+        fixed=True,
+        doc="standard deviation of its logarithm",
         source="assumed: with reach, fits the figures of people",
-    )  # fmt: skip
+    )
     turn: float = parameter(
-        0.3, lower=0.0, upper=2.0, fixed=True,
+        0.3,
+        lower=0.0,
+        upper=2.0,
+        fixed=True,
         doc="standard deviation of the turn to the next target, in parts of operator.rotation",
         source="assumed: fits the figures of people",
-    )  # fmt: skip
+    )
     width: float = parameter(
-        2.6e-3, unit="m", lower=1e-4, upper=0.1, fixed=True, doc="width of a target, as of Fitts",
+        2.6e-3,
+        unit="m",
+        lower=1e-4,
+        upper=0.1,
+        fixed=True,
+        doc="width of a target, as of Fitts",
         source="assumed: fits the figures of people",
-    )  # fmt: skip
+    )
     tolerance: float = parameter(
-        2.4e-3, unit="m", lower=1e-4, upper=0.1, fixed=True,
+        2.4e-3,
+        unit="m",
+        lower=1e-4,
+        upper=0.1,
+        fixed=True,
         doc="distance from the target at which no correction is made",
         source="assumed: a little below width",
-    )  # fmt: skip
+    )
     movement_time: float = parameter(
-        0.055, unit="s", lower=0.05, upper=2.0, fixed=True,
+        0.055,
+        unit="s",
+        lower=0.05,
+        upper=2.0,
+        fixed=True,
         doc="duration of a submovement of no difficulty",
         source="assumed: fits the figures of people; form of Fitts 1954",
-    )  # fmt: skip
+    )
     time_per_bit: float = parameter(
-        0.195, unit="s", lower=0.0, upper=2.0, fixed=True,
+        0.195,
+        unit="s",
+        lower=0.0,
+        upper=2.0,
+        fixed=True,
         doc="what each bit of difficulty adds to the duration of a submovement",
         source="assumed: 5 bit/s, as of a mouse (Soukoreff, MacKenzie 2004); pen: 10 (Fitts 1954)",
-    )  # fmt: skip
+    )
     time_spread: float = parameter(
-        0.23, lower=0.0, upper=1.0, fixed=True, doc="standard deviation of its logarithm",
+        0.23,
+        lower=0.0,
+        upper=1.0,
+        fixed=True,
+        doc="standard deviation of its logarithm",
         source="assumed: fits the figures of people",
-    )  # fmt: skip
+    )
     shortfall: float = parameter(
-        0.05, lower=0.0, upper=0.5, fixed=True,
+        0.05,
+        lower=0.0,
+        upper=0.5,
+        fixed=True,
         doc="share of the distance that a first submovement aims short by",
         source="assumed: first submovements fall short (Engelbrecht, Berthier and O'Sullivan 2003)",
-    )  # fmt: skip
+    )
     noise_along: float = parameter(
-        0.05, unit="s", lower=0.0, upper=0.2, fixed=True,
+        0.05,
+        unit="s",
+        lower=0.0,
+        upper=0.2,
+        fixed=True,
         doc="standard deviation of a submovement's end along its way, per mean speed",
         source="assumed: ends spread with mean speed (Schmidt et al. 1979; Meyer et al. 1988)",
-    )  # fmt: skip
+    )
     noise_across: float = parameter(
-        0.018, unit="s", lower=0.0, upper=0.2, fixed=True, doc="the same across its way",
+        0.018,
+        unit="s",
+        lower=0.0,
+        upper=0.2,
+        fixed=True,
+        doc="the same across its way",
         source="assumed: smaller than along (Gordon, Ghilardi and Ghez 1994)",
-    )  # fmt: skip
+    )
     reaction_time: float = parameter(
-        0.22, unit="s", lower=0.05, upper=1.0, fixed=True,
+        0.22,
+        unit="s",
+        lower=0.05,
+        upper=1.0,
+        fixed=True,
         doc="from seeing an error, half way through a submovement, to its correction",
         source="published: 0.19 to 0.26 s (Keele and Posner 1968)",
-    )  # fmt: skip
+    )
     corrections: int = parameter(
-        3, lower=0, upper=10, fixed=True, doc="largest number of corrections of a reach",
+        3,
+        lower=0,
+        upper=10,
+        fixed=True,
+        doc="largest number of corrections of a reach",
         source="assumed: more are hardly ever needed",
-    )  # fmt: skip
+    )
     dwell_time: float = parameter(
-        0.22, unit="s", lower=0.01, upper=10.0, fixed=True, doc="median rest at a target",
+        0.22,
+        unit="s",
+        lower=0.01,
+        upper=10.0,
+        fixed=True,
+        doc="median rest at a target",
         source="assumed: fits the figures of people",
-    )  # fmt: skip
+    )
     dwell_spread: float = parameter(
-        0.4, lower=0.0, upper=2.0, fixed=True, doc="standard deviation of its logarithm",
+        0.4,
+        lower=0.0,
+        upper=2.0,
+        fixed=True,
+        doc="standard deviation of its logarithm",
         source="assumed: fits the figures of people",
-    )  # fmt: skip
+    )
     passing: float = parameter(
-        0.75, lower=0.0, upper=1.0, fixed=True, doc="share of targets at which the hand rests not",
+        0.75,
+        lower=0.0,
+        upper=1.0,
+        fixed=True,
+        doc="share of targets at which the hand rests not",
         source="assumed: fits the figures of people",
-    )  # fmt: skip
+    )
     overlap: float = parameter(
-        0.32, lower=0.0, upper=0.5, fixed=True,
+        0.32,
+        lower=0.0,
+        upper=0.5,
+        fixed=True,
         doc="share of the last submovement into which the next reach begins at such a target",
         source="assumed: that submovements overlap: Flash and Henis 1991",
-    )  # fmt: skip
+    )
     tremor: float = parameter(
-        63e-6, unit="m", lower=0.0, upper=5e-3, fixed=True,
+        63e-6,
+        unit="m",
+        lower=0.0,
+        upper=5e-3,
+        fixed=True,
         doc="tremor of the tip from 8 to 12 Hz, at rest too: root mean square over three axes",
         source="fitted: to the tremor of a hand that rests, docs/human_operator.md",
-    )  # fmt: skip
+    )
 
     def __post_init__(self) -> None:
         if self.tolerance > self.reach:
@@ -138,9 +210,7 @@ class Submovement(NamedTuple):
         return self.begin + self.duration
 
 
-def submovements(
-    p: HumanParameters, region: OperatorParameters, rng: np.random.Generator
-) -> Iterator[Submovement]:
+def submovements(p: HumanParameters, region: OperatorParameters, rng: np.random.Generator) -> Iterator[Submovement]:
     """All that the hand does after the approach, without end, each later than the one before.
 
     Args:

@@ -26,9 +26,7 @@ from teleop_core.kernels.portable import dot, length, product
 AHEAD = 16
 """Ticks for which it is asked at once, about a frame: the eye needs longer, so nothing is late."""
 _GAIN = STATE["gain"]
-_NUMBER, _ACT, _GOAL, _WIDTH = (
-    TASK_STATE.columns.index(name) for name in ("number", "act", "goal_x", "width")
-)
+_NUMBER, _ACT, _GOAL, _WIDTH = (TASK_STATE.columns.index(name) for name in ("number", "act", "goal_x", "width"))
 _PRESS_TIME = 0.06  # for which the hand stays closed [s]
 _STILL_TIME, _STILL = 0.02, 0.05  # at rest: in this time [s] it goes this share of its way
 _SHORTEST = 0.1  # of a width: a way that is not worth a submovement
@@ -40,50 +38,76 @@ class ObserverParameters:
     """How the operator sees, waits and moves."""
 
     eye: float = parameter(
-        0.13, unit="s", lower=0.0, upper=1.0, fixed=True,
+        0.13,
+        unit="s",
+        lower=0.0,
+        upper=1.0,
+        fixed=True,
         doc="from when something is on the screen to when a plan can use it",
         source="published: 0.110 to 0.163 s in six studies of corrections by sight",
-    )  # fmt: skip
+    )
     reaction: float = parameter(
-        0.25, unit="s", lower=0.0, upper=2.0, fixed=True,
-        doc="from a new goal to the first submovement", source=_FITTED,
-    )  # fmt: skip
+        0.25, unit="s", lower=0.0, upper=2.0, fixed=True, doc="from a new goal to the first submovement", source=_FITTED
+    )
     least_time: float = parameter(
-        0.06, unit="s", lower=0.02, upper=1.0, fixed=True,
-        doc="duration of a submovement of no difficulty", source=_FITTED,
-    )  # fmt: skip
+        0.06,
+        unit="s",
+        lower=0.02,
+        upper=1.0,
+        fixed=True,
+        doc="duration of a submovement of no difficulty",
+        source=_FITTED,
+    )
     time_per_bit: float = parameter(
-        0.02, unit="s", lower=0.0, upper=1.0, fixed=True,
-        doc="what each bit of difficulty adds to it", source=_FITTED,
-    )  # fmt: skip
+        0.02, unit="s", lower=0.0, upper=1.0, fixed=True, doc="what each bit of difficulty adds to it", source=_FITTED
+    )
     noise: float = parameter(
-        0.04, unit="s", lower=0.0, upper=0.5, fixed=True,
+        0.04,
+        unit="s",
+        lower=0.0,
+        upper=0.5,
+        fixed=True,
         doc="standard deviation of a submovement's end along its way, per mean speed",
         source=_FITTED + "; linear in speed: Meyer et al. 1988",
-    )  # fmt: skip
+    )
     noise_across: float = parameter(
-        0.36, lower=0.0, upper=1.0, fixed=True, doc="the same across its way, per that along it",
+        0.36,
+        lower=0.0,
+        upper=1.0,
+        fixed=True,
+        doc="the same across its way, per that along it",
         source="assumed: as of the operator human",
-    )  # fmt: skip
+    )
     error_cost: float = parameter(
-        0.0, unit="s", lower=0.0, upper=100.0, off=0.0, fixed=True,
+        0.0,
+        unit="s",
+        lower=0.0,
+        upper=100.0,
+        off=0.0,
+        fixed=True,
         doc="time that an error costs: it presses unseen where that is worth the wait; 0: never",
-    )  # fmt: skip
+    )
     fastest: float = parameter(
-        0.04, unit="m/s", lower=0.005, upper=10.0, fixed=True,
+        0.04,
+        unit="m/s",
+        lower=0.005,
+        upper=10.0,
+        fixed=True,
         doc="largest mean speed of a submovement of the hand; its peak is 1.9 times that",
         source="fitted: 95 % at 65 mm/s while it moves, UVA-DSA telesurgery QoS analysis 2026",
-    )  # fmt: skip
+    )
     longest_wait: float = parameter(
-        3.0, unit="s", lower=0.1, upper=60.0, fixed=True,
-        doc="after which it goes on, though its last motion did not show; less once it knows "
-        "how late a motion shows",
+        3.0,
+        unit="s",
+        lower=0.1,
+        upper=60.0,
+        fixed=True,
+        doc="after which it goes on, though its last motion did not show; less once it knows how late a motion shows",
         source="assumed: as the longest outage of the UVA-DSA telesurgery QoS analysis 2026",
-    )  # fmt: skip
+    )
     axes: tuple[str, ...] = parameter(
-        ("-z", "-x", "+y"), length=3, fixed=True,
-        doc="axes of the hand along x, y, z of the slave, as motion_scaling's",
-    )  # fmt: skip
+        ("-z", "-x", "+y"), length=3, fixed=True, doc="axes of the hand along x, y, z of the slave, as motion_scaling's"
+    )
 
 
 class _Glance(NamedTuple):
@@ -247,9 +271,7 @@ class Observer:
             return p.longest_wait
         return min(p.longest_wait, p.eye + 1.5 * self._lag + p.reaction)
 
-    def _begin(
-        self, now: float, tip: Array, way: Array, distance: float, width: float, act: int
-    ) -> None:
+    def _begin(self, now: float, tip: Array, way: Array, distance: float, width: float, act: int) -> None:
         """Begin a submovement along a way of the tip (3,) [m], as long as it is."""
         p = self._p
         gain = float(self._seen.state[_GAIN]) or 1.0
@@ -264,11 +286,7 @@ class Observer:
         self._place = self._place + step
         self._next, self._half_seen, self._is_still = now + duration, math.inf, False
         missed = math.erfc(0.5 * width / (math.sqrt(2.0) * max(spread, 1e-12)))
-        if (
-            act == Act.PRESS
-            and missed * p.error_cost < max(self._lag, 0.0) + p.eye
-            and p.error_cost > 0.0
-        ):
+        if act == Act.PRESS and missed * p.error_cost < max(self._lag, 0.0) + p.eye and p.error_cost > 0.0:
             self._press(now + duration, act)
 
     def _press(self, when: float, act: int) -> None:

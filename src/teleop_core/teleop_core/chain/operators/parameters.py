@@ -15,19 +15,13 @@ PRESS_TIME = 0.1
 class ButtonParameters:
     """When the operator uses the buttons [s]; each press of fixture or mode lasts 0.1 s."""
 
-    clutch: tuple[float, ...] = parameter(
-        (), unit="s", lower=0.0, fixed=True, doc="press, release, press, release, …"
-    )
-    fixture: tuple[float, ...] = parameter(
-        (), unit="s", lower=0.0, fixed=True, doc="presses: each toggles the box"
-    )
+    clutch: tuple[float, ...] = parameter((), unit="s", lower=0.0, fixed=True, doc="press, release, press, release, …")
+    fixture: tuple[float, ...] = parameter((), unit="s", lower=0.0, fixed=True, doc="presses: each toggles the box")
     mode: tuple[float, ...] = parameter(
         (), unit="s", lower=0.0, fixed=True, doc="presses: each toggles coarse and fine"
     )
 
-    jaw: tuple[float, ...] = parameter(
-        (), unit="s", lower=0.0, fixed=True, doc="jaw: close, open, close, open, …"
-    )
+    jaw: tuple[float, ...] = parameter((), unit="s", lower=0.0, fixed=True, doc="jaw: close, open, close, open, …")
 
     def __post_init__(self) -> None:
         for name, pairs in (("clutch", self.clutch), ("jaw", self.jaw)):
@@ -47,13 +41,23 @@ class RoomParameters:
     """
 
     workspace: tuple[float, ...] = parameter(
-        (0.16, 0.12, 0.07), unit="m", lower=0.01, upper=1.0, length=3, fixed=True,
+        (0.16, 0.12, 0.07),
+        unit="m",
+        lower=0.01,
+        upper=1.0,
+        length=3,
+        fixed=True,
         doc="width, height, depth within which the tip can move; as haptic_master's",
-    )  # fmt: skip
+    )
     start: tuple[float, ...] = parameter(
-        (0.0, 0.0, -0.03), unit="m", lower=-0.5, upper=0.5, length=3, fixed=True,
+        (0.0, 0.0, -0.03),
+        unit="m",
+        lower=-0.5,
+        upper=0.5,
+        length=3,
+        fixed=True,
         doc="place of the inkwell relative to the middle of it; as haptic_master's",
-    )  # fmt: skip
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,50 +67,88 @@ class OperatorParameters:
     kind: Choice = choice(OPERATORS, "random", fixed=True, doc="who moves the hand, and how")
     seed: int = parameter(1, lower=0, fixed=True, doc="seed of everything random in the session")
     patience: float = parameter(
-        10.0, unit="s", lower=0.0, upper=3600.0, fixed=True,
+        10.0,
+        unit="s",
+        lower=0.0,
+        upper=3600.0,
+        fixed=True,
         doc="it begins when teleop/state says that the slave follows, or after this",
-    )  # fmt: skip
+    )
     center: tuple[float, ...] = parameter(
-        (0.0, 0.0, 0.0), unit="m", lower=-0.3, upper=0.3, length=3, fixed=True,
+        (0.0, 0.0, 0.0),
+        unit="m",
+        lower=-0.3,
+        upper=0.3,
+        length=3,
+        fixed=True,
         doc="centre of the motion, first point of a line",
-    )  # fmt: skip
+    )
     approach_time: float = parameter(
         4.0, unit="s", lower=0.1, upper=60.0, fixed=True, doc="smooth move from start to the centre"
     )
     size: tuple[float, ...] = parameter(
-        (0.03, 0.03, 0.03), unit="m", lower=0.0, upper=0.3, length=3, fixed=True,
+        (0.03, 0.03, 0.03),
+        unit="m",
+        lower=0.0,
+        upper=0.3,
+        length=3,
+        fixed=True,
         doc="random: width of the region; circle: diameters on x, y, z; line: from end to end",
-    )  # fmt: skip
+    )
     period: float = parameter(
-        8.0, unit="s", lower=0.1, upper=600.0, fixed=True,
+        8.0,
+        unit="s",
+        lower=0.1,
+        upper=600.0,
+        fixed=True,
         doc="time of one round; random: of the slowest part of the motion; points: per leg",
-    )  # fmt: skip
+    )
     tilt: tuple[float, ...] = parameter(
-        (0.0, 0.0, 0.0), unit="rad", lower=-1.5, upper=1.5, length=3, fixed=True,
+        (0.0, 0.0, 0.0),
+        unit="rad",
+        lower=-1.5,
+        upper=1.5,
+        length=3,
+        fixed=True,
         doc="turn of the stylus at the centre, as a rotation vector",
-    )  # fmt: skip
+    )
     rotation: float = parameter(
-        0.2, unit="rad", lower=0.0, upper=1.5, fixed=True,
-        doc="largest random turn of the stylus about each axis",
-    )  # fmt: skip
+        0.2, unit="rad", lower=0.0, upper=1.5, fixed=True, doc="largest random turn of the stylus about each axis"
+    )
     points: tuple[float, ...] = parameter(
-        (), unit="m", lower=-0.3, upper=0.3, fixed=True,
+        (),
+        unit="m",
+        lower=-0.3,
+        upper=0.3,
+        fixed=True,
         doc="points: x, y, z of each stop relative to the centre, one after the other",
-    )  # fmt: skip
+    )
     bag: str = parameter("", fixed=True, doc="bag: recording whose master/measured_cp is followed")
     longest_gap: float = parameter(
-        0.1, unit="s", lower=0.0, upper=60.0, fixed=True,
+        0.1,
+        unit="s",
+        lower=0.0,
+        upper=60.0,
+        fixed=True,
         doc="bag, file: over longer gaps between samples the hand waits, but not below 5 periods",
-    )  # fmt: skip
+    )
 
     tremor_amplitude: float = parameter(
-        0.1e-3, unit="m", lower=0.0, upper=5e-3, doc="amplitude of the wanted tremor on each axis",
+        0.1e-3,
+        unit="m",
+        lower=0.0,
+        upper=5e-3,
+        doc="amplitude of the wanted tremor on each axis",
         source="assumed: within the 50 to 200 µm of microsurgery; friction swallows it at rest",
-    )  # fmt: skip
+    )
     tremor_frequency: float = parameter(
-        10.0, unit="Hz", lower=8.0, upper=12.0, doc="middle of the tremor's band, which is ±2 Hz",
+        10.0,
+        unit="Hz",
+        lower=8.0,
+        upper=12.0,
+        doc="middle of the tremor's band, which is ±2 Hz",
         source="published: physiological tremor has 8 to 12 Hz (Elble and Koller 1990)",
-    )  # fmt: skip
+    )
     buttons: ButtonParameters = field(default_factory=ButtonParameters)
     device: RoomParameters = field(default_factory=RoomParameters)
 

@@ -34,32 +34,59 @@ class RemoteParameters:
     """How a hand follows what a person wants from afar."""
 
     delay: float = parameter(
-        0.045, unit="s", lower=0.005, upper=0.5, fixed=True,
+        0.045,
+        unit="s",
+        lower=0.005,
+        upper=0.5,
+        fixed=True,
         doc="how far the stylus is behind a steady motion that is wanted",
         source="assumed: smooths 30 to 60 poses a second; less than a third of what people feel",
-    )  # fmt: skip
+    )
     timeout: float = parameter(
-        0.2, unit="s", lower=0.02, upper=5.0, fixed=True,
+        0.2,
+        unit="s",
+        lower=0.02,
+        upper=5.0,
+        fixed=True,
         doc="silence that lets go of the stylus: the clutch is pressed until the next pose",
         source="assumed: some six frames of a slow page",
-    )  # fmt: skip
+    )
     speed: float = parameter(
-        0.5, unit="m/s", lower=0.01, upper=2.5, fixed=True, doc="largest speed of the stylus",
+        0.5,
+        unit="m/s",
+        lower=0.01,
+        upper=2.5,
+        fixed=True,
+        doc="largest speed of the stylus",
         source="assumed: through the Phantom's workspace in a third of a second",
-    )  # fmt: skip
+    )
     acceleration: float = parameter(
-        30.0, unit="m/s²", lower=0.1, upper=500.0, fixed=True,
-        doc="largest acceleration of the stylus", source="assumed: three times that of a free fall",
-    )  # fmt: skip
+        30.0,
+        unit="m/s²",
+        lower=0.1,
+        upper=500.0,
+        fixed=True,
+        doc="largest acceleration of the stylus",
+        source="assumed: three times that of a free fall",
+    )
     turn_speed: float = parameter(
-        6.0, unit="rad/s", lower=0.05, upper=50.0, fixed=True, doc="largest speed of its turn",
+        6.0,
+        unit="rad/s",
+        lower=0.05,
+        upper=50.0,
+        fixed=True,
+        doc="largest speed of its turn",
         source="assumed: about one turn a second",
-    )  # fmt: skip
+    )
     turn_acceleration: float = parameter(
-        300.0, unit="rad/s²", lower=1.0, upper=5000.0, fixed=True,
+        300.0,
+        unit="rad/s²",
+        lower=1.0,
+        upper=5000.0,
+        fixed=True,
         doc="largest acceleration of its turn",
         source="assumed: reaches turn_speed in half of the delay",
-    )  # fmt: skip
+    )
 
 
 Person = Callable[["RemoteHand", float], None]

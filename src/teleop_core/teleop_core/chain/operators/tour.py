@@ -22,22 +22,40 @@ class TourParameters:
     """Where a tour goes, and how fast."""
 
     points: tuple[float, ...] = parameter(
-        (), unit="m", lower=-0.3, upper=0.3, fixed=True,
+        (),
+        unit="m",
+        lower=-0.3,
+        upper=0.3,
+        fixed=True,
         doc="x, y, z of each point relative to the centre, one after the other",
-    )  # fmt: skip
+    )
     leg_time: float = parameter(
-        0.7, unit="s", lower=0.05, upper=60.0, fixed=True, doc="from one point to the next",
+        0.7,
+        unit="s",
+        lower=0.05,
+        upper=60.0,
+        fixed=True,
+        doc="from one point to the next",
         source="assumed: 24 points, rests and the line take the published 45 s",
-    )  # fmt: skip
+    )
     rest_time: float = parameter(
-        0.6, unit="s", lower=0.0, upper=60.0, fixed=True, doc="rest at each point",
+        0.6,
+        unit="s",
+        lower=0.0,
+        upper=60.0,
+        fixed=True,
+        doc="rest at each point",
         source="assumed: as the time of a leg",
-    )  # fmt: skip
+    )
     trace_time: float = parameter(
-        13.8, unit="s", lower=0.0, upper=600.0, fixed=True,
+        13.8,
+        unit="s",
+        lower=0.0,
+        upper=600.0,
+        fixed=True,
         doc="line back through all points, from the last to the first; 0: none",
         source="assumed: as the time of a leg",
-    )  # fmt: skip
+    )
 
     def __post_init__(self) -> None:
         if len(self.points) % 3:
@@ -69,9 +87,7 @@ def through(points: Array, share: Array) -> Array:
     slopes = np.gradient(points, axis=0)
     a, b, u, v = points[first], points[first + 1], slopes[first], slopes[first + 1]
     rising = t * t * (3.0 - 2.0 * t)
-    return np.asarray(
-        a + (b - a) * rising + u * (t * (1.0 - t) ** 2) - v * (t * t * (1.0 - t)), dtype=np.float64
-    )
+    return np.asarray(a + (b - a) * rising + u * (t * (1.0 - t) ** 2) - v * (t * t * (1.0 - t)), dtype=np.float64)
 
 
 def tour(p: TourParameters, times: Array) -> Array:

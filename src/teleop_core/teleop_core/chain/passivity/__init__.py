@@ -24,9 +24,7 @@ from teleop_core.kernels.parts import fenced, is_whole, numbers_of
 __all__ = ["MEMORY", "PASSIVITIES", "Passivity", "leave_command", "register_passivity"]
 
 _ROW = types.float64[::1]
-HAND = types.void(
-    _ROW, _ROW, _ROW, _ROW, _ROW, _ROW, _ROW, _ROW, _ROW, types.float64, types.float64
-)
+HAND = types.void(_ROW, _ROW, _ROW, _ROW, _ROW, _ROW, _ROW, _ROW, _ROW, types.float64, types.float64)
 SLAVE = types.void(_ROW, _ROW, _ROW, _ROW, _ROW, _ROW, _ROW, _ROW, _ROW, types.float64)
 """Signatures of both kernels, so that one compiled stage serves every kind."""
 MEMORY = 12
@@ -107,12 +105,8 @@ def _try(part: Passivity) -> None:
         heard, port, flow = np.zeros(width), np.zeros(width), np.full(3, 1e-6)
         for size in (0.0, 1.0, -1.0):
             push[:], moved = size, np.full(3, 1e-4 * size)
-            part.hand(
-                numbers, memory, push.copy(), moved, moved, flow, heard, port, push, 1.0, 1e-3
-            )
-            part.slave(
-                np.ones(7), memory, flow, np.full(6, size), last, last, heard, port, command, 1e-3
-            )
+            part.hand(numbers, memory, push.copy(), moved, moved, flow, heard, port, push, 1.0, 1e-3)
+            part.slave(np.ones(7), memory, flow, np.full(6, size), last, last, heard, port, command, 1e-3)
             is_sound = np.isfinite(push).all() and np.isfinite(command).all()
             if not (is_sound and is_whole(fence) and is_whole(behind) and is_whole(after)):
                 text = f"one whose push and command are finite, not {push!r} and {command!r}"

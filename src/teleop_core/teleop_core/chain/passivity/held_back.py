@@ -13,9 +13,7 @@ from teleop_core.kernels.room import room
 
 
 @inner
-def hold_back(
-    force: Array, size: float, last: Array, left: float, least: float, port: Array, command: Array
-) -> float:
+def hold_back(force: Array, size: float, last: Array, left: float, least: float, port: Array, command: Array) -> float:
     """Let the command (7,) go against the force as far as work is left for it; the rest is drift.
 
     Args:
@@ -79,9 +77,8 @@ def make_up(numbers: Array, drift: Array, met: float, period: float) -> None:
 
 @inner
 def hold_lead(
-    numbers: Array, memory: Array, left: float, stop: float, force: Array, tip: Array, port: Array,
-    command: Array,
-) -> None:  # fmt: skip
+    numbers: Array, memory: Array, left: float, stop: float, force: Array, tip: Array, port: Array, command: Array
+) -> None:
     """Let the command (7,) be ahead of the tip only as far as what is left pays for on the way.
 
     The arm goes on to its command whatever it meets. So the way from the tip to the command is paid

@@ -11,16 +11,7 @@ import numpy as np
 
 from teleop_core.base.parameters import parameter
 from teleop_core.chain.passivity import MEMORY, PASSIVITIES
-from teleop_core.chain.passivity.port import (
-    IN,
-    LAW,
-    ROUND,
-    TURN_IN,
-    begin_round,
-    count,
-    hear_energy,
-    port_work,
-)
+from teleop_core.chain.passivity.port import IN, LAW, ROUND, TURN_IN, begin_round, count, hear_energy, port_work
 from teleop_core.graph.row import Row
 from teleop_core.graph.signals import DT, assign, copy
 from teleop_core.graph.stage import RunningStage, Stage
@@ -42,44 +33,65 @@ class PassivityParameters:
     """Parameters of the slave's side, of every kind of passivity."""
 
     recovery: float = parameter(
-        0.2, unit="s", lower=1e-3, upper=100.0,
+        0.2,
+        unit="s",
+        lower=1e-3,
+        upper=100.0,
         doc="time constant with which what a command lost is made up for",
         source="assumed",
-    )  # fmt: skip
+    )
     recovery_speed: float = parameter(
-        5e-3, unit="m/s", lower=0.0, upper=1.0,
+        5e-3,
+        unit="m/s",
+        lower=0.0,
+        upper=1.0,
         doc="largest speed of the same, and of going back from what is overdrawn",
         source="assumed: at it an arm meets steel with some 2 N",
-    )  # fmt: skip
+    )
     least_force: float = parameter(
-        0.01, unit="N", lower=0.0, upper=10.0,
+        0.01,
+        unit="N",
+        lower=0.0,
+        upper=10.0,
         doc="a smaller force on the tip is none; above what the sensor tells of nothing",
         source="assumed: that of an ideal sensor",
-    )  # fmt: skip
+    )
     credit: float = parameter(
-        2e-4, unit="J", lower=0.0, upper=1.0,
+        2e-4,
+        unit="J",
+        lower=0.0,
+        upper=1.0,
         doc="energy that the arm lends before the hand has paid: once with tank and tdpa, in each "
         "touch with wave; what the world gives back goes to it first, never to the hand",
         source="assumed: moves the arm by half a millimetre until the hand has paid",
-    )  # fmt: skip
+    )
     credit_force: float = parameter(
-        1.0, unit="N", lower=1e-3, upper=100.0,
+        1.0,
+        unit="N",
+        lower=1e-3,
+        upper=100.0,
         doc="with wave, force on the tip up to which it lends all of that; from twice the force on "
         "it lends nothing, and what an arm that ran into something hard overdrew is given back",
         source="assumed: a gentle touch",
-    )  # fmt: skip
+    )
     stop_force: float = parameter(
-        5.0, unit="N", lower=0.1, upper=1000.0,
+        5.0,
+        unit="N",
+        lower=0.1,
+        upper=1000.0,
         doc="force on the tip at which a tank stops a command that goes against it; the arm, which "
         "comes behind its command, presses harder",
         source="assumed: below what RCRT-1's drives give for long",
-    )  # fmt: skip
+    )
     approach_stiffness: float = parameter(
-        1300.0, unit="N/m", lower=1.0, upper=1e6,
+        1300.0,
+        unit="N/m",
+        lower=1.0,
+        upper=1e6,
         doc="stiffness of what may be met: with tank and tdpa the command is ahead of the tip no "
         "farther than what is left pays for on the way into it",
         source="assumed: silicone; into softer things the arm needs less, and harder ones stop it",
-    )  # fmt: skip
+    )
 
 
 class Laws(NamedTuple):
@@ -186,15 +198,7 @@ class SlaveSide(RunningStage):
         self.parameters, self.state = records([("none", "i8")])[0], record(PortState)
         self.kernel = passivity_step
         slaves = tuple(PASSIVITIES.find(name).slave_pointer for name in PASSIVITIES)
-        self._laws = Laws(
-            slaves,
-            np.zeros(7),
-            np.zeros(MEMORY),
-            np.zeros(3),
-            np.zeros(3),
-            np.zeros(3),
-            np.zeros(7),
-        )
+        self._laws = Laws(slaves, np.zeros(7), np.zeros(MEMORY), np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(7))
         self.arguments = (self.parameters, self.state, self._laws)
         self._start = self.signals.copy()
         self.retune(parameters)
@@ -210,10 +214,14 @@ class SlaveSide(RunningStage):
     def retune(self, parameters: PassivityParameters) -> None:
         """Take new parameters from the next command on."""
         self._laws.numbers[:] = (
-            parameters.recovery, parameters.recovery_speed, parameters.least_force,
-            parameters.credit, parameters.credit_force, parameters.stop_force,
+            parameters.recovery,
+            parameters.recovery_speed,
+            parameters.least_force,
+            parameters.credit,
+            parameters.credit_force,
+            parameters.stop_force,
             parameters.approach_stiffness,
-        )  # fmt: skip
+        )
 
 
 PASSIVITY = Stage(

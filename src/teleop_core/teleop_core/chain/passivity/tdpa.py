@@ -31,22 +31,31 @@ class StoreParameters:
     """How much the hand's side keeps for itself, and what it sees to that the slave has."""
 
     kept_way: float = parameter(
-        3e-4, unit="m", lower=0.0, upper=0.01,
+        3e-4,
+        unit="m",
+        lower=0.0,
+        upper=0.01,
         doc="what the hand gave is told to the slave but for the present push over this way, which "
         "is kept so that the push outlasts a step of the reading outwards",
         source="assumed: five steps of the device's reading, 0.055 mm",
-    )  # fmt: skip
+    )
     store: float = parameter(
-        6e-3, unit="J", lower=0.0, upper=1.0,
-        doc="energy that the slave shall have before it touches anything; while it has less the "
-        "hand feels a drag",
+        6e-3,
+        unit="J",
+        lower=0.0,
+        upper=1.0,
+        doc="energy that the slave shall have before it touches anything; while it has less the hand feels a drag",
         source="derived: half of approach_stiffness times the square of the 3 mm by which the arm "
         "lags behind a command of 60 mm/s",
-    )  # fmt: skip
+    )
     drag: float = parameter(
-        10.0, unit="N·s/m", lower=0.0, upper=100.0,
-        doc="that drag, where the slave has nothing or less", source="assumed: that of a wave",
-    )  # fmt: skip
+        10.0,
+        unit="N·s/m",
+        lower=0.0,
+        upper=100.0,
+        doc="that drag, where the slave has nothing or less",
+        source="assumed: that of a wave",
+    )
 
 
 @inner

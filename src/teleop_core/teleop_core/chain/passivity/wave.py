@@ -24,11 +24,14 @@ class WaveParameters:
     """What waves travel through."""
 
     impedance: float = parameter(
-        10.0, unit="N·s/m", lower=0.1, upper=100.0,
+        10.0,
+        unit="N·s/m",
+        lower=0.1,
+        upper=100.0,
         doc="force over speed of a wave, at the hand; the hand feels 1.5 times as much as a drag",
         source="assumed: tissue of 200 N/m times the arm's lag of 50 ms, below which an arm that "
         "yields to a force that it reads late swings",
-    )  # fmt: skip
+    )
 
 
 DRAG = 1.5
@@ -138,9 +141,8 @@ def wave_hand(
 
 @inner
 def pay_command(
-    numbers: Array, memory: Array, force: Array, last: Array, port: Array, command: Array,
-    period: float,
-) -> None:  # fmt: skip
+    numbers: Array, memory: Array, force: Array, last: Array, port: Array, command: Array, period: float
+) -> None:
     """Let the command (7,) go against the force as far as what is left pays for; the rest is drift.
 
     Arguments are those of :func:`wave_slave`.

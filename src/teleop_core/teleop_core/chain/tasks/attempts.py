@@ -17,9 +17,9 @@ KEPT = 59
 _PASS = int(Act.PASS)
 _SINCE, _CLOSED = KEPT + 3, KEPT + 4
 _OPENS, _CLOSES = 0.4, 0.6  # closing at which a hand counts as open and closed again
-(
-    _NUMBER, _ACT, _GOAL, _, _, _WIDTH, _ATTEMPTS, _SUCCESSES, _ERRORS, _WAY, _OFF, _TIME, _MISS, _
-) = range(len(TASK_STATE.columns))  # fmt: skip
+(_NUMBER, _ACT, _GOAL, _, _, _WIDTH, _ATTEMPTS, _SUCCESSES, _ERRORS, _WAY, _OFF, _TIME, _MISS, _) = range(
+    len(TASK_STATE.columns)
+)
 _NONE, _BESIDE, _LATE, _FORCE = (int(m) for m in (Miss.NONE, Miss.BESIDE, Miss.LATE, Miss.FORCE))
 _PUSH = SCENE.index("fx")
 
@@ -44,9 +44,7 @@ def move_goal(state: Array, act: int, x: float, y: float, z: float, width: float
 
 
 @inner
-def begin_goal(
-    memory: Array, scene: Array, state: Array, act: int, x: float, y: float, z: float, width: float
-) -> None:
+def begin_goal(memory: Array, scene: Array, state: Array, act: int, x: float, y: float, z: float, width: float) -> None:
     """Set the goal of the next attempt at a place [m], as wide as it is [m]."""
     move_goal(state, act, x, y, z, width)
     for i in range(3):
@@ -89,12 +87,8 @@ class PressedParameters:
     """What is an error where things are touched; first of the numbers of such a task."""
 
     width: float = parameter(0.004, unit="m", lower=1e-4, upper=0.1, doc="of a goal, a ball")
-    most: float = parameter(
-        2.0, unit="N", lower=0.01, upper=500.0, doc="a larger force is an error"
-    )
-    longest: float = parameter(
-        20.0, unit="s", lower=0.1, upper=600.0, doc="an attempt that takes longer is an error"
-    )
+    most: float = parameter(2.0, unit="N", lower=0.01, upper=500.0, doc="a larger force is an error")
+    longest: float = parameter(20.0, unit="s", lower=0.1, upper=600.0, doc="an attempt that takes longer is an error")
 
 
 @inner
@@ -118,13 +112,14 @@ def tell_attempt(memory: Array, scene: Array, state: Array) -> None:
 class LedParameters:
     """How a goal that is followed is judged; first of the numbers of a task that leads."""
 
-    width: float = parameter(
-        0.006, unit="m", lower=1e-4, upper=0.1, doc="twice the distance from it that is near"
-    )
+    width: float = parameter(0.006, unit="m", lower=1e-4, upper=0.1, doc="twice the distance from it that is near")
     step: float = parameter(
-        0.5, unit="s", lower=0.01, upper=60.0,
+        0.5,
+        unit="s",
+        lower=0.01,
+        upper=60.0,
         doc="after which the tip is judged each time, and the next place counts as a goal",
-    )  # fmt: skip
+    )
 
 
 @inner

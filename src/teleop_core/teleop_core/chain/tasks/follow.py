@@ -21,12 +21,8 @@ class FollowParameters(LedParameters):
         Sums of sines as targets: McRuer and Jex 1967, IEEE Trans. Human Factors in Electronics 8.
     """
 
-    size: float = parameter(
-        0.02, unit="m", lower=1e-3, upper=0.5, doc="farthest that it goes along each axis"
-    )
-    period: float = parameter(
-        60.0, unit="s", lower=1.0, upper=3600.0, doc="after which its way repeats itself"
-    )
+    size: float = parameter(0.02, unit="m", lower=1e-3, upper=0.5, doc="farthest that it goes along each axis")
+    period: float = parameter(60.0, unit="s", lower=1.0, upper=3600.0, doc="after which its way repeats itself")
 
 
 @kernel

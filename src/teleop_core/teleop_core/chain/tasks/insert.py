@@ -17,9 +17,13 @@ class InsertParameters(attempts.PressedParameters):
     """Where the hole is, and how deep to go; the object that has it is a part of the world."""
 
     place: tuple[float, ...] = parameter(
-        (0.3, 0.0, 0.0), unit="m", lower=-10.0, upper=10.0, length=3,
+        (0.3, 0.0, 0.0),
+        unit="m",
+        lower=-10.0,
+        upper=10.0,
+        length=3,
         doc="of its mouth in the slave's base, as world.place",
-    )  # fmt: skip
+    )
     axis: tuple[float, ...] = parameter(
         (0.0, 0.0, 1.0), lower=-1.0, upper=1.0, length=3, doc="out of it, as world.hole.axis"
     )

@@ -21,9 +21,12 @@ class PalpateParameters(attempts.PressedParameters):
     tolerance: float = parameter(0.2, unit="N", lower=1e-3, upper=100.0, doc="it may be so far off")
     hold: float = parameter(0.5, unit="s", lower=0.0, upper=60.0, doc="it must last so long")
     yielding: float = parameter(
-        0.003, unit="m/N", lower=1e-5, upper=0.1,
+        0.003,
+        unit="m/N",
+        lower=1e-5,
+        upper=0.1,
         doc="the goal is so much deeper than the tip for each newton that is missing",
-    )  # fmt: skip
+    )
 
 
 @kernel

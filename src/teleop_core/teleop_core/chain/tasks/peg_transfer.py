@@ -15,13 +15,9 @@ from teleop_core.kernels.geometry import Array
 
 KINDS = ("one", "two", "hand_over")
 """Who transfers: one arm all blocks; each arm every other one; the second takes from the first."""
-STEPS = (
-    "wait", "reach", "grasp", "lift", "meet", "take", "release", "retreat", "carry", "place",
-)  # fmt: skip
+STEPS = ("wait", "reach", "grasp", "lift", "meet", "take", "release", "retreat", "carry", "place")
 """What an arm is doing: of these the nine after the first make a transfer with a hand-over."""
-(
-    _WAIT, _REACH, _GRASP, _LIFT, _MEET, _TAKE, _RELEASE, _RETREAT, _CARRY, _PLACE,
-) = range(len(STEPS))  # fmt: skip
+(_WAIT, _REACH, _GRASP, _LIFT, _MEET, _TAKE, _RELEASE, _RETREAT, _CARRY, _PLACE) = range(len(STEPS))
 _TWO, _HAND_OVER = KINDS.index("two"), KINDS.index("hand_over")
 _GRIP, _LET_GO = int(Act.GRIP), int(Act.LET_GO)
 _NONE, _LATE, _DROP, _WRONG = (int(m) for m in (Miss.NONE, Miss.LATE, Miss.DROP, Miss.WRONG))
@@ -41,23 +37,24 @@ class PegTransferParameters:
     """
 
     arms: str = parameter(
-        "one", choices=KINDS,
+        "one",
+        choices=KINDS,
         doc="who transfers: one arm all blocks; each of two every other one; or the first one "
         "hands each over to the second",
-    )  # fmt: skip
+    )
     ways: tuple[float, ...] = parameter(
-        (0.0, -0.04), unit="m", lower=-1.0, upper=1.0,
+        (0.0, -0.04),
+        unit="m",
+        lower=-1.0,
+        upper=1.0,
         doc="x, y of the way from each block to the peg of its colour; one way holds for all",
-    )  # fmt: skip
+    )
     lift: float = parameter(0.03, unit="m", lower=1e-3, upper=0.5, doc="above where blocks stand")
     clearance: float = parameter(
-        0.0015, unit="m", lower=0.0, upper=0.1,
-        doc="of a block that is on a peg, as jaw_sim.pegs.clearance",
-    )  # fmt: skip
-    width: float = parameter(0.002, unit="m", lower=1e-4, upper=0.1, doc="of a goal, a ball")
-    longest: float = parameter(
-        60.0, unit="s", lower=1.0, upper=600.0, doc="a transfer that takes longer is an error"
+        0.0015, unit="m", lower=0.0, upper=0.1, doc="of a block that is on a peg, as jaw_sim.pegs.clearance"
     )
+    width: float = parameter(0.002, unit="m", lower=1e-4, upper=0.1, doc="of a goal, a ball")
+    longest: float = parameter(60.0, unit="s", lower=1.0, upper=600.0, doc="a transfer that takes longer is an error")
 
     def __post_init__(self) -> None:
         if len(self.ways) not in {2, 2 * JAW_OBJECTS}:

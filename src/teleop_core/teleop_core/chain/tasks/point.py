@@ -17,17 +17,21 @@ class PointParameters:
     """A ring of targets around the place where the tip is when the task begins."""
 
     count: int = parameter(
-        13, lower=3, upper=99, doc="targets of the ring",
+        13,
+        lower=3,
+        upper=99,
+        doc="targets of the ring",
         source="published: ISO/TS 9241-411 2012 has an odd number, 13 and 25 in its figures",
-    )  # fmt: skip
-    diameter: float = parameter(0.03, unit="m", lower=1e-3, upper=0.5, doc="of the ring")
-    width: float = parameter(
-        0.004, unit="m", lower=1e-4, upper=0.1, doc="diameter of a target, a ball"
     )
+    diameter: float = parameter(0.03, unit="m", lower=1e-3, upper=0.5, doc="of the ring")
+    width: float = parameter(0.004, unit="m", lower=1e-4, upper=0.1, doc="diameter of a target, a ball")
     normal: tuple[float, ...] = parameter(
-        (1.0, 0.0, 0.0), lower=-1.0, upper=1.0, length=3,
+        (1.0, 0.0, 0.0),
+        lower=-1.0,
+        upper=1.0,
+        length=3,
         doc="axis of the ring in the slave's base, of any length but 0",
-    )  # fmt: skip
+    )
 
 
 @kernel

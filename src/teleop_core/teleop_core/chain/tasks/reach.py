@@ -4,13 +4,7 @@ from dataclasses import dataclass
 
 from teleop_core.base.parameters import parameter
 from teleop_core.chain.tasks import Act, Miss, Task
-from teleop_core.chain.tasks.attempts import (
-    begin_goal,
-    end_attempt,
-    is_at_goal,
-    tell_attempt,
-    waited,
-)
+from teleop_core.chain.tasks.attempts import begin_goal, end_attempt, is_at_goal, tell_attempt, waited
 from teleop_core.kernels import kernel
 from teleop_core.kernels.geometry import Array
 
@@ -23,15 +17,9 @@ _STEPS = (0.8191725133961645, 0.6710436067037893, 0.5497004779019703)
 class ReachTaskParameters:
     """A box around the place where the tip is when the task begins."""
 
-    size: tuple[float, ...] = parameter(
-        (0.01, 0.04, 0.04), unit="m", lower=0.0, upper=0.5, length=3, doc="of the box"
-    )
-    width: float = parameter(
-        0.004, unit="m", lower=1e-4, upper=0.1, doc="diameter of a goal, a ball"
-    )
-    longest: float = parameter(
-        10.0, unit="s", lower=0.1, upper=600.0, doc="after which a goal counts as an error"
-    )
+    size: tuple[float, ...] = parameter((0.01, 0.04, 0.04), unit="m", lower=0.0, upper=0.5, length=3, doc="of the box")
+    width: float = parameter(0.004, unit="m", lower=1e-4, upper=0.1, doc="diameter of a goal, a ball")
+    longest: float = parameter(10.0, unit="s", lower=0.1, upper=600.0, doc="after which a goal counts as an error")
     first: int = parameter(0, lower=0, upper=10**6, doc="which place comes first")
 
 

@@ -15,9 +15,7 @@ class TraceParameters(LedParameters):
     """A ring in the slave's y-z plane, on which the place where the task begins lies lowest."""
 
     diameter: float = parameter(0.03, unit="m", lower=1e-3, upper=0.5, doc="of the ring")
-    period: float = parameter(
-        12.0, unit="s", lower=0.5, upper=600.0, doc="in which the point goes round once"
-    )
+    period: float = parameter(12.0, unit="s", lower=0.5, upper=600.0, doc="in which the point goes round once")
 
 
 @kernel

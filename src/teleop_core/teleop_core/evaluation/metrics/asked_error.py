@@ -105,10 +105,7 @@ def _last(begins: NDArray[np.bool_]) -> Integers:
 
 
 _GROUP = "against what was asked for"
-_MEANING = (
-    "slave/measured_cp to where the hand has asked it to be since it was engaged or the clutch let "
-    "go"
-)
+_MEANING = "slave/measured_cp to where the hand has asked it to be since it was engaged or the clutch let go"
 
 
 class _AskedMetric(SpreadMetric):

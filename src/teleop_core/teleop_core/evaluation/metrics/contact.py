@@ -23,9 +23,7 @@ _NUMBER, _TAKEN, _RETURNED, _FRICTION, _MOST = range(len(MASTER_CONTACT.columns)
 class ContactScore:
     """Energy of the contacts of the hand with walls; None where there is none, or none known."""
 
-    count: int | None = figure(
-        "1", "stretches in which the device pushed and took 14 µJ or more; null if not recorded"
-    )
+    count: int | None = figure("1", "stretches in which the device pushed and took 14 µJ or more; null if not recorded")
     touches: int | None = figure("1", "those that took less")
     returned_max: float | None = figure(
         "1", "largest share of the energy taken that a contact gave back; above 1 it fed the hand"
@@ -41,9 +39,7 @@ class ContactScore:
     )
     taken_max_mj: float | None = figure("mJ", "most energy that one took")
     worst_s: float | None = figure("s", "when the one with returned_max began, after the start")
-    largest_force_min_n: float | None = figure(
-        "N", "least force that the warmth of the device's motors allowed"
-    )
+    largest_force_min_n: float | None = figure("N", "least force that the warmth of the device's motors allowed")
 
 
 class ContactMetric(Metric):
@@ -109,11 +105,6 @@ class ContactMetric(Metric):
         return [
             Row(GROUP, "contacts, touches", "", f"{score.count}, {score.touches}"),
             Row(GROUP, "energy given back of taken, max", "%", f"{number(share)}{worst}"),
-            Row(
-                GROUP,
-                "contacts that gave more, wall/device",
-                "",
-                f"{score.feeding}/{score.feeding_device}",
-            ),
+            Row(GROUP, "contacts that gave more, wall/device", "", f"{score.feeding}/{score.feeding_device}"),
             row(GROUP, "least force that warmth allowed", "N", score.largest_force_min_n),
         ]

@@ -74,10 +74,13 @@ class TicksMetric(Metric):
 
     name = "ticks"
     keys = (
-        Key("ticks.executed|late|made_up|dropped", "1",
+        Key(
+            "ticks.executed|late|made_up|dropped",
+            "1",
             "control ticks of the slave: begun late, executed after the next one was due, never "
-            "executed; late and made_up are null if uncounted"),
-    )  # fmt: skip
+            "executed; late and made_up are null if uncounted",
+        ),
+    )
     topics = (SLAVE_MEASURED_CP,)
 
     def __init__(self, context: Context) -> None:
@@ -129,14 +132,19 @@ class TopicsMetric(Metric):
     name = "topics"
     keys = (
         Key("topics.<name>.count", "1", "messages"),
-        Key("topics.<name>.gaps", "1",
+        Key(
+            "topics.<name>.gaps",
+            "1",
             "messages missing by their stamps, lost or passed over by a stage that takes only the "
             "newest; a hole counts where it begins, and not at all in a file that was replayed; "
-            "null if not a stream, or one that is sent where it changes"),
-        Key("topics.<name>.lost", "1",
-            "messages that were sent and did not reach the recorder, by its own count; null if "
-            "uncounted"),
-    )  # fmt: skip
+            "null if not a stream, or one that is sent where it changes",
+        ),
+        Key(
+            "topics.<name>.lost",
+            "1",
+            "messages that were sent and did not reach the recorder, by its own count; null if uncounted",
+        ),
+    )
 
     def __init__(self, context: Context) -> None:
         self._infos, self._stamps = context.bag.topics, context.shared(StampTallies)

@@ -47,9 +47,7 @@ class FixtureScore:
 
     on_s: float = figure("s", "time with the fixture on")
     outside_share: float | None = figure("1", "share of that time with the slave's tip outside")
-    penetration_max_mm: float | None = figure(
-        "mm", "largest distance of the slave's tip from the fixture"
-    )
+    penetration_max_mm: float | None = figure("mm", "largest distance of the slave's tip from the fixture")
     penetration_rms_mm: float | None = figure("mm", "root mean square of it, zero inside")
     hand_penetration_max_mm: float | None = figure(
         "mm", "largest distance of the hand from its fixture, by the command; 0 if held inside"

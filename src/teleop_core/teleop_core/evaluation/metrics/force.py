@@ -18,9 +18,7 @@ class ForceMetric(Metric):
     """Spread of the magnitude of the force on the hand, [N]."""
 
     name = "force_n"
-    keys = (
-        Key("force_n.rms|sd|max", "N", f"magnitude of the force on the hand: {SPREAD_MEANING}"),
-    )
+    keys = (Key("force_n.rms|sd|max", "N", f"magnitude of the force on the hand: {SPREAD_MEANING}"),)
     topics = (MASTER_MEASURED_CF,)
 
     def __init__(self, context: Context) -> None:
@@ -57,9 +55,5 @@ class ForceMetric(Metric):
         kinds = kinds_of(outlines_of(self._context))
         sentence = f"The device pushes the hand with {number(self.values().max)} N at most"
         sentence += f"; the {kinds} pushes back only where the hand is beyond a wall" * bool(kinds)
-        layout = {
-            "xaxis": time_axis(),
-            "yaxis": {"title": {"text": "force [N]"}},
-            "hovermode": "x unified",
-        }
+        layout = {"xaxis": time_axis(), "yaxis": {"title": {"text": "force [N]"}}, "hovermode": "x unified"}
         return [Figure("Force on the hand", f"{sentence}.", traces, layout, 340)]

@@ -26,9 +26,7 @@ class ForceSensingScore:
         "of both in touch; null without a touch, or if nobody tells the true force",
     )
     measured_max_n: float | None = figure("N", "largest such distance")
-    estimated_rms_n: float | None = figure(
-        "N", "the same of slave/estimated_cf; null too if nothing was estimated"
-    )
+    estimated_rms_n: float | None = figure("N", "the same of slave/estimated_cf; null too if nothing was estimated")
     estimated_max_n: float | None = figure("N", "largest such distance")
 
 

@@ -15,8 +15,7 @@ from teleop_core.graph.topics import SLAVE_JAW_GRIP, SLAVE_JAW_MEASURED_JS, SLAV
 
 GROUP = "the jaw"
 _FORCE, _IS_GRIPPED, _GRIPS, _SLIPS, _DROPS = (
-    SLAVE_JAW_GRIP.columns.index(name)
-    for name in ("force", "is_gripped", "grips", "slips", "drops")
+    SLAVE_JAW_GRIP.columns.index(name) for name in ("force", "is_gripped", "grips", "slips", "drops")
 )
 
 
@@ -28,9 +27,7 @@ class JawScore:
     slips: int | None = figure("1", "grips in which the object slid by more than 1 mm")
     drops: int | None = figure("1", "how often it slid out of the jaw above the table")
     peak_force_n: float | None = figure("N", "largest push of each finger on the object")
-    delay_s: float | None = figure(
-        "s", "mean time from the master's sample that begins to close the jaw to the grip"
-    )
+    delay_s: float | None = figure("s", "mean time from the master's sample that begins to close the jaw to the grip")
 
 
 class JawMetric(Metric):

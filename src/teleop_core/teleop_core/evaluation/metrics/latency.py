@@ -30,12 +30,15 @@ class LatencyMetric(Metric):
 
     name = "latency_ms"
     keys = (
-        Key("latency_ms.<stage>.median|p99|max", "ms",
+        Key(
+            "latency_ms.<stage>.median|p99|max",
+            "ms",
             "own delay of each stage between the hand and the slave: from the arrival at the "
             "recorder of what it answers to that of its answer; of the first, and "
             f"{TOTAL}: from the stamp of the hand's sample to the arrival of the sample and of the "
-            f"last answer; {ASKED}: what a simulated network and teleop.delays are to add to it"),
-    )  # fmt: skip
+            f"last answer; {ASKED}: what a simulated network and teleop.delays are to add to it",
+        ),
+    )
 
     def __init__(self, context: Context) -> None:
         self._chain = context.origin.chain

@@ -98,12 +98,15 @@ class MotionMetric(Metric):
         *keys_of("motion.hand|slave|in_fixture", MotionFigures),
         Key("motion.clutch.count", "1", "strokes of the clutch"),
         Key("motion.clutch.time_s", "s", "time with the clutch pressed"),
-        Key("motion.segments.<number>.begin_s|end_s", "s",
-            "hand between clutch strokes, from 0.5 s on: when, from the start of the recording"),
+        Key(
+            "motion.segments.<number>.begin_s|end_s",
+            "s",
+            "hand between clutch strokes, from 0.5 s on: when, from the start of the recording",
+        ),
         *keys_of("motion.segments.<number>", _OF_SEGMENTS, "of a segment: "),
         Key("motion.segment_median.count", "1", "number of segments"),
         *keys_of("motion.segment_median", _OF_SEGMENTS, "median of the segments: "),
-    )  # fmt: skip
+    )
     topics = (MASTER_MEASURED_CP, SLAVE_MEASURED_CP)
 
     def __init__(self, context: Context) -> None:
@@ -208,11 +211,7 @@ class MotionMetric(Metric):
         )
         layout = {
             "xaxis": {"title": {"text": "frequency [Hz]"}, "type": "log"},
-            "yaxis": {
-                "title": {"text": "power of velocity [mm²/s²/Hz]"},
-                "type": "log",
-                "exponentformat": "power",
-            },
+            "yaxis": {"title": {"text": "power of velocity [mm²/s²/Hz]"}, "type": "log", "exponentformat": "power"},
         }
         return Figure("Spectrum of motion", sentence, traces, layout, 340)
 
@@ -249,10 +248,7 @@ def _segments(hand: Kinematics, mask: Mask) -> dict[str, dict[str, float | None]
         only = np.zeros(len(mask), np.bool_)
         only[begin:end] = True
         figures = hand.figures(only)
-        values: dict[str, float | None] = {
-            "begin_s": float(hand.times[begin]),
-            "end_s": float(hand.times[end - 1]),
-        }
+        values: dict[str, float | None] = {"begin_s": float(hand.times[begin]), "end_s": float(hand.times[end - 1])}
         values |= {name: getattr(figures, name) for name in _SEGMENT_NAMES}
         found[str(len(found) + 1)] = values
     return found

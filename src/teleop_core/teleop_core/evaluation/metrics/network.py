@@ -17,12 +17,7 @@ from teleop_core.evaluation.rows import Row, number, row
 from teleop_core.evaluation.traces import Envelope
 from teleop_core.evaluation.windows import Window
 from teleop_core.graph.signals import TICK_NS
-from teleop_core.graph.topics import (
-    NETWORK_MEASURED_CP,
-    NETWORK_SERVO_CP,
-    NETWORK_STATE,
-    NO_COMMAND_NS,
-)
+from teleop_core.graph.topics import NETWORK_MEASURED_CP, NETWORK_SERVO_CP, NETWORK_STATE, NO_COMMAND_NS
 
 GROUP = "network"
 _WAYS = (("to the slave", NETWORK_SERVO_CP), ("from the slave", NETWORK_MEASURED_CP))
@@ -164,11 +159,7 @@ class NetworkMetric(Metric):
                 traces.append(line(times, values[:, 0], name, color, 1.2, "ms"))
         if not traces:
             return []
-        layout = {
-            "xaxis": time_axis(),
-            "yaxis": {"title": {"text": "age [ms]"}},
-            "hovermode": "x unified",
-        }
+        layout = {"xaxis": time_axis(), "yaxis": {"title": {"text": "age [ms]"}}, "hovermode": "x unified"}
         text = (
             f"What its reader has is {number(score.there.age_mean_ms)} ms old on average on the "
             f"way to the slave, {number(score.back.age_mean_ms)} ms on the way back."

@@ -107,9 +107,7 @@ class OrientationErrorMetric(Metric):
                 "yaxis": f"y{figure.axis_suffix(row)}",
                 "showlegend": False,
             }
-            for row, (name, color) in enumerate(
-                zip(TURNS, (figure.FIRST, figure.SECOND, figure.THIRD), strict=True)
-            )
+            for row, (name, color) in enumerate(zip(TURNS, (figure.FIRST, figure.SECOND, figure.THIRD), strict=True))
         ]
         layout = figure.stacked_axes(TURNS, "deg") | {"hovermode": "x unified"}
         return [figure.Figure("Orientation error", _sentence(self.values()), traces, layout, 480)]
@@ -133,14 +131,19 @@ class CommandOrientationErrorMetric(Metric):
 
     name = "command_orientation_error_deg"
     keys = (
-        Key("command_orientation_error_deg.roll|pitch|yaw.rms|sd|max", "deg",
+        Key(
+            "command_orientation_error_deg.roll|pitch|yaw.rms|sd|max",
+            "deg",
             "difference of the fixed angles of slave/measured_cp and the latest slave/servo_cp at "
-            f"its stamp: {SPREAD_MEANING}"),
-        Key("command_orientation_error_deg.angle.rms|sd|max", "deg",
-            f"angle of the one rotation between the same two: {SPREAD_MEANING}"),
-        Key("command_orientation_error_deg.degenerate_share", "1",
-            "as in orientation_error_deg"),
-    )  # fmt: skip
+            f"its stamp: {SPREAD_MEANING}",
+        ),
+        Key(
+            "command_orientation_error_deg.angle.rms|sd|max",
+            "deg",
+            f"angle of the one rotation between the same two: {SPREAD_MEANING}",
+        ),
+        Key("command_orientation_error_deg.degenerate_share", "1", "as in orientation_error_deg"),
+    )
     topics = TRACKED
 
     def __init__(self, context: Context) -> None:

@@ -128,9 +128,7 @@ class PassivityMetric(Metric):
         if not slave.is_there:
             return PassivityScore(hand.score(), slave.score(), None, None, None)
         chatter = self._variation / self._seconds if self._seconds else None
-        return PassivityScore(
-            hand.score(), slave.score(), chatter, *(1e3 * drift for drift in slave.drifts)
-        )
+        return PassivityScore(hand.score(), slave.score(), chatter, *(1e3 * drift for drift in slave.drifts))
 
     def rows(self) -> list[Row]:
         """Energies of both ports and the costs; nothing without a stage ``passivity``."""
@@ -161,15 +159,8 @@ class PassivityMetric(Metric):
                 line(times, values[:, 0], f"in at the {name}", into, 1.4, "mJ"),
                 line(times, values[:, 1], f"out at the {name}", out, 1.4, "mJ"),
             ]
-        layout = {
-            "xaxis": time_axis(),
-            "yaxis": {"title": {"text": "energy [mJ]"}},
-            "hovermode": "x unified",
-        }
+        layout = {"xaxis": time_axis(), "yaxis": {"title": {"text": "energy [mJ]"}}, "hovermode": "x unified"}
         whole = sum(part or 0.0 for part in (score.hand.in_mj, score.slave.in_mj))
         given = sum(part or 0.0 for part in (score.hand.out_mj, score.slave.out_mj))
-        text = (
-            f"{number(whole)} mJ went in at both ports together, {number(given)} mJ came out, in "
-            "the slave's scale."
-        )
+        text = f"{number(whole)} mJ went in at both ports together, {number(given)} mJ came out, in the slave's scale."
         return [Figure("Energy between hand and slave", text, traces, layout, 320)]

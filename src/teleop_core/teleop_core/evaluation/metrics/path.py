@@ -19,9 +19,13 @@ from teleop_core.graph.signals import STATE
 
 _PLANES = ((0, 1), (0, 2), (1, 2))
 _TIME_BAR = {
-    "title": {"text": "measured, time [s]", "side": "top"}, "orientation": "h", "thickness": 8,
-    "len": 0.5, "y": 0.0, "yanchor": "bottom",
-}  # fmt: skip
+    "title": {"text": "measured, time [s]", "side": "top"},
+    "orientation": "h",
+    "thickness": 8,
+    "len": 0.5,
+    "y": 0.0,
+    "yanchor": "bottom",
+}
 _CAMERA = {"eye": {"x": 1.4, "y": -1.7, "z": 0.85}, "center": {"x": 0, "y": 0, "z": -0.1}}
 
 
@@ -120,9 +124,7 @@ class PathMetric(Metric):
             f"within {number(self._error.values().max)} mm of the reference."
         )
         if outlines:
-            sentence += (
-                f" Dashed: where the {kinds_of(outlines)} ends, from its middle along each axis."
-            )
+            sentence += f" Dashed: where the {kinds_of(outlines)} ends, from its middle along each axis."
         sentence += " Drag to zoom, all plots follow; double-click to see the whole recording."
         return figure.Figure("Position against time", sentence, traces, layout, 640)
 
@@ -164,11 +166,7 @@ def _in_space(path: _Path, outlines: list[Outline], sentence: str) -> figure.Fig
     measured |= {"showlegend": False}  # its colours are told by the bar
     measured["line"] |= {"colorscale": "Viridis", "showscale": True, "colorbar": _TIME_BAR}
     traces = [
-        {
-            **figure.along(whole, path.times, path.during, whole=True),
-            "opacity": 0.5,
-            "hoverinfo": "skip",
-        },
+        {**figure.along(whole, path.times, path.during, whole=True), "opacity": 0.5, "hoverinfo": "skip"},
         # Both lines at once would hide each other in turns.
         {**figure.along(reference, path.times, path.during), "visible": "legendonly"},
         figure.along(measured, path.times, path.during, colored=True),
@@ -183,25 +181,27 @@ def _in_space(path: _Path, outlines: list[Outline], sentence: str) -> figure.Fig
     return figure.Figure("Path in space", sentence, traces, {"scene": scene}, 560)
 
 
-def _line3(
-    points: figure.Numbers, name: str, color: str, width: int, *, hidden: bool = False
-) -> dict[str, Any]:
+def _line3(points: figure.Numbers, name: str, color: str, width: int, *, hidden: bool = False) -> dict[str, Any]:
     x, y, z = points.T
     return {
-        "type": "scatter3d", "mode": "lines", "name": name, "legendgroup": name,
-        "showlegend": not hidden, "x": x, "y": y, "z": z,
+        "type": "scatter3d",
+        "mode": "lines",
+        "name": name,
+        "legendgroup": name,
+        "showlegend": not hidden,
+        "x": x,
+        "y": y,
+        "z": z,
         "line": {"color": color, "width": width},
         "hovertemplate": "x %{x:.3f}<br>y %{y:.3f}<br>z %{z:.3f} mm",
-    }  # fmt: skip
+    }
 
 
 def _in_planes(path: _Path, outlines: list[Outline]) -> figure.Figure:
     """The same along each axis; behind it all of the path, or where it spent its time."""
     shown = path.shown
     fixtures = largest(outlines)
-    every = np.concatenate(
-        [shown, path.reference[np.isfinite(shown[:, 0])], *(outline.points for outline in fixtures)]
-    )
+    every = np.concatenate([shown, path.reference[np.isfinite(shown[:, 0])], *(outline.points for outline in fixtures)])
     ranges = [figure.span(every[:, axis]) or [0.0, 1.0] for axis in range(3)]
     traces: list[dict[str, Any]] = []
     layout: dict[str, Any] = {"grid": {"rows": 1, "columns": 3, "pattern": "independent"}}
@@ -211,16 +211,12 @@ def _in_planes(path: _Path, outlines: list[Outline]) -> figure.Figure:
         drawn = [_surroundings(path, shown, across, up, (ranges[across], ranges[up]), is_dense)]
         drawn += _plane_lines(path, across, up)
         drawn += [
-            figure.line(
-                outline.points[:, across], outline.points[:, up], outline.kind, figure.FIXTURE, 2.0
-            )
+            figure.line(outline.points[:, across], outline.points[:, up], outline.kind, figure.FIXTURE, 2.0)
             for outline in fixtures
         ]
         named: set[str] = set()
         for trace in drawn:
-            traces.append(
-                {**trace, **place, "showlegend": plot == 0 and trace["name"] not in named}
-            )
+            traces.append({**trace, **place, "showlegend": plot == 0 and trace["name"] not in named})
             named.add(trace["name"])
         layout |= _plane_axes(plot, "xyz"[across], "xyz"[up], ranges[across], ranges[up])
     sentence = (
@@ -232,27 +228,15 @@ def _in_planes(path: _Path, outlines: list[Outline]) -> figure.Figure:
 
 def _plane_lines(path: _Path, across: int, up: int) -> list[dict[str, Any]]:
     """Reference and tip seen along an axis."""
-    lines = (
-        (path.reference, "reference", figure.REFERENCE, 6.0),
-        (path.measured, "measured", figure.MEASURED, 1.6),
-    )
+    lines = ((path.reference, "reference", figure.REFERENCE, 6.0), (path.measured, "measured", figure.MEASURED, 1.6))
     return [
-        figure.along(
-            figure.line(points[:, across], points[:, up], name, color, width),
-            path.times,
-            path.during,
-        )
+        figure.along(figure.line(points[:, across], points[:, up], name, color, width), path.times, path.during)
         for points, name, color, width in lines
     ]
 
 
 def _surroundings(
-    path: _Path,
-    shown: figure.Numbers,
-    across: int,
-    up: int,
-    ranges: tuple[list[float], list[float]],
-    is_dense: bool,
+    path: _Path, shown: figure.Numbers, across: int, up: int, ranges: tuple[list[float], list[float]], is_dense: bool
 ) -> dict[str, Any]:
     """What stays behind the visible part of a path: all of it, or the time it spent anywhere."""
     if is_dense:
@@ -270,11 +254,11 @@ def _plane_axes(
     """Two axes of the same scale."""
     suffix = figure.axis_suffix(plot)
     return {
-        f"xaxis{suffix}": {
-            "title": {"text": f"{across} [mm]"}, "constrain": "domain", "range": width,
-        },
+        f"xaxis{suffix}": {"title": {"text": f"{across} [mm]"}, "constrain": "domain", "range": width},
         f"yaxis{suffix}": {
-            "title": {"text": f"{up} [mm]"}, "constrain": "domain", "range": height,
+            "title": {"text": f"{up} [mm]"},
+            "constrain": "domain",
+            "range": height,
             "scaleanchor": f"x{suffix}",
         },
-    }  # fmt: skip
+    }

@@ -25,9 +25,12 @@ class CommandErrorMetric(SpreadMetric):
 
     name, group = "command_error_mm", COMMAND_GROUP
     keys = (
-        Key("command_error_mm.rms|sd|max", "mm",
-            f"slave/measured_cp to the latest slave/servo_cp at its stamp: {SPREAD_MEANING}"),
-    )  # fmt: skip
+        Key(
+            "command_error_mm.rms|sd|max",
+            "mm",
+            f"slave/measured_cp to the latest slave/servo_cp at its stamp: {SPREAD_MEANING}",
+        ),
+    )
     topics = TRACKED
 
     def errors(self, window: Window) -> Array:
@@ -40,10 +43,12 @@ class TrueErrorMetric(SpreadMetric):
 
     name, group = "true_error_mm", "true tip, behind the encoders"
     keys = (
-        Key("true_error_mm.rms|sd|max", "mm",
-            "slave/true_cp to slave/setpoint_cp of the same tick, null if nobody tells the true "
-            f"tip: {SPREAD_MEANING}"),
-    )  # fmt: skip
+        Key(
+            "true_error_mm.rms|sd|max",
+            "mm",
+            f"slave/true_cp to slave/setpoint_cp of the same tick, null if nobody tells the true tip: {SPREAD_MEANING}",
+        ),
+    )
     topics = TRACKED
 
     def __init__(self, context: Context) -> None:
@@ -64,9 +69,12 @@ class PositionErrorMetric(SpreadMetric):
 
     name, group = "position_error_mm", GROUP
     keys = (
-        Key("position_error_mm.rms|sd|max", "mm",
-            f"slave/measured_cp to slave/setpoint_cp of the same tick: {SPREAD_MEANING}"),
-    )  # fmt: skip
+        Key(
+            "position_error_mm.rms|sd|max",
+            "mm",
+            f"slave/measured_cp to slave/setpoint_cp of the same tick: {SPREAD_MEANING}",
+        ),
+    )
     topics = TRACKED
 
     def __init__(self, context: Context) -> None:
@@ -100,8 +108,5 @@ class PositionErrorMetric(SpreadMetric):
             f"{number(spread.max)} mm at most. Against the unfiltered command (click the legend) "
             f"it is {number(behind.rms)} mm RMS, with the lag of the low-pass in it."
         )
-        layout = {
-            "xaxis": time_axis(),
-            "yaxis": {"title": {"text": "position error [mm]"}, "rangemode": "tozero"},
-        }
+        layout = {"xaxis": time_axis(), "yaxis": {"title": {"text": "position error [mm]"}, "rangemode": "tozero"}}
         return [Figure("Position error", sentence, traces, layout, 340)]

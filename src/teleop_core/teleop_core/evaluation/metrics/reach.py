@@ -43,19 +43,11 @@ class ReachScore:
     aligning_share: float | None = figure(
         "1", "share of it in which master or slave were silent, or it was aligned anew"
     )
-    residual_mm: Spread = figure(
-        "mm", f"what inverse kinematics left of each command: {SPREAD_MEANING}"
-    )
+    residual_mm: Spread = figure("mm", f"what inverse kinematics left of each command: {SPREAD_MEANING}")
     residual_deg: Spread = figure("deg", f"the same for angles: {SPREAD_MEANING}")
-    master_hz: float | None = figure(
-        "Hz", "commands per second, by the median step of their stamps"
-    )
-    interpolation: str | None = figure(
-        "1", "how the slave goes from command to command; null if it is not told"
-    )
-    interpolation_ms: float | None = figure(
-        "ms", "by what that is late; 0 where there is a command every tick"
-    )
+    master_hz: float | None = figure("Hz", "commands per second, by the median step of their stamps")
+    interpolation: str | None = figure("1", "how the slave goes from command to command; null if it is not told")
+    interpolation_ms: float | None = figure("ms", "by what that is late; 0 where there is a command every tick")
 
 
 class ReachMetric(Metric):

@@ -12,8 +12,7 @@ from teleop_core.graph.topics import DISPLAY_MEASURED_CP, NO_COMMAND_NS, TASK_ST
 
 GROUP = "task"
 _ATTEMPTS, _SUCCESSES, _WAY, _OFF, _TIME, _MISS = (
-    TASK_STATE.columns.index(name)
-    for name in ("attempts", "successes", "way", "off", "time", "miss")
+    TASK_STATE.columns.index(name) for name in ("attempts", "successes", "way", "off", "time", "miss")
 )
 _KINDS = ("beside", "late", "forced", "dropped", "wrong")  # of Miss, from 1 on
 EFFECTIVE = 4.133
@@ -33,12 +32,9 @@ class TaskScore:
         "which begins while the arm is led in",
     )
     throughput: float | None = figure(
-        "bit/s",
-        "log2(mean way / effective width + 1) over the mean time, without the first attempt",
+        "bit/s", "log2(mean way / effective width + 1) over the mean time, without the first attempt"
     )
-    effective_width_mm: float | None = figure(
-        "mm", "4.133 standard deviations of the end points along their ways"
-    )
+    effective_width_mm: float | None = figure("mm", "4.133 standard deviations of the end points along their ways")
     beside: int | None = figure("1", "errors: it ended beside the goal")
     late: int | None = figure("1", "errors: it took too long")
     forced: int | None = figure("1", "errors: it pressed too hard")
@@ -101,17 +97,11 @@ class TaskMetric(Metric):
         return [
             Row(GROUP, "attempts", "", str(score.attempts)),
             Row(GROUP, "successes", "", str(score.successes)),
-            row(
-                GROUP, "errors", "%", None if score.error_share is None else 1e2 * score.error_share
-            ),
+            row(GROUP, "errors", "%", None if score.error_share is None else 1e2 * score.error_share),
             row(GROUP, "time of an attempt, mean", "s", score.time_s),
             row(GROUP, "throughput", "bit/s", score.throughput),
             row(GROUP, "effective width", "mm", score.effective_width_mm),
-            *(
-                Row(GROUP, f"errors: {kind}", "", str(n))
-                for kind in _KINDS
-                if (n := getattr(score, kind))
-            ),
+            *(Row(GROUP, f"errors: {kind}", "", str(n)) for kind in _KINDS if (n := getattr(score, kind))),
         ]
 
 

@@ -32,9 +32,7 @@ class TouchScore:
     peak_n: float | None = figure("N", "largest force on the tip; null without a touch")
     rms_n: float | None = figure("N", "root mean square of the samples with a force")
     share: float | None = figure("1", "share of the recorded time in touch")
-    drop_n: float | None = figure(
-        "N", "largest fall of the force from sample to sample within 5 ms, as of a puncture"
-    )
+    drop_n: float | None = figure("N", "largest fall of the force from sample to sample within 5 ms, as of a puncture")
     presses: int | None = figure(
         "1", "how often a button was pressed to its stop, from click to click; null without one"
     )
@@ -160,10 +158,6 @@ class TouchMetric(Metric):
         traces.append(line(times, values[:, 3], "magnitude", DARK, 1.4, "N"))
         score = self.values()
         sentence = f"The world pushes the slave's tip with {number(score.peak_n)} N at most"
-        layout = {
-            "xaxis": time_axis(),
-            "yaxis": {"title": {"text": "force [N]"}},
-            "hovermode": "x unified",
-        }
+        layout = {"xaxis": time_axis(), "yaxis": {"title": {"text": "force [N]"}}, "hovermode": "x unified"}
         text = f"{sentence}, in {score.count} touches."
         return [Figure("Force on the slave's tip", text, traces, layout, 340)]

@@ -12,9 +12,7 @@ from teleop_core.evaluation.windows import Window
 from teleop_core.graph.topics import SLAVE_JAW_BOARD, SLAVE_JAW_GRIP
 
 GROUP = "peg transfer"
-_TRANSFERRED, _DROPPED, _PULL = (
-    SLAVE_JAW_BOARD.columns.index(name) for name in ("transferred", "dropped", "pull")
-)
+_TRANSFERRED, _DROPPED, _PULL = (SLAVE_JAW_BOARD.columns.index(name) for name in ("transferred", "dropped", "pull"))
 _GRIPS = SLAVE_JAW_GRIP.columns.index("grips")
 
 
@@ -25,9 +23,7 @@ class TransferScore:
     transferred: int | None = figure("1", "objects that were let go onto another peg")
     dropped: int | None = figure("1", "objects that came to rest on no peg")
     time_s: float | None = figure("s", "mean time of those transferred, from the last grip to rest")
-    peak_pull_n: float | None = figure(
-        "N", "largest pull of a peg on the gripped object, across the peg"
-    )
+    peak_pull_n: float | None = figure("N", "largest pull of a peg on the gripped object, across the peg")
 
 
 class TransferMetric(Metric):
@@ -67,9 +63,7 @@ class TransferMetric(Metric):
             return TransferScore(None, None, None, None)
         counts = self._last - self._first
         transferred, dropped = int(counts[_TRANSFERRED]), int(counts[_DROPPED])
-        return TransferScore(
-            transferred, dropped, mean_wait_s(self._begins, self._ends), self._peak
-        )
+        return TransferScore(transferred, dropped, mean_wait_s(self._begins, self._ends), self._peak)
 
     def rows(self) -> list[Row]:
         """All four; nothing where no object came onto a peg or missed one."""

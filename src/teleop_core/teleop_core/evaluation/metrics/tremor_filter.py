@@ -24,9 +24,7 @@ MEANT = 2.0
 class TremorFilterScore:
     """What a tremor filter did; None without one, or where the recording is too slow or short."""
 
-    before_um: float | None = figure(
-        "um", "RMS of the stylus's motion in 8 to 12 Hz over three axes; null below 60 Hz"
-    )
+    before_um: float | None = figure("um", "RMS of the stylus's motion in 8 to 12 Hz over three axes; null below 60 Hz")
     after_um: float | None = figure("um", "the same of the filtered stylus")
     left_share: float | None = figure("1", "tremor after the filter over tremor before it")
     delay_ms: float | None = figure(
@@ -34,9 +32,7 @@ class TremorFilterScore:
         "by how much motion below 2 Hz comes out later: slope of the phase of the cross-spectrum "
         "of both velocities, weighted with its magnitude; negative where it is ahead",
     )
-    gain: float | None = figure(
-        "1", "how large motion below 2 Hz comes out: in phase with it, over all of it"
-    )
+    gain: float | None = figure("1", "how large motion below 2 Hz comes out: in phase with it, over all of it")
     intention_before_um: float | None = figure(
         "um",
         "RMS distance of the stylus from what the hand meant, against intention: its tremor; "
@@ -72,9 +68,7 @@ def passage(before: Array, after: Array) -> tuple[float, float] | None:
     for begin in range(0, len(before) - size + 1, size - size // 2):
         first, second = (
             np.fft.rfft(
-                (motion[begin : begin + size] - motion[begin : begin + size].mean(axis=0))
-                * window[:, None],
-                axis=0,
+                (motion[begin : begin + size] - motion[begin : begin + size].mean(axis=0)) * window[:, None], axis=0
             )[is_meant]
             for motion in (before, after)
         )
@@ -110,9 +104,7 @@ class TremorFilterMetric(Metric):
         readings = window.around(MASTER_MEASURED_CP)
         if not (len(answers) and len(readings)):
             return
-        stamps, first, second = np.intersect1d(
-            readings.stamp_ns, answers.stamp_ns, return_indices=True
-        )
+        stamps, first, second = np.intersect1d(readings.stamp_ns, answers.stamp_ns, return_indices=True)
         times = np.asarray((stamps - self._start_ns) * 1e-9, np.float64)
         self._before.add(times, readings.values[first, :7])
         self._after.add(times, answers.values[second, :7])
@@ -152,9 +144,7 @@ class TremorFilterMetric(Metric):
         if not parts:
             return None
         longest = max(parts, key=lambda part: part.stop - part.start)
-        return passage(
-            *(motion_measures.velocities(motion[longest, :3]) for motion in (before, after))
-        )
+        return passage(*(motion_measures.velocities(motion[longest, :3]) for motion in (before, after)))
 
     def rows(self) -> list[Row]:
         """Tremor before and after, delay and gain; nothing without a filter."""

@@ -29,10 +29,7 @@ class WaitsMetric(Metric):
         for i in np.flatnonzero(np.diff(slots, prepend=self._slot) > 0).tolist():
             has_moved = np.linalg.norm(at.values[i, :3] - self._place) >= 5e-4
             self._still = 0 if has_moved else self._still + 1
-            self._count, self._rests = (
-                self._count + (self._still == 3),
-                self._rests + (self._still > 3),
-            )
+            self._count, self._rests = (self._count + (self._still == 3), self._rests + (self._still > 3))
             self._place, self._slot, self._slots = at.values[i, :3], int(slots[i]), self._slots + 1
 
     def values(self) -> dict[str, float | None]:

@@ -54,9 +54,13 @@ def _table(robot: Robot) -> dict[str, Any]:
     """Denavit-Hartenberg table of the RCRT-1, which has kernels of its own."""
     g, right, turn = robot.geometry, 0.5 * math.pi, {"theta": "q"}
     rows: list[dict[str, Any]] = [
-        turn | {"alpha": -right}, turn | {"alpha": right, "d": g["d2"]}, {"d": "q"},
-        turn | {"alpha": -right}, turn | {"alpha": right}, turn | {"d": g["L6"]},
-    ]  # fmt: skip
+        turn | {"alpha": -right},
+        turn | {"alpha": right, "d": g["d2"]},
+        {"d": "q"},
+        turn | {"alpha": -right},
+        turn | {"alpha": right},
+        turn | {"d": g["L6"]},
+    ]
     for row, name, lower, upper in zip(
         rows, robot.joint_names, robot.lower.tolist(), robot.upper.tolist(), strict=True
     ):

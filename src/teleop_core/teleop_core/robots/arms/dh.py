@@ -62,9 +62,7 @@ __all__ = [
     "parse_table",
     "robot_from_table",
 ]
-_EXPRESSION = re.compile(
-    r"([+-]?)\s*q\s*(?:([+-])\s*((?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?))?", re.A
-)
+_EXPRESSION = re.compile(r"([+-]?)\s*q\s*(?:([+-])\s*((?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?))?", re.A)
 _JOINT_KEYS = ("name", "lower", "upper", "home", "start")
 
 
@@ -138,9 +136,7 @@ def _row(number: int, row: Any, convention: str, unit: float) -> DhRow:
     return DhRow(constants=constants, joint=joint)
 
 
-def _joint(
-    number: int, row: Mapping[str, Any], symbol: str, sign: float, scale: float, kind: str
-) -> DhJoint:
+def _joint(number: int, row: Mapping[str, Any], symbol: str, sign: float, scale: float, kind: str) -> DhJoint:
     where = f"row {number}"
     circle = math.pi / scale if kind == "turn" else None
     bounds = []
@@ -156,9 +152,7 @@ def _joint(
         if not lower <= value <= upper:
             raise ParameterError(f"{where} {name}", value, f"between {lower!r} and {upper!r}")
     name = str(row.get("name", f"q{number}"))
-    return DhJoint(
-        name=name, symbol=symbol, sign=sign, lower=lower, upper=upper, home=home, start=start
-    )
+    return DhJoint(name=name, symbol=symbol, sign=sign, lower=lower, upper=upper, home=home, start=start)
 
 
 def _number(name: str, value: Any, kind: str) -> float:

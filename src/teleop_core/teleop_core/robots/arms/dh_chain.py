@@ -18,14 +18,17 @@ from teleop_core.robots.robot import Robot
 
 # Elementary motions of one row, left to right: what, along or about which axis, by which symbol.
 CONVENTIONS = {
-    "standard": (("turn", "z", "theta"), ("slide", "z", "d"),
-                 ("slide", "x", "a"), ("turn", "x", "alpha")),
-    "modified": (("turn", "x", "alpha"), ("slide", "x", "a"),
-                 ("turn", "z", "theta"), ("slide", "z", "d")),
-    "sheth_uicker": (("turn", "z", "gamma"), ("slide", "z", "c"),
-                     ("turn", "x", "alpha"), ("slide", "x", "a"),
-                     ("turn", "z", "beta"), ("slide", "z", "b")),
-}  # fmt: skip
+    "standard": (("turn", "z", "theta"), ("slide", "z", "d"), ("slide", "x", "a"), ("turn", "x", "alpha")),
+    "modified": (("turn", "x", "alpha"), ("slide", "x", "a"), ("turn", "z", "theta"), ("slide", "z", "d")),
+    "sheth_uicker": (
+        ("turn", "z", "gamma"),
+        ("slide", "z", "c"),
+        ("turn", "x", "alpha"),
+        ("slide", "x", "a"),
+        ("turn", "z", "beta"),
+        ("slide", "z", "b"),
+    ),
+}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -101,9 +104,7 @@ class DhTable:
                 out[i] = product(out[i], elementary(kind, axis, amount))
         return out
 
-    def robot(
-        self, geometry: Mapping[str, float] = MappingProxyType({}), drives: Drives | None = None
-    ) -> Robot:
+    def robot(self, geometry: Mapping[str, float] = MappingProxyType({}), drives: Drives | None = None) -> Robot:
         """The chain as a robot, which can be a slave; in closed form if its axes allow it.
 
         Args:
@@ -181,16 +182,9 @@ def chain_robot(
             **chain,
         }
     numbers = {
-        f"fixed{i}_{r}{c}": float(matrix[r, c])
-        for i, matrix in enumerate(fixed)
-        for r in range(3)
-        for c in range(4)
+        f"fixed{i}_{r}{c}": float(matrix[r, c]) for i, matrix in enumerate(fixed) for r in range(3) for c in range(4)
     }
-    row = {
-        **chain,
-        **numbers,
-        **{f"solution{i}": value for i, value in enumerate(solution.constants)},
-    }
+    row = {**chain, **numbers, **{f"solution{i}": value for i, value in enumerate(solution.constants)}}
     starts = [joint.home if joint.start is None else joint.start for joint in joints]
     return Robot(
         name=name,

@@ -52,10 +52,7 @@ def assumed_drive(kind: str, stated: Mapping[str, float]) -> dict[str, float]:
     inertia = stated.get("inertia", _INERTIA[kind])
     scaled = {name: share * inertia for name, share in _PER_INERTIA[kind].items()}
     joint = {"inertia": inertia, **scaled, **_SPEEDS[kind], **stated}
-    most = {
-        "coulomb": joint["effort_limit"],
-        "viscous": joint["effort_limit"] / joint["speed_limit"],
-    }
+    most = {"coulomb": joint["effort_limit"], "viscous": joint["effort_limit"] / joint["speed_limit"]}
     for name, share in _MOST_ASSUMED.items():
         if name not in stated:
             joint[name] = min(joint[name], share * most[name])
@@ -79,16 +76,12 @@ def least_inertia(kind: str, viscous: float, coulomb: float) -> float:
         coulomb: Dry friction [N·m or N], at the assumed ``friction_speed``; 0 likewise.
     """
     slow, assumed = _SPEEDS[kind]["friction_speed"], _PER_INERTIA[kind]
-    rate = (0.0 if viscous else assumed["viscous"]) + (
-        0.0 if coulomb else assumed["coulomb"]
-    ) / slow
+    rate = (0.0 if viscous else assumed["viscous"]) + (0.0 if coulomb else assumed["coulomb"]) / slow
     # A little more, for the check of the rate divides by it again.
     return 1.001 * (viscous + coulomb / slow) / (_STIFFEST - rate)
 
 
-def read_drives(
-    path: Path, names: Sequence[str], kinds: Sequence[str]
-) -> tuple[dict[str, float], ...]:
+def read_drives(path: Path, names: Sequence[str], kinds: Sequence[str]) -> tuple[dict[str, float], ...]:
     """Stated entries [SI] of each joint, from a YAML file like the ``drives`` section of a table.
 
     Raises:
@@ -99,9 +92,7 @@ def read_drives(
         return _entries(plain_yaml.read(path), names, kinds, 1.0)
 
 
-def parse_drives(
-    content: Any, names: Sequence[str], kinds: Sequence[str], unit: float
-) -> tuple[dict[str, float], ...]:
+def parse_drives(content: Any, names: Sequence[str], kinds: Sequence[str], unit: float) -> tuple[dict[str, float], ...]:
     """Stated entries [SI] of each joint, from the ``drives`` section of a table.
 
     Args:
@@ -120,9 +111,7 @@ def parse_drives(
     return stated
 
 
-def _entries(
-    content: Any, names: Sequence[str], kinds: Sequence[str], unit: float
-) -> tuple[dict[str, float], ...]:
+def _entries(content: Any, names: Sequence[str], kinds: Sequence[str], unit: float) -> tuple[dict[str, float], ...]:
     section = {} if content is None else content
     if not isinstance(section, Mapping):
         raise ParameterError("drives", section, "a mapping from joint names to their entries")

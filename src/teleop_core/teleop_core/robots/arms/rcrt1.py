@@ -301,8 +301,6 @@ def make(**geometry: float) -> Robot:
         geometry=row,
         kernels=Kernels(fk=fk, jacobian=jacobian, ik=ik, ik_all=ik_all),
         drives=rcrt1_dynamics.DRIVES,
-        dynamics=replace(
-            rcrt1_dynamics.DYNAMICS, frames=rcrt1_dynamics.link_frames(HOME, row["d2"])
-        ),
+        dynamics=replace(rcrt1_dynamics.DYNAMICS, frames=rcrt1_dynamics.link_frames(HOME, row["d2"])),
         hardware=rcrt1_hardware.HARDWARE,
     )

@@ -42,9 +42,7 @@ LINKS = {
     "g": 9.81,
 }  # fmt: skip
 # What link 1 has beside I1yy does not act, for it turns about its y axis alone; Iyz is -∫yz dm.
-LINK_1 = {
-    "m1": 2.404, "G1y": -0.142342, "G1z": -0.038193, "I1xx": 0.064, "I1zz": 0.053, "I1yz": -0.011,
-}  # fmt: skip
+LINK_1 = {"m1": 2.404, "G1y": -0.142342, "G1z": -0.038193, "I1xx": 0.064, "I1zz": 0.053, "I1yz": -0.011}
 _ORDER = {symbol: index for index, symbol in enumerate(LINKS)}
 _I1YY, _I2XX, _I2YY, _I2ZZ = (_ORDER[s] for s in ("I1yy", "I2xx", "I2yy", "I2zz"))
 _I2XY, _I2XZ, _I2YZ = (_ORDER[s] for s in ("I2xy", "I2xz", "I2yz"))
@@ -67,18 +65,24 @@ def link_inertias(symbols: Mapping[str, float] = LINKS) -> tuple[LinkInertia, ..
     p, one, about_origin = symbols, LINK_1, LinkInertia.about_origin
     return (
         about_origin(
-            "link 1", one["m1"], (0.0, one["G1y"], one["G1z"]),
-            (one["I1xx"], p["I1yy"], one["I1zz"]), (0.0, 0.0, one["I1yz"]), sign=-1.0,
+            "link 1",
+            one["m1"],
+            (0.0, one["G1y"], one["G1z"]),
+            (one["I1xx"], p["I1yy"], one["I1zz"]),
+            (0.0, 0.0, one["I1yz"]),
+            sign=-1.0,
         ),
         about_origin(
-            "link 2", p["m2"], (p["G2x"], 0.0, p["G2z"]),
-            (p["I2xx"], p["I2yy"], p["I2zz"]), (p["I2xy"], p["I2xz"], p["I2yz"]),
+            "link 2",
+            p["m2"],
+            (p["G2x"], 0.0, p["G2z"]),
+            (p["I2xx"], p["I2yy"], p["I2zz"]),
+            (p["I2xy"], p["I2xz"], p["I2yz"]),
         ),
         about_origin(
-            "link 3", p["m3"], (p["G3x"], 0.0, p["G3z"]),
-            (p["I3xx"], p["I3yy"], p["I3zz"]), (0.0, p["I3xz"], 0.0),
+            "link 3", p["m3"], (p["G3x"], 0.0, p["G3z"]), (p["I3xx"], p["I3yy"], p["I3zz"]), (0.0, p["I3xz"], 0.0)
         ),
-    )  # fmt: skip
+    )
 
 
 def link_frames(q: Array, d2: float) -> tuple[Array, ...]:
@@ -193,14 +197,19 @@ DRIVES = Drives(
     effort_limit=np.array([5.9, 5.9, 0.0056 / 2.184e-4, 0.3525, 0.19, 0.19]),
     # Published (table 3.6); of axis 3 derived from its 1 mm lead.
     speed_limit=np.array(
-        [30.0 * _RPM, 30.0 * _RPM, 3719.677 / 60.0 * 1e-3, 70.213 * _RPM, 130.263 * _RPM,
-         130.263 * _RPM]
+        [30.0 * _RPM, 30.0 * _RPM, 3719.677 / 60.0 * 1e-3, 70.213 * _RPM, 130.263 * _RPM, 130.263 * _RPM]
     ),
     # Derived from pulses (four counts each) and gears of table 3.6, and the lead.
     encoder_step=np.array(
-        [2 * math.pi / (90 * 4000), 2 * math.pi / (90 * 4000), 1e-3 / (3.71 * 2048),
-         2 * math.pi / (141 * 2048), 2 * math.pi / (76 * 2048), 2 * math.pi / (76 * 2048)]
+        [
+            2 * math.pi / (90 * 4000),
+            2 * math.pi / (90 * 4000),
+            1e-3 / (3.71 * 2048),
+            2 * math.pi / (141 * 2048),
+            2 * math.pi / (76 * 2048),
+            2 * math.pi / (76 * 2048),
+        ]
     ),
     bandwidth=np.array([60.0, 60.0, 60.0, 80.0, 80.0, 80.0]),  # assumed: prints no gains
     assumed=("inertia", "viscous", "coulomb", "friction_speed"),  # inertia: of the wrist
-)  # fmt: skip
+)

@@ -55,9 +55,7 @@ HARDWARE = Hardware(
 )
 
 
-def tendon_motor_angles(
-    joints: Array, *, ratio5: float = 1.0, ratio6: float = 1.0, coupling: float = 0.0
-) -> Array:
+def tendon_motor_angles(joints: Array, *, ratio5: float = 1.0, ratio6: float = 1.0, coupling: float = 0.0) -> Array:
     """Motor-side angles of tendon joints 5 and 6: q5* = ratio5 q5, q6* = ratio6 q6 + coupling q5.
 
     The joint-6 tendon runs over an idler on axis 5, so a move of joint 5 pulls it. The defaults
@@ -82,9 +80,7 @@ def tendon_motor_angles(
     return product(joints, _tendon_matrix(ratio5, ratio6, coupling).T)
 
 
-def tendon_joint_angles(
-    motors: Array, *, ratio5: float = 1.0, ratio6: float = 1.0, coupling: float = 0.0
-) -> Array:
+def tendon_joint_angles(motors: Array, *, ratio5: float = 1.0, ratio6: float = 1.0, coupling: float = 0.0) -> Array:
     """Joint angles 5 and 6, (..., 2) [rad]: the inverse of :func:`tendon_motor_angles`."""
     (r5, _), (c, r6) = _tendon_matrix(ratio5, ratio6, coupling)
     return product(motors, np.array([[1.0 / r5, 0.0], [-c / (r5 * r6), 1.0 / r6]]).T)

@@ -127,9 +127,7 @@ def five_axis(**geometry: float | str) -> Robot:
     return _arm("five_axis", g, ("x", "y", "z", "ry", "rz"), rows, drives)
 
 
-def _turn(
-    upper: float, lower: float | None = None, home: float = 0.0, **constants: float
-) -> dict[str, Any]:
+def _turn(upper: float, lower: float | None = None, home: float = 0.0, **constants: float) -> dict[str, Any]:
     """Row of a turning joint, with limits and home [°]."""
     limits = {"lower": -upper if lower is None else lower, "upper": upper, "home": home}
     return {"theta": "q", **limits, **constants}
@@ -142,11 +140,7 @@ def _drives(**entries: Sequence[float] | Array) -> Drives:
 
 
 def _arm(
-    name: str,
-    geometry: Mapping[str, float],
-    task: Sequence[str],
-    rows: Sequence[dict[str, Any]],
-    drives: Drives,
+    name: str, geometry: Mapping[str, float], task: Sequence[str], rows: Sequence[dict[str, Any]], drives: Drives
 ) -> Robot:
     """Robot of a table in the modified (Craig) convention, in degrees."""
     for symbol, value in geometry.items():

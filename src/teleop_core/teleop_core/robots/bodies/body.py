@@ -46,13 +46,7 @@ def _move(kind: int, value: float, pose: Array) -> None:
 
 @kernel
 def place(
-    coordinates: Array,
-    free: Array,
-    parents: Indices,
-    kinds: Indices,
-    places: Indices,
-    origins: Array,
-    out: Array,
+    coordinates: Array, free: Array, parents: Indices, kinds: Indices, places: Indices, origins: Array, out: Array
 ) -> None:
     """Write the poses (N, B, 7) of bodies in the base.
 

@@ -167,9 +167,7 @@ def chain(
     frames = [HERE]
     for i, place in enumerate(chained):
         frame = np.concatenate((place.arrive, along(place.axis.direction[None])[0]))
-        origin = moved(
-            product(inverse(frames[-1]), frame), int(place.axis.kind), -float(reference[i])
-        )
+        origin = moved(product(inverse(frames[-1]), frame), int(place.axis.kind), -float(reference[i]))
         solids = _link(place, ends[i], strokes[i], radii[i + 1], frame)
         bodies.append(Body(names[i], solids, i, place.axis.kind, origin, coordinates[i]))
         frames.append(frame)
@@ -203,9 +201,7 @@ def _base(chained: Sequence[Place], reach: float, radius: float) -> tuple[Solid,
     return (plate, *_run((np.zeros(3), seat), radius, "base"))
 
 
-def _link(
-    place: Place, end: Array, stroke: float, radius: float, frame: Array
-) -> tuple[Solid, ...]:
+def _link(place: Place, end: Array, stroke: float, radius: float, frame: Array) -> tuple[Solid, ...]:
     """Solids of the link after a joint, in its frame: joint, way to the next one, rod."""
     up = np.array([0.0, 0.0, 1.0])
     points = [seen_from(frame, point) for point in (place.arrive, place.leave, end)]
@@ -217,6 +213,4 @@ def _link(
 
 
 def _run(points: Sequence[Array], radius: float, role: Role) -> tuple[Solid, ...]:
-    return tuple(
-        capsule(a, b, radius, role) for a, b in pairwise(points) if length(b - a) > 1e-6 * radius
-    )
+    return tuple(capsule(a, b, radius, role) for a, b in pairwise(points) if length(b - a) > 1e-6 * radius)

@@ -71,9 +71,7 @@ def pose_of(transform: geometry.Array) -> geometry.Array:
     return out
 
 
-def pose(
-    x: float = 0.0, y: float = 0.0, z: float = 0.0, axis: str = "z", angle: float = 0.0
-) -> geometry.Array:
+def pose(x: float = 0.0, y: float = 0.0, z: float = 0.0, axis: str = "z", angle: float = 0.0) -> geometry.Array:
     """Pose (7,) at a point [m], turned by an angle [rad] about one of its axes."""
     out = np.array([x, y, z, math.cos(0.5 * angle), 0.0, 0.0, 0.0])
     out[4 + "xyz".index(axis)] = math.sin(0.5 * angle)

@@ -28,9 +28,7 @@ def looks_of(robot: Robot) -> dict[int, Mesh]:
         try:
             vertices, faces = _triangles(visual)
         except TeleopError as error:
-            warnings.warn(
-                f"link {visual.link} is drawn without: {error}", TeleopWarning, stacklevel=2
-            )
+            warnings.warn(f"link {visual.link} is drawn without: {error}", TeleopWarning, stacklevel=2)
             continue
         placed = product(vertices, visual.place[:3, :3].T) + visual.place[:3, 3]
         frame = frames[visual.joints]

@@ -74,11 +74,14 @@ def _revolved(profiles: list[Array], around: int) -> Mesh:
         here = np.arange(around)
         beside = np.roll(here, -1)
         strips = [
-            around * ring + np.concatenate((
-                np.stack((here, beside, beside + around), axis=1),
-                np.stack((here, beside + around, here + around), axis=1),
-            ))
+            around * ring
+            + np.concatenate(
+                (
+                    np.stack((here, beside, beside + around), axis=1),
+                    np.stack((here, beside + around, here + around), axis=1),
+                )
+            )
             for ring in range(len(profile) - 1)
-        ]  # fmt: skip
+        ]
         meshes.append((rings.reshape(-1, 3), np.concatenate(strips)))
     return merged(meshes)

@@ -82,9 +82,7 @@ def joints_of(bodies: Bodies) -> dict[int, int]:
     return found
 
 
-def _joint(
-    root: Xml.Element, robot: Robot, bodies: Bodies, body: Body, joint: int | None, prefix: str
-) -> None:
+def _joint(root: Xml.Element, robot: Robot, bodies: Bodies, body: Body, joint: int | None, prefix: str) -> None:
     is_fixed = body.joint is Joint.FIXED
     follows = None if is_fixed or joint is not None else _follows(robot, bodies, body)
     name = f"{body.name}_joint" if joint is None else robot.joint_names[joint]

@@ -38,9 +38,7 @@ def body_row(mass: float, center: Array, inertia: Array) -> Array:
     return np.concatenate([[mass], mass * center, about_origin.ravel()])
 
 
-def chain_row(
-    kinds: Sequence[float], fixed: Sequence[Array], bodies: Array, motors: Array
-) -> Array:
+def chain_row(kinds: Sequence[float], fixed: Sequence[Array], bodies: Array, motors: Array) -> Array:
     """Parameter row of the kernels below.
 
     Args:
@@ -61,10 +59,7 @@ def chain_dynamics(row: Array) -> Dynamics:
     """Model of a chain over a row of :func:`chain_row`; all of its gravity is fed forward."""
     n = (row.shape[0] - 22) // 27  # see chain_row
     return Dynamics(
-        acceleration=chain_acceleration,
-        gravity=chain_gravity,
-        parameters=row,
-        compensated=np.ones(n, np.bool_),
+        acceleration=chain_acceleration, gravity=chain_gravity, parameters=row, compensated=np.ones(n, np.bool_)
     )
 
 

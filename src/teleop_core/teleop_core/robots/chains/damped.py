@@ -117,9 +117,7 @@ def free_joints(J: Array, error: Array, q: Array, box: Array, is_free: Array) ->
 
 
 @inner
-def damped_move(
-    J: Array, error: Array, damping: float, is_free: Array, box: Array, q: Array, moved: Array
-) -> None:
+def damped_move(J: Array, error: Array, damping: float, is_free: Array, box: Array, q: Array, moved: Array) -> None:
     """Write ``moved`` (n,): q + Jᵀ (J Jᵀ + damping I)⁻¹ error over the free joints, in the box."""
     A, y = room(6, 6), room(6)
     assign(y, error)

@@ -21,16 +21,7 @@ import numpy as np
 from teleop_core.kernels import inner, kernel
 from teleop_core.kernels.geometry import Array
 from teleop_core.kernels.room import room
-from teleop_core.robots.branches import (
-    OUTSIDE,
-    SLACK,
-    cost_of,
-    is_allowed,
-    slowed,
-    turn,
-    turned,
-    wrapped,
-)
+from teleop_core.robots.branches import OUTSIDE, SLACK, cost_of, is_allowed, slowed, turn, turned, wrapped
 from teleop_core.robots.chains.damped import ZERO, assign, pose_error
 from teleop_core.robots.chains.dh_kernels import descend, descend_long, fk, pose_of_chain
 from teleop_core.robots.kinematics import IkStatus, pose_residual
@@ -131,9 +122,7 @@ def set_angle(K: Array, n: int, i: int, angle: float, q: Array) -> None:
 
 
 @inner
-def _group_cost(
-    q: Array, K: Array, seed: Array, limits: Array, group: int, do_limits_count: bool
-) -> float:
+def _group_cost(q: Array, K: Array, seed: Array, limits: Array, group: int, do_limits_count: bool) -> float:
     """:func:`cost_of` the joints of one group."""
     worst = 0.0
     for i in range(seed.shape[0]):
@@ -143,9 +132,7 @@ def _group_cost(
 
 
 @inner
-def angle_cost(
-    K: Array, n: int, i: int, angle: float, seed: Array, limits: Array, do_limits_count: bool
-) -> float:
+def angle_cost(K: Array, n: int, i: int, angle: float, seed: Array, limits: Array, do_limits_count: bool) -> float:
     """:func:`cost_of` joint i of the closed form at an angle, by whole turns next to the seed.
 
     No branch with this angle costs less.
@@ -167,9 +154,7 @@ def branch_cost(q: Array, seed: Array, limits: Array) -> float:
 
 
 @inner
-def _is_better(
-    q: Array, best: Array, K: Array, seed: Array, limits: Array, do_limits_count: bool
-) -> bool:
+def _is_better(q: Array, best: Array, K: Array, seed: Array, limits: Array, do_limits_count: bool) -> bool:
     """Whether a branch goes before another in a path: group by group, the first that differs."""
     for group in range(1, _GROUPS + 1):
         ours = _group_cost(q, K, seed, limits, group, do_limits_count and group > 1)
@@ -260,9 +245,7 @@ def move_of(q: Array, seed: Array) -> float:
 
 
 @kernel
-def _best_of_rest(
-    T: Array, seed: Array, limits: Array, geometry: Array, found: Array, count: int, q: Array
-) -> None:
+def _best_of_rest(T: Array, seed: Array, limits: Array, geometry: Array, found: Array, count: int, q: Array) -> None:
     """Replace ``q`` by the joints within limits that come nearest to the pose.
 
     A search from the branch itself, from the seed and from all other branches, of which the least
@@ -285,9 +268,7 @@ def _best_of_rest(
 
 
 @kernel
-def _best_of_step(
-    T: Array, seed: Array, limits: Array, geometry: Array, does_reach: bool, q: Array
-) -> None:
+def _best_of_step(T: Array, seed: Array, limits: Array, geometry: Array, does_reach: bool, q: Array) -> None:
     """Replace ``q`` by the joints within limits and step that come nearest to the pose.
 
     A search from the branch. Where that reaches the pose, joints that a step does not bring there

@@ -55,10 +55,7 @@ def _searched() -> Kernels:
     return _closed(dh_kernels.ik, dh_kernels.ik_all)
 
 
-SEARCH = Solution(
-    text="search: damped least squares from the seed, then from 24 starts or more",
-    kernels=_searched(),
-)
+SEARCH = Solution(text="search: damped least squares from the seed, then from 24 starts or more", kernels=_searched())
 
 
 @dataclass(kw_only=True)
@@ -177,9 +174,7 @@ def _chains(kinds: Sequence[float], fixed: Sequence[Array], reach: float) -> tup
     )
 
 
-def solution_of(
-    kinds: Sequence[float], fixed: Sequence[Array], reach: float, task: Sequence[str]
-) -> Solution:
+def solution_of(kinds: Sequence[float], fixed: Sequence[Array], reach: float, task: Sequence[str]) -> Solution:
     """How to solve the inverse kinematics of a chain.
 
     Args:
@@ -239,9 +234,7 @@ def _spherical_wrist(chain: _Chain) -> Solution | None:
     return Solution(
         text=f"spherical {where}, closed form, 8 solutions",
         kernels=_closed(spherical_wrist.ik, spherical_wrist.ik_all),
-        constants=chain.constants(
-            (1, 1, 1, 2, 2, 2), (kind, *rule, *B, over, float(h0), float(h1))
-        ),
+        constants=chain.constants((1, 1, 1, 2, 2, 2), (kind, *rule, *B, over, float(h0), float(h1))),
     )
 
 
@@ -274,8 +267,7 @@ def _parallel_axes(chain: _Chain) -> Solution | None:
         text="three parallel axes, closed form, 8 solutions",
         kernels=_closed(parallel_axes.ik, parallel_axes.ik_all),
         constants=chain.constants(
-            (1, 3, 3, 3, 2, 2),
-            (kind, *(rule or (0.0, 0.0, 0.0)), *B, over, float(r[2] * a[2]), float(h1)),
+            (1, 3, 3, 3, 2, 2), (kind, *(rule or (0.0, 0.0, 0.0)), *B, over, float(r[2] * a[2]), float(h1))
         ),
     )
 
@@ -295,9 +287,7 @@ def _shoulder_and_wrist(chain: _Chain) -> Solution | None:
     )
 
 
-def _arm_in_plane(
-    kinds: Sequence[float], fixed: Sequence[Array], reach: float, task: Sequence[str]
-) -> Solution | None:
+def _arm_in_plane(kinds: Sequence[float], fixed: Sequence[Array], reach: float, task: Sequence[str]) -> Solution | None:
     """Three parallel turning joints, with a slide along them, or with a first and a last joint."""
     turns = [i for i, kind in enumerate(kinds) if abs(kind) < 1.5]
     slides = [i for i in range(len(kinds)) if i not in turns]

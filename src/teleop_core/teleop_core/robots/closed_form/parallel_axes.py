@@ -18,12 +18,7 @@ from teleop_core.kernels.geometry import Array
 from teleop_core.kernels.room import room
 from teleop_core.robots.branches import BESIDE, OUTSIDE
 from teleop_core.robots.closed_form import candidates
-from teleop_core.robots.closed_form.subproblems import (
-    close_pair,
-    one_angle,
-    open_pairs,
-    turn_between,
-)
+from teleop_core.robots.closed_form.subproblems import close_pair, one_angle, open_pairs, turn_between
 from teleop_core.robots.kinematics import is_askable
 
 _F1, _F2, _F3, _F4, _F5 = (37, 49, 61, 73, 85)
@@ -173,9 +168,7 @@ def _known_cost(q: Array, K: Array, seed: Array, limits: Array, least: float) ->
 
 
 @kernel
-def _branches(
-    T: Array, geometry: Array, seed: Array, limits: Array, do_all: bool, found: Array
-) -> tuple[int, float]:
+def _branches(T: Array, geometry: Array, seed: Array, limits: Array, do_all: bool, found: Array) -> tuple[int, float]:
     """Write branches into ``found`` (8, 7), and whether each reaches the pose.
 
     Unless all are wanted, pairs of joints 1 and 5 of the least moves come first, and none that

@@ -19,12 +19,7 @@ from teleop_core.kernels.geometry import Array
 from teleop_core.kernels.room import room
 from teleop_core.robots.branches import BESIDE, OUTSIDE, hold, is_allowed, turn, wrapped
 from teleop_core.robots.closed_form import candidates
-from teleop_core.robots.closed_form.subproblems import (
-    close_pair,
-    one_angle,
-    open_pairs,
-    turn_between,
-)
+from teleop_core.robots.closed_form.subproblems import close_pair, one_angle, open_pairs, turn_between
 from teleop_core.robots.kinematics import is_askable
 
 _F1, _F2, _F3, _F4, _F5 = (37, 49, 61, 73, 85)
@@ -170,9 +165,7 @@ def _attitude(G: Array, K: Array, arm: Array, M: Array, N: Array) -> None:
 
 
 @inner
-def _wrist(
-    G: Array, K: Array, arm: Array, seed: Array, limits: Array, do_both: bool, q: Array
-) -> tuple[float, float]:
+def _wrist(G: Array, K: Array, arm: Array, seed: Array, limits: Array, do_both: bool, q: Array) -> tuple[float, float]:
     """Write both branches of an arm into q (2, 7).
 
     Unless both are wanted, that whose joint 5 moves more is left out where it cannot win.
@@ -214,9 +207,7 @@ def _wrist(
 
 
 @kernel
-def _branches(
-    T: Array, geometry: Array, seed: Array, limits: Array, do_all: bool, found: Array
-) -> tuple[int, float]:
+def _branches(T: Array, geometry: Array, seed: Array, limits: Array, do_all: bool, found: Array) -> tuple[int, float]:
     """Write branches into ``found`` (8, 7), and whether each reaches the pose.
 
     Unless all are wanted, the arms of the least moves come first, and none that cannot win: with

@@ -158,9 +158,7 @@ def _alone(A: Array, h: Array, rule: Array, seed: float) -> tuple[float, float, 
 
 
 @inner
-def _beside(
-    A: Array, B: Array, h: Array, rule: Array, x: float, seed: float
-) -> tuple[float, float, float]:
+def _beside(A: Array, B: Array, h: Array, rule: Array, x: float, seed: float) -> tuple[float, float, float]:
     """Base, spread and exactness of the other angle, of factors B, where that of A is known."""
     row = int(rule[3])
     d = h[row] - A[row, 0] * math.cos(x) - A[row, 1] * math.sin(x)
@@ -200,9 +198,7 @@ def open_pairs(A: Array, B: Array, h: Array, rule: Array, seeds: Array, pairs: A
 
 
 @inner
-def close_pair(
-    A: Array, B: Array, h: Array, rule: Array, seeds: Array, k: int, pairs: Array
-) -> None:
+def close_pair(A: Array, B: Array, h: Array, rule: Array, seeds: Array, k: int, pairs: Array) -> None:
     """Write the other angle of rows k and k + 1 of what :func:`open_pairs` began."""
     if rule[0] < 0.5:
         base, spread, is_exact = _beside(A, B, h, rule, pairs[k, 0], seeds[1])

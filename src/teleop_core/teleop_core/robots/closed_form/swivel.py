@@ -61,9 +61,7 @@ def _elbow_cost(fourth: float, K: Array, seed: Array, limits: Array, q: Array) -
 
 
 @inner
-def _write(
-    S: Array, W: Array, psi: float, K: Array, seed: Array, M: Array, angles: Array, q: Array, k: int
-) -> float:
+def _write(S: Array, W: Array, psi: float, K: Array, seed: Array, M: Array, angles: Array, q: Array, k: int) -> float:
     """Write joints of shoulder and wrist of branch k at psi into q (8,); the least spread."""
     blend(S, psi, M)
     spread, is_exact = wrist_angles(M, K, swivel_families.F1, angle_of(K, 7, 0, seed), angles)
@@ -130,9 +128,7 @@ def _branches(
 
 
 @inner
-def _step_to_margin(
-    seed: Array, limits: Array, K: Array, work: Array, found: Array, best: int, q: Array
-) -> None:
+def _step_to_margin(seed: Array, limits: Array, K: Array, work: Array, found: Array, best: int, q: Array) -> None:
     """Let the swivel of a branch in a path go back to the margin of its arc, slowly."""
     elbow, k, trial = best // 4, best % 4, found[8]
     S, W = work[16 + 20 * elbow : 25 + 20 * elbow], work[25 + 20 * elbow : 34 + 20 * elbow]
@@ -177,9 +173,7 @@ def _room(q: Array, limits: Array) -> float:
 def _width(q: Array, K: Array, i: int) -> float:
     """Manipulability of the shoulder (i = 1) or wrist (5): the volume that their axes span."""
     return abs(
-        swivel_families.triple_product(
-            K, swivel_families.F1 if i == 1 else swivel_families.F5, angle_of(K, 7, i, q)
-        )
+        swivel_families.triple_product(K, swivel_families.F1 if i == 1 else swivel_families.F5, angle_of(K, 7, i, q))
     )
 
 
@@ -200,9 +194,7 @@ def _urge(q: Array, seed: Array, limits: Array, K: Array) -> float:
 
 
 @inner
-def _step_to_width(
-    T: Array, seed: Array, limits: Array, geometry: Array, urge: float, found: Array, q: Array
-) -> None:
+def _step_to_width(T: Array, seed: Array, limits: Array, geometry: Array, urge: float, found: Array, q: Array) -> None:
     """Let the swivel of a path go to the side where manipulability grows, as fast as ``urge``.
 
     No joint moves by more than a share of its step for that, nor out of its step from the seed.

@@ -121,9 +121,7 @@ def _edge(arcs: Array, j: int) -> float:
 
 
 @inner
-def _is_legal(
-    j: int, branch: int, S: Array, W: Array, K: Array, seed: Array, limits: Array, arcs: Array
-) -> bool:
+def _is_legal(j: int, branch: int, S: Array, W: Array, K: Array, seed: Array, limits: Array, arcs: Array) -> bool:
     """Whether a branch of shoulder and wrist is legal in piece j; what is found out is kept."""
     count, M, angles = int(arcs[2, 0]), arcs[3:6, :3], arcs[6:8, :3]
     k = j + count if j < 0 else (j if j < count else j - count)
@@ -149,9 +147,7 @@ def _nearest(low: float, high: float) -> float:
 
 
 @kernel
-def swivel_of(
-    branch: int, S: Array, W: Array, K: Array, seed: Array, limits: Array, arcs: Array
-) -> float:
+def swivel_of(branch: int, S: Array, W: Array, K: Array, seed: Array, limits: Array, arcs: Array) -> float:
     """Psi [rad] of a branch next to 0 in its legal arcs; infinity where no arc is legal.
 
     ``arcs`` is what :func:`cut_circle` wrote. Pieces are tested from psi = 0 outwards, until all

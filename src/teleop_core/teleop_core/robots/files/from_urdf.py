@@ -30,13 +30,7 @@ from teleop_core.kernels.portable import dot, length, product
 from teleop_core.robots.arms.dh_chain import DhJoint, chain_robot
 from teleop_core.robots.arms.dh_drives import drives_of, least_inertia, parse_drives, read_drives
 from teleop_core.robots.chains.chain_dynamics import body_row, chain_dynamics, chain_row
-from teleop_core.robots.chains.followers import (
-    Follower,
-    Followers,
-    dynamics_row,
-    follower_dynamics,
-    follower_inertia,
-)
+from teleop_core.robots.chains.followers import Follower, Followers, dynamics_row, follower_dynamics, follower_inertia
 from teleop_core.robots.closed_form.decomposition import SEARCH, solution_of
 from teleop_core.robots.drives import ENTRIES, Drives, Dynamics
 from teleop_core.robots.files.urdf_notes import notes_on
@@ -114,17 +108,13 @@ def load_urdf(
         raise UnknownNameError("dynamics", dynamics, MODELS)
     root = root_of(Path(path), xml_of(Path(path), arguments or {}))
     links = elements_of(root, "link")
-    joints = [
-        joint_of(name, element, links) for name, element in elements_of(root, "joint").items()
-    ]
+    joints = [joint_of(name, element, links) for name, element in elements_of(root, "joint").items()]
     by_child = joints_by_child(joints)
     base = root_link(links, by_child)
     chain = chain_to(tip_of(tip, links, joints), by_child)
     moving = [joint for joint in chain if joint.axis is not None]
     if not moving:
-        raise ParameterError(
-            "tip", tip or chain, "a link that some joint between it and the root moves"
-        )
+        raise ParameterError("tip", tip or chain, "a link that some joint between it and the root moves")
     trains, followers = _trains(moving, {joint.name: joint for joint in joints})
     leaders = [train[0].joint for train in trains]
     limits = [_narrowed(train) for train in trains]
@@ -176,9 +166,7 @@ class _Geared:
     offset: float = 0.0
 
 
-def _trains(
-    moving: list[UrdfJoint], named: Mapping[str, UrdfJoint]
-) -> tuple[list[list[_Geared]], Followers]:
+def _trains(moving: list[UrdfJoint], named: Mapping[str, UrdfJoint]) -> tuple[list[list[_Geared]], Followers]:
     """For each joint of the robot itself and all that follow it to the tip; and the motions."""
     trains: dict[str, list[_Geared]] = {}
     motions = []
@@ -214,9 +202,7 @@ def _leader(joint: UrdfJoint, named: Mapping[str, UrdfJoint]) -> tuple[UrdfJoint
     return joint, factor, offset
 
 
-def _refuse_beside(
-    leaders: list[UrdfJoint], moving: list[UrdfJoint], joints: list[UrdfJoint]
-) -> None:
+def _refuse_beside(leaders: list[UrdfJoint], moving: list[UrdfJoint], joints: list[UrdfJoint]) -> None:
     """Refuse what moves with a joint of the robot, but not between root and tip: it would weigh."""
     named = {joint.name: joint for joint in joints}
     for joint in joints:
@@ -318,9 +304,7 @@ def _drive_entries(joint: UrdfJoint) -> dict[str, float]:
     return found
 
 
-def _bodies(
-    moving: list[UrdfJoint], base: str, links: Links, joints: list[UrdfJoint], may_be_any: bool
-) -> Array:
+def _bodies(moving: list[UrdfJoint], base: str, links: Links, joints: list[UrdfJoint], may_be_any: bool) -> Array:
     """What each joint moves up to the next, (n, 13), see :func:`body_row`; other joints at zero.
 
     Files give many an inertia that no body has. It does no harm where nothing moves it, and where
@@ -355,8 +339,7 @@ def _mass(name: str, link: Xml.Element, may_be_any: bool) -> tuple[float, Array,
     mass = float(numbers_of(where, element.find("mass"), "value", (0.0,), "kg")[0])
     tensor = element.find("inertia")
     xx, xy, xz, yy, yz, zz = (
-        float(numbers_of(where, tensor, key, (0.0,), "kg·m²")[0])
-        for key in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+        float(numbers_of(where, tensor, key, (0.0,), "kg·m²")[0]) for key in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
     )
     inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     if 0.0 <= mass < _NO_MASS and abs(inertia).max() < _NO_MASS:  # a frame that has to weigh

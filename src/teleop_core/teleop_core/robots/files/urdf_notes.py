@@ -25,9 +25,7 @@ def notes_on(chain: Sequence[UrdfJoint], links: Links) -> Iterator[str]:
     """
     moving = [joint for joint in chain if joint.axis is not None]
     bounded = [joint for joint in moving if joint.kind != "continuous"]
-    yield from _listed(
-        "narrowed to the soft limits of its safety_controller", bounded, _is_narrowed
-    )
+    yield from _listed("narrowed to the soft limits of its safety_controller", bounded, _is_narrowed)
     endless = [joint for joint in moving if joint.kind == "continuous"]
     yield from _listed("lower and upper left out: it is continuous", endless, _has_limits)
     for kind, unit in UNITS.items():
@@ -46,9 +44,7 @@ def notes_on(chain: Sequence[UrdfJoint], links: Links) -> Iterator[str]:
             yield f"link {name} has a negative inertia, which no body has"
 
 
-def _listed(
-    what: str, joints: Sequence[UrdfJoint], is_so: Callable[[UrdfJoint], bool]
-) -> Iterator[str]:
+def _listed(what: str, joints: Sequence[UrdfJoint], is_so: Callable[[UrdfJoint], bool]) -> Iterator[str]:
     if found := [joint.name for joint in joints if is_so(joint)]:
         yield f"{', '.join(found)}: {what}"
 
@@ -71,8 +67,6 @@ def _speed(joint: UrdfJoint, unit: str) -> float:
     return float(numbers_of(joint.name, limit, "velocity", (0.0,), f"{unit}/s")[0])
 
 
-def _told(
-    what: str, joints: Sequence[UrdfJoint], values: Sequence[float], unit: str
-) -> Iterator[str]:
+def _told(what: str, joints: Sequence[UrdfJoint], values: Sequence[float], unit: str) -> Iterator[str]:
     if found := unusual([joint.name for joint in joints], values, unit):
         yield f"{what} of {found}"

@@ -65,10 +65,7 @@ def root_of(path: Path, data: bytes) -> Xml.Element:
         root = tree_of(data)
     if root.tag != "robot":
         raise ParameterError(str(path), f"<{root.tag}>", "a <robot>")
-    elements = (
-        *root,
-        *(inner for kind in _READ for element in root.iter(kind) for inner in element),
-    )
+    elements = (*root, *(inner for kind in _READ for element in root.iter(kind) for inner in element))
     if macros := [element.tag for element in elements if element.tag.startswith(_XACRO)]:
         found = f"<xacro:{macros[0].removeprefix(_XACRO)}>"
         raise ParameterError(str(path), found, "without macros; call it .xacro to have it expanded")
@@ -125,15 +122,7 @@ def joint_of(name: str, element: Xml.Element, links: Links) -> UrdfJoint:
             raise ParameterError(f"axis of joint {name}", given.tolist(), "longer than 0")
         axis = given / norm
     origin = origin_of(f"joint {name}", element)
-    return UrdfJoint(
-        name=name,
-        kind=kind,
-        parent=ends[0],
-        child=ends[1],
-        origin=origin,
-        axis=axis,
-        element=element,
-    )
+    return UrdfJoint(name=name, kind=kind, parent=ends[0], child=ends[1], origin=origin, axis=axis, element=element)
 
 
 def joints_by_child(joints: list[UrdfJoint]) -> dict[str, UrdfJoint]:
@@ -236,13 +225,7 @@ def _turned_z(axis: Array) -> Array:
     """Shortest rotation (3, 3) that turns z into a unit vector (3,) with z >= 0."""
     x, y, z = axis.tolist()
     share = 1.0 / (1.0 + z)
-    return np.array(
-        [
-            [1.0 - x * x * share, -x * y * share, x],
-            [-x * y * share, 1.0 - y * y * share, y],
-            [-x, -y, z],
-        ]
-    )
+    return np.array([[1.0 - x * x * share, -x * y * share, x], [-x * y * share, 1.0 - y * y * share, y], [-x, -y, z]])
 
 
 def origin_of(where: str, element: Xml.Element) -> Array:
@@ -257,9 +240,7 @@ def origin_of(where: str, element: Xml.Element) -> Array:
     return transform(turn, place)
 
 
-def numbers_of(
-    where: str, element: Xml.Element | None, key: str, default: tuple[float, ...], unit: str = ""
-) -> Array:
+def numbers_of(where: str, element: Xml.Element | None, key: str, default: tuple[float, ...], unit: str = "") -> Array:
     """Numbers of an attribute, or the default where element or attribute is missing.
 
     Args:

@@ -14,24 +14,18 @@ import numpy as np
 from teleop_core.base.errors import ParameterError
 from teleop_core.kernels.geometry import Array, rotation, transform
 from teleop_core.kernels.portable import product
-from teleop_core.robots.files.urdf_tree import (
-    Links,
-    UrdfJoint,
-    chain_to,
-    numbers_of,
-    origin_of,
-    tree_of,
-    turn_of_z,
-)
+from teleop_core.robots.files.urdf_tree import Links, UrdfJoint, chain_to, numbers_of, origin_of, tree_of, turn_of_z
 
 VisualKind = Literal["mesh", "box", "cylinder", "sphere"]
 _ENDINGS = (".stl", ".dae", ".obj", ".ply", ".glb", ".gltf", ".off")
 _UP = 4  # folders above that of a URDF in which its meshes may be
 _PACKAGE = "package://"
 _SHAPES: dict[VisualKind, tuple[tuple[str, tuple[float, ...]], ...]] = {
-    "mesh": (("scale", (1.0, 1.0, 1.0)),), "box": (("size", (0.0, 0.0, 0.0)),),
-    "cylinder": (("radius", (0.0,)), ("length", (0.0,))), "sphere": (("radius", (0.0,)),),
-}  # fmt: skip
+    "mesh": (("scale", (1.0, 1.0, 1.0)),),
+    "box": (("size", (0.0, 0.0, 0.0)),),
+    "cylinder": (("radius", (0.0,)), ("length", (0.0,))),
+    "sphere": (("radius", (0.0,)),),
+}
 """Attributes of each shape of a visual [m], which are those of :class:`Visual` in this order."""
 
 

@@ -68,9 +68,7 @@ def _part(text: str, name: str) -> Part:
         raise ParameterError(name, text, f"a text that begins with one of {', '.join(PARTS)}")
     if _SETTING.sub("", rest).strip():
         raise ParameterError(name, text, f"{kind}, then settings such as at=[0.0, 0.01, 0.0]")
-    values: dict[str, Any] = {
-        key: _value(value, f"{name} {key}") for key, value in _SETTING.findall(rest)
-    }
+    values: dict[str, Any] = {key: _value(value, f"{name} {key}") for key, value in _SETTING.findall(rest)}
     at = values.pop("at", (0.0, 0.0, 0.0))
     if not isinstance(at, tuple) or len(at) != 3 or not np.isfinite(at).all():
         raise ParameterError(f"{name} at", at, "x, y, z of the part's middle [m]")
@@ -102,10 +100,7 @@ def numbers_of_parts(parameters: Combined) -> Array:
     rows: list[Array] = [np.array([len(parameters.parts)], np.float64)]
     for part in parts_of(parameters.parts, "parts"):
         numbers = part.kind.numbers(part.parameters)
-        rows += [
-            np.array([PARTS.index(part.kind.name), len(numbers), part.side, *part.at]),
-            numbers,
-        ]
+        rows += [np.array([PARTS.index(part.kind.name), len(numbers), part.side, *part.at]), numbers]
     return np.concatenate(rows)
 
 

@@ -80,9 +80,7 @@ def _block(heights: Array, width: float) -> Triangles:
     y = width * (np.arange(columns) - 0.5 * (columns - 1))
     top = np.stack((*np.meshgrid(x, y, indexing="ij"), heights), axis=2).reshape(-1, 3)
     index = np.arange(rows * columns).reshape(rows, columns)
-    a, b, c, d = (
-        part.ravel() for part in (index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:])
-    )
+    a, b, c, d = (part.ravel() for part in (index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]))
     rim: NDArray[np.int64] = np.concatenate(
         (index[:-1, 0], index[-1, :-1], index[:0:-1, -1], index[0, :0:-1])
     )  # counterclockwise seen from above
@@ -92,9 +90,7 @@ def _block(heights: Array, width: float) -> Triangles:
     low = rows * columns + np.arange(len(rim))
     middle = np.full(len(rim), rows * columns + len(rim))
     after, low_after = np.roll(rim, -1), np.roll(low, -1)
-    faces = ((a, b, c), (a, c, d), (rim, low, low_after), (rim, low_after, after),
-             (low, middle, low_after))  # fmt: skip
+    faces = ((a, b, c), (a, c, d), (rim, low, low_after), (rim, low_after, after), (low, middle, low_after))
     return Triangles(
-        np.vstack((top, below, (0.0, 0.0, floor))),
-        np.concatenate([np.stack(corners, axis=1) for corners in faces]),
+        np.vstack((top, below, (0.0, 0.0, floor))), np.concatenate([np.stack(corners, axis=1) for corners in faces])
     )

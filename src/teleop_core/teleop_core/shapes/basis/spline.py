@@ -30,9 +30,11 @@ def weights(t: float) -> tuple[float, float, float, float]:
     """Weights of the four nodes around a place, a share t of a step behind the second."""
     u = 1.0 - t
     return (
-        u * u * u / 6.0, (4.0 - 6.0 * t * t + 3.0 * t * t * t) / 6.0,
-        (4.0 - 6.0 * u * u + 3.0 * u * u * u) / 6.0, t * t * t / 6.0,
-    )  # fmt: skip
+        u * u * u / 6.0,
+        (4.0 - 6.0 * t * t + 3.0 * t * t * t) / 6.0,
+        (4.0 - 6.0 * u * u + 3.0 * u * u * u) / 6.0,
+        t * t * t / 6.0,
+    )
 
 
 @inner

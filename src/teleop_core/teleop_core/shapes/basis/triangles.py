@@ -245,10 +245,7 @@ def _signed(tree: Tree, x: float, y: float, z: float, most: float) -> float:
         if _to_box(tree.boxes[node], x, y, z) > least:
             continue
         if node < leaves:
-            left, right = (
-                _to_box(tree.boxes[2 * node], x, y, z),
-                _to_box(tree.boxes[2 * node + 1], x, y, z),
-            )
+            left, right = (_to_box(tree.boxes[2 * node], x, y, z), _to_box(tree.boxes[2 * node + 1], x, y, z))
             nearer = 2 * node if left <= right else 2 * node + 1
             stack[waiting], stack[waiting + 1] = 4 * node + 1 - nearer, nearer
             waiting += 2

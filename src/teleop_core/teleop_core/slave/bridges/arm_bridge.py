@@ -31,43 +31,66 @@ _STATE, _BRAKED = topics.OPERATION.index("state"), topics.OPERATION.index("is_br
 class BridgeParameters:
     """Parameters of every bridge to a controller."""
 
-    kind: Choice = choice(
-        BRIDGES, "joint_state", doc="what the arm's controller understands", fixed=True
-    )
+    kind: Choice = choice(BRIDGES, "joint_state", doc="what the arm's controller understands", fixed=True)
     command_topic: str = parameter(
         "", fixed=True, doc="where the controller takes commands; empty: where its kind does"
     )
     state_topic: str = parameter(
-        "",
-        fixed=True,
-        doc="where the arm's JointState comes from; empty: from where that of its kind does",
+        "", fixed=True, doc="where the arm's JointState comes from; empty: from where that of its kind does"
     )
     rate: int = parameter(
-        500, unit="1/s", lower=100, upper=1000, fixed=True, source="assumed",
+        500,
+        unit="1/s",
+        lower=100,
+        upper=1000,
+        fixed=True,
+        source="assumed",
         doc="commands a second, one of " + ", ".join(map(str, RATES)),
-    )  # fmt: skip
+    )
     stamps: str = parameter(
-        "header", choices=("header", "sent"), fixed=True,
+        "header",
+        choices=("header", "sent"),
+        fixed=True,
         doc="when a sample of the arm was taken: as its header says, or when it was sent, for "
         "arms on a clock of their own",
-    )  # fmt: skip
+    )
     oldest_stamp: float = parameter(
-        0.1, unit="s", lower=0.001, upper=1.0, fixed=True, source="assumed",
+        0.1,
+        unit="s",
+        lower=0.001,
+        upper=1.0,
+        fixed=True,
+        source="assumed",
         doc="samples whose stamps differ by more from our clock are refused",
-    )  # fmt: skip
+    )
     jump_tolerance: float = parameter(
-        0.02, unit="rad or m", lower=1e-4, upper=0.1, fixed=True, source="assumed",
+        0.02,
+        unit="rad or m",
+        lower=1e-4,
+        upper=0.1,
+        fixed=True,
+        source="assumed",
         doc="what a joint may move between two samples beyond twice its rated speed",
-    )  # fmt: skip
+    )
     arm_timeout: float = parameter(
-        0.3, unit="s", lower=0.02, upper=5.0, fixed=True, source="assumed",
+        0.3,
+        unit="s",
+        lower=0.02,
+        upper=5.0,
+        fixed=True,
+        source="assumed",
         doc="without a sound sample for longer the arm is commanded no more; the server holds "
         "before, at its command_timeout",
-    )  # fmt: skip
+    )
     setpoint_timeout: float = parameter(
-        0.1, unit="s", lower=0.005, upper=5.0, fixed=True, source="assumed",
+        0.1,
+        unit="s",
+        lower=0.005,
+        upper=5.0,
+        fixed=True,
+        source="assumed",
         doc="without slave/setpoint_js for longer the arm is commanded no more",
-    )  # fmt: skip
+    )
 
     def __post_init__(self) -> None:
         """Refuse a rate that is no whole number of milliseconds."""
@@ -79,16 +102,15 @@ class BridgeParameters:
 class ArmBridgeParameters(RobotParameters, BridgeParameters):
     """Parameters of :class:`ArmBridge`."""
 
-    joints: tuple[str, ...] = parameter(
-        (), fixed=True, doc="ours=theirs for each joint that the arm calls otherwise"
-    )
+    joints: tuple[str, ...] = parameter((), fixed=True, doc="ours=theirs for each joint that the arm calls otherwise")
     signs: tuple[float, ...] = parameter(
-        (), lower=-1.0, upper=1.0, fixed=True,
+        (),
+        lower=-1.0,
+        upper=1.0,
+        fixed=True,
         doc="1.0 or -1.0 for each of our joints: ours = sign * theirs + offset; empty: 1.0",
-    )  # fmt: skip
-    offsets: tuple[float, ...] = parameter(
-        (), unit="rad or m", fixed=True, doc="of each of our joints; empty: 0.0"
     )
+    offsets: tuple[float, ...] = parameter((), unit="rad or m", fixed=True, doc="of each of our joints; empty: 0.0")
     order: tuple[str, ...] = parameter(
         (),
         fixed=True,
@@ -96,9 +118,14 @@ class ArmBridgeParameters(RobotParameters, BridgeParameters):
         "empty: the robot's order",
     )
     start_tolerance: float = parameter(
-        0.02, unit="rad or m", lower=1e-4, upper=0.1, fixed=True, source="assumed",
+        0.02,
+        unit="rad or m",
+        lower=1e-4,
+        upper=0.1,
+        fixed=True,
+        source="assumed",
         doc="the arm is commanded once each joint is as near to its setpoint",
-    )  # fmt: skip
+    )
 
 
 class ControllerBridge(RunningStage):
@@ -116,9 +143,8 @@ class ControllerBridge(RunningStage):
     """
 
     def __init__(
-        self, stage: Stage, parameters: BridgeParameters, joints: JointMap, lead: Lead,
-        speed_limit: Array, dt: float,
-    ) -> None:  # fmt: skip
+        self, stage: Stage, parameters: BridgeParameters, joints: JointMap, lead: Lead, speed_limit: Array, dt: float
+    ) -> None:
         super().__init__(stage, len(joints.ours), dt)
         self.kernel = _nothing
         self.parameters, self.joints, self.lead_arm = parameters, joints, lead
@@ -174,11 +200,7 @@ class ControllerBridge(RunningStage):
             return None
         joints, lead = self.joints, self.lead_arm
         return Command(
-            joints.order,
-            joints.command(lead.position),
-            joints.command_rate(lead.velocity),
-            1e-9 * self._every,
-            now_ns,
+            joints.order, joints.command(lead.position), joints.command_rate(lead.velocity), 1e-9 * self._every, now_ns
         )
 
     def _moves(self, now_ns: int, setpoint_age: float, is_led: bool, elapsed: float) -> bool:

@@ -16,11 +16,4 @@ def write_servo_jp(message: Any, command: Command, _: object, make: Callable[[st
     message.name, message.position = list(command.names), command.position.tolist()
 
 
-CRTK = Bridge(
-    "crtk",
-    NoParameters,
-    "sensor_msgs/msg/JointState",
-    "/PSM1/servo_jp",
-    "/PSM1/measured_js",
-    write_servo_jp,
-)
+CRTK = Bridge("crtk", NoParameters, "sensor_msgs/msg/JointState", "/PSM1/servo_jp", "/PSM1/measured_js", write_servo_jp)

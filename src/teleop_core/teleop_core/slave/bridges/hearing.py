@@ -68,9 +68,7 @@ class Hearing:
         refused: Number of samples that were not believed, by reason.
     """
 
-    def __init__(
-        self, joints: JointMap, speed_limit: Array, tolerance: float, oldest: float
-    ) -> None:
+    def __init__(self, joints: JointMap, speed_limit: Array, tolerance: float, oldest: float) -> None:
         n = len(joints.ours)
         self._joints, self._speed_limit = joints, speed_limit
         self.tolerance, self.oldest = tolerance, oldest

@@ -12,13 +12,7 @@ from teleop_core.base.errors import ParameterError
 from teleop_core.base.parameters import parameter
 from teleop_core.graph.signals import DT
 from teleop_core.graph.stage import Stage
-from teleop_core.graph.topics import (
-    JAW,
-    NO_COMMAND_NS,
-    SLAVE_JAW_MEASURED_JS,
-    SLAVE_JAW_SETPOINT_JS,
-    SLAVE_OPERATION,
-)
+from teleop_core.graph.topics import JAW, NO_COMMAND_NS, SLAVE_JAW_MEASURED_JS, SLAVE_JAW_SETPOINT_JS, SLAVE_OPERATION
 from teleop_core.slave.bridges import Command
 from teleop_core.slave.bridges.arm_bridge import BridgeParameters, ControllerBridge
 from teleop_core.slave.bridges.leading import Lead
@@ -32,24 +26,27 @@ _SAME = 1e-3  # a setpoint that moved by less while the gripper was not led stay
 class JawBridgeParameters(BridgeParameters):
     """Parameters of :class:`JawBridge`."""
 
-    command_topic: str = parameter(
-        "/gripper_controller/commands", fixed=True, doc="where the gripper takes commands"
-    )
-    state_topic: str = parameter(
-        "/joint_states", fixed=True, doc="where the gripper's JointState comes from"
-    )
+    command_topic: str = parameter("/gripper_controller/commands", fixed=True, doc="where the gripper takes commands")
+    state_topic: str = parameter("/joint_states", fixed=True, doc="where the gripper's JointState comes from")
     joint: str = parameter("jaw", fixed=True, doc="what the gripper calls its joint")
     scale: float = parameter(
-        1.0, unit="1 or rad/m", lower=-1e4, upper=1e4, fixed=True,
+        1.0,
+        unit="1 or rad/m",
+        lower=-1e4,
+        upper=1e4,
+        fixed=True,
         doc="our angle = scale * theirs + offset; negative where theirs grows as it closes",
-    )  # fmt: skip
-    offset: float = parameter(
-        0.0, unit="rad", lower=-10.0, upper=10.0, fixed=True, doc="our angle where theirs is 0"
     )
+    offset: float = parameter(0.0, unit="rad", lower=-10.0, upper=10.0, fixed=True, doc="our angle where theirs is 0")
     speed_limit: float = parameter(
-        4.0, unit="rad/s", lower=0.01, upper=100.0, fixed=True, source="assumed",
+        4.0,
+        unit="rad/s",
+        lower=0.01,
+        upper=100.0,
+        fixed=True,
+        source="assumed",
         doc="rated speed, which commands exceed by a fifth at most",
-    )  # fmt: skip
+    )
 
     def __post_init__(self) -> None:
         """Refuse a scale of zero too."""
@@ -69,9 +66,7 @@ class JawBridge(ControllerBridge):
     def __init__(self, parameters: JawBridgeParameters, dt: float = DT) -> None:
         p, upper = parameters, np.array([_UPPER])
         speed = np.array([p.speed_limit])
-        joints = JointMap(
-            JAW, [f"{JAW[0]}={p.joint}"], [p.scale], [p.offset], owner="jaw_bridge.", is_scaled=True
-        )
+        joints = JointMap(JAW, [f"{JAW[0]}={p.joint}"], [p.scale], [p.offset], owner="jaw_bridge.", is_scaled=True)
         lead = Lead(-upper, upper, speed, _SAME, 1.0 / p.rate, presses=True)
         super().__init__(JAW_BRIDGE, p, joints, lead, speed, dt)
 

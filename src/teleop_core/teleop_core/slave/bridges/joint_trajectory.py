@@ -19,9 +19,13 @@ class JointTrajectoryParameters:
     """Parameters of trajectories of one point."""
 
     ahead: int = parameter(
-        2, unit="periods", lower=2, upper=100, source="assumed",
+        2,
+        unit="periods",
+        lower=2,
+        upper=100,
+        source="assumed",
         doc="time from start of the point: the arm follows so much later",
-    )  # fmt: skip
+    )
     velocity: str = parameter(
         "none",
         choices=("none", "zero", "setpoint"),
@@ -31,10 +35,7 @@ class JointTrajectoryParameters:
 
 
 def write_trajectory(
-    message: Any,
-    command: Command,
-    parameters: JointTrajectoryParameters,
-    make: Callable[[str], Any],
+    message: Any, command: Command, parameters: JointTrajectoryParameters, make: Callable[[str], Any]
 ) -> None:
     """Fill a ``trajectory_msgs/JointTrajectory``; its stamp stays 0, which means at once."""
     point = make(_POINT)

@@ -30,9 +30,8 @@ class Lead:
     """
 
     def __init__(
-        self, lower: Array, upper: Array, speed_limit: Array, tolerance: float, period: float,
-        *, presses: bool = False,
-    ) -> None:  # fmt: skip
+        self, lower: Array, upper: Array, speed_limit: Array, tolerance: float, period: float, *, presses: bool = False
+    ) -> None:
         n = len(lower)
         self._presses, self._has_led = presses, False
         self._lower, self._upper, self._speed_limit = lower, upper, speed_limit
@@ -53,9 +52,7 @@ class Lead:
         off = np.abs(measured - self.position)
         return self.is_leading and not self._presses and not bool((off <= self.tolerance).all())
 
-    def step(
-        self, setpoint: Array, measured: Array, names: tuple[str, ...], elapsed: float
-    ) -> bool:
+    def step(self, setpoint: Array, measured: Array, names: tuple[str, ...], elapsed: float) -> bool:
         """Go on towards a setpoint (n,); whether there is a command to send.
 
         Args:
@@ -69,10 +66,7 @@ class Lead:
             off = np.abs(setpoint - measured)
             if not self._presses and not (off <= self.tolerance).all():
                 i = int(np.argmax(off))
-                return self.let_go(
-                    f"{names[i]} is {off[i]:.4g} from its setpoint, at most {self.tolerance:g} "
-                    "to begin"
-                )
+                return self.let_go(f"{names[i]} is {off[i]:.4g} from its setpoint, at most {self.tolerance:g} to begin")
             stays = self._has_led and (np.abs(setpoint - self.position) <= self.tolerance).all()
             if not (self._presses and stays):
                 self.position[:] = measured
@@ -80,9 +74,7 @@ class Lead:
         self._approach(np.clip(setpoint, self._lower, self._upper), elapsed)
         return True
 
-    def rejoin(
-        self, setpoint: Array, measured: Array, names: tuple[str, ...], elapsed: float
-    ) -> bool:
+    def rejoin(self, setpoint: Array, measured: Array, names: tuple[str, ...], elapsed: float) -> bool:
         """Go on slowly to a setpoint that went on without the arm; otherwise as :meth:`step`.
 
         Only to one that stands still, and only an arm that was led and stands at the last command:

@@ -49,14 +49,19 @@ class AdaptiveParameters:
     bandwidth: tuple[float, ...] = fields.bandwidth("triple")
     filter_ratio: float = fields.ratio("filters of motion")
     rate: float = parameter(
-        1.0, lower=0.0, upper=10.0,
+        1.0,
+        lower=0.0,
+        upper=10.0,
         doc="how fast it learns, over what gives load and loop three equal poles",
         source="derived: of load alone, 1 gives the poles of pid",
-    )  # fmt: skip
+    )
     span: float = parameter(
-        0.5, lower=0.0, upper=0.9, doc="how far inertia may be from the table, share of it",
+        0.5,
+        lower=0.0,
+        upper=0.9,
+        doc="how far inertia may be from the table, share of it",
         source="assumed: inertias of links change less than that between postures",
-    )  # fmt: skip
+    )
     friction_share: float = fields.friction_share("from which it begins")
     friction_counts: float = fields.friction_counts()
     dead_band: float = fields.dead_band("from which nothing is learned")
@@ -134,6 +139,4 @@ def adaptive_gains(parameters: AdaptiveParameters, robot: Robot, viscous: Array)
     return table
 
 
-ADAPTIVE = Controller(
-    "adaptive", AdaptiveParameters, adaptive_gains, adaptive_control, MEMORY + 4, *holding(_LOAD)
-)
+ADAPTIVE = Controller("adaptive", AdaptiveParameters, adaptive_gains, adaptive_control, MEMORY + 4, *holding(_LOAD))

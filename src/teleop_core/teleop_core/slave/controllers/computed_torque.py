@@ -69,16 +69,12 @@ def computed_torque_control(
             asked += feedforward[2 * n + n * i + j] * memory[j, _WANTED]
         effort[i] = min(max(asked, -limit[i]), limit[i])
         if share == 1.0 and (effort[i] == asked or asked * error < 0.0):
-            row[_INTEGRAL] += (
-                pole * pole * pole * motion_estimates.beyond(error, gains[i, _DEAD_BAND]) * dt
-            )
+            row[_INTEGRAL] += pole * pole * pole * motion_estimates.beyond(error, gains[i, _DEAD_BAND]) * dt
         # A saturated joint accelerates by less than was wanted of it.
         row[motion_estimates.EXPECTED] += (effort[i] - asked) / feedforward[2 * n + n * i + i]
 
 
-def computed_torque_gains(
-    parameters: ComputedTorqueParameters, robot: Robot, viscous: Array
-) -> Array:
+def computed_torque_gains(parameters: ComputedTorqueParameters, robot: Robot, viscous: Array) -> Array:
     """Table (n, 5): pole, friction, dead band and linear range of each joint.
 
     Raises:
@@ -95,6 +91,11 @@ def computed_torque_gains(
 
 
 COMPUTED_TORQUE = Controller(
-    "computed_torque", ComputedTorqueParameters, computed_torque_gains, computed_torque_control,
-    motion_estimates.MEMORY + 2, motion_estimates.begin_motion, uses_model=True,
-)  # fmt: skip
+    "computed_torque",
+    ComputedTorqueParameters,
+    computed_torque_gains,
+    computed_torque_control,
+    motion_estimates.MEMORY + 2,
+    motion_estimates.begin_motion,
+    uses_model=True,
+)

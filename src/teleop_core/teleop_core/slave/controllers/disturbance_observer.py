@@ -55,14 +55,9 @@ def disturbance_observer_control(
         gain, row = gains[i], memory[i]
         inertia, pole, viscous = gain[_INERTIA], gain[_POLE], gain[_VISCOUS]
         motion_estimates.follow_motion(row, setpoint[i], measured[i], gain[_FADING], dt)
-        friction = motion_estimates.friction_of_setpoint(
-            row, setpoint[i], gain[_FRICTION], gain[_TRAVEL]
-        )
+        friction = motion_estimates.friction_of_setpoint(row, setpoint[i], gain[_FRICTION], gain[_TRAVEL])
         off = motion_estimates.beyond(setpoint[i] - measured[i], gain[_DEAD_BAND])
-        error, share = (
-            motion_estimates.approach(off, gain[_RANGE]),
-            motion_estimates.closeness(off, gain[_RANGE]),
-        )
+        error, share = (motion_estimates.approach(off, gain[_RANGE]), motion_estimates.closeness(off, gain[_RANGE]))
         speed = share * row[motion_estimates.SET_SPEED]
         wanted = (
             share * row[motion_estimates.SET_ACCELERATION]
@@ -72,14 +67,10 @@ def disturbance_observer_control(
         )
         known = feedforward[i] + friction + row[_HELD]
         effort[i] = min(max(inertia * wanted + viscous * speed + known, -limit[i]), limit[i])
-        row[motion_estimates.EXPECTED] = (
-            effort[i] - known - viscous * row[motion_estimates.SPEED]
-        ) / inertia
+        row[motion_estimates.EXPECTED] = (effort[i] - known - viscous * row[motion_estimates.SPEED]) / inertia
 
 
-def disturbance_observer_gains(
-    parameters: DisturbanceObserverParameters, robot: Robot, viscous: Array
-) -> Array:
+def disturbance_observer_gains(parameters: DisturbanceObserverParameters, robot: Robot, viscous: Array) -> Array:
     """Table (n, 8): inertia, pole, friction, dead band and linear range of each joint.
 
     Raises:
@@ -87,9 +78,7 @@ def disturbance_observer_gains(
     """
     p = parameters
     drives, pole = drives_and_poles(robot, "disturbance_observer", p.bandwidth)
-    fading = motion_estimates.fading_of(
-        robot, pole, p.observer_ratio, stiffness=1.0, damping=2.0, rejection=1.0
-    )
+    fading = motion_estimates.fading_of(robot, pole, p.observer_ratio, stiffness=1.0, damping=2.0, rejection=1.0)
     friction = p.friction_share * motion_estimates.known_friction(robot)
     count = drives.encoder_step
     table = np.empty((robot.n, 8))
@@ -101,6 +90,10 @@ def disturbance_observer_gains(
 
 
 DISTURBANCE_OBSERVER = Controller(
-    "disturbance_observer", DisturbanceObserverParameters, disturbance_observer_gains,
-    disturbance_observer_control, motion_estimates.MEMORY + 1, *motion_estimates.holding(_HELD),
-)  # fmt: skip
+    "disturbance_observer",
+    DisturbanceObserverParameters,
+    disturbance_observer_gains,
+    disturbance_observer_control,
+    motion_estimates.MEMORY + 1,
+    *motion_estimates.holding(_HELD),
+)

@@ -77,9 +77,7 @@ def friction_compensation_control(
         error, share = approach(off, gain[_RANGE]), closeness(off, gain[_RANGE])
         speed = share * row[SET_SPEED]
         free = gain[_KP] * error + gain[_KD] * (speed - row[SPEED])
-        free += (
-            inertia * share * row[SET_ACCELERATION] + viscous * speed + friction + feedforward[i]
-        )
+        free += inertia * share * row[SET_ACCELERATION] + viscous * speed + friction + feedforward[i]
         integral = row[_INTEGRAL] + gain[_KI] * beyond(error, gain[_DEAD_BAND]) * dt
         is_inside = abs(free + integral) <= limit[i] or (free + integral) * error < 0.0
         if share == 1.0 and is_inside:
@@ -90,9 +88,7 @@ def friction_compensation_control(
         row[EXPECTED] = (effort[i] - known - viscous * row[SPEED]) / inertia
 
 
-def friction_compensation_gains(
-    parameters: FrictionCompensationParameters, robot: Robot, viscous: Array
-) -> Array:
+def friction_compensation_gains(parameters: FrictionCompensationParameters, robot: Robot, viscous: Array) -> Array:
     """Table (n, 10): PID gains, inertia, friction, dead band and linear range of each joint.
 
     Raises:
@@ -112,6 +108,10 @@ def friction_compensation_gains(
 
 
 FRICTION_COMPENSATION = Controller(
-    "friction_compensation", FrictionCompensationParameters, friction_compensation_gains,
-    friction_compensation_control, MEMORY + 1, *holding(_INTEGRAL),
-)  # fmt: skip
+    "friction_compensation",
+    FrictionCompensationParameters,
+    friction_compensation_gains,
+    friction_compensation_control,
+    MEMORY + 1,
+    *holding(_INTEGRAL),
+)

@@ -65,9 +65,7 @@ def follow(memory: Array, at: int, value: float, expected: float, fading: float,
 
 
 @kernel
-def follow_motion(
-    memory: Array, setpoint: float, measured: float, fading: float, dt: float
-) -> None:
+def follow_motion(memory: Array, setpoint: float, measured: float, fading: float, dt: float) -> None:
     """Take the next setpoint and the next measured position of a joint into their estimates."""
     follow(memory, PLACE, measured, memory[EXPECTED], fading, dt)
     follow(memory, SET_PLACE, setpoint, 0.0, fading, dt)
@@ -163,13 +161,7 @@ def known_friction(robot: Robot) -> Array:
 
 
 def fading_of(
-    robot: Robot,
-    pole: Array,
-    ratio: float,
-    *,
-    stiffness: float,
-    damping: float,
-    rejection: float = 0.0,
+    robot: Robot, pole: Array, ratio: float, *, stiffness: float, damping: float, rejection: float = 0.0
 ) -> Array:
     """Fading (n,) of the filters of a law, as fast as its own noise allows.
 
@@ -205,13 +197,9 @@ def fading_of(
     return exponential(-np.where(if_fast, high, slow) * DT)
 
 
-def _per_count(
-    bandwidth: Array, pole: Array, stiffness: float, damping: float, rejection: float
-) -> Array:
+def _per_count(bandwidth: Array, pole: Array, stiffness: float, damping: float, rejection: float) -> Array:
     """Acceleration (n,) asked for when a position jumps by one, at once [1/s²]."""
     fading = exponential(-bandwidth * DT)
     speed = 1.5 * (1.0 - fading) ** 2 * (1.0 + fading) / DT
     unexplained = (1.0 - fading) * (1.0 - fading) ** 2 / DT**2
-    return np.asarray(
-        stiffness * pole**2 + damping * pole * speed + rejection * unexplained, dtype=np.float64
-    )
+    return np.asarray(stiffness * pole**2 + damping * pole * speed + rejection * unexplained, dtype=np.float64)

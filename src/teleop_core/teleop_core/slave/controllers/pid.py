@@ -20,22 +20,26 @@ class PidParameters:
     """Gains; empty lists mean: by the rule of three equal poles, from the robot's drive table."""
 
     bandwidth: tuple[float, ...] = parameter(
-        (), unit="rad/s", lower=0.1, upper=500.0, doc="triple closed-loop pole of each joint",
+        (),
+        unit="rad/s",
+        lower=0.1,
+        upper=500.0,
+        doc="triple closed-loop pole of each joint",
         source="assumed: the drive table's",
-    )  # fmt: skip
+    )
     kp: tuple[float, ...] = parameter((), lower=0.0, doc="N·m/rad or N/m of each joint")
     ki: tuple[float, ...] = parameter((), lower=0.0, doc="N·m/(rad·s) or N/(m·s) of each joint")
     kd: tuple[float, ...] = parameter((), lower=0.0, doc="N·m·s/rad or N·s/m of each joint")
     setpoint_weight: float = parameter(
-        1.0, lower=0.0, upper=1.0,
+        1.0,
+        lower=0.0,
+        upper=1.0,
         doc="share of the setpoint in the proportional action; at 1/3 no step overshoots",
         source="assumed: 1 tracks best, and overshoots steps that pass no filter by a quarter",
-    )  # fmt: skip
+    )
 
 
-def critically_damped_gains(
-    inertia: Array, viscous: Array, bandwidth: Array
-) -> tuple[Array, Array, Array]:
+def critically_damped_gains(inertia: Array, viscous: Array, bandwidth: Array) -> tuple[Array, Array, Array]:
     """Gains that put all three closed-loop poles of an inertia with friction at one real place.
 
     The loop ``inertia q'' + viscous q' = Kp (b r - q) + Ki ∫(r - q) - Kd q'`` has the
@@ -70,13 +74,7 @@ _INTEGRAL, _LAST, _SPEED, _LAGGED = range(4)
 
 @kernel
 def pid_step(
-    setpoint: float,
-    measured: float,
-    gains: Array,
-    memory: Array,
-    feedforward: float,
-    limit: float,
-    dt: float,
+    setpoint: float, measured: float, gains: Array, memory: Array, feedforward: float, limit: float, dt: float
 ) -> float:
     """Drive effort for one tick, within ±limit; updates the memory.
 
@@ -110,9 +108,7 @@ def pid_step(
 
 
 @kernel
-def weighted_setpoint(
-    setpoint: float, measured: float, gains: Array, memory: Array, room: float, dt: float
-) -> float:
+def weighted_setpoint(setpoint: float, measured: float, gains: Array, memory: Array, room: float, dt: float) -> float:
     """Setpoint that gives a PID on its error the setpoint weight b; at b = 1 that is itself.
 
     It is ``b r + (1 - b) x``, with x the setpoint r through a lag of Ki / Kp. It makes the same

@@ -30,10 +30,13 @@ class SourcePidParameters:
     """Gains; empty lists mean: by the rule, from the robot's drive table."""
 
     bandwidth: tuple[float, ...] = parameter(
-        (), unit="rad/s", lower=0.1, upper=500.0,
+        (),
+        unit="rad/s",
+        lower=0.1,
+        upper=500.0,
         doc="closed-loop pole of each joint, double, triple where it has integral action",
         source="assumed: the source prints no gains; critically damped, as it says they were",
-    )  # fmt: skip
+    )
     kp: tuple[float, ...] = parameter((), lower=0.0, doc="N·m/rad or N/m of each joint")
     ki: tuple[float, ...] = parameter((), lower=0.0, doc="N·m/(rad·s) or N/(m·s) of each joint")
     kd: tuple[float, ...] = parameter((), lower=0.0, doc="N·m·s/rad or N·s/m of each joint")
@@ -66,9 +69,7 @@ def source_pid_control(
         memory[i, _INTEGRAL] = min(max(integral, -limit[i]), limit[i])
         change = (error - memory[i, _LAST]) / dt
         memory[i, _LAST] = error
-        effort[i] = (
-            gains[i, _KP] * error + memory[i, _INTEGRAL] + gains[i, _KD] * change + feedforward[i]
-        )
+        effort[i] = gains[i, _KP] * error + memory[i, _INTEGRAL] + gains[i, _KD] * change + feedforward[i]
 
 
 def loaded_axes(robot: Robot) -> NDArray[np.bool_]:
@@ -110,6 +111,4 @@ def shift(memory: Array, effort: Array) -> None:
     """Leave the integrals: without integral action nothing takes over what gravity feeds less."""
 
 
-SOURCE_PID = Controller(
-    "source_pid", SourcePidParameters, source_pid_gains, source_pid_control, 2, begin, shift
-)
+SOURCE_PID = Controller("source_pid", SourcePidParameters, source_pid_gains, source_pid_control, 2, begin, shift)

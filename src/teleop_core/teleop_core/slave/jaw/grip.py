@@ -91,9 +91,8 @@ def make_room() -> GripRoom:
 
 @inner
 def _tip_motion(
-    s: GripState, room: GripRoom, hand: int, pose: geometry.Array, motion: geometry.Array,
-    dt: float,
-) -> None:  # fmt: skip
+    s: GripState, room: GripRoom, hand: int, pose: geometry.Array, motion: geometry.Array, dt: float
+) -> None:
     """Write a tip's turn since its last sample, and its speed (3,) at the object's middle."""
     before, now = s.tips[7 * hand : 7 * hand + 7], room.tips[hand]
     geometry.invert_quaternion(before[3:7], room.back)
@@ -114,9 +113,8 @@ def _most(p: GripNumbers, force: float, dt: float) -> float:
 
 @inner
 def _rub(
-    p: GripNumbers, s: GripState, motion: geometry.Array, tip: geometry.Array, force: float,
-    cut: float, dt: float,
-) -> float:  # fmt: skip
+    p: GripNumbers, s: GripState, motion: geometry.Array, tip: geometry.Array, force: float, cut: float, dt: float
+) -> float:
     """Bring an object's speed (3,) to that of the fingers, as far as friction of both can.
 
     Where a peg stops the pose, the fingers slide on by ``cut`` [m/s] across it, and friction has
@@ -195,9 +193,8 @@ def _find(p: GripNumbers, s: GripState, tip: geometry.Array) -> bool:
 
 @inner
 def _meet_peg(
-    p: GripNumbers, peg: int, pose: geometry.Array, motion: geometry.Array, wanted: geometry.Array,
-    dt: float,
-) -> float:  # fmt: skip
+    p: GripNumbers, peg: int, pose: geometry.Array, motion: geometry.Array, wanted: geometry.Array, dt: float
+) -> float:
     """Stop a wanted motion (3,) where the peg is that an object is on, and the object with it.
 
     The peg is rigid, has no friction, and gives nothing back. It holds the object across its axis

@@ -26,17 +26,23 @@ class JawParameters:
     """Parameters of :class:`Jaw`."""
 
     command_timeout: float = parameter(
-        0.1, unit="s", lower=0.002, upper=5.0,
+        0.1,
+        unit="s",
+        lower=0.002,
+        upper=5.0,
         doc="the jaw stays where it is led when for longer than this no command came, or the jaw "
         "did not say where it is",
-    )  # fmt: skip
-    upper: float = parameter(
-        0.8, unit="rad", lower=0.05, upper=3.0, fixed=True, source="assumed",
-        doc="largest angle between the fingers that the jaw is led to",
-    )  # fmt: skip
-    speed_limit: float = parameter(
-        4.0, unit="rad/s", lower=0.01, upper=100.0, doc="of the setpoint", source="assumed"
     )
+    upper: float = parameter(
+        0.8,
+        unit="rad",
+        lower=0.05,
+        upper=3.0,
+        fixed=True,
+        source="assumed",
+        doc="largest angle between the fingers that the jaw is led to",
+    )
+    speed_limit: float = parameter(4.0, unit="rad/s", lower=0.01, upper=100.0, doc="of the setpoint", source="assumed")
 
 
 class JawNumbers(Fields):

@@ -34,21 +34,19 @@ class GripObjectParameters:
     """Objects that the jaw can grip, as thick from every side; they stand on a flat table."""
 
     place: tuple[float, ...] = parameter(
-        (), unit="m", lower=-10.0, upper=10.0, fixed=True,
+        (),
+        unit="m",
+        lower=-10.0,
+        upper=10.0,
+        fixed=True,
         doc="its middle at first, half its size above the table; those of "
         "several one after the other, with the same z; empty: none",
-    )  # fmt: skip
+    )
     size: float = parameter(0.02, unit="m", lower=1e-3, upper=0.2, doc="thickness")
     mass: float = parameter(0.05, unit="kg", lower=1e-4, upper=10.0, doc="mass")
-    stiffness: float = parameter(
-        4000.0, unit="N/m", lower=10.0, upper=1e6, doc="of it and both pads", source="assumed"
-    )
-    damping: float = parameter(
-        20.0, unit="N·s/m", lower=0.0, upper=1e4, doc="of it and both pads", source="assumed"
-    )
-    friction: float = parameter(
-        0.5, lower=0.0, upper=5.0, doc="dry friction of each pad on it", source="assumed"
-    )
+    stiffness: float = parameter(4000.0, unit="N/m", lower=10.0, upper=1e6, doc="of it and both pads", source="assumed")
+    damping: float = parameter(20.0, unit="N·s/m", lower=0.0, upper=1e4, doc="of it and both pads", source="assumed")
+    friction: float = parameter(0.5, lower=0.0, upper=5.0, doc="dry friction of each pad on it", source="assumed")
 
     def __post_init__(self) -> None:
         n, rest = divmod(len(self.place), 3)
@@ -62,17 +60,24 @@ class PegParameters:
     """Pegs of the table, upright, which go through objects."""
 
     place: tuple[float, ...] = parameter(
-        (), unit="m", lower=-10.0, upper=10.0, fixed=True,
+        (),
+        unit="m",
+        lower=-10.0,
+        upper=10.0,
+        fixed=True,
         doc="x, y of the axis of each, one after the other; empty: none",
-    )  # fmt: skip
+    )
     height: float = parameter(
-        0.015, unit="m", lower=1e-3, upper=0.5, source="assumed",
-        doc="by which an object must be lifted to come off",
-    )  # fmt: skip
+        0.015, unit="m", lower=1e-3, upper=0.5, source="assumed", doc="by which an object must be lifted to come off"
+    )
     clearance: float = parameter(
-        0.0015, unit="m", lower=0.0, upper=0.1, source="assumed",
+        0.0015,
+        unit="m",
+        lower=0.0,
+        upper=0.1,
+        source="assumed",
         doc="way of an object from the axis on which the peg does not touch it",
-    )  # fmt: skip
+    )
 
     def __post_init__(self) -> None:
         x, y = self.place[::2], self.place[1::2]
@@ -89,33 +94,46 @@ class JawSimParameters:
     """Parameters of :class:`JawSim`."""
 
     upper: float = parameter(
-        0.8, unit="rad", lower=0.05, upper=3.0, fixed=True, source="assumed",
+        0.8,
+        unit="rad",
+        lower=0.05,
+        upper=3.0,
+        fixed=True,
+        source="assumed",
         doc="angle between the fingers at the drive's stop, where it begins",
-    )  # fmt: skip
-    effort_limit: float = parameter(
-        0.15, unit="N·m", lower=0.0, upper=100.0, doc="of the drive", source="assumed"
     )
-    inertia: float = parameter(
-        1e-4, unit="kg·m²", lower=1e-7, upper=1.0, doc="of drive and fingers", source="assumed"
-    )
-    viscous: float = parameter(
-        1e-3, unit="N·m·s/rad", lower=0.0, upper=10.0, doc="friction", source="assumed"
-    )
+    effort_limit: float = parameter(0.15, unit="N·m", lower=0.0, upper=100.0, doc="of the drive", source="assumed")
+    inertia: float = parameter(1e-4, unit="kg·m²", lower=1e-7, upper=1.0, doc="of drive and fingers", source="assumed")
+    viscous: float = parameter(1e-3, unit="N·m·s/rad", lower=0.0, upper=10.0, doc="friction", source="assumed")
     bandwidth: float = parameter(
-        100.0, unit="rad/s", lower=1.0, upper=200.0, source="assumed",
+        100.0,
+        unit="rad/s",
+        lower=1.0,
+        upper=200.0,
+        source="assumed",
         doc="of the control law, which is damped critically",
-    )  # fmt: skip
+    )
     finger_length: float = parameter(
         0.04, unit="m", lower=1e-3, upper=0.5, doc="from the pivot to the pads", source="assumed"
     )
     origin: tuple[float, ...] = parameter(
-        (0.0, 0.0, 0.0), unit="m", lower=-10.0, upper=10.0, length=3, fixed=True,
+        (0.0, 0.0, 0.0),
+        unit="m",
+        lower=-10.0,
+        upper=10.0,
+        length=3,
+        fixed=True,
         doc="of the board, in the base of the first arm; objects and pegs are placed from there",
-    )  # fmt: skip
+    )
     second_base: tuple[float, ...] = parameter(
-        (0.0, 0.0, 0.0), unit="m", lower=-10.0, upper=10.0, length=3, fixed=True,
+        (0.0, 0.0, 0.0),
+        unit="m",
+        lower=-10.0,
+        upper=10.0,
+        length=3,
+        fixed=True,
         doc="where the base of the second arm is in that of the first, axes parallel",
-    )  # fmt: skip
+    )
     object: GripObjectParameters = field(default_factory=GripObjectParameters)
     pegs: PegParameters = field(default_factory=PegParameters)
 
@@ -194,12 +212,7 @@ JAW_SIM = Stage(
     JawSimParameters,
     reads=(topics.SLAVE_JAW_SETPOINT_JS, topics.SLAVE_TRUE_CP, *_OTHERS),
     late=_OTHERS,
-    writes=(
-        topics.SLAVE_JAW_MEASURED_JS,
-        topics.SLAVE_JAW_GRIP,
-        topics.SLAVE_JAW_OBJECT_CP,
-        topics.SLAVE_JAW_BOARD,
-    ),
+    writes=(topics.SLAVE_JAW_MEASURED_JS, topics.SLAVE_JAW_GRIP, topics.SLAVE_JAW_OBJECT_CP, topics.SLAVE_JAW_BOARD),
     optional=(topics.SLAVE_TRUE_CP, *_OTHERS),
     make=JawSim,
 )

@@ -24,9 +24,7 @@ def far_from(a: geometry.Array, b: geometry.Array) -> float:
 
 
 @inner
-def _sticks(
-    motion: geometry.Array, tip: geometry.Array, most: float, other: geometry.Array, against: float
-) -> bool:
+def _sticks(motion: geometry.Array, tip: geometry.Array, most: float, other: geometry.Array, against: float) -> bool:
     """Whether an object sticks to a tip, while another one slides on it or moves alike."""
     apart = far_from(other, tip)
     if apart == 0.0:

@@ -63,9 +63,7 @@ FAULTS: Mapping[Fault, FaultKind] = {
     Fault.FLOOD: FaultKind(Reaction.REPORT, "more messages than anybody needs"),
     Fault.STALL: FaultKind(Reaction.PAUSE, "the slave's own loop stood still", "s"),
     Fault.FEEDBACK: FaultKind(
-        Reaction.HOLD,
-        "no slave/measured_js; its sender, such as arm_bridge, says why in its log",
-        "s",
+        Reaction.HOLD, "no slave/measured_js; its sender, such as arm_bridge, says why in its log", "s"
     ),
 }
 """What there is, with its reaction; those that a session names as ``reported`` only report."""

@@ -16,9 +16,7 @@ class OperationParameters:
     """Limits, faults and states of an arm in operation."""
 
     starts_enabled: bool = parameter(
-        True,
-        fixed=True,
-        doc="whether it enables and homes itself; false: it waits for enable and home, as hardware",
+        True, fixed=True, doc="whether it enables and homes itself; false: it waits for enable and home, as hardware"
     )
     standstill: str = parameter(
         "hold",
@@ -26,65 +24,88 @@ class OperationParameters:
         doc="after a stop, or disabled: the drives hold the arm, or are off and brakes hold it",
     )
     heartbeat: float = parameter(
-        0.0, unit="s", lower=0.01, upper=10.0, off=0.0,
-        doc="a stop button that says 'released' less often than this counts as pressed; 0: none is "
-        "there",
-    )  # fmt: skip
+        0.0,
+        unit="s",
+        lower=0.01,
+        upper=10.0,
+        off=0.0,
+        doc="a stop button that says 'released' less often than this counts as pressed; 0: none is there",
+    )
     longest_outage: float = parameter(
-        2.0, unit="s", lower=0.01, upper=60.0, off=0.0,
+        2.0,
+        unit="s",
+        lower=0.01,
+        upper=60.0,
+        off=0.0,
         doc="after a longer silence of commands it is paused and resumes on purpose only; 0: never",
         source="assumed: longer than a node takes to hiccup, shorter than a person to look away",
-    )  # fmt: skip
+    )
     longest_silence: float = parameter(
-        2.0, unit="s", lower=0.01, upper=60.0,
+        2.0,
+        unit="s",
+        lower=0.01,
+        upper=60.0,
         doc="an arm that has not said for longer where it is has a fault; it holds long before, "
         "after the command timeout",
         source="assumed: as the longest outage",
-    )  # fmt: skip
+    )
     acceleration_share: float = parameter(
-        20.0, lower=1.0, upper=1000.0,
+        20.0,
+        lower=1.0,
+        upper=1000.0,
         doc="largest acceleration of setpoints over that of the drives, effort limit over inertia",
         source="assumed: encoder steps of the stylus alone ask for up to 12 times at 1 kHz",
-    )  # fmt: skip
+    )
     tool_speed: float = parameter(
-        0.0, unit="m/s", lower=0.0, upper=10.0,
+        0.0,
+        unit="m/s",
+        lower=0.0,
+        upper=10.0,
         doc="largest speed of the tip; 0: what the joint that moves it fastest at home reaches",
-    )  # fmt: skip
+    )
     tool_acceleration: float = parameter(
-        0.0, unit="m/s²", lower=0.0, upper=1e5,
+        0.0,
+        unit="m/s²",
+        lower=0.0,
+        upper=1e5,
         doc="largest rise of the tip's speed; 0: what that joint's acceleration_share gives",
-    )  # fmt: skip
+    )
     longest_lag: float = parameter(
-        0.2, unit="s", lower=0.001, upper=10.0,
+        0.2,
+        unit="s",
+        lower=0.001,
+        upper=10.0,
         doc="a joint farther from its setpoint than full speed makes up in this time is a fault",
         source="assumed: four times what the PID laws leave at full speed, 3 over their bandwidth",
-    )  # fmt: skip
+    )
     tip_error: float = parameter(
-        0.0, unit="m", lower=0.0, upper=1.0,
-        doc="a tip farther from its setpoint than this is a fault; 0: than tool_speed makes up in "
-        "longest_lag",
-    )  # fmt: skip
+        0.0,
+        unit="m",
+        lower=0.0,
+        upper=1.0,
+        doc="a tip farther from its setpoint than this is a fault; 0: than tool_speed makes up in longest_lag",
+    )
     effort_time: float = parameter(
-        1.0, unit="s", lower=0.01, upper=60.0,
+        1.0,
+        unit="s",
+        lower=0.01,
+        upper=60.0,
         doc="a drive at its effort limit for longer is a fault",
         source="assumed: braking from full speed takes 0.1 s",
-    )  # fmt: skip
+    )
     overspeed: float = parameter(
-        1.5, lower=1.0, upper=10.0,
+        1.5,
+        lower=1.0,
+        upper=10.0,
         doc="a joint faster than this share of its speed limit is a fault",
         source="assumed: motors fade out a tenth above their rated speed",
-    )  # fmt: skip
-    pressing_time: float = parameter(
-        1.0, unit="s", lower=0.01, upper=60.0,
-        doc="commands beyond a joint's limit for longer press it into that limit",
-    )  # fmt: skip
-    reported: tuple[str, ...] = parameter(
-        (), choices=NAMES, doc="faults that are told only and stop nothing"
     )
+    pressing_time: float = parameter(
+        1.0, unit="s", lower=0.01, upper=60.0, doc="commands beyond a joint's limit for longer press it into that limit"
+    )
+    reported: tuple[str, ...] = parameter((), choices=NAMES, doc="faults that are told only and stop nothing")
     events: tuple[str, ...] = parameter(
-        (),
-        fixed=True,
-        doc="commands at times since the start, command@seconds: stop@2.5, reset@4, enable@4.1",
+        (), fixed=True, doc="commands at times since the start, command@seconds: stop@2.5, reset@4, enable@4.1"
     )
 
     def __post_init__(self) -> None:

@@ -24,10 +24,7 @@ def operation_text(values: Mapping[str, float], joint_names: tuple[str, ...] = (
     reason = fault_text(fault, values, joint_names)
     release = "release the stop, " if values["is_pressed"] else ""
     home = ", then home" if not values["is_homed"] else ""
-    cure = {
-        State.FAULT: f"; {release}reset, then enable{home}",
-        State.PAUSED: "; resume to go on",
-    }.get(state, "")
+    cure = {State.FAULT: f"; {release}reset, then enable{home}", State.PAUSED: "; resume to go on"}.get(state, "")
     return f"{text}: {reason}{cure}"
 
 

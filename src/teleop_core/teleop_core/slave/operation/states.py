@@ -70,20 +70,14 @@ _NEXT = {
     Event.FAILED: {_D: _F, _E: _F, _P: _F, _F: _F},
     Event.LAPSED: {_E: _P},
 }
-TABLE = np.array(
-    [[_NEXT[event].get(state, -1) for event in Event] for state in State], dtype=np.int64
-)
+TABLE = np.array([[_NEXT[event].get(state, -1) for event in Event] for state in State], dtype=np.int64)
 """Next state for each state and event; -1 where the event is refused."""
 
 _DONE, _ALREADY, _REFUSED = int(Answer.DONE), int(Answer.ALREADY), int(Answer.REFUSED)
 _STOPPED, _BRAKING = int(Answer.STOPPED), int(Answer.BRAKING)
 _ENABLED, _PAUSED, _FAULT = int(_E), int(_P), int(_F)
-_ENABLE, _DISABLE, _HOME, _UNHOME = (
-    int(Event.ENABLE), int(Event.DISABLE), int(Event.HOME), int(Event.UNHOME)
-)  # fmt: skip
-_RESET, _STOP, _MOVE, _ARRIVED = (
-    int(Event.RESET), int(Event.STOP), int(Event.MOVE), int(Event.ARRIVED)
-)  # fmt: skip
+_ENABLE, _DISABLE, _HOME, _UNHOME = (int(Event.ENABLE), int(Event.DISABLE), int(Event.HOME), int(Event.UNHOME))
+_RESET, _STOP, _MOVE, _ARRIVED = (int(Event.RESET), int(Event.STOP), int(Event.MOVE), int(Event.ARRIVED))
 _RESUME, _LAPSED = int(Event.RESUME), int(Event.LAPSED)
 
 

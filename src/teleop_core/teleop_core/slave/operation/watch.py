@@ -62,9 +62,7 @@ class ServerState(OperatingState):
 
 
 _REACTIONS = {Reaction.HOLD: 0, Reaction.BRAKE: 1, Reaction.PAUSE: 2, Reaction.REPORT: 3}
-_REACTION = np.array(
-    [3, *(_REACTIONS[FAULTS[fault].reaction] for fault in Fault if fault)], dtype=np.int64
-)
+_REACTION = np.array([3, *(_REACTIONS[FAULTS[fault].reaction] for fault in Fault if fault)], dtype=np.int64)
 _BRAKE, _PAUSE, _REPORT = 1, 2, 3
 _ENABLED, _PAUSED, _FAULT = int(State.ENABLED), int(State.PAUSED), int(State.FAULT)
 _DISABLED = int(State.DISABLED)
@@ -83,9 +81,7 @@ _FULL = 0.999
 
 
 @inner
-def fail(
-    p: ServerParameters, s: ServerState, fault: int, joint: int, value: float, bound: float
-) -> None:
+def fail(p: ServerParameters, s: ServerState, fault: int, joint: int, value: float, bound: float) -> None:
     """Take note of a fault, and do what it asks for; a fault in force is not overwritten."""
     reaction = _REPORT if p.reported[fault] else _REACTION[fault]
     if reaction == _REPORT:

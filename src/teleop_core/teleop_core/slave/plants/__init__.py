@@ -109,11 +109,7 @@ def _try(part: Plant) -> None:
 
 
 PLANTS: Registry[Plant] = Registry(
-    "plant",
-    "plants",
-    places("teleop_core.slave.plants", "ideal hardware"),
-    part_check("plant", Plant, "physics"),
-    _try,
+    "plant", "plants", places("teleop_core.slave.plants", "ideal hardware"), part_check("plant", Plant, "physics"), _try
 )
 """All plants by name."""
 

@@ -47,53 +47,73 @@ class HardwareParameters:
         (), unit="N·m or N", lower=0.0, doc="dry friction of each joint; empty: the robot's"
     )
     wander: tuple[float, ...] = parameter(
-        (), lower=0.0, upper=2.0,
+        (),
+        lower=0.0,
+        upper=2.0,
         doc="standard deviation of each joint's dry friction over its mean; empty: the robot's",
-    )  # fmt: skip
+    )
     bias: tuple[float, ...] = parameter(
         (), unit="N·m or N", doc="effort of each amplifier when none is asked; empty: the robot's"
     )
     play: tuple[float, ...] = parameter(
-        (), unit="rad or m", lower=0.0,
-        doc="half width of the play behind each encoder; empty: the robot's",
-    )  # fmt: skip
+        (), unit="rad or m", lower=0.0, doc="half width of the play behind each encoder; empty: the robot's"
+    )
     weights: tuple[str, ...] = parameter(
-        (),
-        fixed=True,
-        doc="symbol=value of the dynamics that the source does not state; empty: the robot's",
+        (), fixed=True, doc="symbol=value of the dynamics that the source does not state; empty: the robot's"
     )
     bristle_frequency: float = parameter(
-        250.0, unit="rad/s", lower=10.0, upper=2000.0,
+        250.0,
+        unit="rad/s",
+        lower=10.0,
+        upper=2000.0,
         doc="at which a joint swings on its friction before it slips",
         source="assumed: a joint gives by a few encoder counts before it slips",
-    )  # fmt: skip
+    )
     wander_travel: float = parameter(
-        2000.0, unit="encoder counts", lower=1.0, upper=1e7,
+        2000.0,
+        unit="encoder counts",
+        lower=1.0,
+        upper=1e7,
         doc="way on which dry friction changes as a joint slips; at rest it stays",
         source="assumed: about a turn of the motor, in which gears and bearings meet themselves",
-    )  # fmt: skip
+    )
     drive_bits: int = parameter(
-        14, lower=4, upper=32, doc="of the converter that commands the amplifier, peak to peak",
+        14,
+        lower=4,
+        upper=32,
+        doc="of the converter that commands the amplifier, peak to peak",
         source="assumed: usual for cards of analog outputs; the source names no number",
-    )  # fmt: skip
+    )
     # Faults that no source of the RCRT-1 speaks of; `teleop experiment robustness` turns them on.
     effort_delay: float = parameter(
-        0.0, unit="s", lower=0.0, upper=0.03,
+        0.0,
+        unit="s",
+        lower=0.0,
+        upper=0.03,
         doc="from the control law to the motor, beyond the tick, in whole ticks",
         source="assumed: none; buses of drives take 1 to 5 ms",
-    )  # fmt: skip
+    )
     drive_gain: float = parameter(
-        1.0, lower=0.1, upper=20.0, doc="effort of the drives over the one asked for",
+        1.0,
+        lower=0.1,
+        upper=20.0,
+        doc="effort of the drives over the one asked for",
         source="assumed: 1; torque constants are good to some 10 %",
-    )  # fmt: skip
+    )
     gear_stiffness: tuple[float, ...] = parameter(
-        (), unit="N·m/rad or N/m", lower=0.0, fixed=True,
+        (),
+        unit="N·m/rad or N/m",
+        lower=0.0,
+        fixed=True,
         doc="stiffness of each gear between motor, with its encoder, and link; 0 or empty: rigid",
-    )  # fmt: skip
+    )
     motor_inertia: tuple[float, ...] = parameter(
-        (), unit="kg·m² or kg", lower=1e-12, fixed=True,
+        (),
+        unit="kg·m² or kg",
+        lower=1e-12,
+        fixed=True,
         doc="of each motor through its gear, a part of its axis's; where gears bend. Empty: known",
-    )  # fmt: skip
+    )
 
 
 def faults_of(robot: Robot) -> Hardware:
@@ -103,10 +123,13 @@ def faults_of(robot: Robot) -> Hardware:
     assert robot.drives is not None
     zero = np.zeros(robot.n)
     return Hardware(
-        coulomb=robot.drives.coulomb, bias=zero, wander=zero, play=zero,
+        coulomb=robot.drives.coulomb,
+        bias=zero,
+        wander=zero,
+        play=zero,
         coupling=np.zeros((robot.n, robot.n)),
         sources={"coulomb": "assumed: as in the drive table"},
-    )  # fmt: skip
+    )
 
 
 def _steps(drives: Drives, bits: int) -> Array:
@@ -184,14 +207,10 @@ def _gears(robot: Robot, parameters: HardwareParameters) -> Array:
     for i in np.flatnonzero(stiffness):
         of = f"plant.hardware.gear_stiffness of {robot.joint_names[i]}"
         if links[i] <= 1e-9 * motors[i]:
-            raise ParameterError(
-                of, stiffness[i], "0: in this model its motor is all that it moves"
-            )
+            raise ParameterError(of, stiffness[i], "0: in this model its motor is all that it moves")
         most = FASTEST_GEAR**2 * motors[i] * links[i] / (motors[i] + links[i])
         if stiffness[i] > most:
-            raise ParameterError(
-                of, stiffness[i], f"<= {most:.3g}, which swings at {FASTEST_GEAR} rad/s"
-            )
+            raise ParameterError(of, stiffness[i], f"<= {most:.3g}, which swings at {FASTEST_GEAR} rad/s")
     return stiffness
 
 

@@ -51,23 +51,16 @@ class ButtonParameters(CylinderParameters):
         (0.0, 0.0, 1.0), lower=-1.0, upper=1.0, length=3, doc="upwards, of any length"
     )
     click_force: float = parameter(
-        1.0, unit="N", lower=0.01, upper=_LARGEST, doc="on the way in, where it snaps",
-        source="assumed",
-    )  # fmt: skip
-    click_travel: float = parameter(
-        2e-3, unit="m", lower=1e-4, upper=0.1, doc="way to the click", source="assumed"
+        1.0, unit="N", lower=0.01, upper=_LARGEST, doc="on the way in, where it snaps", source="assumed"
     )
+    click_travel: float = parameter(2e-3, unit="m", lower=1e-4, upper=0.1, doc="way to the click", source="assumed")
     contact_force: float = parameter(
-        0.4, unit="N", lower=0.0, upper=_LARGEST, doc="on the way in, just before the stop",
-        source="assumed",
-    )  # fmt: skip
-    stroke: float = parameter(
-        3e-3, unit="m", lower=2e-4, upper=0.1, doc="way to the stop", source="assumed"
+        0.4, unit="N", lower=0.0, upper=_LARGEST, doc="on the way in, just before the stop", source="assumed"
     )
+    stroke: float = parameter(3e-3, unit="m", lower=2e-4, upper=0.1, doc="way to the stop", source="assumed")
     hysteresis: float = parameter(
-        0.3, lower=0.0, upper=1.0, source="assumed",
-        doc="share of the spring's force that is missing on the way out",
-    )  # fmt: skip
+        0.3, lower=0.0, upper=1.0, source="assumed", doc="share of the spring's force that is missing on the way out"
+    )
 
     def __post_init__(self) -> None:
         half = min(self.radius, 0.5 * self.length)
@@ -134,9 +127,7 @@ def push_of_button(p: ButtonNumbers, s: ButtonState, depth: float) -> float:
     return spring - most + min(max(friction, -most), most)
 
 
-def count_presses(
-    depths: Array, parameters: ButtonParameters, *, is_pressed: bool
-) -> tuple[int, bool]:
+def count_presses(depths: Array, parameters: ButtonParameters, *, is_pressed: bool) -> tuple[int, bool]:
     """Count presses along a way, as :func:`follow_button` does tick by tick.
 
     Args:

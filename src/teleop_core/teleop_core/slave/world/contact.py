@@ -21,13 +21,7 @@ from teleop_core.kernels.room import room
 from teleop_core.shapes.basis.directions import NEAR, make_unit
 from teleop_core.slave.arm import Arm
 from teleop_core.slave.world.button import ButtonNumbers, ButtonState, follow_button, push_of_button
-from teleop_core.slave.world.puncture import (
-    PunctureNumbers,
-    PunctureState,
-    follow_channel,
-    puncture,
-    push_in_channel,
-)
+from teleop_core.slave.world.puncture import PunctureNumbers, PunctureState, follow_channel, puncture, push_in_channel
 
 
 class WorldNumbers(PunctureNumbers, ButtonNumbers):
@@ -182,9 +176,8 @@ def _keep_bend(p: WorldNumbers, s: ContactState, force: Array) -> None:
 
 @inner
 def _touch_at(
-    p: WorldNumbers, s: ContactState, arm: Arm, has_jacobian: bool, lever: Array, q: Array,
-    dq: Array, force: Array,
-) -> bool:  # fmt: skip
+    p: WorldNumbers, s: ContactState, arm: Arm, has_jacobian: bool, lever: Array, q: Array, dq: Array, force: Array
+) -> bool:
     """Find where one point is against the object, and write the push on it (3,) [N].
 
     Args:

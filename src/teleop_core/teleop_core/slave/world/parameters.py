@@ -35,8 +35,10 @@ MATERIALS = {
 }
 """Materials by name. All numbers are assumed: what a tip meets depends on its own size as well."""
 _USUAL: dict[str, Value] = {
-    "box.size": (0.06, 0.06, 0.03), "cylinder.radius": 0.02, "cylinder.direction": (0.0, 0.0, 1.0),
-}  # fmt: skip
+    "box.size": (0.06, 0.06, 0.03),
+    "cylinder.radius": 0.02,
+    "cylinder.direction": (0.0, 0.0, 1.0),
+}
 """Parameters of objects that are something else where nothing is said than for a fixture."""
 _FARTHEST = 3.0  # below a tip, where an object is looked for [m]
 
@@ -45,69 +47,88 @@ _FARTHEST = 3.0  # below a tip, where an object is looked for [m]
 class WorldParameters:
     """What the tip can touch."""
 
-    kind: Choice = choice(
-        WORLD_OBJECTS, "empty", fixed=True, doc="what the tip can touch", usual=_USUAL
-    )
+    kind: Choice = choice(WORLD_OBJECTS, "empty", fixed=True, doc="what the tip can touch", usual=_USUAL)
     place: tuple[float, ...] = parameter(
-        (), unit="m", lower=-10.0, upper=10.0, fixed=True,
-        doc="middle of the object in the slave's base; empty: straight below the tip of the "
-        "robot's start, gap apart",
-    )  # fmt: skip
+        (),
+        unit="m",
+        lower=-10.0,
+        upper=10.0,
+        fixed=True,
+        doc="middle of the object in the slave's base; empty: straight below the tip of the robot's start, gap apart",
+    )
     gap: float = parameter(
-        0.01, unit="m", lower=0.0, upper=1.0, fixed=True,
-        doc="between that tip and the object, if no place is given",
-    )  # fmt: skip
+        0.01, unit="m", lower=0.0, upper=1.0, fixed=True, doc="between that tip and the object, if no place is given"
+    )
     material: str = parameter(
         "tissue",
         choices=(*MATERIALS, "own"),
         doc="what it is made of; own: of the following three numbers",
         source="assumed: all five; what a tip meets depends on its own size as well",
     )
-    stiffness: float = parameter(
-        1000.0, unit="N/m", lower=1.0, upper=1e5, doc="of the surface, if the material is own"
-    )
+    stiffness: float = parameter(1000.0, unit="N/m", lower=1.0, upper=1e5, doc="of the surface, if the material is own")
     damping: float = parameter(
-        1.0, unit="s/m", lower=0.0, upper=100.0,
+        1.0,
+        unit="s/m",
+        lower=0.0,
+        upper=100.0,
         doc="share of the force per speed, if the material is own",
         source="assumed: the number; the law is that of Hunt and Crossley 1975",
-    )  # fmt: skip
+    )
     friction_coefficient: float = parameter(
         0.3, lower=0.0, upper=2.0, doc="over the normal force, if the material is own"
     )
 
     tool_points: int = parameter(
-        1, lower=1, upper=16, fixed=True,
-        doc="places where the tool touches: its tip, and others behind it along its axis, which is "
-        "z of the tip",
-    )  # fmt: skip
+        1,
+        lower=1,
+        upper=16,
+        fixed=True,
+        doc="places where the tool touches: its tip, and others behind it along its axis, which is z of the tip",
+    )
     tool_length: float = parameter(
-        0.02, unit="m", lower=1e-3, upper=1.0, fixed=True,
-        doc="from the tip to the last of several points", source="assumed",
-    )  # fmt: skip
+        0.02,
+        unit="m",
+        lower=1e-3,
+        upper=1.0,
+        fixed=True,
+        doc="from the tip to the last of several points",
+        source="assumed",
+    )
     tool_radius: float = parameter(
         0.0, unit="m", lower=0.0, upper=0.1, fixed=True, doc="of the tool at each of its points"
     )
 
     puncture_force: float = parameter(
-        0.0, unit="N", lower=0.0, upper=100.0,
-        doc="push along the normal at which the surface gives way to the tip, of any material; "
-        "0: it never does",
-    )  # fmt: skip
+        0.0,
+        unit="N",
+        lower=0.0,
+        upper=100.0,
+        doc="push along the normal at which the surface gives way to the tip, of any material; 0: it never does",
+    )
     cutting_force: float = parameter(
-        0.2, unit="N", lower=0.0, upper=100.0,
+        0.2,
+        unit="N",
+        lower=0.0,
+        upper=100.0,
         doc="push against a tip that goes deeper than before, behind a punctured surface",
         source="assumed: the number; the law is that of Okamura, Simone and O'Leary 2004",
-    )  # fmt: skip
+    )
     shaft_friction: float = parameter(
-        20.0, unit="N/m", lower=0.0, upper=1e4,
+        20.0,
+        unit="N/m",
+        lower=0.0,
+        upper=1e4,
         doc="dry friction of the needle's shaft over its depth behind a punctured surface",
         source="assumed: the number; the law is that of Okamura, Simone and O'Leary 2004",
-    )  # fmt: skip
+    )
     hole_radius: float = parameter(
-        0.002, unit="m", lower=1e-4, upper=0.1,
+        0.002,
+        unit="m",
+        lower=1e-4,
+        upper=0.1,
         doc="how near to the last hole the tip enters it again without a puncture",
         source="assumed",
-    )  # fmt: skip
+    )
 
     @property
     def made_of(self) -> Material:

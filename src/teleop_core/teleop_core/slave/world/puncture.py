@@ -40,9 +40,7 @@ class PunctureState(Fields):
 
 
 @inner
-def puncture(
-    p: PunctureNumbers, s: PunctureState, stiffness: float, push: float, offset: Array
-) -> None:
+def puncture(p: PunctureNumbers, s: PunctureState, stiffness: float, push: float, offset: Array) -> None:
     """Open the surface under the tip, if the push on it reaches the puncture force.
 
     What is left of the force at once is the cutting force, as far as the surface has stored it.
@@ -66,9 +64,7 @@ def puncture(
 
 
 @inner
-def _is_open(
-    p: PunctureNumbers, s: PunctureState, before: float, along: float, beside: float
-) -> bool:
+def _is_open(p: PunctureNumbers, s: PunctureState, before: float, along: float, beside: float) -> bool:
     """Whether a tip goes on in the channel, or is where it can enter it.
 
     Args:
@@ -89,9 +85,8 @@ def _is_open(
 
 @inner
 def follow_channel(
-    p: PunctureNumbers, s: PunctureState, stiffness: float, before: float, offset: Array,
-    normal: Array,
-) -> None:  # fmt: skip
+    p: PunctureNumbers, s: PunctureState, stiffness: float, before: float, offset: Array, normal: Array
+) -> None:
     """Measure a tip at the last hole along its channel, and let what yields take up its way.
 
     Elsewhere nothing changes: there the surface is whole.
