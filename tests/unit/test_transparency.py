@@ -60,11 +60,9 @@ def test_a_two_port_measured_through_our_hand_and_mapping_is_the_exact_one(known
 def rod(damping: float, spring: float, damper: float, world: float) -> two_port.Ports:
     """Ports of a damper at the hand, then a spring with a damper to a tip on a spring [N/m]."""
     hand = two_port.multisine(TIMES)
-    if world == 0.0:
-        tip = hand.copy()
-    else:
-        # c (x' - y') + k (x - y) = K y, so y (c s + k + K) = x (c s + k).
-        tip = lsim(([damper, spring], [damper, spring + world]), hand, TIMES)[1]
+    # A damper c and a spring k with a spring K behind them: c (x' - y') + k (x - y) = K y, so
+    # y (c s + k + K) = x (c s + k).
+    tip = lsim(([damper, spring], [damper, spring + world]), hand, TIMES)[1] if world else hand.copy()
     speed = np.gradient(hand, 1e-3, edge_order=2)
     push = -(world * tip + damping * speed)
     return two_port.Ports.of(hand, push, tip, -world * tip)
