@@ -448,3 +448,18 @@ def test_the_pads_are_at_the_tip_whatever_the_angle() -> None:
         poses = finger_poses(tip, angle, 0.04)
         pads = poses[:, :3] + 0.02 * rotations_from_quaternions(poses[:, 3:])[:, :, 2]
         np.testing.assert_allclose(pads.mean(axis=0), tip[:3], atol=1e-12)
+
+
+def test_the_goal_of_a_task_is_a_ball_where_it_is_and_as_wide(server: Server) -> None:
+    recording = tc.run("point", duration=3.0)
+    scene, view = drawn(server, RecordedLink(recording.bag), recording.duration - 0.1)
+    goal = present(scene.arms[""]._goal)
+    told = recording["task/state"]
+    row = told.values[np.searchsorted(told.log_ns, told.log_ns[0] + int(1e9 * (recording.duration - 0.1)))]
+    assert row[0] > 0.0
+    np.testing.assert_allclose(goal.position, row[2:5], atol=1e-9)
+    assert goal.scale == pytest.approx(row[5])
+    assert goal.visible
+    view.arms[""].streams["task/state"][0] = 0.0
+    scene.draw(view)
+    assert not goal.visible

@@ -2,11 +2,14 @@
 
 import math
 
+import numpy as np
 import pytest
 
 from teleop_console.link import ArmView, View
-from teleop_console.status import facts, leader, next_step, status_html
+from teleop_console.status import facts, leader, next_step, status_html, task_text
 from teleop_core.chain.operators import OPERATORS
+from teleop_core.chain.tasks import Act, Miss
+from teleop_core.graph.topics import TASK_STATE
 from teleop_core.slave.operation import State
 
 
@@ -56,3 +59,27 @@ def test_nothing_is_red_that_is_not_wrong() -> None:
     silent = view_of(State.ENABLED)
     silent.is_fresh = False
     assert "t-wrong" in status_html(silent, "wall", "run 1")
+
+
+def arm_at_a_task(**told: float) -> ArmView:
+    row = np.array([told.get(name, 0.0) for name in TASK_STATE.columns])
+    return ArmView(streams={TASK_STATE.name: row})
+
+
+def test_a_task_is_told_with_its_attempts_and_what_was_wrong_with_the_last() -> None:
+    assert task_text(ArmView()) == ""
+    assert task_text(arm_at_a_task(number=0)) == ""  # not begun
+    begun = arm_at_a_task(number=1, act=Act.PRESS)
+    assert task_text(begun) == "Task: press at the goal"
+    tried = arm_at_a_task(number=4, act=Act.GRIP, attempts=3, successes=2, time=1.24, miss=Miss.DROP)
+    assert task_text(tried) == (
+        "Task: go to the goal, jaw closed · 2 of 3 attempts reached their goal · last 1.2 s, dropped"
+    )
+
+
+@pytest.mark.parametrize("act", list(Act))
+@pytest.mark.parametrize("miss", list(Miss))
+def test_every_act_and_every_error_has_words(act: Act, miss: Miss) -> None:
+    text = task_text(arm_at_a_task(number=2, act=act, attempts=1, miss=miss))
+    assert text.startswith("Task: ")
+    assert text.endswith("s") == (miss is Miss.NONE)

@@ -59,7 +59,7 @@ class Console:
         self._failed = set[str]()
         self.panel = Panel(server.viser, link, drivers, renew, of_session)
         self.panel.settings.on_change(self.scene.retune)
-        self._visitors = Visitors(server.viser, drivers, self.scene)
+        self._visitors = Visitors(server.viser, drivers, self.scene, is_live=link.is_live)
         if link.is_live:
             server.answers.stop = self._stop
         else:

@@ -11,7 +11,7 @@ from teleop_console.cameras import corners
 from teleop_console.fixture_outlines import Look, OutlineNode, scale_of, unit_outline
 from teleop_console.jaw_nodes import JawNodes
 from teleop_console.link import Arm, ArmView, box_of
-from teleop_console.look import MEASURED, WANTED, Color
+from teleop_console.look import MEASURED, TARGET, WANTED, Color
 from teleop_console.master_nodes import MasterNodes
 from teleop_console.stand import DEVICE, PUBLISHED_AXES, REST, stand_beside
 from teleop_console.tails import LENGTH, Tail, is_jump
@@ -26,6 +26,7 @@ from teleop_core.graph.topics import (
     SLAVE_SERVO_CP,
     SLAVE_SETPOINT_CP,
     SLAVE_SETPOINT_JS,
+    TASK_STATE,
     Limit,
     Topic,
 )
@@ -40,6 +41,8 @@ Path = Callable[[Topic, str, float], tuple[Array, Array]]
 _AT = 1e-3
 """Share of a joint's range next to its end that counts as at its limit."""
 _WORK, _GRIP = 0.05, 0.1  # room on all sides of a tip and of a stylus with its handles [m]
+_GOAL = TASK_STATE.columns.index("goal_x")
+_LEAST_GOAL = 1e-3  # width of a goal as it is drawn [m]
 _TOUCH = 0.05  # force of a wall that somebody touches [N]
 
 
@@ -81,6 +84,7 @@ class ArmNodes:
         self.world = WorldNodes(server, self.path, robot)
         self.jaw = JawNodes(server, self.path)
         self.fixture = Look()
+        self._goal: viser.IcosphereHandle | None = None
         self.outline = OutlineNode(server, f"{self.path}/fixture", self._stand.quaternion)
         self._poses = self.drawn.move(start)
         self._begin: Array | None = None
@@ -156,6 +160,7 @@ class ArmNodes:
         push = view.get(SLAVE_MEASURED_CF)
         self.world.draw(self._poses[-1][:3], None if push is None else push[:3])
         self.jaw.draw(self._poses[-1], view)
+        self._draw_goal(view)
 
     def _draw_ghost(self, view: ArmView) -> None:
         """Draw the reference posture, every third time: it tells no more than where to."""
@@ -183,6 +188,21 @@ class ArmNodes:
             reference = view.get(SLAVE_SERVO_CP)
         self.measured.draw(time, None if measured is None else measured[:3])
         self.reference.draw(time, None if reference is None else reference[:3])
+
+    def _draw_goal(self, view: ArmView) -> None:
+        """Draw the goal of a task as a ball, as wide as it is."""
+        told = view.get(TASK_STATE)
+        is_there = told is not None and told[0] > 0.0
+        if self._goal is None and is_there:
+            self._goal = self._server.scene.add_icosphere(
+                f"{self.path}/goal", 0.5, TARGET, subdivisions=2, opacity=0.5, cast_shadow=False
+            )
+        if self._goal is None:
+            return
+        self._goal.visible = is_there
+        if told is not None and is_there:
+            self._goal.position = told[_GOAL : _GOAL + 3]
+            self._goal.scale = max(float(told[_GOAL + 3]), _LEAST_GOAL)
 
     def _draw_fixture(self, view: ArmView, *, is_touched: bool) -> None:
         """Draw the fixture around the slave, which is told, and its image around the hand."""

@@ -25,6 +25,7 @@ from teleop_core.graph.topics import (
     SLAVE_MEASURED_JS,
     SLAVE_OPERATION,
     STREAMS,
+    TASK_STATE,
     TELEOP_STATE,
     Topic,
 )
@@ -45,6 +46,7 @@ _KEPT = (
     SLAVE_JAW_BOARD,
     MASTER_ENERGY,
     SLAVE_ENERGY,
+    TASK_STATE,
 )
 
 

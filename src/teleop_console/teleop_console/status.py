@@ -5,6 +5,8 @@ import math
 
 from teleop_console.answers import Situation
 from teleop_console.link import ArmView, View
+from teleop_core.chain.tasks import Act, Miss
+from teleop_core.graph.topics import TASK_STATE
 from teleop_core.slave.operation import Fault, State
 
 _SIGNALS = {State.ENABLED: "good", State.PAUSED: "held", State.DISABLED: "idle", State.FAULT: "wrong"}
@@ -14,6 +16,19 @@ _PRESSED = (
 )
 _RELEASED = "Released; the arms stay in FAULT. Next: press Initialize, which resets and homes them."
 _NEWS = 4  # lines
+_ASKED = {
+    Act.PRESS: "press at the goal",
+    Act.PASS: "be at the goal",
+    Act.GRIP: "go to the goal, jaw closed",
+    Act.LET_GO: "go to the goal, jaw open",
+}
+_MISSED = {
+    Miss.BESIDE: "beside it",
+    Miss.LATE: "too late",
+    Miss.FORCE: "too hard",
+    Miss.DROP: "dropped",
+    Miss.WRONG: "on the wrong goal",
+}
 RESTS = "nobody holds the stylus"
 """How nodes of a hand end the line that says that it rests."""
 
@@ -105,6 +120,21 @@ def fixture_text(arm: ArmView) -> str:
     return ("on" if arm.state["is_fixture_on"] else "off") if arm.state else ""
 
 
+def task_text(arm: ArmView) -> str:
+    """What the task asks for, and what came of it so far; empty without one."""
+    told = arm.get(TASK_STATE)
+    if told is None or told[0] <= 0.0:
+        return ""
+    task = dict(zip(TASK_STATE.columns, told.tolist(), strict=True))
+    text = f"Task: {_ASKED[Act(int(task['act']))]}"
+    tried, done = int(task["attempts"]), int(task["successes"])
+    if not tried:
+        return text
+    last = Miss(int(task["miss"]))
+    ended = f"last {task['time']:.1f} s" + (f", {_MISSED[last]}" if last in _MISSED else "")
+    return f"{text} · {done} of {tried} attempts reached their goal · {ended}"
+
+
 def status_html(view: View, title: str, doing: str, step: str = "") -> str:
     """State of every arm, mode, the next step, what is being done, and warnings."""
     lines = [line for name, arm in view.arms.items() for line in _arm_lines(view, name, arm)]
@@ -138,4 +168,6 @@ def _arm_lines(view: View, name: str, arm: ArmView) -> list[str]:
     if arm.state:
         hand = "clutched" if arm.state["is_clutched"] else "follows"
         lines.append(f"{mode_text(arm)} · {hand} · fixture {fixture_text(arm)}")
+    if task := task_text(arm):
+        lines.append(task)
     return lines

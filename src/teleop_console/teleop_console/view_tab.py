@@ -137,10 +137,11 @@ class Visitors:
         server: The page.
         drivers: Who drives.
         scene: What is seen.
+        is_live: Whether it is a session, and not a recording.
     """
 
-    def __init__(self, server: viser.ViserServer, drivers: Drivers, scene: Scene) -> None:
-        self._server, self._drivers, self._scene = server, drivers, scene
+    def __init__(self, server: viser.ViserServer, drivers: Drivers, scene: Scene, *, is_live: bool) -> None:
+        self._server, self._drivers, self._scene, self._is_live = server, drivers, scene, is_live
         self._lines: dict[int, viser.GuiHtmlHandle] = {}
         self._fitted: dict[int, tuple[float, float]] = {}  # since when, for which picture
 
@@ -148,7 +149,7 @@ class Visitors:
         """Welcome who has come, and tell everybody whether he drives or watches."""
         clients = self._server.get_clients()
         for number, client in clients.items():
-            text = f'<p class="t-role">{self._drivers.role(number)}</p>'
+            text = f'<p class="t-role">{self._role(number)}</p>'
             self._fit(number, client)
             if number not in self._lines:
                 self._lines[number] = client.gui.add_html(text, order=-10.0)
@@ -156,6 +157,11 @@ class Visitors:
                 self._lines[number].content = text
         for number in self._lines.keys() - clients.keys():
             del self._lines[number], self._fitted[number]
+
+    def _role(self, number: int) -> str:
+        if self._is_live:
+            return self._drivers.role(number)
+        return f"replay: {'you play it' if self._drivers.may_drive(number) else 'another page plays it'}"
 
     def _fit(self, number: int, client: viser.ClientHandle) -> None:
         """Show the whole to who has come, again where the window finds its size a moment later."""

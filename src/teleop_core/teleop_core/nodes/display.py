@@ -19,6 +19,7 @@ from teleop_core.graph.topics import (
     SLAVE_MEASURED_JS,
     SLAVE_SERVO_CP,
     SLAVE_SETPOINT_JS,
+    TASK_STATE,
     Topic,
 )
 from teleop_core.nodes.base import CoreNode
@@ -27,7 +28,7 @@ from teleop_core.nodes.newest import Cadence, Newest
 SEEN = (
     MASTER_MEASURED_CP, MASTER_MEASURED_CF, SLAVE_SERVO_CP, SLAVE_SETPOINT_JS, SLAVE_MEASURED_JS,
     SLAVE_MEASURED_CP, SLAVE_MEASURED_CF, SLAVE_JAW_MEASURED_JS, SLAVE_JAW_OBJECT_CP,
-    SLAVE_JAW_BOARD, MASTER_ENERGY, SLAVE_ENERGY,
+    SLAVE_JAW_BOARD, MASTER_ENERGY, SLAVE_ENERGY, TASK_STATE,
 )  # fmt: skip
 """Streams that are said again."""
 PERIOD_NS = 25_000_000
