@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 import teleop_core as tc
 from teleop_core.chain.operators.observer import AHEAD, Observer, ObserverParameters
 from teleop_core.chain.operators.parameters import OperatorParameters
+from teleop_core.chain.tasks import Act
 from teleop_core.graph.signals import STATE
 from teleop_core.graph.topics import TASK_STATE
 
@@ -68,6 +69,27 @@ def test_a_smaller_target_takes_longer_and_so_does_a_farther_one() -> None:
     )
     assert far > near
     assert small > near
+
+
+@pytest.mark.parametrize("lag", [0.02, 0.2])
+def test_a_goal_that_is_suddenly_elsewhere_is_not_run_after_as_one_that_moves(lag: float) -> None:
+    seen = tc.Seen(np.zeros(7), np.zeros(7), np.zeros(6), np.zeros(len(STATE)), np.zeros(len(COLUMN)))
+    seen.slave[3] = seen.state[STATE["gain"]] = 1.0
+    p = ObserverParameters(fastest=10.0, noise=0.0, axes=("+x", "+y", "+z"))
+    person = Observer(p, tc.Setting(OperatorParameters(), np.zeros((6, 4)), 1, seen))
+    begins, way, late = np.array([0.3, -0.2, 0.0]), 0.1, round(lag / TICK)
+    pointer, went = deque([begins] * (late + 1), maxlen=late + 1), list[float]()
+    seen.task[COLUMN["number"]], seen.task[COLUMN["act"]], seen.task[COLUMN["width"]] = 1.0, Act.PASS, 0.01
+    goal = seen.task[COLUMN["goal_x"] : COLUMN["goal_x"] + 3]
+    goal[:] = begins
+    for tick in range(0, 4000, AHEAD):
+        goal[0] = begins[0] + (way if tick > 1000 else 0.0)
+        seen.slave[:3] = pointer[0]
+        for row in person(np.arange(tick + 1, tick + 1 + AHEAD, dtype=np.float64) * TICK):
+            pointer.append(begins + row[:3])
+            went.append(row[0])
+    assert max(went) < way + 0.005
+    assert went[-1] == pytest.approx(way, abs=0.005)
 
 
 def test_nobody_moves_without_a_goal() -> None:

@@ -297,8 +297,13 @@ class Observer:
             self._holds, self._turn = act == Act.GRIP, when
 
     def _speed_of_goal(self) -> Array:
-        """Velocity of the goal (3,) [m/s] as it is seen."""
-        first, last = self._glances[0], self._glances[-1]
+        """Velocity of the goal (3,) [m/s] as it is seen, since it last jumped to another place."""
+        glances = self._glances
+        first = last = glances[-1]
+        for glance in reversed(glances):
+            if float(length(first.goal - glance.goal)) > self._seen.task[_WIDTH]:
+                break
+            first = glance
         return (last.goal - first.goal) / max(last.time - first.time, 1e-9)
 
 
