@@ -6,7 +6,7 @@ import numpy as np
 
 from teleop_core.graph.row import Row
 from teleop_core.graph.signals import make_signals
-from teleop_core.graph.topics import BY_NAME
+from teleop_core.graph.topics import BY_NAME, PORTS_BETWEEN_ARMS
 from teleop_core.kernels.fields import Fields, IntegerPerJoint, PerJoint, Vector3, fields_of, record
 from teleop_core.kernels.geometry import Array
 
@@ -44,6 +44,6 @@ def test_a_field_that_two_bases_name_is_there_once() -> None:
 
 
 def test_the_row_names_each_field_of_each_topic_and_no_other() -> None:
-    topics = [topic for topic in BY_NAME.values() if topic.width(1)]
+    topics = [topic for topic in (*BY_NAME.values(), *PORTS_BETWEEN_ARMS) if topic.width(1)]
     made = make_signals(topics, 1, (("answered_ns", "i8"),))
     assert {name for name, *_ in fields_of(Row)} == set(made.dtype.names)
