@@ -13,7 +13,7 @@ def main() -> None:
         {"display.latency": (0.033, 0.333), "coarse_gain": (0.5, 1.0)},
         seeds=(1, 2),
         metrics=("task.time_s", "task.error_share"),
-        settings={"teleop.duration": 8.0},
+        settings={"teleop.duration": 16.0},
     )
     with TemporaryDirectory() as folder:
         store = Path(folder) / "delay"
