@@ -4,11 +4,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import pytest
 
 from teleop_core.bags.reader import Bag
 from teleop_core.bags.transforms import TF
 from teleop_core.graph import topics
 from teleop_core.robots import load_robot
+from teleop_core.session.configuration import configure
 
 if TYPE_CHECKING:
     from peers import AnyPeer as Peer
@@ -47,3 +49,31 @@ def test_a_recorder_in_a_namespace_records_the_topics_of_its_arm(peer: "Peer", t
     shared = {topics.DIAGNOSTICS.name, TF.name}
     assert all(name.startswith("left/") for name in {*bag.topics} - shared)
     assert (bag.read(LEFT_MASTER).values == REST).all()
+
+
+@pytest.mark.slow
+def test_nodes_of_two_arms_hand_a_block_from_jaw_to_jaw(peer: "Peer", tmp_path: Path) -> None:
+    given = [
+        "teleop.arms=[left, right]", "jaw_sim.second_base=[0.0, -0.03, 0.0]",
+        f"left/operator.tour.points={[0.0, 0.0, 0.02, 0.0, -0.03, 0.02, *[0.0, 0.0, 0.02] * 4]}",
+        "left/operator.buttons.jaw=[5.3, 9.5]",
+        f"right/operator.tour.points={[0.0, 0.0, 0.0, -0.03, 0.0, 0.0, *[-0.03, 0.0, 0.02] * 2, *[0.0, 0.0, 0.02] * 2]}",
+        "right/operator.buttons.jaw=[8.5, 14.0]",
+    ]  # fmt: skip
+    first, second = topics.SLAVE_JAW_GRIP, topics.SLAVE_JAW_GRIP.of_arm("right")
+    grips = {topic: peer.listen(topic) for topic in (first, second)}
+    taken = first.columns.index("is_gripped")
+
+    def is_handed_over() -> bool:
+        for listener in grips.values():
+            listener.take()
+        rows = [listener.values[-1] for listener in grips.values() if len(listener.values)]
+        return len(rows) == 2 and not rows[0][taken] and bool(rows[1][taken])
+
+    bag = peer.run(configure("pick", settings=given), is_handed_over, tmp_path / "bag")
+    for topic in (first, second):
+        told = bag.read(topic).values
+        assert told[-1, first.columns.index("grips")] == 1.0
+        assert told[-1, first.columns.index("drops")] == 0.0
+    board = bag.read(topics.SLAVE_JAW_BOARD.of_arm("right")).values
+    assert board[-1, 5] > board[0, 5] + 0.01, "the block is not in the air"
