@@ -53,13 +53,15 @@ def test_a_recorder_in_a_namespace_records_the_topics_of_its_arm(peer: "Peer", t
 
 @pytest.mark.slow
 def test_nodes_of_two_arms_hand_a_block_from_jaw_to_jaw(peer: "Peer", tmp_path: Path) -> None:
+    still, lifted = [0.0, 0.0, 0.02], [-0.03, 0.0, 0.02]
     given = [
-        "teleop.arms=[left, right]", "jaw_sim.second_base=[0.0, -0.03, 0.0]",
-        f"left/operator.tour.points={[0.0, 0.0, 0.02, 0.0, -0.03, 0.02, *[0.0, 0.0, 0.02] * 4]}",
+        "teleop.arms=[left, right]",
+        "jaw_sim.second_base=[0.0, -0.03, 0.0]",
+        f"left/operator.tour.points={[*still, 0.0, -0.03, 0.02, *still * 4]}",
         "left/operator.buttons.jaw=[5.3, 9.5]",
-        f"right/operator.tour.points={[0.0, 0.0, 0.0, -0.03, 0.0, 0.0, *[-0.03, 0.0, 0.02] * 2, *[0.0, 0.0, 0.02] * 2]}",
+        f"right/operator.tour.points={[0.0, 0.0, 0.0, -0.03, 0.0, 0.0, *lifted * 2, *still * 2]}",
         "right/operator.buttons.jaw=[8.5, 14.0]",
-    ]  # fmt: skip
+    ]
     first, second = topics.SLAVE_JAW_GRIP, topics.SLAVE_JAW_GRIP.of_arm("right")
     grips = {topic: peer.listen(topic) for topic in (first, second)}
     taken = first.columns.index("is_gripped")
