@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from geometry_msgs.msg import PoseStamped, WrenchStamped
 from sensor_msgs.msg import JointState
+from std_msgs.msg import Empty
 
 from stock_client import MIDDLE, StockClient, crtk
 from teleop_core.kernels.geometry import Array, framed_wrenches
@@ -91,3 +92,21 @@ def test_a_disabled_master_pushes_with_no_force(peer: "Peer") -> None:
     client.reaches(("ENABLED", True, False))
     client.send("state_command", crtk.StringStamped(string="disable"))
     client.reaches(("DISABLED", True, False))
+
+
+def test_speeds_end_with_the_messages_and_hold_ends_a_move(client: StockClient) -> None:
+    before = client.joints()
+
+    def is_driven() -> bool:
+        client.send("servo_jv", JointState(velocity=[0.05, 0.0, 0.0, 0.0, 0.0, 0.0]))
+        return bool(client.joints()[0] > before[0])
+
+    client.wait(is_driven, "motion")
+    status = client.peer.status
+    client.peer.wait(lambda: status("slave").values["motion"] == "nothing", "rest")
+    goal = [*MIDDLE[:2], 0.02, *MIDDLE[3:]]
+    client.send("move_jp", JointState(position=goal))
+    client.reaches(("ENABLED", True, True))
+    client.send("hold", Empty())
+    client.reaches(("ENABLED", True, False))
+    assert client.joints()[2] > goal[2] + 0.001

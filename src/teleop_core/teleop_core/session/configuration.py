@@ -5,10 +5,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from teleop_core.base.errors import ParameterError, PartError, UnknownNameError
 from teleop_core.base.parameters import build, specs, values_of
+from teleop_core.base.plain_yaml import written
 from teleop_core.chain.architectures import ARCHITECTURES
 from teleop_core.chain.architectures.impedance import IMPEDANCE
 from teleop_core.chain.operators import OPERATORS
@@ -89,13 +88,16 @@ class Configuration:
 
     def text(self) -> str:
         """All values as a ROS 2 parameter file, which :func:`parse_layer` reads back."""
-        plain = {
+        return written(self.content())
+
+    def content(self) -> dict[str, Any]:
+        """The same as mappings, lists and plain values, by nodes."""
+        return {
             name: {
                 "ros__parameters": {k: (list(v) if isinstance(v, tuple) else v) for k, v in values_of(group).items()}
             }
             for name, group in self.groups.items()
         }
-        return yaml.safe_dump(plain, sort_keys=False, allow_unicode=True)
 
 
 _SHARED = ("seed", "device.workspace", "device.start")

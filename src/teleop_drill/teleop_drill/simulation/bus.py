@@ -86,13 +86,6 @@ class Bus:
         self._orders += 1
         return self._orders
 
-    def offset_of(self, process: Process) -> int:
-        """What the clock of the middleware of a process is ahead of time [ns].
-
-        A clock that the drill steps is that of Python alone.
-        """
-        return process.machine.epoch_ns(process.machine.clock)
-
     def watch(self, process: Process) -> None:
         """Take part in the life of a process."""
         self._born_ns[process] = self.scheduler.now_ns

@@ -47,7 +47,7 @@ class Writer:
     ) -> None:
         self._bus, self.process, self.node, self.topic, self.qos = bus, process, node, topic, qos
         self._encode = encode
-        self.sender, self.born_ns = bus.next_gid(), bus.scheduler.now_ns
+        self.sender, self.born_ns, self._clock = bus.next_gid(), bus.scheduler.now_ns, process.machine.clock
         self.number, self.is_open, self.is_active = 0, True, True
         self.links: list[Link] = []
         self.history: deque[Taken] = deque(maxlen=None if qos.keeps_all else qos.depth)
@@ -61,10 +61,10 @@ class Writer:
         if not (self.is_active and self.is_open):
             return
         bus = self._bus
-        bus.scheduler.charge(_PUBLISH_NS)
+        bus.scheduler.now_ns = now_ns = bus.scheduler.now_ns + _PUBLISH_NS
         self.number += 1
-        now_ns = bus.scheduler.now_ns
-        taken = Taken(data, self.sender, self.number, now_ns + bus.offset_of(self.process), 0)
+        # The middleware reads the machine's clock: one that the drill steps is Python's alone.
+        taken = Taken(data, self.sender, self.number, now_ns + self._clock.ahead_ns(now_ns), 0)
         self.history.append(taken)
         if self.topic in bus.seen:
             bus.seen[self.topic](taken)
@@ -107,16 +107,17 @@ class Reader:
     def take(self) -> Taken | None:
         """Oldest waiting message; None if there is none."""
         scheduler = self._bus.scheduler
-        scheduler.charge(_TAKE_NS)
+        scheduler.now_ns = now_ns = scheduler.now_ns + _TAKE_NS
         coming, ready = self.coming, self._ready
-        while coming and coming[0][0] <= scheduler.now_ns:
+        while coming and coming[0][0] <= now_ns:
             ready.append(coming.popleft())
         if not ready or not self.is_open:
             return None
         came_ns, _, taken = ready.popleft()
         if self.topic in self._bus.heard:
             self._bus.heard[self.topic](self, taken)
-        return taken._replace(came_ns=came_ns + self._bus.offset_of(self.process))
+        data, sender, number, sent_ns, _ = taken
+        return Taken(data, sender, number, sent_ns, came_ns + self.process.machine.clock.ahead_ns(now_ns))
 
     def wait(self, seconds: float) -> None:
         """Return when there is a message, or after some time [s]."""

@@ -37,7 +37,8 @@ class SimulatedWorld:
 
     def time_ns(self) -> int:
         """Time of the system's clock [ns]."""
-        return self._scheduler.look_ns() + self.process.machine.epoch_ns(self.process.clock)
+        now_ns = self._scheduler.look_ns()
+        return now_ns + self.process.clock.ahead_ns(now_ns)
 
     def lock(self) -> Lock:
         """Lock between threads."""
