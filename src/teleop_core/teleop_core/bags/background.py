@@ -53,7 +53,6 @@ class Background(Protocol):
             OSError: The disk does not.
         """
 
-
     def sync(self, file: BinaryIO) -> None:
         """Wait until what was written is on the disk.
 

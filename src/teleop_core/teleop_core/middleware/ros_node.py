@@ -112,11 +112,19 @@ class RosNode:
 
     def publishers(self, name: str) -> list[Endpoint]:
         """Publishers of a topic that were found."""
-        return [
-            Endpoint(
-                f"{info.node_namespace.rstrip('/')}/{info.node_name}",
-                bytes(info.endpoint_gid),
-                info.qos_profile.durability == DurabilityPolicy.TRANSIENT_LOCAL,
-            )
-            for info in self.own.get_publishers_info_by_topic(name)
-        ]
+        return [_endpoint(info) for info in self.own.get_publishers_info_by_topic(name)]
+
+    def readers(self, name: str) -> list[Endpoint]:
+        """Readers of a topic that were found."""
+        return [_endpoint(info) for info in self.own.get_subscriptions_info_by_topic(name)]
+
+
+def _endpoint(info: Any) -> Endpoint:
+    """What rclpy tells of one."""
+    return Endpoint(
+        f"{info.node_namespace.rstrip('/')}/{info.node_name}",
+        bytes(info.endpoint_gid),
+        info.topic_type,
+        info.qos_profile.reliability == ReliabilityPolicy.RELIABLE,
+        info.qos_profile.durability == DurabilityPolicy.TRANSIENT_LOCAL,
+    )
