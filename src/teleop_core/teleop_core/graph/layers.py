@@ -102,13 +102,15 @@ def config_folder() -> Path:
     return prefix if prefix.is_dir() else package.parent / "config"
 
 
+def _scenarios() -> dict[str, Path]:
+    """Names of the scenarios to their files."""
+    return {path.stem: path for path in sorted(config_folder().glob("*.yaml")) if path.stem != "teleop"}
+
+
 def list_scenarios() -> dict[str, str]:
     """Names of the scenarios to their descriptions."""
-    found = {}
-    for path in sorted(config_folder().glob("*.yaml")):
-        if path.stem != "teleop":
-            found[path.stem] = str(load_file(path).get("teleop", {}).get("description", ""))
-    return found
+    files = _scenarios().items()
+    return {name: str(load_file(path).get("teleop", {}).get("description", "")) for name, path in files}
 
 
 def scenario_file(name: str) -> Path:
@@ -117,10 +119,10 @@ def scenario_file(name: str) -> Path:
     Raises:
         UnknownNameError: No such scenario; the alternatives are listed.
     """
-    scenarios = list_scenarios()
-    if name not in scenarios:
-        raise UnknownNameError("scenario", name, scenarios)
-    return config_folder() / f"{name}.yaml"
+    files = _scenarios()
+    if name not in files:
+        raise UnknownNameError("scenario", name, files)
+    return files[name]
 
 
 def load_file(path: Path) -> Layer:
