@@ -9,10 +9,9 @@ import numpy as np
 from hypothesis import strategies as st
 from hypothesis.strategies import SearchStrategy
 
-from teleop_core.base.errors import ParameterError
+from teleop_core.base import ParameterError
 from teleop_core.chain.fixtures import Fixture, Held, fixture_depth
-from teleop_core.kernels import kernel
-from teleop_core.kernels.geometry import Array
+from teleop_core.kernels import Array, kernel
 from teleop_core.shapes import SHAPES
 from teleop_core.shapes.box import BoxParameters
 from teleop_core.shapes.capsule import CapsuleParameters

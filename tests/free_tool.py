@@ -8,9 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from led_tip import DT, PIECES, needle
-from teleop_core.kernels import kernel, pointer
-from teleop_core.kernels.fields import record, record_array
-from teleop_core.kernels.geometry import Array
+from teleop_core.kernels import Array, kernel, pointer, record, record_array
 from teleop_core.robots.drives import ACCELERATION
 from teleop_core.shapes.hole import HoleParameters
 from teleop_core.slave.joints import integrate

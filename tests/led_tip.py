@@ -5,9 +5,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from teleop_core.kernels import kernel, pointer
-from teleop_core.kernels.fields import fields_of, record, record_array
-from teleop_core.kernels.geometry import Array
+from teleop_core.kernels import Array, fields_of, kernel, pointer, record, record_array
 from teleop_core.robots.kinematics import FK
 from teleop_core.slave.simulation import SimulationNumbers
 from teleop_core.slave.world import WORLD_OBJECTS

@@ -9,8 +9,7 @@ from scipy.spatial.transform import Rotation
 from teleop_core.bags.reader import Bag
 from teleop_core.bags.reports import report
 from teleop_core.bags.writer import BagWriter
-from teleop_core.graph import topics
-from teleop_core.graph.signals import STATE_FIELDS, TICK_NS
+from teleop_core.graph import STATE_FIELDS, TICK_NS, topics
 from teleop_core.kernels.geometry import Array
 
 JOINTS = tuple(f"joint_{i}" for i in range(1, 7))

@@ -20,7 +20,6 @@ from teleop_core.bags.reports import report
 from teleop_core.bags.series import kind_of
 from teleop_core.bags.writer import BagWriter
 from teleop_core.graph import topics
-from teleop_core.graph.topics import Kind
 
 TOPICS = (topics.SLAVE_MEASURED_CP, topics.SLAVE_SERVO_JP, topics.TELEOP_STATE)
 MS = 1_000_000
@@ -49,7 +48,7 @@ def read_all(path: Path) -> None:
     for name, info in bag.topics.items():
         kind = kind_of(name, info.type)
         if info.count and kind is not None:
-            bag.reports(name) if kind is Kind.REPORT else bag.read(name)
+            bag.reports(name) if kind is topics.Kind.REPORT else bag.read(name)
     for _ in bag.raw():
         pass
 

@@ -10,12 +10,10 @@ import pytest
 from numpy.typing import NDArray
 
 from teleop_core.bags.reader import Bag
-from teleop_core.base.errors import PartError
-from teleop_core.base.parameters import NoParameters, build, parameter
+from teleop_core.base import NoParameters, PartError, build, parameter
 from teleop_core.chain.mapping.parameters import MotionScalingParameters
 from teleop_core.chain.operators import register_operator
-from teleop_core.graph.signals import STATE, TICK_NS
-from teleop_core.graph.stage import Stage, register_stage
+from teleop_core.graph import STATE, TICK_NS, Stage, register_stage
 from teleop_core.graph.topics import (
     MASTER_MEASURED_CP,
     SLAVE_MEASURED_CP,
@@ -25,8 +23,7 @@ from teleop_core.graph.topics import (
     Topic,
     passed_on,
 )
-from teleop_core.kernels import kernel
-from teleop_core.kernels.geometry import Array
+from teleop_core.kernels import Array, kernel
 from teleop_core.robots import load_robot
 from teleop_core.session.configuration import configure
 from teleop_core.session.runner import simulate

@@ -8,12 +8,10 @@ import pytest
 from numpy.typing import NDArray
 
 import teleop_core as tc
-from teleop_core.base.errors import PartError, UnknownNameError
-from teleop_core.base.parameters import build
+from teleop_core.base import PartError, UnknownNameError, build
 from teleop_core.chain.mapping.parameters import MotionScalingParameters
-from teleop_core.graph.signals import STATE
-from teleop_core.kernels import kernel
-from teleop_core.kernels.geometry import Array
+from teleop_core.graph import STATE
+from teleop_core.kernels import Array, kernel
 from teleop_core.session.configuration import configure
 from teleop_core.session.virtual import VirtualTime
 

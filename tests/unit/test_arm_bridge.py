@@ -12,8 +12,7 @@ import pytest
 import yaml
 
 from present import present
-from teleop_core.base.errors import ParameterError
-from teleop_core.base.parameters import build
+from teleop_core.base import ParameterError, build
 from teleop_core.robots import load_robot
 from teleop_core.session.configuration import configure
 from teleop_core.slave.bridges import BRIDGES, Command

@@ -28,10 +28,8 @@ from teleop_core.bags.messages import layout, report
 from teleop_core.bags.reader import Bag
 from teleop_core.bags.recording import RecordingParameters
 from teleop_core.bags.writer import BagWriter
-from teleop_core.base.errors import ParameterError, RecordingError, ShapeError, UnknownNameError
-from teleop_core.base.parameters import build
+from teleop_core.base import ParameterError, RecordingError, ShapeError, UnknownNameError, build
 from teleop_core.graph import topics
-from teleop_core.graph.topics import Topic
 from teleop_core.kernels.geometry import Array
 
 JOINTS = ("a", "b", "c")
@@ -46,7 +44,7 @@ def rng() -> np.random.Generator:
 
 def block(
     rng: Any, begin: int, count: int, chosen: Any = topics.STREAMS
-) -> dict[Topic, tuple[NDArray[np.int64], Array, NDArray[np.int64]]]:
+) -> dict[topics.Topic, tuple[NDArray[np.int64], Array, NDArray[np.int64]]]:
     """Samples of one block; stamps lie a little before log times."""
     log_ns = np.arange(begin, begin + count) * MS + 10
     return {

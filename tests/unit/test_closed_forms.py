@@ -24,8 +24,7 @@ from random_arms import (
     wrist_axes,
 )
 from real_arms import urdf_of
-from teleop_core.kernels import kernel
-from teleop_core.kernels.geometry import Array
+from teleop_core.kernels import Array, kernel
 from teleop_core.robots import IkStatus, load_robot
 from teleop_core.robots.arms.as_chain import chain_of
 from teleop_core.robots.branches import turn

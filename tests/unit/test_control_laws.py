@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 from present import present
-from teleop_core.base.errors import ParameterError, PartError
-from teleop_core.base.parameters import build
-from teleop_core.graph.signals import TICK_NS
+from teleop_core.base import ParameterError, PartError, build
+from teleop_core.graph import TICK_NS
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot
 from teleop_core.robots.robot import Robot

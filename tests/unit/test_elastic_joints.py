@@ -7,11 +7,9 @@ import numpy as np
 import pytest
 
 from present import present
-from teleop_core.base.errors import ParameterError
-from teleop_core.base.parameters import build
-from teleop_core.graph.signals import DT, TICK_NS
-from teleop_core.kernels import kernel
-from teleop_core.kernels.geometry import Array
+from teleop_core.base import ParameterError, build
+from teleop_core.graph import DT, TICK_NS
+from teleop_core.kernels import Array, kernel
 from teleop_core.robots import load_robot
 from teleop_core.slave.elastic import integrate_elastic
 from teleop_core.slave.plants.hardware import faults_of

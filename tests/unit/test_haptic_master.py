@@ -13,8 +13,7 @@ from scipy.signal import periodogram
 from scipy.spatial.transform import Rotation
 
 from held_master import HeldMaster
-from teleop_core.base.errors import ParameterError
-from teleop_core.base.parameters import build
+from teleop_core.base import ParameterError, build
 from teleop_core.chain.master.device import DeviceParameters
 from teleop_core.chain.master.hand_mechanics import HandParameters
 from teleop_core.chain.master.haptic_master import HapticMaster, HapticMasterParameters
@@ -22,8 +21,7 @@ from teleop_core.chain.operators import OPERATORS, Setting, register_operator
 from teleop_core.chain.operators.parameters import ButtonParameters, OperatorParameters
 from teleop_core.chain.operators.rest import REST_POSITION, REST_TILT
 from teleop_core.chain.operators.shapes import PHASES
-from teleop_core.kernels import records
-from teleop_core.kernels.geometry import Array
+from teleop_core.kernels import Array, records
 
 RESOLUTION, NOISE, PEAK = 0.055e-3, 2e-3, 3.3
 REST = Rotation.from_euler("x", REST_TILT)

@@ -9,12 +9,9 @@ import pytest
 from numpy.typing import NDArray
 from scipy.signal import lsim
 
-from teleop_core.base.errors import ParameterError, PartError
-from teleop_core.base.parameters import build
+from teleop_core.base import ParameterError, PartError, build
 from teleop_core.chain.architectures.impedance import IMPEDANCE, ImpedanceParameters
-from teleop_core.graph.graph import Graph, build_graph
-from teleop_core.graph.signals import TICK_NS
-from teleop_core.graph.topics import NO_COMMAND_NS
+from teleop_core.graph import TICK_NS, Graph, build_graph, topics
 from teleop_core.kernels.geometry import Array
 from teleop_core.session.configuration import configure
 from teleop_core.session.virtual import VirtualTime
@@ -40,7 +37,7 @@ def slave(**values: float) -> tuple[Any, Callable[..., float]]:
     """A stage at work, and a call that gives it a command after some ticks: where the tip goes."""
     stage = IMPEDANCE.run(build(ImpedanceParameters, values))
     row = stage.signals
-    row["slave_setpoint_cp_ns"] = NO_COMMAND_NS + 1
+    row["slave_setpoint_cp_ns"] = topics.NO_COMMAND_NS + 1
 
     def command(
         force: float = 0.0, lead: float = 0.0, ticks: int = 1, place: tuple[float, float, float] = (0.1, 0.2, 0.3)
@@ -101,7 +98,7 @@ def test_a_slave_that_goes_its_own_way_gathers_none_and_loses_what_it_had_withou
     row, command = slave()
     for _ in range(1000):
         command(-2.0)
-    row["slave_setpoint_cp_ns"] = NO_COMMAND_NS
+    row["slave_setpoint_cp_ns"] = topics.NO_COMMAND_NS
     ways = np.array([command(-2.0) for _ in range(1500)])
     assert np.abs(np.diff(ways)).max() < 2e-3 * 1e-3 * 50.0  # 2 mm over 20 ms
     assert np.all(np.diff(ways) > 0.0)

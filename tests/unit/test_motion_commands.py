@@ -12,10 +12,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from present import present
-from teleop_core.base.errors import ShapeError
-from teleop_core.base.parameters import build
-from teleop_core.graph.signals import DT, TICK_NS
-from teleop_core.graph.topics import NO_COMMAND_NS
+from teleop_core.base import ShapeError, build
+from teleop_core.graph import DT, TICK_NS, topics
 from teleop_core.kernels.geometry import Array, rotation, transform
 from teleop_core.robots import load_robot
 from teleop_core.robots.robot import Robot
@@ -327,10 +325,10 @@ def test_a_move_takes_over_from_a_stream_which_is_followed_again_afterwards(benc
 def test_after_a_move_no_command_is_in_force(bench: Bench) -> None:
     bench.follow(MIDDLE)
     bench.run(1)
-    assert bench.slave.signals["slave_setpoint_js_ns"] > NO_COMMAND_NS
+    assert bench.slave.signals["slave_setpoint_js_ns"] > topics.NO_COMMAND_NS
     bench.motion.move(MIDDLE + SMALL)
     bench.run(2000)
-    assert bench.slave.signals["slave_setpoint_js_ns"] == NO_COMMAND_NS
+    assert bench.slave.signals["slave_setpoint_js_ns"] == topics.NO_COMMAND_NS
     np.testing.assert_array_equal(bench.setpoint, MIDDLE + SMALL)
 
 

@@ -7,12 +7,11 @@ import numpy as np
 import pytest
 
 from scaling_desk import ANY_HAND, HOME, MM, Desk
-from teleop_core.base.parameters import build
+from teleop_core.base import build
 from teleop_core.chain.mapping import motion_scaling
 from teleop_core.chain.mapping.parameters import FixtureParameters, MotionScalingParameters
 from teleop_core.chain.operators.rest import REST_POSITION, REST_TILT
-from teleop_core.graph.signals import TICK_NS
-from teleop_core.graph.topics import NO_COMMAND_NS
+from teleop_core.graph import TICK_NS, topics
 from teleop_core.kernels.geometry import Array, quaternion_from_rotation, rotation, rotation_from_quaternion
 
 DEGREE = math.pi / 180.0
@@ -318,7 +317,7 @@ def test_wall_pushes_the_hand_back(wall: str, mm: float, newton: float) -> None:
 
 def test_a_slave_that_does_not_follow_for_long_is_aligned_anew_once() -> None:
     desk = Desk()
-    desk.row["slave_setpoint_cp_ns"] = NO_COMMAND_NS
+    desk.row["slave_setpoint_cp_ns"] = topics.NO_COMMAND_NS
     for _ in range(1000):  # it homes
         desk.step(does_follow=False)
     assert not any("anew" in text for text in desk.scaling.concerns())

@@ -14,15 +14,13 @@ from numpy.typing import NDArray
 import teleop_core as tc
 from present import present
 from teleop_core.bags.reader import Bag
-from teleop_core.base.errors import ParameterError, PartError, TeleopError
-from teleop_core.base.parameters import NoParameters, build
+from teleop_core.base import NoParameters, ParameterError, PartError, TeleopError, build
 from teleop_core.chain.network import LOST, NETWORKS, Network, register_network
 from teleop_core.chain.network.network import NETWORK, NetworkLink
 from teleop_core.chain.network.parameters import PRESETS, NetworkParameters
 from teleop_core.chain.network.trace import read_trace
 from teleop_core.evaluation.metrics.network import _Ages
-from teleop_core.kernels import kernel
-from teleop_core.kernels.geometry import Array
+from teleop_core.kernels import Array, kernel
 from teleop_core.session.configuration import configure
 from teleop_core.session.virtual import VirtualTime
 

@@ -12,11 +12,10 @@ from typing import Any, cast
 import pytest
 
 from teleop_core import evaluation
-from teleop_core.base.errors import ParameterError, PartError
-from teleop_core.base.parameters import NoParameters, build, parameter, specs
+from teleop_core.base import NoParameters, ParameterError, PartError, build, parameter, specs
 from teleop_core.chain.operators import Operator, register_operator
 from teleop_core.evaluation import Metric
-from teleop_core.graph.stage import Stage, register_stage
+from teleop_core.graph import Stage, register_stage
 from teleop_core.graph.topics import SLAVE_MEASURED_CP, SLAVE_SERVO_CP, Kind, Topic, passed_on
 from teleop_core.kernels import IS_COMPILED, kernel, records
 from teleop_core.session.configuration import configure

@@ -22,8 +22,7 @@ from teleop_core.evaluation.score import Score
 from teleop_core.evaluation.score_table import MET, NOT_MET, score_tables
 from teleop_core.evaluation.scoring import evaluate
 from teleop_core.evaluation.windows import windows
-from teleop_core.graph import topics
-from teleop_core.graph.signals import STATE_FIELDS, TICK_NS
+from teleop_core.graph import STATE_FIELDS, TICK_NS, topics
 from teleop_core.kernels.geometry import Array
 from teleop_core.session.api import configuration
 

@@ -6,8 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from present import present
-from teleop_core.kernels import pointer
-from teleop_core.kernels.geometry import Array
+from teleop_core.kernels import Array, pointer
 from teleop_core.robots import load_robot
 from teleop_core.robots.arms import rcrt1_dynamics
 from teleop_core.robots.chains.rigid_body import invert_positive, write_model

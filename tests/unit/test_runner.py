@@ -6,8 +6,7 @@ from typing import Any
 import numpy as np
 
 from teleop_core.bags.reader import Bag
-from teleop_core.graph import topics
-from teleop_core.graph.signals import TICK_NS
+from teleop_core.graph import TICK_NS, topics
 from teleop_core.robots import load_robot
 from teleop_core.session import api
 from teleop_core.session.configuration import Configuration, configure

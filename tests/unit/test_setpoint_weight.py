@@ -11,10 +11,9 @@ from scipy.linalg import expm
 from scipy.signal import lsim
 
 from present import present
-from teleop_core.base.parameters import build
-from teleop_core.graph.signals import DT, TICK_NS
-from teleop_core.kernels import kernel
-from teleop_core.kernels.geometry import Array
+from teleop_core.base import build
+from teleop_core.graph import DT, TICK_NS
+from teleop_core.kernels import Array, kernel
 from teleop_core.robots import load_robot
 from teleop_core.robots.robot import Robot
 from teleop_core.slave.controllers.pid import PID, THIRD, PidParameters, pid_control, pid_step

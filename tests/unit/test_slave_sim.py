@@ -14,11 +14,9 @@ from scipy.linalg import expm
 from scipy.signal import lfilter
 
 from present import present
-from teleop_core.base.errors import ParameterError
-from teleop_core.base.parameters import build
-from teleop_core.graph.signals import DT, TICK_NS
-from teleop_core.kernels import pointer
-from teleop_core.kernels.geometry import Array
+from teleop_core.base import ParameterError, build
+from teleop_core.graph import DT, TICK_NS
+from teleop_core.kernels import Array, pointer
 from teleop_core.robots import load_robot
 from teleop_core.robots.drives import ACCELERATION, independent_acceleration
 from teleop_core.slave.commands import CommandStatus

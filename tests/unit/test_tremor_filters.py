@@ -16,8 +16,7 @@ from scipy.signal import butter, freqz, iirnotch, sosfreqz
 import teleop_core as tc
 from forgotten_parts import own_parts  # noqa: F401
 from present import present
-from teleop_core.base.errors import ParameterError, PartError
-from teleop_core.base.parameters import NoParameters, build
+from teleop_core.base import NoParameters, ParameterError, PartError, build
 from teleop_core.chain.filters import LONGEST_NS, MEMORY, TREMOR_FILTERS, tremor_filter
 from teleop_core.chain.filters.wflc import RATE
 from teleop_core.chain.mapping.motion_scaling import MOTION_SCALING
@@ -25,10 +24,8 @@ from teleop_core.chain.mapping.parameters import MotionScalingParameters
 from teleop_core.evaluation.metrics.tremor_filter import passage
 from teleop_core.evaluation.motion_measures import RATE as SAMPLED
 from teleop_core.evaluation.motion_measures import tremor_power, velocities
-from teleop_core.graph.graph import build_graph
-from teleop_core.graph.topics import MASTER_CONTACT
-from teleop_core.kernels import kernel
-from teleop_core.kernels.geometry import Array
+from teleop_core.graph import build_graph, topics
+from teleop_core.kernels import Array, kernel
 from teleop_core.session.configuration import configure
 from teleop_core.session.virtual import VirtualTime
 
@@ -503,7 +500,7 @@ def touches(scenario: str, seconds: float, *given: Any) -> Any:
     """Energies of the contacts of a session: shares given back."""
     rows = session(*given, scenario=scenario).run(round(1000 * seconds))
     contact = rows["master_contact"]
-    taken, returned = (contact[:, MASTER_CONTACT.columns.index(n)] for n in ("taken", "returned"))
+    taken, returned = (contact[:, topics.MASTER_CONTACT.columns.index(n)] for n in ("taken", "returned"))
     ends = np.flatnonzero(np.diff(contact[:, 0], append=-1.0))
     counts = taken[ends] > 1e-6
     return returned[ends][counts] / taken[ends][counts]

@@ -7,10 +7,8 @@ import pytest
 from scipy.optimize import minimize
 
 import teleop_core as tc
-from teleop_core.graph import topics
-from teleop_core.graph.signals import TICK_NS
-from teleop_core.kernels import kernel
-from teleop_core.kernels.geometry import Array
+from teleop_core.graph import TICK_NS, topics
+from teleop_core.kernels import Array, kernel
 from teleop_core.session.links import link_texts
 from teleop_core.slave.jaw.grip import WEIGHT
 from teleop_core.slave.jaw.jaw_sim import GripObjectParameters, JawSim, JawSimParameters

@@ -11,8 +11,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any, NoReturn
 
-from teleop_core.base.errors import SessionError, TeleopError, TeleopWarning
-from teleop_core.base.texts import one_line
+from teleop_core.base import SessionError, TeleopError, TeleopWarning, one_line
 from teleop_core.commands import compiling, devices, installed, operate
 from teleop_core.commands.arguments import (
     command,

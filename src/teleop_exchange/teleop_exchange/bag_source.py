@@ -9,9 +9,8 @@ from typing import Any
 import numpy as np
 
 from teleop_core.bags.reader import Bag
-from teleop_core.base.damage import damage_told
-from teleop_core.base.errors import ParameterError, RecordingError, UnknownNameError
-from teleop_core.graph.topics import MASTER_BUTTONS, MASTER_MEASURED_CP
+from teleop_core.base import ParameterError, RecordingError, UnknownNameError, damage_told
+from teleop_core.graph import topics
 from teleop_core.kernels.geometry import Array
 from teleop_exchange.bag_messages import JOY, POSES, TRANSFORMS, Frames, JoyReader, PoseReader, Rows, frames, plain
 from teleop_exchange.options import BUTTONS, ORIENTATIONS, ImportOptions, button_map
@@ -96,7 +95,7 @@ class BagSource:
             listed = ", ".join(f"{n} ({kind})" for n, kind in sorted(self._types.items()))
             raise RecordingError(self.path, f"holds no topic of poses; it has {listed or 'nothing'}")
         stamped = [name for name in found if self._types[name] not in TRANSFORMS]
-        for few in ([n for n in found if n == MASTER_MEASURED_CP.name], found, stamped):
+        for few in ([n for n in found if n == topics.MASTER_MEASURED_CP.name], found, stamped):
             if len(few) == 1:
                 self.told.append(f"poses of {few[0]} ({self._types[few[0]]})")
                 return few[0]
@@ -138,8 +137,8 @@ class BagSource:
             if wanted is None:
                 raise UnknownNameError("--buttons-topic", plain(given), sorted(found) or ["none"])
             return wanted
-        if MASTER_BUTTONS.name in found or len(found) == 1:
-            return MASTER_BUTTONS.name if MASTER_BUTTONS.name in found else found[0]
+        if topics.MASTER_BUTTONS.name in found or len(found) == 1:
+            return topics.MASTER_BUTTONS.name if topics.MASTER_BUTTONS.name in found else found[0]
         if found and self._options.buttons:
             raise UnknownNameError("--buttons-topic", "", sorted(found))
         if found:

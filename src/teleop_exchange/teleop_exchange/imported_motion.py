@@ -7,10 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from teleop_core.base.damage import damage_told
-from teleop_core.base.errors import RecordingError
-from teleop_core.kernels import geometry
-from teleop_core.kernels.portable import product
+from teleop_core.base import RecordingError, damage_told
+from teleop_core.kernels import geometry, product
 from teleop_exchange.gathering import gather
 from teleop_exchange.options import ImportOptions
 from teleop_exchange.source import Source

@@ -7,9 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from teleop_core.base.errors import ParameterError, RecordingError
-from teleop_core.kernels.geometry import Array
-from teleop_core.kernels.portable import length
+from teleop_core.base import ParameterError, RecordingError
+from teleop_core.kernels import Array, length
 from teleop_exchange import names
 from teleop_exchange.episodes import Episodes
 from teleop_exchange.options import BUTTONS, CHOICES, ImportOptions, option

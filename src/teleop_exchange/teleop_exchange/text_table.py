@@ -12,8 +12,7 @@ import pandas as pd
 import pyarrow as pa
 import pyarrow.csv as pc
 
-from teleop_core.base.damage import damage_told
-from teleop_core.base.errors import RecordingError
+from teleop_core.base import RecordingError, damage_told
 from teleop_exchange.tables import SAMPLE, Numbers, numbers, unique
 
 _HEAD_BYTES = 1 << 18

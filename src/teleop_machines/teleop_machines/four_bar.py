@@ -16,9 +16,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from teleop_core.base.errors import ParameterError
-from teleop_core.kernels import inner, kernel
-from teleop_core.kernels.geometry import Array
+from teleop_core.base import ParameterError
+from teleop_core.kernels import Array, inner, kernel
 from teleop_core.robots import kinematics
 from teleop_core.robots.branches import bounded, turned, wrapped
 from teleop_core.robots.robot import Robot, geometry_of

@@ -16,9 +16,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from teleop_core.base.errors import ParameterError
-from teleop_core.kernels.geometry import Array
-from teleop_core.kernels.portable import arctangent
+from teleop_core.base import ParameterError
+from teleop_core.kernels import Array, arctangent
 
 _ROUNDING = 1e-12
 

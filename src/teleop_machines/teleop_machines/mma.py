@@ -20,9 +20,8 @@ import math
 
 import numpy as np
 
-from teleop_core.base.errors import ParameterError, UnknownNameError
-from teleop_core.kernels.geometry import Array
-from teleop_core.kernels.portable import product
+from teleop_core.base import ParameterError, UnknownNameError
+from teleop_core.kernels import Array, product
 from teleop_core.robots.drives import ENTRIES, Drives
 from teleop_core.robots.kinematics import Kernels
 from teleop_core.robots.robot import Robot, geometry_of

@@ -12,8 +12,7 @@ import math
 
 import numpy as np
 
-from teleop_core.kernels import inner, kernel
-from teleop_core.kernels.geometry import Array
+from teleop_core.kernels import Array, inner, kernel
 
 # Lengths [m] in the symbols of table 4.4; magnitudes, so d7 and d9 enter tables with a minus.
 # a3 is the long side of the parallelogram (a3' = a3'' in table 4.10) and d5 the sum of what

@@ -13,8 +13,7 @@ import math
 
 import numpy as np
 
-from teleop_core.kernels import inner, kernel
-from teleop_core.kernels.geometry import Array
+from teleop_core.kernels import Array, inner, kernel
 from teleop_core.robots.branches import bounded
 from teleop_core.robots.chains import damped
 from teleop_core.robots.kinematics import IkStatus, is_askable, pose_residual

@@ -19,9 +19,8 @@ import math
 
 import numpy as np
 
-from teleop_core.base.errors import ParameterError, UnknownNameError
-from teleop_core.kernels import inner, kernel
-from teleop_core.kernels.geometry import Array
+from teleop_core.base import ParameterError, UnknownNameError
+from teleop_core.kernels import Array, inner, kernel
 from teleop_core.robots import kinematics
 from teleop_core.robots.branches import bounded, hold, is_allowed, move_cost, slowed, turned
 from teleop_core.robots.robot import Robot, geometry_of

@@ -16,8 +16,7 @@ import math
 
 import numpy as np
 
-from teleop_core.kernels import inner, kernel
-from teleop_core.kernels.geometry import Array
+from teleop_core.kernels import Array, inner, kernel
 from teleop_core.robots.kinematics import AGREED, FkStatus
 from teleop_machines.stewart_legs import direct, leg_system
 from teleop_machines.stewart_search import close_legs, side_of

@@ -24,10 +24,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from teleop_core.base.errors import ParameterError, ShapeError
-from teleop_core.kernels import inner, kernel
-from teleop_core.kernels.geometry import Array, checked_array, is_rigid
-from teleop_core.kernels.portable import length
+from teleop_core.base import ParameterError, ShapeError
+from teleop_core.kernels import Array, checked_array, inner, is_rigid, kernel, length
 from teleop_core.robots import kinematics
 from teleop_core.robots.branches import slowed
 from teleop_core.robots.chains.damped import is_near_singular

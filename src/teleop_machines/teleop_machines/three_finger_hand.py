@@ -15,9 +15,8 @@ import math
 
 import numpy as np
 
-from teleop_core.base.errors import ParameterError
-from teleop_core.kernels import inner, kernel
-from teleop_core.kernels.geometry import Array
+from teleop_core.base import ParameterError
+from teleop_core.kernels import Array, inner, kernel
 from teleop_core.robots import kinematics
 from teleop_core.robots.robot import Robot
 from teleop_machines.bodies.hand_bodies import hand_bodies

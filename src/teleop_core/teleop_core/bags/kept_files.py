@@ -18,8 +18,7 @@ from collections.abc import Iterable, Mapping
 from functools import cache
 from pathlib import Path
 
-from teleop_core.base.errors import TeleopWarning
-from teleop_core.base.texts import printable
+from teleop_core.base import TeleopWarning, printable
 from teleop_core.robots import geometry_of
 from teleop_core.robots.files.visuals import kept_mesh, meshes_of
 from teleop_core.robots.files.xacro_files import EXPANDED, xml_of

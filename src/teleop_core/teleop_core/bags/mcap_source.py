@@ -19,8 +19,7 @@ from teleop_core.bags import walk
 from teleop_core.bags.compression import decompress
 from teleop_core.bags.layouts import Bytes, Stamps
 from teleop_core.bags.mcap_file import MAGIC
-from teleop_core.base.damage import damage_told
-from teleop_core.base.errors import RecordingError
+from teleop_core.base import RecordingError, damage_told
 
 CUT_OFF = "was cut off while being recorded; `teleop recover {path}` saves what is there"
 _FOOTER_SIZE = 9 + 20

@@ -19,8 +19,7 @@ from teleop_core.bags.messages import Refusal, Report, read_reports
 from teleop_core.bags.recovery import recover
 from teleop_core.bags.series import Column, Series, join, kind_of
 from teleop_core.bags.writer import METADATA_NAME
-from teleop_core.base.errors import RecordingError, TeleopWarning
-from teleop_core.base.texts import printable
+from teleop_core.base import RecordingError, TeleopWarning, printable
 from teleop_core.graph.topics import Kind, Topic
 
 

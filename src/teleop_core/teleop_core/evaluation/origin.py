@@ -8,18 +8,14 @@ from typing import Any
 
 from teleop_core.bags.arms import PLAYED_KEY
 from teleop_core.bags.reader import Bag
-from teleop_core.base import plain_yaml
-from teleop_core.base.errors import TeleopError
-from teleop_core.base.parameters import build, specs
-from teleop_core.base.texts import shown
+from teleop_core.base import TeleopError, build, plain_yaml, shown, specs
 from teleop_core.chain.mapping.motion_scaling import MOTION_SCALING
 from teleop_core.chain.mapping.parameters import MotionScalingParameters, axis_map, tool_maps
 from teleop_core.chain.master.operator import OPERATOR
+from teleop_core.graph import HAND, SESSION, STAGES, Graph, Layer, SessionParameters, build_graph, topics
 from teleop_core.graph.former_shapes import present_layer
-from teleop_core.graph.graph import DEVICE, HAND, Graph, build_graph
-from teleop_core.graph.layers import SESSION, Layer, SessionParameters, parse_layer
-from teleop_core.graph.stage import STAGES
-from teleop_core.graph.topics import Topic
+from teleop_core.graph.graph import DEVICE
+from teleop_core.graph.layers import parse_layer
 from teleop_core.kernels.geometry import Array
 from teleop_core.slave.slave import SLAVE
 from teleop_core.slave.slave_sim import SLAVE_SIM
@@ -66,12 +62,12 @@ class Origin:
     begin: str = ""
 
     @cached_property
-    def chain(self) -> tuple[tuple[str, Topic], ...]:
+    def chain(self) -> tuple[tuple[str, topics.Topic], ...]:
         """Way of a master's sample to the slave: stages, each with the topic it answers with."""
         return self.graph.chain()
 
     @property
-    def streams(self) -> tuple[Topic, ...]:
+    def streams(self) -> tuple[topics.Topic, ...]:
         """Topics of an arm with one message per step."""
         return tuple(topic for topic in self.graph.streams if not topic.arm)
 
@@ -83,7 +79,7 @@ class Origin:
         return sum(link.delay for link in links if (link.topic, link.reader.stage.name) in steps)
 
     @property
-    def sources(self) -> dict[str, Topic]:
+    def sources(self) -> dict[str, topics.Topic]:
         """Topic whose stamps each passes on, by its name."""
         return {
             written.name: link.topic
@@ -98,7 +94,7 @@ class Origin:
         stages = (member.stage for member in self.graph.played(self.begin) if not member.arm)
         return frozenset(topic.name for stage in stages for topic in stage.writes)
 
-    def writer(self, topic: Topic) -> str:
+    def writer(self, topic: topics.Topic) -> str:
         """Name of the stage that writes a topic; empty if none does."""
         names = (stage.name for stage in self.graph.stages if topic in stage.writes)
         return next(names, "")

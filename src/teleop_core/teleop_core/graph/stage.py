@@ -13,13 +13,11 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from teleop_core.base.errors import PartError
-from teleop_core.base.parameters import Value, specs, values_of
-from teleop_core.base.registry import Registry
+from teleop_core.base import PartError, Registry, Value, specs, values_of
 from teleop_core.graph.signals import DT, assign, make_signals
 from teleop_core.graph.topics import Topic
-from teleop_core.kernels import bound, raise_pending, records
-from teleop_core.kernels.fields import Field, Fields, fields_of
+from teleop_core.kernels import Fields, bound, fields_of, raise_pending, records
+from teleop_core.kernels.fields import Field
 
 __all__ = ["STAGES", "Runner", "RunningStage", "Stage", "joints_of", "register_stage"]
 

@@ -23,8 +23,9 @@ from collections.abc import Callable, Iterable, Mapping
 from difflib import get_close_matches
 from functools import partial
 from types import FunctionType
-from typing import Any, ParamSpec, Protocol, TypeVar, cast
+from typing import TYPE_CHECKING, Any, ParamSpec, Protocol, TypeVar, cast
 
+import lazy_loader
 import numba
 import numpy as np
 
@@ -329,3 +330,20 @@ def record_dtype(fields: Any) -> np.dtype[Any]:
         fields: What :class:`numpy.dtype` takes: pairs of name and type, or a dtype.
     """
     return np.dtype((Record, np.dtype(fields)))
+
+
+if TYPE_CHECKING:
+    from teleop_core.kernels.fields import *  # noqa: F403
+    from teleop_core.kernels.geometry import *  # noqa: F403
+    from teleop_core.kernels.parts import *  # noqa: F403
+    from teleop_core.kernels.portable import *  # noqa: F403
+else:  # loaded with their first use
+    _NAMES = {
+        "fields": ("Fields", "IntegerPerJoint", "Integers", "PerJoint", "PoseRow", "Quaternion", "Vector3", "Wrench",
+            "fields_of", "record", "record_array"),
+        "geometry": ("Array", "checked_array", "is_rigid", "multiply_quaternions", "pose_from_transform", "rotation",
+            "rotations_from_quaternions", "transform", "turn_by"),
+        "parts": ("fenced", "is_whole", "numbers_of"),
+        "portable": ("arctangent", "dot", "inverse_motion", "length", "product"),
+    }  # fmt: skip
+    __getattr__ = lazy_loader.attach(__name__, None, _NAMES)[0]

@@ -2,8 +2,7 @@
 
 import math
 
-from teleop_core.kernels import inner
-from teleop_core.kernels.geometry import Array
+from teleop_core.kernels import Array, inner
 
 SLACK = 1e-12
 """Rounding that a joint on its limit may show [rad or m]."""

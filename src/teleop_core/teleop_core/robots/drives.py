@@ -8,9 +8,8 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
-from teleop_core.base.errors import ParameterError, ShapeError, UnknownNameError
-from teleop_core.kernels import kernel
-from teleop_core.kernels.geometry import Array
+from teleop_core.base import ParameterError, ShapeError, UnknownNameError
+from teleop_core.kernels import Array, kernel
 from teleop_core.robots.inertias import LinkInertia, check_possible
 
 _ROW = types.float64[::1]

@@ -2,9 +2,8 @@
 
 import numpy as np
 
-from teleop_core.base.errors import ClosureError, ParameterError, ShapeError
-from teleop_core.kernels import raise_pending
-from teleop_core.kernels.geometry import Array, checked_array, is_rigid
+from teleop_core.base import ClosureError, ParameterError, ShapeError
+from teleop_core.kernels import Array, checked_array, is_rigid, raise_pending
 from teleop_core.robots import kinematics
 from teleop_core.robots.arm import Arm
 from teleop_core.robots.kinematics import MAX_ASSEMBLIES, SEARCH, FkBatch, FkOne, FkResult, FkStatus

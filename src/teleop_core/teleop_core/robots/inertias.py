@@ -16,9 +16,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from teleop_core.base.errors import ParameterError, ShapeError
-from teleop_core.kernels.geometry import Array
-from teleop_core.kernels.portable import dot
+from teleop_core.base import ParameterError, ShapeError
+from teleop_core.kernels import Array, dot
 
 # Share of the largest moment by which rounding may break the triangle inequality: of a plate, or
 # of numbers that a source gives to some digits.

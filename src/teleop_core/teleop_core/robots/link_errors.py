@@ -27,9 +27,8 @@ from functools import reduce
 
 import numpy as np
 
-from teleop_core.base.errors import ParameterError, UnknownNameError
-from teleop_core.kernels.geometry import Array, rotation, transform
-from teleop_core.kernels.portable import inverse_motion, product
+from teleop_core.base import ParameterError, UnknownNameError
+from teleop_core.kernels import Array, inverse_motion, product, rotation, transform
 from teleop_core.robots.arm import Arm
 from teleop_core.robots.drives import read_only
 

@@ -9,10 +9,8 @@ from typing import TYPE_CHECKING, cast, overload
 
 import numpy as np
 
-from teleop_core.base.errors import ParameterError, ShapeError, UnknownNameError
-from teleop_core.kernels import direct, pointer, raise_pending
-from teleop_core.kernels.geometry import Array, checked_array, is_rigid
-from teleop_core.kernels.portable import product
+from teleop_core.base import ParameterError, ShapeError, UnknownNameError
+from teleop_core.kernels import Array, checked_array, direct, is_rigid, pointer, product, raise_pending
 from teleop_core.robots import description, forward_kinematics, kinematics
 from teleop_core.robots.drives import Drives, Dynamics, independent_axes, read_only
 from teleop_core.robots.hardware import Hardware

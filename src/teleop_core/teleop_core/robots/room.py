@@ -13,9 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from teleop_core.kernels import raise_pending
-from teleop_core.kernels.geometry import Array, rotations_from_quaternions
-from teleop_core.kernels.portable import length, product
+from teleop_core.kernels import Array, length, product, raise_pending, rotations_from_quaternions
 from teleop_core.robots import kinematics
 from teleop_core.robots.arm import Arm
 from teleop_core.robots.kinematics import IkStatus

@@ -18,12 +18,11 @@ from numpy.typing import NDArray
 
 from teleop_core.bags.memory import MemoryBag, Message
 from teleop_core.bags.series import Series
-from teleop_core.base.errors import ParameterError, TeleopError, TeleopWarning
+from teleop_core.base import ParameterError, TeleopError, TeleopWarning
 from teleop_core.chain.operators import OPERATORS, Motion, Operator, following
-from teleop_core.graph.graph import DEVICE, HAND
-from teleop_core.graph.layers import SESSION, Layer, config_folder, load_file, parse_setting, scenario_file, setting
-from teleop_core.graph.stage import STAGES, Stage
-from teleop_core.graph.topics import Topic
+from teleop_core.graph import HAND, SESSION, STAGES, Layer, Stage, config_folder, topics
+from teleop_core.graph.graph import DEVICE
+from teleop_core.graph.layers import load_file, parse_setting, scenario_file, setting
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots import ROBOTS, Robot
 from teleop_core.robots.arms.dh import DhTable
@@ -267,8 +266,8 @@ class _Memory:
     def __init__(self, session: VirtualTime) -> None:
         self._session, self._reports = session, runner.StateReports(session)
         self._is_new = runner.NewSamples()
-        self._parts: dict[Topic, list[Sequence[NDArray[Any]]]] = {topic: [] for topic in session.graph.streams}
-        self._messages: dict[Topic, list[Message]] = {
+        self._parts: dict[topics.Topic, list[Sequence[NDArray[Any]]]] = {topic: [] for topic in session.graph.streams}
+        self._messages: dict[topics.Topic, list[Message]] = {
             topic: [] for topic in session.graph.topics if topic not in self._parts
         }
         self.ticks = 0
@@ -280,7 +279,7 @@ class _Memory:
             parts.append([np.array(part) for part in self._is_new.of(topic, block, log_ns)])
         self._reports.write(self, block)
 
-    def write(self, topic: Topic, log_ns: int, data: bytes) -> None:
+    def write(self, topic: topics.Topic, log_ns: int, data: bytes) -> None:
         """Take one message of a report."""
         self._messages[topic].append((log_ns, data))
 

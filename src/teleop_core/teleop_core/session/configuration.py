@@ -7,14 +7,14 @@ from typing import Any
 
 import yaml
 
-from teleop_core.base.errors import ParameterError, PartError, UnknownNameError
-from teleop_core.base.parameters import build, specs, values_of
+from teleop_core.base import ParameterError, PartError, UnknownNameError, build, specs, values_of
 from teleop_core.chain.architectures import ARCHITECTURES
 from teleop_core.chain.architectures.impedance import IMPEDANCE
 from teleop_core.chain.operators import OPERATORS
 from teleop_core.chain.passivity import PASSIVITIES
 from teleop_core.chain.passivity.slave_side import PASSIVITY
-from teleop_core.graph.graph import DEVICE, HAND, RECORDER_NAME, Graph, Member, build_graph
+from teleop_core.graph import HAND, RECORDER_NAME, STAGES, Graph, Member, build_graph
+from teleop_core.graph.graph import DEVICE
 from teleop_core.graph.layers import (
     SESSION,
     Layer,
@@ -25,7 +25,6 @@ from teleop_core.graph.layers import (
     parse_setting,
     scenario_file,
 )
-from teleop_core.graph.stage import STAGES
 
 
 @dataclass(frozen=True)

@@ -8,8 +8,7 @@ import numpy as np
 from teleop_core.bags.markers import Color, Marker, Shape
 from teleop_core.chain.fixtures.reported_fixture import ReportedFixture, reported_fixture
 from teleop_core.chain.mapping.parameters import MotionScalingParameters, axis_map
-from teleop_core.kernels.geometry import Array
-from teleop_core.kernels.portable import length
+from teleop_core.kernels import Array, length
 from teleop_core.session.model import MASTER, SLAVE
 from teleop_core.shapes.basis.drawing import segments_of
 from teleop_core.shapes.box import BOX

@@ -4,9 +4,7 @@ from teleop_core.chain.mapping.parameters import FixtureParameters, MotionScalin
 from teleop_core.chain.mapping.walls import WALLS, passive_stiffness
 from teleop_core.chain.master.device import DeviceParameters
 from teleop_core.chain.master.haptic_master import HapticMasterParameters
-from teleop_core.graph.graph import BUILT_IN
-from teleop_core.graph.signals import DT
-from teleop_core.graph.topics import MASTER_MEASURED_CP, MASTER_SERVO_CF
+from teleop_core.graph import BUILT_IN, DT, topics
 from teleop_core.robots import load_robot_set
 from teleop_core.robots.parts import is_urdf
 from teleop_core.robots.robot_notes import assumed_note, notes_on_robot
@@ -43,8 +41,8 @@ def notes_of(configuration: Configuration, transport: float = 0.0) -> list[str]:
 
 def _delay(configuration: Configuration, arm: str) -> float:
     """Declared delays on the way from the device's samples to its force [s]."""
-    around = (MASTER_MEASURED_CP.name, MASTER_SERVO_CF.name)
-    ends = {MASTER_MEASURED_CP.name: _MAPPING, MASTER_SERVO_CF.name: _MASTER}
+    around = (topics.MASTER_MEASURED_CP.name, topics.MASTER_SERVO_CF.name)
+    ends = {topics.MASTER_MEASURED_CP.name: _MAPPING, topics.MASTER_SERVO_CF.name: _MASTER}
     return sum(
         link.delay
         for link in configuration.graph.links

@@ -11,12 +11,11 @@ from teleop_core.bags import kept_files
 from teleop_core.bags.arms import ARMS_KEY, PLAYED_KEY
 from teleop_core.bags.reader import Bag, Series
 from teleop_core.bags.writer import BagWriter
-from teleop_core.base.errors import RecordingError
+from teleop_core.base import RecordingError
+from teleop_core.graph import RECORDER_NAME, SESSION, TICK_NS, Layer, Member, topics
 from teleop_core.graph.former_shapes import present_layer
-from teleop_core.graph.graph import DEVICE, RECORDER_NAME, Member
-from teleop_core.graph.layers import SESSION, Layer, parse_text
-from teleop_core.graph.signals import TICK_NS
-from teleop_core.graph.topics import SELDOM_NS, TELEOP_STATE, Kind, Topic
+from teleop_core.graph.graph import DEVICE
+from teleop_core.graph.layers import parse_text
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot_set
 from teleop_core.session.configuration import Configuration
@@ -122,7 +121,7 @@ def replayed_blocks(session: VirtualTime, bag: Bag) -> tuple[Iterator[Any], int]
 def _lead_ns(session: VirtualTime, bag: Bag, first_ns: int) -> int:
     """Time [ns] that arms need before the first sample; none where the hand waited as long."""
     lead_ns = session.lead * TICK_NS
-    states = [TELEOP_STATE.of_arm(arm) for arm in session.graph.namespaces]
+    states = [topics.TELEOP_STATE.of_arm(arm) for arm in session.graph.namespaces]
     is_known = all(state.name in bag.topics for state in states)
     if not lead_ns or "configuration" not in bag.metadata or not is_known:
         return lead_ns
@@ -130,7 +129,7 @@ def _lead_ns(session: VirtualTime, bag: Bag, first_ns: int) -> int:
     return lead_ns if None in begins else max(0, lead_ns - (max(filter(None, begins)) - first_ns))
 
 
-def _follows_ns(bag: Bag, state: Topic) -> int | None:
+def _follows_ns(bag: Bag, state: topics.Topic) -> int | None:
     """When an arm began to follow its hand [ns]; None if it never did."""
     told = (r.stamp_ns for r in bag.reports(state) if r.values.get("is_following") == "1.0")
     return min(told, default=None)
@@ -221,7 +220,7 @@ def record_blocks(
 
 
 def open_writer(
-    session: VirtualTime, configuration: Configuration, out: Path, further: tuple[Topic, ...] = ()
+    session: VirtualTime, configuration: Configuration, out: Path, further: tuple[topics.Topic, ...] = ()
 ) -> BagWriter:
     """Writer of everything that a session's stages write, and of further topics."""
     return BagWriter(
@@ -267,7 +266,7 @@ class NewSamples:
         self._periods: dict[str, int] = {}
 
     def of(
-        self, topic: Topic, block: Any, log_ns: NDArray[np.int64]
+        self, topic: topics.Topic, block: Any, log_ns: NDArray[np.int64]
     ) -> tuple[NDArray[np.int64], Array, NDArray[np.int64]]:
         """Stamps (N,), values (N, width) and log times (N,) of the messages in the next rows."""
         stamps, values = block[f"{topic.field}_ns"], block[topic.field]
@@ -283,13 +282,13 @@ class NewSamples:
             return stamps, values, log_ns
         return stamps[is_new], values[is_new], log_ns[is_new]
 
-    def _is_due(self, topic: Topic, values: Array, stamps: NDArray[np.int64]) -> NDArray[np.bool_]:
+    def _is_due(self, topic: topics.Topic, values: Array, stamps: NDArray[np.int64]) -> NDArray[np.bool_]:
         """Which rows (N,) change, or come when it is time to say it again."""
         before = self._values.get(topic.name, np.full((1, values.shape[1]), np.nan))
         self._values[topic.name] = values[-1:].copy()
         changes = (np.concatenate((before, values[:-1])) != values).any(axis=1)
         # Stamps of a session that was live are no whole periods.
-        periods = stamps // SELDOM_NS
+        periods = stamps // topics.SELDOM_NS
         last = self._periods.get(topic.name, int(periods[0]))
         self._periods[topic.name] = int(periods[-1])
         due: NDArray[np.bool_] = changes | (np.diff(periods, prepend=last) != 0)
@@ -299,7 +298,7 @@ class NewSamples:
 class ReportWriter(Protocol):
     """What takes single messages."""
 
-    def write(self, topic: Topic, log_ns: int, data: bytes) -> None:
+    def write(self, topic: topics.Topic, log_ns: int, data: bytes) -> None:
         """Take one message."""
 
 
@@ -311,7 +310,7 @@ class StateReports:
             _Report(session, member, topic)
             for member in session.graph.members
             for topic in member.writes
-            if topic.kind is Kind.REPORT
+            if topic.kind is topics.Kind.REPORT
         ]
 
     def write(self, writer: ReportWriter, block: Any) -> None:
@@ -321,7 +320,7 @@ class StateReports:
 
 
 class _Report:
-    def __init__(self, session: VirtualTime, member: Member, topic: Topic) -> None:
+    def __init__(self, session: VirtualTime, member: Member, topic: topics.Topic) -> None:
         self._topic, self._stage = topic, session.stages.get(member.name)
         self._last = np.full(len(topic.columns), np.nan)
 

@@ -7,17 +7,16 @@ from pathlib import Path
 
 import numpy as np
 
-from teleop_core.base.errors import ParameterError, SessionError, ShapeError, UnknownNameError
+from teleop_core.base import ParameterError, SessionError, ShapeError, UnknownNameError
 from teleop_core.chain.operators import Operator
-from teleop_core.graph.signals import STATE, TICK_NS
-from teleop_core.graph.topics import OPERATION
+from teleop_core.graph import STATE, TICK_NS, topics
 from teleop_core.kernels.geometry import Array
 from teleop_core.session.api import Setting, configuration
 from teleop_core.session.virtual import VirtualTime
 from teleop_core.slave.operation import State
 
 _NUMBERS = count()
-_STATE = OPERATION.index("state")
+_STATE = topics.OPERATION.index("state")
 _PATIENCE = 60.0  # an arm that does not follow by then will not [s]
 
 

@@ -4,8 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from teleop_core.kernels import inner, kernel
-from teleop_core.kernels.geometry import Array
+from teleop_core.kernels import Array, inner, kernel
 from teleop_core.shapes import Shape
 from teleop_core.shapes.basis import combined
 from teleop_core.shapes.basis.directions import MIDDLE, length_of, scale_to

@@ -7,9 +7,8 @@ they are a cubic spline, so that the normal, which is its gradient, turns withou
 import math
 from dataclasses import dataclass
 
-from teleop_core.base.parameters import parameter
-from teleop_core.kernels import inner, kernel
-from teleop_core.kernels.geometry import Array
+from teleop_core.base import parameter
+from teleop_core.kernels import Array, inner, kernel
 from teleop_core.shapes import Shape
 from teleop_core.shapes.basis.directions import length_of, make_unit
 from teleop_core.shapes.basis.distance_grid import EDGE, HEADER, DistanceGrid, GridRequest, distance_grid

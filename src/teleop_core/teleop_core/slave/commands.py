@@ -3,12 +3,9 @@
 import math
 from enum import IntEnum
 
-from teleop_core.graph.row import Row
-from teleop_core.graph.signals import copy
-from teleop_core.kernels import inner
-from teleop_core.kernels.fields import PerJoint, Wrench
+from teleop_core.graph import Row, copy
+from teleop_core.kernels import Array, PerJoint, Wrench, inner
 from teleop_core.kernels.filters import lag_step
-from teleop_core.kernels.geometry import Array
 from teleop_core.slave.arm import ArmModel
 from teleop_core.slave.interpolation import WayParameters, WayState, begin_way
 from teleop_core.slave.operation.faults import Fault

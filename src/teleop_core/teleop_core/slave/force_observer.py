@@ -9,10 +9,8 @@ from typing import Annotated
 
 import numpy as np
 
-from teleop_core.graph.signals import copy
-from teleop_core.kernels import inner, kernel
-from teleop_core.kernels.fields import Fields, PerJoint
-from teleop_core.kernels.geometry import Array
+from teleop_core.graph import copy
+from teleop_core.kernels import Array, Fields, PerJoint, inner, kernel
 from teleop_core.kernels.room import room
 from teleop_core.robots.chains.rigid_body import invert_positive, write_model
 from teleop_core.slave.arm import Arm

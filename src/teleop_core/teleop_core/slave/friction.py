@@ -11,8 +11,7 @@ at high speed, is the return of the bristle to its bound here, which is exact at
 import math
 from typing import Any
 
-from teleop_core.kernels import inner
-from teleop_core.kernels.fields import Fields, IntegerPerJoint, PerJoint
+from teleop_core.kernels import Fields, IntegerPerJoint, PerJoint, inner
 
 # Noise: the multiplicative generator of Lewis, Goodman and Miller (1969), multiplier of Park,
 # Miller and Stockmeyer (1993).

@@ -1,8 +1,6 @@
 """Interpolation: the way from command to command where they come slower than the ticks."""
 
-from teleop_core.kernels import inner
-from teleop_core.kernels.fields import Fields, PerJoint
-from teleop_core.kernels.geometry import Array
+from teleop_core.kernels import Array, Fields, PerJoint, inner
 
 _LINEAR, _MINIMUM_JERK = 1, 2
 

@@ -3,8 +3,7 @@
 from dataclasses import dataclass, fields
 from typing import Any
 
-from teleop_core.graph.signals import DT, assign
-from teleop_core.graph.stage import RunningStage, Stage
+from teleop_core.graph import DT, RunningStage, Stage, assign
 from teleop_core.kernels import apart, kernel
 from teleop_core.slave.commands import SlaveRow
 from teleop_core.slave.simulation import simulation_step

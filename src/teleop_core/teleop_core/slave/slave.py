@@ -9,15 +9,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from teleop_core.base.errors import ParameterError
-from teleop_core.base.parameters import parameter
-from teleop_core.graph import topics
-from teleop_core.graph.signals import DT, assign
-from teleop_core.graph.stage import RunningStage, Stage
-from teleop_core.kernels import kernel, pointer, records
-from teleop_core.kernels.fields import record
-from teleop_core.kernels.geometry import Array, pose_from_transform
-from teleop_core.kernels.portable import length
+from teleop_core.base import ParameterError, parameter
+from teleop_core.graph import DT, RunningStage, Stage, assign, topics
+from teleop_core.kernels import Array, kernel, length, pointer, pose_from_transform, record, records
 from teleop_core.robots import load_robot_set
 from teleop_core.robots.kinematics import FK
 from teleop_core.robots.parameters import RobotParameters

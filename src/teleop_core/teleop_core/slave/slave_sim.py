@@ -4,14 +4,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from teleop_core.base.errors import ClosureError, ParameterError
-from teleop_core.base.parameters import Choice, choice, parameter
-from teleop_core.graph import topics
-from teleop_core.graph.signals import DT, assign
-from teleop_core.graph.stage import RunningStage, Stage
-from teleop_core.kernels import pointer
-from teleop_core.kernels.fields import fields_of, record, record_array
-from teleop_core.kernels.geometry import Array
+from teleop_core.base import Choice, ClosureError, ParameterError, choice, parameter
+from teleop_core.graph import DT, RunningStage, Stage, assign, topics
+from teleop_core.kernels import Array, fields_of, pointer, record, record_array
 from teleop_core.robots import load_robot_set
 from teleop_core.robots.chains import dh_kernels
 from teleop_core.robots.drives import ACCELERATION, GRAVITY

@@ -1,9 +1,7 @@
 """Step of the slave: one tick of the arm's server, on records of parameters, state and signals."""
 
-from teleop_core.graph.signals import copy
-from teleop_core.graph.topics import NO_COMMAND_NS
-from teleop_core.kernels import inner, kernel
-from teleop_core.kernels.geometry import Array, pose_from_transform
+from teleop_core.graph import copy, topics
+from teleop_core.kernels import Array, inner, kernel, pose_from_transform
 from teleop_core.slave.arm import ArmModel
 from teleop_core.slave.commands import (
     AT_LIMITS,
@@ -153,7 +151,7 @@ def slave_step(p: SlaveNumbers, s: SlaveState, arm: ArmModel, row: SlaveRow, dt:
         if s.is_homing:
             copy(p.start, s.move_to)
         plan_move(p, s, arm, dt)
-        s.command_stamp_ns, s.motion = NO_COMMAND_NS, 0
+        s.command_stamp_ns, s.motion = topics.NO_COMMAND_NS, 0
     copy(s.command, joints)
     _go_on(p, s, arm, row, joints, dt)
     limit_tool(p, s, arm, row.slave_setpoint_cp, dt)

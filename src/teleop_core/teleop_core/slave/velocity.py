@@ -3,9 +3,8 @@
 import math
 from enum import IntEnum
 
-from teleop_core.graph.signals import copy
-from teleop_core.kernels import inner
-from teleop_core.kernels.geometry import Array
+from teleop_core.graph import copy
+from teleop_core.kernels import Array, inner
 from teleop_core.robots.chains.damped import eliminate, gram, weigh
 from teleop_core.slave.arm import ArmModel
 from teleop_core.slave.commands import SlaveNumbers, SlaveState

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from teleop_core.base.damage import damage_told
-from teleop_core.base.errors import ParameterError, ShapeError, TeleopError
+from teleop_core.base import ParameterError, ShapeError, TeleopError, damage_told
 from teleop_core.kernels.geometry import Array, checked_array
 from teleop_core.robots.robot import Robot
 from teleop_exchange.names import without_unit

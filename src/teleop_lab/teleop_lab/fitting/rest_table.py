@@ -6,8 +6,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from teleop_core.base.damage import damage_told
-from teleop_core.base.errors import TeleopError
+from teleop_core.base import TeleopError, damage_told
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots.robot import Robot
 

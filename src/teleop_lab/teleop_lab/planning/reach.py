@@ -6,16 +6,9 @@ from pathlib import Path
 
 from teleop_core.bags.arms import of_arm
 from teleop_core.bags.reader import Bag
-from teleop_core.base.errors import ParameterError, RecordingError, UnknownNameError
-from teleop_core.graph.layers import (
-    Layer,
-    config_folder,
-    list_scenarios,
-    load_file,
-    parse_setting,
-    scenario_file,
-    setting,
-)
+from teleop_core.base import ParameterError, RecordingError, UnknownNameError
+from teleop_core.graph import Layer, config_folder
+from teleop_core.graph.layers import list_scenarios, load_file, parse_setting, scenario_file, setting
 from teleop_core.robots.robot import Robot
 from teleop_core.session.api import run
 from teleop_core.session.configuration import Configuration

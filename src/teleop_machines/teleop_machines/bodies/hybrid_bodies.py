@@ -4,9 +4,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from teleop_core.kernels import kernel
-from teleop_core.kernels.geometry import Array
-from teleop_core.kernels.portable import product
+from teleop_core.kernels import Array, kernel, product
 from teleop_core.robots.bodies.body import HERE, Bodies, Body, Coordinates, Joint
 from teleop_core.robots.bodies.frames import pose, tips
 from teleop_core.robots.bodies.solids import ball, capsule, cylinder

@@ -9,8 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from teleop_core.kernels.geometry import Array
-from teleop_core.kernels.portable import product
+from teleop_core.kernels import Array, product
 from teleop_core.robots.bodies.body import Bodies, Body, Joint
 from teleop_core.robots.bodies.chain import axes_of, chain, places, tip_of
 from teleop_core.robots.bodies.frames import moved, pose, pose_of

@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from teleop_core.base.errors import SessionError
-from teleop_core.base.parameters import parameter
+from teleop_core.base import SessionError, parameter
 from teleop_core.chain.devices import Reading
 from teleop_core.chain.devices.pilot import PilotParameters
 from teleop_core.chain.operators import Operator

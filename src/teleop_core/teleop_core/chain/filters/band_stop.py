@@ -3,12 +3,10 @@
 import math
 from dataclasses import dataclass
 
-from teleop_core.base.errors import ParameterError
-from teleop_core.base.parameters import parameter
+from teleop_core.base import ParameterError, parameter
 from teleop_core.chain.filters import TremorFilter
 from teleop_core.chain.filters.sections import WIDTH, advance_section
-from teleop_core.kernels import inner, kernel
-from teleop_core.kernels.geometry import Array
+from teleop_core.kernels import Array, inner, kernel
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -3,12 +3,10 @@
 import math
 from dataclasses import dataclass
 
-from teleop_core.base.errors import ParameterError
-from teleop_core.base.parameters import parameter
+from teleop_core.base import ParameterError, parameter
 from teleop_core.chain.filters import LONGEST_NS, TremorFilter
 from teleop_core.chain.filters.sections import advance_section
-from teleop_core.kernels import kernel
-from teleop_core.kernels.geometry import Array
+from teleop_core.kernels import Array, kernel
 
 _WIDEST = 0.45
 """Width of a notch times the period of samples, below the pole of its tangent at a half."""

@@ -1,7 +1,6 @@
 """Sections: filters of second order from which notch, band stop and high-pass are made."""
 
-from teleop_core.kernels import inner
-from teleop_core.kernels.geometry import Array
+from teleop_core.kernels import Array, inner
 
 WIDTH = 3
 """Numbers that a section remembers: band-pass, low-pass, and its input."""

@@ -11,16 +11,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from teleop_core.base.parameters import Choice, choice, parameter
+from teleop_core.base import Choice, choice, parameter
 from teleop_core.chain.filters import LONGEST_NS, MEMORY, TREMOR_FILTERS
 from teleop_core.chain.mapping import plausibility
-from teleop_core.graph.row import Row
-from teleop_core.graph.signals import DT, assign
-from teleop_core.graph.stage import RunningStage, Stage
-from teleop_core.graph.topics import MASTER_FILTERED_CP, MASTER_FILTERED_OUT, MASTER_MEASURED_CP
-from teleop_core.kernels import inner, kernel
-from teleop_core.kernels.fields import Vector3, record
-from teleop_core.kernels.geometry import Array
+from teleop_core.graph import DT, Row, RunningStage, Stage, assign, topics
+from teleop_core.kernels import Array, Vector3, inner, kernel, record
 
 _FADE = 0.2
 """Time constant with which the difference between old and new parameters goes away [s]."""
@@ -195,10 +190,10 @@ class RunningTremorFilter(RunningStage):
 TREMOR_FILTER = Stage(
     "tremor_filter",
     TremorFilterParameters,
-    reads=(MASTER_MEASURED_CP,),
-    writes=(MASTER_FILTERED_CP, MASTER_FILTERED_OUT),
-    trigger=MASTER_MEASURED_CP,
-    replaces=MASTER_MEASURED_CP,
+    reads=(topics.MASTER_MEASURED_CP,),
+    writes=(topics.MASTER_FILTERED_CP, topics.MASTER_FILTERED_OUT),
+    trigger=topics.MASTER_MEASURED_CP,
+    replaces=topics.MASTER_MEASURED_CP,
     spares=("operator",),
     make=RunningTremorFilter,
 )

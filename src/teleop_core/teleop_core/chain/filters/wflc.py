@@ -3,11 +3,10 @@
 import math
 from dataclasses import dataclass
 
-from teleop_core.base.parameters import parameter
+from teleop_core.base import parameter
 from teleop_core.chain.filters import TremorFilter
 from teleop_core.chain.filters.sections import WIDTH, advance_section
-from teleop_core.kernels import inner, kernel
-from teleop_core.kernels.geometry import Array
+from teleop_core.kernels import Array, inner, kernel
 
 _SECOND, _THIRD = WIDTH, 2 * WIDTH
 _PHASE, RATE, _HEARD, _SUBTRACTED = range(3 * WIDTH, 3 * WIDTH + 8, 2)

@@ -28,24 +28,7 @@ from teleop_core.chain.mapping.reflection import (
 )
 from teleop_core.chain.mapping.side import SideNumbers, SideState, Walled, hold_slave, let_go
 from teleop_core.chain.passivity import PASSIVITIES
-from teleop_core.graph.row import Row
-from teleop_core.graph.signals import DT, STATE, assign, copy
-from teleop_core.graph.stage import RunningStage, Stage
-from teleop_core.graph.topics import (
-    MASTER_BUTTONS,
-    MASTER_ENERGY,
-    MASTER_FILTERED_OUT,
-    MASTER_MEASURED_CP,
-    MASTER_SERVO_CF,
-    SLAVE_ENERGY,
-    SLAVE_MEASURED_CF,
-    SLAVE_MEASURED_CP,
-    SLAVE_REACH,
-    SLAVE_SERVO_CF,
-    SLAVE_SERVO_CP,
-    SLAVE_SETPOINT_CP,
-    TELEOP_STATE,
-)
+from teleop_core.graph import DT, STATE, Row, RunningStage, Stage, assign, copy, topics
 from teleop_core.kernels import inner, kernel
 from teleop_core.kernels.fields import Integers, Quaternion, Vector3, record, record_array
 from teleop_core.kernels.geometry import Array, multiply_quaternions, rotate_by_vector, turn_within
@@ -459,20 +442,32 @@ MOTION_SCALING = Stage(
     "motion_scaling",
     MotionScalingParameters,
     reads=(
-        MASTER_MEASURED_CP,
-        MASTER_BUTTONS,
-        SLAVE_SETPOINT_CP,
-        SLAVE_REACH,
-        SLAVE_MEASURED_CF,
-        SLAVE_MEASURED_CP,
-        MASTER_FILTERED_OUT,
-        SLAVE_ENERGY,
+        topics.MASTER_MEASURED_CP,
+        topics.MASTER_BUTTONS,
+        topics.SLAVE_SETPOINT_CP,
+        topics.SLAVE_REACH,
+        topics.SLAVE_MEASURED_CF,
+        topics.SLAVE_MEASURED_CP,
+        topics.MASTER_FILTERED_OUT,
+        topics.SLAVE_ENERGY,
     ),
-    writes=(SLAVE_SERVO_CP, MASTER_SERVO_CF, TELEOP_STATE, MASTER_ENERGY, SLAVE_SERVO_CF),
-    late=(SLAVE_SETPOINT_CP, SLAVE_REACH, SLAVE_MEASURED_CF, SLAVE_MEASURED_CP, SLAVE_ENERGY),
-    optional=(MASTER_FILTERED_OUT, SLAVE_ENERGY),
-    on_demand=(MASTER_ENERGY, SLAVE_SERVO_CF),
-    trigger=MASTER_MEASURED_CP,
-    needs=(SLAVE_SETPOINT_CP,),
+    writes=(
+        topics.SLAVE_SERVO_CP,
+        topics.MASTER_SERVO_CF,
+        topics.TELEOP_STATE,
+        topics.MASTER_ENERGY,
+        topics.SLAVE_SERVO_CF,
+    ),
+    late=(
+        topics.SLAVE_SETPOINT_CP,
+        topics.SLAVE_REACH,
+        topics.SLAVE_MEASURED_CF,
+        topics.SLAVE_MEASURED_CP,
+        topics.SLAVE_ENERGY,
+    ),
+    optional=(topics.MASTER_FILTERED_OUT, topics.SLAVE_ENERGY),
+    on_demand=(topics.MASTER_ENERGY, topics.SLAVE_SERVO_CF),
+    trigger=topics.MASTER_MEASURED_CP,
+    needs=(topics.SLAVE_SETPOINT_CP,),
     make=MotionScaling,
 )

@@ -6,8 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
-from teleop_core.base.errors import ParameterError
-from teleop_core.base.parameters import Choice, choice, parameter
+from teleop_core.base import Choice, ParameterError, choice, parameter
 from teleop_core.chain.architectures import ARCHITECTURES
 from teleop_core.chain.fixtures import Fixture
 from teleop_core.chain.mapping.plausibility import PlausibilityParameters

@@ -16,9 +16,7 @@ import math
 from typing import NamedTuple
 
 from teleop_core.chain.fixtures import Held, fixture_depth
-from teleop_core.kernels import inner
-from teleop_core.kernels.fields import Fields, Vector3
-from teleop_core.kernels.geometry import Array
+from teleop_core.kernels import Array, Fields, Vector3, inner
 from teleop_core.kernels.room import room
 
 SIDES = ("hand", "slave", "both")

@@ -2,13 +2,11 @@
 
 import math
 
-from teleop_core.graph.topics import MASTER_CONTACT
-from teleop_core.kernels import inner
-from teleop_core.kernels.fields import Fields, Vector3
-from teleop_core.kernels.geometry import Array
+from teleop_core.graph import topics
+from teleop_core.kernels import Array, Fields, Vector3, inner
 
 _NUMBER, _TAKEN, _RETURNED, _FRICTION = (
-    MASTER_CONTACT.columns.index(name) for name in ("number", "taken", "returned", "friction")
+    topics.MASTER_CONTACT.columns.index(name) for name in ("number", "taken", "returned", "friction")
 )
 
 

@@ -6,11 +6,9 @@ from typing import Annotated
 
 import numpy as np
 
-from teleop_core.base.parameters import parameter
+from teleop_core.base import parameter
 from teleop_core.chain.master.device import DeviceParameters
-from teleop_core.kernels import inner
-from teleop_core.kernels.fields import Fields, Vector3
-from teleop_core.kernels.geometry import Array
+from teleop_core.kernels import Array, Fields, Vector3, inner
 from teleop_core.kernels.portable import matrix_exponential
 from teleop_core.kernels.room import room
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from teleop_core.base.parameters import parameter
+from teleop_core.base import parameter
 from teleop_core.chain.master import hand_mechanics
 from teleop_core.chain.master.contact import ContactState, account, distance
 from teleop_core.chain.master.device import (
@@ -21,26 +21,8 @@ from teleop_core.chain.master.device import (
 from teleop_core.chain.master.rendering import RenderingNumbers, RenderingState, render
 from teleop_core.chain.operators.rest import REST_POSITION, REST_TILT, rest_pose
 from teleop_core.chain.operators.shapes import PHASES
-from teleop_core.graph.noise import Noise
-from teleop_core.graph.row import Row
-from teleop_core.graph.signals import DT, assign
-from teleop_core.graph.stage import RunningStage, Stage
-from teleop_core.graph.topics import (
-    HAND_BUTTONS,
-    HAND_SERVO_CP,
-    HAND_TREMOR,
-    MASTER_BUTTONS,
-    MASTER_CONTACT,
-    MASTER_MEASURED_CF,
-    MASTER_MEASURED_CP,
-    MASTER_MEASURED_CV,
-    MASTER_SERVO_CF,
-    OPERATION,
-    SLAVE_OPERATION,
-)
-from teleop_core.kernels import inner, kernel
-from teleop_core.kernels.fields import PoseRow, record
-from teleop_core.kernels.geometry import Array, rotation, transform
+from teleop_core.graph import DT, Noise, Row, RunningStage, Stage, assign, topics
+from teleop_core.kernels import Array, PoseRow, inner, kernel, record, rotation, transform
 from teleop_core.kernels.room import room
 from teleop_core.slave.operation.states import State
 
@@ -103,8 +85,8 @@ class MasterState(hand_mechanics.HandState, ReadingState, RenderingState, Contac
     doubted: float  # force that was out of range [N]
 
 
-_STATE_OF_SLAVE, _FAULT = OPERATION.index("state"), int(State.FAULT)
-_MOST = MASTER_CONTACT.columns.index("largest_force")
+_STATE_OF_SLAVE, _FAULT = topics.OPERATION.index("state"), int(State.FAULT)
+_MOST = topics.MASTER_CONTACT.columns.index("largest_force")
 
 
 @inner
@@ -259,9 +241,21 @@ class HapticMaster(RunningStage):
 HAPTIC_MASTER = Stage(
     "haptic_master",
     HapticMasterParameters,
-    reads=(HAND_SERVO_CP, HAND_BUTTONS, HAND_TREMOR, MASTER_SERVO_CF, SLAVE_OPERATION),
-    writes=(MASTER_MEASURED_CP, MASTER_MEASURED_CV, MASTER_MEASURED_CF, MASTER_BUTTONS, MASTER_CONTACT),
-    late=(MASTER_SERVO_CF, SLAVE_OPERATION),
+    reads=(
+        topics.HAND_SERVO_CP,
+        topics.HAND_BUTTONS,
+        topics.HAND_TREMOR,
+        topics.MASTER_SERVO_CF,
+        topics.SLAVE_OPERATION,
+    ),
+    writes=(
+        topics.MASTER_MEASURED_CP,
+        topics.MASTER_MEASURED_CV,
+        topics.MASTER_MEASURED_CF,
+        topics.MASTER_BUTTONS,
+        topics.MASTER_CONTACT,
+    ),
+    late=(topics.MASTER_SERVO_CF, topics.SLAVE_OPERATION),
     make=HapticMaster,
     node="teleop_core.nodes.haptic_master:HapticMasterNode",
 )

@@ -13,9 +13,7 @@ import numpy as np
 
 from teleop_core.chain.network import CHANCES, MEMORY
 from teleop_core.chain.network.packet_size import HEADER
-from teleop_core.kernels import inner
-from teleop_core.kernels.fields import Fields, Integers
-from teleop_core.kernels.geometry import Array
+from teleop_core.kernels import Array, Fields, Integers, inner
 
 LONGEST = 16384
 """Ticks that a packet may be on the way; one that would take longer is lost."""

@@ -11,9 +11,7 @@ import numpy as np
 from teleop_core.chain.network import CHANCES, NETWORKS, deadband, link
 from teleop_core.chain.network.packet_size import message_sizes
 from teleop_core.chain.network.parameters import NetworkParameters, WayParameters
-from teleop_core.graph.row import Row
-from teleop_core.graph.signals import DT, assign
-from teleop_core.graph.stage import RunningStage, Stage
+from teleop_core.graph import DT, Row, RunningStage, Stage, assign
 from teleop_core.graph.topics import (
     ENERGY,
     MASTER_ENERGY,
@@ -38,9 +36,7 @@ from teleop_core.graph.topics import (
     SLAVE_SETPOINT_CP,
     Topic,
 )
-from teleop_core.kernels import inner, kernel
-from teleop_core.kernels.fields import Vector3, record
-from teleop_core.kernels.geometry import Array
+from teleop_core.kernels import Array, Vector3, inner, kernel, record
 
 THERE, BACK = 0, 1
 _TOLD = 20

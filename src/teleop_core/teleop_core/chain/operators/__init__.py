@@ -11,9 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from teleop_core.base.errors import PartError
-from teleop_core.base.parameters import NoParameters
-from teleop_core.base.registry import Registry
+from teleop_core.base import NoParameters, PartError, Registry
 from teleop_core.kernels.geometry import Array
 
 if TYPE_CHECKING:

@@ -12,8 +12,7 @@ from typing import Any, NamedTuple, cast
 
 import numpy as np
 
-from teleop_core.base.errors import ShapeError, UnknownNameError
-from teleop_core.base.parameters import parameter
+from teleop_core.base import ShapeError, UnknownNameError, parameter
 from teleop_core.chain.operators import Motion, Operator, Setting
 from teleop_core.chain.operators.follower import MOST, Follower
 from teleop_core.chain.operators.rest import rest_pose

@@ -9,8 +9,7 @@ from typing import cast
 
 import numpy as np
 
-from teleop_core.base.errors import ParameterError
-from teleop_core.base.parameters import parameter
+from teleop_core.base import ParameterError, parameter
 from teleop_core.chain.operators import Motion, Operator, Setting
 from teleop_core.chain.operators.parameters import OperatorParameters
 from teleop_core.chain.operators.shapes import minimum_jerk, smooth

@@ -14,12 +14,10 @@ from typing import Any
 import numpy as np
 from numba import types
 
-from teleop_core.base.errors import PartError
-from teleop_core.base.registry import Registry, part_check, tried
-from teleop_core.graph.topics import ENERGY
-from teleop_core.kernels import kernel, pointer
-from teleop_core.kernels.geometry import Array
-from teleop_core.kernels.parts import fenced, is_whole, numbers_of
+from teleop_core.base import PartError, Registry, part_check
+from teleop_core.base.registry import tried
+from teleop_core.graph import topics
+from teleop_core.kernels import Array, fenced, is_whole, kernel, numbers_of, pointer
 
 __all__ = ["MEMORY", "PASSIVITIES", "Passivity", "leave_command", "register_passivity"]
 
@@ -97,7 +95,7 @@ def _try(part: Passivity) -> None:
         "and parameters that all have defaults"
     )
     with tried("passivity", part.name, needs):
-        numbers, width = part.numbers_of(part.parameters()), len(ENERGY)
+        numbers, width = part.numbers_of(part.parameters()), len(topics.ENERGY)
         memory, fence = fenced(np.zeros(MEMORY))
         push, behind = fenced(np.zeros(3))
         command, after = fenced(np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]))

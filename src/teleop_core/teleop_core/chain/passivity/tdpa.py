@@ -9,12 +9,11 @@ that can be paid. While the slave has little, the hand pays by a drag.
 import math
 from dataclasses import dataclass
 
-from teleop_core.base.parameters import parameter
+from teleop_core.base import parameter
 from teleop_core.chain.passivity import Passivity
 from teleop_core.chain.passivity.held_back import hold_lead, make_up, met_way, norm
 from teleop_core.chain.passivity.port import DRIFT, HEARD, IN, LAW, MARGIN, ROUND, TOLD
-from teleop_core.kernels import inner, kernel
-from teleop_core.kernels.geometry import Array
+from teleop_core.kernels import Array, inner, kernel
 
 READING = 0.06e-3
 """A step of the device's reading [m]."""

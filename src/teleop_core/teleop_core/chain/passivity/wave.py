@@ -10,13 +10,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from teleop_core.base.parameters import parameter
+from teleop_core.base import parameter
 from teleop_core.chain.passivity import Passivity
 from teleop_core.chain.passivity.held_back import hold_back, make_up, norm
 from teleop_core.chain.passivity.port import DRIFT, HEARD, IMPEDANCE, MARGIN, ROUND, TOLD, WAVE
 from teleop_core.chain.passivity.tdpa import SPEED_TIME, pay_push
-from teleop_core.kernels import inner, kernel
-from teleop_core.kernels.geometry import Array
+from teleop_core.kernels import Array, inner, kernel
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -5,13 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from teleop_core.base.errors import ParameterError
-from teleop_core.base.parameters import parameter
+from teleop_core.base import ParameterError, parameter
 from teleop_core.chain.tasks import SCENE, Act, Miss, Task
 from teleop_core.chain.tasks.attempts import begin_goal, end_attempt, is_at_goal, move_goal, waited
-from teleop_core.graph.topics import JAW_OBJECTS, TASK_STATE
-from teleop_core.kernels import inner, kernel
-from teleop_core.kernels.geometry import Array
+from teleop_core.graph import topics
+from teleop_core.kernels import Array, inner, kernel
 
 KINDS = ("one", "two", "hand_over")
 """Who transfers: one arm all blocks; each arm every other one; the second takes from the first."""
@@ -21,7 +19,7 @@ STEPS = ("wait", "reach", "grasp", "lift", "meet", "take", "release", "retreat",
 _TWO, _HAND_OVER = KINDS.index("two"), KINDS.index("hand_over")
 _GRIP, _LET_GO = int(Act.GRIP), int(Act.LET_GO)
 _NONE, _LATE, _DROP, _WRONG = (int(m) for m in (Miss.NONE, Miss.LATE, Miss.DROP, Miss.WRONG))
-_STEP = TASK_STATE.columns.index("step")
+_STEP = topics.TASK_STATE.columns.index("step")
 _SECOND, _X0 = SCENE.index("is_second"), SCENE.index("x0")
 _STARTS = 4  # places of the blocks at the beginning, in the memory
 _MEETS = 0.01  # a block that is no farther from where both meet is there [m]
@@ -57,14 +55,14 @@ class PegTransferParameters:
     longest: float = parameter(60.0, unit="s", lower=1.0, upper=600.0, doc="a transfer that takes longer is an error")
 
     def __post_init__(self) -> None:
-        if len(self.ways) not in {2, 2 * JAW_OBJECTS}:
-            needed = f"x, y of one way, or of {JAW_OBJECTS}"
+        if len(self.ways) not in {2, 2 * topics.JAW_OBJECTS}:
+            needed = f"x, y of one way, or of {topics.JAW_OBJECTS}"
             raise ParameterError("task.peg_transfer.ways", self.ways, needed)
 
 
 def numbers(p: PegTransferParameters) -> Array:
     """Numbers that the judge takes: lift, width, longest, kind, six ways, clearance."""
-    ways, kind = np.resize(p.ways, 2 * JAW_OBJECTS), KINDS.index(p.arms)
+    ways, kind = np.resize(p.ways, 2 * topics.JAW_OBJECTS), KINDS.index(p.arms)
     return np.array([p.lift, p.width, p.longest, kind, *ways, p.clearance], dtype=np.float64)
 
 
@@ -75,8 +73,8 @@ def _verdict(numbers: Array, memory: Array, scene: Array, block: int) -> int:
     is_high = scene[now + 2] - memory[_STARTS + 3 * block + 2] > _RESTS
     if is_high or brought + scene[_SECOND + 4] - memory[3] == 0.0:
         return -1
-    best, nearest = _DROP, numbers[4 + 2 * JAW_OBJECTS] + 1e-9
-    for i in range(JAW_OBJECTS):
+    best, nearest = _DROP, numbers[4 + 2 * topics.JAW_OBJECTS] + 1e-9
+    for i in range(topics.JAW_OBJECTS):
         x = memory[_STARTS + 3 * i] + numbers[4 + 2 * i] - scene[now]
         y = memory[_STARTS + 3 * i + 1] + numbers[5 + 2 * i] - scene[now + 1]
         if brought > 0.0 and math.hypot(x, y) <= nearest:
@@ -157,7 +155,7 @@ def _next_block(numbers: Array, memory: Array, scene: Array, state: Array) -> No
         memory[0] += stride
     memory[2], memory[3] = scene[_SECOND + 3], scene[_SECOND + 4]
     begin = _MEET if int(numbers[3]) == _HAND_OVER and is_second else _REACH
-    if memory[0] >= JAW_OBJECTS or memory[_STARTS + 3 * int(memory[0])] == 0.0:
+    if memory[0] >= topics.JAW_OBJECTS or memory[_STARTS + 3 * int(memory[0])] == 0.0:
         memory[0], begin = -1.0, _WAIT
     _begin_step(numbers, memory, scene, state, begin)
 
@@ -171,7 +169,7 @@ def peg_transfer_judge(numbers: Array, memory: Array, scene: Array, state: Array
     From the fifth on it holds the first places of all.
     """
     if state[0] == 0.0:
-        for i in range(3 * JAW_OBJECTS):
+        for i in range(3 * topics.JAW_OBJECTS):
             memory[_STARTS + i] = scene[_X0 + i]
         _next_block(numbers, memory, scene, state)
     if memory[0] < 0.0:

@@ -3,11 +3,10 @@
 import math
 from dataclasses import dataclass
 
-from teleop_core.base.parameters import parameter
+from teleop_core.base import parameter
 from teleop_core.chain.tasks import Act, Task
 from teleop_core.chain.tasks.attempts import begin_goal, tell_attempt, was_pressed
-from teleop_core.kernels import kernel
-from teleop_core.kernels.geometry import Array
+from teleop_core.kernels import Array, kernel
 
 _PRESS = int(Act.PRESS)
 

@@ -2,11 +2,10 @@
 
 from dataclasses import dataclass
 
-from teleop_core.base.parameters import parameter
+from teleop_core.base import parameter
 from teleop_core.chain.tasks import Act, Miss, Task
 from teleop_core.chain.tasks.attempts import begin_goal, end_attempt, is_at_goal, tell_attempt, waited
-from teleop_core.kernels import kernel
-from teleop_core.kernels.geometry import Array
+from teleop_core.kernels import Array, kernel
 
 _PASS, _LATE = int(Act.PASS), int(Miss.LATE)
 # Powers of the inverse of the plastic number's relative in three dimensions, 1.2207440846…

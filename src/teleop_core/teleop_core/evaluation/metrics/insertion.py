@@ -10,8 +10,7 @@ from teleop_core.evaluation.metrics.touch import object_of
 from teleop_core.evaluation.rows import Row, row
 from teleop_core.evaluation.windows import Window
 from teleop_core.graph.topics import SLAVE_TRUE_CF, SLAVE_TRUE_CP
-from teleop_core.kernels.geometry import Array
-from teleop_core.kernels.portable import length
+from teleop_core.kernels import Array, length
 from teleop_core.shapes.hole import HoleParameters
 
 GROUP = "insertion"

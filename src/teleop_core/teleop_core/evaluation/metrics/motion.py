@@ -5,8 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from teleop_core.base.errors import TeleopError
-from teleop_core.base.parameters import build
+from teleop_core.base import TeleopError, build
 from teleop_core.chain.operators import OPERATORS
 from teleop_core.chain.operators.parameters import OperatorParameters
 from teleop_core.evaluation.context import Context
@@ -18,7 +17,7 @@ from teleop_core.evaluation.motion_samples import MotionSamples
 from teleop_core.evaluation.rows import Row, number, row
 from teleop_core.evaluation.state_history import States
 from teleop_core.evaluation.windows import Window
-from teleop_core.graph.signals import STATE
+from teleop_core.graph import STATE
 from teleop_core.graph.topics import MASTER_MEASURED_CP, SLAVE_MEASURED_CP, Topic
 
 

@@ -5,8 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from teleop_core.base.errors import TeleopError
-from teleop_core.base.parameters import build
+from teleop_core.base import TeleopError, build
 from teleop_core.evaluation.accumulators import Moments
 from teleop_core.evaluation.context import Context
 from teleop_core.evaluation.figure import DARK, FIRST, SECOND, THIRD, Figure, line, time_axis

@@ -42,9 +42,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from teleop_core.base import plain_yaml
-from teleop_core.base.damage import damage_told
-from teleop_core.base.errors import ParameterError, UnknownNameError
+from teleop_core.base import ParameterError, UnknownNameError, damage_told, plain_yaml
 from teleop_core.base.ranges import MOST_OF_ARM, check
 from teleop_core.robots.arms.dh_chain import CONVENTIONS, DhJoint, DhRow, DhTable, elementary
 from teleop_core.robots.arms.dh_drives import parse_drives

@@ -13,9 +13,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from teleop_core.base.errors import ParameterError
-from teleop_core.kernels import inner, kernel
-from teleop_core.kernels.geometry import Array
+from teleop_core.base import ParameterError
+from teleop_core.kernels import Array, inner, kernel
 from teleop_core.kernels.room import room
 from teleop_core.robots.arms import rcrt1_dynamics, rcrt1_hardware
 from teleop_core.robots.branches import BESIDE, bounded, cost_of, hold, is_allowed, turn, wrapped

@@ -20,9 +20,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from teleop_core.kernels import kernel
-from teleop_core.kernels.geometry import Array, rotation, transform
-from teleop_core.kernels.portable import product
+from teleop_core.kernels import Array, kernel, product, rotation, transform
 from teleop_core.kernels.room import room
 from teleop_core.robots.drives import Drives, Dynamics
 from teleop_core.robots.inertias import LinkInertia

@@ -12,9 +12,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from teleop_core.base.errors import ParameterError
-from teleop_core.kernels.geometry import Array
-from teleop_core.kernels.portable import product
+from teleop_core.base import ParameterError
+from teleop_core.kernels import Array, product
 from teleop_core.robots.arms.rcrt1_dynamics import LINKS, link_row
 from teleop_core.robots.hardware import Hardware
 from teleop_core.robots.link_errors import LinkErrors

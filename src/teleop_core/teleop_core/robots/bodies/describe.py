@@ -13,8 +13,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from teleop_core.kernels.geometry import Array, rotations_from_quaternions
-from teleop_core.kernels.portable import length
+from teleop_core.kernels import Array, length, rotations_from_quaternions
 from teleop_core.robots.bodies.body import HERE, Bodies, Body, Joint
 from teleop_core.robots.bodies.chain import axes_of, chain, places, tip_of
 from teleop_core.robots.bodies.frames import pose_of, tips

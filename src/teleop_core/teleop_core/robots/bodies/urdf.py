@@ -13,8 +13,7 @@ from xml.etree import ElementTree as Xml
 
 import numpy as np
 
-from teleop_core.kernels.geometry import Array, rotation, rotations_from_quaternions
-from teleop_core.kernels.portable import product
+from teleop_core.kernels import Array, product, rotation, rotations_from_quaternions
 from teleop_core.robots.bodies.body import HERE, Bodies, Body, Joint
 from teleop_core.robots.bodies.describe import bodies_of
 from teleop_core.robots.bodies.inertials import DENSITY, has_own_links, inertials_of

@@ -15,8 +15,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from teleop_core.kernels import inner, kernel
-from teleop_core.kernels.geometry import Array
+from teleop_core.kernels import Array, inner, kernel
 from teleop_core.robots.chains.dh_kernels import append_fixed, jacobian, move_joint
 from teleop_core.robots.chains.rigid_body import invert_positive
 from teleop_core.robots.drives import Dynamics

@@ -11,8 +11,7 @@ Source:
 
 import math
 
-from teleop_core.kernels import inner, kernel
-from teleop_core.kernels.geometry import Array
+from teleop_core.kernels import Array, inner, kernel
 from teleop_core.kernels.room import room
 
 # Squared weighted error that counts as zero: 1e-12 m at a length of 0.1 m, 1e-11 rad.

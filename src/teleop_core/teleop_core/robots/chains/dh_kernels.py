@@ -15,8 +15,7 @@ import math
 
 import numpy as np
 
-from teleop_core.kernels import inner, kernel
-from teleop_core.kernels.geometry import Array
+from teleop_core.kernels import Array, inner, kernel
 from teleop_core.kernels.room import room
 from teleop_core.robots.chains.damped import ZERO, damped_move, free_joints, pose_error
 from teleop_core.robots.kinematics import REACHED, IkStatus, is_askable, pose_residual

@@ -17,8 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from teleop_core.kernels import inner, kernel
-from teleop_core.kernels.geometry import Array
+from teleop_core.kernels import Array, inner, kernel
 from teleop_core.robots.chains.chain_dynamics import inertia_matrix, inverse_dynamics
 from teleop_core.robots.chains.dh_kernels import jacobian, spread
 from teleop_core.robots.chains.rigid_body import invert_positive

@@ -18,8 +18,7 @@ import math
 
 import numpy as np
 
-from teleop_core.kernels import inner, kernel
-from teleop_core.kernels.geometry import Array
+from teleop_core.kernels import Array, inner, kernel
 from teleop_core.kernels.room import room
 from teleop_core.robots.branches import OUTSIDE, SLACK, cost_of, is_allowed, slowed, turn, turned, wrapped
 from teleop_core.robots.chains.damped import ZERO, assign, pose_error

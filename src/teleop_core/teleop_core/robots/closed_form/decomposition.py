@@ -21,8 +21,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from teleop_core.kernels.geometry import Array, rotation, transform
-from teleop_core.kernels.portable import arctangent, dot, inverse_motion, length, product
+from teleop_core.kernels import Array, arctangent, dot, inverse_motion, length, product, rotation, transform
 from teleop_core.robots.chains import dh_kernels
 from teleop_core.robots.closed_form import parallel_axes, plane_arm, spherical_wrist, swivel
 from teleop_core.robots.kinematics import Kernels

@@ -13,8 +13,7 @@ Source:
 
 import math
 
-from teleop_core.kernels import inner, kernel
-from teleop_core.kernels.geometry import Array
+from teleop_core.kernels import Array, inner, kernel
 from teleop_core.kernels.room import room
 from teleop_core.robots.branches import BESIDE, OUTSIDE
 from teleop_core.robots.closed_form import candidates

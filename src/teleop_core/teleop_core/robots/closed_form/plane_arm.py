@@ -17,8 +17,7 @@ Source:
 
 import math
 
-from teleop_core.kernels import inner, kernel
-from teleop_core.kernels.geometry import Array
+from teleop_core.kernels import Array, inner, kernel
 from teleop_core.kernels.room import room
 from teleop_core.robots.branches import OUTSIDE, cost_of, hold, is_allowed, turn, wrapped
 from teleop_core.robots.chains.dh_kernels import fk

@@ -11,8 +11,7 @@ Source:
 
 import math
 
-from teleop_core.kernels import inner, kernel
-from teleop_core.kernels.geometry import Array
+from teleop_core.kernels import Array, inner, kernel
 from teleop_core.robots.branches import turned, wrapped
 from teleop_core.robots.closed_form.candidates import joint_of
 from teleop_core.robots.closed_form.spherical_wrist import wrist_angles

@@ -24,9 +24,8 @@ from xml.etree import ElementTree as Xml
 
 import numpy as np
 
-from teleop_core.base.errors import ParameterError, UnknownNameError
-from teleop_core.kernels.geometry import Array
-from teleop_core.kernels.portable import dot, length, product
+from teleop_core.base import ParameterError, UnknownNameError
+from teleop_core.kernels import Array, dot, length, product
 from teleop_core.robots.arms.dh_chain import DhJoint, chain_robot
 from teleop_core.robots.arms.dh_drives import drives_of, least_inertia, parse_drives, read_drives
 from teleop_core.robots.chains.chain_dynamics import body_row, chain_dynamics, chain_row

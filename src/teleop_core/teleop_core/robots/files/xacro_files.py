@@ -9,8 +9,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
-from teleop_core.base.damage import damage_told
-from teleop_core.base.errors import ParameterError, TeleopError, UnknownNameError
+from teleop_core.base import ParameterError, TeleopError, UnknownNameError, damage_told
 from teleop_core.robots.files.urdf_tree import tree_of
 from teleop_core.robots.files.visuals import package_folder
 

@@ -16,9 +16,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from teleop_core.base.errors import ParameterError
-from teleop_core.kernels.geometry import Array, rotation
-from teleop_core.kernels.portable import dot, product
+from teleop_core.base import ParameterError
+from teleop_core.kernels import Array, dot, product, rotation
 from teleop_core.kernels.progress import told
 from teleop_core.kernels.store import user_cache
 from teleop_core.shapes.basis.directions import NEAR

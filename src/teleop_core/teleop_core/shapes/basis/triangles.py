@@ -8,11 +8,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from teleop_core.base.errors import ParameterError, TeleopError
+from teleop_core.base import ParameterError, TeleopError
 from teleop_core.base.ranges import check
-from teleop_core.kernels import inner, kernel
-from teleop_core.kernels.geometry import Array
-from teleop_core.kernels.portable import arctangent, dot, length, product
+from teleop_core.kernels import Array, arctangent, dot, inner, kernel, length, product
 
 _FLAT = 1e-6  # share of the cube around it that a mesh must fill
 _LEAF = 4  # triangles in a leaf of the tree, at least

@@ -8,10 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from teleop_core.base.errors import ParameterError
-from teleop_core.base.parameters import parameter
-from teleop_core.graph.signals import DT
-from teleop_core.graph.stage import Stage
+from teleop_core.base import ParameterError, parameter
+from teleop_core.graph import DT, Stage
 from teleop_core.graph.topics import JAW, NO_COMMAND_NS, SLAVE_JAW_MEASURED_JS, SLAVE_JAW_SETPOINT_JS, SLAVE_OPERATION
 from teleop_core.slave.bridges import Command
 from teleop_core.slave.bridges.arm_bridge import BridgeParameters, ControllerBridge

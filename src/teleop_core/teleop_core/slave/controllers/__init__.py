@@ -13,12 +13,10 @@ from typing import Any
 import numpy as np
 from numba import types
 
-from teleop_core.base.errors import ParameterError, PartError
-from teleop_core.base.registry import Registry, part_check, places, tried
-from teleop_core.graph.signals import DT
-from teleop_core.kernels import pointer
-from teleop_core.kernels.geometry import Array
-from teleop_core.kernels.parts import fenced, is_whole
+from teleop_core.base import ParameterError, PartError, Registry, part_check
+from teleop_core.base.registry import places, tried
+from teleop_core.graph import DT
+from teleop_core.kernels import Array, fenced, is_whole, pointer
 from teleop_core.robots.drives import Drives
 from teleop_core.robots.robot import Robot
 

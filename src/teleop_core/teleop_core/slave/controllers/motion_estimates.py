@@ -16,9 +16,8 @@ import math
 
 import numpy as np
 
-from teleop_core.graph.signals import DT
-from teleop_core.kernels import kernel
-from teleop_core.kernels.geometry import Array
+from teleop_core.graph import DT
+from teleop_core.kernels import Array, kernel
 from teleop_core.kernels.portable import exponential
 from teleop_core.robots.robot import Robot
 from teleop_core.slave.controllers import Begin, Shift

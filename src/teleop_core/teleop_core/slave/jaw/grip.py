@@ -13,11 +13,8 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from teleop_core.graph.row import Row
-from teleop_core.graph.signals import copy
-from teleop_core.graph.topics import JAW_OBJECTS
-from teleop_core.kernels import geometry, inner, kernel
-from teleop_core.kernels.fields import Integers, Vector3
+from teleop_core.graph import Row, copy, topics
+from teleop_core.kernels import Integers, Vector3, geometry, inner, kernel
 from teleop_core.slave.jaw.drive import DriveNumbers, DriveState, width
 from teleop_core.slave.jaw.sharing import far_from, share_speed
 
@@ -56,10 +53,10 @@ class GripState(DriveState):
     held: Vector3  # of the second arm: the object's middle in the tip's frame as the grip began [m]
     forces: Annotated[geometry.Array, 2]  # of each hand's fingers on its object [N]
     numbers: Annotated[Integers, 2]  # of the object that each hand moves, or moved last
-    objects: Annotated[geometry.Array, 7 * JAW_OBJECTS]  # poses
-    motions: Annotated[geometry.Array, 3 * JAW_OBJECTS]  # [m/s]
-    pegs: Annotated[Integers, JAW_OBJECTS]  # that each is on; _NONE without
-    homes: Annotated[Integers, JAW_OBJECTS]  # peg where each rested last; _NONE: it dropped
+    objects: Annotated[geometry.Array, 7 * topics.JAW_OBJECTS]  # poses
+    motions: Annotated[geometry.Array, 3 * topics.JAW_OBJECTS]  # [m/s]
+    pegs: Annotated[Integers, topics.JAW_OBJECTS]  # that each is on; _NONE without
+    homes: Annotated[Integers, topics.JAW_OBJECTS]  # peg where each rested last; _NONE: it dropped
     pull: float  # of a peg on a gripped object, across [N]
     transferred: int
     dropped: int

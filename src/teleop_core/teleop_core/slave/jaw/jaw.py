@@ -6,13 +6,9 @@ It leads the jaw's setpoint as ``slave`` leads the arm's. Where the jaw is, it i
 import math
 from dataclasses import dataclass
 
-from teleop_core.base.parameters import parameter
-from teleop_core.graph import topics
-from teleop_core.graph.row import Row
-from teleop_core.graph.signals import DT, assign
-from teleop_core.graph.stage import RunningStage, Stage
-from teleop_core.kernels import inner, kernel
-from teleop_core.kernels.fields import Fields, record
+from teleop_core.base import parameter
+from teleop_core.graph import DT, Row, RunningStage, Stage, assign, topics
+from teleop_core.kernels import Fields, inner, kernel, record
 from teleop_core.slave.operation.states import State
 
 _STATE, _ENABLED = topics.OPERATION.index("state"), int(State.ENABLED)

@@ -9,10 +9,9 @@ from enum import IntEnum
 
 import numpy as np
 
-from teleop_core.base.errors import UnknownNameError
-from teleop_core.graph.topics import STATE_COMMANDS
-from teleop_core.kernels import inner
-from teleop_core.kernels.fields import Fields
+from teleop_core.base import UnknownNameError
+from teleop_core.graph import topics
+from teleop_core.kernels import Fields, inner
 
 
 class State(IntEnum):
@@ -41,7 +40,7 @@ class Event(IntEnum):
     LAPSED = 11  # commands were silent for so long that motion is resumed on purpose only
 
 
-COMMANDS = STATE_COMMANDS
+COMMANDS = topics.STATE_COMMANDS
 """Events that people and programs send, by name."""
 
 

@@ -14,9 +14,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from teleop_core.kernels import inner
-from teleop_core.kernels.fields import PerJoint, Vector3
-from teleop_core.kernels.geometry import Array
+from teleop_core.kernels import Array, PerJoint, Vector3, inner
 from teleop_core.kernels.room import room
 from teleop_core.shapes.basis.directions import NEAR, make_unit
 from teleop_core.slave.arm import Arm

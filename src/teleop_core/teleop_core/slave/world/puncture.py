@@ -11,9 +11,7 @@ Source:
     and cutting. The yielding springs are those of :mod:`teleop_core.slave.friction`.
 """
 
-from teleop_core.kernels import inner
-from teleop_core.kernels.fields import Fields, Vector3
-from teleop_core.kernels.geometry import Array
+from teleop_core.kernels import Array, Fields, Vector3, inner
 
 
 class PunctureNumbers(Fields):
