@@ -18,8 +18,7 @@ from teleop_core.chain.master.hand_mechanics import HandParameters
 from teleop_core.chain.master.haptic_master import HapticMasterParameters
 from teleop_core.chain.operators.parameters import OperatorParameters
 from teleop_core.chain.operators.rest import REST_POSITION
-from teleop_core.evaluation.score import Score
-from teleop_core.evaluation.scoring import evaluate
+from teleop_core.evaluation import Score, evaluate
 from teleop_core.graph.topics import MASTER_CONTACT
 from teleop_core.kernels.geometry import Array
 from teleop_core.session.api import configuration

@@ -17,11 +17,10 @@ from teleop_core.bags.reader import Bag
 from teleop_core.base import EvaluationError, parameter
 from teleop_core.chain.fixtures.reported_fixture import ReportedFixture
 from teleop_core.chain.mapping.parameters import MotionScalingParameters, axis_map
+from teleop_core.evaluation import Figure, Row, evaluate, study
 from teleop_core.evaluation.command import evaluate_bags
-from teleop_core.evaluation.figure import Figure
 from teleop_core.evaluation.origin import read_origin
-from teleop_core.evaluation.rows import Row, summary
-from teleop_core.evaluation.scoring import evaluate, study
+from teleop_core.evaluation.rows import summary
 from teleop_core.graph import TICK_NS, topics
 from teleop_core.kernels.geometry import Array
 from teleop_core.shapes import Shape, register_shape

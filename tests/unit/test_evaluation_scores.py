@@ -18,10 +18,9 @@ from teleop_core.bags.reader import Bag
 from teleop_core.bags.reports import report
 from teleop_core.bags.writer import BagWriter
 from teleop_core.base.errors import EvaluationError, RecordingError
+from teleop_core.evaluation import evaluate, key_table, keys, study
 from teleop_core.evaluation.command import evaluate_bags
-from teleop_core.evaluation.score import key_table, keys
 from teleop_core.evaluation.score_table import score_tables
-from teleop_core.evaluation.scoring import evaluate, study
 from teleop_core.evaluation.windows import WINDOW_NS, DisorderError, windows
 from teleop_core.graph.signals import STATE_FIELDS, TICK_NS
 from teleop_core.graph.topics import (

@@ -18,9 +18,8 @@ from teleop_core.bags.reports import report
 from teleop_core.bags.writer import BagWriter
 from teleop_core.chain.mapping.motion_scaling import MotionScaling
 from teleop_core.chain.mapping.parameters import MotionScalingParameters
-from teleop_core.evaluation.score import Score
+from teleop_core.evaluation import Score, evaluate
 from teleop_core.evaluation.score_table import MET, NOT_MET, score_tables
-from teleop_core.evaluation.scoring import evaluate
 from teleop_core.evaluation.windows import windows
 from teleop_core.graph import STATE_FIELDS, TICK_NS, topics
 from teleop_core.kernels.geometry import Array

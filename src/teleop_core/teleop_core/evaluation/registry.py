@@ -134,3 +134,9 @@ def all_metrics(further: Iterable[type[Metric]] = ()) -> list[type[Metric]]:
             raise PartError("metric", name, "a name that is free; this one is used already")
         found[name] = check_metric(name, part)
     return list(found.values())
+
+
+def register_metric(metric: type[Metric], *, replace: bool = False) -> type[Metric]:
+    """Add a metric under its own name for the rest of the program; see :meth:`Registry.add`."""
+    fallback = getattr(metric, "__name__", type(metric).__name__)
+    return METRICS.add(getattr(metric, "name", fallback), metric, replace=replace)

@@ -4,18 +4,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from teleop_core.evaluation.figure import (
-    COMMAND,
-    FIRST,
-    MEASURED,
-    REFERENCE,
-    SECOND,
-    THIRD,
-    Figure,
-    axis_suffix,
-    stacked_axes,
-    time_axis,
-)
+from teleop_core.evaluation import COMMAND, FIRST, MEASURED, SECOND, THIRD, Figure, axis_suffix, time_axis
+from teleop_core.evaluation.figure import REFERENCE, stacked_axes
 from teleop_core.evaluation.published import ANGLE_FACTOR, BOX_OVERSHOOT_MM, COARSE, FINE, POSITION_SHARE, Published
 from teleop_core.kernels.geometry import Array, roll_pitch_yaw, rotations_from_quaternions
 from teleop_core.shapes.basis.drawing import edges_of

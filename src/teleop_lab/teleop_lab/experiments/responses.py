@@ -6,17 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from teleop_core.evaluation.figure import (
-    FIRST,
-    MEASURED,
-    REFERENCE,
-    SECOND,
-    THIRD,
-    Figure,
-    axis_suffix,
-    stacked_axes,
-    time_axis,
-)
+from teleop_core.evaluation import FIRST, MEASURED, SECOND, THIRD, Figure, axis_suffix, time_axis
+from teleop_core.evaluation.figure import REFERENCE, stacked_axes
 from teleop_core.graph.signals import TICK_NS
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot
