@@ -18,9 +18,7 @@ from teleop_core.chain.operators.shapes import minimum_jerk
 from teleop_core.graph import STATE, TICK_NS, topics
 from teleop_core.kernels.geometry import Array, pose_from_transform
 from teleop_core.robots import load_robot
-from teleop_core.session.api import configuration
-from teleop_core.session.runner import replayed_blocks
-from teleop_core.session.virtual import VirtualTime
+from teleop_core.session import api, runner, virtual
 
 ANY_HAND = PlausibilityParameters(speed=1000.0, acceleration=1e6, turn=1e4, reach=100.0, button_silence=0.0)
 """A hand that may jump, as tests have it do."""
@@ -209,8 +207,8 @@ def setpoints(stamps_ns: NDArray[np.int64], **values: Any) -> tuple[Array, Array
     The reference filter, which lags behind any master, is off.
     """
     values = {"slave.reference_filter.is_on": False} | values
-    session = VirtualTime(configuration(settings=values), played="haptic_master")
-    rows = np.concatenate(list(replayed_blocks(session, master_bag(stamps_ns))[0]))
+    session = virtual.VirtualTime(api.configuration(settings=values), played="haptic_master")
+    rows = np.concatenate(list(runner.replayed_blocks(session, master_bag(stamps_ns))[0]))
     last = rows["now_ns"][-1] - stamps_ns[-1]
     rows = rows[rows["slave_setpoint_cp_ns"] > topics.NO_COMMAND_NS]  # after the move to where it starts
     return (rows["now_ns"] - last) * 1e-9, rows["slave_setpoint_cp"][:, :3]

@@ -28,8 +28,7 @@ from present import present
 from stock_client import MIDDLE, StockClient, crtk
 from teleop_core.nodes.children import free_domain
 from teleop_drill.conformance import Finding, Verdict
-from teleop_drill.nodes.conformance import examine, left_behind
-from teleop_drill.nodes.conformance_arm import Arm
+from teleop_drill.nodes import conformance, conformance_arm
 
 if TYPE_CHECKING:
     from ros.conftest import Peer
@@ -182,11 +181,11 @@ class ForeignArm(Node):
 def findings_of(faults: tuple[str, ...], *, may_move: bool) -> dict[str, Finding]:
     """What is found of a foreign arm with these faults, by topic."""
     with foreign_arm(*faults) as arm:
-        return {found.row.name: found for found in examine(arm, may_move=may_move)}
+        return {found.row.name: found for found in conformance.examine(arm, may_move=may_move)}
 
 
 @contextmanager
-def foreign_arm(*faults: object) -> Iterator[Arm]:
+def foreign_arm(*faults: object) -> Iterator[conformance_arm.Arm]:
     """Client of a foreign arm with these faults, which runs meanwhile."""
     domain, context = int(free_domain()), Context()
     context.init(args=[], domain_id=domain)
@@ -200,7 +199,7 @@ def foreign_arm(*faults: object) -> Iterator[Arm]:
     thread = threading.Thread(target=spin, daemon=True)
     thread.start()
     try:
-        with Arm("PSM", domain) as arm:
+        with conformance_arm.Arm("PSM", domain) as arm:
             assert arm.is_there(20.0)
             yield arm
     finally:
@@ -317,8 +316,8 @@ def takes_part(domain: int) -> bool:
 
 def test_what_an_interrupted_test_leaves_is_told() -> None:
     with foreign_arm() as arm:
-        assert left_behind(arm, may_move=False) == "nothing was commanded"
-        assert "the arm is ENABLED and may be off by 0.01 rad" in left_behind(arm, may_move=True)
+        assert conformance.left_behind(arm, may_move=False) == "nothing was commanded"
+        assert "the arm is ENABLED and may be off by 0.01 rad" in conformance.left_behind(arm, may_move=True)
 
 
 def test_nothing_is_commanded_when_only_looking(by_looking: Any) -> None:

@@ -11,8 +11,7 @@ import pytest
 
 import teleop_core as tc
 from teleop_core.graph import TICK_NS, topics
-from teleop_core.session.configuration import configure
-from teleop_core.session.virtual import VirtualTime
+from teleop_core.session import configuration, virtual
 
 if TYPE_CHECKING:
     from conftest import Run
@@ -26,8 +25,8 @@ def stage(step: Callable[[object, object, object, float], None]) -> tc.Stage:
     return tc.register_stage(made)
 
 
-def session(step: Callable[[object, object, object, float], None]) -> VirtualTime:
-    return VirtualTime(configure(settings=[f"teleop.stages=[{stage(step).name}]"]))
+def session(step: Callable[[object, object, object, float], None]) -> virtual.VirtualTime:
+    return virtual.VirtualTime(configuration.configure(settings=[f"teleop.stages=[{stage(step).name}]"]))
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf])

@@ -9,9 +9,8 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from present import present
-from teleop_core.bags import ros_types
+from teleop_core.bags import messages, ros_types
 from teleop_core.bags.layouts import Layout, discover, layout, layout_of
-from teleop_core.bags.messages import Refusal, read_values
 from teleop_core.base import ShapeError
 from teleop_core.graph import topics
 from teleop_core.kernels.geometry import Array
@@ -104,8 +103,8 @@ def test_reading_by_attribute_agrees_with_reading_bytes(stream: tuple[Layout, ND
     form, stamps, values = stream
     data = form.encode_one(int(stamps[0]), values[0])
     message = ros_types.deserialise(data, form.kind.ros_type)
-    result = read_values(form.kind, message, form.joint_names)
-    assert not isinstance(result, Refusal)
+    result = messages.read_values(form.kind, message, form.joint_names)
+    assert not isinstance(result, messages.Refusal)
     assert result[0] == stamps[0]
     np.testing.assert_array_equal(result[1], values[0])
 

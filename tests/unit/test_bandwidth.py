@@ -16,8 +16,7 @@ from teleop_core.chain.network.packet_size import HEADER, message_size
 from teleop_core.chain.network.parameters import NetworkParameters
 from teleop_core.graph import topics
 from teleop_core.kernels.geometry import Array
-from teleop_core.session.configuration import configure
-from teleop_core.session.virtual import VirtualTime
+from teleop_core.session import configuration, virtual
 
 MS = 1_000_000
 BITS = 8 * (HEADER + message_size(topics.SLAVE_SERVO_CP))
@@ -155,13 +154,13 @@ def test_a_session_over_a_narrow_line_scores_its_losses_and_repeats_to_the_bit()
         f"network.there.bandwidth={500 * BITS}",
         "network.there.queue=1",
     ]
-    rows = VirtualTime(configure("free_motion", settings=given)).run(6000)
+    rows = virtual.VirtualTime(configuration.configure("free_motion", settings=given)).run(6000)
     state = rows["network_state"][-1]
     assert state[1] / state[0] == pytest.approx(0.5, abs=0.01)
     ages = (rows["now_ns"] - rows["network_servo_cp_ns"])[3000:] / MS
     assert 2.0 <= ages.min() <= ages.max() <= 5.0
     assert rows["teleop_state"][-2000:, 0].all()
-    again = VirtualTime(configure("free_motion", settings=given)).run(6000)
+    again = virtual.VirtualTime(configuration.configure("free_motion", settings=given)).run(6000)
     assert all((rows[name] == again[name]).all() for name in present(rows.dtype.names))
 
 

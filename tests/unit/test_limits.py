@@ -7,9 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from teleop_core.base import build
-from teleop_core.chain.mapping import parameters
-from teleop_core.chain.mapping.limits import SENT
-from teleop_core.chain.mapping.motion_scaling import MotionScaling
+from teleop_core.chain.mapping import limits, motion_scaling, parameters
 from teleop_core.graph import STATE, TICK_NS, topics
 from teleop_core.kernels.geometry import Array
 
@@ -28,7 +26,7 @@ class Arm:
     """
 
     def __init__(self, delay: int = 1, **values: Any) -> None:
-        self.scaling = MotionScaling(parameters.MotionScalingParameters(**PLAIN, **values))
+        self.scaling = motion_scaling.MotionScaling(parameters.MotionScalingParameters(**PLAIN, **values))
         self.told: list[Any]
         self.row, self.delay, self.told = self.scaling.signals, delay, []
         self.hand, self.turn, self.stamp_ns = np.zeros(3), 0.0, TICK_NS
@@ -103,10 +101,10 @@ def test_turns_beyond_are_cut_too_and_come_back_at_once(delay: int) -> None:
 
 
 def test_an_answer_to_a_command_that_is_forgotten_draws_nothing_back() -> None:
-    arm = Arm(delay=SENT + 100)
-    for _ in range(2 * SENT):
+    arm = Arm(delay=limits.SENT + 100)
+    for _ in range(2 * limits.SENT):
         arm.step(1)
-    assert arm.x == pytest.approx(2 * SENT * STEP, abs=1e-9)
+    assert arm.x == pytest.approx(2 * limits.SENT * STEP, abs=1e-9)
 
 
 @pytest.mark.parametrize("gain", [1.0, 0.25])

@@ -19,15 +19,13 @@ from present import present
 from teleop_core.base import NoParameters, ParameterError, PartError, build
 from teleop_core.chain.filters import LONGEST_NS, MEMORY, TREMOR_FILTERS, tremor_filter
 from teleop_core.chain.filters.wflc import RATE
-from teleop_core.chain.mapping.motion_scaling import MOTION_SCALING
-from teleop_core.chain.mapping.parameters import MotionScalingParameters
+from teleop_core.chain.mapping import motion_scaling, parameters
 from teleop_core.evaluation.metrics.tremor_filter import passage
 from teleop_core.evaluation.motion_measures import RATE as SAMPLED
 from teleop_core.evaluation.motion_measures import tremor_power, velocities
 from teleop_core.graph import build_graph, topics
 from teleop_core.kernels import Array, kernel
-from teleop_core.session.configuration import configure
-from teleop_core.session.virtual import VirtualTime
+from teleop_core.session import configuration, virtual
 
 MS = 1_000_000
 KINDS = ("notch", "band_stop", "kalman", "wflc")
@@ -349,7 +347,7 @@ def test_a_hand_that_is_thrown_elsewhere_is_followed_from_there_as_from_the_firs
 
 def commands(runner: tremor_filter.RunningTremorFilter, places: Array) -> Array:
     """What the mapping commands (N, 3) behind a filter, with a slave that is where it is led."""
-    scaling = MOTION_SCALING.run(MotionScalingParameters())
+    scaling = motion_scaling.MOTION_SCALING.run(parameters.MotionScalingParameters())
     row, found = scaling.signals, []
     row["slave_setpoint_cp"] = [0.3, 0.0, 0.2, 1.0, 0.0, 0.0, 0.0]
     for i, place in enumerate(places):
@@ -478,8 +476,8 @@ def test_the_widest_notch_that_is_taken_comes_to_rest_at_any_period(frequency: f
     assert np.abs(answer[-100:]).max() < 1e-9
 
 
-def session(*given: str, scenario: str = "human") -> VirtualTime:
-    return VirtualTime(configure(scenario, settings=["teleop.stages=[tremor_filter]", *given]))
+def session(*given: str, scenario: str = "human") -> virtual.VirtualTime:
+    return virtual.VirtualTime(configuration.configure(scenario, settings=["teleop.stages=[tremor_filter]", *given]))
 
 
 @pytest.mark.parametrize("kind", KINDS)

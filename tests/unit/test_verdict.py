@@ -18,8 +18,7 @@ from teleop_core.evaluation.rows import fixed, number
 from teleop_core.evaluation.verdict import verdict_of
 from teleop_core.graph import STAGES, Stage, register_stage, topics
 from teleop_core.robots import ROBOTS, load_robot, register_robot
-from teleop_core.shapes import SHAPES, register_shape
-from teleop_core.shapes.sphere import SPHERE
+from teleop_core.shapes import SHAPES, register_shape, sphere
 from teleop_core.slave.controllers import CONTROLLERS, register_controller
 from teleop_core.slave.controllers.source_pid import SOURCE_PID
 
@@ -170,7 +169,7 @@ def test_scores_are_a_row_of_a_data_frame_each(drifting: tc.Recording) -> None:
 
 
 def slab() -> dict[str, Any]:
-    register_shape(replace(SPHERE, name="slab"))
+    register_shape(replace(sphere.SPHERE, name="slab"))
     return {"fixture": "slab"}
 
 

@@ -24,8 +24,7 @@ from teleop_core.chain.passivity.port import (
 from teleop_core.chain.passivity.wave import draw, wave_hand, wave_slave
 from teleop_core.graph import topics
 from teleop_core.kernels import Array, kernel
-from teleop_core.session.configuration import configure
-from teleop_core.session.virtual import VirtualTime
+from teleop_core.session import configuration, virtual
 
 DT, ARM, STEP = 1e-3, 0.05, 55e-6
 """Tick [s], lag of the arm [s], step of the device's reading [m]."""
@@ -235,7 +234,7 @@ def pressing(*texts: str, ticks: int = 12_000, scenario: str = "palpation") -> N
         "gimbal_noise=0.0",
         "reflection.passivity=wave",
     )
-    return VirtualTime(configure(scenario, settings=[*settings, *texts])).run(ticks)
+    return virtual.VirtualTime(configuration.configure(scenario, settings=[*settings, *texts])).run(ticks)
 
 
 @pytest.mark.parametrize("direction", [(0.0, 0.0, 1.0), (0.6, 0.0, 0.8)])
@@ -316,4 +315,4 @@ def test_a_hand_that_moves_without_leading_feels_no_drag_and_sends_no_wave() -> 
 
 def test_waves_without_the_slaves_side_are_refused_with_what_they_need() -> None:
     with pytest.raises(ParameterError, match=r"teleop.stages=\[passivity\]"):
-        configure("palpation", settings=["reflection.passivity=wave"])
+        configuration.configure("palpation", settings=["reflection.passivity=wave"])

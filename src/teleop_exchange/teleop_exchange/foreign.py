@@ -13,8 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from teleop_core.bags.memory import MemoryBag
-from teleop_core.bags.reader import Bag
+from teleop_core.bags import memory, reader
 from teleop_core.bags.series import Series
 from teleop_core.base import RecordingError, TeleopError, TeleopWarning, damage_told
 from teleop_core.graph import topics
@@ -23,7 +22,7 @@ from teleop_exchange.imported_motion import Motion
 from teleop_exchange.options import ImportOptions
 
 
-def master_of_others(path: Path, bag: Bag | None, prefixes: Sequence[str]) -> MemoryBag:
+def master_of_others(path: Path, bag: reader.Bag | None, prefixes: Sequence[str]) -> memory.MemoryBag:
     """Copy of the master's topics in memory, with the same stamps and metadata.
 
     Args:
@@ -40,7 +39,7 @@ def master_of_others(path: Path, bag: Bag | None, prefixes: Sequence[str]) -> Me
     for prefix in prefixes or [""]:
         chosen = wanted if bag is None else _of_arm(bag, prefix, wanted)
         series |= _read(path, prefix.rstrip("/"), chosen)
-    return MemoryBag(str(path), series, {}, {} if bag is None else bag.metadata)
+    return memory.MemoryBag(str(path), series, {}, {} if bag is None else bag.metadata)
 
 
 def columns_of(path: Path) -> ImportOptions:
@@ -66,7 +65,7 @@ def columns_of(path: Path) -> ImportOptions:
     ).changed(**{name: name for name in COLUMNS[7:] if name in head})
 
 
-def _of_arm(bag: Bag, prefix: str, options: ImportOptions) -> ImportOptions:
+def _of_arm(bag: reader.Bag, prefix: str, options: ImportOptions) -> ImportOptions:
     """Options that take an arm's topics, where it has them and nothing else is wanted."""
     poses, buttons = prefix + topics.MASTER_MEASURED_CP.name, prefix + topics.MASTER_BUTTONS.name
     topic = options.topic or (poses if poses in bag.topics else "")

@@ -25,11 +25,8 @@ from teleop_core.kernels import Array, product
 from teleop_core.robots.drives import ENTRIES, Drives
 from teleop_core.robots.kinematics import Kernels
 from teleop_core.robots.robot import Robot, geometry_of
+from teleop_machines import mma_balance, mma_forward, mma_ik, mma_models
 from teleop_machines.bodies.mma_bodies import mma_bodies
-from teleop_machines.mma_balance import ShoulderSpring, shoulder_load
-from teleop_machines.mma_forward import GEOMETRY, MODEL_A, fk, jacobian
-from teleop_machines.mma_ik import ik, ik_all
-from teleop_machines.mma_models import MODELS, vector
 
 JOINTS = ("theta1", "theta2", "theta3", "theta3_prime", "theta6", "theta8", "theta10")
 HOME = np.radians([0.0, -90.0, 0.0, 90.0, 90.0, 0.0, 0.0])
@@ -64,9 +61,9 @@ def make(model: str = "C", **geometry: float) -> Robot:
         UnknownNameError: No such model or symbol.
         ParameterError: A length is not possible.
     """
-    if model not in MODELS:
-        raise UnknownNameError("model", model, MODELS)
-    row = geometry_of(GEOMETRY, (MODEL_A if model == "A" else {}) | geometry)
+    if model not in mma_models.MODELS:
+        raise UnknownNameError("model", model, mma_models.MODELS)
+    row = geometry_of(mma_forward.GEOMETRY, (mma_forward.MODEL_A if model == "A" else {}) | geometry)
     for symbol, value in row.items():
         smallest = 1e-3 if symbol in {"a2", "a3"} else 0.0
         if symbol != "theta12" and not smallest <= value <= 1.0:
@@ -77,15 +74,15 @@ def make(model: str = "C", **geometry: float) -> Robot:
         lower=HOME - math.pi,
         upper=HOME + math.pi,
         home=HOME,
-        start=START if row == GEOMETRY else None,
+        start=START if row == mma_forward.GEOMETRY else None,
         geometry=row,
-        kernels=Kernels(fk=fk, jacobian=jacobian, ik=ik, ik_all=ik_all),
+        kernels=Kernels(fk=mma_forward.fk, jacobian=mma_forward.jacobian, ik=mma_ik.ik, ik_all=mma_ik.ik_all),
         drives=DRIVES,
         describe=mma_bodies,
     )
 
 
-def holding_torques(robot: Robot, q: object, wrench: object, spring: ShoulderSpring | None = None) -> Array:
+def holding_torques(robot: Robot, q: object, wrench: object, spring: mma_balance.ShoulderSpring | None = None) -> Array:
     """Joint torques with which the handle stands still and pushes on the hand.
 
     Gravity is known for joint 2 only (the source weighs the links but prints no mass centres), in
@@ -105,7 +102,7 @@ def holding_torques(robot: Robot, q: object, wrench: object, spring: ShoulderSpr
         ShapeError: Another shape.
         ParameterError: NaN or infinity.
     """
-    push, joints = vector("wrench", wrench, 6), vector("q", q, 7)
+    push, joints = mma_models.vector("wrench", wrench, 6), mma_models.vector("q", q, 7)
     torques = product(robot.jacobian(joints).T, push)
-    torques[1] -= shoulder_load(joints[1], spring).residual
+    torques[1] -= mma_balance.shoulder_load(joints[1], spring).residual
     return torques

@@ -25,8 +25,7 @@ import numpy as np
 
 from teleop_core.base import ParameterError
 from teleop_core.kernels import Array, inner, kernel
-from teleop_core.robots import kinematics
-from teleop_core.robots.branches import slowed
+from teleop_core.robots import branches, kinematics
 from teleop_core.robots.robot import Robot, geometry_of
 from teleop_machines.bodies.parallel import rps3_bodies
 from teleop_machines.drives import electric_cylinders
@@ -123,7 +122,7 @@ def ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual
     if not kinematics.is_askable(T, seed):
         return -1
     _legs(T, geometry, q)
-    is_there = slowed(q, seed, limits, q)
+    is_there = branches.slowed(q, seed, limits, q)
     theta, S, reached = np.empty(3), np.empty((3, 3)), np.empty((4, 4))
     _close(q, geometry, theta)
     points(q, theta, geometry[0], S)

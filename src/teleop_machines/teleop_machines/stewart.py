@@ -26,8 +26,7 @@ import numpy as np
 
 from teleop_core.base import ParameterError, ShapeError
 from teleop_core.kernels import Array, checked_array, inner, is_rigid, kernel, length
-from teleop_core.robots import kinematics
-from teleop_core.robots.branches import slowed
+from teleop_core.robots import branches, kinematics
 from teleop_core.robots.chains.damped import is_near_singular
 from teleop_core.robots.robot import Robot, geometry_of
 from teleop_machines.bodies.parallel import stewart_bodies
@@ -257,7 +256,7 @@ def ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual
     base, platform = geometry[:18].reshape((6, 3)), geometry[18:36].reshape((6, 3))
     size, legs, reached = geometry[_SIZE], np.empty((6, 6)), np.empty((4, 4))
     leg_system(T, base, platform, q, legs)
-    is_there = slowed(q, seed, limits, q)
+    is_there = branches.slowed(q, seed, limits, q)
     if geometry[_SINGULAR] > 0.0:
         # The legs of the pose, though they do not hold it; a pose next to it if they fell short.
         reached[:] = T

@@ -20,8 +20,7 @@ from pathlib import Path
 
 from teleop_core.base import TeleopWarning, printable
 from teleop_core.robots import geometry_of
-from teleop_core.robots.files.visuals import kept_mesh, meshes_of
-from teleop_core.robots.files.xacro_files import EXPANDED, xml_of
+from teleop_core.robots.files import visuals, xacro_files
 from teleop_core.robots.parts import DESCRIPTION, arguments_of, file_of
 
 TOUCHED, FIXTURE = "mesh", "fixture_mesh"
@@ -65,7 +64,7 @@ class KeptFiles:
         path, text, geometry = found[0], None, geometry_of(settings)
         if path.suffix.lower() == ".xacro":
             arguments = found[1] | arguments_of(geometry)
-            text = printable(xml_of(path, arguments).decode())
+            text = printable(xacro_files.xml_of(path, arguments).decode())
         else:
             text = _text(path)
         if text is None:
@@ -73,7 +72,7 @@ class KeptFiles:
         self._texts[f"{prefix}{_ROBOT}{_FILE}"] = text
         if drives := str(geometry.get(_DRIVES, "")):
             self._name(f"{prefix}{_DRIVES}", drives)
-        digests = {mesh: self._add(file) for mesh, file in meshes_of(text, path).items()}
+        digests = {mesh: self._add(file) for mesh, file in visuals.meshes_of(text, path).items()}
         if lines := [f"{digest} {mesh}" for mesh, digest in digests.items() if digest]:
             self._texts[f"{prefix}{_ROBOT}{_MESHES}"] = "\n".join(lines)
 
@@ -160,12 +159,12 @@ def recorded_geometry(settings: Iterable[str], files: Mapping[str, str]) -> tupl
 def _robot_now(name: str, text: str, digests: Mapping[str, str], metadata: Mapping[str, str]) -> str:
     """Path of a robot's file, with the meshes of its links as they were recorded."""
     path = Path(name).expanduser()
-    files = meshes_of(text, path)
+    files = visuals.meshes_of(text, path)
     same = {mesh for mesh, digest in digests.items() if _digest_now(files.get(mesh)) == digest}
     if _text(path) == text and len(same) == len(digests):
         return name
     is_made = path.name.lower().endswith((".xacro", DESCRIPTION))
-    copy = _place(f"{text}{digests}") / (path.name + EXPANDED * is_made)
+    copy = _place(f"{text}{digests}") / (path.name + xacro_files.EXPANDED * is_made)
     room = _MOST
     for mesh, digest in digests.items():
         data = _unpacked(metadata, digest, room)
@@ -175,7 +174,7 @@ def _robot_now(name: str, text: str, digests: Mapping[str, str], metadata: Mappi
         if data is None:
             _tell(mesh, files.get(mesh))
         else:
-            _written(kept_mesh(mesh, copy), data)
+            _written(visuals.kept_mesh(mesh, copy), data)
     return str(_written(copy, text.encode()))
 
 

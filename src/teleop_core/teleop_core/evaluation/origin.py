@@ -6,8 +6,7 @@ from functools import cached_property
 from itertools import pairwise
 from typing import Any
 
-from teleop_core.bags.arms import PLAYED_KEY
-from teleop_core.bags.reader import Bag
+from teleop_core.bags import arms, reader
 from teleop_core.base import TeleopError, build, plain_yaml, shown, specs
 from teleop_core.chain.mapping.motion_scaling import MOTION_SCALING
 from teleop_core.chain.mapping.parameters import MotionScalingParameters, axis_map, tool_maps
@@ -17,8 +16,7 @@ from teleop_core.graph.former_shapes import present_layer
 from teleop_core.graph.graph import DEVICE
 from teleop_core.graph.layers import parse_layer
 from teleop_core.kernels.geometry import Array
-from teleop_core.slave.slave import SLAVE
-from teleop_core.slave.slave_sim import SLAVE_SIM
+from teleop_core.slave import slave, slave_sim
 
 _BEGINS = (HAND, DEVICE)
 _GRAPH = ("arms", "stages", "delays")
@@ -100,7 +98,7 @@ class Origin:
         return next(names, "")
 
 
-def read_origin(bag: Bag, arm: str = "") -> Origin:
+def read_origin(bag: reader.Bag, arm: str = "") -> Origin:
     """Origin of a recording.
 
     What is missing, or cannot be built any more, is that of the built-in stages with their
@@ -111,16 +109,16 @@ def read_origin(bag: Bag, arm: str = "") -> Origin:
         arm: Name of the arm.
     """
     content = _content(bag)
-    layer, has_server = _layer(bag, content), any(_stage(name) == SLAVE.name for name in content)
+    layer, has_server = _layer(bag, content), any(_stage(name) == slave.SLAVE.name for name in content)
     return Origin(
         _graph(layer), _axes(layer, arm), _operator(layer, arm), _interpolation(layer, arm),
         _tool(layer, arm), *_slave(layer, arm), _geometry(layer, arm),
         int(has_server), _world(layer, arm), tuple(dict.fromkeys(_missing(layer, arm))),
-        begin if (begin := bag.metadata.get(PLAYED_KEY, "")) in _BEGINS else "",
+        begin if (begin := bag.metadata.get(arms.PLAYED_KEY, "")) in _BEGINS else "",
     )  # fmt: skip
 
 
-def _content(bag: Bag) -> Mapping[Any, Any]:
+def _content(bag: reader.Bag) -> Mapping[Any, Any]:
     """What is stored about stages, installed or not."""
     try:
         content = plain_yaml.parse(bag.metadata.get("configuration", ""))
@@ -133,7 +131,7 @@ def _stage(name: object) -> str:
     return str(name).rpartition("/")[2]
 
 
-def _layer(bag: Bag, content: Mapping[Any, Any]) -> Layer:
+def _layer(bag: reader.Bag, content: Mapping[Any, Any]) -> Layer:
     """What is stored about stages that are installed."""
     known = {SESSION, *STAGES}
     kept = {name: said for name, said in content.items() if _stage(name) in known}
@@ -176,13 +174,13 @@ def _said(layer: Layer, stage: str, arm: str) -> dict[str, object]:
 
 def _interpolation(layer: Layer, arm: str) -> str | None:
     """Way of the slave between commands, if it is told."""
-    said = _said(layer, SLAVE.name, arm).get("interpolation")
+    said = _said(layer, slave.SLAVE.name, arm).get("interpolation")
     return said if isinstance(said, str) else None
 
 
 def _slave(layer: Layer, arm: str) -> tuple[str | None, str | None]:
     """Plant and control law of the slave."""
-    said = _said(layer, SLAVE_SIM.name, arm)
+    said = _said(layer, slave_sim.SLAVE_SIM.name, arm)
     if not said:
         return None, None
     law = said.get("controller.kind", "pid")
@@ -190,13 +188,13 @@ def _slave(layer: Layer, arm: str) -> tuple[str | None, str | None]:
 
 
 def _geometry(layer: Layer, arm: str) -> tuple[str, ...]:
-    said = _said(layer, SLAVE_SIM.name, arm).get("geometry")
+    said = _said(layer, slave_sim.SLAVE_SIM.name, arm).get("geometry")
     return tuple(map(str, said)) if isinstance(said, list | tuple) else ()
 
 
 def _world(layer: Layer, arm: str) -> dict[str, object]:
     """Parameters of the object that the slave touches, by names without what is before them."""
-    said = _said(layer, SLAVE_SIM.name, arm).items()
+    said = _said(layer, slave_sim.SLAVE_SIM.name, arm).items()
     return {name[len(_WORLD) :]: value for name, value in said if name.startswith(_WORLD)}
 
 

@@ -6,9 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from teleop_core.bags.kept_files import recorded_files
-from teleop_core.bags.messages import Report
-from teleop_core.bags.reader import Bag
+from teleop_core.bags import kept_files, messages, reader
 from teleop_core.base import EvaluationError, TeleopWarning
 from teleop_core.chain.fixtures.reported_fixture import ReportedFixture, reported_fixture
 from teleop_core.evaluation.accumulators import Integers
@@ -94,7 +92,7 @@ NO_HISTORY: StateHistory = StateHistory(np.empty(0, np.int64), np.empty((0, len(
 """That of a recording without teleop/state."""
 
 
-def read_history(bag: Bag) -> StateHistory:
+def read_history(bag: reader.Bag) -> StateHistory:
     """State history of a recording; empty if it has no teleop/state.
 
     Reports of others that lack a field, or have one that is no number, are left out with a warning.
@@ -109,7 +107,7 @@ def read_history(bag: Bag) -> StateHistory:
     fixtures: dict[ReportedFixture, int] = {}
     which: list[int] = []
     wrong: list[EvaluationError] = []
-    files = recorded_files(bag.metadata)
+    files = kept_files.recorded_files(bag.metadata)
     for report in bag.reports(topics.TELEOP_STATE) if info is not None and info.count else ():
         try:
             row = _row(bag, report)
@@ -130,11 +128,11 @@ def read_history(bag: Bag) -> StateHistory:
     return StateHistory(times[order], columns[order], told[order], tuple(fixtures))
 
 
-def _row(bag: Bag, report: Report) -> Array:
+def _row(bag: reader.Bag, report: messages.Report) -> Array:
     return np.array([_number(bag, name, report.values.get(name, _SINCE.get(name))) for name in STATE_FIELDS])
 
 
-def _number(bag: Bag, name: str, text: str | None) -> float:
+def _number(bag: reader.Bag, name: str, text: str | None) -> float:
     if text is None:
         raise EvaluationError(f"{bag.path}: a {topics.TELEOP_STATE.name} report lacks {name}")
     try:

@@ -29,8 +29,7 @@ import numpy as np
 
 from teleop_core.base import ParameterError, UnknownNameError
 from teleop_core.kernels import Array, inverse_motion, product, rotation, transform
-from teleop_core.robots.arm import Arm
-from teleop_core.robots.drives import read_only
+from teleop_core.robots import arm, drives
 
 SYMBOLS = ("a", "alpha", "d", "theta")
 """Kinds of errors, in the order of every vector of them: a1 ... an, alpha1 ... thetan."""
@@ -61,7 +60,7 @@ class LinkErrors:
 
     def __post_init__(self) -> None:
         for name in SYMBOLS:
-            values = read_only(name, getattr(self, name), np.shape(self.a))
+            values = drives.read_only(name, getattr(self, name), np.shape(self.a))
             object.__setattr__(self, name, values)
 
     @property
@@ -91,7 +90,7 @@ class LinkErrors:
         return LinkErrors.from_vector(np.zeros(4 * n))
 
     @staticmethod
-    def of(robot: Arm, given: Mapping[str, float]) -> "LinkErrors":
+    def of(robot: arm.Arm, given: Mapping[str, float]) -> "LinkErrors":
         """Errors by name, such as ``{"d3": 5.5e-3}``; all others are zero.
 
         Raises:

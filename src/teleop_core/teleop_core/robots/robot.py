@@ -11,7 +11,7 @@ import numpy as np
 
 from teleop_core.base import ParameterError, ShapeError, UnknownNameError
 from teleop_core.kernels import Array, checked_array, direct, is_rigid, pointer, product, raise_pending
-from teleop_core.robots import description, forward_kinematics, kinematics
+from teleop_core.robots import description, forward_kinematics, kinematics, room
 from teleop_core.robots.drives import Drives, Dynamics, independent_axes, read_only
 from teleop_core.robots.hardware import Hardware
 from teleop_core.robots.kinematics import (
@@ -31,7 +31,6 @@ from teleop_core.robots.kinematics import (
     WriteKernel,
     is_ready,
 )
-from teleop_core.robots.room import start_of
 
 if TYPE_CHECKING:
     from teleop_core.robots.bodies.body import Bodies
@@ -49,7 +48,7 @@ class _Start:
         if robot is None:
             return None  # the field's default
         if robot.__dict__["start"] is None:
-            posture = read_only("start", start_of(robot), (robot.n,))
+            posture = read_only("start", room.start_of(robot), (robot.n,))
             robot.__dict__["start"] = posture
         return cast("Array", robot.__dict__["start"])
 

@@ -14,8 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from teleop_core.kernels import Array, length, product, raise_pending, rotations_from_quaternions
-from teleop_core.robots import kinematics
-from teleop_core.robots.arm import Arm
+from teleop_core.robots import arm, kinematics
 from teleop_core.robots.kinematics import IkStatus
 
 # One step of the walk turns the tool so far [rad], or takes it as far as a lever of reach/pi would.
@@ -44,7 +43,7 @@ class Room(NamedTuple):
     """Turn about the tip in place; inf if no rotation is controlled."""
 
 
-def room(robot: Arm, q: object) -> Room:
+def room(robot: arm.Arm, q: object) -> Room:
     """How far the tip can go from a posture in every direction.
 
     Args:
@@ -63,7 +62,7 @@ def room(robot: Arm, q: object) -> Room:
     return Room(float(moves[0]) * STEP * lever(robot), float(turns[0]) * STEP)
 
 
-def lever(robot: Arm) -> float:
+def lever(robot: arm.Arm) -> float:
     """Distance [m] that counts as much as a radian: reach/pi.
 
     The reach is the largest distance of the tip from the base's origin over the postures that are
@@ -72,7 +71,7 @@ def lever(robot: Arm) -> float:
     return float(length(_poses(robot, samples(robot))[:, :3, 3]).max()) / math.pi
 
 
-def samples(robot: Arm) -> Array:
+def samples(robot: arm.Arm) -> Array:
     """Joint vectors (:data:`SAMPLES`, n) spread evenly inside the limits, the same every time.
 
     Source:
@@ -86,7 +85,7 @@ def samples(robot: Arm) -> Array:
     return robot.lower + (shares % 1.0) * (robot.upper - robot.lower)
 
 
-def start_of(robot: Arm) -> Array:
+def start_of(robot: arm.Arm) -> Array:
     """:func:`start_posture`, looked for once per program for robots that are alike."""
     arrays = (robot.lower, robot.upper, robot.home, robot.geometry_row, np.array(robot.task_mask))
     key = (robot.kernels, *(array.tobytes() for array in arrays))
@@ -95,7 +94,7 @@ def start_of(robot: Arm) -> Array:
     return _KNOWN[key]
 
 
-def start_posture(robot: Arm) -> Array:
+def start_posture(robot: arm.Arm) -> Array:
     """Posture from which the tip has room in all directions, by a rule without chance.
 
     Home, if it has room enough: a turn by 30 degrees and a move by reach/15. Else of the
@@ -126,7 +125,7 @@ def start_posture(robot: Arm) -> Array:
     return np.asarray(good[int(away.argmin())])
 
 
-def roomy_postures(robot: Arm, count: int) -> Array:
+def roomy_postures(robot: arm.Arm, count: int) -> Array:
     """Postures with room all around, the start first, then those looked at with the most room.
 
     Args:
@@ -143,12 +142,12 @@ def roomy_postures(robot: Arm, count: int) -> Array:
     return np.vstack((robot.start, wide[: count - 1]))
 
 
-def _poses(robot: Arm, postures: Array) -> Array:
+def _poses(robot: arm.Arm, postures: Array) -> Array:
     """Poses (N, 4, 4) next to home, of least error where joints spread evenly do not assemble."""
     return robot.solve_fk_batch(postures, search=False).T
 
 
-def _steps(robot: Arm, postures: Array) -> tuple[Array, Array]:
+def _steps(robot: arm.Arm, postures: Array) -> tuple[Array, Array]:
     """Steps (N,) that every posture has in its worst direction: of moving, of turning; or inf."""
     mask = np.array(robot.task_mask)
     return (
@@ -164,7 +163,7 @@ def _directions(controlled: NDArray[np.bool_]) -> Array:
     return kept / length(kept)[:, None]
 
 
-def _walk(robot: Arm, postures: Array, directions: Array, *, is_turn: bool) -> Array:
+def _walk(robot: arm.Arm, postures: Array, directions: Array, *, is_turn: bool) -> Array:
     """Steps (N,) that each posture has in its worst direction."""
     count, fan = len(postures), len(directions)
     if not fan:
@@ -200,7 +199,7 @@ def _moved(begin: Array, offsets: Array, is_turn: bool) -> Array:
     return poses.reshape(-1, 4, 4)
 
 
-def _solve(robot: Arm, poses: Array, seeds: Array, limits: Array) -> tuple[Array, NDArray[np.int64]]:
+def _solve(robot: arm.Arm, poses: Array, seeds: Array, limits: Array) -> tuple[Array, NDArray[np.int64]]:
     q, residual = np.empty_like(seeds), np.empty((len(seeds), 2))
     status = np.zeros(len(seeds), np.int64)
     kinematics.ik_batch(robot.ik_pointer, poses, seeds, False, limits, robot.geometry_row, q, residual, status)

@@ -26,12 +26,9 @@ from teleop_core.graph.layers import load_file, parse_setting, scenario_file, se
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots import ROBOTS, Robot
 from teleop_core.robots.arms.dh import DhTable
-from teleop_core.session import runner
+from teleop_core.session import length, notes, runner, virtual
 from teleop_core.session.configuration import Configuration
-from teleop_core.session.length import as_long_as_followed
-from teleop_core.session.notes import notes_of
 from teleop_core.session.recording import Recording, open_recording
-from teleop_core.session.virtual import VirtualTime
 from teleop_core.shapes import SHAPES, Shape
 from teleop_core.slave.controllers import CONTROLLERS, Controller
 from teleop_core.slave.plants import PLANTS, Plant
@@ -121,7 +118,7 @@ def configuration(
     given += [setting(key, _plain(value)) for key, value in (named | dict(settings or {})).items()]
     given += [parse_setting(text) for text in texts]
     made = Configuration.from_layers([*layers, *given], scenario or "")
-    return as_long_as_followed(made, given)
+    return length.as_long_as_followed(made, given)
 
 
 def run(
@@ -184,9 +181,9 @@ def run(
             controller=controller, plant=plant, robot=robot, stages=stages, arms=arms,
             delays=delays, **parameters,
         )  # fmt: skip
-    for note in notes_of(made):
+    for note in notes.notes_of(made):
         warnings.warn(note, TeleopWarning, stacklevel=2)
-    session = VirtualTime(made)
+    session = virtual.VirtualTime(made)
     ticks = runner.session_ticks(made, session)
     return _kept(session, made, runner.run_blocks(session, ticks), ticks, out, progress)
 
@@ -236,13 +233,13 @@ def replay(
     made = Configuration.from_layers(layers, scenario)
     if begin not in _BEGINS:
         raise ParameterError("begin", begin, " or ".join(_BEGINS))
-    session = VirtualTime(made, played=_BEGINS[begin])
+    session = virtual.VirtualTime(made, played=_BEGINS[begin])
     blocks, ticks = runner.replayed_blocks(session, bag)
     return _kept(session, made, blocks, ticks, out, progress)
 
 
 def _kept(
-    session: VirtualTime,
+    session: virtual.VirtualTime,
     made: Configuration,
     blocks: Iterable[NDArray[np.void]],
     ticks: int,
@@ -263,7 +260,7 @@ def _kept(
 class _Memory:
     """Takes blocks as a writer does."""
 
-    def __init__(self, session: VirtualTime) -> None:
+    def __init__(self, session: virtual.VirtualTime) -> None:
         self._session, self._reports = session, runner.StateReports(session)
         self._is_new = runner.NewSamples()
         self._parts: dict[topics.Topic, list[Sequence[NDArray[Any]]]] = {topic: [] for topic in session.graph.streams}

@@ -1,7 +1,6 @@
 """Notes: what runs but may not be meant, of a configuration before its session begins."""
 
-from teleop_core.chain.mapping.parameters import FixtureParameters, MotionScalingParameters
-from teleop_core.chain.mapping.walls import WALLS, passive_stiffness
+from teleop_core.chain.mapping import parameters, walls
 from teleop_core.chain.master.device import DeviceParameters
 from teleop_core.chain.master.haptic_master import HapticMasterParameters
 from teleop_core.graph import BUILT_IN, DT, topics
@@ -25,7 +24,7 @@ def notes_of(configuration: Configuration, transport: float = 0.0) -> list[str]:
     found = list(configuration.graph.notes)
     for arm in configuration.graph.namespaces:
         master, mapping = (configuration.group(name, arm) for name in BUILT_IN[1:3])
-        if isinstance(master, HapticMasterParameters) and isinstance(mapping, MotionScalingParameters):
+        if isinstance(master, HapticMasterParameters) and isinstance(mapping, parameters.MotionScalingParameters):
             delay = transport + _delay(configuration, arm)
             told = (rendered_note(master.device, mapping.fixture), passive_note(master.device, mapping.fixture, delay))
             found += [f"arm {arm!r}: {note}" if arm else note for note in told if note]
@@ -50,7 +49,7 @@ def _delay(configuration: Configuration, arm: str) -> float:
     )
 
 
-def passive_note(device: DeviceParameters, fixture: FixtureParameters, delay: float) -> str:
+def passive_note(device: DeviceParameters, fixture: parameters.FixtureParameters, delay: float) -> str:
     """What a wall gives back that is stiffer than passive; empty where it is not.
 
     Args:
@@ -58,10 +57,10 @@ def passive_note(device: DeviceParameters, fixture: FixtureParameters, delay: fl
         fixture: The wall.
         delay: Of its force beyond the tick [s].
     """
-    wall = WALLS[fixture.wall]
+    wall = walls.WALLS[fixture.wall]
     stiffness = wall.spring(fixture.stiffness, fixture.max_force)
     damping = fixture.damping if wall.is_damped else 0.0
-    most = passive_stiffness(damping, DT, delay, device.friction, device.position_resolution)
+    most = walls.passive_stiffness(damping, DT, delay, device.friction, device.position_resolution)
     if stiffness <= most * (1.0 + 1e-9) or not fixture.pushes:
         return ""
     until = f"with {1e3 * (DT + delay):.3g} ms from sample to force it is passive up to {most:.0f} N/m"
@@ -70,12 +69,12 @@ def passive_note(device: DeviceParameters, fixture: FixtureParameters, delay: fl
     return f"the {fixture.wall} wall of {stiffness:.0f} N/m may give back more energy than it took: {until}"
 
 
-def rendered_note(device: DeviceParameters, fixture: FixtureParameters) -> str:
+def rendered_note(device: DeviceParameters, fixture: parameters.FixtureParameters) -> str:
     """What becomes of a wall that is stiffer than the device; empty where none is.
 
     The device bends by force over its stiffness, so wall and device are two springs in series.
     """
-    stiffness = WALLS[fixture.wall].spring(fixture.stiffness, fixture.max_force)
+    stiffness = walls.WALLS[fixture.wall].spring(fixture.stiffness, fixture.max_force)
     soft = [i for i in range(3) if stiffness > device.stiffness[i]]
     if not soft or not fixture.pushes:
         return ""

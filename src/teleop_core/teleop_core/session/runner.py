@@ -18,11 +18,10 @@ from teleop_core.graph.graph import DEVICE
 from teleop_core.graph.layers import parse_text
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot_set
+from teleop_core.session import replayed_span, virtual
 from teleop_core.session.configuration import Configuration
 from teleop_core.session.model import Model, ModelRecords
-from teleop_core.session.replayed_span import in_order, replayed_span, tick_times
 from teleop_core.session.reports import report_of
-from teleop_core.session.virtual import BLOCK, VirtualTime
 from teleop_core.shapes import files_of, moved
 
 Progress = Callable[[int, int], None]
@@ -46,21 +45,21 @@ def simulate(configuration: Configuration, out: Path, progress: Progress = silen
     Raises:
         RecordingError: The directory exists, cannot be written, or the disk is full.
     """
-    session = VirtualTime(configuration)
+    session = virtual.VirtualTime(configuration)
     ticks = session_ticks(configuration, session)
     return record_blocks(session, configuration, out, run_blocks(session, ticks), ticks, progress)
 
 
-def session_ticks(configuration: Configuration, session: VirtualTime) -> int:
+def session_ticks(configuration: Configuration, session: virtual.VirtualTime) -> int:
     """Ticks until the hand has moved for the configured duration; it waits for the arms first."""
     return session.lead + max(1, round(configuration.groups[SESSION].duration * 1e9 / TICK_NS))
 
 
-def run_blocks(session: VirtualTime, ticks: int) -> Iterator[Any]:
+def run_blocks(session: virtual.VirtualTime, ticks: int) -> Iterator[Any]:
     """Rows of the next ticks, a block at a time; each block takes the place of the one before."""
-    rows = session.rows(min(BLOCK, ticks))
-    for done in range(0, ticks, BLOCK):
-        count = min(BLOCK, ticks - done)
+    rows = session.rows(min(virtual.BLOCK, ticks))
+    for done in range(0, ticks, virtual.BLOCK):
+        count = min(virtual.BLOCK, ticks - done)
         yield session.run(count, rows[:count])
 
 
@@ -86,21 +85,21 @@ def replay(bag: Bag, configuration: Configuration, out: Path, progress: Progress
     Raises:
         RecordingError: The bag lacks a topic, or the directory is as in :func:`simulate`.
     """
-    session = VirtualTime(configuration, played=begin)
+    session = virtual.VirtualTime(configuration, played=begin)
     samples, ticks = replayed_blocks(session, bag)
     return record_blocks(session, configuration, out, samples, ticks, progress)
 
 
-def replayed_blocks(session: VirtualTime, bag: Bag) -> tuple[Iterator[Any], int]:
+def replayed_blocks(session: virtual.VirtualTime, bag: Bag) -> tuple[Iterator[Any], int]:
     """Rows of a replay, a block at a time, and the number of ticks; raises as :func:`replay`."""
     played = session.played_topics
     needed = session.needed_topics
     bag.require(needed)
     session.plays_file = PLAYED_KEY in bag.metadata or not bag.metadata.get("configuration")
     recorded = [t for t in played if t.name in bag.topics and bag.topics[t.name].count]
-    series = {name: in_order(found) for name, found in bag.read_many(recorded).items()}
+    series = {name: replayed_span.in_order(found) for name, found in bag.read_many(recorded).items()}
     name = needed[0].name
-    first_ns, last_ns = replayed_span(bag.path, name, series[name].stamp_ns)
+    first_ns, last_ns = replayed_span.replayed_span(bag.path, name, series[name].stamp_ns)
     lead_ns = _lead_ns(session, bag, first_ns)
     later_ns = max(0, TICK_NS + lead_ns - first_ns)  # stamps are positive
     # The last tick is the first one that is not before the last sample.
@@ -108,9 +107,9 @@ def replayed_blocks(session: VirtualTime, bag: Bag) -> tuple[Iterator[Any], int]
     ticks = -(-(last_ns + later_ns + TICK_NS - begin_ns) // TICK_NS)
 
     def blocks() -> Iterator[Any]:
-        for done in range(0, ticks, BLOCK):
-            samples = session.rows(min(BLOCK, ticks - done))
-            samples["now_ns"] = tick_times(begin_ns + done * TICK_NS, len(samples))
+        for done in range(0, ticks, virtual.BLOCK):
+            samples = session.rows(min(virtual.BLOCK, ticks - done))
+            samples["now_ns"] = replayed_span.tick_times(begin_ns + done * TICK_NS, len(samples))
             for topic in recorded:
                 _hold(series[topic.name], later_ns, samples, topic.field)
             yield session.replay(samples)
@@ -118,7 +117,7 @@ def replayed_blocks(session: VirtualTime, bag: Bag) -> tuple[Iterator[Any], int]
     return blocks(), ticks
 
 
-def _lead_ns(session: VirtualTime, bag: Bag, first_ns: int) -> int:
+def _lead_ns(session: virtual.VirtualTime, bag: Bag, first_ns: int) -> int:
     """Time [ns] that arms need before the first sample; none where the hand waited as long."""
     lead_ns = session.lead * TICK_NS
     states = [topics.TELEOP_STATE.of_arm(arm) for arm in session.graph.namespaces]
@@ -181,7 +180,7 @@ def _begin_at_home(layer: Layer) -> None:
 
 
 def record_blocks(
-    session: VirtualTime,
+    session: virtual.VirtualTime,
     configuration: Configuration,
     out: Path,
     blocks: Iterable[Any],
@@ -220,7 +219,7 @@ def record_blocks(
 
 
 def open_writer(
-    session: VirtualTime, configuration: Configuration, out: Path, further: tuple[topics.Topic, ...] = ()
+    session: virtual.VirtualTime, configuration: Configuration, out: Path, further: tuple[topics.Topic, ...] = ()
 ) -> BagWriter:
     """Writer of everything that a session's stages write, and of further topics."""
     return BagWriter(
@@ -305,7 +304,7 @@ class ReportWriter(Protocol):
 class StateReports:
     """Recorder of the reports of a session's stages, where they change."""
 
-    def __init__(self, session: VirtualTime) -> None:
+    def __init__(self, session: virtual.VirtualTime) -> None:
         self._reports = [
             _Report(session, member, topic)
             for member in session.graph.members
@@ -320,7 +319,7 @@ class StateReports:
 
 
 class _Report:
-    def __init__(self, session: VirtualTime, member: Member, topic: topics.Topic) -> None:
+    def __init__(self, session: virtual.VirtualTime, member: Member, topic: topics.Topic) -> None:
         self._topic, self._stage = topic, session.stages.get(member.name)
         self._last = np.full(len(topic.columns), np.nan)
 

@@ -14,10 +14,9 @@ import numpy as np
 from teleop_core.kernels.geometry import Array, multiply_quaternions, transform_from_pose
 from teleop_core.robots.kinematics import IkStatus
 from teleop_core.robots.room import roomy_postures
+from teleop_lab.planning import turns, walk
 from teleop_lab.planning.aim import Aim
 from teleop_lab.planning.placement import Placement
-from teleop_lab.planning.turns import turns
-from teleop_lab.planning.walk import Walker
 
 ROTATION_GAINS = (1.0, 0.75, 0.5, 0.25, 0.1, 0.0)
 """Rotation gains that are tried, the largest first."""
@@ -51,9 +50,9 @@ class Search:
     """
 
     def __init__(
-        self, walker: Walker, given: Placement, aim: Aim, tell: Callable[[], None], *, keeps_axes: bool = False
+        self, walker: walk.Walker, given: Placement, aim: Aim, tell: Callable[[], None], *, keeps_axes: bool = False
     ) -> None:
-        self._turns = () if keeps_axes else turns()
+        self._turns = () if keeps_axes else turns.turns()
         self._walker, self._given, self._aim, self._tell = walker, given, aim, tell
         self._goal = 1.0
         self._known: dict[Placement, float] = {}

@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 
 from teleop_core.base import SessionError, parameter
-from teleop_core.chain.devices import Reading
-from teleop_core.chain.devices.pilot import PilotParameters
+from teleop_core.chain.devices import Reading, pilot
 from teleop_core.chain.operators import Operator
 from teleop_core.chain.operators.remote import AHEAD, make_remote
 
@@ -25,7 +24,7 @@ _HINTS = {
 
 
 @dataclass(frozen=True, kw_only=True)
-class GamepadParameters(PilotParameters):
+class GamepadParameters(pilot.PilotParameters):
     """How a gamepad moves the stylus, and how it tells the force."""
 
     rumble: float = parameter(1.0, lower=0.0, upper=1.0, fixed=True, doc="rumble at the device's peak force; 0: none")

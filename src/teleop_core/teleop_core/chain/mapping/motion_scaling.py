@@ -8,7 +8,7 @@ import numpy as np
 
 from teleop_core.chain.architectures import ARCHITECTURES
 from teleop_core.chain.fixtures import Held, fixture_depth
-from teleop_core.chain.mapping import following, limits, plausibility, walls
+from teleop_core.chain.mapping import following, limits, plausibility, side, walls
 from teleop_core.chain.mapping.parameters import (
     MODES,
     FixtureParameters,
@@ -26,7 +26,6 @@ from teleop_core.chain.mapping.reflection import (
     make_law,
     reflect,
 )
-from teleop_core.chain.mapping.side import SideNumbers, SideState, Walled, hold_slave, let_go
 from teleop_core.chain.passivity import PASSIVITIES
 from teleop_core.graph import DT, STATE, Row, RunningStage, Stage, assign, copy, topics
 from teleop_core.kernels import inner, kernel
@@ -36,7 +35,7 @@ from teleop_core.kernels.room import room
 
 
 class ScalingNumbers(
-    walls.WallNumbers, SideNumbers, ReflectionNumbers, plausibility.PlausibilityNumbers, following.FollowingNumbers
+    walls.WallNumbers, side.SideNumbers, ReflectionNumbers, plausibility.PlausibilityNumbers, following.FollowingNumbers
 ):
     """Parameter record of the motion scaling."""
 
@@ -54,7 +53,7 @@ class ScalingNumbers(
 class ScalingState(
     limits.LimitState,
     walls.WallState,
-    SideState,
+    side.SideState,
     plausibility.PlausibilityState,
     ReflectionState,
     following.FollowingState,
@@ -137,15 +136,15 @@ def _latch(s: ScalingState, stylus: Array) -> None:
 
 
 @inner
-def _move(p: ScalingNumbers, s: ScalingState, fixture: Walled, gain: float, position: Array, turn: Array) -> None:
+def _move(p: ScalingNumbers, s: ScalingState, fixture: side.Walled, gain: float, position: Array, turn: Array) -> None:
     """Add the scaled step of the hand to the command; turn the tool as the stylus."""
     step = room(3)
     for i in range(3):
         step[i] = position[i] - s.master[i]
     if s.is_fixture_on and p.holds_slave:
-        hold_slave(s, fixture, step)
+        side.hold_slave(s, fixture, step)
     else:
-        let_go(s)
+        side.let_go(s)
     to_slave_axes(p, step, step)
     for i in range(3):
         s.command[i] += gain * step[i]
@@ -164,7 +163,7 @@ def _move(p: ScalingNumbers, s: ScalingState, fixture: Walled, gain: float, posi
 
 
 @inner
-def _wall(p: ScalingNumbers, s: ScalingState, fixture: Walled, period: float, stylus: Array, force: Array) -> None:
+def _wall(p: ScalingNumbers, s: ScalingState, fixture: side.Walled, period: float, stylus: Array, force: Array) -> None:
     """Write the push (3,) [N] of the fixture's wall; after a pause it begins anew."""
     length = 0.0
     if s.is_fixture_on and p.holds_hand:
@@ -238,7 +237,7 @@ def _refuse(
 
 @kernel
 def motion_scaling_step(
-    p: ScalingNumbers, s: ScalingState, sent: Sequence[limits.Sent], fixture: Walled, law: Law, row: Row, dt: float
+    p: ScalingNumbers, s: ScalingState, sent: Sequence[limits.Sent], fixture: side.Walled, law: Law, row: Row, dt: float
 ) -> None:
     """One master sample: write slave_servo_cp, master_servo_cf and teleop_state.
 
@@ -318,7 +317,7 @@ class MotionScaling(RunningStage):
         self._values = parameters
         self.kernel = motion_scaling_step
         nothing = Held(None, np.empty(0), np.empty(4))
-        self._walled = Walled(nothing, np.zeros(3), np.zeros(3))
+        self._walled = side.Walled(nothing, np.zeros(3), np.zeros(3))
         self._law = make_law(ARCHITECTURES.find("unilateral"), np.empty(0), PASSIVITIES.find("none"), np.empty(0))
         self.reset()
         self.retune(parameters)

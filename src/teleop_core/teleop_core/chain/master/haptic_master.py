@@ -6,8 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from teleop_core.base import parameter
-from teleop_core.chain.master import hand_mechanics
-from teleop_core.chain.master.contact import ContactState, account, distance
+from teleop_core.chain.master import contact, hand_mechanics, rendering
 from teleop_core.chain.master.device import (
     DeviceParameters,
     Handle,
@@ -18,7 +17,6 @@ from teleop_core.chain.master.device import (
     read_handle,
     read_phantom,
 )
-from teleop_core.chain.master.rendering import RenderingNumbers, RenderingState, render
 from teleop_core.chain.operators.rest import REST_POSITION, REST_TILT, rest_pose
 from teleop_core.chain.operators.shapes import PHASES
 from teleop_core.graph import DT, Noise, Row, RunningStage, Stage, assign, topics
@@ -64,14 +62,14 @@ class HapticMasterParameters:
     hand: hand_mechanics.HandParameters = field(default_factory=hand_mechanics.HandParameters)
 
 
-class MasterNumbers(hand_mechanics.HandNumbers, ReadingNumbers, RenderingNumbers):
+class MasterNumbers(hand_mechanics.HandNumbers, ReadingNumbers, rendering.RenderingNumbers):
     """Parameter record of the haptic master."""
 
     force_range: float  # beyond which a force is not given [N]
     silence_ns: int
 
 
-class MasterState(hand_mechanics.HandState, ReadingState, RenderingState, ContactState):
+class MasterState(hand_mechanics.HandState, ReadingState, rendering.RenderingState, contact.ContactState):
     """State record of the haptic master."""
 
     next_noise: int
@@ -112,7 +110,7 @@ def _holds(p: MasterNumbers, s: MasterState, row: Row) -> bool:
         reach = _FASTEST * max(1e-9 * silence_ns if s.told_ns > 0 else 0.0, 1e-3)
         if s.told_ns > 0 and silence_ns > p.silence_ns:
             reach = _NEAR
-        if distance(s.aim, row.hand_servo_cp) > reach:
+        if contact.distance(s.aim, row.hand_servo_cp) > reach:
             s.free_ns = row.now_ns
         s.told_ns, s.heard_ns, silence_ns = row.hand_servo_cp_ns, row.now_ns, 0
         for i in range(7):
@@ -144,13 +142,13 @@ def haptic_master_step(p: MasterNumbers, s: MasterState, handle: Handle, noises:
     noise, force = noises[s.next_noise], room(3)
     s.next_noise += 1
     before, place = room(3), room(3)
-    row.master_contact[_MOST] = render(p, s, row.master_servo_cf, force)
+    row.master_contact[_MOST] = rendering.render(p, s, row.master_servo_cf, force)
     for i in range(3):
         before[i] = s.position[i]
     hand_mechanics.move_hand(p, s, s.aim[0:3], force, dt)
     for i in range(3):
         place[i] = s.position[i] + row.hand_tremor[i]
-    account(s, force, p.friction, distance(before, s.position), place, row.master_contact)
+    contact.account(s, force, p.friction, contact.distance(before, s.position), place, row.master_contact)
     if handle is None:
         read_phantom(p, place, s.aim[3:7], noise[3:6], row.master_measured_cp)
     else:

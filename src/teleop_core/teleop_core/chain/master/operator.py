@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 
 from teleop_core.base import PartError, TeleopError
-from teleop_core.chain.operators import OPERATORS, Seen, Setting
-from teleop_core.chain.operators.follower import MOST, Wanted
+from teleop_core.chain.operators import OPERATORS, Seen, Setting, follower
 from teleop_core.chain.operators.parameters import PRESS_TIME, OperatorParameters
 from teleop_core.chain.operators.remote import RemoteHand
 from teleop_core.chain.operators.rest import REST_POSITION, rest_pose
@@ -71,7 +70,7 @@ def tremble(p: OperatorNumbers, s: OperatorState, noise: Array, tremor: Array, d
 
 @kernel
 def operator_step(
-    p: OperatorNumbers, s: OperatorState, wanted: Sequence[Wanted], noises: Array, row: Row, dt: float
+    p: OperatorNumbers, s: OperatorState, wanted: Sequence[follower.Wanted], noises: Array, row: Row, dt: float
 ) -> None:
     """One tick: write where the hand is wanted, its tremor and the buttons.
 
@@ -120,7 +119,7 @@ class RunningOperator(RunningStage):
         super().__init__(OPERATOR, 0, dt)
         self.parameters, self.state = record(OperatorNumbers), record(OperatorState)
         # The first record of what is wanted is that of the present tick.
-        self._wanted, self._noise = record_array(Wanted, BLOCK + 1), Noise()
+        self._wanted, self._noise = record_array(follower.Wanted, BLOCK + 1), Noise()
         self._fixed = parameters
         self.kernel = operator_step
         self.arguments = (self.parameters, self.state, self._wanted, self._noise.rows)
@@ -185,7 +184,7 @@ class RunningOperator(RunningStage):
     def _draw(self, drawn: Any) -> None:
         """Fill records with what the operator wants in the ticks that follow."""
         count = len(drawn)
-        if self._person is not None and count <= MOST:  # faster than by way of turns
+        if self._person is not None and count <= follower.MOST:  # faster than by way of turns
             drawn[:] = self._person.draw((self._tick + 1) * self.dt, self.dt, count)
             self._tick += count
             return

@@ -11,8 +11,7 @@ from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
-from teleop_core.chain.network import CHANCES, MEMORY
-from teleop_core.chain.network.packet_size import HEADER
+from teleop_core.chain.network import CHANCES, MEMORY, packet_size
 from teleop_core.kernels import Array, Fields, Integers, inner
 
 LONGEST = 16384
@@ -121,7 +120,7 @@ def _due(p: LinkNumbers, s: LinkState, way: Way, k: int, dt: float) -> int:
 @inner
 def _packet_bytes(way: Way) -> float:
     """Bytes of ``way.packet``: a topic that nobody has written yet is not in it."""
-    size = float(HEADER)
+    size = float(packet_size.HEADER)
     for i in range(way.sizes.shape[0]):
         if way.packet_ns[i] != 0:
             size += way.sizes[i]

@@ -8,8 +8,7 @@ import math
 
 import numpy as np
 
-from teleop_core.chain.network import CHANCES, NETWORKS, deadband, link
-from teleop_core.chain.network.packet_size import message_sizes
+from teleop_core.chain.network import CHANCES, NETWORKS, deadband, link, packet_size
 from teleop_core.chain.network.parameters import NetworkParameters, WayParameters
 from teleop_core.graph import DT, Row, RunningStage, Stage, assign
 from teleop_core.graph.topics import (
@@ -237,7 +236,7 @@ class NetworkLink(RunningStage):
     def _made(width: int, topics: tuple[Topic, ...], given: WayParameters) -> link.Way:
         kind = NETWORKS.find(given.kind.kind)
         numbers = kind.numbers(given.kind.parameters)
-        return link.make_way(width, message_sizes(topics), kind.draw_pointer, numbers)
+        return link.make_way(width, packet_size.message_sizes(topics), kind.draw_pointer, numbers)
 
     def reset(self) -> None:
         """Nothing is on the way, and the random numbers of the seed begin anew."""

@@ -10,8 +10,7 @@ import math
 from dataclasses import dataclass
 
 from teleop_core.base import parameter
-from teleop_core.chain.passivity import Passivity
-from teleop_core.chain.passivity.held_back import hold_lead, make_up, met_way, norm
+from teleop_core.chain.passivity import Passivity, held_back
 from teleop_core.chain.passivity.port import DRIFT, HEARD, IN, LAW, MARGIN, ROUND, TOLD
 from teleop_core.kernels import Array, inner, kernel
 
@@ -132,11 +131,11 @@ def lead_slave(
 ) -> None:  # fmt: skip
     """Make of the command (7,) that came the one that is given; see :func:`tdpa_slave`."""
     left, drift = keep_account(numbers, flow, force, port), port[DRIFT : DRIFT + 3]
-    met = met_way(command, last, drift) if norm(force) <= numbers[2] else 0.0
-    make_up(numbers, drift, met, period)
+    met = held_back.met_way(command, last, drift) if held_back.norm(force) <= numbers[2] else 0.0
+    held_back.make_up(numbers, drift, met, period)
     for i in range(3):
         command[i] -= drift[i]
-    hold_lead(numbers, memory, left, stop, force, tip, port, command)
+    held_back.hold_lead(numbers, memory, left, stop, force, tip, port, command)
 
 
 @kernel

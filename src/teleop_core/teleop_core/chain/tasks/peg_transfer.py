@@ -6,8 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from teleop_core.base import ParameterError, parameter
-from teleop_core.chain.tasks import SCENE, Act, Miss, Task
-from teleop_core.chain.tasks.attempts import begin_goal, end_attempt, is_at_goal, move_goal, waited
+from teleop_core.chain.tasks import SCENE, Act, Miss, Task, attempts
 from teleop_core.graph import topics
 from teleop_core.kernels import Array, inner, kernel
 
@@ -106,9 +105,9 @@ def _begin_step(numbers: Array, memory: Array, scene: Array, state: Array, step:
     is_closed = is_closed or step == _TAKE or (step == _RELEASE and scene[_SECOND] > 0.0)
     act = _GRIP if is_closed else _LET_GO
     if step == _REACH or (step == _MEET and scene[_SECOND] > 0.0):
-        begin_goal(memory, scene, state, act, x, y, z, width)
+        attempts.begin_goal(memory, scene, state, act, x, y, z, width)
     else:
-        move_goal(state, act, x, y, z, width)
+        attempts.move_goal(state, act, x, y, z, width)
 
 
 @inner
@@ -126,7 +125,7 @@ def _is_done(numbers: Array, memory: Array, scene: Array, state: Array) -> bool:
         return not (other if is_second else grips)
     if step in (_GRASP, _TAKE):
         return grips if step == _GRASP or is_second else other
-    return step not in (_WAIT, _PLACE) and is_at_goal(scene, state)
+    return step not in (_WAIT, _PLACE) and attempts.is_at_goal(scene, state)
 
 
 @inner
@@ -178,10 +177,10 @@ def peg_transfer_judge(numbers: Array, memory: Array, scene: Array, state: Array
     is_others = int(numbers[3]) == _HAND_OVER and scene[_SECOND + 2] > 0.0
     if scene[_SECOND + 1] == 0.0 and not is_others and (step > _LIFT or step == _WAIT):
         miss = _verdict(numbers, memory, scene, block)
-    if miss < 0 and waited(memory, scene) > numbers[2]:
+    if miss < 0 and attempts.waited(memory, scene) > numbers[2]:
         miss = _LATE
     if miss >= 0:
-        end_attempt(memory, scene, state, miss)
+        attempts.end_attempt(memory, scene, state, miss)
         _next_block(numbers, memory, scene, state)
         return
     if step == _TAKE and scene[_SECOND] > 0.0:  # from a hand that is never quite still

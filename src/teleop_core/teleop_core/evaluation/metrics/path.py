@@ -5,8 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from teleop_core.evaluation import TRACKED, Context, Envelope, Metric, Window, figure, number, tracked
-from teleop_core.evaluation.metrics.fixture import FixtureMetric
-from teleop_core.evaluation.metrics.position_error import PositionErrorMetric
+from teleop_core.evaluation.metrics import fixture, position_error
 from teleop_core.evaluation.outlines import Outline, kinds_of, largest, outlines_of
 from teleop_core.evaluation.plain import Values
 from teleop_core.graph.signals import STATE
@@ -49,8 +48,8 @@ class PathMetric(Metric):
 
     def __init__(self, context: Context) -> None:
         self._context = context
-        self._error = context.shared(PositionErrorMetric)
-        self._fixture = context.shared(FixtureMetric)
+        self._error = context.shared(position_error.PositionErrorMetric)
+        self._fixture = context.shared(fixture.FixtureMetric)
         # x, y, z of command, setpoint and measured, [mm].
         self._position = Envelope(context.bag.start_ns, context.bag.end_ns, columns=9)
 

@@ -21,8 +21,7 @@ import numpy as np
 from teleop_core.kernels import Array, inner, kernel
 from teleop_core.kernels.room import room
 from teleop_core.robots.branches import OUTSIDE, SLACK, cost_of, is_allowed, slowed, turn, turned, wrapped
-from teleop_core.robots.chains.damped import ZERO, assign, pose_error
-from teleop_core.robots.chains.dh_kernels import descend, descend_long, fk, pose_of_chain
+from teleop_core.robots.chains import damped, dh_kernels
 from teleop_core.robots.kinematics import IkStatus, pose_residual
 
 _ROUNDS, _PATH_ROUNDS = 60, 12  # of the search that makes the best of a branch out of limits
@@ -192,7 +191,7 @@ def choose(
         if cost < least:
             best, least = k, cost
     if best < 0:  # numbers that overflow
-        assign(q, seed)
+        damped.assign(q, seed)
         return 0, best
     for i in range(n):
         q[i] = found[best, i]
@@ -231,7 +230,7 @@ def _does_descend(T: Array, seed: Array, limits: Array, geometry: Array, q: Arra
     box_around(seed, limits, box)
     for i in range(n):
         q[i] = min(max(seed[i], box[0, i]), box[1, i])
-    return descend(T, box, geometry, _FEW_ROUNDS, q) <= ZERO and move_of(q, seed) < BESIDE_SEED
+    return dh_kernels.descend(T, box, geometry, _FEW_ROUNDS, q) <= damped.ZERO and move_of(q, seed) < BESIDE_SEED
 
 
 @inner
@@ -258,11 +257,11 @@ def _best_of_rest(T: Array, seed: Array, limits: Array, geometry: Array, found: 
         for i in range(n):
             start = found[k, i] if k >= 0 else (seed[i] if k == -1 else q[i])
             trial[i] = min(max(start, box[0, i]), box[1, i])
-        error = descend_long(T, box, geometry, trial)
+        error = dh_kernels.descend_long(T, box, geometry, trial)
         if error < least:
             least = error
-            assign(q, trial)
-        if error <= ZERO:
+            damped.assign(q, trial)
+        if error <= damped.ZERO:
             break
 
 
@@ -282,19 +281,19 @@ def _best_of_step(T: Array, seed: Array, limits: Array, geometry: Array, does_re
         trial[i] = min(max(q[i], box[0, i]), box[1, i])
         if does_reach and trial[i] != q[i]:
             box[0, i] = box[1, i] = trial[i]
-    if descend(T, box, geometry, _PATH_ROUNDS, trial) > ZERO and does_reach:
+    if dh_kernels.descend(T, box, geometry, _PATH_ROUNDS, trial) > damped.ZERO and does_reach:
         slowed(q, seed, limits, q)
         if _lag(q, T, geometry) < _lag(trial, T, geometry):
             return
-    assign(q, trial)
+    damped.assign(q, trial)
 
 
 @inner
 def _lag(q: Array, T: Array, geometry: Array) -> float:
     """Squared error of a pose, of which a place counts as a turn at :data:`_LEVER`."""
     reached, error = room(4, 4), room(6)
-    fk(q, geometry, reached)
-    return pose_error(reached, T, _LEVER, error)
+    dh_kernels.fk(q, geometry, reached)
+    return damped.pose_error(reached, T, _LEVER, error)
 
 
 @kernel
@@ -316,7 +315,7 @@ def settled(
     """
     reached, J = room(4, 4), room(6, 7)
     if is_allowed(q, seed, limits):
-        is_flat = pose_of_chain(q, geometry, J, reached)
+        is_flat = dh_kernels.pose_of_chain(q, geometry, J, reached)
         if pose_residual(reached, T, residual):
             return _NEAR_SINGULAR if is_flat else _FOLLOWED
     if math.isfinite(limits[2, 0]):
@@ -330,7 +329,7 @@ def settled(
 def told(T: Array, geometry: Array, reach: int, q: Array, residual: Array) -> int:
     """Write the residual (2,) of joints within limits and steps, and say how well they do."""
     reached, J = room(4, 4), room(6, 7)
-    is_flat = pose_of_chain(q, geometry, J, reached)
+    is_flat = dh_kernels.pose_of_chain(q, geometry, J, reached)
     if not pose_residual(reached, T, residual):
         return _LIMITED if reach > 0 else _UNREACHABLE
     return _NEAR_SINGULAR if is_flat else _FOLLOWED
@@ -360,9 +359,9 @@ def kept(T: Array, found: Array, count: int, geometry: Array, solutions: Array) 
         for i in range(n):
             q[i] = wrapped(found[k, i])
             box[0, i], box[1, i] = q[i] - 1.0, q[i] + 1.0
-        fk(q, geometry, reached)
+        dh_kernels.fk(q, geometry, reached)
         if not pose_residual(reached, T, residual):
-            descend(T, box, geometry, _ROUNDS, q)
+            dh_kernels.descend(T, box, geometry, _ROUNDS, q)
             for i in range(n):
                 q[i] = wrapped(q[i])
         number += 1

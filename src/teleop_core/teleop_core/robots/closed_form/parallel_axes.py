@@ -16,8 +16,7 @@ import math
 from teleop_core.kernels import Array, inner, kernel
 from teleop_core.kernels.room import room
 from teleop_core.robots.branches import BESIDE, OUTSIDE
-from teleop_core.robots.closed_form import candidates
-from teleop_core.robots.closed_form.subproblems import close_pair, one_angle, open_pairs, turn_between
+from teleop_core.robots.closed_form import candidates, subproblems
 from teleop_core.robots.kinematics import is_askable
 
 _F1, _F2, _F3, _F4, _F5 = (37, 49, 61, 73, 85)
@@ -67,7 +66,7 @@ def _sixth(H: Array, K: Array, fifth: float, seed: float) -> float:
     y = u * K[_F5 + 1] + v * K[_F5 + 5] + w * K[_F5 + 9]
     if H[2, 0] * H[2, 0] + H[2, 1] * H[2, 1] <= _ALIGNED * _ALIGNED:
         return seed
-    return turn_between(H[2, 0], H[2, 1], x, y, seed)
+    return subproblems.turn_between(H[2, 0], H[2, 1], x, y, seed)
 
 
 @inner
@@ -87,11 +86,11 @@ def _plane(H: Array, M: Array, K: Array, seed: float, angles: Array) -> float:
     x, y = H[0, 3] - c * M[0, 3] + s * M[1, 3], H[1, 3] - s * M[0, 3] - c * M[1, 3]
     a0, a1, b0, b1 = K[_F2 + 3], K[_F2 + 7], K[_F3 + 3], K[_F3 + 7]
     rest = 0.5 * (x * x + y * y - a0 * a0 - a1 * a1 - b0 * b0 - b1 * b1)
-    base, spread, is_exact = one_angle(a0 * b0 + a1 * b1, a1 * b0 - a0 * b1, rest, 0.0)
+    base, spread, is_exact = subproblems.one_angle(a0 * b0 + a1 * b1, a1 * b0 - a0 * b1, rest, 0.0)
     for k in range(2):
         q3 = base + spread if k == 0 else base - spread
         c, s = math.cos(q3), math.sin(q3)
-        q2 = turn_between(a0 + c * b0 - s * b1, a1 + s * b0 + c * b1, x, y, seed)
+        q2 = subproblems.turn_between(a0 + c * b0 - s * b1, a1 + s * b0 + c * b1, x, y, seed)
         angles[k, 0], angles[k, 1], angles[k, 2] = q2, q3, whole - q2 - q3
     return is_exact
 
@@ -183,7 +182,7 @@ def _branches(T: Array, geometry: Array, seed: Array, limits: Array, do_all: boo
     candidates.wanted_motion(T, K, 6, M, G)
     _equations(G, K, A, B, h)
     seeds[0], seeds[1] = candidates.angle_of(K, 6, 0, seed), candidates.angle_of(K, 6, 4, seed)
-    count, first, best = open_pairs(A, B, h, rule, seeds, pairs), math.inf, math.inf
+    count, first, best = subproblems.open_pairs(A, B, h, rule, seeds, pairs), math.inf, math.inf
     least = _least_sine(G, K, pairs, count) if is_path else math.inf
     for k in range(count):
         found[2 * k, 6] = found[2 * k + 1, 6] = candidates.UNKNOWN
@@ -198,7 +197,7 @@ def _branches(T: Array, geometry: Array, seed: Array, limits: Array, do_all: boo
         if not cost < math.inf or (cost > best and (is_path or best < OUTSIDE)):
             return 2 * count, least
         if pairs[k, _LEVEL] < 0.5:
-            close_pair(A, B, h, rule, seeds, k, pairs)
+            subproblems.close_pair(A, B, h, rule, seeds, k, pairs)
             for other in range(k, k + 2):
                 cost = _cost(pairs[other], K, seed, limits, first, least)
                 pairs[other, _COST] = 0.0 if do_all else cost

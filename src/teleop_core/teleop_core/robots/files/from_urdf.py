@@ -26,13 +26,12 @@ import numpy as np
 
 from teleop_core.base import ParameterError, UnknownNameError
 from teleop_core.kernels import Array, dot, length, product
-from teleop_core.robots.arms.dh_chain import DhJoint, chain_robot
-from teleop_core.robots.arms.dh_drives import drives_of, least_inertia, parse_drives, read_drives
+from teleop_core.robots.arms import dh_chain, dh_drives
 from teleop_core.robots.chains.chain_dynamics import body_row, chain_dynamics, chain_row
 from teleop_core.robots.chains.followers import Follower, Followers, dynamics_row, follower_dynamics, follower_inertia
 from teleop_core.robots.closed_form.decomposition import SEARCH, solution_of
 from teleop_core.robots.drives import ENTRIES, Drives, Dynamics
-from teleop_core.robots.files.urdf_notes import notes_on
+from teleop_core.robots.files import urdf_notes, xacro_files
 from teleop_core.robots.files.urdf_tree import (
     KINDS,
     UNITS,
@@ -52,7 +51,6 @@ from teleop_core.robots.files.urdf_tree import (
     turn_of_z,
 )
 from teleop_core.robots.files.visuals import visuals_of
-from teleop_core.robots.files.xacro_files import xml_of
 from teleop_core.robots.kinematics import DIRECTIONS
 from teleop_core.robots.rank import directions_of
 from teleop_core.robots.robot import Robot
@@ -105,7 +103,7 @@ def load_urdf(
     """
     if dynamics not in MODELS:
         raise UnknownNameError("dynamics", dynamics, MODELS)
-    root = root_of(Path(path), xml_of(Path(path), arguments or {}))
+    root = root_of(Path(path), xacro_files.xml_of(Path(path), arguments or {}))
     links = elements_of(root, "link")
     joints = [joint_of(name, element, links) for name, element in elements_of(root, "joint").items()]
     by_child = joints_by_child(joints)
@@ -127,7 +125,7 @@ def load_urdf(
     follower_inertia(home, dynamics_row(followers, chain_numbers, np.zeros(n)), inertia)
     table = _drives(trains, np.diag(inertia).tolist(), str(drives))
     make = partial(
-        chain_robot,
+        dh_chain.chain_robot,
         name=root.get("name") or Path(path).stem,
         joints=limits,
         kinds=kinds,
@@ -142,7 +140,7 @@ def load_urdf(
     coordinates = dict(zip((j.name for j in moving), followers.of(home).tolist(), strict=True))
     visuals = tuple(visuals_of(coordinates, links, by_child, Path(path)))
     # Without its start, for which a second's search would begin here: who needs it asks for it.
-    notes = tuple(notes_on(chain, links))
+    notes = tuple(urdf_notes.notes_on(chain, links))
     robot = replace(robot, visuals=visuals, notes=notes, home_is_assumed=True, start=None)
     if dynamics == "independent":
         return robot
@@ -228,7 +226,7 @@ def _task(task: str) -> tuple[str, ...]:
     return names
 
 
-def _narrowed(train: list[_Geared]) -> DhJoint:
+def _narrowed(train: list[_Geared]) -> dh_chain.DhJoint:
     """Joint with the limits in which it and all that follow it are within theirs."""
     leader = train[0].joint
     lower, upper = limits_of(leader)
@@ -241,7 +239,7 @@ def _narrowed(train: list[_Geared]) -> DhJoint:
         needed = f"lower < upper within the limits of {names}, by which it is followed"
         raise ParameterError(f"limits of joint {leader.name}", (lower, upper), needed)
     home = 0.0 if lower <= 0.0 <= upper else 0.5 * (lower + upper)
-    return DhJoint(name=leader.name, symbol="", sign=1.0, lower=lower, upper=upper, home=home)
+    return dh_chain.DhJoint(name=leader.name, symbol="", sign=1.0, lower=lower, upper=upper, home=home)
 
 
 def _frames(chain: list[UrdfJoint]) -> tuple[list[Array], list[float]]:
@@ -261,7 +259,7 @@ def _drives(trains: list[list[_Geared]], inertias: list[float], file: str) -> Dr
     """Drives of the leaders, which bear friction and keep speed limits of what follows them."""
     kinds, stated = [KINDS[train[0].joint.kind] for train in trains], {}
     names = [train[0].joint.name for train in trains]
-    given = read_drives(Path(file).expanduser(), names, kinds) if file else [{}] * len(trains)
+    given = dh_drives.read_drives(Path(file).expanduser(), names, kinds) if file else [{}] * len(trains)
     for train, kind, inertia, drive in zip(trains, kinds, inertias, given, strict=True):
         own: dict[str, float] = {}
         for geared in train:
@@ -274,13 +272,13 @@ def _drives(trains: list[list[_Geared]], inertias: list[float], file: str) -> Dr
                 elif geared is train[0]:
                     own[entry] = value
         own |= drive
-        least = least_inertia(kind, own.get("viscous", 0.0), own.get("coulomb", 0.0))
+        least = dh_drives.least_inertia(kind, own.get("viscous", 0.0), own.get("coulomb", 0.0))
         if "inertia" in drive:
             own["inertia"] = inertia + drive["inertia"]
         elif max(inertia, least) > _NO_INERTIA:
             own["inertia"] = max(inertia, least)
         stated[train[0].joint.name] = own
-    drives = drives_of(kinds, parse_drives(stated, names, kinds, 1.0))
+    drives = dh_drives.drives_of(kinds, dh_drives.parse_drives(stated, names, kinds, 1.0))
     motors = ("inertia",) * any("inertia" not in drive for drive in given)
     assumed = tuple(name for name in ENTRIES if name in (*motors, *drives.assumed))
     return replace(drives, assumed=assumed)

@@ -10,8 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from teleop_core.base import ParameterError, TeleopError, UnknownNameError, damage_told
-from teleop_core.robots.files.urdf_tree import tree_of
-from teleop_core.robots.files.visuals import package_folder
+from teleop_core.robots.files import urdf_tree, visuals
 
 EXPANDED = ".expanded.urdf"
 """Ending of the URDF that a recording keeps of a xacro; arguments may stand, and do nothing."""
@@ -90,10 +89,10 @@ def _our_files(path: Path) -> Iterator[None]:
     from xacro import substitution_args
 
     def find(name: str) -> str:
-        return str(package_folder(name, path))
+        return str(visuals.package_folder(name, path))
 
     def parse(source: object, filename: str) -> object:
-        tree_of(Path(filename).read_bytes())
+        urdf_tree.tree_of(Path(filename).read_bytes())
         return theirs(source, filename)
 
     theirs, found = xacro.parse, substitution_args._eval_find

@@ -7,8 +7,7 @@ import numpy as np
 from teleop_core.base import parameter
 from teleop_core.kernels import Array, kernel
 from teleop_core.robots.robot import Robot
-from teleop_core.slave.controllers import Controller, drives_and_poles, per_joint
-from teleop_core.slave.controllers.motion_estimates import approach
+from teleop_core.slave.controllers import Controller, drives_and_poles, motion_estimates, per_joint
 
 THIRD = 1.0 / 3.0
 """Setpoint weight whose zero cancels one of three equal poles."""
@@ -131,7 +130,7 @@ def weighted_setpoint(setpoint: float, measured: float, gains: Array, memory: Ar
         return setpoint
     linear = room / (max(weight, THIRD) * gains[_KP] + 1e-300)
     if abs(setpoint - measured) > linear:
-        near = measured + approach(setpoint - measured, linear)
+        near = measured + motion_estimates.approach(setpoint - measured, linear)
     memory[_LAGGED] += (near - memory[_LAGGED]) * (pull / (gains[_KP] + pull))
     return weight * near + (1.0 - weight) * memory[_LAGGED]
 
