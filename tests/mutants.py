@@ -130,7 +130,7 @@ MUTANTS = (
             "fast = p.overspeed * p.speed_limit[i]", "fast = 1e9 * p.speed_limit[i]",
             "overspeed"),
     _mutant("stop_soft", "a stop brakes as softly as a pause", _STEP,
-            "AT_ONCE if s.state == _FAULT else AT_LIMITS", "AT_LIMITS", "stop_topic"),
+            "commands.AT_ONCE if s.state == _FAULT else commands.AT_LIMITS", "commands.AT_LIMITS", "stop_topic"),
     _mutant("reset_not_needed", "enable ends a stop without reset", "slave/operation/states.py",
             "{_D: _E, _E: _E, _P: _E}", "{_D: _E, _E: _E, _P: _E, _F: _E}", "stop_latched"),
     _mutant("heartbeat_ignored", "a silent stop button is none", _WATCH,
