@@ -3,10 +3,9 @@
     python tests/mutants.py --list
     python tests/mutants.py stop_late braking_weak --composed
 
-A mutant is a copy of the package in a directory of its own with a few words of its source replaced,
-and comes first in the path of the drill and of what it starts. The machine is a simulated one, so
-that what is found is found every time; ``--live`` takes this one. What a mutant compiles is kept in
-its own directory, and used again in the next run.
+A mutant is a copy of the package in a directory of its own with a few words of its source replaced, and comes first in
+the path of the drill and of what it starts. The machine is a simulated one, so that what is found is found every time;
+``--live`` takes this one. What a mutant compiles is kept in its own directory, and used again in the next run.
 """
 
 import argparse

@@ -36,9 +36,8 @@ if TYPE_CHECKING:
 pytestmark = pytest.mark.ros
 
 SPEED = 0.017
-"""Of the foreign arm [rad/s]: as fast as a hundredth of a radian is commanded in a sine of two
-seconds. Where commands come late it catches up no faster, or its motion would be over before its
-speeds could be told."""
+"""Of the foreign arm [rad/s]: as fast as a hundredth of a radian is commanded in a sine of two seconds. Where commands
+come late it catches up no faster, or its motion would be over before its speeds could be told."""
 
 
 @pytest.fixture

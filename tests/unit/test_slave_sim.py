@@ -245,8 +245,7 @@ def test_long_move_runs_at_the_speed_limit_and_recovers_without_windup(joint: in
 
 
 def test_integral_stays_bounded_while_an_overload_holds_the_arm_back() -> None:
-    # A friction far above the rated torque, as of an arm that is caught: the setpoint goes, it
-    # cannot.
+    # A friction far above the rated torque, as of an arm that is caught: the setpoint goes, it cannot.
     told = OperationParameters(reported=("tracking", "tip", "effort"))
     bench = Bench(operation=told)
     bench.slave.simulated.parameters["coulomb"][0] = 20.0

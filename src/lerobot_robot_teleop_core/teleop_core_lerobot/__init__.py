@@ -1,8 +1,7 @@
 """Sides of a session for loops of another program: a slave that follows joints, a master.
 
-Each side is a session in virtual time, which a call of the loop advances by one period. Nothing
-here needs LeRobot; ``lerobot_robot_teleop_core`` and ``lerobot_teleoperator_teleop_core`` give both
-to it.
+Each side is a session in virtual time, which a call of the loop advances by one period. Nothing here needs LeRobot;
+``lerobot_robot_teleop_core`` and ``lerobot_teleoperator_teleop_core`` give both to it.
 """
 
 from collections.abc import Mapping, Sequence
@@ -236,8 +235,7 @@ class SlaveSide(Side):
 class MasterSide(Side):
     """The master, from the hand to the joint references that it asks of a slave.
 
-    The session has a simulated slave of its own, which the hand sees and feels until a force is
-    given.
+    The session has a simulated slave of its own, which the hand sees and feels until a force is given.
     """
 
     feedback_keys = _FORCE

@@ -229,8 +229,7 @@ def _lines_before(lines: list[str], first: int, count: int) -> int:
 def _head(rows: list[list[str]], width: int) -> tuple[str, ...]:
     """Names of the columns from the lines before the numbers; units of a second line behind them.
 
-    The line of names is the last one that has as many cells as there are columns, except for a
-    line of units below it.
+    The line of names is the last one that has as many cells as there are columns, except for a line of units below it.
     """
     padded = [[*row, ""] if len(row) == width - 1 else _cut(row, width) for row in rows]
     fitting = [row for row in padded if len(row) == width and any(cell.strip() for cell in row)]

@@ -1,11 +1,10 @@
 """Four-bar: a crank that moves a point of the coupler along a plane curve.
 
-q is the crank angle theta1 alone; the tip is the point of the coupler at distance ``a`` from the
-crank, with x along the coupler. ``ik`` takes the point of its curve nearest to the wanted x and
-y, and everything else is residual. ``mode``, 1 or -1, is the sign in front of the arc cosine of
-the closure. Outside its range :meth:`Robot.fk` refuses a crank, and :meth:`Robot.solve_fk` says
-NOT_CLOSED and gives the loop torn as little as possible; :class:`FourBar` answers for both modes
-and in all forms of the closure.
+q is the crank angle theta1 alone; the tip is the point of the coupler at distance ``a`` from the crank, with x along
+the coupler. ``ik`` takes the point of its curve nearest to the wanted x and y, and everything else is residual.
+``mode``, 1 or -1, is the sign in front of the arc cosine of the closure. Outside its range :meth:`Robot.fk` refuses a
+crank, and :meth:`Robot.solve_fk` says NOT_CLOSED and gives the loop torn as little as possible; :class:`FourBar`
+answers for both modes and in all forms of the closure.
 
 Source:
     Ghosal 2020, lecture 11, section on the planar 4-bar; Freudenstein 1954.

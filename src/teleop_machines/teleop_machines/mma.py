@@ -8,9 +8,8 @@ Joint readings q = (θ1, θ2, θ3, θ3', θ6, θ8, θ10). Links 3, 3a, 3b and 4 
 - ``model="A"``: the conventional table, kept for comparison. It loses four offsets (the tool is
   127 mm off at home) and turns the tool frame by 90°.
 
-The source gives no joint limits, sensors, drives or rates: one turn about home and the drive
-table are *assumed*. As a master it needs only :meth:`Robot.fk`; :func:`holding_torques` is for
-force feedback.
+The source gives no joint limits, sensors, drives or rates: one turn about home and the drive table are *assumed*. As a
+master it needs only :meth:`Robot.fk`; :func:`holding_torques` is for force feedback.
 
 Source:
     Singh 2014, Kinematic study of a spatial hybrid manipulator for robot-assisted surgery.
@@ -85,9 +84,8 @@ def make(model: str = "C", **geometry: float) -> Robot:
 def holding_torques(robot: Robot, q: object, wrench: object, spring: mma_balance.ShoulderSpring | None = None) -> Array:
     """Joint torques with which the handle stands still and pushes on the hand.
 
-    Gravity is known for joint 2 only (the source weighs the links but prints no mass centres), in
-    poses whose links beyond the shoulder keep the attitude of home; all other joints count as
-    balanced.
+    Gravity is known for joint 2 only (the source weighs the links but prints no mass centres), in poses whose links
+    beyond the shoulder keep the attitude of home; all other joints count as balanced.
 
     Args:
         robot: The MMA.

@@ -75,9 +75,8 @@ def _descend(T: Array, box: Array, geometry: Array, rounds: int, q: Array) -> fl
 def _approach(T: Array, box: Array, geometry: Array, rounds: int, q: Array) -> float:
     """Move ``q`` (7,) inside a box to the pose T, or as near as a neighbourhood allows.
 
-    Where the error points along a direction that the arm has just lost, no step lowers it at
-    first order; a small move of all joints then leaves the stand-still, and is kept only if the
-    error becomes less.
+    Where the error points along a direction that the arm has just lost, no step lowers it at first order; a small move
+    of all joints then leaves the stand-still, and is kept only if the error becomes less.
 
     Returns:
         Squared weighted error that is left.

@@ -4,10 +4,9 @@ Hinges R_i are at distance ``b`` from the base centre, ball joints S_i at distan
 platform centre, both at 0, 120 and 240°; theta_i is the leg's angle above the base, measured from
 the direction to the centre. The tip is the platform centre, with x towards S1.
 
-The three slides set the height and the direction of the platform's normal; each leg stays in its
-plane, which makes the turn about the normal nothing (zero torsion) and moves the centre sideways:
-with R12 = R21, x = a/2 (R11 - R22) and y = -a R21. So ``task_mask`` is z and two tilts, and ``ik``
-leaves the rest as residual.
+The three slides set the height and the direction of the platform's normal; each leg stays in its plane, which makes the
+turn about the normal nothing (zero torsion) and moves the centre sideways: with R12 = R21, x = a/2 (R11 - R22) and y =
+-a R21. So ``task_mask`` is z and two tilts, and ``ik`` leaves the rest as residual.
 
 Direct kinematics has up to 16 assembly modes, in pairs above and below the base:
 :func:`assembly_modes` and :meth:`Robot.fk_all` find all. ``fk`` takes the one next to legs that

@@ -1,16 +1,14 @@
 """Stewart-Gough platform: a body on six legs of any layout (6-UPS).
 
-A :class:`Layout` holds the twelve joint points and answers: leg lengths of a pose, the pose of leg
-lengths from a seed, leg Jacobian and rank. On an architecturally singular layout, such as two
-similar hexagons one above the other, the legs never fix the platform, whatever the pose; direct
-kinematics is refused there with a status.
+A :class:`Layout` holds the twelve joint points and answers: leg lengths of a pose, the pose of leg lengths from a seed,
+leg Jacobian and rank. On an architecturally singular layout, such as two similar hexagons one above the other, the legs
+never fix the platform, whatever the pose; direct kinematics is refused there with a status.
 
-As a robot, q is the six leg lengths, the tip is the platform frame, and ``fk`` is direct
-kinematics from the home pose: the level platform ``z0`` above the base. Where the wanted pose
-belongs to another assembly than the one next to home, ``ik`` gives its legs and says UNREACHABLE.
-Where none is next to home, :meth:`Robot.fk` searches, and :meth:`Robot.fk_all` finds up to 40. On
-an architecturally singular layout legs fix no pose: :meth:`Robot.solve_fk` says UNDETERMINED,
-``fk`` and ``jacobian`` refuse, their kernels write NaN, and ``ik`` says NEAR_SINGULAR.
+As a robot, q is the six leg lengths, the tip is the platform frame, and ``fk`` is direct kinematics from the home pose:
+the level platform ``z0`` above the base. Where the wanted pose belongs to another assembly than the one next to home,
+``ik`` gives its legs and says UNREACHABLE. Where none is next to home, :meth:`Robot.fk` searches, and
+:meth:`Robot.fk_all` finds up to 40. On an architecturally singular layout legs fix no pose: :meth:`Robot.solve_fk` says
+UNDETERMINED, ``fk`` and ``jacobian`` refuse, their kernels write NaN, and ``ik`` says NEAR_SINGULAR.
 ``load_robot("stewart", **layout.symbols())`` takes any layout.
 
 Source:
@@ -195,9 +193,8 @@ def _at_home(geometry: Array, T: Array) -> None:
 def fk(q: Array, geometry: Array, T: Array) -> None:
     """Write ``T_base_tip`` (4, 4) of leg lengths (6,) [m], found from the home pose.
 
-    Of least error where nothing closes next to home: with the joints in pairs none of the poses
-    that are turned by up to 1 rad, 0.2 % up to 1.3 rad, 8 % up to half a turn, as measured over
-    legal legs. :func:`assemble` says so.
+    Of least error where nothing closes next to home: with the joints in pairs none of the poses that are turned by up
+    to 1 rad, 0.2 % up to 1.3 rad, 8 % up to half a turn, as measured over legal legs. :func:`assemble` says so.
     """
     _at_home(geometry, T)
     base, platform = geometry[:18].reshape((6, 3)), geometry[18:36].reshape((6, 3))

@@ -1,11 +1,10 @@
 """Three-fingered hand: three R-R-R fingers that hold a triangle, contacts as ball joints.
 
-The hand has six freedoms (nine joints less three distances between contacts). As a robot, q is
-all nine joints, theta, psi, phi of each finger; ``fk`` is the object's frame at the three contact
-points, if the joints hold the object to 0.1 mm; ``ik`` keeps every finger on the contact point of
-the wanted object pose, so it only returns joints that hold the object unless a finger cannot
-follow. :class:`Hand` answers for contact points, single fingers, and the three joints that follow
-from six actuated ones.
+The hand has six freedoms (nine joints less three distances between contacts). As a robot, q is all nine joints, theta,
+psi, phi of each finger; ``fk`` is the object's frame at the three contact points, if the joints hold the object to 0.1
+mm; ``ik`` keeps every finger on the contact point of the wanted object pose, so it only returns joints that hold the
+object unless a finger cannot follow. :class:`Hand` answers for contact points, single fingers, and the three joints
+that follow from six actuated ones.
 
 Source:
     Ghosal 2020, lectures 6 and 11, after Salisbury 1982; six freedoms, not three as spoken.

@@ -1,11 +1,10 @@
 """Kept files: what is replayed, scored and drawn is what was recorded.
 
-A recording holds the text of a robot's file (a URDF, a table of links) under ``robot_file`` beside
-``robot``. All other files stand there by their digests: a mesh or field of heights that is touched
-under ``mesh_file`` beside ``mesh``; the mesh of a fixture under ``fixture_mesh_file``; drives of a
-URDF under ``drives_file``; the meshes that a robot's links look like under ``robot_meshes``, in a
-line of digest and name each. Under each digest are the packed bytes, once for all arms, as long as
-there is room for them. Where a file is gone or says something else by now, what was recorded is
+A recording holds the text of a robot's file (a URDF, a table of links) under ``robot_file`` beside ``robot``. All other
+files stand there by their digests: a mesh or field of heights that is touched under ``mesh_file`` beside ``mesh``; the
+mesh of a fixture under ``fixture_mesh_file``; drives of a URDF under ``drives_file``; the meshes that a robot's links
+look like under ``robot_meshes``, in a line of digest and name each. Under each digest are the packed bytes, once for
+all arms, as long as there is room for them. Where a file is gone or says something else by now, what was recorded is
 written to a temporary folder and takes its place.
 """
 
@@ -54,8 +53,7 @@ class KeptFiles:
 
         Args:
             name: The robot's name or path.
-            settings: Its geometry; arguments among them have expanded a xacro, of which the URDF is
-                stored.
+            settings: Its geometry; arguments among them have expanded a xacro, of which the URDF is stored.
             prefix: What stands before the names of its arm.
         """
         found = file_of(name)
@@ -108,8 +106,7 @@ class KeptFiles:
 def recorded_files(metadata: Mapping[str, str], arm: str = "") -> dict[str, str]:
     """Path of each recorded file of an arm, by the path under which it was recorded.
 
-    A file of which only the digest was kept, and that is gone or another by now, is told by a
-    warning.
+    A file of which only the digest was kept, and that is gone or another by now, is told by a warning.
 
     Args:
         metadata: Names and texts of a recording.

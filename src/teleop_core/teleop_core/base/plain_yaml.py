@@ -1,8 +1,7 @@
 """Plain YAML: what files and settings say, with bounds on what reading it can cost.
 
-It is YAML 1.1 as of PyYAML's safe loader, of which dates are texts, since no value here is one.
-Aliases are fine unless they lead back into themselves or multiply; so are numbers of a length that
-a number can have.
+It is YAML 1.1 as of PyYAML's safe loader, of which dates are texts, since no value here is one. Aliases are fine unless
+they lead back into themselves or multiply; so are numbers of a length that a number can have.
 """
 
 import stat

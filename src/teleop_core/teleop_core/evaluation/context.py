@@ -89,8 +89,7 @@ class Context:
     def shared(self, kind: Callable[["Context"], Shared]) -> Shared:
         """The one accumulator of a kind, metrics included, that all metrics of a score share.
 
-        It is made when it is first asked for, gets every window once, and gets it before those
-        who asked for it.
+        It is made when it is first asked for, gets every window once, and gets it before those who asked for it.
 
         Args:
             kind: Its class, or another maker.

@@ -33,8 +33,7 @@ class Origin:
         axes: Rotation (3, 3) from the master's base to the slave's axes.
         operator: What is stored of the stage ``operator``, by names.
         interpolation: How the slave goes from command to command; None if it is not told.
-        plant: What the simulated slave was; "ideal" of versions that knew no other, None if no
-            simulator is told of.
+        plant: What the simulated slave was; "ideal" of versions that knew no other, None if no simulator is told of.
         controller: Its control law; None if it is not told.
         geometry: Settings that its robot was made with.
         lag: By how many setpoints a measured pose comes after that which it was sampled with: by

@@ -25,9 +25,8 @@ __all__ = ["STAGES", "Runner", "RunningStage", "Stage", "joints_of", "register_s
 class Runner(Protocol):
     """A stage at work: what virtual time and nodes need of it.
 
-    ``kernel(*arguments, signals, dt)`` makes one step from the inputs in ``signals`` to the outputs
-    there; a kernel that is compiled becomes part of the compiled tick, any other callable is
-    called from Python.
+    ``kernel(*arguments, signals, dt)`` makes one step from the inputs in ``signals`` to the outputs there; a kernel
+    that is compiled becomes part of the compiled tick, any other callable is called from Python.
     """
 
     signals: Any
@@ -89,8 +88,7 @@ class Stage:
             them.
         make: In place of ``step`` and ``state``: makes the :class:`Runner` from parameters and the
             length of a tick [s].
-        late: Those of ``reads`` that are taken as they were at the end of the last tick. A cycle
-            of stages needs one.
+        late: Those of ``reads`` that are taken as they were at the end of the last tick. A cycle of stages needs one.
         optional: Those of ``reads`` that no stage has to write; zeros where none does.
         trigger: The topic whose messages it answers, one step each; None for a stage with a clock
             of its own, which makes one step per tick.

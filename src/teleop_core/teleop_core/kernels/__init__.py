@@ -8,11 +8,10 @@ only other kernels call it::
         for i in range(3):
             force[i] = -stiffness * position[i]
 
-It is compiled when it is first called, for the types of that call, and kept on disk. What is kept
-is thrown away when anything changes that it was made from: its file, a kernel that it calls, the
-value of a constant that either refers to, numba or this package. There is no ``fastmath`` and no
-reordering: results are the same in every way of running, and on every x86-64 processor since 2013
-with the same C library.
+It is compiled when it is first called, for the types of that call, and kept on disk. What is kept is thrown away when
+anything changes that it was made from: its file, a kernel that it calls, the value of a constant that either refers to,
+numba or this package. There is no ``fastmath`` and no reordering: results are the same in every way of running, and on
+every x86-64 processor since 2013 with the same C library.
 
 With ``NUMBA_DISABLE_JIT=1`` in the environment all kernels stay Python functions: a debugger steps
 through them, coverage counts their lines, and everything is some hundred times slower.
@@ -130,8 +129,7 @@ def kernel_from_source(text: str, name: str, names: Mapping[str, object]) -> Any
     constants, is compiled once. Tracebacks show its lines.
 
     Args:
-        text: Python source that defines a function; it makes no arrays, but kernels that it calls
-            may.
+        text: Python source that defines a function; it makes no arrays, but kernels that it calls may.
         name: Name of that function.
         names: What the text refers to: kernels, constants, modules.
     """
@@ -198,8 +196,7 @@ def records(fields: Any, count: int = 1) -> Any:
         count: Number of records.
 
     Returns:
-        Array of :class:`~teleop_core.kernels.Record`; take ``[0]`` for one record that
-        shares its memory.
+        Array of :class:`~teleop_core.kernels.Record`; take ``[0]`` for one record that shares its memory.
     """
     return np.zeros(count, record_dtype(fields))
 
@@ -270,8 +267,7 @@ def _types(arguments: tuple[object, ...]) -> tuple[Any, ...]:
 class _Memory:
     """What compiled code asks a record for: its bytes.
 
-    NumPy answers with a description of all fields besides, anew in each call: 5 µs for a record
-    of a hundred.
+    NumPy answers with a description of all fields besides, anew in each call: 5 µs for a record of a hundred.
     """
 
     __slots__ = ("data",)

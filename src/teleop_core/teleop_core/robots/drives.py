@@ -99,9 +99,8 @@ class Drives:
 class Dynamics:
     """Rigid-body model of a slave over its ``parameters`` row; arrays are read-only copies.
 
-    ``acceleration(q, dq, effort, parameters, ddq)`` and ``gravity(q, parameters, effort)`` write
-    their last argument (n,); both are kernels or plain Python. They take writable arrays: hand
-    them a copy of ``parameters``.
+    ``acceleration(q, dq, effort, parameters, ddq)`` and ``gravity(q, parameters, effort)`` write their last argument
+    (n,); both are kernels or plain Python. They take writable arrays: hand them a copy of ``parameters``.
 
     Args:
         acceleration: Joint accelerations under the net effort.
@@ -116,8 +115,7 @@ class Dynamics:
 
     Raises:
         ShapeError: ``parameters`` are not a vector, or there is not one frame for each link.
-        ParameterError: ``parameters`` that are not finite, or a link whose inertia no body can
-            have.
+        ParameterError: ``parameters`` that are not finite, or a link whose inertia no body can have.
     """
 
     acceleration: AccelerationKernel

@@ -1,23 +1,20 @@
 """Link errors: how a built arm differs from its drawing, as deltas of Denavit-Hartenberg numbers.
 
-Link i of a chain is T_i = Rz(theta) Tz(d) Tx(a) Rx(alpha), the standard convention. A built arm has
-theta + its error of theta and so on; joint offsets are errors of theta on turning and of d on
-sliding joints. :func:`~teleop_core.robots.arms.as_chain.true_chain` gives the geometry row of the
-arm as built, on which :func:`teleop_core.robots.chains.dh_kernels.fk` says where its tip really
-is::
+Link i of a chain is T_i = Rz(theta) Tz(d) Tx(a) Rx(alpha), the standard convention. A built arm has theta + its error
+of theta and so on; joint offsets are errors of theta on turning and of d on sliding joints.
+:func:`~teleop_core.robots.arms.as_chain.true_chain` gives the geometry row of the arm as built, on which
+:func:`teleop_core.robots.chains.dh_kernels.fk` says where its tip really is::
 
     errors = LinkErrors.of(robot, {"d3": 5.5e-3})
     dh_kernels.fk(q, true_chain(robot, errors), T_base_tip)
 
-Arms described in other conventions are brought to this one: every pair of successive axes has a
-common normal, along which a is measured, pointing to the later axis. Where axes are parallel it is
-any of them; the small turn of the later axis out of the plane of both is then no error of the four
-numbers (Hayati and Mirmirani 1985). A pair of nearly parallel axes can be built in a way that they
-do not describe.
+Arms described in other conventions are brought to this one: every pair of successive axes has a common normal, along
+which a is measured, pointing to the later axis. Where axes are parallel it is any of them; the small turn of the later
+axis out of the plane of both is then no error of the four numbers (Hayati and Mirmirani 1985). A pair of nearly
+parallel axes can be built in a way that they do not describe.
 
 Source:
-    Denavit and Hartenberg 1955; Mooring, Roth and Driels 1991, Fundamentals of manipulator
-    calibration.
+    Denavit and Hartenberg 1955; Mooring, Roth and Driels 1991, Fundamentals of manipulator calibration.
 """
 
 import math

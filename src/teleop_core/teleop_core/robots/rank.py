@@ -1,9 +1,8 @@
 """Rank: in how many directions a tip can move at once, and which of them to control.
 
-An arm of five joints cannot hold every pose: asked for all six directions it follows none of them
-well. Of the sets of directions that it can move in at once, those count that hold most of the
-position. Of these the one is taken in which the worst direction needs the least motion of the
-joints, in the median of postures spread evenly over the limits.
+An arm of five joints cannot hold every pose: asked for all six directions it follows none of them well. Of the sets of
+directions that it can move in at once, those count that hold most of the position. Of these the one is taken in which
+the worst direction needs the least motion of the joints, in the median of postures spread evenly over the limits.
 """
 
 from itertools import combinations

@@ -70,11 +70,9 @@ class Robot:
         home: Joint vector (n,) of the published or natural zero, inside the limits.
         home_is_assumed: Whether nobody says that home is a posture to work from: the zero of a
             URDF, at which many arms are stretched out. No session starts there.
-        start: Joint vector (n,) at which a session starts, inside the limits; None for one with
-            room in all directions (:func:`teleop_core.robots.room.start_posture`), looked for
-            when it is first asked for.
-        geometry: Symbols and their values [m, rad], in the order the kernels expect if there is no
-            row.
+        start: Joint vector (n,) at which a session starts, inside the limits; None for one with room in all directions
+            (:func:`teleop_core.robots.room.start_posture`), looked for when it is first asked for.
+        geometry: Symbols and their values [m, rad], in the order the kernels expect if there is no row.
         kernels: Compiled functions.
         row: Numbers that the kernels take (k,); None for the values of the geometry.
         drives: Drive table, None for robots that are not used as slaves.
@@ -308,8 +306,7 @@ class Robot:
             q: Joint vector (n,) [rad, m].
 
         Returns:
-            (6, n): linear velocity of the tip point [m/s], then angular velocity [rad/s], per
-            unit joint speed.
+            (6, n): linear velocity of the tip point [m/s], then angular velocity [rad/s], per unit joint speed.
 
         Raises:
             ShapeError: Another shape.

@@ -1,9 +1,8 @@
 """Room: how far the tip can go in every direction, and the posture a slave starts from.
 
-The tip is walked away from a posture along 26 directions, and turned about as many axes, in small
-steps, as the hand will move it. A direction ends where a joint limit ends it, and where the arm
-comes beside a singularity: there a joint has to move :data:`SWIFT` times as far as the tool. What
-is left in the worst direction is the room there.
+The tip is walked away from a posture along 26 directions, and turned about as many axes, in small steps, as the hand
+will move it. A direction ends where a joint limit ends it, and where the arm comes beside a singularity: there a joint
+has to move :data:`SWIFT` times as far as the tool. What is left in the worst direction is the room there.
 """
 
 import itertools
@@ -65,8 +64,7 @@ def room(robot: arm.Arm, q: object) -> Room:
 def lever(robot: arm.Arm) -> float:
     """Distance [m] that counts as much as a radian: reach/pi.
 
-    The reach is the largest distance of the tip from the base's origin over the postures that are
-    looked at.
+    The reach is the largest distance of the tip from the base's origin over the postures that are looked at.
     """
     return float(length(_poses(robot, samples(robot))[:, :3, 3]).max()) / math.pi
 
@@ -97,10 +95,9 @@ def start_of(robot: arm.Arm) -> Array:
 def start_posture(robot: arm.Arm) -> Array:
     """Posture from which the tip has room in all directions, by a rule without chance.
 
-    Home, if it has room enough: a turn by 30 degrees and a move by reach/15. Else of the
-    postures looked at that hold the tool as home does, where some can turn and move by 30
-    degrees, or else of all, those within :data:`EQUAL` of the most room; of these the one nearest
-    to home, by the largest share of a joint's range.
+    Home, if it has room enough: a turn by 30 degrees and a move by reach/15. Else of the postures looked at that hold
+    the tool as home does, where some can turn and move by 30 degrees, or else of all, those within :data:`EQUAL` of the
+    most room; of these the one nearest to home, by the largest share of a joint's range.
 
     Args:
         robot: The arm.

@@ -205,8 +205,7 @@ def replay(
 ) -> Recording:
     """Run the recorded masters of a session through the graph again, in virtual time.
 
-    Without changes a recording of virtual time gives the same slave motion, bit for bit, wherever
-    it begins.
+    Without changes a recording of virtual time gives the same slave motion, bit for bit, wherever it begins.
 
     Args:
         recording: What was recorded; its own configuration is the start.

@@ -18,8 +18,7 @@ def notes_of(configuration: Configuration, transport: float = 0.0) -> list[str]:
 
     Args:
         configuration: Of the session.
-        transport: Time that a sample takes from the device to the wall and back, beside declared
-            delays [s].
+        transport: Time that a sample takes from the device to the wall and back, beside declared delays [s].
     """
     found = list(configuration.graph.notes)
     for arm in configuration.graph.namespaces:

@@ -47,8 +47,7 @@ class Samples(NamedTuple):
     Attributes:
         at: Times (N,) [s] since the first sample.
         moves: Places (N, 3) [m], in the master's axes.
-        turns: Turns since the first sample, quaternions (N, 4) in the master's axes; their signs
-            do not jump.
+        turns: Turns since the first sample, quaternions (N, 4) in the master's axes; their signs do not jump.
         pressed_at: Times (K,) [s] at which buttons change.
         pressed: Clutch, fixture, mode from then on (K, 3).
         closed_at: Times (M,) [s] at which the hand closes the jaw farther or less far.

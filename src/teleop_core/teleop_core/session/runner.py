@@ -66,11 +66,10 @@ def run_blocks(session: virtual.VirtualTime, ticks: int) -> Iterator[Any]:
 def replay(bag: Bag, configuration: Configuration, out: Path, progress: Progress = silent, begin: str = DEVICE) -> int:
     """Run recorded masters, or hands, through the graph again, in virtual time, and record it.
 
-    Ticks are 1 ms apart, from the first to the last recorded sample; each sample is answered once,
-    at the first tick that is not before it. For a recording of virtual time every tick has its own
-    sample, so the same configuration gives the same slave motion, bit for bit. Recordings that are
-    not ours, or whose hand did not wait as long, begin with the time that the arms need to get
-    ready.
+    Ticks are 1 ms apart, from the first to the last recorded sample; each sample is answered once, at the first tick
+    that is not before it. For a recording of virtual time every tick has its own sample, so the same configuration
+    gives the same slave motion, bit for bit. Recordings that are not ours, or whose hand did not wait as long, begin
+    with the time that the arms need to get ready.
 
     Args:
         bag: Recording with master/measured_cp of every arm, or hand/servo_cp.

@@ -136,8 +136,7 @@ class VirtualTime:
     def reset(self) -> None:
         """Back to before the first tick, so that the session repeats itself to the bit.
 
-        Parameters that were changed since stay changed; a stage of your own begins anew as far as
-        its ``reset`` does.
+        Parameters that were changed since stay changed; a stage of your own begins anew as far as its ``reset`` does.
         """
         for name, stage in self.stages.items():
             assign(stage.signals, self._begin[name])

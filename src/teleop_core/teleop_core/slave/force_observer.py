@@ -75,9 +75,8 @@ def _observe(p: ObserverNumbers, s: ObserverState, model: Array, dt: float) -> N
         dt: Tick [s].
 
     Source:
-        De Luca and Mattone 2003; De Luca, Albu-Schäffer, Haddadin and Hirzinger 2006:
-        r = K (p - ∫(τ + Cᵀ dq - g + r) dt), with Cᵀ dq = dM/dt dq - C dq. Steps take the new
-        r, so that every gain is stable.
+        De Luca and Mattone 2003; De Luca, Albu-Schäffer, Haddadin and Hirzinger 2006: r = K (p - ∫(τ + Cᵀ dq - g + r)
+        dt), with Cᵀ dq = dM/dt dq - C dq. Steps take the new r, so that every gain is stable.
     """
     n = s.speed.shape[0]
     for i in range(n):

@@ -82,8 +82,7 @@ def _slopes(s: WayState, i: int) -> tuple[float, float]:
 def advance_on_way(p: WayParameters, s: WayState) -> None:
     """Move the command on by one tick; at the end of the way it is the newest command, exactly.
 
-    The polynomial of fifth degree with given position, speed and acceleration at its ends is the
-    way with least jerk.
+    The polynomial of fifth degree with given position, speed and acceleration at its ends is the way with least jerk.
 
     Source:
         Flash and Hogan 1985, eq. 3.

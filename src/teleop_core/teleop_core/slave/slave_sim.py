@@ -199,8 +199,7 @@ class SlaveSim(RunningStage):
         """Take new parameters from the next tick on; a law that can shift takes over what it gave.
 
         Raises:
-            ParameterError: What :meth:`examine` refuses, unless these were examined; nothing
-                has changed then.
+            ParameterError: What :meth:`examine` refuses, unless these were examined; nothing has changed then.
         """
         if parameters is not self._examined:
             self.examine(parameters)

@@ -15,8 +15,7 @@ from teleop_lab.calibration.model import Model, rotation_of
 from teleop_lab.calibration.poses import optimal_poses, random_poses
 
 TOLERANCES = {"cnc": 20e-6, "prototype": 100e-6}
-"""Half widths of tolerances [m], published: Vongbunyong 2008, chapter 3, of milled and of
-rapid-prototyped parts."""
+"""Half widths of tolerances [m], published: Vongbunyong 2008, chapter 3, of milled and of rapid-prototyped parts."""
 SEAT = 0.05
 """Lever [m] over which a tolerance turns an axis; assumed: the size of a bearing seat or a link."""
 RULER = "ruler"

@@ -135,9 +135,8 @@ def wall_boundary(grip: one_axis.Grip, damping: float, late: int) -> float:
 def press_energy(damping: float, wall: Wall, length: int, speed: float) -> float:
     """Energy [J] that a hand gets of a press in a wall: in at one speed, out at the same.
 
-    The hand is one that nothing stops. It has pressed once before, so the press begins within the
-    wall. The wall's work is that of ``master/contact``; our device has no viscous friction, so what
-    that takes of the press is counted here.
+    The hand is one that nothing stops. It has pressed once before, so the press begins within the wall. The wall's work
+    is that of ``master/contact``; our device has no viscous friction, so what that takes of the press is counted here.
 
     Args:
         damping: Viscous friction of the device [N·s/m].

@@ -203,9 +203,8 @@ def one_sided(robot: Robot, table: RestTable) -> NDArray[np.bool_]:
 def default_free(robot: Robot, table: RestTable) -> tuple[str, ...]:
     """What a table can tell of a robot: names for :func:`fit`.
 
-    Dry friction of every axis that gravity does not leave to an integrator; the bias of those among
-    them that are approached from both sides and not loaded by gravity; and weights that no source
-    states.
+    Dry friction of every axis that gravity does not leave to an integrator; the bias of those among them that are
+    approached from both sides and not loaded by gravity; and weights that no source states.
     """
     from teleop_core.slave.controllers.source_pid import loaded_axes
 
@@ -235,9 +234,8 @@ def fit(
 ) -> FitResult:
     """Fit numbers of the plant ``hardware`` to where a machine came to rest.
 
-    Residuals count in standard deviations of the runs; Cauchy's loss lets go of points that no
-    such model explains. Intervals are those of M-estimates. The wandering of friction
-    follows afterwards, from the spread of the runs.
+    Residuals count in standard deviations of the runs; Cauchy's loss lets go of points that no such model explains.
+    Intervals are those of M-estimates. The wandering of friction follows afterwards, from the spread of the runs.
 
     Args:
         table: Measured rests.

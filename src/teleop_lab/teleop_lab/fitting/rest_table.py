@@ -50,8 +50,7 @@ def read_rests(file: Path, robot: Robot) -> RestTable:
         robot: Whose joints it has.
 
     Raises:
-        TeleopError: It cannot be read, columns or numbers are missing, or a point has one run
-            alone or several targets.
+        TeleopError: It cannot be read, columns or numbers are missing, or a point has one run alone or several targets.
     """
     with damage_told(file):
         table = pd.read_csv(file)

@@ -25,8 +25,7 @@ _WHOLE, _EXCERPT = 150_000, 6_000
 _EXCERPT_RATE = 20.0  # Hz
 # Walks that a search usually takes, for the progress.
 _USUAL_WALKS = 500
-# The short excerpt is easier to follow than the whole path, so the search raises its goal up to
-# this many times.
+# The short excerpt is easier to follow than the whole path, so the search raises its goal up to this many times.
 _ATTEMPTS = 3
 
 
@@ -117,9 +116,8 @@ def reach(
     """How much of a hand's motion a slave can follow, and with what it follows most of it.
 
     Args:
-        source: A recording, its path, or the name of a scenario, which is run first. Its own
-            configuration is the start; of a recording of others, in any file that replay takes,
-            the default one.
+        source: A recording, its path, or the name of a scenario, which is run first. Its own configuration is the
+            start; of a recording of others, in any file that replay takes, the default one.
         robot: The slave, in place of the configuration's; its start then is the robot's own.
         geometry: Its lengths [m, rad] as ``symbol=value``.
         share: Share of the time that is to be followed, above 0 and at most 1.

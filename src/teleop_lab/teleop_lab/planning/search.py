@@ -1,8 +1,7 @@
 """Search: the placement, turn and gains with which a slave follows a hand's motion.
 
-The largest rotation gain that can reach the goal comes first, then the largest gain. Where the
-motion drifts against a limit the start is moved by what was cut off, which is how far from the
-middle of its room the arm began.
+The largest rotation gain that can reach the goal comes first, then the largest gain. Where the motion drifts against a
+limit the start is moved by what was cut off, which is how far from the middle of its room the arm began.
 """
 
 import math
@@ -27,8 +26,7 @@ STARTS = 24
 CUT = 0.03
 """By how much less of the time than a session follows the path may be followed where it is, with
 nothing cut off: a placement lives from motion that fits, not from motion that is cut to fit."""
-# Another start, which the eye, and another turn, which the hand has to get used to, must be worth
-# this factor of gain.
+# Another start, which the eye, and another turn, which the hand has to get used to, must be worth this factor of gain.
 _WORTH = 1.25
 _IMPROVED = 3  # of those tried, the best so many
 _ROUNDS, _BISECTIONS = 3, 6

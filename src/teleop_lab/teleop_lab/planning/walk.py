@@ -1,8 +1,7 @@
 """Walk: a hand's path through motion scaling and inverse kinematics alone.
 
-The stages of a session answer sample after sample, with a slave that is at once where it is told
-to be. So what is followed, what is cut off and why comes out as in a session, some hundred times
-faster.
+The stages of a session answer sample after sample, with a slave that is at once where it is told to be. So what is
+followed, what is cut off and why comes out as in a session, some hundred times faster.
 """
 
 from dataclasses import dataclass, replace

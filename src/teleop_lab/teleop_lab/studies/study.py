@@ -174,10 +174,8 @@ class Study:
 
         Args:
             store: Directory of the results, made if it is missing; None keeps them in memory.
-            jobs: Processes of this machine, a session at a time in each; None: as many as
-                processors.
-            client: A Dask client whose workers run the sessions in place of processes; nothing but
-                values travels.
+            jobs: Processes of this machine, a session at a time in each; None: as many as processors.
+            client: A Dask client whose workers run the sessions in place of processes; nothing but values travels.
             recordings: Directory for a recording of each session; None: none are kept.
             progress: Told how many points are done, and how many there are.
 

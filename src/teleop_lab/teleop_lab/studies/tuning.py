@@ -66,8 +66,7 @@ class Tuning:
 
     Attributes:
         scenario: One of ``teleop scenarios``; None for the defaults.
-        searched: A :class:`Range` or a list of choices for each parameter, named as on the command
-            line.
+        searched: A :class:`Range` or a list of choices for each parameter, named as on the command line.
         seeds: Hands over which a score is averaged: values that suit one alone are no use.
         metric: Key of the score, such as ``task.time_s``.
         is_largest: Whether the largest score is the best one.

@@ -67,10 +67,9 @@ class Sdl:
 class Gamepad:
     """A gamepad that is open; see :class:`teleop_core.chain.devices.Device`.
 
-    The left stick moves the stylus to the sides and away, the right one up, and turns it about the
-    vertical; the triggers roll it, or the right one closes the jaw; the cross tips it. It moves
-    while a shoulder button is held. The lower button of the right hand (A) is the fixture, the
-    right one (B) the mode.
+    The left stick moves the stylus to the sides and away, the right one up, and turns it about the vertical; the
+    triggers roll it, or the right one closes the jaw; the cross tips it. It moves while a shoulder button is held. The
+    lower button of the right hand (A) is the fixture, the right one (B) the mode.
 
     Args:
         wanted: Part of its name; empty: the first.

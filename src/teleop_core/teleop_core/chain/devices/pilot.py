@@ -103,8 +103,7 @@ class Pilot:
     def _close(self, reading: Reading) -> None:
         """Close the jaw as far as the device says.
 
-        One that came back says that nothing is pressed. It leads the jaw again once it was closed
-        as far as it is.
+        One that came back says that nothing is pressed. It leads the jaw again once it was closed as far as it is.
         """
         if reading.jaw is None:
             return

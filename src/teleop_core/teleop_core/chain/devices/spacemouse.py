@@ -67,8 +67,7 @@ class Reports:
 class SpaceMouse:
     """A 3-D mouse that is open; see :class:`teleop_core.chain.devices.Device`.
 
-    It moves the stylus while its cap is touched. Its first button is the fixture, its second one
-    the mode.
+    It moves the stylus while its cap is touched. Its first button is the fixture, its second one the mode.
 
     Args:
         wanted: Part of its name; empty: the first.

@@ -114,11 +114,10 @@ def _follow(s: FilterState, part: Part, pose: Array, elapsed_ns: int, filtered: 
 def tremor_filter_step(p: plausibility.PlausibilityNumbers, s: FilterState, part: Part, row: Row, dt: float) -> None:
     """One master sample: write master_filtered_cp and master_filtered_out.
 
-    The position is filtered coordinate by coordinate, over the time between stamps; the orientation
-    passes. A reading that is not finite, or of the same stamp as the last one, changes nothing:
-    what was written stays. The filter begins anew at the first reading, after a pause, where stamps
-    go back, and at a reading that no hand can have made. That passes as it is, so that
-    ``motion_scaling`` judges the same jump. Nothing rings after it.
+    The position is filtered coordinate by coordinate, over the time between stamps; the orientation passes. A reading
+    that is not finite, or of the same stamp as the last one, changes nothing: what was written stays. The filter begins
+    anew at the first reading, after a pause, where stamps go back, and at a reading that no hand can have made. That
+    passes as it is, so that ``motion_scaling`` judges the same jump. Nothing rings after it.
 
     Args:
         p: Parameter record.

@@ -56,12 +56,11 @@ def _band_pass(memory: Array, at: int, value: float, slope: float) -> float:
 def wflc_filter(numbers: Array, memory: Array, value: float, period: float) -> float:
     """Value without the sine that has been learned.
 
-    Two combiners learn the weights of the same sine by least mean squares. The second one hears
-    the value behind a high-pass and is subtracted. The first one hears it behind two band-passes
-    more, so that hardly any meant motion is left, and finds the rate: by its error times the sine's
-    derivative, here over the squared amplitude, so that large and small tremors are learned alike.
-    The high-pass turns the tremor's phase and takes from its amplitude; at the learned rate both
-    are known, and what is subtracted is the sine before the pass.
+    Two combiners learn the weights of the same sine by least mean squares. The second one hears the value behind a
+    high-pass and is subtracted. The first one hears it behind two band-passes more, so that hardly any meant motion is
+    left, and finds the rate: by its error times the sine's derivative, here over the squared amplitude, so that large
+    and small tremors are learned alike. The high-pass turns the tremor's phase and takes from its amplitude; at the
+    learned rate both are known, and what is subtracted is the sine before the pass.
 
     Source:
         Riviere, Rader and Thakor 1998 (IEEE Trans. Biomed. Eng. 45, 7): the weighted-frequency

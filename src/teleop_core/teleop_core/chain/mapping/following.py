@@ -1,9 +1,8 @@
 """Following: whether the slave follows the hand, and what is sent where it does not.
 
-What is heard of the slave may be old, as by way of a network: a slave follows as long as the stamps
-of what it has in force rise. Where they do no longer, the last command is held for as long as an
-answer takes, for it may be followed still; then the slave goes its own way, and the command is
-where it is.
+What is heard of the slave may be old, as by way of a network: a slave follows as long as the stamps of what it has in
+force rise. Where they do no longer, the last command is held for as long as an answer takes, for it may be followed
+still; then the slave goes its own way, and the command is where it is.
 """
 
 from teleop_core.graph import Row, topics

@@ -250,13 +250,12 @@ def motion_scaling_step(
         row: Signals.
         dt: Tick [s].
 
-    Position is incremental (X_S += gain X_P), so a change of gain alone moves nothing;
-    orientation follows the stylus absolutely, up to an alignment that is latched whenever the
-    slave is engaged anew. While clutched the command is held; while the slave does not follow it
-    is the slave's own setpoint. What the arm cannot reach is cut off, and motion goes on from
-    there: see :mod:`teleop_core.chain.mapping.limits`. The slave is led by the pose, which a tremor
-    filter may have made late; what pushes the hand goes by the stylus, tremor and all. A fixture
-    that holds the slave cuts the steps of the command: see :mod:`teleop_core.chain.mapping.side`.
+    Position is incremental (X_S += gain X_P), so a change of gain alone moves nothing; orientation follows the stylus
+    absolutely, up to an alignment that is latched whenever the slave is engaged anew. While clutched the command is
+    held; while the slave does not follow it is the slave's own setpoint. What the arm cannot reach is cut off, and
+    motion goes on from there: see :mod:`teleop_core.chain.mapping.limits`. The slave is led by the pose, which a tremor
+    filter may have made late; what pushes the hand goes by the stylus, tremor and all. A fixture that holds the slave
+    cuts the steps of the command: see :mod:`teleop_core.chain.mapping.side`.
 
     Source:
         Vongbunyong 2008, sections 6.2-6.3.

@@ -127,10 +127,8 @@ def haptic_master_step(p: MasterNumbers, s: MasterState, handle: Handle, noises:
     Args:
         p: Parameter record.
         s: State record; written.
-        handle: None for the Phantom, else as :func:`teleop_core.chain.master.device.make_handle`
-            gives.
-        noises: Standard normal numbers of the coming ticks (N, 6), of which the last three shake
-            the gimbal's readings.
+        handle: None for the Phantom, else as :func:`teleop_core.chain.master.device.make_handle` gives.
+        noises: Standard normal numbers of the coming ticks (N, 6), of which the last three shake the gimbal's readings.
         row: Signals.
         dt: Tick [s].
     """
@@ -165,8 +163,7 @@ def haptic_master_step(p: MasterNumbers, s: MasterState, handle: Handle, noises:
 class HapticMaster(RunningStage):
     """Stage that simulates the device and the mechanics of the hand.
 
-    The same parameters give the same motion, bit for bit, as long as the same hand and the same
-    forces act on it.
+    The same parameters give the same motion, bit for bit, as long as the same hand and the same forces act on it.
 
     Args:
         parameters: What device and hand are.

@@ -79,10 +79,9 @@ def operator_step(
     Args:
         p: Parameter record.
         s: State record; written.
-        wanted: What is wanted, now and in the coming ticks, record by record: ``wanted`` (3,) [m]
-            in the master's base, ``attitude`` of the stylus, quaternion (4,), ``buttons`` (3,):
-            clutch, fixture, mode, ``tremor`` (3,) [m], which the tip makes whatever friction and
-            force are, and how far the ``jaw`` is closed.
+        wanted: What is wanted, now and in the coming ticks, record by record: ``wanted`` (3,) [m] in the master's base,
+            ``attitude`` of the stylus, quaternion (4,), ``buttons`` (3,): clutch, fixture, mode, ``tremor`` (3,) [m],
+            which the tip makes whatever friction and force are, and how far the ``jaw`` is closed.
         noises: Standard normal numbers of the coming ticks (N, 6), of which x, y, z shake the hand.
         row: Signals.
         dt: Tick [s].
@@ -104,8 +103,7 @@ def operator_step(
 class RunningOperator(RunningStage):
     """Stage of the operator.
 
-    The same parameters give the same motion, bit for bit, of whoever does not answer to what is
-    seen.
+    The same parameters give the same motion, bit for bit, of whoever does not answer to what is seen.
 
     Args:
         parameters: Who it is.

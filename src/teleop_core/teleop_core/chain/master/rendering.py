@@ -4,8 +4,7 @@ import math
 
 from teleop_core.kernels import Array, Fields, inner
 
-# The peak force falls to the continuous one while the motors take up the last quarter of the heat
-# that they bear.
+# The peak force falls to the continuous one while the motors take up the last quarter of the heat that they bear.
 _LAST = 0.25
 
 

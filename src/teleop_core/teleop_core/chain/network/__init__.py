@@ -35,11 +35,10 @@ class Network:
     Attributes:
         name: What ``--set network.there.kind=`` calls it.
         parameters: Its parameter group.
-        draw: ``draw(numbers, memory, chances, now)``, a kernel or a plain function, called once for
-            every packet. ``numbers`` are those of the parameters; ``memory`` (4,) is kept from
-            packet to packet, and zero at the start; ``chances`` (3,) are random numbers, even from
-            0 to 1; ``now`` is the time since the start [s]. Returns the time on the way beside the
-            least one [s], or :data:`LOST`.
+        draw: ``draw(numbers, memory, chances, now)``, a kernel or a plain function, called once for every packet.
+            ``numbers`` are those of the parameters; ``memory`` (4,) is kept from packet to packet, and zero at the
+            start; ``chances`` (3,) are random numbers, even from 0 to 1; ``now`` is the time since the start [s].
+            Returns the time on the way beside the least one [s], or :data:`LOST`.
         numbers: ``numbers(parameters)`` gives what ``draw`` takes, if that is
             something else than the numbers of the parameters in their order.
     """

@@ -1,10 +1,9 @@
 """Link: packets on their way, one direction of a network.
 
-A packet waits in a queue while the line is busy with those before it. Its transmission begins at
-``max(sent, end of the one before)`` and takes its size over the bandwidth: a queue of one server
-(Kleinrock 1975, section 1.2). Every packet is due at a tick, found when its transmission begins.
-What is due at the same tick shares a place in a calendar of ticks, where the newest packet stays;
-so a tick costs the same with any delay.
+A packet waits in a queue while the line is busy with those before it. Its transmission begins at ``max(sent, end of the
+one before)`` and takes its size over the bandwidth: a queue of one server (Kleinrock 1975, section 1.2). Every packet
+is due at a tick, found when its transmission begins. What is due at the same tick shares a place in a calendar of
+ticks, where the newest packet stays; so a tick costs the same with any delay.
 """
 
 from typing import Annotated, Any, NamedTuple

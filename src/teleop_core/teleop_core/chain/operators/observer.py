@@ -1,9 +1,8 @@
 """Observer: an operator who looks at the slave, plans from what it saw, moves, and looks again.
 
-Each look-move cycle is one submovement towards the goal of a task, with the noise of a fast hand.
-Its end is seen as late as display, network and eye make it, and only then the next one begins. So
-a delay slows it down by its share of the cycle, and nothing in here knows how long the delay is.
-Where the constants come from stands in ``docs/tasks.md``.
+Each look-move cycle is one submovement towards the goal of a task, with the noise of a fast hand. Its end is seen as
+late as display, network and eye make it, and only then the next one begins. So a delay slows it down by its share of
+the cycle, and nothing in here knows how long the delay is. Where the constants come from stands in ``docs/tasks.md``.
 """
 
 import math

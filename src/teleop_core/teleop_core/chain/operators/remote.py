@@ -93,8 +93,7 @@ Person = Callable[["RemoteHand", float], None]
 class _Wanted(NamedTuple):
     """What was said last.
 
-    ``time`` is when [s], NaN for when it is first looked at; ``grip`` how often the stylus had been
-    let go of before.
+    ``time`` is when [s], NaN for when it is first looked at; ``grip`` how often the stylus had been let go of before.
     """
 
     pose: geometry.Array
@@ -105,9 +104,8 @@ class _Wanted(NamedTuple):
 class RemoteHand:
     """Hand of a person who is not here: follows poses that are wanted, and lets go in silence.
 
-    A grip is relative: its first pose is taken as where the stylus is then, later ones move it by
-    the difference. :meth:`want`, :meth:`press` and :meth:`let_go` may be called by one other thread
-    than :meth:`motion`.
+    A grip is relative: its first pose is taken as where the stylus is then, later ones move it by the difference.
+    :meth:`want`, :meth:`press` and :meth:`let_go` may be called by one other thread than :meth:`motion`.
 
     Args:
         parameters: Delay, timeout and bounds.
@@ -153,8 +151,7 @@ class RemoteHand:
             time: When it was wanted, in the time of :meth:`motion` [s]; None for now.
 
         Returns:
-            Whether it is used: not if it is not finite, its quaternion is none, or it is more than
-            10 m away.
+            Whether it is used: not if it is not finite, its quaternion is none, or it is more than 10 m away.
 
         Raises:
             ShapeError: It has another shape.

@@ -74,8 +74,7 @@ class TourParameters:
 def through(points: Array, share: Array) -> Array:
     """Smooth line (M, 3) through points (N, 3), N >= 2, at shares (M,) of its way, 0 to 1.
 
-    Between neighbours it is a cubic whose slope at a point is that from the point before to the
-    point after.
+    Between neighbours it is a cubic whose slope at a point is that from the point before to the point after.
 
     Source:
         Catmull and Rom 1974.

@@ -72,10 +72,9 @@ def tdpa_hand(
 ) -> None:  # fmt: skip
     """Make the push (3,) [N] no larger than what is left can pay for until the next sample.
 
-    What is left is what was heard and what came in, less what was told and what went out. A touch
-    that is over leaves nothing, but what is owed stays owed. Where a slave's port is heard of, it
-    is told what came in; while it has less than its store, or energy is owed here, a drag on the
-    hand brings some in.
+    What is left is what was heard and what came in, less what was told and what went out. A touch that is over leaves
+    nothing, but what is owed stays owed. Where a slave's port is heard of, it is told what came in; while it has less
+    than its store, or energy is owed here, a drag on the hand brings some in.
 
     Source:
         Ryu, Artigas and Preusche 2010 for the law. Theirs is a damper by a measured speed; the

@@ -1,8 +1,7 @@
 """Wave: hand and slave exchange waves, each a mix of force and speed.
 
-A wave carries energy: what the two-port holds is what is on its way. Its integral and its energy
-travel, which are both sums, so a packet that is lost, late or doubled takes nothing away from the
-next one and adds no energy.
+A wave carries energy: what the two-port holds is what is on its way. Its integral and its energy travel, which are both
+sums, so a packet that is lost, late or doubled takes nothing away from the next one and adds no energy.
 """
 
 import math

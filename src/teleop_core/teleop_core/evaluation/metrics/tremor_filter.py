@@ -42,10 +42,9 @@ class TremorFilterScore:
 def passage(before: Array, after: Array) -> tuple[float, float] | None:
     """Delay [s] and gain of motion below :data:`MEANT` from one motion to another.
 
-    Segments of :data:`SPECTRUM_SAMPLES`, half overlapping and Hann-windowed, give the
-    cross-spectrum S of both velocities, summed over the axes. The delay is the one whose phase
-    ``-2πf delay`` fits best: ``-Σ|S| 2πf arg S / Σ|S| (2πf)²``. The gain is
-    ``|Σ S exp(2πjf delay)|`` over the power of the first motion.
+    Segments of :data:`SPECTRUM_SAMPLES`, half overlapping and Hann-windowed, give the cross-spectrum S of both
+    velocities, summed over the axes. The delay is the one whose phase ``-2πf delay`` fits best: ``-Σ|S| 2πf arg S /
+    Σ|S| (2πf)²``. The gain is ``|Σ S exp(2πjf delay)|`` over the power of the first motion.
 
     Args:
         before: Velocities (N, 3) at :data:`RATE`.

@@ -243,10 +243,9 @@ def _settle(T: Array, seed: Array, limits: Array, M: Array, q: Array) -> None:
 def ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual: Array) -> int:
     """Write joints (6,) for ``T_base_tip``; see :class:`teleop_core.robots.robot.Kernels`.
 
-    Where a limit or step holds a joint back, the joints after it make the best of it: the wrist
-    turns the tool as wanted from where the arm really is, joint 5 and then 6 from where joint 4
-    really is. At the wrist singularity joint 4 lags, joint 5 passes through zero with its sign,
-    and motion goes on at the other side.
+    Where a limit or step holds a joint back, the joints after it make the best of it: the wrist turns the tool as
+    wanted from where the arm really is, joint 5 and then 6 from where joint 4 really is. At the wrist singularity joint
+    4 lags, joint 5 passes through zero with its sign, and motion goes on at the other side.
 
     Source:
         Vongbunyong 2008, eqs. 4.5.1-4.5.9, atan2 throughout, and its rule for q5 = 0.

@@ -1,9 +1,8 @@
 """Followers: chains in which one joint moves several motions, each by a factor and an offset.
 
-The ``mimic`` of a URDF. With joints q (n,) and motions p (m,) of the chain, p = A q + b, where each
-row of A has one factor. Then the Jacobian of the joints is J A; by the principle of virtual work
-their efforts are Aᵀ times those of the motions, and their inertia is Aᵀ M A. A is constant, so that
-accelerations bring no term of their own.
+The ``mimic`` of a URDF. With joints q (n,) and motions p (m,) of the chain, p = A q + b, where each row of A has one
+factor. Then the Jacobian of the joints is J A; by the principle of virtual work their efforts are Aᵀ times those of the
+motions, and their inertia is Aᵀ M A. A is constant, so that accelerations bring no term of their own.
 
 The row of a dynamics here holds m, then leader, factor and offset of each motion (m,), and the
 inertias (n,) of the motors at the joints. Behind them stands the row of

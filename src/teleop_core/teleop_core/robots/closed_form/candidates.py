@@ -1,11 +1,10 @@
 """Closed forms of chains: what all of them share, from the pose that is asked to the status.
 
-A closed form sees the arm as G = Rz(q1) F1 Rz(q2) F2 ... Rz(qn), with constant transforms between
-the joints and every joint about its own z axis; for arms that decompose from the tip it is the arm
-from tip to base. Its constants stand behind the chain's in the geometry row
-(:mod:`teleop_core.robots.chains.dh_kernels`): 1 or -1 for the order, n signs, n groups, then
-transforms of twelve numbers each: before and after G, and those between the joints. Behind them
-stands what a class of arms has beside, and last 1 for an arm that is of its class only nearly
+A closed form sees the arm as G = Rz(q1) F1 Rz(q2) F2 ... Rz(qn), with constant transforms between the joints and every
+joint about its own z axis; for arms that decompose from the tip it is the arm from tip to base. Its constants stand
+behind the chain's in the geometry row (:mod:`teleop_core.robots.chains.dh_kernels`): 1 or -1 for the order, n signs, n
+groups, then transforms of twelve numbers each: before and after G, and those between the joints. Behind them stands
+what a class of arms has beside, and last 1 for an arm that is of its class only nearly
 (:mod:`teleop_core.robots.closed_form.decomposition`).
 
 Branches are candidates: joint vectors in the arm's own order, with 1.0 behind those that reach the
@@ -168,10 +167,9 @@ def choose(
 ) -> tuple[int, int]:
     """Write the best of the candidates (count, n + 1), each by whole turns next to the seed.
 
-    The best has the smallest largest move of a joint, inside limits before outside. In a path
-    limits do not count, and joints that choose the branch come before those that swing beside a
-    singularity, group by group; where two branches lie beside each other limits count after the
-    first group.
+    The best has the smallest largest move of a joint, inside limits before outside. In a path limits do not count, and
+    joints that choose the branch come before those that swing beside a singularity, group by group; where two branches
+    lie beside each other limits count after the first group.
 
     Returns:
         2 if it reaches the pose, 1 if only another candidate does, 0 if none does; and its place.
@@ -246,8 +244,7 @@ def move_of(q: Array, seed: Array) -> float:
 def _best_of_rest(T: Array, seed: Array, limits: Array, geometry: Array, found: Array, count: int, q: Array) -> None:
     """Replace ``q`` by the joints within limits that come nearest to the pose.
 
-    A search from the branch itself, from the seed and from all other branches, of which the least
-    error counts.
+    A search from the branch itself, from the seed and from all other branches, of which the least error counts.
     """
     n, box, trial, least = q.shape[0], np.empty((2, q.shape[0])), np.empty(q.shape[0]), math.inf
     box_around(seed, limits, box)
@@ -269,9 +266,8 @@ def _best_of_rest(T: Array, seed: Array, limits: Array, geometry: Array, found: 
 def _best_of_step(T: Array, seed: Array, limits: Array, geometry: Array, does_reach: bool, q: Array) -> None:
     """Replace ``q`` by the joints within limits and step that come nearest to the pose.
 
-    A search from the branch. Where that reaches the pose, joints that a step does not bring there
-    go at full speed. The others make the best of that, or go slower with them on the straight way,
-    whichever lags less.
+    A search from the branch. Where that reaches the pose, joints that a step does not bring there go at full speed. The
+    others make the best of that, or go slower with them on the straight way, whichever lags less.
     """
     n, box, trial = q.shape[0], np.empty((2, q.shape[0])), np.empty(q.shape[0])
     box_around(seed, limits, box)
@@ -347,8 +343,7 @@ def forget(seed: Array, limits: Array) -> None:
 def kept(T: Array, found: Array, count: int, geometry: Array, solutions: Array) -> int:
     """Write the candidates (count, n + 1) that reach the pose into ``solutions``; how many do.
 
-    Angles are within ±pi. A class is recognised with a tolerance; a search takes away what it
-    leaves.
+    Angles are within ±pi. A class is recognised with a tolerance; a search takes away what it leaves.
     """
     n, number = solutions.shape[1], 0
     box, reached, residual = np.empty((2, n)), np.empty((4, 4)), np.empty(2)

@@ -8,10 +8,9 @@ Classes, in the order in which they are looked for, from the base and, turned ro
 - *arm in a plane*: three parallel turning joints, with a slide along them, or with a joint before
   them that turns their plane, one behind them that rolls the tool in it, or both.
 
-Axes meet or are parallel within :data:`NEARLY`, as in files that say 1.571 for a quarter turn; what
-that leaves, Newton steps on the chain as it is take away. Arms in a plane must be so exactly. All
-others are solved by search (:mod:`teleop_core.robots.chains.dh_kernels`); those with six directions
-say by how much their axes miss a class.
+Axes meet or are parallel within :data:`NEARLY`, as in files that say 1.571 for a quarter turn; what that leaves, Newton
+steps on the chain as it is take away. Arms in a plane must be so exactly. All others are solved by search
+(:mod:`teleop_core.robots.chains.dh_kernels`); those with six directions say by how much their axes miss a class.
 """
 
 import math
@@ -61,9 +60,8 @@ SEARCH = Solution(text="search: damped least squares from the seed, then from 24
 class _Chain:
     """Turning joints about z with constant transforms around them, from base to tip or back.
 
-    ``signs`` say which way the arm's own joints turn; ``order`` is -1 for a chain from the tip.
-    ``off`` is the largest angle or share of the reach that was taken for none, ``misses`` says what
-    it lacks to be of a class.
+    ``signs`` say which way the arm's own joints turn; ``order`` is -1 for a chain from the tip. ``off`` is the largest
+    angle or share of the reach that was taken for none, ``misses`` says what it lacks to be of a class.
     """
 
     order: float

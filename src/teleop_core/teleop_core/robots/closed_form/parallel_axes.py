@@ -1,10 +1,9 @@
 """Arms of six turning joints whose axes 2, 3 and 4 are parallel: closed form, up to eight branches.
 
-The three parallel joints move everything behind them in a plane. The height of axis 6 over that
-plane, and its slope to it, say where joints 1 and 5 are: two equations, linear in their sines and
-cosines. Where axes 5 and 6 meet, joint 5 is in one of them alone; else an equation of degree four
-is left. Then joint 6 follows, and the plane's arm of two links with its hand. An arm whose axes 3,
-4 and 5 are parallel is one of these, from tip to base.
+The three parallel joints move everything behind them in a plane. The height of axis 6 over that plane, and its slope to
+it, say where joints 1 and 5 are: two equations, linear in their sines and cosines. Where axes 5 and 6 meet, joint 5 is
+in one of them alone; else an equation of degree four is left. Then joint 6 follows, and the plane's arm of two links
+with its hand. An arm whose axes 3, 4 and 5 are parallel is one of these, from tip to base.
 
 Source:
     Elias and Wen 2022, section on three parallel axes; Hawkins 2013 for the arms of Universal
@@ -23,8 +22,7 @@ _F1, _F2, _F3, _F4, _F5 = (37, 49, 61, 73, 85)
 RULE = 97
 """Place, among the constants, of the rule of the arm's pair of equations; then B and a length."""
 _LEVEL, _COST = 3, 4
-# A pair's row: joints 1 and 5, whether it reaches, 1.0 if both are known, the least cost of its
-# branches.
+# A pair's row: joints 1 and 5, whether it reaches, 1.0 if both are known, the least cost of its branches.
 _LATER = 1e9  # added to the cost of pairs that others go before, whatever else they are
 _ALIGNED = 1e-10  # sine under which axis 6 counts as parallel to 2, 3 and 4, and joint 6 is free
 
@@ -137,8 +135,7 @@ def _least_sine(G: Array, K: Array, pairs: Array, count: int) -> float:
 def _cost(pair: Array, K: Array, seed: Array, limits: Array, first: float, least: float) -> float:
     """Least cost of all branches of a pair, by what is known of its joints 1 and 5.
 
-    In a path joint 1 comes first: of pairs with its least move ``first`` joint 5 counts, all others
-    come later.
+    In a path joint 1 comes first: of pairs with its least move ``first`` joint 5 counts, all others come later.
     """
     is_path, is_closed = math.isfinite(limits[2, 0]), pair[_LEVEL] > 0.5
     one = candidates.angle_cost(K, 6, 0, pair[0], seed, limits, not is_path)
@@ -169,8 +166,7 @@ def _known_cost(q: Array, K: Array, seed: Array, limits: Array, least: float) ->
 def _branches(T: Array, geometry: Array, seed: Array, limits: Array, do_all: bool, found: Array) -> tuple[int, float]:
     """Write branches into ``found`` (8, 7), and whether each reaches the pose.
 
-    Unless all are wanted, pairs of joints 1 and 5 of the least moves come first, and none that
-    cannot win.
+    Unless all are wanted, pairs of joints 1 and 5 of the least moves come first, and none that cannot win.
 
     Returns:
         How many, and in a path the least sine between axis 6 and the parallel ones.

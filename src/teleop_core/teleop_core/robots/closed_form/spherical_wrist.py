@@ -1,11 +1,10 @@
 """Arms of six turning joints with a spherical wrist: closed form, up to eight branches.
 
-The last three axes meet in the wrist centre, whose place says where the first three joints are. In
-the frame of axis 2 its height and its distance from axis 2's origin do not change as joint 2
-turns: two equations in joints 1 and 3, linear in their sines and cosines. Axes 1 and 2, or 2 and
-3, that are parallel or meet take one joint out of one of them; skew ones leave an equation of
-degree four. The attitude that is left gives the wrist. An arm whose first three axes meet in a
-point is one of these, from tip to base.
+The last three axes meet in the wrist centre, whose place says where the first three joints are. In the frame of axis 2
+its height and its distance from axis 2's origin do not change as joint 2 turns: two equations in joints 1 and 3, linear
+in their sines and cosines. Axes 1 and 2, or 2 and 3, that are parallel or meet take one joint out of one of them; skew
+ones leave an equation of degree four. The attitude that is left gives the wrist. An arm whose first three axes meet in
+a point is one of these, from tip to base.
 
 Source:
     Pieper 1968 (three axes that meet decouple); Elias and Wen 2022, sections on spherical wrists.

@@ -1,14 +1,13 @@
 """Arms of seven turning joints with a spherical shoulder and wrist: closed form over the swivel.
 
-The distance of the wrist centre from the shoulder's fixes joint 4. The arm can then swivel about
-the line between them: the shoulder's rotation is A(psi) = P cos psi + Q sin psi + N. A joint of
-shoulder or wrist is at a given angle where an equation linear in cos psi and sin psi says so. So
-the limits of all joints cut the circle of psi into arcs, exactly: an arc is legal as a whole or not
-at all, however narrow it is. Of the legal psi the nearest to the seed's posture is taken that keeps
-a margin to the ends of its arc; psi = 0 is the seed's. In a path the arm makes the least move that
-follows, and the swivel goes back to its margin where a joint is near a limit. Where instead the
-axes of shoulder or wrist come to lie in a plane, the swivel goes slowly, with speed that the path
-leaves, to the side where the manipulability of both grows: the volumes that unit axes span.
+The distance of the wrist centre from the shoulder's fixes joint 4. The arm can then swivel about the line between them:
+the shoulder's rotation is A(psi) = P cos psi + Q sin psi + N. A joint of shoulder or wrist is at a given angle where an
+equation linear in cos psi and sin psi says so. So the limits of all joints cut the circle of psi into arcs, exactly: an
+arc is legal as a whole or not at all, however narrow it is. Of the legal psi the nearest to the seed's posture is taken
+that keeps a margin to the ends of its arc; psi = 0 is the seed's. In a path the arm makes the least move that follows,
+and the swivel goes back to its margin where a joint is near a limit. Where instead the axes of shoulder or wrist come
+to lie in a plane, the swivel goes slowly, with speed that the path leaves, to the side where the manipulability of both
+grows: the volumes that unit axes span.
 
 Source:
     Shimizu, Kakuya, Yoon, Kitagaki and Kosuge 2008, IEEE T-RO 24(5), sections on joint limits;
@@ -68,9 +67,8 @@ def _branches(
 ) -> tuple[int, float]:
     """Write branches into ``found`` (8, 8): at the seed's swivel, or, where free, at legal ones.
 
-    Where free the elbow of the lesser move comes first, and ends it if a branch of it moves less
-    than joint 4 of the other. ``work``, (60, 4), holds the families S and W of both elbows for
-    those who go on from there.
+    Where free the elbow of the lesser move comes first, and ends it if a branch of it moves less than joint 4 of the
+    other. ``work``, (60, 4), holds the families S and W of both elbows for those who go on from there.
 
     Returns:
         Number of branches, and the least spread of a shoulder or wrist [rad].
@@ -169,9 +167,8 @@ def _width(q: Array, K: Array, i: int) -> float:
 def _urge(q: Array, seed: Array, limits: Array, K: Array) -> float:
     """How much manipulability counts, from 0 to 1, without a jump at either end.
 
-    Nothing where axes are far from a plane or pass through it, within the margin of a limit, or
-    where a joint needs all of its speed. Of a part of it a hand whose readings are noisy asks
-    all the time.
+    Nothing where axes are far from a plane or pass through it, within the margin of a limit, or where a joint needs all
+    of its speed. Of a part of it a hand whose readings are noisy asks all the time.
     """
     left, apart = 1.0, _room(q, limits) / swivel_arcs.MARGIN - 1.0
     for i in range(7):
@@ -244,8 +241,7 @@ def ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual
 def ik_all(T: Array, geometry: Array, solutions: Array) -> int:
     """Write one joint vector (k, 7) of each branch, at most eight, at the swivel nearest to zero's.
 
-    Limits do not count. There are endless many more, by turning the elbow about the line from
-    shoulder to wrist.
+    Limits do not count. There are endless many more, by turning the elbow about the line from shoulder to wrist.
     """
     found, work, seed, limits = room(8, 8), room(60, 4), room(7), room(3, 7)
     candidates.forget(seed, limits)

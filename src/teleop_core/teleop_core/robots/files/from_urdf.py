@@ -1,14 +1,13 @@
 """Robots from URDF: the chain from the root link to a tip, with what the file says of its drives.
 
-What moves the tip are the joints between root and tip; all others stay at zero, and weigh. A joint
-between them that mimics another moves with it (:mod:`teleop_core.robots.chains.followers`). The
-kinematics are those of Denavit-Hartenberg chains (:mod:`teleop_core.robots.chains.dh_kernels`), the
-dynamics those of rigid bodies (:mod:`teleop_core.robots.chains.chain_dynamics`). Effort and
-velocity limits, damping and friction are the drives' where they stand in the file and are above
-zero. The inertia of a drive is that of the links at home; that of its motor is in no URDF. A file
-of drives may state it, and what else a URDF leaves out. Whatever is left out there too is assumed
-as for tables (:mod:`teleop_core.robots.arms.dh_drives`), and ``Robot.drives.assumed`` names it.
-Meshes are read where they are drawn (:mod:`teleop_core.robots.bodies.looks`).
+What moves the tip are the joints between root and tip; all others stay at zero, and weigh. A joint between them that
+mimics another moves with it (:mod:`teleop_core.robots.chains.followers`). The kinematics are those of
+Denavit-Hartenberg chains (:mod:`teleop_core.robots.chains.dh_kernels`), the dynamics those of rigid bodies
+(:mod:`teleop_core.robots.chains.chain_dynamics`). Effort and velocity limits, damping and friction are the drives'
+where they stand in the file and are above zero. The inertia of a drive is that of the links at home; that of its motor
+is in no URDF. A file of drives may state it, and what else a URDF leaves out. Whatever is left out there too is assumed
+as for tables (:mod:`teleop_core.robots.arms.dh_drives`), and ``Robot.drives.assumed`` names it. Meshes are read where
+they are drawn (:mod:`teleop_core.robots.bodies.looks`).
 
 Source:
     The XML specification of URDF, pages joint and link.
@@ -81,9 +80,8 @@ def load_urdf(
         task: Directions that the arm is to control, of :data:`DIRECTIONS`, with blanks or commas
             between them; empty for all, or of an arm that cannot move in all of them at once for
             those of :func:`~teleop_core.robots.rank.directions_of`.
-        dynamics: Of :data:`MODELS`. independent: axes that do not act on each other, gravity
-            balanced. links: the bodies of the file, which weigh and act on each other; the
-            controller feeds their gravity forward.
+        dynamics: Of :data:`MODELS`. independent: axes that do not act on each other, gravity balanced. links: the
+            bodies of the file, which weigh and act on each other; the controller feeds their gravity forward.
         drives: YAML file of what the drives of the joints are, by their names, in the entries of
             :class:`~teleop_core.robots.drives.Drives`; it stands above the URDF. Inertia is that
             of the motor, to which that of the links is added.
@@ -304,8 +302,7 @@ def _drive_entries(joint: UrdfJoint) -> dict[str, float]:
 def _bodies(moving: list[UrdfJoint], base: str, links: Links, joints: list[UrdfJoint], may_be_any: bool) -> Array:
     """What each joint moves up to the next, (n, 13), see :func:`body_row`; other joints at zero.
 
-    Files give many an inertia that no body has. It does no harm where nothing moves it, and where
-    ``may_be_any``.
+    Files give many an inertia that no body has. It does no harm where nothing moves it, and where ``may_be_any``.
     """
     carried: dict[str, list[UrdfJoint]] = {}
     for joint in joints:
@@ -350,8 +347,7 @@ def _mass(name: str, link: Xml.Element, may_be_any: bool) -> tuple[float, Array,
 def _is_possible(inertia: Array) -> bool:
     """Whether some body has this inertia: no principal moment exceeds the sum of the others.
 
-    That is so where half the trace less the inertia has no negative eigenvalue, and so no negative
-    principal minor.
+    That is so where half the trace less the inertia has no negative eigenvalue, and so no negative principal minor.
     """
     spread = 0.5 * float(np.trace(inertia))
     if spread == 0.0:

@@ -1,7 +1,6 @@
 """Xacro: a macro file of an arm, expanded to its URDF by the package ``xacro``.
 
-Expanding evaluates the expressions of the file and of all that it includes: a xacro is a program
-(docs/security.md).
+Expanding evaluates the expressions of the file and of all that it includes: a xacro is a program (docs/security.md).
 """
 
 import re

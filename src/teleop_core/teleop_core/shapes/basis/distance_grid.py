@@ -69,8 +69,7 @@ class DistanceGrid(NamedTuple):
     """Distances from a mesh, and how it is drawn.
 
     Attributes:
-        numbers: Header, then the coefficients of the cubic spline through the distances [m], along
-            z fastest.
+        numbers: Header, then the coefficients of the cubic spline through the distances [m], along z fastest.
         outline: Lines (N, 3) [m], a row of NaN between them.
     """
 

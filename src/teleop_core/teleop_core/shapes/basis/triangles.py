@@ -201,8 +201,7 @@ def _nearest_on(  # noqa: PLR0911 - seven regions
     """Nearest place of a triangle (3, 3).
 
     Returns:
-        What it lies on, as the rows of :func:`_pseudonormals`; shares of the edges from corner 0 to
-        1 and from 0 to 2.
+        What it lies on, as the rows of :func:`_pseudonormals`; shares of the edges from corner 0 to 1 and from 0 to 2.
 
     Source:
         Ericson 2005, Real-Time Collision Detection, section 5.1.5: regions of corners and edges.

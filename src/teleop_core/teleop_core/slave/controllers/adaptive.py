@@ -5,8 +5,7 @@ leads back to the setpoint, and a pull to that motion. What is left of the pull'
 parameters, each within bounds around what the drive table says.
 
 Source:
-    Slotine and Li 1987, eqs. 5-9, on each joint by itself; bounds and dead zone as in Slotine and
-    Li 1991, section 8.7.
+    Slotine and Li 1987, eqs. 5-9, on each joint by itself; bounds and dead zone as in Slotine and Li 1991, section 8.7.
 """
 
 from dataclasses import dataclass

@@ -40,13 +40,12 @@ class PidParameters:
 def critically_damped_gains(inertia: Array, viscous: Array, bandwidth: Array) -> tuple[Array, Array, Array]:
     """Gains that put all three closed-loop poles of an inertia with friction at one real place.
 
-    The loop ``inertia q'' + viscous q' = Kp (b r - q) + Ki ∫(r - q) - Kd q'`` has the
-    characteristic polynomial ``inertia (s + bandwidth)³``, critically damped: what disturbs it dies
-    away without swinging. Its answer to the setpoint r is ``bandwidth² (3 b s + bandwidth) / (s +
-    bandwidth)³``. With the whole setpoint in the proportional action, b = 1, the zero makes a step
-    overshoot by 25 % all the same. It is 20 % at 1 kHz, and less where the setpoint moves no faster
-    than the drive. With b = 1/3 it cancels a pole, ``bandwidth² / (s + bandwidth)²`` is left, and
-    no step overshoots.
+    The loop ``inertia q'' + viscous q' = Kp (b r - q) + Ki ∫(r - q) - Kd q'`` has the characteristic polynomial
+    ``inertia (s + bandwidth)³``, critically damped: what disturbs it dies away without swinging. Its answer to the
+    setpoint r is ``bandwidth² (3 b s + bandwidth) / (s + bandwidth)³``. With the whole setpoint in the proportional
+    action, b = 1, the zero makes a step overshoot by 25 % all the same. It is 20 % at 1 kHz, and less where the
+    setpoint moves no faster than the drive. With b = 1/3 it cancels a pole, ``bandwidth² / (s + bandwidth)²`` is left,
+    and no step overshoots.
 
     Args:
         inertia: Inertias (n,) [kg·m² or kg], > 0.

@@ -96,9 +96,8 @@ def _may_move(p: JawNumbers, s: JawState, row: Row) -> bool:
 def _is_led(s: JawState, wanted: float) -> bool:
     """Whether a command leads the jaw, which after a hold it does by the operator's doing alone.
 
-    It opens the jaw once one has asked for the angle held, or less: nothing falls because the hand
-    was opened during a stop. It closes the jaw once one has asked for the angle held, or more, or
-    while it closes.
+    It opens the jaw once one has asked for the angle held, or less: nothing falls because the hand was opened during a
+    stop. It closes the jaw once one has asked for the angle held, or more, or while it closes.
     """
     if s.is_led == 0:
         s.lowest, s.highest = min(s.lowest, wanted), max(s.highest, wanted)

@@ -1,8 +1,7 @@
 """States of an arm and what leads from one to another: one table for all ways to run it.
 
-The states and commands are those of CRTK (Collaborative Robotics Toolkit, robot operating states),
-with two more commands: ``stop``, the emergency stop, which every state takes, and ``reset``, which
-alone ends it.
+The states and commands are those of CRTK (Collaborative Robotics Toolkit, robot operating states), with two more
+commands: ``stop``, the emergency stop, which every state takes, and ``reset``, which alone ends it.
 """
 
 from enum import IntEnum

@@ -190,8 +190,7 @@ def _gears(robot: Robot, parameters: HardwareParameters) -> Array:
     """Stiffness of the gears (n,).
 
     Raises:
-        ParameterError: A gear that bends with no inertia of a link behind it, or that swings too
-            fast for the ticks.
+        ParameterError: A gear that bends with no inertia of a link behind it, or that swings too fast for the ticks.
     """
     given, n, model = parameters.gear_stiffness, robot.n, robot.dynamics
     stiffness = per_joint(robot, "plant.hardware.gear_stiffness", given, np.zeros(n))
