@@ -111,7 +111,6 @@ def _command_of(words: list[str]) -> str | None:
 
 @cache
 def _parser() -> argparse.ArgumentParser:
-    """Parser of all commands, those of installed packages too."""
     parser, commands = _core()
     installed.add(commands)
     return parser

@@ -168,7 +168,6 @@ class BagSource:
         return PoseReader(bag.typestore, kind, is_ros2=bag.is_ros2, frame=frame, parent=parent)
 
     def _composed(self, bag: ros_bags.RosBag) -> Rows:
-        """Poses along the chain."""
         edges, told = [], []
         top = ""
         for topic, (parent, child) in self._chain:
@@ -238,5 +237,4 @@ def _named(wanted: str, names: Iterable[str]) -> str | None:
 
 
 def _holds(path: Path, *ends: str) -> bool:
-    """Whether a directory has a file with one of these ends."""
     return any(file.suffix in ends for file in path.iterdir())

@@ -77,7 +77,6 @@ def numbers_of(table: tables.Table) -> list[int]:
 
 
 def _column(table: tables.Table) -> int | None:
-    """Column of numbers that says which episode a row is of."""
     column = names.find_episode(table.names) if table.is_named else None
     is_number = column is not None and np.isfinite(table.sample(column)).all()
     return column if is_number else None

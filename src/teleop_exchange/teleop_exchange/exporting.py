@@ -198,7 +198,6 @@ def _remove(draft: Path) -> None:
 
 
 def _schema(streams: Streams, *, units: bool) -> pa.Schema:
-    """Names of the columns, with their units as metadata."""
     found = [("time", "s")]
     for topic, columns in streams.columns.items():
         found += [(f"{topic}.{column}", unit_of(topic, column)) for column in columns]
@@ -211,7 +210,6 @@ def _schema(streams: Streams, *, units: bool) -> pa.Schema:
 def _write(
     streams: Streams, rows: Iterable[Joined], schema: pa.Schema, draft: Path, chosen: str, *, is_packed: bool
 ) -> int:
-    """Write all rows; their number."""
     written = 0
     packed = "gzip" if is_packed and chosen == "csv" else None
     with pa.output_stream(str(draft), compression=packed) as file:

@@ -75,7 +75,6 @@ def _of_arm(bag: reader.Bag, prefix: str, options: ImportOptions) -> ImportOptio
 
 
 def _read(path: Path, arm: str, options: ImportOptions) -> dict[topics.Topic, Series]:
-    """Streams of one arm."""
     with _options_told(path):
         motion = Motion(path, options)
     presses, stamps = motion.presses(), motion.stamp_ns

@@ -73,7 +73,6 @@ class TextTable:
         return pa.input_stream(str(self.path), compression=self._packed)
 
     def _rows(self) -> pa.NativeFile:
-        """The file; with one blank between cells where blanks part them."""
         if self._form.separator != _BLANK:
             return self._stream()
         with self._stream() as stream:

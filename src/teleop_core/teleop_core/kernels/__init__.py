@@ -158,7 +158,6 @@ def _executed(text: str, name: str, names: Mapping[str, object], key: str) -> Fu
 
 
 def _plain(function: Any) -> Any:
-    """Kernel of the pure-Python mode: the function itself."""
     function.py_func = function
     return function
 

@@ -245,7 +245,6 @@ def _kept(
     out: Path | str | None,
     progress: Progress,
 ) -> Recording:
-    """Recording of blocks, on disk or in memory."""
     if out is not None:
         runner.record_blocks(session, made, Path(out), blocks, ticks, progress)
         return open_recording(out)

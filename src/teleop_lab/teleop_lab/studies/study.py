@@ -243,7 +243,6 @@ def _study(
     given: Mapping[str, Any],
     parts: Iterable[Path | str],
 ) -> Study:
-    """Study in which lists are swept."""
     swept = {name: tuple(v) for name, v in given.items() if isinstance(v, list | range)}
     fixed = {name: value for name, value in given.items() if name not in swept}
     return Study(scenario, swept, tuple(seeds), tuple(metrics), fixed, tuple(Path(part) for part in parts))

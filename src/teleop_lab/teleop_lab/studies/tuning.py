@@ -153,7 +153,6 @@ class Tuning:
         return Tuned(tuple(done), min(scored, key=lambda trial: sign * (trial.score or 0.0)))
 
     def _values(self, trial: Any) -> dict[str, api.Setting]:
-        """Values of a trial of Optuna."""
         found: dict[str, api.Setting] = {}
         for name, where in self.searched.items():
             if not isinstance(where, Range):

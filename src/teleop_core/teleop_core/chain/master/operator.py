@@ -180,7 +180,6 @@ class RunningOperator(RunningStage):
         self._draw(self._wanted[left : self._end])
 
     def _draw(self, drawn: Any) -> None:
-        """Fill records with what the operator wants in the ticks that follow."""
         count = len(drawn)
         if self._person is not None and count <= follower.MOST:  # faster than by way of turns
             drawn[:] = self._person.draw((self._tick + 1) * self.dt, self.dt, count)

@@ -83,7 +83,6 @@ def _verdict(numbers: Array, memory: Array, scene: Array, block: int) -> int:
 
 @inner
 def _begin_step(numbers: Array, memory: Array, scene: Array, state: Array, step: int) -> None:
-    """Set the goal of a step."""
     block, lift, width = max(int(memory[0]), 0), numbers[0], numbers[1]
     start, now = _STARTS + 3 * block, _X0 + 3 * block
     way_x, way_y = numbers[4 + 2 * block], numbers[5 + 2 * block]
@@ -130,7 +129,6 @@ def _is_done(numbers: Array, memory: Array, scene: Array, state: Array) -> bool:
 
 @inner
 def _next_step(numbers: Array, memory: Array, scene: Array, step: int) -> int:
-    """Step that comes after one that is done."""
     if step == _RETREAT:
         return _WAIT
     if step == _CARRY:  # first above the peg, then down

@@ -235,7 +235,6 @@ class _Stream:
 
 
 def _segments(hand: Kinematics, mask: Mask) -> dict[str, dict[str, float | None]]:
-    """Figures of each stretch of a mask."""
     edges = np.flatnonzero(np.diff(np.concatenate(([False], mask, [False]))))
     found: dict[str, dict[str, float | None]] = {}
     for begin, end in list(pairwise(edges.tolist()))[::2]:

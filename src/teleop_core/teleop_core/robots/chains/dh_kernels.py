@@ -236,7 +236,6 @@ def _start(number: int, box: Array, q: Array) -> None:
 
 @inner
 def _distance(a: Array, b: Array) -> float:
-    """Largest difference of two joint vectors."""
     worst = 0.0
     for i in range(a.shape[0]):
         worst = max(worst, abs(a[i] - b[i]))

@@ -162,7 +162,6 @@ def _degrees(sine: float) -> float:
 
 
 def _chains(kinds: Sequence[float], fixed: Sequence[Array], reach: float) -> tuple[_Chain, _Chain]:
-    """The chain from base to tip, and from tip to base."""
     back = [inverse_motion(matrix) for matrix in fixed[::-1]]
     turned = [-kind for kind in kinds[::-1]]
     return (
@@ -202,7 +201,6 @@ def solution_of(kinds: Sequence[float], fixed: Sequence[Array], reach: float, ta
 
 
 def _spherical_wrist(chain: _Chain) -> Solution | None:
-    """Six joints whose last three axes meet."""
     if not chain.do_meet((3, 4, 5)):
         return None
     chain.slide_next_to(1, 0)
@@ -236,7 +234,6 @@ def _spherical_wrist(chain: _Chain) -> Solution | None:
 
 
 def _parallel_axes(chain: _Chain) -> Solution | None:
-    """Six joints whose axes 2, 3 and 4 are parallel."""
     if not chain.is_parallel((1, 2, 3)):
         return None
     axes = [frame[:3, 2] for frame in chain.frames()]
