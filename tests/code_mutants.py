@@ -537,6 +537,8 @@ CODE_MUTANTS = (
             "time.monotonic() - self._last > self._patience", "time.monotonic() < 0.0", "starter"),
     _mutant("aliases_multiply", "a file may stand for any number of values", "base/plain_yaml.py",
             "        _count(node, {}, set())\n", "", "launching"),
+    _mutant("nested_deep", "a file may be nested deeper than the reader's stack bears",
+            "base/plain_yaml.py", "        _check_depth(text)\n", "", "launching"),
     _mutant("held_on", "who takes control holds what the one before held",
             "teleop_console/drivers.py", "self._driver, self._holds = page, False",
             "self._driver = page", "console_drivers"),

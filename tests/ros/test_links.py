@@ -13,7 +13,6 @@ from links import (
     STAGES,
     WATCHED,
     assert_delay_is_seen_in_the_latency,
-    assert_second_source_of_force_acts_beside_the_first,
     assert_stages_run_between_ours,
     is_enough,
 )
@@ -54,5 +53,4 @@ def test_stages_of_an_installed_package_sum_and_run_between_ours(peer: "Peer", t
         session.close()
     recorded = session.recorded()
     assert_delay_is_seen_in_the_latency(recorded)
-    assert_second_source_of_force_acts_beside_the_first(recorded)
     assert_stages_run_between_ours(recorded)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from geometry_msgs.msg import PoseStamped, WrenchStamped
 from sensor_msgs.msg import JointState
+from std_msgs.msg import Empty
 
 from stock_client import MIDDLE, StockClient, crtk
 from teleop_core.kernels.geometry import Array, framed_wrenches
@@ -91,3 +92,46 @@ def test_a_disabled_master_pushes_with_no_force(peer: "Peer") -> None:
     client.reaches(("ENABLED", True, False))
     client.send("state_command", crtk.StringStamped(string="disable"))
     client.reaches(("DISABLED", True, False))
+
+
+def test_a_move_without_names_arrives_busy_on_the_way_and_not_afterwards(peer: "Peer") -> None:
+    client = StockClient.of_slave(peer)
+    goal = [a + 0.05 for a in MIDDLE]
+    goal[2] = 0.35
+    client.was_busy = False
+    client.send("move_jp", JointState(position=goal))
+    client.wait(lambda: client.was_busy, "busy")
+    client.reaches(("ENABLED", True, False))
+    client.wait(lambda: np.allclose(client.joints(), goal, atol=1e-9), "the goal")
+    client.wait(lambda: np.allclose(client.newest["goal_js"].position, goal), "goal_js")
+
+
+def test_a_single_servo_jp_without_names_is_gone_to_all_the_way(client: StockClient) -> None:
+    goal = [a + 0.02 for a in MIDDLE]
+    goal[2] = 0.36
+    peer, received = client.peer, 0.0
+    while not received:  # the first may be lost: the slave need not know its sender yet
+        client.send("servo_jp", JointState(position=goal))
+        sent: Any = peer.status("slave").number("ticks")
+        peer.wait_value("slave", "ticks", lambda ticks: ticks > sent + 1500)
+        received = peer.status("slave").number("received.slave/servo_jp")
+    assert received == 1
+    client.wait(lambda: np.allclose(client.joints(), goal, atol=1e-6), "the reference")
+
+
+def test_speeds_end_with_the_messages_and_hold_ends_a_move(client: StockClient) -> None:
+    before = client.joints()
+
+    def is_driven() -> bool:
+        client.send("servo_jv", JointState(velocity=[0.05, 0.0, 0.0, 0.0, 0.0, 0.0]))
+        return bool(client.joints()[0] > before[0])
+
+    client.wait(is_driven, "motion")
+    status = client.peer.status
+    client.peer.wait(lambda: status("slave").values["motion"] == "nothing", "rest")
+    goal = [*MIDDLE[:2], 0.02, *MIDDLE[3:]]
+    client.send("move_jp", JointState(position=goal))
+    client.reaches(("ENABLED", True, True))
+    client.send("hold", Empty())
+    client.reaches(("ENABLED", True, False))
+    assert client.joints()[2] > goal[2] + 0.001

@@ -10,10 +10,13 @@ from teleop_core.bags.messages import layout
 from teleop_core.graph import topics
 from teleop_core.graph.stage import STAGES
 from teleop_core.middleware.world import Qos
+from teleop_core.nodes.recorder import DISCOVERY_NS
 from teleop_core.nodes.streams import message_type
+from teleop_drill.simulation.world import SimulatedWorld
 
 if TYPE_CHECKING:
     from peers import AnyPeer as Peer
+    from simulated.conftest import SimulatedPeer
 
 
 GARBAGE = b"\0\1\0\0" + bytes(range(200, 256))
@@ -121,3 +124,35 @@ def test_a_recorder_does_not_take_a_second_publisher_for_losses(peer: "Peer", tm
     status = peer.wait(recorded, "messages of both")
     # What a busy machine loses is lost, but nothing is both lost and received, or never was sent.
     assert status.number(f"lost.{topic.name}") <= sent - status.number(f"received.{topic.name}")
+
+
+def test_a_recorder_tells_how_much_of_a_node_that_starts_again_came_before_it_knew_of_it(
+    peer: "SimulatedPeer", tmp_path: Path
+) -> None:
+    peer.start("recorder", out=str(tmp_path / "bag"))
+    topic, unheard, heard = topics.MASTER_MEASURED_CP, 300, list[int]()
+    first = peer.publisher(topic)
+    data = layout(topic, ()).encode_one(1, np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]))
+    begin_ns = peer.world.monotonic_ns()
+
+    def heard_for_longer_than_discovery_takes() -> bool:
+        first.publish(data)
+        received = peer.status("recorder").number(f"received.{topic.name}")
+        return received > 0 and peer.world.monotonic_ns() > begin_ns + DISCOVERY_NS
+
+    peer.wait(heard_for_longer_than_discovery_takes, "the first publisher")
+
+    def newcomer(world: SimulatedWorld) -> int:
+        second = world.node("newcomer").create_publisher(message_type(topic.kind.ros_type), topic.name, Qos(depth=10))
+        for _ in range(unheard):
+            second.publish(data)
+        heard.append(second.get_subscription_count())
+        while True:
+            second.publish(data)
+            world.sleep(0.01)
+
+    peer.foreign("newcomer", newcomer)
+    lost = f"lost.{topic.name}"
+    peer.wait(lambda: peer.status("recorder").number(lost) >= unheard, "what the recorder tells of it")
+    assert "lost" in peer.status("recorder").message
+    assert heard == [0]

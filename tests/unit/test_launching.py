@@ -123,7 +123,15 @@ BOMB = "\n".join(f"{own}: &{own} [{', '.join([inner] * 99)}]" for own, inner in 
 
 
 @pytest.mark.parametrize(
-    ("text", "says"), [("a: " + "x" * LARGEST_TEXT, "has more than"), ("[", "is not YAML"), (BOMB, "values")]
+    ("text", "says"),
+    [
+        ("a: " + "x" * LARGEST_TEXT, "has more than"),
+        ("[", "is not YAML"),
+        (BOMB, "values"),
+        ("[" * 2000 + "]" * 2000, "nested too deeply"),
+        ("- " * 2000, "nested too deeply"),
+    ],
+    ids=("long", "open", "bomb", "nested lists", "nested entries"),
 )
 def test_a_parameter_file_of_a_node_costs_no_more_than_any_other(tmp_path: Path, text: str, says: str) -> None:
     file = tmp_path / "mine.yaml"

@@ -1,5 +1,6 @@
 """Background: the thread that writes a recording, its queue, and the disk below it."""
 
+import os
 import queue
 import threading
 from collections.abc import Callable
@@ -52,6 +53,13 @@ class Background(Protocol):
             OSError: The disk does not.
         """
 
+    def sync(self, file: BinaryIO) -> None:
+        """Wait until what was written is on the disk.
+
+        Raises:
+            OSError: The disk refuses it.
+        """
+
 
 class System:
     """Threads and files as they are."""
@@ -72,6 +80,10 @@ class System:
         """Let a file end after so many bytes, and go on to write there."""
         file.seek(size)
         file.truncate()
+
+    def sync(self, file: BinaryIO) -> None:
+        """Wait until what was written is on the disk."""
+        os.fdatasync(file.fileno())
 
 
 SYSTEM = System()

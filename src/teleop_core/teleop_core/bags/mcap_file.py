@@ -145,7 +145,7 @@ class McapFile:
         Raises:
             OSError: The disk refuses it.
         """
-        os.fdatasync(self._file.fileno())
+        self._background.sync(self._file)
 
     def statistics(self) -> Statistics:
         """Numbers and times of the messages in whole chunks."""

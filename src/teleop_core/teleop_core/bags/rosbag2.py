@@ -7,7 +7,6 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-import yaml
 from mcap.records import Channel, Schema, Statistics
 
 from teleop_core.bags import ros_types
@@ -50,16 +49,12 @@ def records_of(topics: list[Topic]) -> tuple[list[Schema], list[Channel]]:
     channels = []
     for number, topic in enumerate(topics, start=1):
         entries = {
-            "offered_qos_profiles": _text(offered_qos(topic.quality)),
+            "offered_qos_profiles": plain_yaml.written(offered_qos(topic.quality)),
             "topic_type_hash": ros_types.type_hash(topic.ros_type),
         }
         schema = 1 + names.index(topic.ros_type)
         channels.append(Channel(number, "/" + topic.name, "cdr", entries, schema))
     return schemas, channels
-
-
-def _text(value: Any) -> str:
-    return yaml.dump(value, Dumper=plain_yaml.FullDumper, sort_keys=False, allow_unicode=True)
 
 
 def _parsed(qos: str) -> Any:
@@ -118,7 +113,7 @@ def metadata_text(
         "custom_data": None,
         "ros_distro": ros_types.DISTRIBUTION,
     }
-    return _text({"rosbag2_bagfile_information": information})
+    return plain_yaml.written({"rosbag2_bagfile_information": information})
 
 
 @contextmanager

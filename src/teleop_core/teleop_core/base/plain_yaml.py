@@ -1,7 +1,9 @@
-"""Plain YAML: what files and settings say, with bounds on what reading it can cost.
+"""Plain YAML: what files and settings say, with bounds on what reading it can cost, and writing it.
 
-It is YAML 1.1 as of PyYAML's safe loader, of which dates are texts, since no value here is one. Aliases are fine unless
-they lead back into themselves or multiply; so are numbers of a length that a number can have.
+It is YAML 1.1 as of PyYAML's safe loader, of which dates are texts, since no value here is one.
+Aliases are fine unless they lead back into themselves or multiply; so are numbers of a length that
+a number can have. Where PyYAML has libyaml, that reads and writes: the values are the same, six times
+as fast.
 """
 
 import stat
@@ -18,6 +20,8 @@ MOST_VALUES = 50_000
 """Values that a text may stand for, aliases counted as often as they are used."""
 LONGEST_NUMBER = 400
 """Characters of a number: the longest double written out has 309 digits before its point."""
+DEEPEST = 100
+"""Levels of lists and mappings within each other: libyaml's composer has no bound of its own."""
 _DATE = "tag:yaml.org,2002:timestamp"
 _NUMBERS = ("tag:yaml.org,2002:int", "tag:yaml.org,2002:float")
 
@@ -26,7 +30,10 @@ class UnreadableError(ValueError):
     """A text is not YAML as this package reads it; says why in one line."""
 
 
-class _Loader(yaml.SafeLoader):
+_BEGINS, _ENDS = yaml.CollectionStartEvent, yaml.CollectionEndEvent
+
+
+class _Loader(getattr(yaml, "CSafeLoader", yaml.SafeLoader)):  # type: ignore[misc]
     """Safe loader without dates."""
 
     yaml_implicit_resolvers = {  # noqa: RUF012  (PyYAML's own form)
@@ -35,12 +42,22 @@ class _Loader(yaml.SafeLoader):
     }
 
 
-class FullDumper(yaml.SafeDumper):
+class _Dumper(getattr(yaml, "CSafeDumper", yaml.SafeDumper)):  # type: ignore[misc]
     """Writes equal parts in full instead of as references, which rcl cannot read."""
 
     def ignore_aliases(self, data: Any) -> bool:
         """Never refer to what was written before."""
         return True
+
+
+def written(value: Any, **options: Any) -> str:
+    """Text of a value: mappings in their own order, equal parts in full.
+
+    Args:
+        value: Mappings, lists, texts, numbers, truth values or None.
+        options: As of ``yaml.dump``, such as ``width``.
+    """
+    return str(yaml.dump(value, Dumper=_Dumper, sort_keys=False, allow_unicode=True, **options))
 
 
 def parse(text: str) -> Any:
@@ -52,14 +69,13 @@ def parse(text: str) -> Any:
     if len(text) > LARGEST_TEXT:
         raise UnreadableError(f"has {len(text)} characters, must have at most {LARGEST_TEXT}")
     try:
+        _check_depth(text)
         loader = _Loader(text)
         node = loader.get_single_node()
         if node is None:
             return None
         _count(node, {}, set())
         return loader.construct_document(node)
-    except RecursionError:
-        raise UnreadableError("is nested too deeply") from None
     except yaml.MarkedYAMLError as error:
         raise UnreadableError(_told(error)) from error
     except UnreadableError:
@@ -67,6 +83,14 @@ def parse(text: str) -> Any:
     # What constructors of explicit tags raise, such as of "!!int x", is of many kinds.
     except (yaml.YAMLError, ValueError, TypeError, KeyError, AttributeError, IndexError) as error:
         raise UnreadableError(f"is not YAML: {' '.join(str(error).split())}") from error
+
+
+def _check_depth(text: str) -> None:
+    depth = 0
+    for event in yaml.parse(text, _Loader):
+        depth += isinstance(event, _BEGINS) - isinstance(event, _ENDS)
+        if depth > DEEPEST:
+            raise UnreadableError(f"is nested too deeply, more than {DEEPEST} levels")
 
 
 def _told(error: yaml.MarkedYAMLError) -> str:

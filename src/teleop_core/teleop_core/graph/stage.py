@@ -274,7 +274,7 @@ class RunningStage:
     def step(self) -> None:
         """Make one step."""
         self.prepare(1)
-        self.load()()
+        (self._bound or self.load())()
         raise_pending()
 
     def load(self) -> Callable[[], object]:

@@ -14,7 +14,8 @@ from rclpy.service import Service
 from rclpy.subscription import Subscription
 from rclpy.timer import Timer
 
-from teleop_core.middleware import ros_taking, world
+from teleop_core.middleware.ros_taking import RosTaker
+from teleop_core.middleware.world import Endpoint, Qos
 
 _DESTROY = {
     LifecyclePublisher: "destroy_lifecycle_publisher",
@@ -27,7 +28,7 @@ _DESTROY = {
 }
 
 
-def profile_of(qos: world.Qos) -> QoSProfile:
+def profile_of(qos: Qos) -> QoSProfile:
     """Quality of service as rclpy has it."""
     return QoSProfile(
         history=HistoryPolicy.KEEP_ALL if qos.keeps_all else HistoryPolicy.KEEP_LAST,
@@ -85,15 +86,15 @@ class RosNode:
         self.get_service_names_and_types = self.own.get_service_names_and_types
         self.destroy_node = self.own.destroy_node
 
-    def create_publisher(self, kind: Any, name: str, qos: world.Qos) -> RosPublisher:
+    def create_publisher(self, kind: Any, name: str, qos: Qos) -> RosPublisher:
         """Publisher of messages of a class."""
         return RosPublisher(self.own.create_publisher(kind, name, profile_of(qos)))
 
-    def create_taker(self, kind: Any, name: str, qos: world.Qos) -> ros_taking.RosTaker:
+    def create_taker(self, kind: Any, name: str, qos: Qos) -> RosTaker:
         """Subscription whose messages are taken by hand."""
-        return ros_taking.RosTaker(self.own, kind, name, profile_of(qos))
+        return RosTaker(self.own, kind, name, profile_of(qos))
 
-    def create_subscription(self, kind: Any, name: str, callback: Callable[[Any], None], qos: world.Qos) -> Any:
+    def create_subscription(self, kind: Any, name: str, callback: Callable[[Any], None], qos: Qos) -> Any:
         """Subscription whose messages the executor hands over."""
         return self.own.create_subscription(kind, name, callback, profile_of(qos))
 
@@ -109,13 +110,21 @@ class RosNode:
         if executor is not None:
             executor.create_task(work, *arguments)
 
-    def publishers(self, name: str) -> list[world.Endpoint]:
+    def publishers(self, name: str) -> list[Endpoint]:
         """Publishers of a topic that were found."""
-        return [
-            world.Endpoint(
-                f"{info.node_namespace.rstrip('/')}/{info.node_name}",
-                bytes(info.endpoint_gid),
-                info.qos_profile.durability == DurabilityPolicy.TRANSIENT_LOCAL,
-            )
-            for info in self.own.get_publishers_info_by_topic(name)
-        ]
+        return [_endpoint(info) for info in self.own.get_publishers_info_by_topic(name)]
+
+    def readers(self, name: str) -> list[Endpoint]:
+        """Readers of a topic that were found."""
+        return [_endpoint(info) for info in self.own.get_subscriptions_info_by_topic(name)]
+
+
+def _endpoint(info: Any) -> Endpoint:
+    """What rclpy tells of one."""
+    return Endpoint(
+        f"{info.node_namespace.rstrip('/')}/{info.node_name}",
+        bytes(info.endpoint_gid),
+        info.topic_type,
+        info.qos_profile.reliability == ReliabilityPolicy.RELIABLE,
+        info.qos_profile.durability == DurabilityPolicy.TRANSIENT_LOCAL,
+    )

@@ -49,16 +49,20 @@ class Taken(NamedTuple):
 
 
 class Endpoint(NamedTuple):
-    """Publisher of a topic, as discovery knows it.
+    """Publisher or reader of a topic, as discovery knows it.
 
     Attributes:
         node: Name of its node, with the namespace and a slash before it.
-        sender: As of :class:`Taken`.
+        sender: As of :class:`Taken`; of a reader its own number.
+        ros_type: Type of its messages, such as ``sensor_msgs/msg/JointState``.
+        is_reliable: As of :class:`Qos`.
         is_latched: As of :class:`Qos`.
     """
 
     node: str
     sender: bytes
+    ros_type: str
+    is_reliable: bool
     is_latched: bool
 
 
@@ -286,6 +290,9 @@ class Node(Protocol):
 
     def publishers(self, name: str) -> list[Endpoint]:
         """The same, one by one."""
+
+    def readers(self, name: str) -> list[Endpoint]:
+        """Readers of a topic that were found."""
 
     def get_topic_names_and_types(self) -> list[tuple[str, list[str]]]:
         """Topics that were found."""

@@ -8,10 +8,8 @@ from itertools import pairwise
 from pathlib import Path
 from typing import IO, Any
 
-import yaml
-
 from teleop_core.base.parameters import build
-from teleop_core.base.plain_yaml import FullDumper, load
+from teleop_core.base.plain_yaml import load, written
 from teleop_core.graph.graph import Graph, build_graph
 from teleop_core.graph.layers import SESSION, SessionParameters
 
@@ -48,7 +46,7 @@ def _anywhere(key: str) -> str:
 def _copy(content: dict[str, Any]) -> str:
     """Place of a copy for this process, in a file without a name: nothing can stay of it."""
     file = tempfile.TemporaryFile("w+", encoding="utf-8")  # noqa: SIM115
-    yaml.dump(content, file, Dumper=FullDumper, allow_unicode=True, sort_keys=False)
+    file.write(written(content))
     file.flush()
     _copies.append(file)  # it is there as long as it is open
     return f"/dev/fd/{file.fileno()}"

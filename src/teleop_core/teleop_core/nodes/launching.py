@@ -9,10 +9,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from teleop_core.base.errors import ParameterError
+from teleop_core.base.plain_yaml import written
 from teleop_core.graph.graph import RECORDER_NAME
 from teleop_core.nodes.crews import Processes, crews
 from teleop_core.nodes.files import temporary_file
-from teleop_core.nodes.live import parameter_file
+from teleop_core.nodes.live import session_parameters
 from teleop_core.nodes.start import SESSION
 from teleop_core.session.configuration import configure
 
@@ -84,7 +85,7 @@ def processes(given: Mapping[str, str], namespace: str = "") -> list[Process]:
     if level not in LOG_LEVELS:
         raise ParameterError("log_level", given["log_level"], f"one of {', '.join(LOG_LEVELS)}")
     is_recorded = _truth("record", given["record"])
-    text = parameter_file(configuration, given["out"], where, starts_recorder=is_recorded)
+    text = written(session_parameters(configuration, given["out"], where, starts_recorder=is_recorded))
     file = temporary_file(text)
     if given["processes"] not in set(Processes):
         raise ParameterError("processes", given["processes"], f"one of {', '.join(Processes)}")

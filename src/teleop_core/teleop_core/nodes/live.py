@@ -4,14 +4,13 @@ import tempfile
 import time
 from collections.abc import Collection, Mapping
 from contextlib import suppress
-from copy import deepcopy
 from pathlib import Path
 from typing import IO, Any
 
-import yaml
 from rich.console import Console
 
 from teleop_core.base.errors import RecordingError, SessionError
+from teleop_core.base.plain_yaml import written
 from teleop_core.base.texts import printable
 from teleop_core.graph.graph import HAND, RECORDER_NAME
 from teleop_core.graph.layers import SESSION
@@ -94,7 +93,7 @@ def live(
         Observer(int(env["ROS_DOMAIN_ID"])) as observer,
     ):
         priority = _priority(configuration, processes)
-        parameters.write(parameter_file(configuration, str(out), priority=priority))
+        parameters.write(written(session_parameters(configuration, str(out), priority=priority)))
         parameters.flush()
         session = _Session(configuration, console, observer, parameters, env, interrupt, starter)
         session.crews = shared
@@ -353,15 +352,15 @@ class _Progress:
         return time.monotonic() - self._last
 
 
-def parameter_file(
+def session_parameters(
     configuration: Configuration,
     out: str,
     namespace: str = "",
     *,
     starts_recorder: bool = True,
     priority: int | None = None,
-) -> str:
-    """Parameters of all nodes as a ROS 2 parameter file; ``out`` is that of the recorder.
+) -> dict[str, Any]:
+    """Parameters of all nodes, as a ROS 2 parameter file has them; ``out`` is that of the recorder.
 
     Every node is named with its namespace. What feeds its ports, where that is not the topic of
     the port's name, stands in its ``links``.
@@ -373,22 +372,21 @@ def parameter_file(
         priority: Priority of the loops; None: as configured.
         starts_recorder: Whether the recorder configures and activates itself.
     """
-    text, graph = configuration.text(), configuration.graph
-    content: dict[str, Any] = yaml.safe_load(text)
+    content, graph = configuration.content(), configuration.graph
     session = content.pop(SESSION)
     shared = {k: v for k, v in session["ros__parameters"].items() if k.startswith("real_time.")}
     if priority is not None:
         shared["real_time.priority"] = priority
     for node in content.values():
-        node["ros__parameters"] |= deepcopy(shared)  # rcl cannot read YAML's aliases
+        node["ros__parameters"] |= shared
     for member in graph.members:
         if links := link_texts(graph, member):
             content[member.name]["ros__parameters"]["links"] = links
     recorder = content[RECORDER_NAME]["ros__parameters"]
-    recorder["out"], recorder["configuration"] = out, text
+    recorder["out"], recorder["configuration"] = out, configuration.text()
     recorder["scenario"], recorder["real_time.priority"] = configuration.scenario, 0
     if not starts_recorder:
         recorder["autostart"] = False
     place = f"/{namespace}" if namespace else ""
     named = {f"{place}/{name}": node for name, node in content.items()}
-    return yaml.safe_dump({SESSION: session, **named}, allow_unicode=True)
+    return {SESSION: session, **named}

@@ -162,12 +162,12 @@ class Input:
 
         Of buttons it is the first that presses or releases one, so that no press goes unseen.
         """
-        is_new, has_buttons = False, self.topic.kind is Kind.BUTTONS
+        has_buttons = self.topic.kind is Kind.BUTTONS
         before = self._target.tobytes() if has_buttons else b""
-        while self.take():
-            is_new = True
-            if has_buttons and self._target.tobytes() != before:
-                break
+        is_new = self.take()
+        if is_new and (self.subscription is not None or self._delay_ns):
+            while not (has_buttons and self._target.tobytes() != before) and self.take():
+                pass
         return is_new
 
     def _next(self) -> tuple[int, Values] | None:

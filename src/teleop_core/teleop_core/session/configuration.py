@@ -5,9 +5,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from teleop_core.base import ParameterError, PartError, UnknownNameError, build, specs, values_of
+from teleop_core.base.plain_yaml import written
 from teleop_core.chain.architectures import ARCHITECTURES, impedance
 from teleop_core.chain.operators import OPERATORS
 from teleop_core.chain.passivity import PASSIVITIES
@@ -87,13 +86,16 @@ class Configuration:
 
     def text(self) -> str:
         """All values as a ROS 2 parameter file, which :func:`parse_layer` reads back."""
-        plain = {
+        return written(self.content())
+
+    def content(self) -> dict[str, Any]:
+        """The same as mappings, lists and plain values, by nodes."""
+        return {
             name: {
                 "ros__parameters": {k: (list(v) if isinstance(v, tuple) else v) for k, v in values_of(group).items()}
             }
             for name, group in self.groups.items()
         }
-        return yaml.safe_dump(plain, sort_keys=False, allow_unicode=True)
 
 
 _SHARED = ("seed", "device.workspace", "device.start")

@@ -51,6 +51,13 @@ def add(commands: Any) -> None:
         metavar="N",
         help="run so many random schedules of faults, simulated, from --seed on",
     )
+    parser.add_argument(
+        "--breaks",
+        type=float,
+        default=0.0,
+        metavar="SHARE",
+        help="share of the looks at a clock at which another thread goes on, in schedules (default 0; try 0.0005)",
+    )
     parser.add_argument("--faults", metavar="I,K", help="of one schedule, these faults alone; -: none")
     parser.add_argument("--list", action="store_true", dest="is_list", help="list the faults")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write all numbers as JSON")

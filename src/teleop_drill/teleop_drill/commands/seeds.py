@@ -21,16 +21,18 @@ def run_schedules(arguments: argparse.Namespace) -> int:
         raise ParameterError("--seeds", count, "without names, --short and --drives")
     if (arguments.faults is not None or out is not None) and count != 1:
         raise ParameterError("--seeds", count, "1 with --faults and --out")
+    if not 0.0 <= arguments.breaks <= 0.1:
+        raise ParameterError("--breaks", arguments.breaks, "from 0 to 0.1")
     if out is not None and out.exists():
         raise RecordingError(out, "exists already; choose another --out")
     ros_module("seeds", "teleop_drill.simulation")
     processes = Processes.ONE if arguments.composed else Processes.SIDES
     if count == 1:
-        return _run_one(first, arguments.faults, out, processes)
-    return _run_many(first, count, arguments.json, processes)
+        return _run_one(first, arguments.faults, out, processes, arguments.breaks)
+    return _run_many(first, count, arguments.json, processes, arguments.breaks)
 
 
-def _run_one(seed: int, chosen: str | None, out: Path | None, processes: Processes) -> int:
+def _run_one(seed: int, chosen: str | None, out: Path | None, processes: Processes, breaks: float) -> int:
     from teleop_drill.simulation.schedules import draw
     from teleop_drill.simulation.seeds import PROCESSES, run_seed
 
@@ -43,7 +45,7 @@ def _run_one(seed: int, chosen: str | None, out: Path | None, processes: Process
         faults = tuple(faults[int(number)] for number in numbers)
     if out is not None:
         out.mkdir(parents=True)
-    found = run_seed(seed, faults, out, processes)
+    found = run_seed(seed, faults, out, processes, breaks)
     for fault in found.faults:
         print(fault.text())
     for one in found.broken:
@@ -52,7 +54,7 @@ def _run_one(seed: int, chosen: str | None, out: Path | None, processes: Process
     return 1 if found.broken else 0
 
 
-def _run_many(first: int, count: int, json_file: Path | None, processes: Processes) -> int:
+def _run_many(first: int, count: int, json_file: Path | None, processes: Processes, breaks: float) -> int:
     from rich.console import Console
     from rich.progress import track
     from rich.table import Column, Table
@@ -61,7 +63,7 @@ def _run_many(first: int, count: int, json_file: Path | None, processes: Process
     from teleop_drill.simulation.seeds import run_seeds, shrink
 
     console, coverage = Console(), Coverage()
-    runs = run_seeds(first, count, None, processes)
+    runs = run_seeds(first, count, None, processes, breaks)
     for found in track(runs, "schedules", count, console=console):
         coverage.add(found)
         if json_file is not None:  # after each: an hour of them may be ended

@@ -1,16 +1,14 @@
 """An arm as a stock CRTK client sees it: taps on its topics, and commands to it."""
 
-import time
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
-from rclpy.serialization import deserialize_message
 
 from teleop_core.bags.messages import SECOND_NS
-from teleop_core.middleware.ros_taking import RosTaker
+from teleop_core.middleware.ros import ROS
+from teleop_core.middleware.ros_messages import read_message
+from teleop_core.middleware.world import Endpoint, Node, Publisher, Qos, World
 from teleop_core.nodes.guest import Guest
 from teleop_core.nodes.interrupt import Interrupt
 from teleop_core.nodes.streams import message_type
@@ -21,7 +19,7 @@ _TURN = 0.005
 _SETTLED = 15  # tenths of a second without new ends after which all are known
 
 
-class Tap(RosTaker):
+class Tap:
     """What comes on one topic: how many messages, and the newest.
 
     Args:
@@ -32,8 +30,9 @@ class Tap(RosTaker):
     """
 
     def __init__(self, node: Node, name: str, ros_type: str, depth: int = 2000) -> None:
-        quality = QoSProfile(depth=depth, reliability=ReliabilityPolicy.BEST_EFFORT)
-        super().__init__(node, message_type(ros_type), name, quality)
+        self._taker = node.create_taker(message_type(ros_type), name, Qos(depth=depth, is_reliable=False))
+        self.close: Callable[[], None] = self._taker.close
+        """Stop listening."""
         self.count = 0
         self.newest: Any = None
         self._kept: list[tuple[int, bytes]] = []
@@ -45,25 +44,25 @@ class Tap(RosTaker):
             every: Called with each of them; without it only the newest is read.
         """
         data, count = None, 0
-        while (taken := self.take()) is not None:
+        while (taken := self._taker.take()) is not None:
             data = taken.data
             count += 1
             if every is not None:
-                every(deserialize_message(data, self.type))
+                every(read_message(data, self._taker.type))
         if data is not None:
-            self.newest = deserialize_message(data, self.type)
+            self.newest = read_message(data, self._taker.type)
         self.count += count
         return count
 
     def drain(self) -> bool:
         """Keep what has come, unread; returns whether anything is kept."""
-        while (taken := self.take()) is not None:
+        while (taken := self._taker.take()) is not None:
             self._kept.append((taken.sent_ns, taken.data))
         return bool(self._kept)
 
     def kept(self) -> list[tuple[int, Any]]:
         """Messages of :meth:`drain`, each with the time at which it was sent [ns]."""
-        return [(sent_ns, deserialize_message(data, self.type)) for sent_ns, data in self._kept]
+        return [(sent_ns, read_message(data, self._taker.type)) for sent_ns, data in self._kept]
 
 
 class Arm(Guest):
@@ -72,6 +71,7 @@ class Arm(Guest):
     Args:
         namespace: Where its topics are, such as ``/PSM1`` or ``slave``.
         domain: ROS domain; None for that of the environment.
+        world: Where we are.
 
     Attributes:
         interrupt: What ends a wait with KeyboardInterrupt.
@@ -80,17 +80,16 @@ class Arm(Guest):
         MessageTypeError: A package of messages is not installed, such as crtk_msgs.
     """
 
-    def __init__(self, namespace: str, domain: int | None = None) -> None:
+    def __init__(self, namespace: str, domain: int | None = None, world: World = ROS) -> None:
         for row in ROWS:  # before anything moves
             message_type(row.ros_type)
-        super().__init__("teleop_conformance", domain)
-        ros: Any = self.ros
-        self.node = ros.own  # of rclpy: stock clients know no other
+        super().__init__("teleop_conformance", domain, world)
+        self._own = f"/{self.ros.get_name()}"
         self.namespace = "/" + namespace.strip("/")
         self.interrupt = Interrupt()
         self._taps: dict[str, Tap] = {}
         self._keeping: dict[str, Tap] = {}
-        self._publishers: dict[str, Any] = {}
+        self._publishers: dict[str, Publisher] = {}
 
     def path(self, name: str) -> str:
         """Full name of one of its topics."""
@@ -112,30 +111,26 @@ class Arm(Guest):
         """How many publishers and readers its topics have, beside us."""
         return sum(len(self.publishers(r.name)) + len(self.readers(r.name)) for r in ROWS)
 
-    def publishers(self, name: str) -> list[Any]:
+    def publishers(self, name: str) -> list[Endpoint]:
         """Who sends a topic, beside us."""
-        found = self.node.get_publishers_info_by_topic(self.path(name))
-        return [end for end in found if end.node_name != self.node.get_name()]
+        return [end for end in self.ros.publishers(self.path(name)) if end.node != self._own]
 
-    def readers(self, name: str) -> list[Any]:
+    def readers(self, name: str) -> list[Endpoint]:
         """Who reads a topic, beside us."""
-        found = self.node.get_subscriptions_info_by_topic(self.path(name))
-        return [end for end in found if end.node_name != self.node.get_name()]
+        return [end for end in self.ros.readers(self.path(name)) if end.node != self._own]
 
     def others(self, name: str) -> int:
         """How many others command the arm on a topic: those who do not sit in its own nodes."""
-        own = {
-            end.node_name for query in ("setpoint_js", "measured_js", "measured_cp") for end in self.publishers(query)
-        }
-        own |= {end.node_name for end in self.readers("servo_cp")}
-        return sum(end.node_name not in own for end in self.publishers(name))
+        own = {end.node for query in ("setpoint_js", "measured_js", "measured_cp") for end in self.publishers(query)}
+        own |= {end.node for end in self.readers("servo_cp")}
+        return sum(end.node not in own for end in self.publishers(name))
 
     # -- listening and speaking ------------------------------------------------------------------
 
     def tap(self, name: str) -> Tap:
         """What comes on one of its topics, from the first call on."""
         if name not in self._taps:
-            self._taps[name] = Tap(self.node, self.path(name), _ROWS[name].ros_type)
+            self._taps[name] = Tap(self.ros, self.path(name), _ROWS[name].ros_type)
         return self._taps[name]
 
     def untap(self, name: str) -> None:
@@ -149,7 +144,7 @@ class Arm(Guest):
         Returns once there is one of each, or after a time [s]: until a publisher has found a new
         reader, nothing that it sends is kept, and a motion that begins earlier is not seen whole.
         """
-        made = [Tap(self.node, self.path(name), _ROWS[name].ros_type) for name in names]
+        made = [Tap(self.ros, self.path(name), _ROWS[name].ros_type) for name in names]
         self._keeping.update(zip(names, made, strict=True))
         self.wait(lambda: all(tap.drain() for tap in made), timeout)
 
@@ -173,18 +168,15 @@ class Arm(Guest):
         """Send a command, stamped with the time now."""
         if hasattr(message, "header"):
             stamp = message.header.stamp
-            stamp.sec, stamp.nanosec = divmod(time.time_ns(), SECOND_NS)
+            stamp.sec, stamp.nanosec = divmod(self.world.time_ns(), SECOND_NS)
         self.publisher_of(name).publish(message)
 
-    def publisher_of(self, name: str) -> Any:
+    def publisher_of(self, name: str) -> Publisher:
         """Publisher of a command, once the arm reads it."""
         row = _ROWS[name]
         if row.name not in self._publishers:
-            quality = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
-            if row.name == "state_command":  # as the stock client does
-                quality.durability = DurabilityPolicy.TRANSIENT_LOCAL
-            kind = message_type(row.ros_type)
-            own = self.node.create_publisher(kind, self.path(row.name), quality)
+            quality = Qos(is_latched=row.name == "state_command")  # as the stock client has it
+            own = self.ros.create_publisher(message_type(row.ros_type), self.path(row.name), quality)
             self._publishers[row.name] = own
             self.wait(lambda: own.get_subscription_count() > 0, 3.0)
         return self._publishers[row.name]
@@ -195,14 +187,14 @@ class Arm(Guest):
 
     def wait(self, condition: Callable[[], bool], timeout: float) -> bool:
         """Whether something becomes true within a time [s]."""
-        end = time.monotonic() + timeout
+        end_ns = self.world.monotonic_ns() + round(timeout * SECOND_NS)
         while not condition():
             self.interrupt.check()
             for tap in self._keeping.values():
                 tap.drain()
-            if time.monotonic() > end:
+            if self.world.monotonic_ns() > end_ns:
                 return False
-            time.sleep(_TURN)
+            self.world.sleep(_TURN)
         return True
 
     def pause(self, seconds: float) -> None:

@@ -1,12 +1,12 @@
 """Queries: whether a topic is there, of the right type, sound, stamped, and for every reader."""
 
-import time
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from rclpy.qos import ReliabilityPolicy
 
+from teleop_core.bags.messages import SECOND_NS
+from teleop_core.middleware.world import Endpoint
 from teleop_drill.conformance.rows import STATES, Finding, Group, Row, Verdict
 from teleop_drill.nodes.conformance_arm import Arm, numbers_of, stamp_of
 
@@ -24,7 +24,7 @@ def look(arm: Arm, row: Row) -> Finding:
     if not ends:
         verdict = Verdict.FAILED if row.is_required else Verdict.ABSENT
         return Finding(row, verdict, "" if verdict is Verdict.ABSENT else f"no {side}")
-    wrong = {end.topic_type for end in ends} - {row.ros_type}
+    wrong = {end.ros_type for end in ends} - {row.ros_type}
     if wrong:
         return Finding(row, Verdict.FAILED, ", ".join(sorted(wrong)), f"must be {row.ros_type}")
     if is_command:
@@ -32,32 +32,32 @@ def look(arm: Arm, row: Row) -> Finding:
     return _listen(arm, row, ends)
 
 
-def _listen(arm: Arm, row: Row, ends: list[Any]) -> Finding:
+def _listen(arm: Arm, row: Row, ends: list[Endpoint]) -> Finding:
     """What comes on a topic with publishers of the right type."""
     messages: list[Any] = []
     tap = arm.tap(row.name)
     arm.wait(lambda: tap.read(messages.append) > 0, _FIRST)
-    begin, before = time.monotonic(), tap.count
-    while time.monotonic() - begin < _LOOK:
+    begin_ns, before = arm.world.monotonic_ns(), tap.count
+    while (looked := (arm.world.monotonic_ns() - begin_ns) / SECOND_NS) < _LOOK:
         tap.read(messages.append)
         arm.pause(0.01)
-    rate = (tap.count - before) / (time.monotonic() - begin)
+    rate = (tap.count - before) / looked
     arm.untap(row.name)
     if not messages:
         return Finding(row, Verdict.FAILED, "no message", f"nothing came within {_FIRST:g} s")
     found = f"{rate:.0f} Hz" if rate > 0 else "1 message"
-    faults = [*_stamps(row, messages), *_content(row, messages)]
+    faults = [*_stamps(row, messages, arm.world.time_ns()), *_content(row, messages)]
     if faults:
         return Finding(row, Verdict.FAILED, found, faults[0])
     if len(ends) > 1:
         return Finding(row, Verdict.NOTED, found, f"{len(ends)} publishers: who speaks for the arm?")
-    if all(end.qos_profile.reliability is ReliabilityPolicy.BEST_EFFORT for end in ends):
+    if not any(end.is_reliable for end in ends):
         note = "offered best effort: stock clients, which are reliable, get nothing"
         return Finding(row, Verdict.FAILED, found, note)
     return Finding(row, Verdict.OK, found)
 
 
-def _stamps(row: Row, messages: list[Any]) -> list[str]:
+def _stamps(row: Row, messages: list[Any], now_ns: int) -> list[str]:
     """What is wrong with the stamps."""
     if not hasattr(messages[0], "header"):
         return []
@@ -66,7 +66,7 @@ def _stamps(row: Row, messages: list[Any]) -> list[str]:
         return ["its stamp is 0, which means invalid"]
     if any(late < early for early, late in pairwise(stamps)):
         return ["its stamps go back"]
-    age = 1e-9 * (time.time_ns() - stamps[-1])
+    age = 1e-9 * (now_ns - stamps[-1])
     if row.name.startswith("measured") and not -_OLD < age < _OLD + _LOOK:
         return [f"its stamp is {age:.3g} s old: another clock, or none"]
     if row.name.startswith("measured") and len(stamps) > 2 and stamps[0] == stamps[-1]:

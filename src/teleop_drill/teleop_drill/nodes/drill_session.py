@@ -12,16 +12,15 @@ from contextlib import suppress
 from pathlib import Path
 from typing import IO, Any
 
-import yaml
-
 from teleop_core.base.errors import SessionError
 from teleop_core.base.own_parts import VARIABLE
+from teleop_core.base.plain_yaml import written
 from teleop_core.graph.graph import RECORDER_NAME
 from teleop_core.middleware.ros import ROS
 from teleop_core.middleware.world import World
 from teleop_core.nodes.children import Child, end_all, environment, free_domain
 from teleop_core.nodes.interrupt import Interrupt
-from teleop_core.nodes.live import parameter_file
+from teleop_core.nodes.live import session_parameters
 from teleop_core.nodes.observer import Observer
 from teleop_core.nodes.start import SESSION as SESSION_NODE
 from teleop_core.nodes.starter import START_TIMEOUT, Starter
@@ -114,13 +113,10 @@ class DrillSession:
         self._children[process] = Child(process, file, self._env, self._starter, command)
 
     def _parameters(self) -> str:
-        text = parameter_file(self._configuration, str(self.recordings[-1]))
-        if self._has_device:
-            return text
-        content = yaml.safe_load(text)
-        for name in (_HAND, _MASTER):
+        content = session_parameters(self._configuration, str(self.recordings[-1]))
+        for name in () if self._has_device else (_HAND, _MASTER):
             content[f"/{name}"]["ros__parameters"]["autostart"] = False
-        return str(yaml.safe_dump(content, allow_unicode=True))
+        return written(content)
 
     def _await(self, nodes: list[str]) -> None:
         for name in nodes:

@@ -6,7 +6,7 @@ loses its oldest; a socket that nobody reads loses what comes, and reliable writ
 far as they still have it; each writer numbers its messages.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from random import Random
 
@@ -86,13 +86,6 @@ class Bus:
         self._orders += 1
         return self._orders
 
-    def offset_of(self, process: Process) -> int:
-        """What the clock of the middleware of a process is ahead of time [ns].
-
-        A clock that the drill steps is that of Python alone.
-        """
-        return process.machine.epoch_ns(process.machine.clock)
-
     def watch(self, process: Process) -> None:
         """Take part in the life of a process."""
         self._born_ns[process] = self.scheduler.now_ns
@@ -127,11 +120,11 @@ class Bus:
         for writer in self.writers.get(reader.topic, ()):
             writer.links = [link for link in writer.links if link.reader is not reader]
 
-    def publishers(self, process: Process, topic: str) -> list[Endpoint]:
-        """Writers of a topic that a process has found."""
+    def found(self, process: Process, ends: Iterable[Writer | Reader]) -> list[Endpoint]:
+        """Ends of a topic that a process has found."""
         return [
-            Endpoint(one.node, one.sender, one.qos.is_latched)
-            for one in self.writers.get(topic, ())
+            Endpoint(one.node, one.sender, one.ros_type, one.qos.is_reliable, one.qos.is_latched)
+            for one in ends
             if self.knows(process, one)
         ]
 
@@ -168,8 +161,10 @@ class Bus:
         return sorted(names)
 
     def _match(self, writer: Writer, reader: Reader) -> None:
-        """Let a writer and a reader find each other, if their qualities go together."""
+        """Let a writer and a reader find each other, if their types and qualities go together."""
         wanted, offered = reader.qos, writer.qos
+        if writer.ros_type != reader.ros_type:
+            return
         if wanted.is_reliable and not offered.is_reliable:
             return
         if wanted.is_latched and not offered.is_latched:

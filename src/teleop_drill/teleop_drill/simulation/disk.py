@@ -88,6 +88,10 @@ class Disk:
         self._insist()
         SYSTEM.cut(file, size)
 
+    def sync(self, file: BinaryIO) -> None:
+        """Find all on the disk already, if there is one; raises OSError."""
+        self._insist()
+
     def _insist(self) -> None:
         if number := self._process.disk_error:
             raise OSError(number, os.strerror(number))

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from teleop_core.middleware.ros_messages import write_message
 from teleop_core.middleware.world import Qos, Taken
 from teleop_drill.simulation.machine import Process
 from teleop_drill.simulation.scheduler import Strand
@@ -15,6 +16,11 @@ if TYPE_CHECKING:
 
 _PUBLISH_NS, _TAKE_NS = 12_000, 900
 """What the middleware needs to hand a message over, measured with rclpy."""
+
+
+def _name_of(kind: Any) -> str:
+    """Type of the messages of a class, such as ``sensor_msgs/msg/JointState``."""
+    return f"{kind.__module__.partition('.')[0]}/msg/{kind.__name__}"
 
 
 @dataclass
@@ -38,33 +44,31 @@ class Writer:
         process: Whose it is.
         node: Name of its node, with the namespace.
         topic: Full name.
+        kind: Class of its messages.
         qos: Its quality.
-        encode: Bytes of a message.
     """
 
-    def __init__(
-        self, bus: "Bus", process: Process, node: str, topic: str, qos: Qos, encode: Callable[[Any], bytes]
-    ) -> None:
+    def __init__(self, bus: "Bus", process: Process, node: str, topic: str, kind: Any, qos: Qos) -> None:
         self._bus, self.process, self.node, self.topic, self.qos = bus, process, node, topic, qos
-        self._encode = encode
-        self.sender, self.born_ns = bus.next_gid(), bus.scheduler.now_ns
+        self.ros_type = _name_of(kind)
+        self.sender, self.born_ns, self._clock = bus.next_gid(), bus.scheduler.now_ns, process.machine.clock
         self.number, self.is_open, self.is_active = 0, True, True
         self.links: list[Link] = []
         self.history: deque[Taken] = deque(maxlen=None if qos.keeps_all else qos.depth)
 
     def publish(self, message: Any) -> None:
         """Send a message, or the bytes of one."""
-        self.send(message if isinstance(message, bytes) else self._encode(message))
+        self.send(message if isinstance(message, bytes) else write_message(message))
 
     def send(self, data: bytes) -> None:
         """Send bytes, if the node is active."""
         if not (self.is_active and self.is_open):
             return
         bus = self._bus
-        bus.scheduler.charge(_PUBLISH_NS)
+        bus.scheduler.now_ns = now_ns = bus.scheduler.now_ns + _PUBLISH_NS
         self.number += 1
-        now_ns = bus.scheduler.now_ns
-        taken = Taken(data, self.sender, self.number, now_ns + bus.offset_of(self.process), 0)
+        # The middleware reads the machine's clock: one that the drill steps is Python's alone.
+        taken = Taken(data, self.sender, self.number, now_ns + self._clock.ahead_ns(now_ns), 0)
         self.history.append(taken)
         if self.topic in bus.seen:
             bus.seen[self.topic](taken)
@@ -96,7 +100,7 @@ class Reader:
 
     def __init__(self, bus: "Bus", process: Process, kind: Any, topic: str, qos: Qos, node: str) -> None:
         self._bus, self.process, self.type, self.topic, self.qos = bus, process, kind, topic, qos
-        self.node = node
+        self.node, self.ros_type, self.sender = node, _name_of(kind), bus.next_gid()
         self.lost, self.born_ns, self.is_open = 0, bus.scheduler.now_ns, True
         self.coming: deque[tuple[int, int, Taken]] = deque()
         self._ready: deque[tuple[int, int, Taken]] = deque(maxlen=None if qos.keeps_all else qos.depth)
@@ -107,16 +111,17 @@ class Reader:
     def take(self) -> Taken | None:
         """Oldest waiting message; None if there is none."""
         scheduler = self._bus.scheduler
-        scheduler.charge(_TAKE_NS)
+        scheduler.now_ns = now_ns = scheduler.now_ns + _TAKE_NS
         coming, ready = self.coming, self._ready
-        while coming and coming[0][0] <= scheduler.now_ns:
+        while coming and coming[0][0] <= now_ns:
             ready.append(coming.popleft())
         if not ready or not self.is_open:
             return None
         came_ns, _, taken = ready.popleft()
         if self.topic in self._bus.heard:
             self._bus.heard[self.topic](self, taken)
-        return taken._replace(came_ns=came_ns + self._bus.offset_of(self.process))
+        data, sender, number, sent_ns, _ = taken
+        return Taken(data, sender, number, sent_ns, came_ns + self.process.machine.clock.ahead_ns(now_ns))
 
     def wait(self, seconds: float) -> None:
         """Return when there is a message, or after some time [s]."""

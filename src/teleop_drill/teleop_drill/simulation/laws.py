@@ -1,5 +1,6 @@
 """Laws: what must hold whatever goes wrong, judged by who sees all at once."""
 
+import math
 import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -94,6 +95,7 @@ class Laws:
         self.begin_ns = self._scheduler.now_ns
         self._last: tuple[Array, Array, Process | None] | None = None
         """Newest setpoint: joints, the tip's place, and whose it is."""
+        self._longest_step = numbers.speed_limit * (1.0 + _SLACK) * DT
         self._braking = float(np.max(numbers.speed_limit / numbers.braking))
         self._slave: Any = None
         self._process: Process | None = None
@@ -124,17 +126,18 @@ class Laws:
     def _judge_setpoint(self, taken: Taken) -> None:
         self._sent_ns.setdefault(taken.sender, []).append(self._stage.world.time_ns())
         found = self._form.decode_one(taken.data)
-        slave = self._stage.session.node("slave")
+        slave, process = self._stage.session.node("slave"), self._stage.session.process_of("slave")
         if found is None or slave is None:
             self._last = None
             return
-        q = np.array(found[1][: self._stage.robot.n])
-        tip, process = self._stage.robot.fk(q)[:3, 3], self._stage.session.process_of("slave")
+        q = found[1][: self._stage.robot.n]
+        tip = self._stage.robot.fk(q)[:3, 3]
         self._judge_owner(slave, process, found[0])
         if self._last is not None and self._last[2] is process:
-            self._judge_speed(q - self._last[0], float(np.linalg.norm(tip - self._last[1])))
+            step = np.abs(q - self._last[0])
+            self._judge_speed(step, math.dist(tip, self._last[1]))
             if slave.row["command_status"] == CommandStatus.FRESH:  # else it may brake still
-                self._judge_age(found[0], bool((q != self._last[0]).any()))
+                self._judge_age(found[0], bool(step.any()))
         self._last, self._stage.setpoint = (q, tip, process), q
 
     def _judge_owner(self, slave: Any, process: Process | None, stamp_ns: int) -> None:
@@ -151,20 +154,20 @@ class Laws:
         if way > most * DT * (1.0 + _CURVED):
             self._break("tool speed", f"the tip was sent at {way / DT:.3g} m/s, at most {most:.3g}")
         self._count("speed")
-        speed = np.abs(step) / DT
-        if (speed > self._numbers.speed_limit * (1.0 + _SLACK)).any():
+        if (step > self._longest_step).any():
+            speed = step / DT
             joint = int(np.argmax(speed / self._numbers.speed_limit))
             self._break(
                 "speed",
                 f"joint {joint + 1} was sent at {speed[joint]:.3g}, beyond its drive's "
                 f"{self._numbers.speed_limit[joint]:.3g}",
             )
-        if speed.max() > _SLACK:
+        if step.max() > _SLACK * DT:
             self._moved_at = self._worked
 
     def _judge_age(self, stamp_ns: int, moves: bool) -> None:
         """No command is followed long after it was given, such as one that waited in a queue."""
-        offset_ns = self._stage.machine.epoch_ns(self._stage.machine.clock)
+        offset_ns = self._stage.machine.clock.ahead_ns(self._scheduler.now_ns)
         if abs(offset_ns - self._offset_ns) > _LOOK_NS:
             self._offset_ns, self._stepped_ns = offset_ns, self._scheduler.now_ns
         if stamp_ns == NO_COMMAND_NS or not moves:

@@ -24,6 +24,11 @@ class Clock:
     offset_ns: int = 0
     drift: float = 0.0
 
+    def ahead_ns(self, now_ns: int) -> int:
+        """What it is ahead of a monotonic time [ns]."""
+        ahead_ns = EPOCH_NS + self.offset_ns
+        return ahead_ns + round(self.drift * (now_ns - BEGIN_NS)) if self.drift else ahead_ns
+
 
 @dataclass
 class Said:
@@ -206,11 +211,6 @@ class Machine:
         process = Process(self, name, lambda: 0)
         self.processes.append(process)
         return process
-
-    def epoch_ns(self, clock: Clock) -> int:
-        """What a system's clock is ahead of the monotonic one [ns]."""
-        now_ns = self.scheduler.now_ns
-        return EPOCH_NS + clock.offset_ns + round(clock.drift * (now_ns - BEGIN_NS))
 
     def fail(self, process: Process, error: BaseException) -> None:
         """Note what has ended a process that nobody expected."""

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
-from teleop_core.middleware.ros_messages import read_message, write_message
+from teleop_core.middleware.ros_messages import read_message
 from teleop_core.middleware.world import Endpoint, Qos
 from teleop_drill.simulation.bus import Bus
 from teleop_drill.simulation.ends import Reader, Service, Writer
@@ -225,8 +225,7 @@ class SimulatedNode:
     def create_publisher(self, kind: Any, name: str, qos: Qos) -> Writer:
         """Publisher of messages of a class."""
         topic = self.resolve_topic_name(name)
-        made = Writer(self.bus, self.process, self.full_name, topic, qos, write_message)
-        return self.bus.open_writer(made)
+        return self.bus.open_writer(Writer(self.bus, self.process, self.full_name, topic, kind, qos))
 
     def create_taker(self, kind: Any, name: str, qos: Qos) -> Reader:
         """Subscription whose messages are taken by hand."""
@@ -304,7 +303,11 @@ class SimulatedNode:
 
     def publishers(self, name: str) -> list[Endpoint]:
         """The same, one by one."""
-        return self.bus.publishers(self.process, self.resolve_topic_name(name))
+        return self.bus.found(self.process, self.bus.writers.get(self.resolve_topic_name(name), ()))
+
+    def readers(self, name: str) -> list[Endpoint]:
+        """Readers of a topic that were found."""
+        return self.bus.found(self.process, self.bus.readers.get(self.resolve_topic_name(name), ()))
 
     def get_topic_names_and_types(self) -> list[tuple[str, list[str]]]:
         """Topics that there are, without their types."""

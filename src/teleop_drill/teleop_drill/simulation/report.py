@@ -83,6 +83,7 @@ def told(found: Found, shortest: Found, law: str) -> list[str]:
     (one,) = (broken for broken in shortest.broken if broken.law == law)
     kept = ",".join(str(found.faults.index(fault)) for fault in shortest.faults)
     way = " --composed" if found.processes is Processes.ONE else ""
+    way += f" --breaks {found.breaks:g}" if found.breaks else ""
     return [
         f"seed {found.seed} breaks `{law}`, {one.at:.3f} s after the arm followed: {one.text}",
         *(f"    {fault.text()}" for fault in shortest.faults),

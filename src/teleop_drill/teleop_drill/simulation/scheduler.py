@@ -19,6 +19,8 @@ EPOCH_NS = 1_800_000_000_000_000_000
 """What the system's clocks are ahead of them [ns]."""
 _LOOK_NS = 60
 """What reading a clock costs: a loop that only looks at it goes on all the same [ns]."""
+_BREAK_NS = 1_000_000
+"""Longest time for which a thread that was amid a turn waits for others of its process [ns]."""
 
 
 class Deadlock(Exception):  # noqa: N818
@@ -154,6 +156,7 @@ class Scheduler:
 
     Args:
         seed: What everything is drawn from.
+        breaks: Share of the looks at a clock at which the interpreter passes to another thread.
 
     Attributes:
         now_ns: Time, as monotonic clocks have it [ns].
@@ -162,8 +165,9 @@ class Scheduler:
         costs: How long things take.
     """
 
-    def __init__(self, seed: int) -> None:
-        self.seed, self.now_ns = seed, BEGIN_NS
+    def __init__(self, seed: int, breaks: float = 0.0) -> None:
+        self.seed, self.now_ns, self.breaks = seed, BEGIN_NS, breaks
+        self._breaking = self.random("breaks")
         self.costs = Costs(self.random("costs"))
         self._queue: list[tuple[int, int, Any, int, bool]] = []
         self._orders, self.hub = count(), getcurrent()
@@ -185,6 +189,12 @@ class Scheduler:
         """Time [ns], for whoever reads a clock."""
         self.now_ns += _LOOK_NS
         return self.now_ns
+
+    def look_and_pass(self) -> int:
+        """As :meth:`look_ns`; now and then other threads of the process work before it returns."""
+        if self._breaking.random() < self.breaks and getcurrent() is self.current.greenlet:
+            self._switch(self.now_ns + round(_BREAK_NS * self._breaking.random()))
+        return self.look_ns()
 
     def sleep(self, seconds: float) -> None:
         """Wait [s]."""

@@ -51,6 +51,7 @@ class Found:
         seed: Of everything.
         faults: What was done.
         processes: How the nodes were shared out.
+        breaks: Share of the looks at a clock at which another thread of the process went on.
         broken: Laws that did not hold.
         met: How often each fault met each state of the arm.
         looks: How often each law was looked at.
@@ -61,6 +62,7 @@ class Found:
     seed: int
     faults: tuple[Fault, ...]
     processes: Processes = Processes.SIDES
+    breaks: float = 0.0
     broken: tuple[Broken, ...] = ()
     met: Counter[tuple[str, str]] = field(default_factory=Counter)
     looks: Counter[str] = field(default_factory=Counter)
@@ -69,7 +71,11 @@ class Found:
 
 
 def run_seed(
-    seed: int, faults: Sequence[Fault] | None = None, folder: Path | None = None, processes: Processes = Processes.SIDES
+    seed: int,
+    faults: Sequence[Fault] | None = None,
+    folder: Path | None = None,
+    processes: Processes = Processes.SIDES,
+    breaks: float = 0.0,
 ) -> Found:
     """Run one schedule.
 
@@ -78,19 +84,20 @@ def run_seed(
         faults: The schedule.
         folder: Where its recording goes; None: nowhere.
         processes: How the nodes are shared out: by side, or all but the recorder in one.
+        breaks: Share of the looks at a clock at which another thread of the process goes on.
     """
     planned = draw(seed, PROCESSES[processes]) if faults is None else tuple(faults)
     with tempfile.TemporaryDirectory(prefix="drill_") as place:
-        machine = Machine(Scheduler(seed))
+        machine = Machine(Scheduler(seed, breaks))
         bus = Bus(machine.scheduler)
         try:
             found: Found = machine.run(
-                lambda owner: _Run(bus, owner, Found(seed, planned, processes), folder or Path(place)).run()
+                lambda owner: _Run(bus, owner, Found(seed, planned, processes, breaks), folder or Path(place)).run()
             )
         except Exception as error:  # of one schedule, which must not end all others
             at = 1e-9 * (machine.scheduler.now_ns - BEGIN_NS)
             text = "".join(traceback.format_exception(error)[-2:])
-            found = Found(seed, planned, processes, (Broken("runs", at, text),), seconds=at)
+            found = Found(seed, planned, processes, breaks, (Broken("runs", at, text),), seconds=at)
     return found
 
 
@@ -175,7 +182,7 @@ def shrink(found: Found, law: str) -> Found:
         must_look = False
         for left_out in range(len(best.faults)):
             fewer = best.faults[:left_out] + best.faults[left_out + 1 :]
-            again = run_seed(found.seed, fewer, processes=found.processes)
+            again = run_seed(found.seed, fewer, None, found.processes, found.breaks)
             if any(one.law == law for one in again.broken):
                 best, must_look = again, True
                 break
@@ -183,7 +190,7 @@ def shrink(found: Found, law: str) -> Found:
 
 
 def run_seeds(
-    first: int, count: int, workers: int | None = None, processes: Processes = Processes.SIDES
+    first: int, count: int, workers: int | None = None, processes: Processes = Processes.SIDES, breaks: float = 0.0
 ) -> Iterator[Found]:
     """Run schedules on all cores: of three seeds each the one whose faults have met least.
 
@@ -195,6 +202,7 @@ def run_seeds(
         count: How many are run.
         workers: How many at once; None: one for each core.
         processes: How the nodes are shared out.
+        breaks: As of :func:`run_seed`.
     """
     workers = workers or os.cpu_count() or 1
     met: Counter[tuple[str, str]] = Counter()
@@ -203,7 +211,7 @@ def run_seeds(
         for begin in range(0, count, _ROUND):
             threes = (range(first + 3 * k, first + 3 * k + 3) for k in range(begin, min(begin + _ROUND, count)))
             seeds = [min(three, key=lambda s: _known(s, met, processes)) for three in threes]
-            for found in pool.map(partial(run_seed, processes=processes), seeds):
+            for found in pool.map(partial(run_seed, processes=processes, breaks=breaks), seeds):
                 met.update(found.met)
                 yield found
 

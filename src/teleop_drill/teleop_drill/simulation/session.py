@@ -5,13 +5,11 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from teleop_core.base.errors import SessionError
 from teleop_core.graph.graph import RECORDER_NAME
 from teleop_core.graph.stage import STAGES
 from teleop_core.nodes.base import CoreNode
-from teleop_core.nodes.live import parameter_file
+from teleop_core.nodes.live import session_parameters
 from teleop_core.nodes.making import make_node
 from teleop_core.nodes.observer import Observer
 from teleop_core.nodes.process import serve
@@ -25,7 +23,6 @@ from teleop_drill.simulation.machine import Process
 from teleop_drill.simulation.stand_ins import SimulatedWatch, Work, stand_by
 from teleop_drill.simulation.world import SimulatedWorld
 
-_LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 _START = 0.4  # of a process, until its node is made [s]
 _STARTED = 60.0  # patience with the start [s]
 _ENDED = 10.0  # patience with the end [s]
@@ -67,6 +64,7 @@ class SimulatedSession:
         self._foreign = dict(foreign or {})
         if ARM in self._foreign:
             self._processes[ARM] = (ARM,)
+        self._places = {node: name for name, nodes in self._processes.items() for node in nodes}
         self.running: dict[str, Process] = {}
         """Newest process of each name."""
         self.crews: dict[Process, Crew] = {}
@@ -175,15 +173,13 @@ class SimulatedSession:
 
     def process_of(self, node: str) -> Process | None:
         """Process that holds a node; None if none does."""
-        names = (n for n, nodes in self._processes.items() if node in nodes)
-        return self.running.get(next(names, ""))
+        return self.running.get(self._places.get(node, ""))
 
     def node(self, name: str) -> CoreNode | None:
         """A node at work, to be looked into; None if there is none."""
         process = self.process_of(name)
         crew = None if process is None or process.is_dead else self.crews.get(process)
-        found = crew.nodes if crew is not None else ()
-        return next((one for one in found if one.member_name == name), None)
+        return None if crew is None else next((one for one in crew.nodes if one.member_name == name), None)
 
     def is_running(self, node: str) -> bool:
         """Whether the process of a node runs."""
@@ -244,7 +240,7 @@ def parameters_of(configuration: Configuration, out: str, namespace: str = "") -
         out: Directory of the recording.
         namespace: Where all nodes are, without slashes before and after it.
     """
-    content: dict[str, Any] = yaml.load(parameter_file(configuration, out, namespace), Loader=_LOADER)
+    content = session_parameters(configuration, out, namespace)
     content.pop(SESSION, None)
     return {
         name.strip("/"): flattened(node["ros__parameters"])

@@ -31,13 +31,15 @@ class SimulatedWorld:
     def __init__(self, bus: Bus, process: Process, given: Mapping[str, Mapping[str, Any]] | None = None) -> None:
         self._bus, self.process, self._given = bus, process, given or {}
         self._scheduler = process.machine.scheduler
-        self.monotonic_ns: Callable[[], int] = self._scheduler.look_ns
+        scheduler = self._scheduler
+        self.monotonic_ns: Callable[[], int] = scheduler.look_and_pass if scheduler.breaks else scheduler.look_ns
         self.background: Background = Disk(process)
         self.sleep: Callable[[float], None] = self._scheduler.sleep
 
     def time_ns(self) -> int:
         """Time of the system's clock [ns]."""
-        return self._scheduler.look_ns() + self.process.machine.epoch_ns(self.process.clock)
+        now_ns = self.monotonic_ns()
+        return now_ns + self.process.clock.ahead_ns(now_ns)
 
     def lock(self) -> Lock:
         """Lock between threads."""

@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
+from teleop_core.base.plain_yaml import written
 from teleop_lab.calibration.accuracy import misread
 from teleop_lab.calibration.identify import LEVEL
 from teleop_lab.calibration.model import FRAME
@@ -104,12 +105,10 @@ def _plain(spreads: object) -> dict[str, dict[str, float]]:
 
 def correction_file(calibration: "Calibration") -> str:
     """The arm as found, as a YAML table for ``--set robot=FILE``; errors stand in its head."""
-    import yaml
-
     found = calibration.found
     head = [f"# {calibration.robot.name} as calibrated from {len(calibration.measured)} poses."]
     for name, value, half in zip(found.names, found.values, found.half_widths, strict=True):
         if name not in FRAME:
             head.append(f"# {name}: {value:.6g} ± {half:.2g} {found.model.unit(name)}")
-    body = yaml.safe_dump(calibration.table(), sort_keys=False, width=200)
+    body = written(calibration.table(), width=200)
     return "\n".join([*head, "# Take it with --set robot=FILE.", body])

@@ -3,8 +3,8 @@
 from typing import TYPE_CHECKING
 
 import numpy as np
-import yaml
 
+from teleop_core.base.plain_yaml import written
 from teleop_core.robots import load_robot
 from teleop_core.slave.plants.hardware import faults_of
 
@@ -55,4 +55,4 @@ def parameter_file(found: "FitResult") -> str:
     slave = {"robot": found.robot, "plant.kind": "hardware", "controller.kind": "source_pid"}
     content = {"slave_sim": slave | given, "slave": {"robot": found.robot}}
     named = {name: {"ros__parameters": values} for name, values in content.items()}
-    return yaml.safe_dump(named, sort_keys=False)
+    return written(named)

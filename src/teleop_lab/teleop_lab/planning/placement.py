@@ -2,8 +2,7 @@
 
 from dataclasses import dataclass
 
-import yaml
-
+from teleop_core.base.plain_yaml import written
 from teleop_core.chain.mapping.parameters import MotionScalingParameters
 from teleop_core.robots.parameters import RobotParameters
 
@@ -83,7 +82,7 @@ class Placement:
         for name, value in self.settings(arm).items():
             stage, _, parameter = name.partition(".")
             stages.setdefault(stage, {"ros__parameters": {}})["ros__parameters"][parameter] = value
-        return yaml.safe_dump(stages, sort_keys=False, default_flow_style=None)
+        return written(stages, default_flow_style=None)
 
 
 def _text(value: Setting) -> str:

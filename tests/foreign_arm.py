@@ -1,0 +1,119 @@
+"""A small CRTK arm of somebody else, with three joints, and what is wrong with it."""
+
+import math
+from collections import deque
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+from geometry_msgs.msg import PoseStamped
+from sensor_msgs.msg import JointState
+
+from foreign_hand import stamp
+from teleop_core.middleware.world import Publisher, Qos, World
+
+crtk = pytest.importorskip("crtk_msgs.msg")
+
+SPEED = 0.017
+"""Of its joints [rad/s]: as fast as a hundredth of a radian is commanded in a sine of two seconds.
+Where commands come late it catches up no faster, or its motion would be over before its speeds
+could be told."""
+
+
+class ForeignArm:
+    """The arm, in whatever world.
+
+    Args:
+        world: Where it is.
+        faults: What is wrong with it.
+    """
+
+    def __init__(self, world: World, faults: tuple[str, ...] = ()) -> None:
+        self.world, self.faults, self.state = world, set(faults), "ENABLED"
+        self.q, self.busy_until_ns = [0.1, 0.2, 0.3], 0
+        self.goal, self.home = list(self.q), list(self.q)
+        self.past: deque[list[float]] = deque(maxlen=50)
+        self.last_ns = world.time_ns()
+        node = world.node("foreign", use_global_arguments=False, enable_rosout=False)
+        self.executor = world.executor()
+        self.executor.add_node(node)
+        self.states: Publisher | None = None
+        if "no state" not in faults:
+            self.states = node.create_publisher(crtk.OperatingState, "PSM/operating_state", Qos())
+        self.measured = node.create_publisher(JointState, "PSM/measured_js", Qos(is_reliable="qos" not in faults))
+        self.setpoint = node.create_publisher(JointState, "PSM/setpoint_js", Qos())
+        self.pose = node.create_publisher(JointState if "type" in faults else PoseStamped, "PSM/measured_cp", Qos())
+        node.create_subscription(crtk.StringStamped, "PSM/state_command", self.command, Qos())
+        node.create_subscription(JointState, "PSM/move_jp", self.move, Qos())
+        node.create_subscription(JointState, "PSM/servo_jp", self.servo, Qos())
+        node.create_timer(0.01, self.tick)
+
+    def serve(self, goes_on: Callable[[], bool] = lambda: True) -> int:
+        """Be there."""
+        while goes_on():
+            self.executor.spin_once(0.1)
+        return 0
+
+    def command(self, message: Any) -> None:
+        word = {"pause": "PAUSED", "resume": "ENABLED"}.get(message.string)
+        if "any word" in self.faults:
+            word = word or "DISABLED"
+        self.state = word or self.state
+
+    def move(self, message: Any) -> None:
+        if self.state == "ENABLED" or "moves paused" in self.faults:
+            self.goal = list(message.position)
+            self.busy_until_ns = self.world.monotonic_ns() + 150_000_000
+
+    def servo(self, message: Any) -> None:
+        if self.state == "ENABLED":
+            self.goal = list(message.position)
+
+    def lying(self, dt: float) -> tuple[list[float], list[float]]:
+        """Joints and speeds as this arm tells them, a time after it told the last ones [s]."""
+        self.past.append(list(self.q))
+        before = self.past[-2] if len(self.past) > 1 else self.q
+        told, speed = list(self.q), [(a - b) / dt for a, b in zip(self.q, before, strict=True)]
+        if "frozen" in self.faults:
+            told = list(self.home)
+        if "scaled" in self.faults:
+            told = [h + 0.5 * (q - h) for h, q in zip(self.home, told, strict=True)]
+        if "late" in self.faults:
+            told = self.past[0]
+        if "speeds" in self.faults:
+            speed = [2.0 * v for v in speed]
+        return told, speed
+
+    def tick(self) -> None:
+        now_ns, is_busy = self.world.time_ns(), False
+        # Ten milliseconds, more on a busy machine: speeds are those of the time that passed.
+        dt = max(1e-9 * (now_ns - self.last_ns), 1e-3)
+        self.last_ns = now_ns
+        for i in range(3):
+            step = min(max(self.goal[i] - self.q[i], -SPEED * dt), SPEED * dt)
+            self.q[i] += step
+            is_busy = is_busy or abs(step) > 0.0
+        is_busy = (is_busy or self.world.monotonic_ns() < self.busy_until_ns) and "never busy" not in self.faults
+        if self.states is not None:
+            state = crtk.OperatingState(state=self.state, is_homed=True, is_busy=is_busy)
+            stamp(state, now_ns)
+            self.states.publish(state)
+        told, speed = self.lying(dt)
+        setpoint = JointState(name=["a", "b", "c"], position=list(self.q))
+        stamp(setpoint, now_ns)
+        self.setpoint.publish(setpoint)
+        joints = JointState(name=["a", "b", "c"], position=told)
+        if self.faults & {"speeds", "honest"}:
+            joints.velocity = speed
+        if "stamp" not in self.faults:
+            stamp(joints, now_ns)
+        if "nan" in self.faults:
+            joints.position[1] = math.nan
+        if "length" in self.faults:
+            joints.velocity = [0.0]
+        self.measured.publish(joints)
+        if "type" not in self.faults:
+            pose = PoseStamped()
+            stamp(pose, now_ns)
+            pose.pose.orientation.w = 0.5 if "unit" in self.faults else 1.0
+            self.pose.publish(pose)

@@ -1,0 +1,85 @@
+"""Conformance: what is wrong with a CRTK arm of somebody else is found from outside."""
+
+from functools import cache
+
+import pytest
+
+from foreign_arm import ForeignArm
+from simulated.conftest import SimulatedPeer
+from teleop_drill.conformance import Finding, Verdict
+from teleop_drill.nodes.conformance import examine
+from teleop_drill.nodes.conformance_arm import Arm
+
+
+@cache
+def findings_of(fault: str, *, may_move: bool = True) -> dict[str, Finding]:
+    """What is found of an arm with a fault, by topic."""
+    peer = SimulatedPeer()
+    peer.foreign("foreign", lambda world: ForeignArm(world, (fault,)).serve())
+    with Arm("PSM", world=peer.world) as arm:
+        assert arm.is_there(20.0)
+        return {found.row.name: found for found in examine(arm, may_move=may_move)}
+
+
+def test_an_arm_without_fault_passes_and_is_only_moved_by_what_it_takes() -> None:
+    found = findings_of("honest")
+    verdicts = {name: one.verdict for name, one in found.items()}
+    sound = ("operating_state", "state_command", "measured_js", "measured_cp", "setpoint_js", "move_jp", "servo_jp")
+    assert {name: verdicts[name] for name in sound} == dict.fromkeys(sound, Verdict.OK), found
+    assert {verdict for name, verdict in verdicts.items() if name not in sound} == {Verdict.ABSENT}
+
+
+@pytest.mark.parametrize(
+    ("fault", "topic", "note"),
+    [
+        ("stamp", "measured_js", "stamp is 0"),
+        ("nan", "measured_js", "not finite"),
+        ("length", "measured_js", "different lengths"),
+        ("unit", "measured_cp", "length 0.5"),
+        ("type", "measured_cp", "must be geometry_msgs/msg/PoseStamped"),
+        ("qos", "measured_js", "best effort"),
+        ("no state", "operating_state", ""),
+    ],
+)
+def test_faults_are_found_by_looking(fault: str, topic: str, note: str) -> None:
+    found = findings_of(fault, may_move=False)[topic]
+    assert found.verdict is Verdict.FAILED
+    assert note in found.note
+
+
+@pytest.mark.parametrize(
+    ("fault", "topic", "note"),
+    [
+        ("moves paused", "state_command", "while PAUSED"),
+        ("any word", "state_command", "no command changed the state"),
+        ("never busy", "move_jp", "never rose"),
+    ],
+)
+def test_faults_are_found_by_trying(fault: str, topic: str, note: str) -> None:
+    found = findings_of(fault)[topic]
+    assert found.verdict is Verdict.FAILED
+    assert note in found.note
+
+
+@pytest.mark.parametrize(
+    ("fault", "topics", "note"),
+    [
+        ("frozen", ("measured_js", "servo_jp", "move_jp"), "measured_js by 0"),
+        ("scaled", ("measured_js", "servo_jp", "move_jp"), "measured_js by 0.00"),
+        ("late", ("measured_js", "servo_jp", "move_jp"), "setpoint"),
+        ("speeds", ("measured_js",), "add up to another way"),
+    ],
+)
+def test_an_arm_that_lies_about_where_it_is_is_found_by_moving_it(
+    fault: str, topics: tuple[str, ...], note: str
+) -> None:
+    found = findings_of(fault)
+    for topic in topics:
+        assert found[topic].verdict is Verdict.FAILED, (topic, found[topic])
+        assert note in found[topic].note, found[topic]
+
+
+def test_nothing_is_commanded_when_only_looking() -> None:
+    found = findings_of("", may_move=False)
+    assert found["move_jp"].verdict is Verdict.SKIPPED
+    assert found["state_command"].note == "read only"
