@@ -9,21 +9,10 @@ import numpy as np
 from hypothesis import strategies as st
 from hypothesis.strategies import SearchStrategy
 
-from teleop_core.base.errors import ParameterError
+from teleop_core.base import ParameterError
 from teleop_core.chain.fixtures import Fixture, Held, fixture_depth
-from teleop_core.kernels import kernel
-from teleop_core.kernels.geometry import Array
-from teleop_core.shapes import SHAPES
-from teleop_core.shapes.box import BoxParameters
-from teleop_core.shapes.capsule import CapsuleParameters
-from teleop_core.shapes.cone import ConeParameters
-from teleop_core.shapes.cylinder import CylinderParameters
-from teleop_core.shapes.half_space import HalfSpaceParameters
-from teleop_core.shapes.hole import HoleParameters
-from teleop_core.shapes.line import LineParameters
-from teleop_core.shapes.path import PathParameters
-from teleop_core.shapes.plane import PlaneParameters
-from teleop_core.shapes.sphere import SphereParameters
+from teleop_core.kernels import Array, kernel
+from teleop_core.shapes import SHAPES, box, capsule, cone, cylinder, half_space, hole, line, path, plane, sphere
 
 lengths = st.floats(1e-3, 0.1)
 places = st.tuples(*[st.floats(-0.1, 0.1)] * 3)
@@ -44,28 +33,28 @@ def valid(group: type[object], **values: SearchStrategy) -> SearchStrategy:
 
 
 KINDS = {
-    "box": valid(BoxParameters, size=st.tuples(lengths, lengths, lengths)),
-    "sphere": valid(SphereParameters, radius=lengths),
-    "cylinder": valid(CylinderParameters, radius=lengths, length=endings, direction=directions),
-    "capsule": valid(CapsuleParameters, radius=lengths, length=endings, direction=directions),
-    "half_space": valid(HalfSpaceParameters, normal=directions, room=st.floats(0.0, 0.1)),
-    "plane": valid(PlaneParameters, normal=directions),
+    "box": valid(box.BoxParameters, size=st.tuples(lengths, lengths, lengths)),
+    "sphere": valid(sphere.SphereParameters, radius=lengths),
+    "cylinder": valid(cylinder.CylinderParameters, radius=lengths, length=endings, direction=directions),
+    "capsule": valid(capsule.CapsuleParameters, radius=lengths, length=endings, direction=directions),
+    "half_space": valid(half_space.HalfSpaceParameters, normal=directions, room=st.floats(0.0, 0.1)),
+    "plane": valid(plane.PlaneParameters, normal=directions),
     "cone": st.builds(
-        lambda axis, far, half: ConeParameters(
+        lambda axis, far, half: cone.ConeParameters(
             axis=axis, half_angle=half, apex=tuple(-far * x / math.hypot(*axis) for x in axis)
         ),
         directions,
         lengths,
         st.floats(0.05, 1.5),
     ),
-    "line": valid(LineParameters, direction=directions, radius=st.floats(0.0, 0.02), length=endings),
+    "line": valid(line.LineParameters, direction=directions, radius=st.floats(0.0, 0.02), length=endings),
     "path": valid(
-        PathParameters,
+        path.PathParameters,
         radius=st.floats(0.0, 0.02),
         points=st.lists(places, min_size=1, max_size=5).map(lambda rows: sum(rows, ())),
     ),
     "hole": valid(
-        HoleParameters,
+        hole.HoleParameters,
         radius=lengths,
         thickness=lengths,
         plate_radius=lengths,
@@ -106,24 +95,24 @@ def beyond_tube(p: Any, points: Array, length: float) -> Any:
     return np.sqrt(x**2 + y**2 + over**2) - p.radius
 
 
-def beyond_cylinder(p: CylinderParameters, points: Array) -> Any:
+def beyond_cylinder(p: cylinder.CylinderParameters, points: Array) -> Any:
     x, y, z = np.moveaxis(turned(p.direction, points), -1, 0)
     return np.maximum(np.hypot(x, y) - p.radius, np.abs(z) - 0.5 * (p.length or math.inf))
 
 
-def beyond_cone(p: ConeParameters, points: Array) -> Any:
+def beyond_cone(p: cone.ConeParameters, points: Array) -> Any:
     x, y, z = np.moveaxis(turned(p.axis, points - np.array(p.apex)), -1, 0)
     far, angle = np.hypot(np.hypot(x, y), z), np.arctan2(np.hypot(x, y), z)
     return far * (angle - p.half_angle)
 
 
-def beyond_path(p: PathParameters, points: Array) -> Any:
+def beyond_path(p: path.PathParameters, points: Array) -> Any:
     along = pieces(p).reshape(-1, 3)
     apart = [np.linalg.norm(point - along, axis=1).min() for point in points.reshape(-1, 3)]
     return np.reshape(apart, points.shape[:-1]) - p.radius
 
 
-def beyond_hole(p: HoleParameters, points: Array) -> Any:
+def beyond_hole(p: hole.HoleParameters, points: Array) -> Any:
     x, y, up = np.moveaxis(turned(p.axis, points), -1, 0)
     out = np.hypot(x, y)
     faces = (up, -p.thickness - up, out - p.plate_radius, p.radius - out, up - out + p.radius + p.chamfer)
@@ -137,7 +126,7 @@ def turned(direction: Sequence[float] | Array, points: Array) -> Array:
     return np.stack((points @ axes[1], points @ axes[2], z), axis=-1)
 
 
-def pieces(p: PathParameters) -> Array:
+def pieces(p: path.PathParameters) -> Array:
     """Points close together along every piece of a path, (pieces, PER_PIECE, 3)."""
     corners = np.vstack((np.zeros(3), np.reshape(p.points, (-1, 3))))
     share = np.linspace(0.0, 1.0, PER_PIECE)[:, None]

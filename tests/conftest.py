@@ -21,8 +21,7 @@ from teleop_core.session.configuration import configure
 settings.register_profile("teleop", deadline=None, derandomize=True, database=None)
 settings.load_profile("teleop")
 if not IS_COMPILED:
-    # Pure-Python kernels are a hundred times slower, and NumPy would warn where compiled code
-    # goes on with infinity.
+    # Pure-Python kernels are a hundred times slower, and NumPy would warn where compiled code goes on with infinity.
     settings.register_profile("pure", settings.get_profile("teleop"), max_examples=10)
     settings.load_profile("pure")
     np.seterr(all="ignore")

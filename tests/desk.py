@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from teleop_console.app import Console
-from teleop_console.link import Arm, ArmView, ParameterInfo, View
+from teleop_console import app, link
 from teleop_console.server import ConsoleServer
 from teleop_core.graph.topics import MASTER_MEASURED_CP, OPERATION
 from teleop_core.kernels.geometry import Array
@@ -29,17 +28,17 @@ class Desk:
 
     def __init__(self, *, is_stoppable: bool = False) -> None:
         self.is_stoppable = is_stoppable
-        self.arms = (Arm("", load_robot_set("rcrt1", ())),)
+        self.arms = (link.Arm("", load_robot_set("rcrt1", ())),)
         self.asked: list[Any]
         self.known: dict[Any, Any]
         self.asked, self.stops, self.known = [], 0, {}
         self.obeys = threading.Event()
         self.obeys.set()
-        arm = ArmView({MASTER_MEASURED_CP.name: POSE}, {}, {}, dict.fromkeys(OPERATION, 0.0), "-")
+        arm = link.ArmView({MASTER_MEASURED_CP.name: POSE}, {}, {}, dict.fromkeys(OPERATION, 0.0), "-")
         arm.operation |= {"state": float(State.ENABLED), "is_homed": 1.0, "fault_joint": -1.0}
-        self._view = View(arms={"": arm}, is_fresh=True)
+        self._view = link.View(arms={"": arm}, is_fresh=True)
 
-    def view(self) -> View:
+    def view(self) -> link.View:
         self._view.time, arm = time.monotonic(), self._view.arms[""]
         arm.operation_text = operation_text(arm.operation)
         return self._view
@@ -68,7 +67,7 @@ class Desk:
     def press_button(self, arm: Any, name: Any) -> None:
         self.asked.append(name)
 
-    def parameters(self) -> dict[tuple[str, str], ParameterInfo]:
+    def parameters(self) -> dict[tuple[str, str], link.ParameterInfo]:
         return self.known
 
     def changes(self) -> dict[str, object]:
@@ -87,7 +86,7 @@ def shown(desk: Any) -> Iterator[tuple[ConsoleServer, Desk]]:
     """Server of the page of a desk, drawn as the command draws it, and the desk."""
     ends = threading.Event()
     with ConsoleServer(0) as server:
-        console = Console(server, desk)
+        console = app.Console(server, desk)
         drawing = threading.Thread(target=console.run, args=(ends.is_set,))
         drawing.start()
         try:

@@ -8,13 +8,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from led_tip import DT, PIECES, needle
-from teleop_core.kernels import kernel, pointer
-from teleop_core.kernels.fields import record, record_array
-from teleop_core.kernels.geometry import Array
+from teleop_core.kernels import Array, kernel, pointer, record, record_array
 from teleop_core.robots.drives import ACCELERATION
 from teleop_core.shapes.hole import HoleParameters
-from teleop_core.slave.joints import integrate
-from teleop_core.slave.simulation import SimulationNumbers, SimulationState
+from teleop_core.slave import joints, simulation
 from teleop_core.slave.world.contact import ContactState, add_push, touch
 
 JOINTS = 6  # the tip's place along the base, and turns about the base's axes
@@ -97,7 +94,7 @@ def _drag(
 @kernel
 def _fly(
     p: Any,
-    s: SimulationState,
+    s: simulation.SimulationState,
     contacts: NDArray[np.void],
     arm: Any,
     acceleration: Callable[..., object],
@@ -117,12 +114,12 @@ def _fly(
         found[tick, 18] = stored(p, contacts)
         for k in range(3):
             found[tick, 19 + k] = axis[k]
-        integrate(acceleration, dynamics, p, s, contacts, p.steps, effort, q, dq, 1e-3)
+        joints.integrate(acceleration, dynamics, p, s, contacts, p.steps, effort, q, dq, 1e-3)
         _turn(axis, q[3:] - before[3:])
 
 
 def _records(points: int, numbers: dict[str, float]) -> tuple[object, NDArray[np.void]]:
-    p, contacts = record(SimulationNumbers, JOINTS), record_array(ContactState, points, JOINTS)
+    p, contacts = record(simulation.SimulationNumbers, JOINTS), record_array(ContactState, points, JOINTS)
     known = {"world_stiffness": 1000.0, "steps": 2, "friction_speed": 1.0, "tool_length": 0.02}
     for key, value in (known | numbers).items():
         p[key] = value
@@ -192,7 +189,7 @@ def fly(
     q, dq, found = np.zeros(6), np.zeros(6), np.zeros((ticks, 22))
     q[:3], dq[: len(speed)] = begin, speed
     thing, body = needle(name, parameters, JOINTS), np.array([mass, inertia, *gravity])
-    state = record(SimulationState, JOINTS)
+    state = record(simulation.SimulationState, JOINTS)
     _fly(p, state, contacts, thing, FREE, body, q, dq, np.array(axis, float), found)
     keys: dict[str, Any] = {
         "place": slice(3),

@@ -1,9 +1,8 @@
 """Fuzzing: one law for whatever comes from outside, tried on very many cases.
 
-A case hands something broken to the package: a file, a text, the bytes of a message. The law: it
-either works or is refused with a :class:`TeleopError` of one printable line, within bounds of time
-and memory. A target is a test that :func:`fuzz` turns into so many cases; its own claims come on
-top::
+A case hands something broken to the package: a file, a text, the bytes of a message. The law: it either works or is
+refused with a :class:`TeleopError` of one printable line, within bounds of time and memory. A target is a test that
+:func:`fuzz` turns into so many cases; its own claims come on top::
 
     from fuzzing import TEXTS, fuzz
 

@@ -5,14 +5,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from teleop_core.kernels import kernel, pointer
-from teleop_core.kernels.fields import fields_of, record, record_array
-from teleop_core.kernels.geometry import Array
+from teleop_core.kernels import Array, fields_of, kernel, pointer, record, record_array
 from teleop_core.robots.kinematics import FK
 from teleop_core.slave.simulation import SimulationNumbers
-from teleop_core.slave.world import WORLD_OBJECTS
+from teleop_core.slave.world import WORLD_OBJECTS, contact
 from teleop_core.slave.world.button import ButtonNumbers
-from teleop_core.slave.world.contact import ContactState, add_push, touch
 
 DT = 1e-3
 PIECES = 16  # pieces of way in a tick, along each of which the push does its work
@@ -100,7 +97,7 @@ def _lead(p: SimulationNumbers, contacts: Any, arm: Any, way: Array, felt: Array
         for k in range(3):
             arm.T[k, 3] = way[first, k]
             speed[k] = (way[first + 1, k] - way[first, k]) * PIECES / 1e-3
-        touch(p, contacts, arm, way[first], speed, felt[tick])
+        contact.touch(p, contacts, arm, way[first], speed, felt[tick])
         lost[tick] = energy - _stored(p, s)
         if not s.is_near:
             continue
@@ -109,7 +106,7 @@ def _lead(p: SimulationNumbers, contacts: Any, arm: Any, way: Array, felt: Array
                 middle[k] = 0.5 * (way[i, k] + way[i + 1, k])
                 speed[k] = (way[i + 1, k] - way[i, k]) * PIECES / 1e-3
                 push[k] = 0.0
-            add_push(p, contacts, middle, speed, push)
+            contact.add_push(p, contacts, middle, speed, push)
             for k in range(3):
                 energy -= push[k] * (way[i + 1, k] - way[i, k])
 
@@ -124,7 +121,7 @@ def lead(way: Array, name: str = "plane", parameters: Any = None, **numbers: flo
         numbers: Of it, beside those of soft tissue.
     """
     # Whole records: numba takes a record for another one that begins with the same fields.
-    p, contacts = record(SimulationNumbers, 3), record_array(ContactState, 1, 3)
+    p, contacts = record(SimulationNumbers, 3), record_array(contact.ContactState, 1, 3)
     known = {
         "world_stiffness": 200.0,
         "puncture_force": 0.5,

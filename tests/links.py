@@ -7,11 +7,10 @@ import numpy as np
 
 from teleop_core.bags.reader import Bag
 from teleop_core.graph import topics
-from teleop_core.graph.topics import Kind, Topic
 from teleop_core.robots import load_robot
 
 MS = 1_000_000
-HELPER = Topic("helper/servo_cf", Kind.WRENCH, topics.MASTER_SERVO_CF.stamp, "master_base")
+HELPER = topics.Topic("helper/servo_cf", topics.Kind.WRENCH, topics.MASTER_SERVO_CF.stamp, "master_base")
 STAGES = """
     from dataclasses import dataclass
 
@@ -95,7 +94,7 @@ ENTRIES = """
     helper = my_stages:HELPER
     failing = my_stages:FAILING
 """
-RAISED, TWICE = (Topic(name, Kind.POSE) for name in ("slave/raised_cp", "slave/plain_cp"))
+RAISED, TWICE = (topics.Topic(name, topics.Kind.POSE) for name in ("slave/raised_cp", "slave/plain_cp"))
 SETTINGS = (
     "teleop.stages=[helper, compiled_raise, plain_raise]",
     "teleop.delays=[slave/servo_jp=0.05]",

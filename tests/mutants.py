@@ -3,10 +3,9 @@
     python tests/mutants.py --list
     python tests/mutants.py stop_late braking_weak --composed
 
-A mutant is a copy of the package in a directory of its own with a few words of its source replaced,
-and comes first in the path of the drill and of what it starts. The machine is a simulated one, so
-that what is found is found every time; ``--live`` takes this one. What a mutant compiles is kept in
-its own directory, and used again in the next run.
+A mutant is a copy of the package in a directory of its own with a few words of its source replaced, and comes first in
+the path of the drill and of what it starts. The machine is a simulated one, so that what is found is found every time;
+``--live`` takes this one. What a mutant compiles is kept in its own directory, and used again in the next run.
 """
 
 import argparse
@@ -130,7 +129,7 @@ MUTANTS = (
             "fast = p.overspeed * p.speed_limit[i]", "fast = 1e9 * p.speed_limit[i]",
             "overspeed"),
     _mutant("stop_soft", "a stop brakes as softly as a pause", _STEP,
-            "AT_ONCE if s.state == _FAULT else AT_LIMITS", "AT_LIMITS", "stop_topic"),
+            "commands.AT_ONCE if s.state == _FAULT else commands.AT_LIMITS", "commands.AT_LIMITS", "stop_topic"),
     _mutant("reset_not_needed", "enable ends a stop without reset", "slave/operation/states.py",
             "{_D: _E, _E: _E, _P: _E}", "{_D: _E, _E: _E, _P: _E, _F: _E}", "stop_latched"),
     _mutant("heartbeat_ignored", "a silent stop button is none", _WATCH,

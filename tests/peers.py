@@ -21,8 +21,7 @@ from teleop_core.nodes.observer import Observer
 from teleop_core.nodes.quality import profile
 from teleop_core.nodes.streams import Subscription, message_type
 from teleop_core.robots import load_robot
-from teleop_core.slave.slave import SlaveParameters
-from teleop_core.slave.slave_sim import SlaveSimParameters
+from teleop_core.slave import slave, slave_sim
 
 with warnings.catch_warnings():
     warnings.simplefilter("ignore")  # its parser imports a deprecated module of Python
@@ -89,7 +88,7 @@ def at_rest(listener: Listener, count: int = 1000) -> Callable[[], object]:
 def _is_of_arm(key: str) -> bool:
     """Whether a parameter, with double underscores for dots, is that of a simulated arm alone."""
     name = key.replace("__", ".")
-    mine, its = ({spec.name for spec in specs(g)} for g in (SlaveParameters, SlaveSimParameters))
+    mine, its = ({spec.name for spec in specs(g)} for g in (slave.SlaveParameters, slave_sim.SlaveSimParameters))
     return name in its - mine
 
 

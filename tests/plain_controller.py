@@ -1,5 +1,4 @@
-"""A plain controller of a real arm, in rclpy alone: an RCRT-1 with names of its own, a UR5e,
-or a gripper.
+"""A plain controller of a real arm, in rclpy alone: an RCRT-1 with names of its own, a UR5e, or a gripper.
 
 python plain_controller.py joint_state|forward_command|joint_trajectory|crtk
     [rcrt1|ur5e|gripper [SEED]]

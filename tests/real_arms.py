@@ -6,10 +6,9 @@ end), speed [rad/s] and effort [N·m] (0: nobody wrote it down). ``tool`` is the
 behind the last joint. ``bodies`` are the links where they are public, one row each: mass [kg],
 centre [m] and the inertia xx, xy, xz, yy, yz, zz [kg·m²] about it, in the axes of the joint.
 
-72 arms are those of ssik (personalrobotics/ssik, commit 65139cc8, its fixtures and its manifest,
-which names the sources); ``class`` is the solver that ssik takes for them. Fixed joints between two
-others are multiplied out. Home pose and limits were compared with the constants in ssik's compiled
-modules: they agree to 5e-12.
+72 arms are those of ssik (personalrobotics/ssik, commit 65139cc8, its fixtures and its manifest, which names the
+sources); ``class`` is the solver that ssik takes for them. Fixed joints between two others are multiplied out. Home
+pose and limits were compared with the constants in ssik's compiled modules: they agree to 5e-12.
 """
 
 import json

@@ -6,11 +6,9 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from teleop_core.bags.reader import Bag
-from teleop_core.bags.reports import report
+from teleop_core.bags import reader, reports
 from teleop_core.bags.writer import BagWriter
-from teleop_core.graph import topics
-from teleop_core.graph.signals import STATE_FIELDS, TICK_NS
+from teleop_core.graph import STATE_FIELDS, TICK_NS, topics
 from teleop_core.kernels.geometry import Array
 
 JOINTS = tuple(f"joint_{i}" for i in range(1, 7))
@@ -34,7 +32,7 @@ def state(stamp_ns: int, described: dict[str, str] | None = None, **values: floa
     """
     is_one = {"gain", "is_following"}
     texts = {name: repr(float(values.get(name, name in is_one))) for name in STATE_FIELDS}
-    return report(stamp_ns, "teleop", 0, "FOLLOWING", texts | (described or {}))
+    return reports.report(stamp_ns, "teleop", 0, "FOLLOWING", texts | (described or {}))
 
 
 class Recipe:
@@ -63,7 +61,7 @@ class Recipe:
         stamps, values, logs = self.rows[topic]
         self.rows[topic] = (stamps, values, logs + delay_ns)
 
-    def write(self, path: Path) -> Bag:
+    def write(self, path: Path) -> reader.Bag:
         with BagWriter(path, self.topics, JOINTS, metadata=self.metadata, start_ns=START_NS) as writer:
             for topic, log_ns, data in self.singles:
                 writer.write(topic, log_ns, data)
@@ -75,4 +73,4 @@ class Recipe:
                         for topic, (a, b, c) in self.rows.items()
                     }
                 )
-        return Bag(path)
+        return reader.Bag(path)

@@ -10,13 +10,12 @@ from hypothesis.strategies import SearchStrategy
 from fuzzing import damaged, fuzz
 from present import present
 from teleop_core.bags import messages
-from teleop_core.graph.stage import STAGES
-from teleop_core.graph.topics import DIAGNOSTICS, Kind, Topic
+from teleop_core.graph import STAGES, topics
 
 JOINTS = ("theta1", "theta2", "d3", "theta4", "theta5", "theta6")
 READ = {topic.name: topic for name in STAGES.names() for topic in STAGES.find(name).reads}
-STREAMS = [topic for topic in READ.values() if topic.kind is not Kind.REPORT]
-REPORTS = [topic for topic in READ.values() if topic.kind is Kind.REPORT]
+STREAMS = [topic for topic in READ.values() if topic.kind is not topics.Kind.REPORT]
+REPORTS = [topic for topic in READ.values() if topic.kind is topics.Kind.REPORT]
 PARTS = len(STREAMS) + len(REPORTS) + 1
 STAMPS = st.one_of(st.none(), st.integers(0, 2**62))
 
@@ -25,7 +24,7 @@ def broken(whole: bytes) -> SearchStrategy:
     return st.one_of(st.binary(max_size=400), damaged(whole), st.just(whole))
 
 
-def streams(topic: Topic) -> Callable[..., None]:
+def streams(topic: topics.Topic) -> Callable[..., None]:
     """Test of what an input does with the bytes of a stream."""
     names, width = topic.names(JOINTS), topic.width(len(JOINTS))
     form = messages.layout(topic, JOINTS)
@@ -48,7 +47,7 @@ def streams(topic: Topic) -> Callable[..., None]:
 
 
 @pytest.mark.parametrize("topic", STREAMS, ids=lambda topic: topic.name)
-def test_any_bytes_of_a_stream_give_sound_numbers_or_a_reason(topic: Topic) -> None:
+def test_any_bytes_of_a_stream_give_sound_numbers_or_a_reason(topic: topics.Topic) -> None:
     streams(topic)()
 
 
@@ -69,6 +68,6 @@ def reports(columns: tuple[str, ...]) -> Callable[..., None]:
     return case
 
 
-@pytest.mark.parametrize("topic", [*REPORTS, DIAGNOSTICS], ids=lambda topic: topic.name)
-def test_any_bytes_of_a_report_give_numbers_or_a_reason(topic: Topic) -> None:
+@pytest.mark.parametrize("topic", [*REPORTS, topics.DIAGNOSTICS], ids=lambda topic: topic.name)
+def test_any_bytes_of_a_report_give_numbers_or_a_reason(topic: topics.Topic) -> None:
     reports(topic.columns or ("rate_hz", "late"))()

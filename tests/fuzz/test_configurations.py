@@ -7,14 +7,12 @@ import pytest
 from hypothesis import strategies as st
 
 from fuzzing import NASTY, TEXTS, assert_one_line, damaged, fuzz, lawful
-from teleop_core.bags.memory import MemoryBag
-from teleop_core.bags.reports import report
+from teleop_core.bags import memory, reports
 from teleop_core.bags.series import Series
-from teleop_core.base.parameters import specs
+from teleop_core.base import specs
 from teleop_core.base.plain_yaml import UnreadableError, parse
 from teleop_core.evaluation.origin import read_origin
-from teleop_core.graph import layers
-from teleop_core.graph.topics import MASTER_BUTTONS, TELEOP_STATE
+from teleop_core.graph import layers, topics
 from teleop_core.session.configuration import Configuration, configure
 from teleop_core.session.runner import recorded_configuration
 
@@ -76,12 +74,12 @@ def test_any_parameter_file_is_taken_or_refused(tmp_path_factory: pytest.TempPat
     Configuration.from_layers([BASE, layers.load_file(path)])
 
 
-def bag_with(configuration: str) -> MemoryBag:
+def bag_with(configuration: str) -> memory.MemoryBag:
     stamps = np.arange(1, 3)
-    series = Series(stamps, stamps, np.zeros((2, MASTER_BUTTONS.width(0))))
-    state = [(1, report(1, "teleop", 0, "", {}))]
+    series = Series(stamps, stamps, np.zeros((2, topics.MASTER_BUTTONS.width(0))))
+    state = [(1, reports.report(1, "teleop", 0, "", {}))]
     about = {"configuration": configuration}
-    return MemoryBag("bag", {MASTER_BUTTONS: series}, {TELEOP_STATE: state}, about)
+    return memory.MemoryBag("bag", {topics.MASTER_BUTTONS: series}, {topics.TELEOP_STATE: state}, about)
 
 
 @fuzz("stored configurations", content=st.one_of(damaged(STORED), TEXTS.map(_encoded)))

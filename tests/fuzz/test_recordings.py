@@ -14,13 +14,9 @@ from hypothesis import strategies as st
 from mcap.writer import CompressionType, IndexType, Writer
 
 from fuzzing import NASTY, TEXTS, damaged, fuzz
-from teleop_core.bags import compression, ros_types
-from teleop_core.bags.reader import Bag, recover
-from teleop_core.bags.reports import report
-from teleop_core.bags.series import kind_of
+from teleop_core.bags import compression, reader, reports, ros_types, series
 from teleop_core.bags.writer import BagWriter
 from teleop_core.graph import topics
-from teleop_core.graph.topics import Kind
 
 TOPICS = (topics.SLAVE_MEASURED_CP, topics.SLAVE_SERVO_JP, topics.TELEOP_STATE)
 MS = 1_000_000
@@ -33,7 +29,7 @@ def made(path: Path, packing: str) -> bytes:
             times = np.arange(begin, begin + 10) * MS
             blocks = {t: (times, np.ones((10, t.width(2))), times) for t in TOPICS[:2]}
             writer.write_block(blocks)
-            data = report(begin * MS, "teleop", 0, "fine", {"is_fine": "1.0", "x": "abc"})
+            data = reports.report(begin * MS, "teleop", 0, "fine", {"is_fine": "1.0", "x": "abc"})
             writer.write(TOPICS[2], begin * MS, data)
     return (path / f"{path.name}_0.mcap").read_bytes()
 
@@ -45,11 +41,11 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def read_all(path: Path) -> None:
     """Everything that can be read of a recording."""
-    bag = Bag(path)
+    bag = reader.Bag(path)
     for name, info in bag.topics.items():
-        kind = kind_of(name, info.type)
+        kind = series.kind_of(name, info.type)
         if info.count and kind is not None:
-            bag.reports(name) if kind is Kind.REPORT else bag.read(name)
+            bag.reports(name) if kind is topics.Kind.REPORT else bag.read(name)
     for _ in bag.raw():
         pass
 
@@ -69,7 +65,7 @@ def unchecked(path: Path) -> bytes:
         )
         writer.start("ros2")
         channels = {}
-        for name, ros_type, log_ns, data in Bag(path).raw():
+        for name, ros_type, log_ns, data in reader.Bag(path).raw():
             if name not in channels:
                 text = ros_types.definition(ros_type).encode()
                 schema = writer.register_schema(ros_type, "ros2msg", text[:80])
@@ -94,7 +90,7 @@ def test_any_recording_is_read_recovered_or_refused(folder: Path, packing: str) 
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             if is_recovered:
-                recover(file, out)
+                reader.recover(file, out)
                 read_all(out)
             else:
                 read_all(file)
@@ -166,6 +162,6 @@ def test_any_metadata_leads_to_the_file_beside_it_or_is_refused(folder: Path) ->
     @fuzz("metadata", text=texts())
     def attempt(text: bytes) -> None:
         index.write_bytes(text)
-        assert Bag(folder / "bag").topics[TOPICS[0].name].count == 20
+        assert reader.Bag(folder / "bag").topics[TOPICS[0].name].count == 20
 
     attempt()

@@ -14,12 +14,10 @@ from teleop_core.base.parameters import build
 from teleop_core.chain.mapping.motion_scaling import MotionScaling
 from teleop_core.chain.mapping.parameters import FixtureParameters, MotionScalingParameters
 from teleop_core.chain.mapping.walls import passive_stiffness
+from teleop_core.chain.master import hand_mechanics, haptic_master
 from teleop_core.chain.master.device import DeviceParameters
-from teleop_core.chain.master.hand_mechanics import HandParameters
-from teleop_core.chain.master.haptic_master import HapticMasterParameters
-from teleop_core.chain.operators import register_operator
+from teleop_core.chain.operators import register_operator, rest
 from teleop_core.chain.operators.parameters import ButtonParameters, OperatorParameters
-from teleop_core.chain.operators.rest import REST_POSITION
 from teleop_core.evaluation.metrics.contact import TOUCH_J
 from teleop_core.graph.signals import TICK_NS
 from teleop_core.kernels.geometry import Array
@@ -48,9 +46,9 @@ def session(
     person = build(OperatorParameters, own)
     master = HeldMaster(
         replace(person, buttons=ButtonParameters(fixture=(0.002,))),
-        HapticMasterParameters(
+        haptic_master.HapticMasterParameters(
             seed=seed,
-            hand=HandParameters(**{k: v for k, v in hand.items() if k not in own}),
+            hand=hand_mechanics.HandParameters(**{k: v for k, v in hand.items() if k not in own}),
             device=DeviceParameters(**(device or {})),
         ),
     )
@@ -198,4 +196,4 @@ def test_a_loose_grip_is_not_thrown_about_by_a_stiff_wall(stiffness: float, boun
     hand = {"stiffness": 100.0, "damping": 0.5, "tremor_amplitude": 0.0}
     places, _ = session(motion, 3.0, hand, stiffness=stiffness)
     assert np.ptp(places[2000:, 0]) < bound * 0.01
-    assert places[-1, 0] - REST_POSITION[0] - HALF < bound
+    assert places[-1, 0] - rest.REST_POSITION[0] - HALF < bound

@@ -15,18 +15,15 @@ from teleop_core.chain.mapping.motion_scaling import MotionScaling
 from teleop_core.chain.mapping.parameters import MotionScalingParameters
 from teleop_core.chain.mapping.plausibility import PlausibilityParameters
 from teleop_core.chain.operators.shapes import minimum_jerk
-from teleop_core.graph.signals import STATE, TICK_NS
-from teleop_core.graph.topics import MASTER_MEASURED_CP, NO_COMMAND_NS, SLAVE_REACH, Limit
+from teleop_core.graph import STATE, TICK_NS, topics
 from teleop_core.kernels.geometry import Array, pose_from_transform
 from teleop_core.robots import load_robot
-from teleop_core.session.api import configuration
-from teleop_core.session.runner import replayed_blocks
-from teleop_core.session.virtual import VirtualTime
+from teleop_core.session import api, runner, virtual
 
 ANY_HAND = PlausibilityParameters(speed=1000.0, acceleration=1e6, turn=1e4, reach=100.0, button_silence=0.0)
 """A hand that may jump, as tests have it do."""
 
-REACH = {name: index for index, name in enumerate(SLAVE_REACH.columns)}
+REACH = {name: index for index, name in enumerate(topics.SLAVE_REACH.columns)}
 # The published map of the master's axes to the slave's.
 AXES = np.array([[0, 0, -1], [-1, 0, 0], [0, 1, 0]], float)
 MICROMETRE = 1e-6
@@ -129,8 +126,8 @@ def test_those_ways_lead_beyond_reach_through_joints_and_the_workspace() -> None
         for seed in range(8):
             chain = Chain(robot)
             wander(chain, np.random.default_rng(seed))
-            limits |= {Limit(int(reach[REACH["limit"]])) for reach, _ in chain.told}
-    assert {Limit.NONE, Limit.JOINT, Limit.WORKSPACE} <= limits
+            limits |= {topics.Limit(int(reach[REACH["limit"]])) for reach, _ in chain.told}
+    assert {topics.Limit.NONE, topics.Limit.JOINT, topics.Limit.WORKSPACE} <= limits
 
 
 def beyond(**values: Any) -> tuple[Chain, Array]:
@@ -146,12 +143,12 @@ def beyond(**values: Any) -> tuple[Chain, Array]:
 
 def test_the_state_names_the_joint_at_its_limit_until_the_hand_has_come_back() -> None:
     chain, step = beyond()
-    assert chain.state("limit") == Limit.JOINT
+    assert chain.state("limit") == topics.Limit.JOINT
     assert chain.state("limited_joint") == 2
     chain.follow(1000)
-    assert chain.state("limit") == Limit.JOINT
+    assert chain.state("limit") == topics.Limit.JOINT
     chain.follow(400, -step)
-    assert chain.state("limit") == Limit.NONE
+    assert chain.state("limit") == topics.Limit.NONE
     assert chain.state("limited_joint") == -1
 
 
@@ -174,7 +171,7 @@ def test_the_force_can_be_switched_off_and_the_limit_is_told_nevertheless() -> N
     values = MotionScalingParameters().reach_force
     chain, _ = beyond(reach_force=type(values)(is_on=False))
     assert not chain.force.any()
-    assert chain.state("limit") == Limit.JOINT
+    assert chain.state("limit") == topics.Limit.JOINT
 
 
 def test_a_clutch_stroke_beyond_reach_takes_the_slave_no_further_out() -> None:
@@ -200,7 +197,7 @@ def master_bag(stamps_ns: Any) -> MemoryBag:
     share = minimum_jerk((stamps_ns * 1e-9 - 1.3) / 1.2)
     poses = np.zeros((len(stamps_ns), 7))
     poses[:, 3], poses[:, 1] = 1.0, 30e-3 * share
-    series = {MASTER_MEASURED_CP: Series(stamps_ns, stamps_ns, poses)}
+    series = {topics.MASTER_MEASURED_CP: Series(stamps_ns, stamps_ns, poses)}
     return MemoryBag("hand", series, {}, {})
 
 
@@ -210,10 +207,10 @@ def setpoints(stamps_ns: NDArray[np.int64], **values: Any) -> tuple[Array, Array
     The reference filter, which lags behind any master, is off.
     """
     values = {"slave.reference_filter.is_on": False} | values
-    session = VirtualTime(configuration(settings=values), played="haptic_master")
-    rows = np.concatenate(list(replayed_blocks(session, master_bag(stamps_ns))[0]))
+    session = virtual.VirtualTime(api.configuration(settings=values), played="haptic_master")
+    rows = np.concatenate(list(runner.replayed_blocks(session, master_bag(stamps_ns))[0]))
     last = rows["now_ns"][-1] - stamps_ns[-1]
-    rows = rows[rows["slave_setpoint_cp_ns"] > NO_COMMAND_NS]  # after the move to where it starts
+    rows = rows[rows["slave_setpoint_cp_ns"] > topics.NO_COMMAND_NS]  # after the move to where it starts
     return (rows["now_ns"] - last) * 1e-9, rows["slave_setpoint_cp"][:, :3]
 
 

@@ -18,8 +18,7 @@ from teleop_core.chain.mapping.plausibility import PlausibilityParameters
 from teleop_core.graph.signals import STATE, TICK_NS
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot
-from teleop_core.session.configuration import configure
-from teleop_core.session.virtual import VirtualTime
+from teleop_core.session import configuration, virtual
 
 # A command of 0.5 m is rounded to 1e-16 m at every sample.
 ROUNDING = 1e-14
@@ -262,7 +261,7 @@ def session_of(
     fixture: Sequence[float] = (),
     mode: Sequence[float] = (),
     **settings_: str | float | list[float],
-) -> VirtualTime:
+) -> virtual.VirtualTime:
     text = [f"{key}={value}" for key, value in settings_.items()]
     texts = [
         f"seed={seed}",
@@ -273,7 +272,7 @@ def session_of(
         f"buttons.fixture={list(fixture)}",
         f"buttons.mode={list(mode)}",
     ]
-    session = VirtualTime(configure(settings=[*texts, *text]))
+    session = virtual.VirtualTime(configuration.configure(settings=[*texts, *text]))
     session.run(session.lead + 3)  # until the slave is where it starts, and follows
     return session
 
@@ -357,7 +356,7 @@ def test_parameters_changed_in_a_running_session_never_move_the_slave(seed: int)
 
 def test_quaternions_stay_unit_over_a_long_session_of_turning_and_clutching() -> None:
     count = 60_000
-    rng, session = np.random.default_rng(8), VirtualTime(configure(), played="haptic_master")
+    rng, session = np.random.default_rng(8), virtual.VirtualTime(configuration.configure(), played="haptic_master")
     turns = Rotation.from_rotvec(0.002 * rng.standard_normal((count, 3)))
     # Products of 100 turns each keep the path smooth and its making fast.
     samples, attitude = session.rows(count), Rotation.identity()

@@ -30,8 +30,7 @@ from peers import Listener as Listener  # noqa: PLC0414
 from present import present
 from teleop_core.bags.reader import Bag
 from teleop_core.graph.graph import BUILT_IN, RECORDER_NAME
-from teleop_core.middleware.ros import RosWorld
-from teleop_core.middleware.ros_node import RosNode
+from teleop_core.middleware import ros, ros_node
 from teleop_core.nodes.children import environment, free_domain
 from teleop_core.nodes.crews import Processes
 from teleop_core.nodes.interrupt import Interrupt
@@ -127,7 +126,7 @@ class Peer(AnyPeer):
         self.context = Context()
         self.context.init(args=[], domain_id=int(self.domain))
         self.node = Node("peer", context=self.context, use_global_arguments=False, enable_rosout=False)
-        self.world, self.ros = RosWorld(self.context), RosNode(self.node)
+        self.world, self.ros = ros.RosWorld(self.context), ros_node.RosNode(self.node)
         self.executor = self.world.executor()
         self.executor.add_node(self.ros)
         self.observer = Observer(int(self.domain))

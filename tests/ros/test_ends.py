@@ -15,8 +15,7 @@ import pytest
 
 from live_process import TIMEOUT, LiveProcess, are_gone, wait_until
 from teleop_core.bags.reader import Bag
-from teleop_core.graph import topics
-from teleop_core.graph.graph import BUILT_IN, RECORDER_NAME
+from teleop_core.graph import BUILT_IN, RECORDER_NAME, topics
 from teleop_core.middleware.real_time import is_priority_granted
 from teleop_core.nodes.observer import Observer
 

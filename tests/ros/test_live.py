@@ -17,10 +17,8 @@ from rosbags.highlevel import AnyReader
 
 from live_process import wait_until, words
 from teleop_core.bags.reader import Bag
-from teleop_core.base.errors import ParameterError, RecordingError, SessionError
-from teleop_core.graph import topics
-from teleop_core.graph.graph import BUILT_IN, RECORDER_NAME
-from teleop_core.graph.topics import STREAMS
+from teleop_core.base import ParameterError, RecordingError, SessionError
+from teleop_core.graph import BUILT_IN, RECORDER_NAME, topics
 from teleop_core.nodes.live import live
 from teleop_core.nodes.play import play
 from teleop_core.session.configuration import Configuration, configure
@@ -61,13 +59,13 @@ def children(name: str = "") -> list[Any]:
 def test_a_live_session_is_recorded_on_every_topic(
     peer: "Peer", session_until: Callable[..., tuple[Bag, str]], tmp_path: Path
 ) -> None:
-    enough = {topic.name: 1000 for topic in STREAMS}
+    enough = {topic.name: 1000 for topic in topics.STREAMS}
     bag, text = session_until(quick(600.0), lambda: peer.has_recorded(enough))
     assert all(f"{name} is ready" in text for name in (*BUILT_IN, RECORDER_NAME))
     assert "slave" in text
     assert children() == []
     assert bag.metadata["scenario"] == "coarse_box"
-    for topic in STREAMS:
+    for topic in topics.STREAMS:
         assert bag.topics[topic.name].count > 1000, topic.name
     measured = bag.read(topics.SLAVE_MEASURED_JS)
     assert (np.diff(measured.stamp_ns) > 0).all()

@@ -11,8 +11,7 @@ import pytest
 import yaml
 from rcl_interfaces.srv import GetParameters
 
-from teleop_core.bags.reader import Bag
-from teleop_core.bags.transforms import TF
+from teleop_core.bags import reader, transforms
 from teleop_core.evaluation import scores
 from teleop_core.graph import topics
 from teleop_core.nodes.children import environment
@@ -56,13 +55,13 @@ def parameter(peer: "Peer", node: str, name: str) -> Any:
     return peer.call(GetParameters, f"{node}/get_parameters", request).values[0]
 
 
-def recorded(peer: "Peer", process: Any, tmp_path: Any, *slaves: Any) -> Bag:
+def recorded(peer: "Peer", process: Any, tmp_path: Any, *slaves: Any) -> reader.Bag:
     """Recording of a session, ended when these slaves have worked for two seconds."""
     for slave in slaves:
         peer.wait_value(slave, "ticks", lambda ticks: ticks > 2000)
     process.send_signal(signal.SIGINT)
     assert process.wait(90) == 0
-    return Bag(tmp_path / "bag")
+    return reader.Bag(tmp_path / "bag")
 
 
 @pytest.mark.slow
@@ -100,7 +99,7 @@ def test_arms_of_a_session_in_a_namespace_stay_apart_below_it_and_keep_the_names
         "recorder",
     }
     bag = recorded(peer, process, tmp_path, "lab/slave", "lab/right/slave")
-    shared = {topics.DIAGNOSTICS.name, TF.name}
+    shared = {topics.DIAGNOSTICS.name, transforms.TF.name}
     assert all(name.startswith("lab/") for name in {*bag.topics} - shared)
     assert bag.topics[f"lab/{MEASURED}"].count > 1000
     joints = bag.read(f"lab/right/{topics.SLAVE_MEASURED_JS.name}")

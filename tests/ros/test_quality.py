@@ -6,10 +6,8 @@ from typing import TYPE_CHECKING, Any
 import pytest
 from rclpy.qos import QoSProfile, ReliabilityPolicy, qos_profile_sensor_data
 
-from teleop_core.base.errors import ParameterError
-from teleop_core.graph import topics
-from teleop_core.graph.stage import STAGES
-from teleop_core.graph.topics import Quality, Topic
+from teleop_core.base import ParameterError
+from teleop_core.graph import STAGES, topics
 from teleop_core.nodes.quality import QualityOverrides, profile
 from teleop_core.nodes.streams import message_type
 
@@ -21,7 +19,7 @@ pytestmark = pytest.mark.ros
 JS: Any = topics.SLAVE_MEASURED_JS
 
 
-def heard(peer: "Peer", topic: Topic, qos: QoSProfile) -> Any:
+def heard(peer: "Peer", topic: topics.Topic, qos: QoSProfile) -> Any:
     """Messages of a subscription as a stock client makes it."""
     found: list[Any] = []
     peer.node.create_subscription(message_type(topic.kind.ros_type), topic.name, found.append, qos)
@@ -38,7 +36,7 @@ def spun(peer: "Peer", condition: Callable[..., object]) -> Callable[[], object]
 
 def test_a_stream_reaches_reliable_and_best_effort_subscribers(peer: "Peer") -> None:
     """The default of ROS's subscribers, and so of stock clients, is reliable."""
-    streams = [t for t in STAGES.find("slave").writes if t.quality is Quality.STREAM]
+    streams = [t for t in STAGES.find("slave").writes if t.quality is topics.Quality.STREAM]
     reliable: Any = {topic: heard(peer, topic, QoSProfile(depth=10)) for topic in streams}
     best_effort = heard(peer, JS, qos_profile_sensor_data)
     peer.start("slave")

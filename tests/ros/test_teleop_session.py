@@ -39,8 +39,7 @@ def test_a_flood_of_commands_is_not_followed_faster_and_drops_no_step(
     def flooded_without_loss() -> Any:
         """Send far more than the slave takes, until it has got a thousand and dropped no step.
 
-        A machine that stood still for a moment costs a flood; one that the slave cannot bear
-        costs every flood.
+        A machine that stood still for a moment costs a flood; one that the slave cannot bear costs every flood.
         """
         nonlocal clock
         for _ in range(500):

@@ -40,8 +40,7 @@ def test_a_subscriber_that_never_reads_does_not_slow_the_session(watched: Any) -
     def goes_on_without_loss() -> Any:
         """Whether 1500 ticks went by, one after another, of which none was dropped.
 
-        A machine that stood still for a moment costs a stretch; a reader that holds up the slave
-        costs every one.
+        A machine that stood still for a moment costs a stretch; a reader that holds up the slave costs every one.
         """
         ticks, lost = _ticks_and_lost_time(watched)
         if lost != spans[-1][1]:

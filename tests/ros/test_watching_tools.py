@@ -9,14 +9,10 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import String
 from visualization_msgs.msg import Marker, MarkerArray
 
-from teleop_core.bags.layouts import layout
-from teleop_core.bags.reader import Bag
-from teleop_core.bags.ros_types import deserialise
-from teleop_core.bags.transforms import ROBOT_DESCRIPTION, TF
+from teleop_core.bags import layouts, reader, ros_types, transforms
 from teleop_core.graph.topics import MASTER_MEASURED_CP, SLAVE_MEASURED_CP, SLAVE_MEASURED_JS
 from teleop_core.robots import load_robot
-from teleop_core.robots.bodies import bodies_of
-from teleop_core.robots.bodies.urdf import urdf_of
+from teleop_core.robots.bodies import bodies_of, urdf
 
 if TYPE_CHECKING:
     from ros.conftest import Peer
@@ -56,15 +52,15 @@ def test_a_recorder_shows_and_records_the_robot_that_it_hears(peer: "Peer", tmp_
         return described
 
     peer.wait(told, "the robot's description")
-    assert described[0].data == urdf_of(robot, prefix="slave_")
+    assert described[0].data == urdf.urdf_of(robot, prefix="slave_")
     path = next(m for m in drawn[-1].markers if m.ns == "measured")
     assert (path.header.frame_id, path.type) == ("slave_base", Marker.LINE_STRIP)
     assert [path.points[-1].x, path.points[-1].y] == pytest.approx(tip[:2])
     assert recorder.end() == 0
-    bag = Bag(tmp_path / "bag")
-    assert bag.topics[ROBOT_DESCRIPTION.name].count == 1
-    for _, kind, _, data in bag.raw([TF]):
-        (found,) = (t for t in deserialise(data, kind).transforms if "tip" in t.child_frame_id)
+    bag = reader.Bag(tmp_path / "bag")
+    assert bag.topics[transforms.ROBOT_DESCRIPTION.name].count == 1
+    for _, kind, _, data in bag.raw([transforms.TF]):
+        (found,) = (t for t in ros_types.deserialise(data, kind).transforms if "tip" in t.child_frame_id)
         place = found.transform.translation
         assert [place.x, place.y, place.z] == pytest.approx(tip[:3])
 
@@ -74,7 +70,7 @@ def test_a_robot_that_is_not_the_recorders_is_not_drawn_as_this_one(peer: "Peer"
     recorder = peer.start("recorder", out=str(tmp_path / "bag"))
     joints = np.concatenate((robot.start, np.zeros(2 * robot.n)))
     stamps = iter(range(MS, 10**6 * MS, MS))
-    form = layout(SLAVE_MEASURED_JS, robot.joint_names)
+    form = layouts.layout(SLAVE_MEASURED_JS, robot.joint_names)
     publisher = peer.publisher(SLAVE_MEASURED_JS)
     key = f"received.{MASTER_MEASURED_CP.name}"
 
@@ -86,4 +82,4 @@ def test_a_robot_that_is_not_the_recorders_is_not_drawn_as_this_one(peer: "Peer"
 
     peer.wait(heard, "samples at the recorder")
     assert recorder.end() == 0
-    assert Bag(tmp_path / "bag").topics[ROBOT_DESCRIPTION.name].count == 0
+    assert reader.Bag(tmp_path / "bag").topics[transforms.ROBOT_DESCRIPTION.name].count == 0

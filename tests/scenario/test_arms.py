@@ -15,9 +15,8 @@ from teleop_core.chain.operators import register_operator
 from teleop_core.graph.layers import parse_layer
 from teleop_core.graph.topics import STREAMS
 from teleop_core.kernels.geometry import Array
+from teleop_core.session import runner, virtual
 from teleop_core.session.configuration import Configuration, configure
-from teleop_core.session.runner import replay, simulate
-from teleop_core.session.virtual import VirtualTime
 
 # Ticks in which the rcrt1 moves to where it starts, at half of its speed; then its hand moves.
 LEAD = 3702
@@ -40,7 +39,7 @@ def settings(*more: str) -> Configuration:
 @pytest.fixture(scope="module")
 def both() -> NDArray[np.void]:
     """Rows of a session of two arms with different robots."""
-    return VirtualTime(settings(*ARMS)).run(TICKS)
+    return virtual.VirtualTime(settings(*ARMS)).run(TICKS)
 
 
 def assert_same_streams(block: NDArray[np.void], arm: str, other: NDArray[np.void]) -> None:
@@ -51,13 +50,13 @@ def assert_same_streams(block: NDArray[np.void], arm: str, other: NDArray[np.voi
 
 
 def test_default_arm_moves_as_alone_to_the_bit(both: NDArray[np.void]) -> None:
-    alone = VirtualTime(settings("fixture=sphere", "fixture.sphere.radius=0.005")).run(TICKS)
+    alone = virtual.VirtualTime(settings("fixture=sphere", "fixture.sphere.radius=0.005")).run(TICKS)
     assert_same_streams(both, "", alone)
     assert np.abs(both["master_servo_cf"]).max() > 0.1
 
 
 def test_second_arm_moves_as_its_robot_alone_to_the_bit(both: NDArray[np.void]) -> None:
-    alone = VirtualTime(settings("robot=scara", "seed=7", "coarse_gain=0.5")).run(TICKS)
+    alone = virtual.VirtualTime(settings("robot=scara", "seed=7", "coarse_gain=0.5")).run(TICKS)
     assert_same_streams(both, "left", alone)
 
 
@@ -121,7 +120,7 @@ def test_delay_of_one_arm_is_not_one_of_the_other(own_parts: None) -> None:
     # The scara starts at home; its hand begins at once, whenever it follows.
     still = ("left/operator=waits", "left/patience=0.0", "left/tremor_amplitude=0.0", "left/gimbal_noise=0.0")
     delay = "teleop.delays=[left/slave/servo_jp=0.02]"
-    block, both = (VirtualTime(settings(*ARMS, *still, *m)).run(TICKS) for m in ((delay,), ()))
+    block, both = (virtual.VirtualTime(settings(*ARMS, *still, *m)).run(TICKS) for m in ((delay,), ()))
     assert np.array_equal(block["slave_setpoint_js"], both["slave_setpoint_js"])
     assert np.ptp(both["slave_setpoint_cp"][LEAD:, :3], axis=0).min() > 1e-3
     setpoints = [rows["left_slave_setpoint_js"] for rows in (block, both)]
@@ -132,9 +131,9 @@ def test_delay_of_one_arm_is_not_one_of_the_other(own_parts: None) -> None:
 @pytest.mark.slow
 def test_one_recording_holds_and_replays_both_arms_to_the_bit(tmp_path: Path, both: NDArray[np.void]) -> None:
     configuration = settings(*ARMS, "duration=1.5")
-    simulate(configuration, tmp_path / "bag")
+    runner.simulate(configuration, tmp_path / "bag")
     bag = Bag(tmp_path / "bag")
-    replay(bag, configuration, tmp_path / "again")
+    runner.replay(bag, configuration, tmp_path / "again")
     again = Bag(tmp_path / "again")
     for arm in ("", "left"):
         for topic in (topic.of_arm(arm) for topic in STREAMS):

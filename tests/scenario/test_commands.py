@@ -21,7 +21,6 @@ from teleop_core.bags.reader import Bag
 from teleop_core.bags.writer import BagWriter
 from teleop_core.commands.progress import Progress, say_work
 from teleop_core.graph import topics
-from teleop_core.graph.topics import STREAMS
 from teleop_core.robots import load_robot
 
 if TYPE_CHECKING:
@@ -54,7 +53,7 @@ def one_line(done: subprocess.CompletedProcess[str]) -> str:
 
 def test_sim_records_every_stream_at_1_khz(recording: Path) -> None:
     bag = Bag(recording)
-    for topic in STREAMS:
+    for topic in topics.STREAMS:
         assert bag.topics[topic.name].count == TICKS
 
 
@@ -72,7 +71,7 @@ def test_the_same_seed_gives_the_same_bytes_and_another_seed_does_not(teleop: "R
 def test_replay_with_the_same_configuration_is_bit_identical(teleop: "Run", recording: Path, tmp_path: Path) -> None:
     teleop("replay", recording, "--out", tmp_path / "again")
     first, again = Bag(recording), Bag(tmp_path / "again")
-    for topic in STREAMS:
+    for topic in topics.STREAMS:
         a, b = first.read(topic), again.read(topic)
         assert np.array_equal(a.values, b.values), topic.name
         assert np.array_equal(a.stamp_ns, b.stamp_ns), topic.name

@@ -19,8 +19,7 @@ import teleop_machines
 from teleop_core.cli import _parser
 from teleop_core.evaluation.score import keys
 from teleop_core.graph.layers import parse_setting
-from teleop_core.session.api import configuration
-from teleop_core.session.virtual import VirtualTime
+from teleop_core.session import api, virtual
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.append(str(ROOT / "docs"))
@@ -108,7 +107,7 @@ def test_every_session_of_a_documented_command_can_be_begun(tmp_path: Path, monk
         settings = getattr(arguments, "settings", [])
         needs_more = re.search(r"\.(py|yaml|csv|stl)\b|=(gamepad|spacemouse|elsewhere|bags/)", line)
         if settings and hasattr(arguments, "scenario") and not needs_more:
-            VirtualTime(configuration(arguments.scenario, texts=settings))
+            virtual.VirtualTime(api.configuration(arguments.scenario, texts=settings))
             begun.add(line)
     assert len(begun) > 5
 

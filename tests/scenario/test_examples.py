@@ -15,8 +15,7 @@ import pytest
 from example_runs import EXAMPLES, NAMES, numbers
 from example_runs import run_again as run
 from present import present
-from teleop_core.session.configuration import configure
-from teleop_core.session.virtual import VirtualTime
+from teleop_core.session import configuration, virtual
 
 PARTS = [name for name in NAMES if name.startswith("own_")]
 
@@ -280,7 +279,7 @@ def test_plant_of_published_rests_predicts_the_published_errors_and_an_ideal_one
 
 def test_recording_becomes_a_data_frame_and_a_page(tmp_path: Path) -> None:
     text = run("bag_to_pandas", tmp_path)
-    ticks = VirtualTime(configure("coarse_box")).lead + 10_000
+    ticks = virtual.VirtualTime(configuration.configure("coarse_box")).lead + 10_000
     assert f"{ticks} rows" in text
     assert numbers(r"height.html: (\d+) MB", text)[0] >= 4
 

@@ -18,9 +18,7 @@ from named import ROOT, Named, commands, places, provide
 from present import present
 from teleop_core.cli import main
 from teleop_core.graph.layers import list_scenarios
-from teleop_core.session.configuration import configure
-from teleop_core.session.runner import session_ticks
-from teleop_core.session.virtual import VirtualTime
+from teleop_core.session import configuration, runner, virtual
 from teleop_lab import experiments
 
 BRIEF = ("--duration", "2")
@@ -55,9 +53,9 @@ def test_every_experiment_runs_to_its_end_and_agrees_as_it_did(name: str, bench:
 @pytest.mark.parametrize("scenario", list_scenarios())
 @pytest.mark.filterwarnings("default")
 def test_every_scenario_runs_to_its_end_and_is_followed(scenario: str) -> None:
-    made = configure(scenario)
+    made = configuration.configure(scenario)
     recording = tc.run(scenario)
-    assert len(recording["slave/measured_js"]) == session_ticks(made, VirtualTime(made))
+    assert len(recording["slave/measured_js"]) == runner.session_ticks(made, virtual.VirtualTime(made))
     score = recording.score()
     assert present(score.reach.followed_share) > 0.99
     expected = pytest.approx(TRACKED_MM.get(scenario, 0.05), rel=0.1 if scenario in TRACKED_MM else 1)

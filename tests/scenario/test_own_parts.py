@@ -10,12 +10,10 @@ import pytest
 from numpy.typing import NDArray
 
 from teleop_core.bags.reader import Bag
-from teleop_core.base.errors import PartError
-from teleop_core.base.parameters import NoParameters, build, parameter
+from teleop_core.base import NoParameters, PartError, build, parameter
 from teleop_core.chain.mapping.parameters import MotionScalingParameters
 from teleop_core.chain.operators import register_operator
-from teleop_core.graph.signals import STATE, TICK_NS
-from teleop_core.graph.stage import Stage, register_stage
+from teleop_core.graph import STATE, TICK_NS, Stage, register_stage
 from teleop_core.graph.topics import (
     MASTER_MEASURED_CP,
     SLAVE_MEASURED_CP,
@@ -25,11 +23,9 @@ from teleop_core.graph.topics import (
     Topic,
     passed_on,
 )
-from teleop_core.kernels import kernel
-from teleop_core.kernels.geometry import Array
+from teleop_core.kernels import Array, kernel
 from teleop_core.robots import load_robot
-from teleop_core.session.configuration import configure
-from teleop_core.session.runner import simulate
+from teleop_core.session import configuration, runner
 from teleop_core.session.virtual import VirtualTime
 
 TICKS = 1500
@@ -48,7 +44,7 @@ SHORT = (
 
 
 def session(*settings: str, scenario: str = "coarse_box", ticks: int = TICKS) -> NDArray[np.void]:
-    return VirtualTime(configure(scenario, settings=[*SHORT, *settings])).run(ticks)
+    return VirtualTime(configuration.configure(scenario, settings=[*SHORT, *settings])).run(ticks)
 
 
 @pytest.fixture(scope="module")
@@ -197,7 +193,7 @@ def test_parameters_of_an_own_stage_are_set_like_others(own_parts: None) -> None
 def test_own_stage_is_recorded_with_its_topic_and_stamp(own_parts: None, tmp_path: Path) -> None:
     register_stage(limit("limit", LIMIT))
     settings = [*AT_ONCE, "teleop.stages=[limit]", "duration=0.2"]
-    simulate(configure(settings=settings), tmp_path / "bag")
+    runner.simulate(configuration.configure(settings=settings), tmp_path / "bag")
     series = Bag(tmp_path / "bag").read(LIMITED)
     assert np.array_equal(series.stamp_ns, TICK_NS * np.arange(1, 201))
 
@@ -285,7 +281,7 @@ def test_other_axis_map_moves_the_slave_along_other_axes() -> None:
         "['-x', '-y', '+z']": (0, -1.0),
     }
     for text, (axis, sign) in axes.items():
-        block: Any = VirtualTime(configure("coarse_box", settings=[*still, f"axes={text}"]))
+        block: Any = VirtualTime(configuration.configure("coarse_box", settings=[*still, f"axes={text}"]))
         block.run(block.lead)  # where it starts, all directions have room
         block = block.run(1200)
         command = block["slave_servo_cp"][:, :3] - block["slave_servo_cp"][0, :3]
@@ -300,7 +296,7 @@ def test_other_axis_map_moves_the_slave_along_other_axes() -> None:
 
 
 def test_another_kind_of_fixture_holds_from_the_next_block_on() -> None:
-    virtual = VirtualTime(configure("coarse_box"))
+    virtual = VirtualTime(configuration.configure("coarse_box"))
     virtual.run(5000)
     wide = {"fixture.kind": "sphere", "fixture.sphere.radius": 0.25}
     virtual.stages["motion_scaling"].retune(build(MotionScalingParameters, wide))
@@ -310,7 +306,7 @@ def test_another_kind_of_fixture_holds_from_the_next_block_on() -> None:
 
 
 def test_reset_stages_repeat_the_session_with_a_jointed_handle_too() -> None:
-    virtual = VirtualTime(configure(settings=["device.handle=mma"]))
+    virtual = VirtualTime(configuration.configure(settings=["device.handle=mma"]))
     first = virtual.run(300)["master_measured_cp"]
     for stage in virtual.stages.values():
         stage.reset()

@@ -10,25 +10,23 @@ import numpy as np
 import pytest
 
 import teleop_core as tc
-from teleop_core.graph.signals import TICK_NS
-from teleop_core.graph.topics import SLAVE_SERVO_CP, passed_on
-from teleop_core.session.configuration import configure
-from teleop_core.session.virtual import VirtualTime
+from teleop_core.graph import TICK_NS, topics
+from teleop_core.session import configuration, virtual
 
 if TYPE_CHECKING:
     from conftest import Run
 
-ANSWER = tc.Topic("test/answer", tc.Kind.POSE, passed_on("slave/servo_cp"))
+ANSWER = tc.Topic("test/answer", tc.Kind.POSE, topics.passed_on("slave/servo_cp"))
 
 
 def stage(step: Callable[[object, object, object, float], None]) -> tc.Stage:
     """Stage that answers every pose commanded; always the same graph, compiled once."""
-    made = tc.Stage("own", tc.NoParameters, (SLAVE_SERVO_CP,), (ANSWER,), step, trigger=SLAVE_SERVO_CP)
+    made = tc.Stage("own", tc.NoParameters, (topics.SLAVE_SERVO_CP,), (ANSWER,), step, trigger=topics.SLAVE_SERVO_CP)
     return tc.register_stage(made)
 
 
-def session(step: Callable[[object, object, object, float], None]) -> VirtualTime:
-    return VirtualTime(configure(settings=[f"teleop.stages=[{stage(step).name}]"]))
+def session(step: Callable[[object, object, object, float], None]) -> virtual.VirtualTime:
+    return virtual.VirtualTime(configuration.configure(settings=[f"teleop.stages=[{stage(step).name}]"]))
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf])

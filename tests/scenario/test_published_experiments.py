@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from teleop_core.graph.signals import STATE, TICK_NS
-from teleop_core.graph.topics import NO_COMMAND_NS, SLAVE_MEASURED_CP, SLAVE_REACH, STREAMS
+from teleop_core.graph import STATE, TICK_NS, topics
 from teleop_core.kernels.geometry import Array, roll_pitch_yaw, rotations_from_quaternions
 from teleop_core.session.configuration import configure
 from teleop_core.session.runner import session_ticks, simulate
@@ -96,10 +95,10 @@ def test_device_never_pushes_harder_than_it_can(box: tuple[str, NDArray[np.void]
 def test_stamps_step_by_one_tick(box: tuple[str, NDArray[np.void]]) -> None:  # case 31
     _, block = box
     assert np.array_equal(np.diff(block["now_ns"]), np.full(len(block) - 1, TICK_NS))
-    for topic in STREAMS:
-        is_sent = block[f"{topic.field}_ns"] > NO_COMMAND_NS  # no command is in force on the way to the start
+    for topic in topics.STREAMS:
+        is_sent = block[f"{topic.field}_ns"] > topics.NO_COMMAND_NS  # no command is in force on the way to the start
         assert is_sent[np.argmax(is_sent) :].all(), topic.name
-        late_ns = TICK_NS if topic is SLAVE_MEASURED_CP else 0  # of what the arm said before
+        late_ns = TICK_NS if topic is topics.SLAVE_MEASURED_CP else 0  # of what the arm said before
         sent_ns = block["now_ns"][is_sent] - late_ns
         assert np.array_equal(block[f"{topic.field}_ns"][is_sent], sent_ns), topic.name
 
@@ -108,7 +107,7 @@ def test_stamps_step_by_one_tick(box: tuple[str, NDArray[np.void]]) -> None:  # 
 def test_inverse_kinematics_keeps_the_tool_within_the_published_rotation_error(seed: int) -> None:
     # Home is a wrist singularity: noise of the gimbal there must not send joint 4 to its limit.
     block = session("free_motion", f"seed={seed}", "duration=20.0")
-    left = SLAVE_REACH.columns.index("rotation_residual")
+    left = topics.SLAVE_REACH.columns.index("rotation_residual")
     assert block["slave_reach"][:, left].max() < 0.9 * DEGREE
 
 

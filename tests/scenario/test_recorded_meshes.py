@@ -16,9 +16,7 @@ from numpy.typing import NDArray
 import teleop_core as tc
 from present import present
 from teleop_console.recorded_arms import configuration_of, recorded_arms
-from teleop_core.bags import kept_files
-from teleop_core.bags.kept_files import KeptFiles, recorded_files
-from teleop_core.bags.reader import Bag
+from teleop_core.bags import kept_files, reader
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots.bodies.looks import looks_of
 
@@ -52,7 +50,7 @@ def recorded(folder: Path, path: Path, **more: list[str] | Mapping[str, str | li
 
 def drawn(path: Path) -> list[dict[int, tuple[Array, NDArray[np.int64]]]]:
     """Looks of each arm as the page of a recording draws them."""
-    bag = Bag(path)
+    bag = reader.Bag(path)
     arms, _ = recorded_arms(bag, configuration_of(bag))
     return [looks_of(one.arm.robot) for one in arms]
 
@@ -118,7 +116,7 @@ def test_what_a_recording_has_no_room_for_is_told_in_one_line_and_again_when_it_
     mesh.unlink() if is_gone else trimesh.creation.icosphere().export(mesh)
     said = f"2.STL: this file is {'gone' if is_gone else 'another by now'}; the recording has no"
     with pytest.warns(UserWarning, match=said):
-        recorded_files(recording.metadata)
+        kept_files.recorded_files(recording.metadata)
 
 
 def test_two_arms_with_the_same_meshes_keep_them_once_and_each_is_drawn_with_its_own(tmp_path: Path) -> None:
@@ -165,13 +163,13 @@ def test_each_of_two_arms_of_one_xacro_is_replayed_with_its_own_arguments(tmp_pa
     "packed", ["", "x", "zlib, base64: x", "zlib, base64: " + base64.b64encode(zlib.compress(b"another")).decode()]
 )
 def test_a_kept_mesh_that_was_damaged_is_told_as_one_that_is_gone(packed: str, tmp_path: Path) -> None:
-    files = KeptFiles()
+    files = kept_files.KeptFiles()
     files.add_robot(str(arm(tmp_path)))
     texts = {"robot": str(tmp_path / "gone.urdf"), **files.texts()}
     shutil.rmtree(tmp_path / "some_arm")
     texts[kept(texts)[0]] = packed
     with pytest.warns(UserWarning, match=r"0\.stl: this file is gone") as told:
-        copy = recorded_files(texts)[texts["robot"]]
+        copy = kept_files.recorded_files(texts)[texts["robot"]]
     assert len(told) == 1
     assert Path(copy).read_text() == texts["robot_file"]
 
@@ -180,16 +178,16 @@ def test_a_recording_leads_to_no_pipe(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe.stl")
     texts = {"mesh": str(tmp_path / "pipe.stl"), "mesh_file": "sha256:0"}
     with pytest.warns(UserWarning, match="gone"):
-        assert recorded_files(texts) == {}
+        assert kept_files.recorded_files(texts) == {}
 
 
 def test_a_kept_mesh_unpacks_to_no_more_than_a_file_that_is_kept(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    files = KeptFiles()
+    files = kept_files.KeptFiles()
     files.add_mesh(str(arm(tmp_path).parents[1] / "meshes" / "1.stl"))
     shutil.rmtree(tmp_path / "some_arm")
-    assert recorded_files(files.texts())
+    assert kept_files.recorded_files(files.texts())
     monkeypatch.setattr(kept_files, "_MOST", 683)
     with pytest.warns(UserWarning, match="gone"):
-        assert recorded_files(files.texts()) == {}
+        assert kept_files.recorded_files(files.texts()) == {}

@@ -18,18 +18,7 @@ from teleop_core.bags.reports import report
 from teleop_core.bags.writer import BagWriter
 from teleop_core.evaluation.command import evaluate_bags
 from teleop_core.evaluation.scoring import studies, study
-from teleop_core.graph.signals import STATE_FIELDS, TICK_NS
-from teleop_core.graph.topics import (
-    ALL,
-    MASTER_MEASURED_CF,
-    MASTER_MEASURED_CP,
-    SLAVE_MEASURED_CP,
-    SLAVE_SERVO_CP,
-    SLAVE_SERVO_JP,
-    SLAVE_SETPOINT_CP,
-    SLAVE_SETPOINT_JS,
-    TELEOP_STATE,
-)
+from teleop_core.graph import STATE_FIELDS, TICK_NS, topics
 
 if TYPE_CHECKING:
     from conftest import Run
@@ -84,19 +73,19 @@ def record(path: Path, seed: int, fixture: dict[Any, Any] | None = None, count: 
     force = np.zeros((count, 6))
     force[:, :3] = -1000.0 * np.sign(curve) * np.maximum(np.abs(curve) - 0.015, 0.0)
     rows = {
-        MASTER_MEASURED_CP: poses,
-        SLAVE_SERVO_CP: poses,
-        SLAVE_SERVO_JP: np.zeros((count, 6)),
-        SLAVE_SETPOINT_JS: np.zeros((count, 6)),
-        SLAVE_SETPOINT_CP: poses,
-        SLAVE_MEASURED_CP: measured,
-        MASTER_MEASURED_CF: force,
+        topics.MASTER_MEASURED_CP: poses,
+        topics.SLAVE_SERVO_CP: poses,
+        topics.SLAVE_SERVO_JP: np.zeros((count, 6)),
+        topics.SLAVE_SETPOINT_JS: np.zeros((count, 6)),
+        topics.SLAVE_SETPOINT_CP: poses,
+        topics.SLAVE_MEASURED_CP: measured,
+        topics.MASTER_MEASURED_CF: force,
     }
     texts = {name: repr(FIXTURE.get(name, 0.0)) for name in STATE_FIELDS} | (fixture or {})
     metadata = {"scenario": '<curve> & "box" \'</script>', "robot": "rcrt1", "seed": str(seed)}
-    with BagWriter(path, ALL, JOINTS, metadata=metadata, start_ns=START_NS) as writer:
+    with BagWriter(path, topics.ALL, JOINTS, metadata=metadata, start_ns=START_NS) as writer:
         at = START_NS + 500 * TICK_NS
-        writer.write(TELEOP_STATE, at, report(at, "teleop", 0, "FOLLOWING", texts))
+        writer.write(topics.TELEOP_STATE, at, report(at, "teleop", 0, "FOLLOWING", texts))
         late = np.sort(rng.integers(100_000, 900_000, (len(rows), count)), axis=0)
         for link, (topic, values) in enumerate(rows.items()):
             logs = np.maximum.accumulate(stamps + late[link])

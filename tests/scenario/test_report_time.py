@@ -14,8 +14,7 @@ from rich.console import Console
 from headless import Headless
 from recipes import START_NS, Recipe, state
 from teleop_core.evaluation.command import evaluate_bags
-from teleop_core.graph import topics
-from teleop_core.graph.signals import TICK_NS
+from teleop_core.graph import TICK_NS, topics
 from teleop_core.kernels.geometry import Array
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]

@@ -12,8 +12,7 @@ import pytest
 import teleop_core as tc
 from present import present
 from teleop_console.recorded import RecordedLink
-from teleop_core.bags.arms import of_arm
-from teleop_core.bags.kept_files import recorded_files
+from teleop_core.bags import arms, kept_files
 from teleop_core.base.errors import ParameterError
 from teleop_core.kernels.geometry import Array
 from teleop_core.session.runner import recorded_configuration
@@ -110,17 +109,17 @@ def test_each_of_two_arms_keeps_its_own_file(tmp_path: Path) -> None:
 def test_an_arm_of_a_name_has_no_file_of_the_arm_beside_it(tmp_path: Path) -> None:
     right: Any = {"right/robot": "puma560", "right/geometry": []}
     recording, path = recorded(tmp_path, "arm.urdf", arms=["left", "right"], settings=right)
-    assert recorded_files(of_arm(recording.bag, "left").metadata) == {str(path): str(path)}
-    assert recorded_files(of_arm(recording.bag, "right").metadata) == {}
+    assert kept_files.recorded_files(arms.of_arm(recording.bag, "left").metadata) == {str(path): str(path)}
+    assert kept_files.recorded_files(arms.of_arm(recording.bag, "right").metadata) == {}
 
 
 def test_a_file_that_says_what_it_said_is_read_where_it_lies(tmp_path: Path) -> None:
     recording, path = recorded(tmp_path, "arm.urdf")
-    assert recorded_files(recording.metadata) == {str(path): str(path)}
+    assert kept_files.recorded_files(recording.metadata) == {str(path): str(path)}
     assert recording.metadata["robot_file"] == URDF
     assert recorded_configuration(recording.bag)[0]["slave"]["robot"] == str(path)
     longer(path)
-    copy = recorded_files(recording.metadata)[str(path)]
+    copy = kept_files.recorded_files(recording.metadata)[str(path)]
     assert Path(copy).name == path.name
     assert Path(copy).read_text() == URDF
     assert recorded_configuration(recording.bag)[0]["slave"]["robot"] == copy
@@ -129,7 +128,7 @@ def test_a_file_that_says_what_it_said_is_read_where_it_lies(tmp_path: Path) -> 
 def test_nothing_of_a_recording_is_expanded(tmp_path: Path) -> None:
     kept = {"robot": str(tmp_path / "arm.xacro"), "robot_file": XACRO}
     with pytest.raises(ParameterError, match="must be without macros"):
-        tc.load_robot(recorded_files(kept)[kept["robot"]], tip="tool0")
+        tc.load_robot(kept_files.recorded_files(kept)[kept["robot"]], tip="tool0")
 
 
 def test_of_a_xacro_the_urdf_is_recorded_that_its_arguments_made(tmp_path: Path) -> None:

@@ -11,9 +11,8 @@ from present import present
 from teleop_core.bags.reader import Bag
 from teleop_core.graph import topics
 from teleop_core.robots import list_robots, load_robot
+from teleop_core.session import runner, virtual
 from teleop_core.session.configuration import configure
-from teleop_core.session.runner import simulate
-from teleop_core.session.virtual import VirtualTime
 
 SHORT = ("teleop.duration=3.0", "operator.approach_time=1.0", "operator.size=[0.02, 0.02, 0.02]")
 
@@ -25,7 +24,7 @@ TABLES = sorted(map(str, Path("config/robots").glob("*.yaml")))
 @pytest.mark.parametrize("name", [*list_robots(), *TABLES])
 def test_every_robot_follows_a_session_inside_its_limits_and_drives(name: Any, tmp_path: Path) -> None:
     configuration = configure("free_motion", settings=[*SHORT, f"robot={name}"])
-    simulate(configuration, tmp_path / "bag")
+    runner.simulate(configuration, tmp_path / "bag")
     robot, bag = load_robot(name), Bag(tmp_path / "bag")
     references = bag.read(topics.SLAVE_SERVO_JP)
     assert references.names == robot.joint_names
@@ -45,7 +44,7 @@ def test_every_robot_follows_a_session_inside_its_limits_and_drives(name: Any, t
 def test_the_mma_reads_the_hand_as_well_as_its_encoders_allow(model: str) -> None:
     handle = ("device.handle=mma", f"device.handle_geometry=[model={model}]")
     poses = [
-        VirtualTime(configure("coarse_box", settings=[*SHORT, *extra])).run(3000)["master_measured_cp"]
+        virtual.VirtualTime(configure("coarse_box", settings=[*SHORT, *extra])).run(3000)["master_measured_cp"]
         for extra in ((), handle)
     ]
     # The Phantom's own reading step is 0.055 mm; the handle's encoders give less than 0.03 mm.
@@ -54,7 +53,7 @@ def test_the_mma_reads_the_hand_as_well_as_its_encoders_allow(model: str) -> Non
 
 @pytest.mark.slow
 def test_an_option_of_a_robot_reaches_both_stages_that_need_it() -> None:
-    session = VirtualTime(configure(settings=["robot=scara_stewart", "geometry=[heading=carried]"]))
+    session = virtual.VirtualTime(configure(settings=["robot=scara_stewart", "geometry=[heading=carried]"]))
     fixed = load_robot("scara_stewart")
     stages: Mapping[str, Any] = session.stages
     solver, slave = (stages[name].robot for name in ("inverse_kinematics", "slave"))

@@ -24,9 +24,8 @@ import numpy as np
 import pytest
 
 from teleop_core.graph.topics import STREAMS, TELEOP_STATE
+from teleop_core.session import runner, virtual
 from teleop_core.session.configuration import configure
-from teleop_core.session.runner import run_blocks, session_ticks
-from teleop_core.session.virtual import VirtualTime
 
 SCENARIOS = ("coarse_box", "fine_box", "mode_switching", "free_motion")
 SEEDS = (1, 2, 3)
@@ -70,8 +69,8 @@ def digests(scenario: str, *settings: str) -> dict[str, str]:
     """First 16 hexadecimal digits of the SHA-256 of each column's bytes, over a whole session."""
     configuration = configure(scenario, settings=settings)
     found: Any = defaultdict(hashlib.sha256)
-    session = VirtualTime(configuration)
-    for block in run_blocks(session, session_ticks(configuration, session)):
+    session = virtual.VirtualTime(configuration)
+    for block in runner.run_blocks(session, runner.session_ticks(configuration, session)):
         for name, field in FIELDS.items():
             found[name].update(block[field].tobytes())
     return {name: digest.hexdigest()[:16] for name, digest in found.items()}

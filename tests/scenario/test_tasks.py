@@ -9,11 +9,10 @@ import teleop_core as tc
 from teleop_core.chain.master.display import DisplayParameters
 from teleop_core.chain.tasks import MEMORY, SCENE
 from teleop_core.chain.tasks.follow import FOLLOW, FollowParameters
-from teleop_core.graph.stage import STAGES
-from teleop_core.graph.topics import SLAVE_MEASURED_CP, TASK_STATE
+from teleop_core.graph import STAGES, topics
 from teleop_core.kernels.parts import numbers_of
 
-COLUMN = {name: i for i, name in enumerate(TASK_STATE.columns)}
+COLUMN = {name: i for i, name in enumerate(topics.TASK_STATE.columns)}
 
 
 @pytest.fixture(scope="module")
@@ -103,7 +102,7 @@ def test_a_late_display_slows_the_operator_down() -> None:
 def test_only_the_operator_reads_the_display_wherever_it_stands() -> None:
     for stages in (["display", "network"], ["network", "display"]):
         graph = tc.build_graph(stages=stages)
-        found = {link.reader.name: link.topic.name for link in graph.links if link.port == SLAVE_MEASURED_CP}
+        found = {link.reader.name: link.topic.name for link in graph.links if link.port == topics.SLAVE_MEASURED_CP}
         assert found["operator"] == "display/measured_cp"
         assert found["display"] == "network/measured_cp"
         assert "display/measured_cp" not in {v for k, v in found.items() if k != "operator"}
@@ -138,7 +137,7 @@ def test_a_goal_that_nobody_foresees_stays_in_its_bounds_and_comes_again_after_i
 
 def place_of(p: FollowParameters, time: float) -> np.ndarray:
     """Where its goal is at a time [s], for a task that began at the origin at 0."""
-    memory, state, scene = np.zeros(MEMORY), np.zeros(len(TASK_STATE.columns)), np.zeros(len(SCENE))
+    memory, state, scene = np.zeros(MEMORY), np.zeros(len(topics.TASK_STATE.columns)), np.zeros(len(SCENE))
     FOLLOW.judge(numbers_of(p), memory, scene, state)
     scene[0] = time
     FOLLOW.judge(numbers_of(p), memory, scene, state)

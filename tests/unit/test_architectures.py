@@ -8,14 +8,11 @@ import pytest
 from numpy.typing import NDArray
 
 import teleop_core as tc
-from teleop_core.base.errors import PartError, UnknownNameError
-from teleop_core.base.parameters import build
+from teleop_core.base import PartError, UnknownNameError, build
 from teleop_core.chain.mapping.parameters import MotionScalingParameters
-from teleop_core.graph.signals import STATE
-from teleop_core.kernels import kernel
-from teleop_core.kernels.geometry import Array
-from teleop_core.session.configuration import configure
-from teleop_core.session.virtual import VirtualTime
+from teleop_core.graph import STATE
+from teleop_core.kernels import Array, kernel
+from teleop_core.session import configuration, virtual
 
 pytestmark = pytest.mark.usefixtures("own_parts")
 CALM = ("reach_force.is_on=false", "reflection.max_force=10.0")
@@ -23,7 +20,7 @@ CALM = ("reach_force.is_on=false", "reflection.max_force=10.0")
 
 def pressing(*texts: str, ticks: int = 14_000) -> NDArray[np.void]:
     """Signals of the scenario ``palpation``."""
-    return VirtualTime(configure("palpation", settings=[*CALM, *texts])).run(ticks)
+    return virtual.VirtualTime(configuration.configure("palpation", settings=[*CALM, *texts])).run(ticks)
 
 
 def on_the_slave(force: Array) -> Array:
@@ -99,7 +96,7 @@ def test_a_spring_softer_than_the_grip_throws_no_hand_that_force_does() -> None:
 @pytest.mark.parametrize(("kind", "silent"), [("position_force", "cf"), ("position_position", "cp")])
 def test_what_falls_silent_fades_within_a_tenth_of_a_second(kind: str, silent: str) -> None:
     chosen = [*CALM, f"reflection.architecture={kind}", "feedback_timeout=0.05"]
-    session = VirtualTime(configure("palpation", settings=chosen))
+    session = virtual.VirtualTime(configuration.configure("palpation", settings=chosen))
     stage, pushes = session.stages["motion_scaling"], []
     row = stage.signals
     session.run(11_600)
@@ -118,7 +115,7 @@ def test_what_falls_silent_fades_within_a_tenth_of_a_second(kind: str, silent: s
 
 
 def test_another_architecture_sets_in_from_nothing_within_a_tenth_of_a_second() -> None:
-    session = VirtualTime(configure("palpation", settings=[*CALM]))
+    session = virtual.VirtualTime(configuration.configure("palpation", settings=[*CALM]))
     session.run(11_600)
     stage = session.stages["motion_scaling"]
     chosen = {"reflection.architecture": "position_position", "reach_force.is_on": False}
@@ -158,4 +155,4 @@ def test_an_architecture_that_cannot_work_is_refused_before_anything_runs(wrong:
 
 def test_an_unknown_architecture_is_refused_with_those_there_are() -> None:
     with pytest.raises(UnknownNameError, match="position_position"):
-        configure("palpation", settings=["reflection.architecture=five_channel"])
+        configuration.configure("palpation", settings=["reflection.architecture=five_channel"])

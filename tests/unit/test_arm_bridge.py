@@ -12,14 +12,11 @@ import pytest
 import yaml
 
 from present import present
-from teleop_core.base.errors import ParameterError
-from teleop_core.base.parameters import build
+from teleop_core.base import ParameterError, build
 from teleop_core.robots import load_robot
 from teleop_core.session.configuration import configure
-from teleop_core.slave.bridges import BRIDGES, Command
-from teleop_core.slave.bridges.arm_bridge import RATES, ArmBridge, ArmBridgeParameters
+from teleop_core.slave.bridges import BRIDGES, Command, arm_bridge, leading
 from teleop_core.slave.bridges.hearing import Hearing, Sample, Wrong
-from teleop_core.slave.bridges.leading import Lead
 from teleop_core.slave.bridges.names import JointMap
 from teleop_core.slave.operation.states import State
 from teleop_core.slave.slave import SlaveParameters
@@ -43,8 +40,8 @@ def sample(
     return Sample(names, position, velocity, (), stamp_ms * MS)
 
 
-def lead() -> Lead:
-    return Lead(-np.ones(2), np.ones(2), SPEED, 0.02, 0.002)
+def lead() -> leading.Lead:
+    return leading.Lead(-np.ones(2), np.ones(2), SPEED, 0.02, 0.002)
 
 
 def test_a_command_in_the_arms_order_and_signs_is_measured_as_what_was_commanded() -> None:
@@ -148,13 +145,13 @@ def test_brakes_bring_the_command_to_where_the_arm_was_and_leave_it_there() -> N
     assert not led.is_leading
 
 
-def bridge(**values: int) -> ArmBridge:
-    made = ArmBridge(build(ArmBridgeParameters, values))
+def bridge(**values: int) -> arm_bridge.ArmBridge:
+    made = arm_bridge.ArmBridge(build(arm_bridge.ArmBridgeParameters, values))
     made.signals["slave_operation"][0] = 1.0
     return made
 
 
-def home_sample(made: ArmBridge, stamp_ns: int) -> Sample:
+def home_sample(made: arm_bridge.ArmBridge, stamp_ns: int) -> Sample:
     return Sample(made.joints.theirs, made.signals["slave_setpoint_js"].tolist(), (), (), stamp_ns)
 
 
@@ -220,7 +217,7 @@ def test_an_arm_that_the_server_left_behind_is_not_passed_on_while_it_is_enabled
 def test_an_arm_that_was_left_behind_at_its_last_command_goes_the_rest_slowly_and_is_led_again(moved: float) -> None:
     made, now = bridge(), 10**9
     made.signals["slave_operation"][0] = State.ENABLED
-    setpoint, robot = made.signals["slave_setpoint_js"], load_robot(ArmBridgeParameters().robot)
+    setpoint, robot = made.signals["slave_setpoint_js"], load_robot(arm_bridge.ArmBridgeParameters().robot)
     speed = present(robot.drives).speed_limit
     setpoint[:] = at = robot.home.copy()
 
@@ -244,7 +241,7 @@ def test_an_arm_that_was_left_behind_at_its_last_command_goes_the_rest_slowly_an
     assert heard[-1] == made.lead_arm.is_leading == (not moved)
 
 
-@pytest.mark.parametrize("rate", RATES)
+@pytest.mark.parametrize("rate", arm_bridge.RATES)
 def test_commands_go_out_at_the_rate_that_was_asked_for(rate: int) -> None:
     made = bridge(rate=rate)
     assert sum(made.is_due(i * MS) for i in range(1000)) == rate
@@ -252,7 +249,7 @@ def test_commands_go_out_at_the_rate_that_was_asked_for(rate: int) -> None:
 
 def test_a_rate_between_whole_milliseconds_is_refused() -> None:
     with pytest.raises(ParameterError, match="rate"):
-        build(ArmBridgeParameters, {"rate": 300})
+        build(arm_bridge.ArmBridgeParameters, {"rate": 300})
 
 
 def blank(_: str = "") -> SimpleNamespace:
@@ -283,7 +280,7 @@ def test_every_kind_writes_the_positions_in_the_order_of_its_names(name: str) ->
 def test_the_configuration_of_each_arm_has_parameters_that_exist(file: Path) -> None:
     groups = {k: v["ros__parameters"] for k, v in yaml.safe_load(file.read_text()).items()}
     common = groups["/**"]
-    made = build(ArmBridgeParameters, common | groups["arm_bridge"])
+    made = build(arm_bridge.ArmBridgeParameters, common | groups["arm_bridge"])
     led = build(SlaveParameters, common | groups["slave"])
     assert not made.order or len(made.order) == len(led.start)
     assert not led.operation.starts_enabled

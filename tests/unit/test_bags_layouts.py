@@ -9,37 +9,35 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from present import present
-from teleop_core.bags import ros_types
+from teleop_core.bags import messages, ros_types
 from teleop_core.bags.layouts import Layout, discover, layout, layout_of
-from teleop_core.bags.messages import Refusal, read_values
-from teleop_core.base.errors import ShapeError
+from teleop_core.base import ShapeError
 from teleop_core.graph import topics
-from teleop_core.graph.topics import Kind
 from teleop_core.kernels.geometry import Array
 
 JOINTS = ("theta1", "d2", "a_rather_long_joint_name")
 NAMES = st.text(st.characters(codec="utf-8", exclude_characters="\0"), min_size=1, max_size=9)
-FIXED = [kind for kind in Kind if kind is not Kind.REPORT]
+FIXED = [kind for kind in topics.Kind if kind is not topics.Kind.REPORT]
 
 
-def names_of(kind: Kind) -> tuple[str, ...]:
+def names_of(kind: topics.Kind) -> tuple[str, ...]:
     """Names of the joints that its messages have."""
-    return topics.JAW if kind is Kind.JAW else JOINTS
+    return topics.JAW if kind is topics.Kind.JAW else JOINTS
 
 
-def rosbags_message(kind: Kind, stamp_ns: int, values: Array, names: tuple[str, ...], frame_id: str) -> object:
+def rosbags_message(kind: topics.Kind, stamp_ns: int, values: Array, names: tuple[str, ...], frame_id: str) -> object:
     """The same message made by rosbags."""
     t = ros_types.typestore().types
     header = t["std_msgs/msg/Header"](t["builtin_interfaces/msg/Time"](*divmod(stamp_ns, 10**9)), frame_id)
     point, turn, vector = (t[f"geometry_msgs/msg/{n}"] for n in ("Point", "Quaternion", "Vector3"))
     v, kind_type = values.tolist(), t[kind.ros_type]
-    if kind is Kind.POSE:
+    if kind is topics.Kind.POSE:
         pose = t["geometry_msgs/msg/Pose"](point(*v[:3]), turn(*v[4:], v[3]))
         return kind_type(header, pose)
-    if kind in {Kind.TWIST, Kind.WRENCH}:
-        part = t["geometry_msgs/msg/" + ("Twist" if kind is Kind.TWIST else "Wrench")]
+    if kind in {topics.Kind.TWIST, topics.Kind.WRENCH}:
+        part = t["geometry_msgs/msg/" + ("Twist" if kind is topics.Kind.TWIST else "Wrench")]
         return kind_type(header, part(vector(*v[:3]), vector(*v[3:])))
-    if kind is Kind.BUTTONS:
+    if kind is topics.Kind.BUTTONS:
         return kind_type(header, np.zeros(0, np.float32), values.astype(np.int32))
     parts = [values[i * len(names) : (i + 1) * len(names)] for i in range(3)]
     return kind_type(header, list(names), *parts)
@@ -49,12 +47,12 @@ def rosbags_message(kind: Kind, stamp_ns: int, values: Array, names: tuple[str, 
 def streams(draw: st.DrawFn) -> tuple[Layout, NDArray[np.int64], Array]:
     """A layout with stamps and values that fit it."""
     kind = draw(st.sampled_from(FIXED))
-    most = 1 if kind is Kind.JAW else 7
+    most = 1 if kind is topics.Kind.JAW else 7
     names = tuple(draw(st.lists(NAMES, min_size=1, max_size=most, unique=True)))
     form = layout_of(kind, names, draw(NAMES | st.just("")))
     count = draw(st.integers(1, 4))
     stamps = draw(st.lists(st.integers(0, 2**31 * 10**9 - 1), min_size=count, max_size=count))
-    number = st.integers(-(2**31), 2**31 - 1) if kind is Kind.BUTTONS else st.floats(width=64)
+    number = st.integers(-(2**31), 2**31 - 1) if kind is topics.Kind.BUTTONS else st.floats(width=64)
     rows = [draw(st.lists(number, min_size=form.width, max_size=form.width)) for _ in stamps]
     return form, np.array(stamps, np.int64), np.array(rows, float)
 
@@ -105,8 +103,8 @@ def test_reading_by_attribute_agrees_with_reading_bytes(stream: tuple[Layout, ND
     form, stamps, values = stream
     data = form.encode_one(int(stamps[0]), values[0])
     message = ros_types.deserialise(data, form.kind.ros_type)
-    result = read_values(form.kind, message, form.joint_names)
-    assert not isinstance(result, Refusal)
+    result = messages.read_values(form.kind, message, form.joint_names)
+    assert not isinstance(result, messages.Refusal)
     assert result[0] == stamps[0]
     np.testing.assert_array_equal(result[1], values[0])
 
@@ -140,7 +138,7 @@ def test_messages_serialised_by_rclpy_are_understood() -> None:
         "0001000001000000020000000b000000736c6176655f62617365000002000000020000006100000003000000"
         "6262000002000000000000000000f03f00000000000000400000000000000000000000007d127402"
     )
-    found = discover(Kind.JOINTS, positions)
+    found = discover(topics.Kind.JOINTS, positions)
     assert found is not None
     assert (found.joint_names, found.frame_id) == (("a", "bb"), "slave_base")
     stamp_ns, values = present(found.decode_one(positions))
@@ -149,7 +147,7 @@ def test_messages_serialised_by_rclpy_are_understood() -> None:
 
 
 @pytest.mark.parametrize("kind", FIXED)
-def test_padding_may_hold_anything_since_rclpy_does_not_clear_it(kind: Kind) -> None:
+def test_padding_may_hold_anything_since_rclpy_does_not_clear_it(kind: topics.Kind) -> None:
     form = layout_of(kind, names_of(kind), "slave_base")
     values = np.arange(form.width, dtype=float)
     clean = form.encode_one(7, values)
@@ -166,7 +164,7 @@ def test_padding_may_hold_anything_since_rclpy_does_not_clear_it(kind: Kind) -> 
 
 
 @pytest.mark.parametrize("kind", FIXED)
-def test_a_message_cut_short_is_not_decoded(kind: Kind) -> None:
+def test_a_message_cut_short_is_not_decoded(kind: topics.Kind) -> None:
     form = layout_of(kind, names_of(kind), "slave_base")
     data = form.encode_one(7, np.zeros(form.width))
     for length in range(len(data)):
@@ -192,6 +190,6 @@ def test_reports_have_no_layout() -> None:
 
 
 def test_positions_alone_are_not_taken_for_a_whole_state() -> None:
-    state = layout_of(Kind.STATE, JOINTS, "f")
-    data = layout_of(Kind.JOINTS, JOINTS, "f").encode_one(1, np.zeros(3))
+    state = layout_of(topics.Kind.STATE, JOINTS, "f")
+    data = layout_of(topics.Kind.JOINTS, JOINTS, "f").encode_one(1, np.zeros(3))
     assert state.decode_one(data + bytes(200)) is None

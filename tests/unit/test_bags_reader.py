@@ -19,9 +19,8 @@ from teleop_core.bags import ros_types
 from teleop_core.bags.messages import layout, layout_of, report
 from teleop_core.bags.reader import Bag, recover
 from teleop_core.bags.writer import BagWriter
-from teleop_core.base.errors import RecordingError
+from teleop_core.base import RecordingError
 from teleop_core.graph import topics
-from teleop_core.graph.topics import Kind, Topic
 from teleop_core.kernels.geometry import Array
 
 JOINTS = ("a", "b", "c")
@@ -29,7 +28,7 @@ MS = 1_000_000
 STREAMS = (topics.SLAVE_MEASURED_CP, topics.SLAVE_MEASURED_JS, topics.MASTER_BUTTONS)
 
 
-def samples(count: int = 60) -> tuple[NDArray[np.int64], dict[Topic, Array]]:
+def samples(count: int = 60) -> tuple[NDArray[np.int64], dict[topics.Topic, Array]]:
     """Stamps, and values per topic, of one recording."""
     rng = np.random.default_rng(5)
     values = {topic: rng.normal(size=(count, topic.width(3))).round(3) for topic in STREAMS}
@@ -63,7 +62,7 @@ def foreign(
         for i, stamp in enumerate(stamps.tolist()):
             for topic, channel in channels.items():
                 row = values[topic][i]
-                if topic.kind is Kind.STATE:
+                if topic.kind is topics.Kind.STATE:
                     row = row.reshape(3, -1)[:, order].ravel()
                 data = layout(topic, joint_names, frame_id).encode_one(stamp, row)
                 writer.add_message(channel, stamp, data, stamp)
@@ -131,7 +130,7 @@ def test_a_recording_of_rosbags_is_read_with_joints_of_changing_order(tmp_path: 
         for i in range(10):
             names = orders[i % 2]
             row = np.array([JOINTS.index(name) + i for name in names] * 3, float)
-            data = layout_of(Kind.STATE, names, "x" * i).encode_one(i * MS, row)
+            data = layout_of(topics.Kind.STATE, names, "x" * i).encode_one(i * MS, row)
             writer.write(connection, i * MS, data)
     series = Bag(path).read(topics.SLAVE_MEASURED_JS)
     assert series.names == ("a", "b", "c")
@@ -152,7 +151,7 @@ def test_a_topic_unknown_to_us_is_read_by_its_type(tmp_path: Path) -> None:
         writer = Writer(file)
         writer.start("ros2")
         schema = writer.register_schema("sensor_msgs/msg/JointState", "ros2msg", b"")
-        for topic, kind in (("/arm/positions", Kind.JOINTS), ("/arm/state", Kind.STATE)):
+        for topic, kind in (("/arm/positions", topics.Kind.JOINTS), ("/arm/state", topics.Kind.STATE)):
             channel = writer.register_channel(topic, "cdr", schema)
             data = layout_of(kind, JOINTS, "").encode_one(4, np.arange(kind.width(3), dtype=float))
             writer.add_message(channel, 5, data, 5)

@@ -23,15 +23,11 @@ from rosbags.interfaces import QosDurability, QosReliability
 from rosbags.rosbag2 import Reader
 
 from present import present
-from teleop_core.bags import ros_types
-from teleop_core.bags.messages import layout, report
+from teleop_core.bags import messages, recording, ros_types
 from teleop_core.bags.reader import Bag
-from teleop_core.bags.recording import RecordingParameters
 from teleop_core.bags.writer import BagWriter
-from teleop_core.base.errors import ParameterError, RecordingError, ShapeError, UnknownNameError
-from teleop_core.base.parameters import build
+from teleop_core.base import ParameterError, RecordingError, ShapeError, UnknownNameError, build
 from teleop_core.graph import topics
-from teleop_core.graph.topics import Topic
 from teleop_core.kernels.geometry import Array
 
 JOINTS = ("a", "b", "c")
@@ -46,7 +42,7 @@ def rng() -> np.random.Generator:
 
 def block(
     rng: Any, begin: int, count: int, chosen: Any = topics.STREAMS
-) -> dict[Topic, tuple[NDArray[np.int64], Array, NDArray[np.int64]]]:
+) -> dict[topics.Topic, tuple[NDArray[np.int64], Array, NDArray[np.int64]]]:
     """Samples of one block; stamps lie a little before log times."""
     log_ns = np.arange(begin, begin + count) * MS + 10
     return {
@@ -61,7 +57,7 @@ def record(path: Path, rng: np.random.Generator, blocks: int = 3, count: int = 5
     with BagWriter(path, topics.ALL, JOINTS, **options) as writer:
         for number in range(blocks):
             begin = number * count
-            data = report(begin * MS, "scaling", 0, "fine", {"mode": str(number)})
+            data = messages.report(begin * MS, "scaling", 0, "fine", {"mode": str(number)})
             writer.write(topics.TELEOP_STATE, begin * MS + 20, data)
             writer.write_block(block(rng, begin, count))
         return writer.counts
@@ -84,7 +80,7 @@ def test_rosbags_reads_every_value_that_was_written(tmp_path: Path, rng: np.rand
             assert ros_types.serialise(message) == bytes(data)
             found[connection.topic[1:]].append((log_ns, bytes(data)))
     for topic, (stamps, values, logs) in written.items():
-        rows = layout(topic, JOINTS).encode(stamps, values)
+        rows = messages.layout(topic, JOINTS).encode(stamps, values)
         assert found[topic.name] == [(t, r.tobytes()) for t, r in zip(logs, rows, strict=True)]
 
 
@@ -126,7 +122,7 @@ def test_streams_out_of_step_stand_at_their_times_among_the_others(
     with BagWriter(path, topics.ALL, JOINTS, compression="none") as writer:
         for number, tick in enumerate(sorted(at)):
             log = begin_ns + tick * MS
-            writer.write(topics.DIAGNOSTICS, log, report(log, "a", 0, str(number), {}))
+            writer.write(topics.DIAGNOSTICS, log, messages.report(log, "a", 0, str(number), {}))
             expected.append((log, len(chosen), "diagnostics"))
         writer.write_block(samples)
     if not expected:
@@ -247,10 +243,10 @@ def test_every_nth_sample_is_recorded_whatever_the_blocks(
     tmp_path_factory: pytest.TempPathFactory, every: int, of: int, sizes: list[int]
 ) -> None:
     path = tmp_path_factory.mktemp("every") / "bag"
-    options = RecordingParameters(every=every, every_of=(f"slave/measured_js={of}",))
+    options = recording.RecordingParameters(every=every, every_of=(f"slave/measured_js={of}",))
     rng, begin = np.random.default_rng(1), 0
     with BagWriter(path, topics.ALL, JOINTS, parameters=options) as writer:
-        writer.write(topics.DIAGNOSTICS, 0, report(0, "a", 0, "b", {}))
+        writer.write(topics.DIAGNOSTICS, 0, messages.report(0, "a", 0, "b", {}))
         for size in sizes:
             writer.write_block(block(rng, begin, size))
             begin += size
@@ -263,19 +259,19 @@ def test_every_nth_sample_is_recorded_whatever_the_blocks(
 
 
 def test_single_messages_are_thinned_out_like_samples_of_blocks(tmp_path: Path) -> None:
-    form = layout(topics.SLAVE_MEASURED_CP, JOINTS)
-    options = RecordingParameters(every=4)
+    form = messages.layout(topics.SLAVE_MEASURED_CP, JOINTS)
+    options = recording.RecordingParameters(every=4)
     with BagWriter(tmp_path / "bag", topics.ALL, JOINTS, parameters=options) as writer:
         for i in range(10):
             writer.write(topics.SLAVE_MEASURED_CP, i, form.encode_one(i, np.zeros(7)))
-            writer.write(topics.DIAGNOSTICS, i, report(i, "a", 0, "b", {}))
+            writer.write(topics.DIAGNOSTICS, i, messages.report(i, "a", 0, "b", {}))
     bag = Bag(tmp_path / "bag")
     np.testing.assert_array_equal(bag.read(topics.SLAVE_MEASURED_CP).stamp_ns, [0, 4, 8])
     assert bag.topics["diagnostics"].count == 10
 
 
 def test_only_chosen_topics_are_recorded(tmp_path: Path, rng: np.random.Generator) -> None:
-    options = RecordingParameters(topics=("slave/measured_cp", "teleop/state"))
+    options = recording.RecordingParameters(topics=("slave/measured_cp", "teleop/state"))
     counts = record(tmp_path / "bag", rng, parameters=options)
     assert counts == {"slave/measured_cp": 150, "teleop/state": 3}
     assert set(Bag(tmp_path / "bag").topics) == set(counts)
@@ -283,7 +279,7 @@ def test_only_chosen_topics_are_recorded(tmp_path: Path, rng: np.random.Generato
 
 @pytest.mark.parametrize("values", [{"topics": ("slave/measured",)}, {"every_of": ("slave=2",)}])
 def test_topics_that_nobody_announced_are_refused_and_leave_no_folder(tmp_path: Path, values: dict[str, Any]) -> None:
-    parameters = RecordingParameters(**values)
+    parameters = recording.RecordingParameters(**values)
     with pytest.raises(UnknownNameError, match=r"one of: .*slave/\w+, "):
         BagWriter(tmp_path / "bag", topics.ALL, JOINTS, parameters=parameters)
     assert not (tmp_path / "bag").exists()
@@ -302,9 +298,9 @@ def test_recording_parameters_out_of_range_are_refused(
     values: Mapping[str, Any], error: type[ParameterError], named: str
 ) -> None:
     with pytest.raises(error, match=named):
-        build(RecordingParameters, values)
+        build(recording.RecordingParameters, values)
     with pytest.raises(error, match=named):
-        RecordingParameters(**values)
+        recording.RecordingParameters(**values)
 
 
 def test_an_existing_recording_is_never_overwritten(tmp_path: Path, rng: np.random.Generator) -> None:
@@ -327,7 +323,7 @@ def test_a_recording_is_finished_when_the_session_fails(tmp_path: Path, rng: np.
     def fail() -> None:
         with BagWriter(tmp_path / "bag", topics.ALL, JOINTS) as writer:
             writer.write_block(block(rng, 0, 10))
-            writer.write(topics.DIAGNOSTICS, 5, report(5, "a", 2, "broken", {}))
+            writer.write(topics.DIAGNOSTICS, 5, messages.report(5, "a", 2, "broken", {}))
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
@@ -391,7 +387,7 @@ def test_a_message_that_cannot_be_stored_does_not_cost_those_before_it(
 
 
 def test_live_messages_wait_for_a_chunk_no_longer_than_a_second_of_log_time(tmp_path: Path) -> None:
-    data = layout(topics.SLAVE_MEASURED_CP, JOINTS).encode_one(0, np.zeros(7))
+    data = messages.layout(topics.SLAVE_MEASURED_CP, JOINTS).encode_one(0, np.zeros(7))
     with BagWriter(tmp_path / "bag", topics.ALL, JOINTS) as writer:
         for i in range(2500):
             writer.write(topics.SLAVE_MEASURED_CP, i * MS, data, publish_ns=i)

@@ -10,18 +10,16 @@ from numpy.typing import NDArray
 
 from present import present
 from teleop_core.bags.cdr import template
-from teleop_core.base.errors import ParameterError
-from teleop_core.base.parameters import build
+from teleop_core.base import ParameterError, build
 from teleop_core.chain.network.network import NETWORK, NetworkLink
 from teleop_core.chain.network.packet_size import HEADER, message_size
 from teleop_core.chain.network.parameters import NetworkParameters
-from teleop_core.graph.topics import SLAVE_SERVO_CP, Topic
+from teleop_core.graph import topics
 from teleop_core.kernels.geometry import Array
-from teleop_core.session.configuration import configure
-from teleop_core.session.virtual import VirtualTime
+from teleop_core.session import configuration, virtual
 
 MS = 1_000_000
-BITS = 8 * (HEADER + message_size(SLAVE_SERVO_CP))
+BITS = 8 * (HEADER + message_size(topics.SLAVE_SERVO_CP))
 """Of a packet to the slave that carries a command alone."""
 
 
@@ -67,7 +65,7 @@ def departures(sent: NDArray[np.int64], service: float) -> Array:
 
 
 @pytest.mark.parametrize("topic", [*NETWORK.reads, *NETWORK.writes], ids=lambda topic: topic.name)
-def test_a_message_has_the_size_with_which_it_is_recorded(topic: Topic) -> None:
+def test_a_message_has_the_size_with_which_it_is_recorded(topic: topics.Topic) -> None:
     recorded = template(topic.kind, topic.names(()), topic.frame_id).template
     assert message_size(topic) == len(recorded)
 
@@ -156,13 +154,13 @@ def test_a_session_over_a_narrow_line_scores_its_losses_and_repeats_to_the_bit()
         f"network.there.bandwidth={500 * BITS}",
         "network.there.queue=1",
     ]
-    rows = VirtualTime(configure("free_motion", settings=given)).run(6000)
+    rows = virtual.VirtualTime(configuration.configure("free_motion", settings=given)).run(6000)
     state = rows["network_state"][-1]
     assert state[1] / state[0] == pytest.approx(0.5, abs=0.01)
     ages = (rows["now_ns"] - rows["network_servo_cp_ns"])[3000:] / MS
     assert 2.0 <= ages.min() <= ages.max() <= 5.0
     assert rows["teleop_state"][-2000:, 0].all()
-    again = VirtualTime(configure("free_motion", settings=given)).run(6000)
+    again = virtual.VirtualTime(configuration.configure("free_motion", settings=given)).run(6000)
     assert all((rows[name] == again[name]).all() for name in present(rows.dtype.names))
 
 

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from numba.core import runtime
 
-from teleop_core.kernels import IS_COMPILED, inner, kernel
-from teleop_core.kernels.geometry import Array
+from teleop_core.kernels import IS_COMPILED, Array, inner, kernel
 
 pytestmark = pytest.mark.skipif(not IS_COMPILED, reason="looks at compiled code")
 

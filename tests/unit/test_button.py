@@ -11,8 +11,7 @@ import teleop_core as tc
 from led_tip import PIECES, along_z, lead, wandering
 from teleop_core.base.errors import ParameterError
 from teleop_core.kernels.geometry import Array
-from teleop_core.session.configuration import configure
-from teleop_core.session.virtual import VirtualTime
+from teleop_core.session import configuration, virtual
 from teleop_core.slave.world.button import BUTTON, ButtonParameters, count_presses
 
 STOP = 20_000.0  # stiffness of the stop [N/m]
@@ -141,7 +140,7 @@ def test_no_motion_gets_energy_from_a_button(
 
 def test_a_session_counts_what_its_score_counts() -> None:
     texts = {"world": "button", "world.material": "silicone"}
-    session = VirtualTime(configure("palpation", settings=[f"{k}={v}" for k, v in texts.items()]))
+    session = virtual.VirtualTime(configuration.configure("palpation", settings=[f"{k}={v}" for k, v in texts.items()]))
     session.run(24_000)
     stage: Any
     stage, score = session.stages["slave_sim"], tc.run("palpation", settings=texts).score()
@@ -175,5 +174,5 @@ def test_its_outline_lies_on_the_post_and_on_the_stop() -> None:
 )
 def test_numbers_that_no_button_has_are_refused_by_name(texts: list[str], name: str) -> None:
     with pytest.raises(ParameterError, match=name) as error:
-        configure("palpation", settings=["world=button", *texts])
+        configuration.configure("palpation", settings=["world=button", *texts])
     assert "\n" not in str(error.value)

@@ -24,15 +24,11 @@ from random_arms import (
     wrist_axes,
 )
 from real_arms import urdf_of
-from teleop_core.kernels import kernel
-from teleop_core.kernels.geometry import Array
-from teleop_core.robots import IkStatus, load_robot
+from teleop_core.kernels import Array, kernel
+from teleop_core.robots import IkStatus, dexterity, load_robot
 from teleop_core.robots.arms.as_chain import chain_of
 from teleop_core.robots.branches import turn
-from teleop_core.robots.closed_form import swivel
-from teleop_core.robots.closed_form.candidates import constants_at
-from teleop_core.robots.closed_form.swivel_arcs import ARCS, MARGIN, cut_circle, swivel_of
-from teleop_core.robots.dexterity import manipulability
+from teleop_core.robots.closed_form import candidates, swivel, swivel_arcs
 from teleop_core.robots.kinematics import IkResult
 from teleop_core.robots.robot import Robot
 
@@ -297,9 +293,9 @@ def test_the_arcs_of_the_swivel_hold_a_legal_posture_without_any_search(seed: in
 def psi_of(branch: Any, elbow: Any, seed: Array, limits: Array, geometry: Array, work: Array) -> float:
     """Psi [rad] that is taken of a branch; infinity where none is legal."""
     S, W = work[16 + 20 * elbow : 25 + 20 * elbow], work[25 + 20 * elbow : 34 + 20 * elbow]
-    K, arcs = geometry[constants_at(7) :], np.empty(ARCS)
-    cut_circle(S, W, K, limits, arcs)
-    return swivel_of(branch, S, W, K, seed, limits, arcs)
+    K, arcs = geometry[candidates.constants_at(7) :], np.empty(swivel_arcs.ARCS)
+    swivel_arcs.cut_circle(S, W, K, limits, arcs)
+    return swivel_arcs.swivel_of(branch, S, W, K, seed, limits, arcs)
 
 
 @kernel
@@ -308,7 +304,7 @@ def write_at(
 ) -> None:
     """Write the joints (8,) of a branch at psi [rad], by whole turns into limits if any are."""
     S, W = work[16 + 20 * elbow : 25 + 20 * elbow], work[25 + 20 * elbow : 34 + 20 * elbow]
-    K, M, angles = geometry[constants_at(7) :], work[8:12], work[12:14]
+    K, M, angles = geometry[candidates.constants_at(7) :], work[8:12], work[12:14]
     swivel._write(S, W, psi, K, seed, M, angles, q, branch)
     turn(q, seed, limits, 0, 7)
 
@@ -324,7 +320,7 @@ def test_no_legal_swivel_is_nearer_to_the_seed_than_the_answer_less_its_margin(l
             for elbow, branch in np.ndindex(2, 4):
                 psi = psi_of(branch, elbow, seed, limits, row, work)
                 legal += math.isfinite(psi)
-                for at in scan[abs(scan) < abs(psi) - MARGIN - 1e-9]:
+                for at in scan[abs(scan) < abs(psi) - swivel_arcs.MARGIN - 1e-9]:
                     write_at(branch, at, elbow, seed, limits, row, work, found[8])
                     joints = found[8, others]
                     is_in = (joints >= arm.lower[others]) & (joints <= arm.upper[others])
@@ -375,7 +371,7 @@ def past_singular(rng: np.random.Generator, flat: int, beside: int) -> Array:
 
 def least_manipulability(arm: Robot, joints: Array) -> float:
     reach = arm.geometry["reach"]
-    return min(manipulability(arm, q, reach) for q in joints[::20])
+    return min(dexterity.manipulability(arm, q, reach) for q in joints[::20])
 
 
 @pytest.mark.parametrize(("flat", "beside"), [(1, 2), (5, 4)], ids=["shoulder", "wrist"])

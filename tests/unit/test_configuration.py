@@ -7,9 +7,8 @@ from typing import Any
 import pytest
 import yaml
 
-from teleop_core.base.errors import ParameterError, TeleopError, UnknownNameError
-from teleop_core.graph import layers
-from teleop_core.graph.graph import BUILT_IN, RECORDER_NAME
+from teleop_core.base import ParameterError, TeleopError, UnknownNameError
+from teleop_core.graph import BUILT_IN, RECORDER_NAME, layers
 from teleop_core.session.configuration import Configuration, configure
 
 SCENARIOS = ("coarse_box", "fine_box", "free_motion", "mode_switching")

@@ -11,27 +11,23 @@ import pytest
 from held_master import HeldMaster
 from recipes import Recipe
 from teleop_core.base.parameters import build
-from teleop_core.chain.mapping.parameters import FixtureParameters
-from teleop_core.chain.mapping.walls import passive_stiffness
+from teleop_core.chain.mapping import parameters, walls
+from teleop_core.chain.master import hand_mechanics, haptic_master
 from teleop_core.chain.master.device import DeviceParameters
-from teleop_core.chain.master.hand_mechanics import HandParameters
-from teleop_core.chain.master.haptic_master import HapticMasterParameters
 from teleop_core.chain.operators.parameters import OperatorParameters
 from teleop_core.chain.operators.rest import REST_POSITION
-from teleop_core.evaluation.score import Score
-from teleop_core.evaluation.scoring import evaluate
+from teleop_core.evaluation import Score, evaluate
 from teleop_core.graph.topics import MASTER_CONTACT
 from teleop_core.kernels.geometry import Array
-from teleop_core.session.api import configuration
-from teleop_core.session.notes import notes_of, passive_note, rendered_note
+from teleop_core.session import api, notes
 
 COLUMN = {name: index for index, name in enumerate(MASTER_CONTACT.columns)}
-CALM = HandParameters()
+CALM = hand_mechanics.HandParameters()
 STILL = build(OperatorParameters, {"kind": "hold", "rotation": 0.0, "tremor_amplitude": 0.0, "patience": 0.0})
 
 
-def master(hand: HandParameters = CALM, **device: Any) -> HeldMaster:
-    return HeldMaster(STILL, HapticMasterParameters(hand=hand, device=DeviceParameters(**device)))
+def master(hand: hand_mechanics.HandParameters = CALM, **device: Any) -> HeldMaster:
+    return HeldMaster(STILL, haptic_master.HapticMasterParameters(hand=hand, device=DeviceParameters(**device)))
 
 
 def push(device: HeldMaster, forces: Array) -> Iterator[Any]:
@@ -203,7 +199,7 @@ def test_recording_that_does_not_tell_of_contacts_says_so(tmp_path: Path) -> Non
 def test_a_wall_stiffer_than_the_device_is_told_with_what_the_hand_feels(
     settings: Mapping[str, Any], told: str
 ) -> None:
-    note = rendered_note(DeviceParameters(), FixtureParameters(**settings))
+    note = notes.rendered_note(DeviceParameters(), parameters.FixtureParameters(**settings))
     assert told in note
     assert bool(note) is bool(told)
 
@@ -217,44 +213,44 @@ HELD = ((1000.0, 0.0), (333.0, 1e-3), (140.0, 3e-3))
 
 @pytest.mark.parametrize(("stiffness", "delay"), BROKEN)
 def test_walls_that_were_seen_to_feed_a_hand_are_told(stiffness: float, delay: float) -> None:
-    fixture = FixtureParameters(stiffness=stiffness)
-    assert "may give back more energy than it took" in passive_note(DEVICE, fixture, delay)
+    fixture = parameters.FixtureParameters(stiffness=stiffness)
+    assert "may give back more energy than it took" in notes.passive_note(DEVICE, fixture, delay)
 
 
 @pytest.mark.parametrize(("stiffness", "delay"), HELD)
 def test_walls_within_what_is_passive_are_not_told(stiffness: float, delay: float) -> None:
-    assert not passive_note(DEVICE, FixtureParameters(stiffness=stiffness), delay)
+    assert not notes.passive_note(DEVICE, parameters.FixtureParameters(stiffness=stiffness), delay)
 
 
 @pytest.mark.parametrize("wall", ["source", "soft", "step"])
 def test_a_wall_without_damping_is_told_whatever_its_stiffness(wall: str) -> None:
-    assert "it is not damped" in passive_note(DEVICE, FixtureParameters(wall=wall), 0.0)
+    assert "it is not damped" in notes.passive_note(DEVICE, parameters.FixtureParameters(wall=wall), 0.0)
     for silent in ({"max_force": 0.0}, {"side": "slave"}):  # the hand feels nothing
-        assert not passive_note(DEVICE, FixtureParameters(wall=wall, **silent), 0.0)
-        assert not rendered_note(DEVICE, FixtureParameters(wall=wall, **silent))
+        assert not notes.passive_note(DEVICE, parameters.FixtureParameters(wall=wall, **silent), 0.0)
+        assert not notes.rendered_note(DEVICE, parameters.FixtureParameters(wall=wall, **silent))
 
 
 def test_passive_stiffness_falls_with_delay_and_coarse_readings_and_gains_nothing_by_damping() -> None:
     given = {"damping": 10.0, "period": 1e-3, "delay": 0.0, "friction": 0.26, "step": 55e-6}
-    assert math.isclose(passive_stiffness(**given), 1000.0)
-    assert passive_stiffness(**given | {"delay": 1e-3}) < 0.34 * 1000.0
-    assert passive_stiffness(**given | {"damping": 5.0}) == 500.0
-    assert passive_stiffness(**given | {"damping": 50.0}) == passive_stiffness(**given)
-    assert passive_stiffness(**given | {"step": 1e-3}) == 520.0  # Abbott and Okamura
-    assert passive_stiffness(**given | {"damping": 0.0}) == 0.0
+    assert math.isclose(walls.passive_stiffness(**given), 1000.0)
+    assert walls.passive_stiffness(**given | {"delay": 1e-3}) < 0.34 * 1000.0
+    assert walls.passive_stiffness(**given | {"damping": 5.0}) == 500.0
+    assert walls.passive_stiffness(**given | {"damping": 50.0}) == walls.passive_stiffness(**given)
+    assert walls.passive_stiffness(**given | {"step": 1e-3}) == 520.0  # Abbott and Okamura
+    assert walls.passive_stiffness(**given | {"damping": 0.0}) == 0.0
 
 
 def test_a_declared_delay_between_device_and_wall_counts() -> None:
-    late = configuration("coarse_box", delays={"master/servo_cf": 1e-3})
-    assert "2 ms from sample to force it is passive up to 333 N/m" in " ".join(notes_of(late))
+    late = api.configuration("coarse_box", delays={"master/servo_cf": 1e-3})
+    assert "2 ms from sample to force it is passive up to 333 N/m" in " ".join(notes.notes_of(late))
     both = dict.fromkeys(("master/measured_cp", "master/servo_cf"), 1e-3)
-    assert "3 ms from sample to force" in " ".join(notes_of(configuration("coarse_box", delays=both)))
-    elsewhere = configuration("coarse_box", delays={"slave/servo_cp": 1e-3})
-    assert not notes_of(elsewhere)
-    assert len(notes_of(configuration("coarse_box"), transport=1e-3)) == 1
+    assert "3 ms from sample to force" in " ".join(notes.notes_of(api.configuration("coarse_box", delays=both)))
+    elsewhere = api.configuration("coarse_box", delays={"slave/servo_cp": 1e-3})
+    assert not notes.notes_of(elsewhere)
+    assert len(notes.notes_of(api.configuration("coarse_box"), transport=1e-3)) == 1
 
 
 def test_sessions_and_their_arms_tell_what_their_devices_cannot_render() -> None:
-    arms = configuration(arms=["left", "right"], settings={"right/fixture.wall": "source"})
-    assert {note.split(":")[0] for note in notes_of(arms)} == {"arm 'right'"}
-    assert not notes_of(configuration("coarse_box"))
+    arms = api.configuration(arms=["left", "right"], settings={"right/fixture.wall": "source"})
+    assert {note.split(":")[0] for note in notes.notes_of(arms)} == {"arm 'right'"}
+    assert not notes.notes_of(api.configuration("coarse_box"))

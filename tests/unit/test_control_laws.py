@@ -8,18 +8,16 @@ import numpy as np
 import pytest
 
 from present import present
-from teleop_core.base.errors import ParameterError, PartError
-from teleop_core.base.parameters import build
-from teleop_core.graph.signals import TICK_NS
+from teleop_core.base import ParameterError, PartError, build
+from teleop_core.graph import TICK_NS
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot
 from teleop_core.robots.robot import Robot
+from teleop_core.slave import pair, slave_sim
 from teleop_core.slave.controllers import CONTROLLERS, Controller, adaptive, register_controller
 from teleop_core.slave.controllers.computed_torque import COMPUTED_TORQUE, computed_torque_control
 from teleop_core.slave.controllers.motion_estimates import known_friction
-from teleop_core.slave.pair import ArmParameters, SimulatedArm
 from teleop_core.slave.slave import ReferenceFilterParameters
-from teleop_core.slave.slave_sim import ControllerParameters, PlantParameters
 from teleop_lab.experiments.joint_steps import answer_to_steps
 
 LAWS = ("friction_compensation", "computed_torque", "adaptive", "disturbance_observer")
@@ -36,20 +34,20 @@ def slave(
     own: Mapping[str, float | tuple[float, ...]] | None = None,
     robot: str = "rcrt1",
     **values: Any,
-) -> SimulatedArm:
+) -> pair.SimulatedArm:
     """A slave at home under a law with parameters ``own``, on a plant with ``faults``."""
-    return SimulatedArm(
-        ArmParameters(
+    return pair.SimulatedArm(
+        pair.ArmParameters(
             robot=robot,
             starts_at_home=True,
-            controller=build(ControllerParameters, {"kind": law, **(own or {})}),
-            plant=build(PlantParameters, {"kind": plant, **(faults or {})}),
+            controller=build(slave_sim.ControllerParameters, {"kind": law, **(own or {})}),
+            plant=build(slave_sim.PlantParameters, {"kind": plant, **(faults or {})}),
             **values,
         )
     )
 
 
-def run(arm: SimulatedArm, way: Array) -> Array:
+def run(arm: pair.SimulatedArm, way: Array) -> Array:
     """Setpoints, measured joints and efforts (N, n) along commands (N, n), one a tick."""
     row, n = arm.signals, arm.robot.n
     found = np.empty((3, len(way), n))
@@ -93,12 +91,12 @@ def test_arm_that_sticks_comes_to_rest_at_the_nearest_count_and_stays(law: str) 
 
 @pytest.mark.parametrize("law", LAWS)
 def test_step_without_a_filter_overshoots_by_no_more_than_a_twentieth_on_the_hardware(law: str) -> None:
-    parameters = ArmParameters(
+    parameters = pair.ArmParameters(
         starts_at_home=True,
         interpolation="none",
         reference_filter=UNFILTERED,
-        controller=build(ControllerParameters, {"kind": law}),
-        plant=build(PlantParameters, {"kind": "hardware"}),
+        controller=build(slave_sim.ControllerParameters, {"kind": law}),
+        plant=build(slave_sim.PlantParameters, {"kind": "hardware"}),
     )
     answer = answer_to_steps(parameters)
     assert (answer.overshoot <= 0.05).all()
@@ -130,7 +128,7 @@ def circling(ticks: int, speed: float = 1.0) -> Array:
     return ARM.home + begin * toward * size * 0.5 * (1.0 - np.cos(rate * t))
 
 
-def tracking_error(arm: SimulatedArm, way: Any = None, **_: object) -> Array:
+def tracking_error(arm: pair.SimulatedArm, way: Any = None, **_: object) -> Array:
     """Root mean square of the error of each joint (n,) [counts], after the first second."""
     setpoint, measured, _ = run(arm, circling(5000) if way is None else way)
     return np.sqrt(np.mean(((measured - setpoint)[1000:] / COUNT) ** 2, axis=0))

@@ -8,11 +8,9 @@ import numpy as np
 import pytest
 
 from present import present
-from teleop_core.base.errors import ParameterError, PartError
-from teleop_core.base.parameters import build
-from teleop_core.graph.signals import DT, TICK_NS
-from teleop_core.kernels import kernel
-from teleop_core.kernels.geometry import Array
+from teleop_core.base import ParameterError, PartError, build
+from teleop_core.graph import DT, TICK_NS
+from teleop_core.kernels import Array, kernel
 from teleop_core.robots import load_robot
 from teleop_core.slave.controllers import CONTROLLERS, Controller, register_controller
 from teleop_core.slave.controllers.pd import PD, PdParameters, pd_control

@@ -12,17 +12,14 @@ from scipy.spatial.transform import Rotation
 
 from present import present
 from teleop_core.base.errors import ParameterError, SessionError
-from teleop_core.chain.devices import NOTHING, Reading
+from teleop_core.chain.devices import NOTHING, Reading, pilot, spacemouse
 from teleop_core.chain.devices.gamepad import Gamepad
-from teleop_core.chain.devices.pilot import Pilot, PilotParameters, beyond
-from teleop_core.chain.devices.spacemouse import Reports, is_space_mouse
 from teleop_core.chain.operators import OPERATORS
 from teleop_core.chain.operators.remote import AHEAD, RemoteHand
 from teleop_core.chain.operators.rest import rest_pose
 from teleop_core.cli import main
 from teleop_core.kernels.geometry import Array
-from teleop_core.session.configuration import configure
-from teleop_core.session.virtual import VirtualTime
+from teleop_core.session import configuration, virtual
 from virtual_pad import VirtualPad
 
 DT = 1e-3
@@ -37,7 +34,7 @@ class Session:
 
     def __init__(self, room: tuple[Array, Array] | None = None, **parameters: Any) -> None:
         self.hand = RemoteHand(room=room)
-        self.pilot = Pilot(self.hand, PilotParameters(**parameters))
+        self.pilot = pilot.Pilot(self.hand, pilot.PilotParameters(**parameters))
         self.rows, self._looks = np.zeros((0, 13)), 0
 
     def for_time(self, duration: float, reading: Reading) -> Array:
@@ -52,17 +49,17 @@ class Session:
 
 @given(six, st.floats(0.0, 0.9))
 def test_a_dead_zone_takes_rest_and_gives_all_directions_alike(rates: Array, zone: float) -> None:
-    found = beyond(rates, zone)
+    found = pilot.beyond(rates, zone)
     assert (found[np.abs(rates) <= zone] == 0.0).all()
     assert (np.abs(found) <= 1.0).all()
     assert (found * rates >= 0.0).all()
-    np.testing.assert_array_equal(beyond(-rates, zone), -found)
-    assert (np.abs(beyond(np.sign(rates), zone)) == np.abs(np.sign(rates))).all()
+    np.testing.assert_array_equal(pilot.beyond(-rates, zone), -found)
+    assert (np.abs(pilot.beyond(np.sign(rates), zone)) == np.abs(np.sign(rates))).all()
 
 
 @given(st.floats(0.0, 0.9), st.floats(0.0, 1.0), st.floats(0.0, 1.0))
 def test_more_deflection_is_never_less_speed_and_nothing_jumps(zone: float, first: float, second: float) -> None:
-    low, high = beyond(np.sort([first, second]), zone)
+    low, high = pilot.beyond(np.sort([first, second]), zone)
     assert 0.0 <= high - low <= (abs(second - first) + 1e-12) / (1.0 - zone) + 1e-12
 
 
@@ -130,7 +127,7 @@ def test_each_press_of_a_button_is_one_press_of_the_hand() -> None:
 @pytest.mark.parametrize("name", [*LIVE, "elsewhere"])
 def test_virtual_time_refuses_a_device_and_says_who_works(name: str) -> None:
     with pytest.raises(ParameterError, match=rf"'{name}', must be one of random, .*remote.* in virt"):
-        VirtualTime(configure(settings=[f"operator={name}"]))
+        virtual.VirtualTime(configuration.configure(settings=[f"operator={name}"]))
 
 
 @pytest.mark.parametrize("name", LIVE)
@@ -177,7 +174,7 @@ def test_a_device_that_leads_no_jaw_and_one_that_says_no_number_leave_it_as_it_i
 
 @given(st.lists(int16, min_size=6, max_size=6))
 def test_both_forms_of_reports_say_the_same(numbers: list[int]) -> None:
-    long, short = Reports(), Reports()
+    long, short = spacemouse.Reports(), spacemouse.Reports()
     assert long.take(struct.pack("<B6h", 1, *numbers))
     assert short.take(struct.pack("<B3h", 1, *numbers[:3]))
     assert short.take(struct.pack("<B3h", 2, *numbers[3:]))
@@ -190,7 +187,7 @@ def test_both_forms_of_reports_say_the_same(numbers: list[int]) -> None:
 @given(six, six)
 def test_axes_of_the_mouse_and_of_the_master_are_turned_and_not_mirrored(first: Array, second: Array) -> None:
     assume(np.linalg.norm(np.cross(first[:3], second[:3])) > 1e-3)
-    reports = [Reports(), Reports(), Reports()]
+    reports = [spacemouse.Reports(), spacemouse.Reports(), spacemouse.Reports()]
     deflections = (first[:3], second[:3], np.cross(first[:3], second[:3]))
     for one, place in zip(reports, deflections, strict=True):
         one.deflection[:] = np.tile(place, 2)
@@ -201,7 +198,7 @@ def test_axes_of_the_mouse_and_of_the_master_are_turned_and_not_mirrored(first: 
 
 
 def test_pulling_the_cap_up_and_towards_the_person_moves_the_stylus_so() -> None:
-    up, near, right = Reports(), Reports(), Reports()
+    up, near, right = spacemouse.Reports(), spacemouse.Reports(), spacemouse.Reports()
     up.take(struct.pack("<B3h", 1, 0, 0, -350))
     near.take(struct.pack("<B3h", 1, 0, 350, 0))
     right.take(struct.pack("<B3h", 1, 350, 0, 0))
@@ -211,7 +208,7 @@ def test_pulling_the_cap_up_and_towards_the_person_moves_the_stylus_so() -> None
 
 
 def test_buttons_are_bits() -> None:
-    reports = Reports()
+    reports = spacemouse.Reports()
     for bits in (1, 2, 3, 0):
         assert reports.take(bytes([3, bits, 0]))
         assert reports.buttons == bits
@@ -219,7 +216,7 @@ def test_buttons_are_bits() -> None:
 
 @given(st.binary(max_size=16))
 def test_no_bytes_are_more_than_a_full_deflection(data: bytes) -> None:
-    reports = Reports()
+    reports = spacemouse.Reports()
     before = reports.deflection.copy(), reports.buttons
     is_taken = reports.take(data)
     assert np.isfinite(reports.deflection).all()
@@ -230,9 +227,9 @@ def test_no_bytes_are_more_than_a_full_deflection(data: bytes) -> None:
 
 
 def test_mice_of_the_maker_and_its_old_ones_of_another_are_known_and_plain_mice_are_not() -> None:
-    assert is_space_mouse(0x256F, 0xC635)
-    assert is_space_mouse(0x046D, 0xC626)
-    assert not is_space_mouse(0x046D, 0xC077)
+    assert spacemouse.is_space_mouse(0x256F, 0xC635)
+    assert spacemouse.is_space_mouse(0x046D, 0xC626)
+    assert not spacemouse.is_space_mouse(0x046D, 0xC077)
 
 
 # -- gamepad ---------------------------------------------------------------------------------------
@@ -259,7 +256,7 @@ def gamepad(pad: VirtualPad) -> Iterator[Gamepad]:
 
 def test_a_gamepad_at_rest_says_nothing(gamepad: Gamepad) -> None:
     reading = gamepad.read()
-    assert (beyond(reading.rates, 0.12) == 0.0).all()
+    assert (pilot.beyond(reading.rates, 0.12) == 0.0).all()
     assert reading[1:] == (False, False, False, None)
 
 

@@ -17,8 +17,7 @@ from scipy import signal
 from code_mutants import CODE_MUTANTS
 from mutants import MUTANTS, ROOT, Mutant, changed
 from present import present
-from teleop_core.bags.reader import Bag
-from teleop_core.bags.reports import report
+from teleop_core.bags import reader, reports
 from teleop_core.bags.writer import BagWriter
 from teleop_core.base.errors import UnknownNameError
 from teleop_core.graph.topics import DIAGNOSTICS, SLAVE_SETPOINT_JS, SLAVE_TRUE_CP
@@ -27,10 +26,9 @@ from teleop_core.robots import load_robot
 from teleop_core.session import api
 from teleop_core.slave.operation import Fault, State
 from teleop_drill import drill
+from teleop_drill.drill import hand, judging
 from teleop_drill.drill.drill_table import drill_table, markdown, rows, summary
 from teleop_drill.drill.exercise import Exercise
-from teleop_drill.drill.hand import Sample
-from teleop_drill.drill.judging import Measured, Seen, judge
 from teleop_drill.drill.numbers import Numbers, Scheduling
 from teleop_drill.drill.recordings import check_recording, missing, told_lost
 
@@ -122,11 +120,11 @@ def test_the_hand_goes_round_at_constant_speed_once_it_has_set_in() -> None:
     assert np.linalg.norm(drill.hand.circle(drill.hand.PERIOD)[:3] - drill.hand.circle(0.0)[:3]) < 1e-6
 
 
-def sent(distortion: Callable[..., Any], count: int = 100) -> list[Sample]:
+def sent(distortion: Callable[..., Any], count: int = 100) -> list[hand.Sample]:
     """Samples that leave, of one every two milliseconds."""
     out = []
     for number in range(count):
-        out += distortion(Sample(number * 2 * MS, drill.hand.circle(2.0 + number * drill.hand.PERIOD)))
+        out += distortion(hand.Sample(number * 2 * MS, drill.hand.circle(2.0 + number * drill.hand.PERIOD)))
     return out
 
 
@@ -138,7 +136,7 @@ def test_what_is_lost_is_a_share_and_the_rest_is_untouched() -> None:
 
 def test_what_is_late_comes_in_order_and_so_many_samples_later() -> None:
     held = drill.hand.delayed(10)
-    assert [len(held(Sample(n, drill.hand.circle(0.0)))) for n in range(12)] == [0] * 10 + [1, 1]
+    assert [len(held(hand.Sample(n, drill.hand.circle(0.0)))) for n in range(12)] == [0] * 10 + [1, 1]
 
 
 def test_what_is_out_of_order_is_all_there() -> None:
@@ -166,7 +164,7 @@ def outcome(**changed: object) -> drill.Outcome:
         "exercise": next(one for one in drill.EXERCISES if one.name == "stop_topic"),
         "state": State.FAULT,
         "fault": Fault.STOP,
-        "measures": {"travel_m": Measured("travel_m", "{0:.1f} mm, at most {1:.1f}", 1e-3, 2e-3)},
+        "measures": {"travel_m": judging.Measured("travel_m", "{0:.1f} mm, at most {1:.1f}", 1e-3, 2e-3)},
         "recording": "intact",
         "recovered": 0.2,
         "cure": drill.Cure.RESET,
@@ -200,12 +198,12 @@ def test_whatever_is_not_as_expected_fails_and_says_what(
 
 
 def test_a_number_outside_its_bounds_fails_and_says_both() -> None:
-    far = Measured("travel_m", "{0:.1f} mm, at most {1:.1f}", 2.5e-3, 2e-3)
+    far = judging.Measured("travel_m", "{0:.1f} mm, at most {1:.1f}", 2.5e-3, 2e-3)
     assert outcome(measures={"travel_m": far}).failures() == ["2.5 mm, at most 2.0"]
-    slow = Measured("path_m", "{0:.0f} mm, at least {1:.0f}", 1e-3, least=9e-3)
+    slow = judging.Measured("path_m", "{0:.0f} mm, at least {1:.0f}", 1e-3, least=9e-3)
     assert outcome(measures={"path_m": slow}).failures() == ["1 mm, at least 9"]
-    assert Measured("told_s", "{0} {1}", math.inf, 1.0).failure
-    assert not Measured("told_s", "{0} {1}", math.nan, 1.0).failure
+    assert judging.Measured("told_s", "{0} {1}", math.inf, 1.0).failure
+    assert not judging.Measured("told_s", "{0} {1}", math.nan, 1.0).failure
 
 
 def test_what_is_not_recorded_fails_unless_the_fault_may_cost_it() -> None:
@@ -240,14 +238,14 @@ ROBOT = NUMBERS.robot
 BEGIN: Any = 1_500 * MS
 
 
-def seen(joints: Array, lies: float = 1.0, told: Any = None, warned: Any = None, late: float = 0.0) -> Seen:
+def seen(joints: Array, lies: float = 1.0, told: Any = None, warned: Any = None, late: float = 0.0) -> judging.Seen:
     """What a tap hears of an arm whose setpoint and measured joints are these, each millisecond."""
     joints = np.asarray(joints)
     measured = ROBOT.start + lies * (joints - ROBOT.start)
     tips = [np.append(ROBOT.fk(row)[:3, 3], [1.0, 0.0, 0.0, 0.0]) for row in joints]
     end = 1_000 * MS + len(joints) * MS
     heard = [trace(values) for values in (joints, measured, tips)]
-    return Seen(BEGIN, end, heard[0], heard[1], heard[2], told, warned, Scheduling(late, late))
+    return judging.Seen(BEGIN, end, heard[0], heard[1], heard[2], told, warned, Scheduling(late, late))
 
 
 def round_and_round(speed: float = 1.0, count: int = 2000) -> Array:
@@ -270,8 +268,8 @@ def stopping(after: float, braking: float = 1.0, count: int = 1500) -> Array:
     return ROBOT.start + np.cumsum(step, axis=0)
 
 
-def wrong(name: str, found: Seen) -> list[str]:
-    return [m.name for m in judge(by_name(name), found, NUMBERS) if m.failure]
+def wrong(name: str, found: judging.Seen) -> list[str]:
+    return [m.name for m in judging.judge(by_name(name), found, NUMBERS) if m.failure]
 
 
 def test_an_arm_that_goes_where_the_hand_goes_is_as_expected() -> None:
@@ -356,8 +354,8 @@ def test_an_arm_that_tells_no_more_where_it_is_is_found_though_its_setpoints_sta
     heard = getattr(whole, stream)
     quiet = replace(whole, **{stream: heard.only(np.arange(len(heard)) < kept)})
     exercise = by_name("master_silent")
-    assert "silent_s" in {m.name for m in judge(exercise, quiet, NUMBERS) if m.failure}
-    assert "silent_s" not in {m.name for m in judge(exercise, whole, NUMBERS) if m.failure}
+    assert "silent_s" in {m.name for m in judging.judge(exercise, quiet, NUMBERS) if m.failure}
+    assert "silent_s" not in {m.name for m in judging.judge(exercise, whole, NUMBERS) if m.failure}
 
 
 def test_a_fault_that_nobody_warns_of_is_found() -> None:
@@ -389,7 +387,7 @@ def test_messages_that_are_not_recorded_are_counted_one_by_one(tmp_path: Path, r
             writer.write_block({SLAVE_SETPOINT_JS: (stamps, values, stamps)})
         pose = np.array([[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]])
         writer.write_block({SLAVE_TRUE_CP: (np.array([5]), pose, np.array([5]))})
-    found = missing(Bag(tmp_path / "bag"), SLAVE_SETPOINT_JS.name, (heard * 10, heard))
+    found = missing(reader.Bag(tmp_path / "bag"), SLAVE_SETPOINT_JS.name, (heard * 10, heard))
     left = list(recorded)
     expected = []
     for stamp in heard:
@@ -448,9 +446,9 @@ def test_what_the_recorder_tells_that_it_lost_is_counted_by_topic_and_time(tmp_p
     second, name = 1_000_000_000, SLAVE_SETPOINT_JS.name
     with BagWriter(tmp_path / "bag", (DIAGNOSTICS,), {}) as writer:
         for at, lost in ((1, 5), (2, 5), (3, 40), (4, 40), (8, 90)):
-            data = report(at * second, "recorder", 1, "lost", {f"lost.{name}": str(lost)})
+            data = reports.report(at * second, "recorder", 1, "lost", {f"lost.{name}": str(lost)})
             writer.write(DIAGNOSTICS, at * second, data, at * second)
-    told = partial(told_lost, Bag(tmp_path / "bag"))
+    told = partial(told_lost, reader.Bag(tmp_path / "bag"))
     assert told(name, 2 * second, 3 * second) == 35  # what was lost before does not count
     assert told(name, 1 * second, int(1.6 * second)) == 35  # told up to 1.5 s later
     assert told(name, 3 * second, 5 * second) == 0

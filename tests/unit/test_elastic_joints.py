@@ -7,17 +7,12 @@ import numpy as np
 import pytest
 
 from present import present
-from teleop_core.base.errors import ParameterError
-from teleop_core.base.parameters import build
-from teleop_core.graph.signals import DT, TICK_NS
-from teleop_core.kernels import kernel
-from teleop_core.kernels.geometry import Array
+from teleop_core.base import ParameterError, build
+from teleop_core.graph import DT, TICK_NS
+from teleop_core.kernels import Array, kernel
 from teleop_core.robots import load_robot
-from teleop_core.slave.elastic import integrate_elastic
+from teleop_core.slave import elastic, simulation, slave_sim, transmission
 from teleop_core.slave.plants.hardware import faults_of
-from teleop_core.slave.simulation import SimulationNumbers, SimulationState
-from teleop_core.slave.slave_sim import SlaveSim, SlaveSimParameters
-from teleop_core.slave.transmission import drive
 
 ARM = load_robot("rcrt1")
 STIFF = 5000.0
@@ -25,9 +20,9 @@ GEARS = {"plant.hardware.gear_stiffness": (STIFF, STIFF, 0.0, 0.0, 0.0, 0.0)}
 ALONE = {"plant.hardware.without": ("friction", "wandering", "bias", "drive_steps")}
 
 
-def slave(**settings: Any) -> SlaveSim:
+def slave(**settings: Any) -> slave_sim.SlaveSim:
     given = {"plant.kind": "hardware", "controller.kind": "source_pid"}
-    return SlaveSim(build(SlaveSimParameters, given | settings))
+    return slave_sim.SlaveSim(build(slave_sim.SlaveSimParameters, given | settings))
 
 
 def test_by_default_no_gear_bends_and_no_effort_is_late() -> None:
@@ -67,7 +62,7 @@ def test_a_gear_rings_at_the_frequency_of_two_masses_on_its_spring() -> None:
     for _ in range(1000):
         for i in range(1, 6):  # all other joints are held
             arm.q[i], s["link"][i], arm.dq[i], s["link_speed"][i] = held[i], held[i], 0.0, 0.0
-        integrate_elastic(arm.acceleration, arm.dynamics, p, s, arm.contacts, 20, weight, arm.q, arm.dq, DT)
+        elastic.integrate_elastic(arm.acceleration, arm.dynamics, p, s, arm.contacts, 20, weight, arm.q, arm.dq, DT)
         path.append((arm.q[0], s["link"][0]))
     motors, links = np.array(path).T
     # Nothing pushes from outside: the common centre of mass stays.
@@ -92,12 +87,12 @@ def test_a_gear_that_swings_too_fast_for_the_ticks_is_refused() -> None:
 
 
 @kernel
-def drive_on(p: SimulationNumbers, s: SimulationState, arm: Any, efforts: Array) -> None:
+def drive_on(p: simulation.SimulationNumbers, s: simulation.SimulationState, arm: Any, efforts: Array) -> None:
     """What drives give for rows of efforts (N, 6); written in their place."""
     for k in range(efforts.shape[0]):
         for i in range(6):
             arm.effort[i] = efforts[k, i]
-        drive(p, s, arm)
+        transmission.drive(p, s, arm)
         for i in range(6):
             efforts[k, i] = arm.effort[i]
 

@@ -10,9 +10,8 @@ import pytest
 from rich.console import Console
 
 from present import present
-from teleop_core.bags.arms import arm_names, of_arm, topic_prefix
+from teleop_core.bags import arms, reports
 from teleop_core.bags.reader import Bag
-from teleop_core.bags.reports import report
 from teleop_core.bags.writer import BagWriter
 from teleop_core.base.errors import EvaluationError, RecordingError, UnknownNameError
 from teleop_core.evaluation import evaluate, scores
@@ -45,7 +44,7 @@ METADATA = {
 
 def state(gain: float) -> bytes:
     values = {name: repr(gain if name == "gain" else 0.0) for name in STATE_FIELDS}
-    return report(0, "teleop", 0, "FOLLOWING", values)
+    return reports.report(0, "teleop", 0, "FOLLOWING", values)
 
 
 def write(
@@ -68,7 +67,7 @@ def write(
         for arm, gain in zip(offsets, (1.0, 0.1), strict=False):
             writer.write(TELEOP_STATE.of_arm(arm), 0, state(gain))
         for name, ticks in (("slave_sim", 1000), ("left/slave_sim", 2000), ("/left/play", 3000)):
-            writer.write(DIAGNOSTICS, 1, report(1, name, 0, "", {"ticks": str(ticks)}))
+            writer.write(DIAGNOSTICS, 1, reports.report(1, name, 0, "", {"ticks": str(ticks)}))
         writer.write_block(rows)
     return path
 
@@ -116,13 +115,13 @@ def test_nodes_are_those_of_the_arm(bag: Bag) -> None:
 
 
 def test_view_of_an_arm_reads_what_the_recording_holds_of_it(bag: Bag) -> None:
-    left = of_arm(bag, "left")
+    left = arms.of_arm(bag, "left")
     series = left.read(SLAVE_MEASURED_JS)
     assert series.names == ("c", "d", "e")
     assert series.values.shape == (COUNT, 9)
     assert {name for name, *_ in left.raw(["slave/servo_cp"])} == {"slave/servo_cp"}
     assert sum(1 for _ in left.raw()) == sum(info.count for info in left.topics.values())
-    assert "left/slave/measured_cp" not in of_arm(bag).topics
+    assert "left/slave/measured_cp" not in arms.of_arm(bag).topics
 
 
 def test_json_table_and_page_show_every_arm(path: Path, tmp_path: Path) -> None:
@@ -142,36 +141,36 @@ def test_json_table_and_page_show_every_arm(path: Path, tmp_path: Path) -> None:
 
 def test_recording_without_names_of_arms_has_one_without_a_name(tmp_path: Path) -> None:
     bag = Bag(write(tmp_path / "one", {"": 1 * MM}, {}))
-    assert arm_names(bag) == ("",)
-    assert of_arm(bag) is bag
+    assert arms.arm_names(bag) == ("",)
+    assert arms.of_arm(bag) is bag
     assert [score.session.arm for score in scores(bag)] == [""]
 
 
 def test_arm_that_was_recorded_alone_is_found_by_its_topics(tmp_path: Path) -> None:
     bag = Bag(write(tmp_path / "alone", {"left": 3 * MM}, {"robot": "puma560", "seed": "8"}))
-    assert arm_names(bag) == ("left",)
+    assert arms.arm_names(bag) == ("left",)
     (score,) = scores(bag)
     assert np.isclose(present(score.position_error_mm.max), 3.0, atol=ROUNDING)
     assert (score.session.arm, score.session.robot, score.session.seed) == ("left", "puma560", 8)
     assert score.nodes == {"slave_sim": {"ticks": 2000}, "play": {"ticks": 3000}}
     assert evaluate(bag).to_json() == evaluate(bag, "left").to_json() == score.to_json()
-    assert topic_prefix(bag, "") == topic_prefix(bag, "left") == "left/"
+    assert arms.topic_prefix(bag, "") == arms.topic_prefix(bag, "left") == "left/"
 
 
 def test_arms_without_names_are_the_plain_one_and_those_with_topics_of_their_own(tmp_path: Path) -> None:
     bag = Bag(write(tmp_path / "pair", {"": 1 * MM, "left": 3 * MM}, {"robot": "rcrt1"}))
-    assert arm_names(bag) == ("", "left")
+    assert arms.arm_names(bag) == ("", "left")
     plain, left = scores(bag)
     assert (plain.session.arm, left.session.arm) == ("", "left")
     assert (plain.session.robot, left.session.robot) == ("rcrt1", None)
     assert plain.nodes == {"slave_sim": {"ticks": 1000}}
-    assert [topic_prefix(bag, arm) for arm in ("", "left")] == ["", "left/"]
+    assert [arms.topic_prefix(bag, arm) for arm in ("", "left")] == ["", "left/"]
 
 
 def test_topics_of_an_arm_that_measures_nothing_make_no_arm(tmp_path: Path) -> None:
     lost = [t.of_arm("left") for t in (SLAVE_MEASURED_CP, SLAVE_SETPOINT_CP)]
     bag = Bag(write(tmp_path / "pair", {"": 1 * MM, "left": 3 * MM}, {}, lost=lost))
-    assert arm_names(bag) == ("",)
+    assert arms.arm_names(bag) == ("",)
     assert evaluate(bag).samples.scored == COUNT
 
 

@@ -14,17 +14,14 @@ from rich.console import Console
 from present import present
 from recipes import START_NS, Recipe, state
 from teleop_core.bags.reader import Bag
-from teleop_core.base.errors import EvaluationError
-from teleop_core.base.parameters import parameter
+from teleop_core.base import EvaluationError, parameter
 from teleop_core.chain.fixtures.reported_fixture import ReportedFixture
 from teleop_core.chain.mapping.parameters import MotionScalingParameters, axis_map
+from teleop_core.evaluation import Figure, Row, evaluate, study
 from teleop_core.evaluation.command import evaluate_bags
-from teleop_core.evaluation.figure import Figure
 from teleop_core.evaluation.origin import read_origin
-from teleop_core.evaluation.rows import Row, summary
-from teleop_core.evaluation.scoring import evaluate, study
-from teleop_core.graph.signals import TICK_NS
-from teleop_core.graph.topics import SLAVE_MEASURED_CP, SLAVE_SERVO_CP, TELEOP_STATE, Topic
+from teleop_core.evaluation.rows import summary
+from teleop_core.graph import TICK_NS, topics
 from teleop_core.kernels.geometry import Array
 from teleop_core.shapes import Shape, register_shape
 
@@ -41,13 +38,13 @@ SIZES = {"sphere": (30, 30, 30), "box": (30, 10, 20)}
 
 def fixture_on(
     described: dict[str, str] | None, gain: float = 1.0, size: Any = (0.03, 0.03, 0.03), at: int = 0
-) -> tuple[Topic, int, bytes]:
+) -> tuple[topics.Topic, int, bytes]:
     """Report that a fixture is on around the slave at rest."""
     stamp_ns = START_NS + at * TICK_NS
     values = {"is_fixture_on": 1.0, "gain": gain}
     for axis, middle, extent in zip("xyz", CENTER, size, strict=True):
         values |= {f"fixture_center_{axis}": middle, f"fixture_size_{axis}": extent}
-    return TELEOP_STATE, stamp_ns, state(stamp_ns, described, **values)
+    return topics.TELEOP_STATE, stamp_ns, state(stamp_ns, described, **values)
 
 
 def configuration(axes: tuple[str, str, str], stage: str = "motion_scaling") -> str:
@@ -94,7 +91,7 @@ def test_depth_of_what_is_no_number_is_none() -> None:
 
 def test_sphere_is_scored_by_the_distance_from_its_middle(recipe: Recipe, path: Path) -> None:
     recipe.singles = [fixture_on(SPHERE)]
-    recipe.values(SLAVE_MEASURED_CP)[500:1000, :3] += 0.01  # inside of the box around it
+    recipe.values(topics.SLAVE_MEASURED_CP)[500:1000, :3] += 0.01  # inside of the box around it
     score = evaluate(recipe.write(path)).fixture
     assert np.isclose(present(score.penetration_max_mm), 10 * np.sqrt(3) - 15, atol=ROUNDING_MM)
     assert np.isclose(present(score.outside_share), 0.25)
@@ -107,7 +104,7 @@ def test_box_of_the_hand_scores_as_the_box_of_the_slave_that_older_recordings_te
         recipe = Recipe(2000)
         recipe.singles = [fixture_on(described, 0.5, np.array([0.015, 0.005, 0.01]))]
         rng = np.random.default_rng(4)
-        for topic in (SLAVE_MEASURED_CP, SLAVE_SERVO_CP):
+        for topic in (topics.SLAVE_MEASURED_CP, topics.SLAVE_SERVO_CP):
             recipe.values(topic)[:, :3] += rng.normal(scale=0.01, size=(2000, 3))
         score = evaluate(recipe.write(tmp_path / str(described is None))).fixture
         assert score.kind == "box"
@@ -125,7 +122,7 @@ def test_fixture_is_turned_by_the_recorded_map_of_axes(
     if axes:
         recipe.metadata["configuration"] = configuration(axes)
     recipe.singles = [fixture_on(BOX)]
-    recipe.values(SLAVE_MEASURED_CP)[:, 0] += 0.02  # the hand's z or x, of 30 or 10 mm
+    recipe.values(topics.SLAVE_MEASURED_CP)[:, 0] += 0.02  # the hand's z or x, of 30 or 10 mm
     found = present(evaluate(recipe.write(path)).fixture.penetration_max_mm)
     assert np.isclose(found, outside_mm, atol=ROUNDING_MM)
 
@@ -163,9 +160,9 @@ def test_kind_and_size_may_change_while_the_fixture_is_on(recipe: Recipe, path: 
         fixture_on(SPHERE),
         fixture_on(SPHERE | {"fixture.radius": "0.005"}, size=(0.01, 0.01, 0.01), at=500),
         fixture_on(BOX, size=(0.03, 0.01, 0.02), at=1000),
-        (TELEOP_STATE, START_NS + 1500 * TICK_NS, state(START_NS + 1500 * TICK_NS, BOX)),
+        (topics.TELEOP_STATE, START_NS + 1500 * TICK_NS, state(START_NS + 1500 * TICK_NS, BOX)),
     ]
-    recipe.values(SLAVE_MEASURED_CP)[:, 0] += 0.016
+    recipe.values(topics.SLAVE_MEASURED_CP)[:, 0] += 0.016
     bag = recipe.write(path)
     score = evaluate(bag)
     assert score.fixture.kind == "sphere and box"
@@ -205,7 +202,7 @@ REPORTED_WALL = {"fixture": "wall", "fixture.height": "0.01"}
 def test_plain_function_of_a_user_is_scored_and_drawn(recipe: Recipe, path: Path) -> None:
     register_shape(WALL)
     recipe.singles = [fixture_on(REPORTED_WALL, 0.5)]
-    recipe.values(SLAVE_MEASURED_CP)[:, 2] += 0.006  # the hand's y is the slave's z
+    recipe.values(topics.SLAVE_MEASURED_CP)[:, 2] += 0.006  # the hand's y is the slave's z
     bag = recipe.write(path)
     assert np.isclose(present(evaluate(bag).fixture.penetration_max_mm), 1.0, atol=ROUNDING_MM)
     trace = next(t for t in figures(bag)["Path in space"].traces if t["name"] == "wall")
@@ -222,7 +219,7 @@ def failing_distance(offset: Array, numbers: Array, out: Array) -> float:
 def test_depth_that_raises_is_told_with_the_metric(recipe: Recipe, path: Path) -> None:
     register_shape(Shape("wall", WallParameters, failing_distance, wall_outline))
     recipe.singles = [fixture_on(REPORTED_WALL)]
-    recipe.values(SLAVE_MEASURED_CP)[:, 2] += 0.03
+    recipe.values(topics.SLAVE_MEASURED_CP)[:, 2] += 0.03
     with pytest.raises(EvaluationError, match="metric 'fixture' failed with ZeroDivisionError"):
         evaluate(recipe.write(path))
 
@@ -239,7 +236,7 @@ def test_fixture_of_an_unknown_shape_leaves_the_rest_of_the_score(
     recipe: Recipe, path: Path, described: dict[str, str], told: str
 ) -> None:
     recipe.singles = [fixture_on(described)]
-    recipe.values(SLAVE_MEASURED_CP)[:, 0] += 0.5e-3
+    recipe.values(topics.SLAVE_MEASURED_CP)[:, 0] += 0.5e-3
     bag = recipe.write(path)
     score = evaluate(bag)
     assert np.isclose(present(score.position_error_mm.max), 0.5, atol=ROUNDING_MM)
@@ -253,7 +250,7 @@ def test_fixture_of_an_unknown_shape_leaves_the_rest_of_the_score(
 
 def test_known_shapes_are_scored_beside_unknown_ones(recipe: Recipe, path: Path) -> None:
     recipe.singles = [fixture_on(REPORTED_WALL), fixture_on(SPHERE, at=1000)]
-    recipe.values(SLAVE_MEASURED_CP)[:, 0] += 0.016
+    recipe.values(topics.SLAVE_MEASURED_CP)[:, 0] += 0.016
     score = evaluate(recipe.write(path)).fixture
     assert np.isclose(present(score.penetration_rms_mm), 1.0, atol=ROUNDING_MM)
     assert score.outside_share == 1.0

@@ -11,13 +11,11 @@ from rich.console import Console
 
 from present import present
 from recipes import Recipe, pose_rows
-from teleop_core.base.parameters import NoParameters
+from teleop_core.base import NoParameters
 from teleop_core.evaluation.command import evaluate_bags
 from teleop_core.evaluation.origin import read_origin
 from teleop_core.evaluation.scoring import evaluate
-from teleop_core.graph.graph import build_graph
-from teleop_core.graph.signals import TICK_NS
-from teleop_core.graph.stage import Stage, register_stage
+from teleop_core.graph import TICK_NS, Stage, build_graph, register_stage
 from teleop_core.graph.topics import (
     MASTER_MEASURED_CP,
     SLAVE_MEASURED_CP,

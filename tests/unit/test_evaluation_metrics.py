@@ -15,21 +15,9 @@ from teleop_core import evaluation
 from teleop_core.bags.reader import Bag
 from teleop_core.bags.writer import BagWriter
 from teleop_core.base.errors import EvaluationError, PartError, UnknownNameError
-from teleop_core.evaluation import (
-    METRICS,
-    Context,
-    Figure,
-    Key,
-    Metric,
-    Moments,
-    Row,
-    Spread,
-    Window,
-    evaluate,
-    line,
-    time_axis,
-)
+from teleop_core.evaluation import METRICS, Context, Key, Metric, Moments, Row, Spread, Window, evaluate
 from teleop_core.evaluation.command import evaluate_bags
+from teleop_core.evaluation.figure import Figure, line, time_axis
 from teleop_core.evaluation.score_table import score_tables
 from teleop_core.graph.signals import TICK_NS
 from teleop_core.graph.topics import (

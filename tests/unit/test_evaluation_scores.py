@@ -14,14 +14,12 @@ from rich.console import Console
 from present import present
 from recipes import JOINTS, START_NS, Recipe, pose_rows, state
 from teleop_console.report.page import report_page
-from teleop_core.bags.reader import Bag
-from teleop_core.bags.reports import report
+from teleop_core.bags import reader, reports
 from teleop_core.bags.writer import BagWriter
 from teleop_core.base.errors import EvaluationError, RecordingError
+from teleop_core.evaluation import evaluate, key_table, keys, study
 from teleop_core.evaluation.command import evaluate_bags
-from teleop_core.evaluation.score import key_table, keys
 from teleop_core.evaluation.score_table import score_tables
-from teleop_core.evaluation.scoring import evaluate, study
 from teleop_core.evaluation.windows import WINDOW_NS, DisorderError, windows
 from teleop_core.graph.signals import STATE_FIELDS, TICK_NS
 from teleop_core.graph.topics import (
@@ -361,7 +359,7 @@ def test_ticks_are_those_that_the_slave_reported_last(recipe: Recipe, path: Path
             "rate_hz": "999.9",
             "refused.slave/servo_jp.jump": "0",
         }
-        recipe.singles.append((DIAGNOSTICS, at, report(at, "slave_sim", 0, "ACTIVE", values)))
+        recipe.singles.append((DIAGNOSTICS, at, reports.report(at, "slave_sim", 0, "ACTIVE", values)))
     score = evaluate(recipe.write(path))
     assert (score.ticks.executed, score.ticks.late) == (2000, 6)
     assert (score.ticks.made_up, score.ticks.dropped) == (16, 2)
@@ -400,8 +398,8 @@ def test_recording_out_of_order_is_scored_all_the_same(path: Path) -> None:
         for topic in (SLAVE_MEASURED_CP, SLAVE_SERVO_CP, SLAVE_SETPOINT_CP):  # one after the other
             writer.write_block({topic: recipe.rows[topic]})
     with pytest.raises(DisorderError):
-        list(windows(Bag(shuffled), recipe.rows))
-    other = evaluate(Bag(shuffled))
+        list(windows(reader.Bag(shuffled), recipe.rows))
+    other = evaluate(reader.Bag(shuffled))
     assert np.isclose(present(other.position_error_mm.rms), present(straight.position_error_mm.rms))
     assert other.samples == straight.samples
 
@@ -409,7 +407,7 @@ def test_recording_out_of_order_is_scored_all_the_same(path: Path) -> None:
 def test_json_has_exactly_the_documented_keys(recipe: Recipe, path: Path) -> None:
     chain(recipe, (1, 1, 1, 1))
     at = START_NS + 5 * TICK_NS
-    recipe.singles.append((DIAGNOSTICS, at, report(at, "slave_sim", 0, "", {"ticks": "5"})))
+    recipe.singles.append((DIAGNOSTICS, at, reports.report(at, "slave_sim", 0, "", {"ticks": "5"})))
     found = set(leaves(evaluate(recipe.write(path)).to_json()))
     patterns = [re.compile(pattern(key.path)) for key in keys()]
     for leaf in found:
@@ -511,7 +509,7 @@ def test_poses_that_never_meet_their_reference_are_refused(recipe: Recipe, path:
 def test_state_of_another_make_is_refused_in_one_line(recipe: Recipe, path: Path, text: Any, told: str) -> None:
     values = dict.fromkeys(STATE_FIELDS, "0.0") | {"gain": text}
     values = {name: value for name, value in values.items() if value is not None}
-    recipe.singles = [(TELEOP_STATE, START_NS, report(START_NS, "teleop", 0, "", values))]
+    recipe.singles = [(TELEOP_STATE, START_NS, reports.report(START_NS, "teleop", 0, "", values))]
     with pytest.raises(EvaluationError, match=told):
         evaluate(recipe.write(path))
 

@@ -11,13 +11,9 @@ from teleop_core.base.errors import ParameterError, PartError, TeleopError, Unkn
 from teleop_core.chain.operators.tour import tour
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot
-from teleop_core.session.configuration import configure
-from teleop_core.session.recording import Stream
+from teleop_core.session import configuration, recording
 from teleop_lab import experiments
-from teleop_lab.experiments import Bench, Experiment, Findings, Row
-from teleop_lab.experiments.accuracy import AXES, DESIRED_MM, Axis, as_read, longer_d3, moved, readings
-from teleop_lab.experiments.points24 import Visits, visits_of
-from teleop_lab.experiments.reference_filter import gain_at, step_response
+from teleop_lab.experiments import Bench, Experiment, Findings, Row, accuracy, points24, reference_filter
 from teleop_lab.experiments.responses import response
 
 # Experiments of formulas alone, each with what its source is known to have misprinted.
@@ -161,8 +157,10 @@ def rms(values: Array) -> float:
 def left(offset_mm: float) -> float:
     """Readings less what a ruler says of an arm with an offset in d3, RMS [mm]."""
     robot = load_robot("rcrt1")
-    expected = [readings(robot, which, longer_d3(robot, offset_mm)) for which in AXES.values()]
-    return rms(np.concatenate([w.read_mm for w in AXES.values()]) - np.concatenate(expected))
+    expected = [
+        accuracy.readings(robot, which, accuracy.longer_d3(robot, offset_mm)) for which in accuracy.AXES.values()
+    ]
+    return rms(np.concatenate([w.read_mm for w in accuracy.AXES.values()]) - np.concatenate(expected))
 
 
 def test_offset_of_five_and_a_half_millimetres_halves_what_the_ruler_saw() -> None:
@@ -174,33 +172,33 @@ def test_offset_of_five_and_a_half_millimetres_halves_what_the_ruler_saw() -> No
     assert abs(best - 5.5) <= 0.25
 
 
-@pytest.mark.parametrize("name", AXES)
+@pytest.mark.parametrize("name", accuracy.AXES)
 def test_arm_without_errors_moves_as_asked(name: str) -> None:
     robot = load_robot("rcrt1")
-    exact = readings(robot, AXES[name], longer_d3(robot, 0.0))
-    assert np.abs(moved(exact, AXES[name].escape_mm) - DESIRED_MM).max() < 1e-9
+    exact = accuracy.readings(robot, accuracy.AXES[name], accuracy.longer_d3(robot, 0.0))
+    assert np.abs(accuracy.moved(exact, accuracy.AXES[name].escape_mm) - accuracy.DESIRED_MM).max() < 1e-9
 
 
-def published_errors(which: Axis) -> Array:
+def published_errors(which: accuracy.Axis) -> Array:
     """Desired less measured (10,), of the ruler's readings [mm]."""
-    return DESIRED_MM - moved(np.array(which.read_mm), which.escape_mm)
+    return accuracy.DESIRED_MM - accuracy.moved(np.array(which.read_mm), which.escape_mm)
 
 
-@pytest.mark.parametrize("name", AXES)
+@pytest.mark.parametrize("name", accuracy.AXES)
 def test_readings_have_the_printed_statistics_and_are_steps_of_the_ruler(name: str) -> None:
-    which = AXES[name]
+    which = accuracy.AXES[name]
     error = published_errors(which)
     # Printed to 0.01 mm, of y from ways that were rounded so too.
     assert rms(error) == pytest.approx(which.rms, abs=6e-3)
     assert np.std(error, ddof=1) == pytest.approx(which.deviation, abs=6e-3)
     assert np.abs(error).max() == pytest.approx(which.largest, abs=6e-3)
-    assert np.array_equal(as_read(np.array(which.read_mm), which.step_mm), which.read_mm)
+    assert np.array_equal(accuracy.as_read(np.array(which.read_mm), which.step_mm), which.read_mm)
 
 
 def test_errors_of_the_accuracy_test_are_those_that_its_tables_print() -> None:
-    assert AXES["y"].error_mm[0] == 0.39
-    assert [AXES["y"].error_mm[k] for k in (5, 9)] == [-1.03, -1.15]
-    for which in AXES.values():  # within the rounding of their own readings
+    assert accuracy.AXES["y"].error_mm[0] == 0.39
+    assert [accuracy.AXES["y"].error_mm[k] for k in (5, 9)] == [-1.03, -1.15]
+    for which in accuracy.AXES.values():  # within the rounding of their own readings
         assert np.abs(which.error_mm - published_errors(which)).max() < 0.012
 
 
@@ -211,10 +209,10 @@ def test_step_and_gain_of_the_filter_are_scipys_of_the_printed_transfer_function
     # Forward Euler of 0.1 (s + 100)/(s + 10) at 1 ms, sign corrected.
     system = dlti([0.1, -0.09], [1.0, -0.99], dt=1e-3)
     _, (expected,) = dstep(system, n=500)
-    assert np.abs(step_response(500) - expected[:, 0]).max() < 1e-12
+    assert np.abs(reference_filter.step_response(500) - expected[:, 0]).max() < 1e-12
     frequency = np.array([0.1, 1.0, 10.0, 50.0, 400.0])
     _, response = system.freqresp(2.0 * np.pi * frequency * 1e-3)
-    assert np.allclose(gain_at(frequency), np.abs(response), rtol=1e-12)
+    assert np.allclose(reference_filter.gain_at(frequency), np.abs(response), rtol=1e-12)
 
 
 # -- points ----------------------------------------------------------------------------------------
@@ -224,7 +222,7 @@ class Perfect:
     """A session whose tip is where the points are, or off by a known way."""
 
     def __init__(self, off_mm: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> None:
-        made = configure("points24").group("operator")
+        made = configuration.configure("points24").group("operator")
         self.p, self.center = made.kind.parameters, np.array(made.center)
         self.approach = made.approach_time
         self.time = np.arange(0.0, 50.0, 1e-2)
@@ -238,12 +236,12 @@ class Perfect:
     def places_mm(self, topic: str) -> Array:
         return self.path
 
-    def __getitem__(self, topic: str) -> Stream:
+    def __getitem__(self, topic: str) -> recording.Stream:
         ns = np.round(self.time * 1e9).astype(np.int64)
-        return Stream(topic, ("x", "y", "z"), ns, ns, self.path * 1e-3, 0)
+        return recording.Stream(topic, ("x", "y", "z"), ns, ns, self.path * 1e-3, 0)
 
-    def visits(self) -> Visits:
-        return visits_of(cast(Any, self), self.p, self.center, self.approach)
+    def visits(self) -> points24.Visits:
+        return points24.visits_of(cast(Any, self), self.p, self.center, self.approach)
 
 
 def test_tip_that_is_where_the_points_are_misses_none() -> None:

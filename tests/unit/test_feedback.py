@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from present import present
-from teleop_core.base.parameters import build
-from teleop_core.graph.signals import DT, TICK_NS
-from teleop_core.graph.topics import OPERATION
+from teleop_core.base import build
+from teleop_core.graph import DT, TICK_NS, topics
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot
 from teleop_core.slave.commands import CommandStatus
@@ -208,7 +207,7 @@ def test_simulated_drives_are_off_while_the_server_lets_brakes_hold_the_arm() ->
     assert all(efforts().any() for _ in range(5))
     arm.server.request("stop")
     told = [efforts() for _ in range(5)]
-    assert row["slave_operation"][OPERATION.index("is_braked")] == 1.0
+    assert row["slave_operation"][topics.OPERATION.index("is_braked")] == 1.0
     assert not np.any(told)
     arm.simulated.arm.dq[:] = 0.5 * LIMIT
     before = arm.simulated.arm.q.copy()

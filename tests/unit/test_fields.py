@@ -4,11 +4,9 @@ from typing import Annotated
 
 import numpy as np
 
-from teleop_core.graph.row import Row
-from teleop_core.graph.signals import make_signals
+from teleop_core.graph import Row, make_signals
 from teleop_core.graph.topics import BY_NAME, PORTS_BETWEEN_ARMS
-from teleop_core.kernels.fields import Fields, IntegerPerJoint, PerJoint, Vector3, fields_of, record
-from teleop_core.kernels.geometry import Array
+from teleop_core.kernels import Array, Fields, IntegerPerJoint, PerJoint, Vector3, fields_of, record
 
 
 class Base(Fields):

@@ -8,8 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from teleop_core.base.errors import ParameterError
-from teleop_core.base.parameters import build
+from teleop_core.base import ParameterError, build
 from teleop_core.kernels.filters import lag_step
 from teleop_core.kernels.geometry import Array
 from teleop_core.slave.slave import ReferenceFilterParameters

@@ -10,8 +10,7 @@ import pytest
 import yaml
 
 from present import present
-from teleop_core.base.errors import ParameterError, TeleopError, UnknownNameError
-from teleop_core.base.parameters import build
+from teleop_core.base import ParameterError, TeleopError, UnknownNameError, build
 from teleop_core.cli import main
 from teleop_core.robots import load_robot
 from teleop_core.session.configuration import configure

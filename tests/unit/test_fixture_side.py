@@ -11,13 +11,11 @@ from hypothesis import strategies as st
 
 from any_shape import KINDS, depth_of, found
 from scaling_desk import MM, Desk
-from teleop_core.base.errors import ParameterError
-from teleop_core.base.parameters import build, parameter
+from teleop_core.base import ParameterError, build, parameter
 from teleop_core.chain.mapping.motion_scaling import to_slave_axes
 from teleop_core.chain.mapping.parameters import FixtureParameters
-from teleop_core.graph.signals import TICK_NS
-from teleop_core.kernels import kernel
-from teleop_core.kernels.geometry import Array
+from teleop_core.graph import TICK_NS
+from teleop_core.kernels import Array, kernel
 from teleop_core.shapes import Shape, register_shape
 
 # Sums of a few hundred steps of millimetres at half a metre [m].

@@ -16,9 +16,8 @@ from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot
 from teleop_core.session.configuration import configure
 from teleop_core.session.virtual import VirtualTime
-from teleop_core.slave.force_observer import force_of_efforts
+from teleop_core.slave import force_observer, slave_sim
 from teleop_core.slave.plants import PLANTS
-from teleop_core.slave.slave_sim import SlaveSim
 
 LAG = 5e-3
 """Time constant of the measured speeds [s]."""
@@ -38,15 +37,15 @@ def fine() -> None:
         tc.register_plant(tc.Plant("fine_encoders", tc.NoParameters, fine_physics))
 
 
-def made(name: str, *texts: str) -> SlaveSim:
+def made(name: str, *texts: str) -> slave_sim.SlaveSim:
     """A simulated arm at its start."""
     given = [f"robot={name}", "trials=small", "estimate=true", *texts]
-    stage = SlaveSim(configure("free_motion", settings=given).group("slave_sim"))
+    stage = slave_sim.SlaveSim(configure("free_motion", settings=given).group("slave_sim"))
     stage._rest_at(stage.robot.start.copy())
     return stage
 
 
-def led(stage: SlaveSim, path: Array) -> Array:
+def led(stage: slave_sim.SlaveSim, path: Array) -> Array:
     """True and estimated force (2, N, 3) of an arm whose setpoints are led along a path (N, n)."""
     forces = np.empty((2, len(path), 3))
     for k, setpoint in enumerate(path):
@@ -147,7 +146,7 @@ def test_the_force_is_the_damped_least_squares_of_the_efforts(n: int, data: st.D
     scale = np.array(data.draw(st.lists(st.floats(0.1, 100.0), min_size=n, max_size=n)))
     J = np.vstack((np.reshape(entries, (3, n)), np.full((3, n), np.nan)))
     efforts, found = J[:3].T @ np.array(force), np.full(3, np.nan)
-    force_of_efforts(J, efforts, scale, found)
+    force_observer.force_of_efforts(J, efforts, scale, found)
     way = J[:3].T / scale[:, None]
     damping = math.sqrt(1e-4 * np.trace(way.T @ way) / 3.0)
     rows = np.vstack((way, damping * np.eye(3)))
@@ -159,7 +158,7 @@ def test_the_force_is_the_damped_least_squares_of_the_efforts(n: int, data: st.D
 @pytest.mark.parametrize("wrong", [0.0, math.nan, math.inf])
 def test_an_arm_without_a_jacobian_feels_nothing(wrong: float) -> None:
     found = np.full(3, np.nan)
-    force_of_efforts(np.full((6, 4), wrong), np.ones(4), np.ones(4), found)
+    force_observer.force_of_efforts(np.full((6, 4), wrong), np.ones(4), np.ones(4), found)
     np.testing.assert_array_equal(found, np.zeros(3))
 
 

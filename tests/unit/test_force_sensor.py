@@ -13,8 +13,7 @@ import teleop_core as tc
 from present import present
 from teleop_core.base.errors import ParameterError
 from teleop_core.kernels.geometry import Array
-from teleop_core.session.configuration import configure
-from teleop_core.session.virtual import VirtualTime
+from teleop_core.session import configuration, virtual
 from teleop_core.slave.pair import ArmParameters, SimulatedArm
 from teleop_core.slave.slave_sim import SlaveSim
 
@@ -24,7 +23,7 @@ TICKS = 2000
 def arm(*texts: str, robot: str = "rcrt1") -> SlaveSim:
     """A simulated arm that nobody leads."""
     given = [f"robot={robot}", "trials=small", *texts]
-    return SlaveSim(configure("free_motion", settings=given).group("slave_sim"))
+    return SlaveSim(configuration.configure("free_motion", settings=given).group("slave_sim"))
 
 
 def told(stage: SlaveSim, ticks: int = TICKS) -> Array:
@@ -64,7 +63,7 @@ def test_noise_does_not_depend_on_how_many_ticks_are_made_at_once() -> None:
     texts = ["force_noise=0.1", "operator=line", "duration=1.0"]
     blocks: Any = []
     for counts in ((1500,), (1, 700, 799)):
-        session = VirtualTime(configure("free_motion", settings=texts))
+        session = virtual.VirtualTime(configuration.configure("free_motion", settings=texts))
         parts = [session.run(count)["slave_measured_cf"].copy() for count in counts]
         blocks.append(np.concatenate(parts))
     np.testing.assert_array_equal(*blocks)
@@ -99,7 +98,7 @@ def test_a_bias_is_what_is_told_of_nothing() -> None:
 def pressed(*texts: str, ticks: int = 13_000) -> NDArray[np.void]:
     """Rows of a session that presses a block from 12 s on."""
     given = ["reflection.architecture=unilateral", *texts]
-    return VirtualTime(configure("palpation", settings=given)).run(ticks)
+    return virtual.VirtualTime(configuration.configure("palpation", settings=given)).run(ticks)
 
 
 def test_what_the_sensor_adds_is_added_to_the_true_push_and_moves_nothing() -> None:
@@ -119,7 +118,7 @@ def test_the_plant_behind_gears_has_its_sensor_too() -> None:
 
 
 def test_an_arm_without_a_graph_draws_its_noise_too() -> None:
-    sensor = configure("free_motion", settings=["force_noise=0.1"]).group("slave_sim").force_sensor
+    sensor = configuration.configure("free_motion", settings=["force_noise=0.1"]).group("slave_sim").force_sensor
     pair = SimulatedArm(ArmParameters(force_sensor=sensor, trials="small", starts_at_home=True))
     rows = []
     for _ in range(1500):
@@ -134,7 +133,7 @@ def test_a_sensor_that_is_retuned_tells_the_new_numbers_from_the_next_tick_on() 
     stage.step()
     assert not stage.signals["slave_measured_cf"].any()
     given = ["robot=rcrt1", "trials=small", "force_bias=[1.0,0.0,0.0]", "force_noise=0.01"]
-    stage.retune(configure("free_motion", settings=given).group("slave_sim"))
+    stage.retune(configuration.configure("free_motion", settings=given).group("slave_sim"))
     measured, _ = told(stage, 200)
     assert measured[:, 0].mean() == pytest.approx(1.0, abs=0.005)
     assert measured[:, 0].std() == pytest.approx(0.01, rel=0.3)
@@ -150,7 +149,7 @@ def test_a_sensor_that_cannot_be_is_refused_by_name(text: str) -> None:
 def score(*texts: str) -> Any:
     """Score of a recorded press."""
     given = ["reflection.architecture=unilateral", "duration=14.0", *texts]
-    return tc.run(configure("palpation", settings=given)).score()
+    return tc.run(configuration.configure("palpation", settings=given)).score()
 
 
 def test_an_ideal_sensor_has_no_error() -> None:

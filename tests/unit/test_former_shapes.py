@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from any_shape import depth_of
-from teleop_core.base.errors import UnknownNameError
-from teleop_core.base.parameters import build
+from teleop_core.base import UnknownNameError, build
 from teleop_core.chain.fixtures.reported_fixture import reported_fixture
 from teleop_core.chain.mapping.parameters import FixtureParameters
 from teleop_core.graph.former_shapes import present_layer

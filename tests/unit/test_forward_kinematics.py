@@ -9,11 +9,9 @@ import pytest
 
 from teleop_core.base.errors import ClosureError, ParameterError, ShapeError
 from teleop_core.kernels.geometry import Array, rotation, transform
-from teleop_core.robots import FkStatus, list_robots, load_robot
-from teleop_core.robots.dexterity import sample_workspace
+from teleop_core.robots import FkStatus, dexterity, list_robots, load_robot
 from teleop_core.robots.robot import Robot
-from teleop_machines.rps3 import assembly_modes
-from teleop_machines.stewart import PAIRED
+from teleop_machines import rps3, stewart
 
 # Loops are solved to rounding of their lengths; a pose loses the condition of its assembly.
 CLOSED, SAME = 1e-9, 1e-6
@@ -35,8 +33,8 @@ def torn_rps3(T: Array, legs: Sequence[float] | Array, b: float = 1.0, a: float 
 
 def torn_stewart(T: Array, legs: Array) -> float:
     """Largest error of a leg [m]."""
-    ends = T[:3, 3] + PAIRED.platform @ T[:3, :3].T
-    return np.abs(np.linalg.norm(ends - PAIRED.base, axis=1) - legs).max()
+    ends = T[:3, 3] + stewart.PAIRED.platform @ T[:3, :3].T
+    return np.abs(np.linalg.norm(ends - stewart.PAIRED.base, axis=1) - legs).max()
 
 
 TORN = {"rps3": torn_rps3, "stewart": torn_stewart}
@@ -125,7 +123,7 @@ def test_every_legal_triple_of_the_3_rps_has_an_assembly_and_fk_finds_it() -> No
 def test_assemblies_of_the_3_rps_are_those_of_its_polynomial() -> None:
     robot = load_robot("rps3")
     for q in np.random.default_rng(5).uniform(0.3, 2.5, (60, 3)):
-        found, modes = robot.fk_all(q), assembly_modes(q, b=1.0, a=0.5).transforms
+        found, modes = robot.fk_all(q), rps3.assembly_modes(q, b=1.0, a=0.5).transforms
         assert len(found) == len(modes)
         for T in modes:
             assert np.abs(found - T).max(axis=(1, 2)).min() < SAME
@@ -228,8 +226,8 @@ def test_opposite_modes_never_meet_without_a_singular_pose() -> None:
     robot = load_robot("stewart")
     for q in legal(robot, 6, 11, share=0.5):
         for T in robot.fk_all(q):
-            sign = np.linalg.slogdet(PAIRED.leg_jacobian(T))[0]
-            home = np.linalg.slogdet(PAIRED.leg_jacobian(robot.fk(robot.home)))[0]
+            sign = np.linalg.slogdet(stewart.PAIRED.leg_jacobian(T))[0]
+            home = np.linalg.slogdet(stewart.PAIRED.leg_jacobian(robot.fk(robot.home)))[0]
             assert robot.solve_fk(q, T).mode == sign * home
 
 
@@ -313,8 +311,8 @@ def test_bad_questions_are_refused_by_name() -> None:
 
 def test_a_workspace_is_made_of_joints_that_close_and_of_all_where_there_are_no_loops() -> None:
     for name, low, high in (("rcrt1", 300, 300), ("rps3", 100, 200), ("three_finger_hand", 300, 300)):
-        points, values = sample_workspace(load_robot(name), 300, np.random.default_rng(13))
+        points, values = dexterity.sample_workspace(load_robot(name), 300, np.random.default_rng(13))
         assert low <= len(points) == len(values) <= high
         assert np.isfinite(points).all()
     # The platform is above its base, as next to home.
-    assert sample_workspace(load_robot("rps3"), 300, np.random.default_rng(13))[0][:, 2].min() > 0.3
+    assert dexterity.sample_workspace(load_robot("rps3"), 300, np.random.default_rng(13))[0][:, 2].min() > 0.3

@@ -10,10 +10,9 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from present import present
-from teleop_core.base.parameters import build
-from teleop_core.graph.signals import DT
-from teleop_core.kernels import kernel
-from teleop_core.kernels.geometry import Array
+from teleop_core.base import build
+from teleop_core.graph import DT
+from teleop_core.kernels import Array, kernel
 from teleop_core.slave.friction import wander
 from teleop_core.slave.joints import integrate
 from teleop_core.slave.simulation import SimulationNumbers, SimulationState

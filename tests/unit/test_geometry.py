@@ -10,9 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from teleop_core.base.errors import ParameterError, ShapeError
-from teleop_core.kernels import geometry, kernel
-from teleop_core.kernels.geometry import Array
+from teleop_core.base import ParameterError, ShapeError
+from teleop_core.kernels import Array, geometry, kernel
 from teleop_core.robots import load_robot
 
 # Sums of a few products of numbers of size one.

@@ -5,11 +5,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from teleop_core.base.errors import ParameterError, PartError, TeleopError, UnknownNameError
-from teleop_core.base.parameters import NoParameters
-from teleop_core.graph import topics
-from teleop_core.graph.graph import BUILT_IN, Delay, Graph, build_graph
-from teleop_core.graph.stage import STAGES, Stage, register_stage
+from teleop_core.base import NoParameters, ParameterError, PartError, TeleopError, UnknownNameError
+from teleop_core.graph import BUILT_IN, STAGES, Graph, Stage, build_graph, register_stage, topics
+from teleop_core.graph.graph import Delay
 from teleop_core.graph.topics import SLAVE_MEASURED_CP, SLAVE_SERVO_CP, Kind, Topic, in_force, passed_on
 from teleop_core.session.configuration import configure
 

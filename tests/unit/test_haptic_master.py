@@ -13,17 +13,14 @@ from scipy.signal import periodogram
 from scipy.spatial.transform import Rotation
 
 from held_master import HeldMaster
-from teleop_core.base.errors import ParameterError
-from teleop_core.base.parameters import build
+from teleop_core.base import ParameterError, build
+from teleop_core.chain.master import hand_mechanics, haptic_master
 from teleop_core.chain.master.device import DeviceParameters
-from teleop_core.chain.master.hand_mechanics import HandParameters
-from teleop_core.chain.master.haptic_master import HapticMaster, HapticMasterParameters
 from teleop_core.chain.operators import OPERATORS, Setting, register_operator
 from teleop_core.chain.operators.parameters import ButtonParameters, OperatorParameters
 from teleop_core.chain.operators.rest import REST_POSITION, REST_TILT
 from teleop_core.chain.operators.shapes import PHASES
-from teleop_core.kernels import records
-from teleop_core.kernels.geometry import Array
+from teleop_core.kernels import Array, records
 
 RESOLUTION, NOISE, PEAK = 0.055e-3, 2e-3, 3.3
 REST = Rotation.from_euler("x", REST_TILT)
@@ -39,7 +36,7 @@ def operator(**values: str | float | tuple[float, ...]) -> OperatorParameters:
 STILL = operator(kind="hold", rotation=0.0)
 
 
-def held(given: tuple[OperatorParameters, HapticMasterParameters]) -> Any:
+def held(given: tuple[OperatorParameters, haptic_master.HapticMasterParameters]) -> Any:
     """Device and operator of given parameters."""
     return HeldMaster(*given)
 
@@ -56,8 +53,8 @@ def parameters(
     own: dict[str, Any] = {k: v for k, v in (hand or {}).items() if k.startswith("tremor")}
     rest = {k: v for k, v in (hand or {}).items() if k not in own}
     person = replace(operator, seed=seed, patience=0.0, buttons=ButtonParameters(**(buttons or {})), **own)
-    return person, HapticMasterParameters(
-        seed=seed, device=DeviceParameters(**(device or {})), hand=HandParameters(**rest)
+    return person, haptic_master.HapticMasterParameters(
+        seed=seed, device=DeviceParameters(**(device or {})), hand=hand_mechanics.HandParameters(**rest)
     )
 
 
@@ -132,7 +129,7 @@ def test_gimbal_noise_is_white() -> None:
     assert abs(lagged) < 4.0 / math.sqrt(5000)
 
 
-def hand_gain(hertz: float, hand: HandParameters, device: DeviceParameters, axis: int) -> float:
+def hand_gain(hertz: float, hand: hand_mechanics.HandParameters, device: DeviceParameters, axis: int) -> float:
     """Amplitude of the reading over that of the wanted place, without friction: two masses."""
     s = 2j * math.pi * hertz
     pull = hand.stiffness + hand.damping * s
@@ -153,7 +150,7 @@ def test_tremor_has_its_peak_in_the_band_with_the_wanted_amplitude(middle: float
         band = (frequency > middle - 2.5) & (frequency < middle + 2.5)
         assert power[band].sum() > 0.95 * power.sum()
     amplitude = math.sqrt(2.0) * motion.std(axis=0)
-    gains = [hand_gain(middle, HandParameters(), DeviceParameters(), axis) for axis in range(3)]
+    gains = [hand_gain(middle, hand_mechanics.HandParameters(), DeviceParameters(), axis) for axis in range(3)]
     # The line wanders by ±2 Hz, over which the gain changes by a third.
     assert np.allclose(amplitude, 0.5e-3 * np.array(gains), rtol=0.1, atol=0)
 
@@ -193,10 +190,10 @@ def test_hand_and_device_give_way_by_force_over_stiffness_but_for_friction(
 @pytest.mark.parametrize("stiffness", [(1260.0, 2310.0, 1020.0), (1e7, 1e6, 1e5)])
 def test_two_masses_move_exactly_under_a_force_that_is_held_for_a_tick(stiffness: tuple[float, float, float]) -> None:
     """Against the exponential of their own equations, tick by tick, axis by axis."""
-    hand = HandParameters()
+    hand = hand_mechanics.HandParameters()
     frictionless: dict[str, Any] = {**QUIET, **COLD, "friction": 0.0, "stiffness": stiffness}
     device = DeviceParameters(**frictionless)
-    master = HapticMaster(HapticMasterParameters(device=device, hand=hand))
+    master = haptic_master.HapticMaster(haptic_master.HapticMasterParameters(device=device, hand=hand))
     forces = np.random.default_rng(6).normal(0.0, 0.5, (300, 3))
     expected = np.zeros((3, 4))  # places of device and hand, their speeds
     steps = []
@@ -394,8 +391,8 @@ def test_what_the_operator_wants_does_not_depend_on_the_blocks_it_is_drawn_in(si
 def test_new_hand_is_felt_from_the_next_tick_and_does_not_jump() -> None:
     master = held(parameters(operator=RANDOM, device=QUIET))
     before = places(run(master, 1000))
-    stiff = HandParameters(stiffness=2000.0, damping=30.0)
-    master.device.retune(HapticMasterParameters(hand=stiff, device=DeviceParameters(**QUIET)))
+    stiff = hand_mechanics.HandParameters(stiffness=2000.0, damping=30.0)
+    master.device.retune(haptic_master.HapticMasterParameters(hand=stiff, device=DeviceParameters(**QUIET)))
     after = places(run(master, 200))
     assert np.abs(after[0] - before[-1]).max() < 2e-4
     off = after - wanted_places(RANDOM, 1200)[1000:]

@@ -10,24 +10,21 @@ from present import present
 from teleop_core.base import errors
 from teleop_core.base.parameters import MARKS, NoParameters, build, parameter, specs
 from teleop_core.graph.signals import TICK_NS
-from teleop_core.robots import load_robot
-from teleop_core.robots.hardware import ENTRIES, Hardware
-from teleop_core.robots.link_errors import LinkErrors
+from teleop_core.robots import hardware, link_errors, load_robot
 from teleop_core.robots.robot import Robot
 from teleop_core.session.configuration import configure
-from teleop_core.slave.pair import ArmParameters, SimulatedArm
+from teleop_core.slave import pair, slave_sim
 from teleop_core.slave.plants import PLANTS, Physics, Plant, register_plant
 from teleop_core.slave.plants.hardware import FAULTS, HARDWARE, faults_of
-from teleop_core.slave.slave_sim import SlaveSim
 from teleop_lab.fitting.rests import Mover
 
 ARM = load_robot("rcrt1")
 TARGET = ARM.home + np.array([0.5, -0.4, -0.04, 0.6, 0.5, 0.4])
 
 
-def slave(plant: str = "hardware", controller: str = "source_pid", **settings: Any) -> ArmParameters:
+def slave(plant: str = "hardware", controller: str = "source_pid", **settings: Any) -> pair.ArmParameters:
     given = {"plant.kind": plant, "controller.kind": controller}
-    return build(ArmParameters, given | settings)
+    return build(pair.ArmParameters, given | settings)
 
 
 def rest(*without: str, **settings: Any) -> Any:
@@ -70,7 +67,7 @@ def test_bias_and_weight_push_a_joint_without_friction_off_by_their_size_over_kp
 @pytest.mark.parametrize("law", ["pid", "friction_compensation", "adaptive"])
 def test_a_law_that_can_hold_bias_and_weight_begins_in_balance(law: str) -> None:
     # Without friction whatever is not held moves axis 1, of the bias, or 2, of the weight, at once.
-    made = SimulatedArm(slave(
+    made = pair.SimulatedArm(slave(
         controller=law, starts_at_home=True,
         **dict[str, Any]({"plant.hardware.without": ("friction", "wandering")}),
     ))  # fmt: skip
@@ -133,7 +130,7 @@ def test_every_fault_can_be_left_out_alone(fault: str) -> None:
 
 
 def test_every_number_of_the_hardware_says_how_it_is_known() -> None:
-    assert set(faults_of(ARM).sources) == set(ENTRIES)
+    assert set(faults_of(ARM).sources) == set(hardware.ENTRIES)
     for text in faults_of(ARM).sources.values():
         assert text.partition(":")[0] in MARKS
     numbers = [spec for spec in specs(HARDWARE.parameters) if spec.kind in {float, int}]
@@ -141,7 +138,7 @@ def test_every_number_of_the_hardware_says_how_it_is_known() -> None:
 
 
 def test_another_robot_sticks_by_its_drive_table_and_is_made_as_drawn() -> None:
-    made = SimulatedArm(build(ArmParameters, {"robot": "puma560", "plant.kind": "hardware"}))
+    made = pair.SimulatedArm(build(pair.ArmParameters, {"robot": "puma560", "plant.kind": "hardware"}))
     robot = made.robot
     assert np.array_equal(made.simulated.parameters["coulomb"], present(robot.drives).coulomb)
     assert (made.simulated.parameters["bristle"] > 0.0).all()
@@ -189,7 +186,7 @@ def test_what_is_no_plant_is_refused_with_the_reason(plant: str | Plant, needed:
 )
 def test_wrong_numbers_of_a_plant_name_what_is_possible(setting: str, needed: str) -> None:
     with pytest.raises((errors.ParameterError, errors.UnknownNameError), match=needed):
-        SlaveSim(configure(None, settings=["plant=hardware", setting]).group("slave_sim"))
+        slave_sim.SlaveSim(configure(None, settings=["plant=hardware", setting]).group("slave_sim"))
 
 
 @pytest.mark.parametrize(
@@ -199,7 +196,7 @@ def test_wrong_numbers_of_a_plant_name_what_is_possible(setting: str, needed: st
         ({"play": [0.0]}, errors.ShapeError),
         ({"coupling": np.zeros((3, 3))}, errors.ShapeError),
         ({"coupling": np.ones((2, 2))}, errors.ParameterError),
-        ({"links": LinkErrors.none(3)}, errors.ShapeError),
+        ({"links": link_errors.LinkErrors.none(3)}, errors.ShapeError),
         ({"sources": {"mass": "published: x"}}, errors.UnknownNameError),
         ({"sources": {"play": "somewhere"}}, errors.ParameterError),
     ],
@@ -209,7 +206,7 @@ def test_impossible_hardware_is_refused(changed: Any, kind: type[errors.TeleopEr
     given = {"coulomb": zero, "bias": zero, "wander": zero, "play": zero,
              "coupling": np.zeros((2, 2))}  # fmt: skip
     with pytest.raises(kind):
-        Hardware(**(given | changed))
+        hardware.Hardware(**(given | changed))
 
 
 def test_a_source_without_a_mark_is_refused() -> None:

@@ -16,11 +16,8 @@ from mcap.records import DataEnd, Footer, Header
 from rich.console import Console
 
 from teleop_core import cli
-from teleop_core.bags.compression import LARGEST
-from teleop_core.bags.mcap_file import MAGIC, encode
-from teleop_core.bags.reader import Bag, recover
+from teleop_core.bags import compression, mcap_file, reader, rosbag2
 from teleop_core.bags.reports import report
-from teleop_core.bags.rosbag2 import records_of
 from teleop_core.bags.writer import BagWriter
 from teleop_core.base.errors import RecordingError, TeleopError, UnknownNameError
 from teleop_core.base.texts import LONGEST_LINE, one_line, printable, shown
@@ -48,12 +45,12 @@ def little_memory() -> Iterator[None]:
 
 def bomb(path: Path, name: str, packed: bytes, told: int) -> Path:
     """A recording of one chunk that says that it unpacks to ``told`` bytes."""
-    schemas, channels = records_of([topics.SLAVE_MEASURED_CP])
+    schemas, channels = rosbag2.records_of([topics.SLAVE_MEASURED_CP])
     head = struct.pack("<QQQI", 1, 2, told, 0) + struct.pack("<I", len(name)) + name.encode()
     body = head + struct.pack("<Q", len(packed)) + packed
     chunk = struct.pack("<BQ", Opcode.CHUNK, len(body)) + body
-    start = MAGIC + encode(Header("ros2", "x"), *schemas, *channels)
-    path.write_bytes(start + chunk + encode(DataEnd(0), Footer(0, 0, 0)) + MAGIC)
+    start = mcap_file.MAGIC + mcap_file.encode(Header("ros2", "x"), *schemas, *channels)
+    path.write_bytes(start + chunk + mcap_file.encode(DataEnd(0), Footer(0, 0, 0)) + mcap_file.MAGIC)
     return path
 
 
@@ -88,20 +85,20 @@ def test_a_small_chunk_that_unpacks_to_gigabytes_is_refused(
 ) -> None:
     path = bomb(tmp_path / "bomb.mcap", kind.partition(" ")[0], packed, told)
     with pytest.raises(RecordingError, match="is damaged") as error:
-        Bag(path)
+        reader.Bag(path)
     assert len(str(error.value)) <= LONGEST_LINE
     with pytest.raises(RecordingError, match="nothing can be recovered"):
-        recover(path)
+        reader.recover(path)
 
 
 def test_the_largest_chunk_is_far_above_those_of_known_writers() -> None:
-    assert LARGEST > 50 * (1 << 20)
+    assert compression.LARGEST > 50 * (1 << 20)
 
 
 def test_a_pipe_in_the_place_of_a_file_is_refused_and_not_waited_for(tmp_path: Path) -> None:
     pipe = tmp_path / "pipe.mcap"
     os.mkfifo(pipe)
-    for attempt in (load_file, load_table, Bag, recover, as_master_bag):
+    for attempt in (load_file, load_table, reader.Bag, reader.recover, as_master_bag):
         with pytest.raises(TeleopError):
             attempt(pipe)
     bag = tmp_path / "bag"
@@ -110,7 +107,7 @@ def test_a_pipe_in_the_place_of_a_file_is_refused_and_not_waited_for(tmp_path: P
     (bag / "metadata.yaml").unlink()
     os.mkfifo(bag / "metadata.yaml")
     with pytest.raises(RecordingError, match="pipe"):
-        Bag(bag)
+        reader.Bag(bag)
 
 
 def test_a_length_that_a_file_claims_is_never_allocated(
@@ -123,7 +120,7 @@ def test_a_length_that_a_file_claims_is_never_allocated(
     struct.pack_into("<Q", whole, start + 1, 3 * GIGABYTE)
     file.write_bytes(whole)
     with pytest.raises(RecordingError, match="its index is damaged"):
-        Bag(file)
+        reader.Bag(file)
     ros1 = tmp_path / "old.bag"
     ros1.write_bytes(b"#ROSBAG V2.0\n" + struct.pack("<I", 3 * GIGABYTE) + bytes(5000))
     assert cli.main(["import", str(ros1), "--out", str(tmp_path / "out")]) == 2
@@ -149,7 +146,7 @@ def test_no_command_prints_codes_that_stand_in_a_recording(tmp_path: Path, capsy
     said = "".join(capsys.readouterr())
     assert "\u241b" in said  # shown, not obeyed
     assert not set(ESCAPES) & set("\x1b\x07\x9b\u202e") & set(said)
-    reports = Bag(path).reports(topics.DIAGNOSTICS)
+    reports = reader.Bag(path).reports(topics.DIAGNOSTICS)
     assert all(printable(text) == text for one in reports for text in (one.name, one.message))
 
 
@@ -167,7 +164,7 @@ def test_metadata_cannot_lead_out_of_the_directory(tmp_path: Path) -> None:
     for outside in ("../secret_0.mcap", str(tmp_path / "secret_0.mcap"), "..", "."):
         index.write_text(whole.replace("- bag_0.mcap", f"- {outside}"))
         with pytest.raises(RecordingError, match="lacks its files"):
-            Bag(path)
+            reader.Bag(path)
 
 
 def test_a_file_that_is_listed_three_thousand_times_is_refused_in_one_line(tmp_path: Path) -> None:
@@ -175,7 +172,7 @@ def test_a_file_that_is_listed_three_thousand_times_is_refused_in_one_line(tmp_p
     index = path / "metadata.yaml"
     index.write_text(index.read_text().replace("- bag_0.mcap\n", "- bag_0.mcap\n  " * 3000))
     with pytest.raises(RecordingError, match="damaged") as told:
-        Bag(path)
+        reader.Bag(path)
     assert len(str(told.value)) <= LONGEST_LINE
 
 

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from held_master import HeldMaster
-from teleop_core.base.errors import ParameterError
-from teleop_core.base.parameters import build
+from teleop_core.base import ParameterError, build
 from teleop_core.chain.master.haptic_master import HapticMasterParameters
 from teleop_core.chain.operators import OPERATORS, Setting
 from teleop_core.chain.operators.human import HumanParameters, Submovement, submovements, tremor

@@ -9,15 +9,11 @@ import pytest
 from numpy.typing import NDArray
 from scipy.signal import lsim
 
-from teleop_core.base.errors import ParameterError, PartError
-from teleop_core.base.parameters import build
+from teleop_core.base import ParameterError, PartError, build
 from teleop_core.chain.architectures.impedance import IMPEDANCE, ImpedanceParameters
-from teleop_core.graph.graph import Graph, build_graph
-from teleop_core.graph.signals import TICK_NS
-from teleop_core.graph.topics import NO_COMMAND_NS
+from teleop_core.graph import TICK_NS, Graph, build_graph, topics
 from teleop_core.kernels.geometry import Array
-from teleop_core.session.configuration import configure
-from teleop_core.session.virtual import VirtualTime
+from teleop_core.session import configuration, virtual
 from teleop_core.slave.slave_sim import SLAVE_SIM
 
 CALM = ("feedback_timeout=1.0", "reach_force.is_on=false", "gimbal_noise=0.0")
@@ -28,7 +24,7 @@ LATE = ("network.there.least_delay=0.03", "network.back.least_delay=0.05")
 def pressing(*texts: str, stages: str = STAGES, ticks: int = 9000) -> NDArray[np.void]:
     """Signals of the scenario ``palpation``, whose slave yields."""
     settings = [stages, *CALM, *texts]
-    return VirtualTime(configure("palpation", settings=settings)).run(ticks)
+    return virtual.VirtualTime(configuration.configure("palpation", settings=settings)).run(ticks)
 
 
 def on_the_slave(force: Array) -> Array:
@@ -40,7 +36,7 @@ def slave(**values: float) -> tuple[Any, Callable[..., float]]:
     """A stage at work, and a call that gives it a command after some ticks: where the tip goes."""
     stage = IMPEDANCE.run(build(ImpedanceParameters, values))
     row = stage.signals
-    row["slave_setpoint_cp_ns"] = NO_COMMAND_NS + 1
+    row["slave_setpoint_cp_ns"] = topics.NO_COMMAND_NS + 1
 
     def command(
         force: float = 0.0, lead: float = 0.0, ticks: int = 1, place: tuple[float, float, float] = (0.1, 0.2, 0.3)
@@ -101,7 +97,7 @@ def test_a_slave_that_goes_its_own_way_gathers_none_and_loses_what_it_had_withou
     row, command = slave()
     for _ in range(1000):
         command(-2.0)
-    row["slave_setpoint_cp_ns"] = NO_COMMAND_NS
+    row["slave_setpoint_cp_ns"] = topics.NO_COMMAND_NS
     ways = np.array([command(-2.0) for _ in range(1500)])
     assert np.abs(np.diff(ways)).max() < 2e-3 * 1e-3 * 50.0  # 2 mm over 20 ms
     assert np.all(np.diff(ways) > 0.0)
@@ -210,20 +206,20 @@ def test_a_force_of_the_hand_behind_a_deadband_is_off_by_no_more_than_its_share(
 @pytest.mark.parametrize("architecture", ["three_channel", "four_channel"])
 def test_channels_before_a_slave_that_does_not_yield_are_refused_with_what_there_is(architecture: str) -> None:
     with pytest.raises(ParameterError, match=r"teleop.stages=\[impedance\].*position_force") as got:
-        configure("palpation", settings=[f"reflection.architecture={architecture}"])
+        configuration.configure("palpation", settings=[f"reflection.architecture={architecture}"])
     assert got.value.value == architecture
 
 
 def test_waves_before_a_slave_that_yields_are_refused_with_the_others() -> None:
     with pytest.raises(ParameterError, match="none, tank, tdpa with the stage impedance"):
-        configure("palpation", settings=[STAGES, "reflection.passivity=wave"])
+        configuration.configure("palpation", settings=[STAGES, "reflection.passivity=wave"])
 
 
 @pytest.mark.parametrize("order", ["impedance,network", "passivity,impedance"])
 def test_a_slave_that_yields_on_the_wrong_side_is_refused_with_the_order(order: str) -> None:
     wanted = ",".join(sorted(order.split(","), key=["network", "impedance", "passivity"].index))
     with pytest.raises(PartError, match=wanted.replace(",", ", ")):
-        configure("palpation", settings=[f"teleop.stages=[{order}]"])
+        configuration.configure("palpation", settings=[f"teleop.stages=[{order}]"])
 
 
 def test_a_slave_that_measures_no_force_cannot_yield() -> None:

@@ -10,25 +10,22 @@ from hypothesis import strategies as st
 
 from present import present
 from teleop_core.base.errors import ParameterError, ShapeError
-from teleop_core.robots import list_robots, load_robot
+from teleop_core.robots import drives, inertias, list_robots, load_robot
 from teleop_core.robots.arms import rcrt1_dynamics
-from teleop_core.robots.arms.rcrt1_dynamics import LINKS, link_inertias
-from teleop_core.robots.drives import Dynamics, independent_axes
-from teleop_core.robots.inertias import LinkInertia, check_possible
 
 points = st.lists(st.tuples(st.floats(0.01, 2.0), *[st.floats(-1.0, 1.0)] * 3), min_size=4, max_size=12)
 
 
-def of_points(cloud: list[tuple[float, float, float, float]]) -> LinkInertia:
+def of_points(cloud: list[tuple[float, float, float, float]]) -> inertias.LinkInertia:
     """Link of point masses (mass, x, y, z): sums over the points, as the definition says."""
     masses, places = np.array([p[0] for p in cloud]), np.array([p[1:] for p in cloud])
     tensor = sum(m * (p @ p * np.eye(3) - np.outer(p, p)) for m, p in zip(masses, places, strict=True))
     center = masses @ places / masses.sum()
-    return LinkInertia(name="cloud", mass=masses.sum(), center=center, inertia=tensor)
+    return inertias.LinkInertia(name="cloud", mass=masses.sum(), center=center, inertia=tensor)
 
 
-def principal(moments: tuple[float, float, float], name: str = "box") -> LinkInertia:
-    return LinkInertia(name=name, mass=1.0, center=np.zeros(3), inertia=np.diag(moments))
+def principal(moments: tuple[float, float, float], name: str = "box") -> inertias.LinkInertia:
+    return inertias.LinkInertia(name=name, mass=1.0, center=np.zeros(3), inertia=np.diag(moments))
 
 
 @given(points)
@@ -40,7 +37,7 @@ def test_every_cloud_of_masses_has_a_possible_inertia_or_is_flat(
     # Sums of squares: no eigenvalue is negative, whatever the cloud; rounding of 24 kg in 2 m.
     assert second[0] > -1e-13
     if np.linalg.eigvalsh(link.central)[0] > 1e-9:
-        check_possible([link])
+        inertias.check_possible([link])
 
 
 @given(points)
@@ -57,16 +54,16 @@ def test_the_triangle_inequality_is_the_pseudo_inertias_sign(moments: tuple[floa
     link = principal(moments)
     least = np.linalg.eigvalsh(link.pseudo)[0]
     if least > 1e-6:
-        check_possible([link])
+        inertias.check_possible([link])
     elif least < -1e-6:
         with pytest.raises(ParameterError, match="second moment"):
-            check_possible([link])
+            inertias.check_possible([link])
 
 
 @pytest.mark.parametrize("name", list_robots())
 def test_every_robot_has_possible_inertias(name: str) -> None:
     robot = load_robot(name)
-    check_possible(present(robot.dynamics).links)
+    inertias.check_possible(present(robot.dynamics).links)
     for link in present(robot.dynamics).links:
         assert np.linalg.eigvalsh(link.pseudo)[0] > 0.0
     assert (present(robot.drives).inertia > 0.0).all()
@@ -78,16 +75,16 @@ def test_the_rcrt1_states_its_links() -> None:
 
 def test_link_3_with_the_printed_product_and_the_mended_centre_is_refused() -> None:
     with pytest.raises(ParameterError, match=r"'link 3' is -0\.0035.*> 0") as refused:
-        check_possible(link_inertias({**LINKS, "I3xz": 3.0e-3}))
+        inertias.check_possible(rcrt1_dynamics.link_inertias({**rcrt1_dynamics.LINKS, "I3xz": 3.0e-3}))
     assert refused.value.value == pytest.approx(-0.0035226, abs=1e-7)
     # As printed throughout, ahead of the wrist, a body could have the numbers.
-    check_possible(link_inertias({**LINKS, "I3xz": 3.0e-3, "G3z": 0.264245}))
+    inertias.check_possible(rcrt1_dynamics.link_inertias({**rcrt1_dynamics.LINKS, "I3xz": 3.0e-3, "G3z": 0.264245}))
 
 
 def test_a_robot_with_an_impossible_link_is_refused_when_it_is_made() -> None:
     bad = principal((1.0, 1.0, 2.5), name="forearm")
     with pytest.raises(ParameterError, match="forearm") as refused:
-        Dynamics(
+        drives.Dynamics(
             acceleration=rcrt1_dynamics.acceleration,
             gravity=rcrt1_dynamics.gravity_effort,
             parameters=rcrt1_dynamics.link_row(),
@@ -98,16 +95,16 @@ def test_a_robot_with_an_impossible_link_is_refused_when_it_is_made() -> None:
 
 
 def test_a_flat_plate_is_possible_and_a_rod_without_thickness_is_not() -> None:
-    check_possible([principal((0.1, 0.2, 0.1 + 0.2))])
+    inertias.check_possible([principal((0.1, 0.2, 0.1 + 0.2))])
     with pytest.raises(ParameterError, match="smallest principal moment"):
-        check_possible([principal((0.1, 0.1, 0.0))])
+        inertias.check_possible([principal((0.1, 0.1, 0.0))])
 
 
 @pytest.mark.parametrize("mass", [0.0, -1.0])
 def test_a_link_without_mass_is_refused(mass: float) -> None:
     link = replace(principal((1.0, 1.0, 1.0)), mass=mass)
     with pytest.raises(ParameterError) as refused:
-        check_possible([link])
+        inertias.check_possible([link])
     assert refused.value.name == "mass of link 'box'"
     assert refused.value.value == mass
 
@@ -128,4 +125,4 @@ def test_values_that_are_no_inertia_are_refused_by_name() -> None:
 @pytest.mark.parametrize("inertia", [0.0, -0.1, np.nan])
 def test_axes_without_links_still_need_inertia(inertia: float) -> None:
     with pytest.raises(ParameterError, match="inertia"):
-        independent_axes(np.array([1.0, inertia]))
+        drives.independent_axes(np.array([1.0, inertia]))

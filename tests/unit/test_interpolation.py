@@ -96,9 +96,8 @@ def test_at_one_command_per_tick_all_kinds_are_equal() -> None:
 def least_jerk(commands: Array, ticks_between: list[int], after: int) -> Array:
     """The ways of least jerk, polynomials of SciPy one after the other, sampled every tick.
 
-    A way takes as long as its command came after the last one. It begins where the one before it
-    is by then, as fast and as curved, or at rest if that one was over; it ends as fast as the
-    commands go, without acceleration.
+    A way takes as long as its command came after the last one. It begins where the one before it is by then, as fast
+    and as curved, or at rest if that one was over; it ends as fast as the commands go, without acceleration.
     """
     place, rate, bend = commands[0], 0.0 * HOME, 0.0 * HOME
     found = [place] * ticks_between[0]

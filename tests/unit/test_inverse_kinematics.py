@@ -10,8 +10,7 @@ from hypothesis import strategies as st
 
 from present import present
 from teleop_core.chain.mapping.inverse_kinematics import InverseKinematics, InverseKinematicsParameters
-from teleop_core.graph.signals import TICK_NS
-from teleop_core.graph.topics import SLAVE_REACH
+from teleop_core.graph import TICK_NS, topics
 from teleop_core.kernels.geometry import Array, pose_from_transform, rotation, transform
 from teleop_core.robots import IkStatus, load_robot
 
@@ -56,7 +55,7 @@ class Stage:
         return IkStatus(int(self.reach("status")))
 
     def reach(self, name: str) -> float:
-        return self.row["slave_reach"][SLAVE_REACH.columns.index(name)]
+        return self.row["slave_reach"][topics.SLAVE_REACH.columns.index(name)]
 
     @property
     def residual(self) -> Array:

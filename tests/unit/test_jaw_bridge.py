@@ -8,20 +8,19 @@ import pytest
 from teleop_core.base.errors import ParameterError
 from teleop_core.graph.topics import NO_COMMAND_NS, OPERATION
 from teleop_core.kernels.geometry import Array
-from teleop_core.slave.bridges.hearing import Sample
-from teleop_core.slave.bridges.jaw_bridge import JawBridge, JawBridgeParameters
+from teleop_core.slave.bridges import hearing, jaw_bridge
 from teleop_core.slave.operation.states import State
 
 MS = 1_000_000
 PERIOD = 2 * MS
-SPEED = JawBridgeParameters().speed_limit
+SPEED = jaw_bridge.JawBridgeParameters().speed_limit
 
 
 class Gripper:
     """A gripper that goes at once where it is told, as far as what it holds lets it."""
 
     def __init__(self, holds: float = 0.0, **parameters: Any) -> None:
-        self.bridge = JawBridge(JawBridgeParameters(joint="finger", **parameters))
+        self.bridge = jaw_bridge.JawBridge(jaw_bridge.JawBridgeParameters(joint="finger", **parameters))
         self.row, self.holds = self.bridge.signals, holds
         self.row["slave_operation"][OPERATION.index("state")] = float(State.ENABLED)
         self.sent: list[Any]
@@ -33,7 +32,7 @@ class Gripper:
         for _ in range(ticks):
             self.now_ns += PERIOD
             if speaks:
-                told = Sample(("a", "finger"), (0.0, self.position), (), (), self.now_ns)
+                told = hearing.Sample(("a", "finger"), (0.0, self.position), (), (), self.now_ns)
                 self.bridge.hear(told, self.now_ns)
             command = self.bridge.command(self.now_ns, self.setpoint_age, True)
             if command is not None:
@@ -101,11 +100,11 @@ def test_a_sliding_gripper_is_read_and_led_in_its_own_units() -> None:
 
 def test_effort_of_a_sliding_gripper_does_the_same_work_as_ours() -> None:
     gripper = Gripper(scale=-20.0, offset=0.8)
-    gripper.bridge.hear(Sample(("finger",), (0.01,), (0.05,), (8.0,), MS), MS)
+    gripper.bridge.hear(hearing.Sample(("finger",), (0.01,), (0.05,), (8.0,), MS), MS)
     _, velocity, effort = gripper.told
     assert velocity * effort == pytest.approx(0.05 * 8.0)
 
 
 def test_a_scale_of_zero_is_refused() -> None:
     with pytest.raises(ParameterError, match="scale"):
-        JawBridgeParameters(scale=0.0)
+        jaw_bridge.JawBridgeParameters(scale=0.0)

@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 
 from teleop_core.bags.messages import Refusal, read_values
-from teleop_core.base.errors import ParameterError
-from teleop_core.base.parameters import build
-from teleop_core.graph.topics import Kind
+from teleop_core.base import ParameterError, build
+from teleop_core.graph import topics
 from teleop_core.nodes.tuned import NodeParameters
 
 
@@ -31,7 +30,7 @@ def joy(*pressed: int) -> Any:
     ],
 )
 def test_a_map_says_which_button_is_what(pressed: Any, places: Any, expected: list[int]) -> None:
-    taken = read_values(Kind.BUTTONS, joy(*pressed), buttons=places)
+    taken = read_values(topics.Kind.BUTTONS, joy(*pressed), buttons=places)
     assert not isinstance(taken, Refusal)
     stamp_ns, values = taken
     assert stamp_ns == 1_000_000_002
@@ -40,7 +39,7 @@ def test_a_map_says_which_button_is_what(pressed: Any, places: Any, expected: li
 
 @pytest.mark.parametrize("places", [(0, 1, 2), (2, -1, -1)])
 def test_a_message_with_fewer_buttons_is_refused_with_what_to_set(places: tuple[int, int, int]) -> None:
-    refusal = read_values(Kind.BUTTONS, joy(1, 0), buttons=places)
+    refusal = read_values(topics.Kind.BUTTONS, joy(1, 0), buttons=places)
     assert refusal is Refusal.FEW_BUTTONS
     assert "set joy_buttons=[0, -1, 1]" in refusal.value
 

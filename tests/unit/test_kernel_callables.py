@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 from numba import types
 
-from teleop_core.base.errors import KernelError
-from teleop_core.kernels import IS_COMPILED, kernel, pointer, raise_pending
-from teleop_core.kernels.geometry import Array
+from teleop_core.base import KernelError
+from teleop_core.kernels import IS_COMPILED, Array, kernel, pointer, raise_pending
 
 compiled_only = pytest.mark.skipif(not IS_COMPILED, reason="measures the compiler")
 

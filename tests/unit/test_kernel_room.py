@@ -5,9 +5,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from teleop_core.base.errors import KernelError
-from teleop_core.kernels import IS_COMPILED, kernel
-from teleop_core.kernels.geometry import Array
+from teleop_core.base import KernelError
+from teleop_core.kernels import IS_COMPILED, Array, kernel
 from teleop_core.kernels.room import room
 
 compiled_only = pytest.mark.skipif(not IS_COMPILED, reason="looks at compiled code")

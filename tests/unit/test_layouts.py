@@ -12,8 +12,7 @@ import yaml
 import teleop_core as tc
 from teleop_core.bags.layouts import layout
 from teleop_core.bags.markers import MARKERS
-from teleop_core.graph.layers import config_folder
-from teleop_core.graph.topics import BY_NAME, Kind
+from teleop_core.graph import config_folder, topics
 
 FOXGLOVE, RVIZ = config_folder() / "foxglove_layout.json", config_folder() / "teleop.rviz"
 TOPIC = re.compile(r"^/[a-z_/]+")
@@ -64,13 +63,13 @@ def test_curves_of_foxglove_are_fields_of_their_messages() -> None:
     assert curves
     for curve in curves:
         name, _, path = curve.removeprefix("/").partition(".")
-        topic = BY_NAME[name]
+        topic = topics.BY_NAME[name]
         index = re.fullmatch(r"position\[(\d+)\]", path)
         if index is not None:
             assert int(index.group(1)) < len(topic.names(joints))
             continue
         whole, part, axis = path.split(".")
-        assert whole == {Kind.POSE: "pose", Kind.WRENCH: "wrench"}[topic.kind]
+        assert whole == {topics.Kind.POSE: "pose", topics.Kind.WRENCH: "wrench"}[topic.kind]
         assert part in fields
         assert axis in "xyz"
         assert layout(topic, joints).width in {6, 7}

@@ -6,15 +6,12 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from teleop_core.base.parameters import build
-from teleop_core.chain.mapping import parameters
-from teleop_core.chain.mapping.limits import SENT
-from teleop_core.chain.mapping.motion_scaling import MotionScaling
-from teleop_core.graph.signals import STATE, TICK_NS
-from teleop_core.graph.topics import SLAVE_REACH, Limit
+from teleop_core.base import build
+from teleop_core.chain.mapping import limits, motion_scaling, parameters
+from teleop_core.graph import STATE, TICK_NS, topics
 from teleop_core.kernels.geometry import Array
 
-REACH = {name: index for index, name in enumerate(SLAVE_REACH.columns)}
+REACH = {name: index for index, name in enumerate(topics.SLAVE_REACH.columns)}
 PLAIN: dict[str, Any] = {"axes": ("+x", "+y", "+z"), "tool_axes": ("+x", "+y", "+z"), "tool_roll": 0.0}
 STEP, TURN = 1e-4, 1e-3  # of the hand, each sample [m, rad]
 WALL, ANGLE = 5e-3, 0.03  # how far along x, and about x, the arm can go [m, rad]
@@ -29,7 +26,7 @@ class Arm:
     """
 
     def __init__(self, delay: int = 1, **values: Any) -> None:
-        self.scaling = MotionScaling(parameters.MotionScalingParameters(**PLAIN, **values))
+        self.scaling = motion_scaling.MotionScaling(parameters.MotionScalingParameters(**PLAIN, **values))
         self.told: list[Any]
         self.row, self.delay, self.told = self.scaling.signals, delay, []
         self.hand, self.turn, self.stamp_ns = np.zeros(3), 0.0, TICK_NS
@@ -60,7 +57,7 @@ class Arm:
         found[REACH["cut_rx"]] = min(0.0, ANGLE - self.angle)
         is_cut = found.any()
         found[REACH["joint"]] = 2.0 if is_cut else -1.0
-        found[REACH["limit"]] = Limit.JOINT if is_cut else Limit.NONE
+        found[REACH["limit"]] = topics.Limit.JOINT if is_cut else topics.Limit.NONE
         return found
 
     @property
@@ -104,10 +101,10 @@ def test_turns_beyond_are_cut_too_and_come_back_at_once(delay: int) -> None:
 
 
 def test_an_answer_to_a_command_that_is_forgotten_draws_nothing_back() -> None:
-    arm = Arm(delay=SENT + 100)
-    for _ in range(2 * SENT):
+    arm = Arm(delay=limits.SENT + 100)
+    for _ in range(2 * limits.SENT):
         arm.step(1)
-    assert arm.x == pytest.approx(2 * SENT * STEP, abs=1e-9)
+    assert arm.x == pytest.approx(2 * limits.SENT * STEP, abs=1e-9)
 
 
 @pytest.mark.parametrize("gain", [1.0, 0.25])
@@ -145,4 +142,4 @@ def test_where_a_fixture_holds_the_slave_too_the_nearer_of_wall_and_limit_stops_
         assert abs(arm.x - arm.state("fixture_center_x")) <= half + 1e-9
         assert arm.x <= min(half, WALL + (delay + 2) * STEP) + ROUNDING
         if half < WALL:
-            assert arm.state("limit") == Limit.NONE
+            assert arm.state("limit") == topics.Limit.NONE

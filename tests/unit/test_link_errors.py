@@ -8,10 +8,9 @@ import pytest
 from present import present
 from teleop_core.base.errors import ParameterError, ShapeError, UnknownNameError
 from teleop_core.kernels.geometry import Array
-from teleop_core.robots import load_robot, robot_from_table
+from teleop_core.robots import link_errors, load_robot, robot_from_table
 from teleop_core.robots.arms.as_chain import chain_of, true_chain
 from teleop_core.robots.chains import dh_kernels
-from teleop_core.robots.link_errors import LinkErrors, error_names, next_axis_motion
 from teleop_core.robots.robot import Robot
 
 CHAINS = ("rcrt1", "puma560", "scara", "planar_3r", "five_axis")
@@ -49,7 +48,7 @@ def standard(theta: float, d: float, a: float, alpha: float) -> Array:
 @pytest.mark.parametrize("name", CHAINS)
 def test_an_arm_without_errors_is_the_robot(name: str) -> None:
     robot, rng = load_robot(name), np.random.default_rng(1)
-    row = present(true_chain(robot, LinkErrors.none(robot.n)))
+    row = present(true_chain(robot, link_errors.LinkErrors.none(robot.n)))
     for _ in range(50):
         q = joints(robot, rng)
         # Lengths up to 2.3 m; a few roundings each.
@@ -61,7 +60,7 @@ def test_changed_lengths_of_the_robot_are_those_of_its_chain(name: str) -> None:
     drawn = load_robot(name)
     symbol = next(iter(drawn.geometry))
     robot = load_robot(name, **{symbol: 0.123})
-    row = present(true_chain(robot, LinkErrors.none(robot.n)))
+    row = present(true_chain(robot, link_errors.LinkErrors.none(robot.n)))
     assert np.allclose(tip(row, robot.home), robot.fk(robot.home), rtol=0, atol=1e-15)
     assert not np.allclose(tip(row, robot.home), drawn.fk(robot.home), rtol=0, atol=1e-3)
 
@@ -77,7 +76,7 @@ def test_errors_of_the_rcrt1_are_those_of_its_published_table() -> None:
         expected = np.eye(4)
         for i in range(6):
             expected = expected @ standard(theta[i], d[i], e[0, i], alpha[i])
-        row = present(true_chain(robot, LinkErrors.from_vector(e.ravel())))
+        row = present(true_chain(robot, link_errors.LinkErrors.from_vector(e.ravel())))
         assert np.allclose(tip(row, q), expected, rtol=0, atol=1e-14)
 
 
@@ -91,7 +90,7 @@ def test_errors_of_a_table_are_those_of_its_rows() -> None:
         expected = np.eye(4)
         for i in range(4):
             expected = expected @ standard(theta[i], d[i], a[i], alpha[i])
-        row = present(true_chain(robot, LinkErrors.from_vector(e.ravel())))
+        row = present(true_chain(robot, link_errors.LinkErrors.from_vector(e.ravel())))
         assert np.allclose(tip(row, q), expected, rtol=0, atol=1e-14)
 
 
@@ -107,7 +106,7 @@ def test_errors_of_a_table_are_those_of_its_rows() -> None:
 def test_an_error_of_a_length_is_another_length(name: str, symbol: str, error: str) -> None:
     robot, rng = load_robot(name), np.random.default_rng(4)
     longer = load_robot(name, **{symbol: robot.geometry[symbol] + 0.01})
-    row = present(true_chain(robot, LinkErrors.of(robot, {error: 0.01})))
+    row = present(true_chain(robot, link_errors.LinkErrors.of(robot, {error: 0.01})))
     q = joints(robot, rng)
     assert np.allclose(tip(row, q), longer.fk(q), rtol=0, atol=1e-14)
 
@@ -121,7 +120,7 @@ def test_a_joint_offset_is_another_joint_vector(name: str) -> None:
         moved = q.copy()
         moved[i] += math.copysign(0.01, kind)
         error = {f"{'theta' if abs(kind) < 1.5 else 'd'}{i + 1}": 0.01}
-        row = present(true_chain(robot, LinkErrors.of(robot, error)))
+        row = present(true_chain(robot, link_errors.LinkErrors.of(robot, error)))
         assert np.allclose(tip(row, q), robot.fk(moved), rtol=0, atol=1e-14)
 
 
@@ -132,26 +131,26 @@ def test_every_transform_between_axes_has_a_common_normal() -> None:
         S = standard(turn, slide, 0.0, 0.0)
         F = standard(theta, d, a, alpha) @ S
         # Alpha near 0 leaves the place of the normal to rounding over its sine.
-        assert np.allclose(next_axis_motion(F), S, rtol=0, atol=1e-13 / abs(math.sin(alpha)))
+        assert np.allclose(link_errors.next_axis_motion(F), S, rtol=0, atol=1e-13 / abs(math.sin(alpha)))
 
 
 @pytest.mark.parametrize("alpha", [0.0, math.pi])
 def test_parallel_axes_have_their_normal_where_the_link_is(alpha: float) -> None:
     S = standard(0.4, 0.0, 0.0, 0.0)
     F = standard(0.7, 0.2, 0.3, alpha) @ S
-    assert np.allclose(next_axis_motion(F), S, rtol=0, atol=1e-14)
+    assert np.allclose(link_errors.next_axis_motion(F), S, rtol=0, atol=1e-14)
 
 
 @pytest.mark.parametrize("name", ["stewart", "mma", "rps3", "three_finger_hand", "four_bar"])
 def test_robots_that_are_no_chain_have_none(name: str) -> None:
     robot = load_robot(name)
-    assert true_chain(robot, LinkErrors.none(robot.n)) is None
+    assert true_chain(robot, link_errors.LinkErrors.none(robot.n)) is None
 
 
 def test_names_and_vectors_are_in_one_order() -> None:
-    names = error_names(2)
+    names = link_errors.error_names(2)
     assert names == ("a1", "a2", "alpha1", "alpha2", "d1", "d2", "theta1", "theta2")
-    errors = LinkErrors.from_vector(np.arange(8.0))
+    errors = link_errors.LinkErrors.from_vector(np.arange(8.0))
     assert np.array_equal(errors.vector, np.arange(8.0))
     assert errors.named()["d2"] == 5.0
     assert "a1" not in errors.named()
@@ -160,12 +159,12 @@ def test_names_and_vectors_are_in_one_order() -> None:
 def test_wrong_errors_are_refused_by_name() -> None:
     robot = load_robot("rcrt1")
     with pytest.raises(UnknownNameError) as unknown:
-        LinkErrors.of(robot, {"d7": 0.1})
+        link_errors.LinkErrors.of(robot, {"d7": 0.1})
     assert "d6" in unknown.value.alternatives
     with pytest.raises(ParameterError) as infinite:
-        LinkErrors.of(robot, {"d3": math.inf})
+        link_errors.LinkErrors.of(robot, {"d3": math.inf})
     assert infinite.value.name == "link error d3"
     with pytest.raises(ParameterError):
-        true_chain(robot, LinkErrors.none(5))
+        true_chain(robot, link_errors.LinkErrors.none(5))
     with pytest.raises(ShapeError):
-        LinkErrors(a=np.zeros(2), alpha=np.zeros(3), d=np.zeros(2), theta=np.zeros(2))
+        link_errors.LinkErrors(a=np.zeros(2), alpha=np.zeros(3), d=np.zeros(2), theta=np.zeros(2))

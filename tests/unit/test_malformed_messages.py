@@ -11,9 +11,8 @@ from teleop_core.bags import ros_types
 from teleop_core.bags.messages import Refusal, layout, read_any, read_numbers, report
 from teleop_core.bags.reader import Bag
 from teleop_core.bags.writer import BagWriter
-from teleop_core.base.errors import RecordingError
+from teleop_core.base import RecordingError
 from teleop_core.graph import topics
-from teleop_core.graph.topics import Kind
 
 JOINTS = ("a", "b")
 GARBAGE = b"\0\1\0\0" + bytes(range(200, 256))
@@ -21,15 +20,15 @@ SESSION_NAMES = (*(t.name for t in topics.STREAMS), topics.TELEOP_STATE.name)
 
 
 def sound(topic: tc.Topic) -> bytes:
-    if topic.kind is Kind.REPORT:
+    if topic.kind is topics.Kind.REPORT:
         return report(5, "x", 0, "fine", dict.fromkeys(topic.columns, "1"))
     count = topic.width(len(JOINTS))
     return layout(topic, JOINTS).encode_one(7, np.arange(count, dtype=float))
 
 
 def test_what_is_no_message_is_refused_as_such() -> None:
-    assert read_any(Kind.POSE, b"\0\1\0\0abc") is Refusal.MALFORMED
-    assert read_any(Kind.POSE, sound(topics.SLAVE_MEASURED_CP)[:-1]) is Refusal.MALFORMED
+    assert read_any(topics.Kind.POSE, b"\0\1\0\0abc") is Refusal.MALFORMED
+    assert read_any(topics.Kind.POSE, sound(topics.SLAVE_MEASURED_CP)[:-1]) is Refusal.MALFORMED
     assert read_numbers(GARBAGE, ("gain",)) is Refusal.MALFORMED
     assert read_numbers(report(0, "x", 0, "", {"gain": "abc"}), ("gain",)) is Refusal.WRONG_NAMES
 
@@ -95,7 +94,7 @@ def copy_of(session: tc.Recording, path: Path, *, bad: tuple[str, ...] = ()) -> 
             if name in bad and name not in given:
                 given.add(name)
                 writer.write(by_name[name], log_ns, GARBAGE)
-                if by_name[name].kind is Kind.REPORT:
+                if by_name[name].kind is topics.Kind.REPORT:
                     wrong = report(log_ns, name, 0, "", dict.fromkeys(by_name[name].columns, "abc"))
                     writer.write(by_name[name], log_ns, wrong)
     return tc.open_recording(path)

@@ -12,10 +12,8 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 import teleop_core as tc
-from teleop_core.bags.layouts import layout
-from teleop_core.bags.memory import MemoryBag
+from teleop_core.bags import layouts, memory, series
 from teleop_core.bags.reader import Bag
-from teleop_core.bags.series import Series
 from teleop_core.bags.writer import BagWriter
 from teleop_core.graph.topics import MASTER_BUTTONS, MASTER_MEASURED_CP, Kind, Topic
 from teleop_core.kernels.geometry import Array
@@ -48,15 +46,15 @@ def bag(
     return path
 
 
-def converted(path: Path) -> tuple[MemoryBag, str]:
+def converted(path: Path) -> tuple[memory.MemoryBag, str]:
     """Bag in memory, and the note about it."""
     with pytest.warns(UserWarning, match=Path(path).name) as notes:
         found = as_master_bag(path)
-    assert isinstance(found, MemoryBag)
+    assert isinstance(found, memory.MemoryBag)
     return found, " ".join(str(note.message) for note in notes)
 
 
-def poses_of(found: Any) -> Series:
+def poses_of(found: Any) -> series.Series:
     return found.read(MASTER_MEASURED_CP)
 
 
@@ -156,7 +154,7 @@ def test_a_recording_whose_frame_changes_is_told(tmp_path: Path) -> None:
         schema = writer.register_schema(place.kind.ros_type, "ros2msg", b"")
         channel = writer.register_channel(place.name, "cdr", schema)
         for i, stamp in enumerate(STAMPS.tolist()):
-            message = layout(place, (), "camera" if i >= 50 else "base").encode_one(stamp, POSES[i])
+            message = layouts.layout(place, (), "camera" if i >= 50 else "base").encode_one(stamp, POSES[i])
             writer.add_message(channel, stamp, message, stamp)
         writer.finish()
     with pytest.warns(UserWarning, match=r"150 messages stand in the frame 'camera'.*'base'"):

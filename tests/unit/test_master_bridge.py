@@ -12,8 +12,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from present import present
-from teleop_core.base.errors import ParameterError
-from teleop_core.base.parameters import build
+from teleop_core.base import ParameterError, build
 from teleop_core.chain.mapping.parameters import AXES
 from teleop_core.chain.master import master_bridge
 from teleop_core.kernels.geometry import Array

@@ -24,10 +24,8 @@ from teleop_core.kernels.geometry import Array
 from teleop_core.kernels.progress import in_work, told
 from teleop_core.kernels.store import prune, user_cache
 from teleop_core.robots import load_robot
-from teleop_core.session.configuration import configure
-from teleop_core.session.virtual import VirtualTime
+from teleop_core.session import configuration, virtual
 from teleop_core.shapes.basis import distance_grid
-from teleop_core.shapes.basis.distance_grid import DistanceGrid, GridRequest
 from teleop_core.shapes.basis.triangles import read_triangles, tree_of, write_distances
 from teleop_core.shapes.mesh import MeshParameters
 from teleop_core.slave.world import WORLD_OBJECTS
@@ -199,7 +197,7 @@ def test_a_sliding_tip_feels_the_friction_of_the_analytic_shape(folder: Path) ->
 
 def test_a_session_presses_a_mesh_of_a_block_as_it_does_the_block(folder: Path) -> None:
     settings = ["world=mesh", f"world.mesh.file={folder / 'box.stl'}"]
-    box, mesh = (VirtualTime(configure("palpation", settings=s)) for s in ([], settings))
+    box, mesh = (virtual.VirtualTime(configuration.configure("palpation", settings=s)) for s in ([], settings))
     field = "slave_true_cf"
     wanted, force = box.run(16_000)[field], mesh.run(16_000)[field]
     assert wanted[:, 2].max() > 0.9
@@ -239,10 +237,10 @@ def test_a_mesh_that_encloses_nothing_is_refused_in_one_line(
     assert "\n" not in str(caught.value)
 
 
-def pressed(file: Path, *settings: str) -> VirtualTime:
+def pressed(file: Path, *settings: str) -> virtual.VirtualTime:
     """Session that presses a mesh."""
     texts = ["world=mesh", f"world.mesh.file={file}", *settings]
-    return VirtualTime(configure("palpation", settings=texts))
+    return virtual.VirtualTime(configuration.configure("palpation", settings=texts))
 
 
 def test_a_hole_is_told_by_the_middle_of_an_edge_along_it(tmp_path: Path) -> None:
@@ -310,7 +308,7 @@ def test_a_mesh_without_triangles_or_of_no_size_is_refused_in_one_line(
     file.write_text(write(size, FACES[:count]))
     texts = [f"{use}.kind=mesh", f"{use}.mesh.file={file}"]
     with pytest.raises(ParameterError, match=said):
-        VirtualTime(configure("coarse_box", settings=texts))
+        virtual.VirtualTime(configuration.configure("coarse_box", settings=texts))
 
 
 def test_a_mesh_that_does_not_fit_is_refused_with_what_would(folder: Path) -> None:
@@ -340,7 +338,7 @@ def test_a_grid_is_made_once_and_kept_by_what_the_file_says(
     made, heard = [], []
     make = distance_grid._make
 
-    def counted(request: GridRequest) -> DistanceGrid:
+    def counted(request: distance_grid.GridRequest) -> distance_grid.DistanceGrid:
         made.append(request.step)
         return make(request)
 

@@ -12,17 +12,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from present import present
-from teleop_core.base.errors import ShapeError
-from teleop_core.base.parameters import build
-from teleop_core.graph.signals import DT, TICK_NS
-from teleop_core.graph.topics import NO_COMMAND_NS
+from teleop_core.base import ShapeError, build
+from teleop_core.graph import DT, TICK_NS, topics
 from teleop_core.kernels.geometry import Array, rotation, transform
 from teleop_core.robots import load_robot
 from teleop_core.robots.robot import Robot
-from teleop_core.slave.motion_commands import MotionCommands
+from teleop_core.slave import motion_commands, pair
 from teleop_core.slave.operation import OperationParameters
 from teleop_core.slave.operation.states import Answer, State
-from teleop_core.slave.pair import ArmParameters, SimulatedArm
 
 ARM = load_robot("rcrt1")
 # Well inside the limits and off the singularities.
@@ -38,7 +35,7 @@ class Bench:
 
     def __init__(self, name: str = "rcrt1", middle: Array = MIDDLE, **values: float | bool) -> None:
         given = {"robot": name, "start_speed": 1.0, "start": tuple(np.asarray(middle).tolist())} | DIRECT | values
-        self.slave = SimulatedArm(build(ArmParameters, given))
+        self.slave = pair.SimulatedArm(build(pair.ArmParameters, given))
         self.robot, self.motion, self.now_ns = self.slave.robot, self.slave.server.motion, 10**9
         self.run(1)
         while self.slave.server.operation["is_busy"]:
@@ -76,7 +73,7 @@ def bench() -> Any:
     return Bench()
 
 
-def move_to_pose(motion: MotionCommands, T: Array) -> Any:
+def move_to_pose(motion: motion_commands.MotionCommands, T: Array) -> Any:
     """Move to where the tip has a pose, as a session does with move_cp."""
     found = motion.solve(T)
     return found if isinstance(found, tuple) else motion.move(found)
@@ -327,10 +324,10 @@ def test_a_move_takes_over_from_a_stream_which_is_followed_again_afterwards(benc
 def test_after_a_move_no_command_is_in_force(bench: Bench) -> None:
     bench.follow(MIDDLE)
     bench.run(1)
-    assert bench.slave.signals["slave_setpoint_js_ns"] > NO_COMMAND_NS
+    assert bench.slave.signals["slave_setpoint_js_ns"] > topics.NO_COMMAND_NS
     bench.motion.move(MIDDLE + SMALL)
     bench.run(2000)
-    assert bench.slave.signals["slave_setpoint_js_ns"] == NO_COMMAND_NS
+    assert bench.slave.signals["slave_setpoint_js_ns"] == topics.NO_COMMAND_NS
     np.testing.assert_array_equal(bench.setpoint, MIDDLE + SMALL)
 
 

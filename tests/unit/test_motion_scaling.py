@@ -7,12 +7,10 @@ import numpy as np
 import pytest
 
 from scaling_desk import ANY_HAND, HOME, MM, Desk
-from teleop_core.base.parameters import build
-from teleop_core.chain.mapping import motion_scaling
-from teleop_core.chain.mapping.parameters import FixtureParameters, MotionScalingParameters
+from teleop_core.base import build
+from teleop_core.chain.mapping import motion_scaling, parameters
 from teleop_core.chain.operators.rest import REST_POSITION, REST_TILT
-from teleop_core.graph.signals import TICK_NS
-from teleop_core.graph.topics import NO_COMMAND_NS
+from teleop_core.graph import TICK_NS, topics
 from teleop_core.kernels.geometry import Array, quaternion_from_rotation, rotation, rotation_from_quaternion
 
 DEGREE = math.pi / 180.0
@@ -23,7 +21,7 @@ NANOMETRE = 1e-9
 
 
 def test_the_wall_stands_around_the_stylus_and_the_slave_goes_by_what_is_left_of_it() -> None:
-    desk = Desk(fixture=FixtureParameters(wall="soft"))
+    desk = Desk(fixture=parameters.FixtureParameters(wall="soft"))
     desk.step()
     out, force = desk.row["master_filtered_out"], desk.row["master_servo_cf"]
     size = desk.scaling.parameters["size"][0]
@@ -47,7 +45,7 @@ def test_the_wall_stands_around_the_stylus_and_the_slave_goes_by_what_is_left_of
 
 
 def mapped(stylus: Array, tool_roll: float) -> Array:
-    scaling = motion_scaling.MotionScaling(MotionScalingParameters(tool_roll=tool_roll))
+    scaling = motion_scaling.MotionScaling(parameters.MotionScalingParameters(tool_roll=tool_roll))
     quaternion, tool, out = np.empty(4), np.empty(4), np.empty((3, 3))
     quaternion_from_rotation(np.ascontiguousarray(stylus), quaternion)
     motion_scaling.mapped_orientation(scaling.parameters, quaternion, tool)
@@ -56,7 +54,7 @@ def mapped(stylus: Array, tool_roll: float) -> Array:
 
 
 def slave_axes(master: tuple[float, float, float], **values: Any) -> Array:
-    scaling, out = motion_scaling.MotionScaling(MotionScalingParameters(**values)), np.empty(3)
+    scaling, out = motion_scaling.MotionScaling(parameters.MotionScalingParameters(**values)), np.empty(3)
     motion_scaling.to_slave_axes(scaling.parameters, np.array(master), out)
     return out
 
@@ -115,7 +113,7 @@ def test_gains_ratchet_the_slave_as_published() -> None:  # case 20
 def test_mode_parameter_switches_the_mode_at_run_time() -> None:
     desk = Desk()
     desk.step()
-    desk.scaling.retune(MotionScalingParameters(plausible=ANY_HAND, mode="fine"))
+    desk.scaling.retune(parameters.MotionScalingParameters(plausible=ANY_HAND, mode="fine"))
     desk.step()
     assert (desk.state("is_fine"), desk.state("gain")) == (1.0, 0.1)
 
@@ -124,7 +122,7 @@ def test_retuning_something_else_leaves_the_mode_of_the_button() -> None:
     desk = Desk()
     desk.step()
     desk.press("mode")
-    desk.scaling.retune(MotionScalingParameters(plausible=ANY_HAND, coarse_gain=2.0))
+    desk.scaling.retune(parameters.MotionScalingParameters(plausible=ANY_HAND, coarse_gain=2.0))
     desk.step()
     assert desk.state("is_fine") == 1.0
 
@@ -229,7 +227,7 @@ def test_button_that_stays_pressed_toggles_once(button: str) -> None:
 
 
 def test_box_is_put_around_the_slave_where_the_button_was_pressed() -> None:
-    desk = Desk(fixture=build(FixtureParameters, {"box.size": (0.01, 0.02, 0.03)}))
+    desk = Desk(fixture=build(parameters.FixtureParameters, {"box.size": (0.01, 0.02, 0.03)}))
     desk.step()
     desk.step((2 * MM, 0, 0))
     desk.hold("fixture")
@@ -243,7 +241,7 @@ def test_box_is_put_around_the_slave_where_the_button_was_pressed() -> None:
 
 
 def test_box_switched_on_while_clutched_stands_around_the_slave() -> None:
-    desk = Desk(fixture=FixtureParameters(wall="soft"))
+    desk = Desk(fixture=parameters.FixtureParameters(wall="soft"))
     held = desk.step()
     desk.hold("clutch")
     desk.step((1 * MM, 0, 0))
@@ -308,7 +306,7 @@ def test_second_press_takes_the_box_and_its_force_away() -> None:
     ],
 )
 def test_wall_pushes_the_hand_back(wall: str, mm: float, newton: float) -> None:
-    desk = Desk(fixture=FixtureParameters(wall=wall))
+    desk = Desk(fixture=parameters.FixtureParameters(wall=wall))
     desk.step()
     desk.press("fixture")
     desk.step((mm * MM, 0, 0))
@@ -318,7 +316,7 @@ def test_wall_pushes_the_hand_back(wall: str, mm: float, newton: float) -> None:
 
 def test_a_slave_that_does_not_follow_for_long_is_aligned_anew_once() -> None:
     desk = Desk()
-    desk.row["slave_setpoint_cp_ns"] = NO_COMMAND_NS
+    desk.row["slave_setpoint_cp_ns"] = topics.NO_COMMAND_NS
     for _ in range(1000):  # it homes
         desk.step(does_follow=False)
     assert not any("anew" in text for text in desk.scaling.concerns())

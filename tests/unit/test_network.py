@@ -14,17 +14,14 @@ from numpy.typing import NDArray
 import teleop_core as tc
 from present import present
 from teleop_core.bags.reader import Bag
-from teleop_core.base.errors import ParameterError, PartError, TeleopError
-from teleop_core.base.parameters import NoParameters, build
+from teleop_core.base import NoParameters, ParameterError, PartError, TeleopError, build
 from teleop_core.chain.network import LOST, NETWORKS, Network, register_network
 from teleop_core.chain.network.network import NETWORK, NetworkLink
 from teleop_core.chain.network.parameters import PRESETS, NetworkParameters
 from teleop_core.chain.network.trace import read_trace
 from teleop_core.evaluation.metrics.network import _Ages
-from teleop_core.kernels import kernel
-from teleop_core.kernels.geometry import Array
-from teleop_core.session.configuration import configure
-from teleop_core.session.virtual import VirtualTime
+from teleop_core.kernels import Array, kernel
+from teleop_core.session import configuration, virtual
 
 MS = 1_000_000
 
@@ -470,16 +467,16 @@ def test_another_network_takes_over_and_what_is_on_its_way_still_arrives() -> No
     assert (age[25:] == 20.0).all()
 
 
-def session(*given: str, scenario: str = "free_motion") -> VirtualTime:
+def session(*given: str, scenario: str = "free_motion") -> virtual.VirtualTime:
     """Session in virtual time with a network."""
-    return VirtualTime(configure(scenario, settings=["teleop.stages=[network]", *given]))
+    return virtual.VirtualTime(configuration.configure(scenario, settings=["teleop.stages=[network]", *given]))
 
 
 AT_HOME = "slave.starts_at_home=true"
 
 
 def test_a_network_without_delay_changes_no_command() -> None:
-    plain = VirtualTime(configure("free_motion", settings=[AT_HOME])).run(4000)
+    plain = virtual.VirtualTime(configuration.configure("free_motion", settings=[AT_HOME])).run(4000)
     through_it = session(AT_HOME).run(4000)
     own, other = plain["slave_servo_cp"], through_it["network_servo_cp"]
     # Following begins two ticks later, at the same place.
@@ -579,8 +576,8 @@ def test_a_kind_of_ones_own_is_one_call_and_a_wrong_one_is_refused() -> None:
 
 def test_settings_of_a_network_that_is_not_there_are_refused_with_the_way_to_have_one() -> None:
     with pytest.raises(TeleopError, match=r"add stages=\[network\]"):
-        configure("free_motion", settings=["network.preset=iss"])
-    configure("free_motion", settings=["seed=3"])
+        configuration.configure("free_motion", settings=["network.preset=iss"])
+    configuration.configure("free_motion", settings=["seed=3"])
     assert [topic.name for topic in NETWORK.replaced] == [topic.name for topic in NETWORK.reads]
 
 

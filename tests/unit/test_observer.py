@@ -10,15 +10,14 @@ import teleop_core as tc
 from teleop_core.chain.operators.observer import AHEAD, Observer, ObserverParameters
 from teleop_core.chain.operators.parameters import OperatorParameters
 from teleop_core.chain.tasks import Act
-from teleop_core.graph.signals import STATE
-from teleop_core.graph.topics import TASK_STATE
+from teleop_core.graph import STATE, topics
 
 Array = NDArray[np.float64]
 # MacKenzie and Ware 1993: lags of the screen [s], mean times of movement [s].
 PUBLISHED = {0.0083: 0.911, 0.025: 0.934, 0.075: 1.059, 0.225: 1.493}
 WAYS, WIDTHS = (0.096, 0.192, 0.384), (0.006, 0.012, 0.024, 0.048)
 TICK = 1e-3
-COLUMN = {name: i for i, name in enumerate(TASK_STATE.columns)}
+COLUMN = {name: i for i, name in enumerate(topics.TASK_STATE.columns)}
 
 
 def pointing(lag: float, way: float, width: float, trials: int, seed: int = 1) -> list[float]:

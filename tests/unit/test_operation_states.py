@@ -9,11 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from present import present
-from teleop_core.base.errors import ParameterError, UnknownNameError
-from teleop_core.base.parameters import build
-from teleop_core.kernels import kernel
-from teleop_core.kernels.fields import record
-from teleop_core.kernels.geometry import Array
+from teleop_core.base import ParameterError, UnknownNameError, build
+from teleop_core.kernels import Array, kernel, record
 from teleop_core.slave.operation import Answer, Event, Fault, OperationParameters, State, command_event
 from teleop_core.slave.operation.states import COMMANDS, TABLE, OperatingState, answer_text, change
 from teleop_core.slave.pair import ArmParameters, SimulatedArm

@@ -12,8 +12,7 @@ from teleop_core.base.errors import ParameterError, RecordingError
 from teleop_core.chain.master.haptic_master import HapticMaster, HapticMasterParameters
 from teleop_core.chain.operators.rest import rest_pose
 from teleop_core.kernels.geometry import Array
-from teleop_core.session.configuration import configure
-from teleop_core.session.virtual import VirtualTime
+from teleop_core.session import configuration, virtual
 
 MS = 1_000_000
 ELSEWHERE = np.array([0.05, 0.03, 0.02])
@@ -102,7 +101,7 @@ def seen_by(*texts: str) -> tuple[Array, Array]:
         return motion
 
     tc.register_operator("looks", tc.Operator("looks", make, ahead=1))
-    session = VirtualTime(configure(settings=["operator=looks", "patience=0.0", *texts]))
+    session = virtual.VirtualTime(configuration.configure(settings=["operator=looks", "patience=0.0", *texts]))
     return session.run(400)["slave_measured_cp"][:, :3], np.array(rows)
 
 

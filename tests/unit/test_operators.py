@@ -11,8 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from held_master import HeldMaster
-from teleop_core.base.errors import ParameterError, PartError
-from teleop_core.base.parameters import NoParameters, build, parameter
+from teleop_core.base import NoParameters, ParameterError, PartError, build, parameter
 from teleop_core.chain.operators import OPERATORS, Operator, Setting, following, register_operator
 from teleop_core.chain.operators.parameters import OperatorParameters
 from teleop_core.chain.operators.shapes import PHASES, minimum_jerk

@@ -11,8 +11,7 @@ from teleop_core.evaluation.bands import Band, bands_of, merged, stretches_of
 from teleop_core.evaluation.context import Context
 from teleop_core.evaluation.origin import read_origin
 from teleop_core.evaluation.state_history import NO_HISTORY, StateHistory, read_history
-from teleop_core.graph.signals import STATE_FIELDS, TICK_NS
-from teleop_core.graph.topics import TELEOP_STATE, Limit, Topic
+from teleop_core.graph import STATE_FIELDS, TICK_NS, topics
 
 COUNT = 3000
 # Times are sums of float64 seconds.
@@ -24,9 +23,9 @@ def bands(recipe: Recipe, path: Path) -> dict[str, Band]:
     return {band.cause: band for band in bands_of(Context(bag, "", read_history(bag), read_origin(bag, "")))}
 
 
-def told(at: int, **values: Any) -> tuple[Topic, int, bytes]:
+def told(at: int, **values: Any) -> tuple[topics.Topic, int, bytes]:
     stamp_ns = START_NS + at * TICK_NS
-    return TELEOP_STATE, stamp_ns, state(stamp_ns, **values)
+    return topics.TELEOP_STATE, stamp_ns, state(stamp_ns, **values)
 
 
 def history(rows: list[tuple[int, None]]) -> StateHistory:
@@ -38,12 +37,12 @@ def history(rows: list[tuple[int, None]]) -> StateHistory:
 def test_each_cause_has_its_stretches(tmp_path: Path) -> None:
     recipe = Recipe(COUNT)
     recipe.singles += [
-        told(500, limit=Limit.JOINT, limited_joint=2),
-        told(800, limit=Limit.SPEED, limited_joint=-1),
+        told(500, limit=topics.Limit.JOINT, limited_joint=2),
+        told(800, limit=topics.Limit.SPEED, limited_joint=-1),
         told(1000, limited_joint=-1),
-        told(1500, limit=Limit.JOINT, limited_joint=0),
+        told(1500, limit=topics.Limit.JOINT, limited_joint=0),
         told(1600, limited_joint=-1, is_clutched=1),
-        told(2500, limit=Limit.WORKSPACE, limited_joint=-1),
+        told(2500, limit=topics.Limit.WORKSPACE, limited_joint=-1),
     ]
     found = bands(recipe, tmp_path / "bag")
     expected = {
@@ -66,7 +65,7 @@ def test_recording_that_does_not_tell_limits_has_no_bands(tmp_path: Path) -> Non
 
 def test_every_cause_has_a_band_of_its_own_colour(tmp_path: Path) -> None:
     recipe = Recipe(COUNT)
-    causes = [limit for limit in Limit if limit is not Limit.NONE]
+    causes = [limit for limit in topics.Limit if limit is not topics.Limit.NONE]
     recipe.singles += [told(200 * (i + 1), limit=limit, limited_joint=-1) for i, limit in enumerate(causes)]
     found = bands(recipe, tmp_path / "bag").values()
     assert len(found) == len(causes) == len({band.color for band in found})

@@ -8,8 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from teleop_core.base.errors import ParameterError, UnknownNameError
-from teleop_core.base.parameters import build, parameter, specs, values_of
+from teleop_core.base import ParameterError, UnknownNameError, build, parameter, specs, values_of
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -12,16 +12,14 @@ from typing import Any, cast
 import pytest
 
 from teleop_core import evaluation
-from teleop_core.base.errors import ParameterError, PartError
-from teleop_core.base.parameters import NoParameters, build, parameter, specs
+from teleop_core.base import NoParameters, ParameterError, PartError, build, parameter, specs
 from teleop_core.chain.operators import Operator, register_operator
 from teleop_core.evaluation import Metric
-from teleop_core.graph.stage import Stage, register_stage
+from teleop_core.graph import Stage, register_stage
 from teleop_core.graph.topics import SLAVE_MEASURED_CP, SLAVE_SERVO_CP, Kind, Topic, passed_on
 from teleop_core.kernels import IS_COMPILED, kernel, records
 from teleop_core.session.configuration import configure
-from teleop_core.shapes import register_shape
-from teleop_core.shapes.sphere import SPHERE
+from teleop_core.shapes import register_shape, sphere
 from teleop_core.slave.controllers import register_controller
 from teleop_core.slave.controllers.pid import PID
 
@@ -82,7 +80,7 @@ def test_wrong_declaration_of_a_parameter_is_refused_before_it_is_used(group: ty
 
 
 WAYS_IN = {
-    "shape": lambda group: register_shape(replace(SPHERE, name="own", parameters=group)),
+    "shape": lambda group: register_shape(replace(sphere.SPHERE, name="own", parameters=group)),
     "controller": lambda group: register_controller(replace(PID, name="own", parameters=group)),
     "operator": lambda group: register_operator("own", Operator("own", lambda p, s: None, group)),  # type: ignore[arg-type, return-value]
     "stage": lambda group: stage("own", group),
@@ -104,13 +102,13 @@ def test_group_that_is_no_dataclass_but_an_object_is_refused(
 @pytest.mark.parametrize("name", ["", "my fixture", "a.b", "a/b", "-a", "a=b", None, 5])
 def test_name_that_keys_and_files_cannot_hold_is_refused(own_parts: None, name: str | int | None) -> None:
     with pytest.raises(PartError, match="named by letters, digits, _ and -") as error:
-        register_shape(replace(SPHERE, name=cast(str, name)))
+        register_shape(replace(sphere.SPHERE, name=cast(str, name)))
     assert (error.value.kind, error.value.name) == ("shape", name)
 
 
 @pytest.mark.parametrize("name", ["my_2nd", "my-cone", "Kegel", "größe"])
 def test_name_of_letters_digits_underscores_and_hyphens_is_taken(own_parts: None, name: str) -> None:
-    assert register_shape(replace(SPHERE, name=name)).name == name
+    assert register_shape(replace(sphere.SPHERE, name=name)).name == name
 
 
 @pytest.mark.parametrize("name", ["", "my-limit", "my limit", "2nd", "a.b"])

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from teleop_core.base.parameters import NoParameters, build
 from teleop_core.chain.mapping.parameters import MotionScalingParameters
-from teleop_core.chain.passivity import PASSIVITIES, Passivity, register_passivity
+from teleop_core.chain.passivity import PASSIVITIES, Passivity, register_passivity, slave_side
 from teleop_core.chain.passivity.port import (
     DRIFT,
     HEARD,
@@ -25,14 +25,12 @@ from teleop_core.chain.passivity.port import (
     begin_round,
     hear_energy,
 )
-from teleop_core.chain.passivity.slave_side import PASSIVITY, PassivityParameters
 from teleop_core.chain.passivity.tank import tank_slave
 from teleop_core.chain.passivity.tdpa import tdpa_hand, tdpa_slave
 from teleop_core.evaluation.metrics.contact import TOUCH_J
 from teleop_core.graph.topics import ENERGY, MASTER_CONTACT, OPERATION
 from teleop_core.kernels.geometry import Array
-from teleop_core.session.configuration import configure
-from teleop_core.session.virtual import VirtualTime
+from teleop_core.session import configuration, virtual
 from teleop_core.slave.operation import Fault
 from teleop_core.slave.world.parameters import MATERIALS
 
@@ -43,12 +41,12 @@ TICK_NS = 1_000_000
 
 def pressing(*texts: str, ticks: int = 12_000) -> NDArray[np.void]:
     """Signals of the scenario ``palpation`` with both ports."""
-    return VirtualTime(configure("palpation", settings=[*BOTH, *texts])).run(ticks)
+    return virtual.VirtualTime(configuration.configure("palpation", settings=[*BOTH, *texts])).run(ticks)
 
 
 def slave_port() -> Callable[[Array, Array], Array]:
     """The slave's side at rest, and a call that makes a tick with force (6,) and pose (7,)."""
-    stage = PASSIVITY.run(PassivityParameters())
+    stage = slave_side.PASSIVITY.run(slave_side.PassivityParameters())
     row = stage.signals
 
     def tick(force: Array, pose: Array) -> Array:
@@ -91,7 +89,7 @@ def test_the_power_of_the_slaves_port_is_each_force_times_its_own_speed(pushed: 
 
 @pytest.mark.parametrize("axis", range(6))
 def test_what_is_left_to_a_slave_counts_ways_and_turns_on_all_six_axes(axis: int) -> None:
-    stage = PASSIVITY.run(PassivityParameters())
+    stage = slave_side.PASSIVITY.run(slave_side.PassivityParameters())
     row = stage.signals
     row["master_energy"][[LAW, ROUND]] = PASSIVITIES.names().index("tdpa"), 1.0
     for k, way in enumerate((0.0, 0.0, -1e-3, -2e-3)):
@@ -383,13 +381,13 @@ def test_no_part_pushes_harder_than_allowed() -> None:
 
     register_passivity(Passivity("rude", NoParameters, rude))
     texts = ("reflection.passivity=rude", "reflection.max_force=1.5", "reach_force.is_on=false")
-    rows = VirtualTime(configure("palpation", settings=[*texts])).run(7000)
+    rows = virtual.VirtualTime(configuration.configure("palpation", settings=[*texts])).run(7000)
     force = np.linalg.norm(rows["master_servo_cf"][:, :3], axis=1)
     assert force.max() == pytest.approx(1.5, rel=1e-9)
 
 
 def test_with_another_passivity_energies_begin_anew_while_a_session_runs() -> None:
-    session = VirtualTime(configure("palpation", settings=[*BOTH]))
+    session = virtual.VirtualTime(configuration.configure("palpation", settings=[*BOTH]))
     before = session.run(7500)
     assert before["master_energy"][-1, IN] > 1e-5
     values = {
@@ -621,7 +619,7 @@ def wall_shares(kind: str, stiffness: float) -> tuple[float, float]:
         f"fixture.stiffness={stiffness}",
         "fixture.damping=10.0",
     )
-    contact = VirtualTime(configure("coarse_box", settings=texts)).run(30_000)["master_contact"]
+    contact = virtual.VirtualTime(configuration.configure("coarse_box", settings=texts)).run(30_000)["master_contact"]
     ends = np.flatnonzero(np.diff(contact[:, 0], append=-1.0))
     taken, returned = (contact[ends, MASTER_CONTACT.columns.index(name)] for name in ("taken", "returned"))
     is_contact = taken > TOUCH_J
@@ -644,7 +642,7 @@ def test_a_stiff_wall_gives_back_no_more_than_it_took_with_passivity(stiffness: 
 def test_a_session_begins_without_a_blow(kind: str) -> None:
     """The slave is at home, so that the hand leads it from the first sample on."""
     texts = ("teleop.stages=[passivity]", "reflection.architecture=position_force", f"reflection.passivity={kind}")
-    rows = VirtualTime(configure("coarse_box", settings=texts)).run(1000)
+    rows = virtual.VirtualTime(configuration.configure("coarse_box", settings=texts)).run(1000)
     assert rows["teleop_state"][100, 0] == 1.0
     assert np.linalg.norm(rows["master_servo_cf"][:, :3], axis=1).max() < 0.3
 

@@ -11,29 +11,27 @@ from scipy.spatial.transform import Rotation
 import teleop_core as tc
 import teleop_lab as lab
 from people import PEOPLE, moves, recorded
-from teleop_core.chain.mapping.inverse_kinematics import InverseKinematicsParameters
-from teleop_core.chain.mapping.parameters import MotionScalingParameters
+from teleop_core.chain.mapping import inverse_kinematics, parameters
 from teleop_core.kernels import IS_COMPILED
 from teleop_core.robots.parameters import RobotParameters
 from teleop_core.robots.room import room, roomy_postures
+from teleop_lab.planning import turns, walk
 from teleop_lab.planning.aim import Aim
 from teleop_lab.planning.asked import STRETCHES, AskedPath, asked_path
 from teleop_lab.planning.placement import Placement
-from teleop_lab.planning.turns import turns
-from teleop_lab.planning.walk import Walker
 
 START = tuple(tc.load_robot("puma560").start.tolist())
 PUMA = RobotParameters(robot="puma560")
-GIVEN = Placement.of(MotionScalingParameters(), PUMA, START)
+GIVEN = Placement.of(parameters.MotionScalingParameters(), PUMA, START)
 
 
 def path_of(name: str, seconds: float, seed: int = 1) -> AskedPath:
     return asked_path(recorded(*moves(PEOPLE[name], seconds, seed)).bag)
 
 
-def walker(path: AskedPath, robot: str = "puma560") -> Walker:
-    solving = InverseKinematicsParameters(robot=robot)
-    return Walker(path, MotionScalingParameters(), solving)
+def walker(path: AskedPath, robot: str = "puma560") -> walk.Walker:
+    solving = inverse_kinematics.InverseKinematicsParameters(robot=robot)
+    return walk.Walker(path, parameters.MotionScalingParameters(), solving)
 
 
 def test_an_excerpt_has_no_more_samples_a_second_than_asked_and_keeps_the_buttons() -> None:
@@ -78,9 +76,9 @@ def test_a_single_pose_is_no_motion() -> None:
 
 
 def test_there_are_24_turns_and_all_are_maps_that_parameters_take() -> None:
-    assert len(set(turns())) == 24
-    for axes in turns():
-        MotionScalingParameters(axes=axes)
+    assert len(set(turns.turns())) == 24
+    for axes in turns.turns():
+        parameters.MotionScalingParameters(axes=axes)
 
 
 def test_a_placement_is_the_same_as_file_as_texts_and_as_settings(tmp_path: Path) -> None:
@@ -125,7 +123,7 @@ def test_a_placement_of_an_arm_leaves_the_other_arms_alone() -> None:
 def test_an_aimed_tool_turns_as_the_hand_does_wherever_axes_allow_it() -> None:
     robot, rng = tc.load_robot("puma560"), np.random.default_rng(6)
     tool = robot.fk(robot.start)[:3, :3]
-    for axes in turns()[::5]:
+    for axes in turns.turns()[::5]:
         # A stylus that the 24 maps and any roll bring to the tool.
         roll = rng.uniform(-np.pi, np.pi)
         matrix = np.zeros((3, 3))
@@ -149,7 +147,7 @@ def test_no_tool_is_aimed_worse_than_a_cube_allows() -> None:
 def test_a_walk_tells_the_same_of_a_path_that_was_walked_before() -> None:
     walks = walker(path_of("da_vinci_36", 10.0))
     first = walks.walk(GIVEN)
-    other = MotionScalingParameters(coarse_gain=3.0, rotation_gain=0.5)
+    other = parameters.MotionScalingParameters(coarse_gain=3.0, rotation_gain=0.5)
     walks.walk(Placement.of(other, PUMA, START))
     again = walks.walk(GIVEN)
     np.testing.assert_array_equal(first.q, again.q)
@@ -160,7 +158,7 @@ def test_a_walk_tells_the_same_of_a_path_that_was_walked_before() -> None:
 def test_shares_and_causes_add_up_to_one() -> None:
     walked = walker(path_of("da_vinci_36", 20.0), "rcrt1")
     start = tuple(tc.load_robot("rcrt1").start.tolist())
-    found = walked.walk(Placement.of(MotionScalingParameters(), PUMA, start))
+    found = walked.walk(Placement.of(parameters.MotionScalingParameters(), PUMA, start))
     assert found.share < 0.9
     assert abs(found.share + sum(found.causes.values()) - 1.0) < 1e-12
 

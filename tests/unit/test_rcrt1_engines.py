@@ -14,10 +14,9 @@ from pinocchio import Model
 
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots.arms import rcrt1_dynamics
-from teleop_core.robots.arms.rcrt1_dynamics import LINKS, link_inertias, link_row
 
-ROW = link_row()
-MOTORS = [LINKS["J1"], LINKS["J2"], LINKS["J3"]]
+ROW = rcrt1_dynamics.link_row()
+MOTORS = [rcrt1_dynamics.LINKS["J1"], rcrt1_dynamics.LINKS["J2"], rcrt1_dynamics.LINKS["J3"]]
 # Accelerations up to some 100 rad/s²: twelve digits of them.
 AGREE = 1e-10
 
@@ -96,7 +95,7 @@ def mujoco_xml(table: Any) -> str:
             child=child,
         )
     return f"""<mujoco>
-  <option gravity="0 0 {-LINKS["g"]!r}"/>
+  <option gravity="0 0 {-rcrt1_dynamics.LINKS["g"]!r}"/>
   <compiler angle="radian"/>
   <worldbody>{child}</worldbody>
 </mujoco>"""
@@ -129,7 +128,7 @@ def test_mujoco_refuses_link_3_with_the_product_as_printed() -> None:
 def pinocchio_model() -> Model:
     """Joints in the source's own frames: standard Denavit-Hartenberg transforms after each."""
     model, parent, place = pinocchio.Model(), 0, pinocchio.SE3.Identity()
-    model.gravity.linear = np.array([0.0, 0.0, -LINKS["g"]])
+    model.gravity.linear = np.array([0.0, 0.0, -rcrt1_dynamics.LINKS["g"]])
     joints = (pinocchio.JointModelRZ(), pinocchio.JointModelRZ(), pinocchio.JointModelPZ())
     for joint, twist, (mass, center, *rest) in zip(joints, (-math.pi / 2, math.pi / 2, 0.0), TABLE, strict=True):
         parent = model.addJoint(parent, joint, place, f"joint{parent + 1}")
@@ -167,12 +166,12 @@ def test_the_mended_sign_raises_the_inertia_of_axis_1_at_home() -> None:
     D, home = np.empty((3, 3)), np.array([0.0, math.radians(113.4), 0.421, 0, 0, 0])
     rcrt1_dynamics.inertia_matrix(home, ROW, D)
     mended = D[0, 0]
-    rcrt1_dynamics.inertia_matrix(home, link_row(I3xz=3.0e-3), D)
+    rcrt1_dynamics.inertia_matrix(home, rcrt1_dynamics.link_row(I3xz=3.0e-3), D)
     assert math.isclose(mended / D[0, 0] - 1.0, 0.037, abs_tol=5e-4)
 
 
 def test_links_of_the_robot_are_those_of_the_table() -> None:
-    for link, row in zip(link_inertias(), TABLE, strict=True):
+    for link, row in zip(rcrt1_dynamics.link_inertias(), TABLE, strict=True):
         mass, center, *rest = row
         assert link.mass == mass
         assert np.array_equal(link.center, center)

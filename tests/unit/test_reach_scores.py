@@ -13,17 +13,14 @@ from scipy.spatial.transform import Rotation
 
 from present import present
 from recipes import JOINTS, START_NS, Recipe, state
-from teleop_core.bags.reader import Bag
-from teleop_core.bags.reports import report
+from teleop_core.bags import reader, reports
 from teleop_core.bags.writer import BagWriter
 from teleop_core.chain.mapping.motion_scaling import MotionScaling
 from teleop_core.chain.mapping.parameters import MotionScalingParameters
-from teleop_core.evaluation.score import Score
+from teleop_core.evaluation import Score, evaluate
 from teleop_core.evaluation.score_table import MET, NOT_MET, score_tables
-from teleop_core.evaluation.scoring import evaluate
 from teleop_core.evaluation.windows import windows
-from teleop_core.graph import topics
-from teleop_core.graph.signals import STATE_FIELDS, TICK_NS
+from teleop_core.graph import STATE_FIELDS, TICK_NS, topics
 from teleop_core.kernels.geometry import Array
 from teleop_core.session.api import configuration
 
@@ -78,7 +75,7 @@ class Session(Recipe):
                 writer.write(topic, log_ns, data)
             for block in blocks:
                 writer.write_block(block)
-        return Bag(path)
+        return reader.Bag(path)
 
 
 def shares(score: Score) -> Any:
@@ -376,7 +373,7 @@ def test_recordings_of_before_have_no_rows_of_reach_and_no_marks(path: Path) -> 
     session.topics.remove(topics.SLAVE_REACH)
     known = set(STATE_FIELDS) - {"limit", "limited_joint"}
     texts = {name: str(float(name in {"gain", "is_following"})) for name in known}
-    session.singles = [(topics.TELEOP_STATE, START_NS, report(START_NS, "teleop", 0, "FOLLOWING", texts))]
+    session.singles = [(topics.TELEOP_STATE, START_NS, reports.report(START_NS, "teleop", 0, "FOLLOWING", texts))]
     score: Any = evaluate(session.write(path))
     assert shares(score) == [None] * len(SHARES)
     assert score.reach.residual_mm.rms is score.reach.interpolation is None

@@ -13,9 +13,8 @@ import teleop_core as tc
 from present import present
 from teleop_core.bags.writer import BagWriter
 from teleop_core.base.parameters import build
-from teleop_core.chain.operators import OPERATORS, Setting
+from teleop_core.chain.operators import OPERATORS, Setting, rest
 from teleop_core.chain.operators.parameters import OperatorParameters
-from teleop_core.chain.operators.rest import REST_TILT
 from teleop_core.chain.operators.shapes import PHASES
 from teleop_core.graph.topics import HAND_JAW, MASTER_BUTTONS, MASTER_MEASURED_CP, Topic
 from teleop_core.kernels.geometry import Array
@@ -25,7 +24,7 @@ COUNT = 201
 T = np.arange(COUNT) * 0.01
 PLACES = 0.01 * np.column_stack((np.cos(T) + 5.0, np.sin(3.0 * T), T))
 TURNS = Rotation.from_rotvec(np.column_stack((np.sin(T), 2.0 * T, np.cos(T))))
-REST = Rotation.from_euler("x", REST_TILT)
+REST = Rotation.from_euler("x", rest.REST_TILT)
 CENTER = (0.01, 0.0, 0.03)
 
 

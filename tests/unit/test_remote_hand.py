@@ -11,8 +11,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from present import present
-from teleop_core.base.errors import ShapeError, UnknownNameError
-from teleop_core.base.parameters import specs
+from teleop_core.base import ShapeError, UnknownNameError, specs
 from teleop_core.chain.mapping.plausibility import PlausibilityParameters
 from teleop_core.chain.master.operator import RunningOperator
 from teleop_core.chain.operators.remote import AHEAD, RemoteHand, RemoteParameters

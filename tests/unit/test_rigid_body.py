@@ -6,15 +6,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from present import present
-from teleop_core.kernels import pointer
-from teleop_core.kernels.geometry import Array
-from teleop_core.robots import load_robot
+from teleop_core.kernels import Array, pointer
+from teleop_core.robots import drives, load_robot
 from teleop_core.robots.arms import rcrt1_dynamics
 from teleop_core.robots.chains.rigid_body import invert_positive, write_model
-from teleop_core.robots.drives import ACCELERATION
 
 ROW = rcrt1_dynamics.link_row()
-FORWARD = pointer(rcrt1_dynamics.DYNAMICS.acceleration, ACCELERATION)
+FORWARD = pointer(rcrt1_dynamics.DYNAMICS.acceleration, drives.ACCELERATION)
 # Two solves of matrices whose entries differ by 2e5.
 ROUNDING = 1e-9
 
@@ -63,7 +61,7 @@ def test_model_of_axes_that_do_not_act_on_each_other_is_their_inertia(name: str)
     robot = load_robot(name)
     n, dynamics = robot.n, robot.dynamics
     out = np.empty(n + n * n)
-    forward = pointer(present(dynamics).acceleration, ACCELERATION)
+    forward = pointer(present(dynamics).acceleration, drives.ACCELERATION)
     write_model(forward, present(dynamics).parameters.copy(), robot.home.copy(), np.ones(n), out)
     assert np.array_equal(out[:n], np.zeros(n))
     assert np.allclose(out[n:].reshape(n, n), np.diag(present(robot.drives).inertia), rtol=1e-14, atol=0)

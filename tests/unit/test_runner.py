@@ -6,13 +6,10 @@ from typing import Any
 import numpy as np
 
 from teleop_core.bags.reader import Bag
-from teleop_core.graph import topics
-from teleop_core.graph.signals import TICK_NS
+from teleop_core.graph import TICK_NS, topics
 from teleop_core.robots import load_robot
-from teleop_core.session import api
+from teleop_core.session import api, runner, virtual
 from teleop_core.session.configuration import Configuration, configure
-from teleop_core.session.runner import recorded_configuration, replay, simulate
-from teleop_core.session.virtual import VirtualTime
 
 HOME = load_robot("rcrt1").home.tolist()
 DELAY_TICKS = 20
@@ -21,7 +18,7 @@ DELAY_TICKS = 20
 def test_setpoints_are_recorded_with_the_stamp_of_the_command_in_force(tmp_path: Path) -> None:
     settings = ["duration=0.5", f"slave.start={HOME}"]
     settings.append(f"teleop.delays=[slave/servo_jp={DELAY_TICKS * 1e-3}]")
-    simulate(configure(settings=settings), tmp_path / "bag")
+    runner.simulate(configure(settings=settings), tmp_path / "bag")
     bag = Bag(tmp_path / "bag")
     sampled = bag.read(topics.MASTER_MEASURED_CP).stamp_ns
     in_force = np.maximum(sampled - DELAY_TICKS * TICK_NS, topics.NO_COMMAND_NS)
@@ -35,9 +32,9 @@ def test_recording_of_before_is_read_and_replayed_from_where_it_began(tmp_path: 
     # Its configuration has former names: path, pid, fixture.size.
     bag = Bag(Path(__file__).parents[2] / "bags" / "example")
     assert "path.kind" in bag.metadata["configuration"]
-    layer, scenario = recorded_configuration(bag)
+    layer, scenario = runner.recorded_configuration(bag)
     configuration = Configuration.from_layers([layer], scenario)
-    assert replay(bag, configuration, tmp_path / "again") == 2000
+    assert runner.replay(bag, configuration, tmp_path / "again") == 2000
     again = Bag(tmp_path / "again")
     for topic in (topics.MASTER_MEASURED_CP, topics.MASTER_MEASURED_CV, topics.MASTER_BUTTONS):
         assert np.array_equal(bag.read(topic).values, again.read(topic).values), topic.name
@@ -63,7 +60,7 @@ def test_arms_that_begin_farther_away_are_waited_for_before_the_recorded_hand_mo
     state, first_ns = at_home["teleop/state"], int(at_home["master/measured_cp"].stamp_ns[0])
     follows_ns = int(state.stamp_ns[np.argmax(state["is_following"] > 0.0)])
     waited = (follows_ns - first_ns) // TICK_NS
-    lead = VirtualTime(configure("coarse_box", settings=["starts_at_home=false"])).lead
+    lead = virtual.VirtualTime(configure("coarse_box", settings=["starts_at_home=false"])).lead
     assert len(later["slave/measured_js"]) == len(at_home["slave/measured_js"]) + lead - waited
     commands, hand = later["slave/servo_cp"][["x", "y", "z"]], later["master/measured_cp"]
     moved = hand[["z", "x", "y"]] * (-1.0, -1.0, 1.0)  # in the slave's axes

@@ -11,16 +11,14 @@ from scipy.linalg import expm
 from scipy.signal import lsim
 
 from present import present
-from teleop_core.base.parameters import build
-from teleop_core.graph.signals import DT, TICK_NS
-from teleop_core.kernels import kernel
-from teleop_core.kernels.geometry import Array
+from teleop_core.base import build
+from teleop_core.graph import DT, TICK_NS
+from teleop_core.kernels import Array, kernel
 from teleop_core.robots import load_robot
 from teleop_core.robots.robot import Robot
+from teleop_core.slave import pair, slave_sim
 from teleop_core.slave.controllers.pid import PID, THIRD, PidParameters, pid_control, pid_step
-from teleop_core.slave.pair import ArmParameters, SimulatedArm
 from teleop_core.slave.slave import ReferenceFilterParameters
-from teleop_core.slave.slave_sim import ControllerParameters
 
 ROBOTS = {name: load_robot(name) for name in ("rcrt1", "scara", "puma560", "stewart", "rps3")}
 AXES = [(name, axis) for name, robot in ROBOTS.items() for axis in range(robot.n)]
@@ -147,13 +145,13 @@ def slave_step_trace(name: Any, axis: Any, size: Any) -> Array:
     robot = ROBOTS[name]
     start = robot.home.copy()
     start[axis] = min(start[axis], robot.upper[axis] - size)
-    slave = SimulatedArm(
-        ArmParameters(
+    slave = pair.SimulatedArm(
+        pair.ArmParameters(
             robot=name,
             starts_at_home=True,
             gravity_compensation="all",
             interpolation="none",
-            controller=build(ControllerParameters, {"kind": "pid", "pid.setpoint_weight": THIRD}),
+            controller=build(slave_sim.ControllerParameters, {"kind": "pid", "pid.setpoint_weight": THIRD}),
             reference_filter=ReferenceFilterParameters(is_on=False),
         )
     )

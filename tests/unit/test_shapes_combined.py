@@ -15,8 +15,7 @@ import teleop_core as tc
 from any_shape import BALL, BEYOND, KINDS, found, places
 from present import present
 from teleop_core.bags.reader import Bag
-from teleop_core.base.errors import ParameterError, TeleopError, UnknownNameError
-from teleop_core.base.parameters import build, values_of
+from teleop_core.base import ParameterError, TeleopError, UnknownNameError, build, values_of
 from teleop_core.chain.fixtures.reported_fixture import reported_fixture
 from teleop_core.chain.mapping.parameters import FixtureParameters
 from teleop_core.evaluation.scoring import evaluate

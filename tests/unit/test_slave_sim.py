@@ -14,20 +14,15 @@ from scipy.linalg import expm
 from scipy.signal import lfilter
 
 from present import present
-from teleop_core.base.errors import ParameterError
-from teleop_core.base.parameters import build
-from teleop_core.graph.signals import DT, TICK_NS
-from teleop_core.kernels import pointer
-from teleop_core.kernels.geometry import Array
-from teleop_core.robots import load_robot
-from teleop_core.robots.drives import ACCELERATION, independent_acceleration
-from teleop_core.slave.commands import CommandStatus
+from teleop_core.base import ParameterError, build
+from teleop_core.graph import DT, TICK_NS
+from teleop_core.kernels import Array, pointer
+from teleop_core.robots import drives, load_robot
+from teleop_core.slave import commands, pair, slave_sim
 from teleop_core.slave.controllers import CONTROLLERS
 from teleop_core.slave.joints import integrate
 from teleop_core.slave.operation import Answer, Fault, OperationParameters, State
-from teleop_core.slave.pair import ArmParameters, SimulatedArm
 from teleop_core.slave.slave import ReferenceFilterParameters
-from teleop_core.slave.slave_sim import ControllerParameters, SlaveSim, SlaveSimParameters
 
 ARM = load_robot("rcrt1")
 DRIVES = present(ARM.drives)
@@ -39,19 +34,19 @@ TIMEOUT_TICKS = 100
 JOINTS = range(6)
 
 
-def pid(**values: tuple[float, ...]) -> ControllerParameters:
+def pid(**values: tuple[float, ...]) -> slave_sim.ControllerParameters:
     """Controller parameters with some of the PID's."""
-    return build(ControllerParameters, {f"pid.{name}": value for name, value in values.items()})
+    return build(slave_sim.ControllerParameters, {f"pid.{name}": value for name, value in values.items()})
 
 
 class Bench:
     """A slave and the ticks that its commands come in."""
 
     def __init__(self, **values: Any) -> None:
-        self.slave = SimulatedArm(ArmParameters(**{"start": AT_HOME} | values))
+        self.slave = pair.SimulatedArm(pair.ArmParameters(**{"start": AT_HOME} | values))
         self.row, self.now_ns = self.slave.signals, 0
 
-    def tick(self, command: Array | None = None, stamp_ns: int | None = None) -> CommandStatus:
+    def tick(self, command: Array | None = None, stamp_ns: int | None = None) -> commands.CommandStatus:
         """One tick, with a command or without; returns the status."""
         self.now_ns += TICK_NS
         if command is not None:
@@ -59,7 +54,7 @@ class Bench:
             self.row["slave_servo_jp_ns"] = self.now_ns if stamp_ns is None else stamp_ns
         self.row["now_ns"] = self.now_ns
         self.slave.step()
-        return CommandStatus(self.row["command_status"])
+        return commands.CommandStatus(self.row["command_status"])
 
     def trace(self, command: Array, ticks: int) -> tuple[Array, Array]:
         """True joints (ticks, 6) and efforts (ticks, 6) under a constant command."""
@@ -86,13 +81,13 @@ class Bench:
 
 # Integration.
 
-SPIN = pointer(independent_acceleration, ACCELERATION)
+SPIN = pointer(drives.independent_acceleration, drives.ACCELERATION)
 
 
 def one_tick_error(rate: float, steps: int) -> float:
     """Error of position and speed, relative to the start speed, of a joint that friction stops."""
     q, dq, effort = np.zeros(6), np.ones(6), np.full(6, 0.3 * rate)
-    slave = SlaveSim(SlaveSimParameters())
+    slave = slave_sim.SlaveSim(slave_sim.SlaveSimParameters())
     slave.parameters["viscous"], slave.parameters["coulomb"] = rate, 0.0
     integrate(SPIN, np.ones(6), slave.parameters, slave.state, slave.arm.contacts, steps, effort, q, dq, DT)
     exact = expm(np.array([[0, 1, 0], [0, -rate, 1], [0, 0, 0]]) * 1e-3) @ [0.0, 1.0, effort[0]]
@@ -110,7 +105,7 @@ def test_error_against_the_exact_solution_falls_with_the_fourth_power_of_the_ste
 def test_default_steps_resolve_the_stiffest_friction_of_the_arm() -> None:
     # Dry friction grows through zero speed like viscous friction of coulomb / friction_speed.
     rates = (DRIVES.viscous + DRIVES.coulomb / DRIVES.friction_speed) / DRIVES.inertia
-    steps = ArmParameters().integration_steps
+    steps = pair.ArmParameters().integration_steps
     # Fifth-order term (rate h)^5 / 120 in each step of h = 1 ms / steps: 670/s makes 7e-5.
     bound = steps * (rates.max() * 1e-3 / steps) ** 5 / 120.0
     assert bound < 1e-4
@@ -118,7 +113,7 @@ def test_default_steps_resolve_the_stiffest_friction_of_the_arm() -> None:
 
 
 def test_more_steps_change_the_path_of_the_arm_less_and_less() -> None:
-    slave, ends = SlaveSim(SlaveSimParameters()), []
+    slave, ends = slave_sim.SlaveSim(slave_sim.SlaveSimParameters()), []
     arm = slave.arm
     effort = np.array([2.0, -3.0, 5.0, 0.05, 0.03, 0.02])
     for steps in (1, 2, 4, 8):
@@ -250,8 +245,7 @@ def test_long_move_runs_at_the_speed_limit_and_recovers_without_windup(joint: in
 
 
 def test_integral_stays_bounded_while_an_overload_holds_the_arm_back() -> None:
-    # A friction far above the rated torque, as of an arm that is caught: the setpoint goes, it
-    # cannot.
+    # A friction far above the rated torque, as of an arm that is caught: the setpoint goes, it cannot.
     told = OperationParameters(reported=("tracking", "tip", "effort"))
     bench = Bench(operation=told)
     bench.slave.simulated.parameters["coulomb"][0] = 20.0
@@ -324,9 +318,9 @@ def test_measured_speed_is_that_of_the_encoders_through_a_low_pass_of_5_ms() -> 
 
 def test_command_is_fresh_until_the_timeout_and_stale_after_it() -> None:
     bench = Bench()
-    assert bench.tick(ARM.home) is CommandStatus.FRESH
+    assert bench.tick(ARM.home) is commands.CommandStatus.FRESH
     statuses = [bench.tick() for _ in range(TIMEOUT_TICKS + 1)]
-    assert statuses == [CommandStatus.FRESH] * TIMEOUT_TICKS + [CommandStatus.STALE]
+    assert statuses == [commands.CommandStatus.FRESH] * TIMEOUT_TICKS + [commands.CommandStatus.STALE]
 
 
 def test_lone_command_is_reached_and_held() -> None:
@@ -338,7 +332,7 @@ def test_lone_command_is_reached_and_held() -> None:
     bench.tick(goal)
     for _ in range(3000):
         status = bench.tick()
-    assert status is CommandStatus.STALE
+    assert status is commands.CommandStatus.STALE
     assert np.allclose(bench.setpoint, goal, rtol=0, atol=1e-12)
     assert (np.abs(bench.joints - goal) <= COUNT).all()
 
@@ -350,7 +344,7 @@ def test_jump_is_refused_counted_and_not_followed(joint: int) -> None:
     calm.go_to(MIDDLE)
     jump = MIDDLE.copy()
     jump[joint] += 0.1001 * DRIVES.speed_limit[joint]
-    assert bench.tick(jump) is CommandStatus.REFUSED
+    assert bench.tick(jump) is commands.CommandStatus.REFUSED
     assert bench.slave.server.refused == 1
     calm.tick()
     assert np.array_equal(bench.setpoint, calm.setpoint)
@@ -360,7 +354,7 @@ def test_jump_is_refused_counted_and_not_followed(joint: int) -> None:
 def test_largest_step_that_is_no_jump_is_followed() -> None:
     bench = Bench()
     bench.go_to(MIDDLE)
-    assert bench.tick(MIDDLE + 0.0999 * DRIVES.speed_limit) is CommandStatus.FRESH
+    assert bench.tick(MIDDLE + 0.0999 * DRIVES.speed_limit) is commands.CommandStatus.FRESH
 
 
 def test_slave_resumes_when_the_command_comes_back_near() -> None:
@@ -369,7 +363,7 @@ def test_slave_resumes_when_the_command_comes_back_near() -> None:
     for _ in range(300):
         bench.tick(MIDDLE + 0.5 * DRIVES.speed_limit)
     near = MIDDLE + 0.01 * DRIVES.speed_limit
-    assert bench.tick(near) is CommandStatus.FRESH
+    assert bench.tick(near) is commands.CommandStatus.FRESH
     bench.trace(near, 2000)
     assert (np.abs(bench.joints - near) <= COUNT).all()
 
@@ -379,8 +373,8 @@ def test_refused_commands_do_not_count_as_fresh_ones() -> None:
     bench.tick(ARM.home)
     far = ARM.home - 0.5 * DRIVES.speed_limit
     statuses = {bench.tick(far) for _ in range(TIMEOUT_TICKS + 10)}
-    assert statuses == {CommandStatus.REFUSED}
-    assert bench.tick() is CommandStatus.STALE
+    assert statuses == {commands.CommandStatus.REFUSED}
+    assert bench.tick() is commands.CommandStatus.STALE
 
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf, 1e300])
@@ -390,7 +384,7 @@ def test_command_that_is_no_number_is_refused_and_harms_nothing(joint: int, bad:
     bench.tick(ARM.home)
     command = ARM.home.copy()
     command[joint] = bad
-    assert bench.tick(command) is CommandStatus.REFUSED
+    assert bench.tick(command) is commands.CommandStatus.REFUSED
     assert bench.slave.server.refused == 1
     joints, efforts = bench.trace(ARM.home, 200)
     assert (np.abs(joints - ARM.home) <= COUNT).all()
@@ -480,7 +474,7 @@ def test_reset_repeats_the_motion_to_the_bit() -> None:
 def test_retuning_at_rest_moves_the_arm_by_a_few_counts_at_most(values: Mapping[str, Any]) -> None:
     bench = Bench()
     bench.go_to(MIDDLE)
-    bench.slave.retune(ArmParameters(**values))
+    bench.slave.retune(pair.ArmParameters(**values))
     joints, _ = bench.trace(MIDDLE, 1000)
     # Friction and gravity stay held by what holds them; sixteen counts are 0.1 mm at the tip.
     assert (np.abs(joints - MIDDLE) <= 16 * COUNT).all()
@@ -503,7 +497,7 @@ def test_gains_that_change_in_motion_make_no_step_of_effort(bandwidth: tuple[flo
     begin_ns = bench.now_ns
     before = moved(4000)[-40:]
     damping = bench.slave.simulated.arm.gains[:, 2].copy()
-    bench.slave.retune(ArmParameters(start=tuple(MIDDLE.tolist()), controller=pid(bandwidth=bandwidth)))
+    bench.slave.retune(pair.ArmParameters(start=tuple(MIDDLE.tolist()), controller=pid(bandwidth=bandwidth)))
     step = np.abs(moved(3) - before.mean(axis=0)).max(axis=0)
     # What the integrators held against the derivatives; steps of encoders are in the rest.
     assert (step < 0.12 * damping * np.pi * way).all()
@@ -513,9 +507,9 @@ def test_gains_that_change_in_motion_make_no_step_of_effort(bandwidth: tuple[flo
 def test_gains_that_change_before_the_first_tick_count_from_the_begin(law: str) -> None:
     soft = {"start": AT_HOME, "controller.kind": law}
     soft |= {f"controller.{law}.bandwidth": tuple((0.5 * DRIVES.bandwidth).tolist())}
-    changed = SimulatedArm(build(ArmParameters, soft | {f"controller.{law}.bandwidth": ()}))
-    changed.retune(build(ArmParameters, soft))
-    made = SimulatedArm(build(ArmParameters, soft))
+    changed = pair.SimulatedArm(build(pair.ArmParameters, soft | {f"controller.{law}.bandwidth": ()}))
+    changed.retune(build(pair.ArmParameters, soft))
+    made = pair.SimulatedArm(build(pair.ArmParameters, soft))
     for k in range(200):
         for slave in (changed, made):
             slave.signals["now_ns"] = slave.signals["slave_servo_jp_ns"] = (k + 1) * TICK_NS
@@ -528,21 +522,21 @@ def test_gains_that_change_before_the_first_tick_count_from_the_begin(law: str) 
 @pytest.mark.parametrize("name", ["viscous", "coulomb"])
 def test_list_of_another_length_than_the_joints_is_refused(name: str, length: int) -> None:
     with pytest.raises(ParameterError) as error:
-        SimulatedArm(ArmParameters(**dict[str, Any]({name: (1.0,) * length})))
+        pair.SimulatedArm(pair.ArmParameters(**dict[str, Any]({name: (1.0,) * length})))
     assert error.value.name == f"slave_sim.{name}"
 
 
 @pytest.mark.parametrize("name", ["bandwidth", "kp", "ki", "kd"])
 def test_gains_of_another_length_than_the_joints_are_refused(name: str) -> None:
     with pytest.raises(ParameterError) as error:
-        SimulatedArm(ArmParameters(controller=pid(**{name: (1.0,) * 5})))
+        pair.SimulatedArm(pair.ArmParameters(controller=pid(**{name: (1.0,) * 5})))
     assert error.value.name == f"slave_sim.controller.pid.{name}"
 
 
 def test_refused_retuning_changes_nothing() -> None:
     bench: Any = Bench()
     before, gains = bench.slave.simulated.parameters.copy(), bench.slave.simulated.arm.gains.copy()
-    wrong = ArmParameters(viscous=(1.0,) * 6, controller=pid(kp=(1.0,) * 5))
+    wrong = pair.ArmParameters(viscous=(1.0,) * 6, controller=pid(kp=(1.0,) * 5))
     with pytest.raises(ParameterError):
         bench.slave.retune(wrong)
     assert bench.slave.simulated.parameters == before

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from teleop_core.robots.bodies import Solid
-from teleop_core.robots.bodies.meshes import mesh_of
+from teleop_core.robots.bodies import Solid, meshes
 
 HERE = np.array([0.1, -0.2, 0.3, np.sqrt(0.5), 0.0, np.sqrt(0.5), 0.0])
 VOLUMES = {
@@ -17,7 +16,7 @@ VOLUMES = {
 
 @pytest.mark.parametrize("solid", VOLUMES, ids=lambda solid: solid.kind)
 def test_triangles_of_a_solid_face_outwards_and_enclose_its_volume_about_its_centre(solid: Solid) -> None:
-    points, faces = mesh_of(solid, 64)
+    points, faces = meshes.mesh_of(solid, 64)
     a, b, c = points[faces].transpose(1, 0, 2) - HERE[:3]
     volumes = np.einsum("ij,ij->i", a, np.cross(b, c)) / 6.0  # of pyramids over the centre
     assert volumes.sum() == pytest.approx(VOLUMES[solid], rel=0.01)

@@ -6,8 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from present import present
-from teleop_core.base.errors import ParameterError
-from teleop_core.base.parameters import build
+from teleop_core.base import ParameterError, build
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot
 from teleop_core.slave.controllers.source_pid import SOURCE_PID, SourcePidParameters, loaded_axes

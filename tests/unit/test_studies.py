@@ -14,9 +14,8 @@ import pytest
 
 import teleop_core as tc
 from teleop_lab import Study, read_study, sweep
-from teleop_lab.studies.point import Result
+from teleop_lab.studies import point, summary
 from teleop_lab.studies.store import Store
-from teleop_lab.studies.summary import differences, mean_of, study_table
 
 if TYPE_CHECKING:
     import xarray
@@ -89,7 +88,7 @@ def test_a_result_that_is_cut_off_counts_as_missing(found: Found, tmp_path: Path
         assert study().explain(store).why == {"missing": 1}
     finally:
         file.write_text(text)
-    assert Result.from_json(text).to_json() == text
+    assert point.Result.from_json(text).to_json() == text
 
 
 def test_a_session_that_fails_is_a_point_with_its_error(own_parts: None, tmp_path: Path) -> None:
@@ -162,12 +161,12 @@ def test_a_file_says_the_same_as_a_call(tmp_path: Path, found: Found) -> None:
 def test_differences_are_by_pairs_and_intervals_hold_their_mean(found: Found) -> None:
     _, data = found
     whole = study()
-    change = differences(whole, data, METRICS[0])["display.latency"][0]
+    change = summary.differences(whole, data, METRICS[0])["display.latency"][0]
     late, early = (data[METRICS[0]].sel({"display.latency": v}).values for v in (0.1, 0.0))
     assert change.value == pytest.approx((late - early).mean())
-    mean = mean_of(np.arange(20.0))
+    mean = summary.mean_of(np.arange(20.0))
     assert mean.low < mean.value == 9.5 < mean.high
-    assert METRICS[0] in study_table(whole, data)
+    assert METRICS[0] in summary.study_table(whole, data)
 
 
 _KILLED = """

@@ -11,8 +11,7 @@ from teleop_core.base.errors import ParameterError, ShapeError, UnknownNameError
 from teleop_core.kernels.geometry import Array, rotation, transform
 from teleop_core.robots import IkStatus, list_robots, load_robot
 from teleop_core.robots.robot import Robot
-from teleop_machines.hand_fingers import finger_point
-from teleop_machines.three_finger_hand import Grasp, Hand
+from teleop_machines import hand_fingers, three_finger_hand
 from ways import stepped
 
 SOLVED = 1e-9
@@ -25,7 +24,7 @@ def robot() -> Any:
 
 @pytest.fixture(scope="module")
 def hand(robot: Robot) -> Any:
-    return Hand(robot.geometry)
+    return three_finger_hand.Hand(robot.geometry)
 
 
 def moves(
@@ -41,13 +40,13 @@ def moves(
 
 
 def test_finger_of_the_specification() -> None:
-    point = finger_point(np.radians(20.0), np.radians(35.0), np.radians(-50.0), (1.0, 0.6, 0.4))
+    point = hand_fingers.finger_point(np.radians(20.0), np.radians(35.0), np.radians(-50.0), (1.0, 0.6, 0.4))
     assert np.allclose(point, [1.764613, 0.642266, 0.240618], atol=6e-7)
 
 
 @pytest.mark.parametrize("finger", [1, 2, 3])
 def test_every_finger_solution_touches_the_point_and_the_original_is_among_them(finger: int) -> None:
-    hand, rng = Hand({"l31": 0.02, "l12": 0.06}), np.random.default_rng(2)
+    hand, rng = three_finger_hand.Hand({"l31": 0.02, "l12": 0.06}), np.random.default_rng(2)
     counts = set()
     for q in rng.uniform(-3.0, 3.0, (500, 9)):
         point = hand.contact_points(q)[finger - 1]
@@ -64,11 +63,11 @@ def test_every_finger_solution_touches_the_point_and_the_original_is_among_them(
     assert 4 in counts
 
 
-def test_a_point_out_of_reach_has_no_finger_solution(hand: Hand) -> None:
+def test_a_point_out_of_reach_has_no_finger_solution(hand: three_finger_hand.Hand) -> None:
     assert hand.finger_solutions(1, [1.0, 0.0, 0.0]).shape == (0, 3)
 
 
-def test_object_pose_and_contact_points_are_inverse_to_each_other(robot: Robot, hand: Hand) -> None:
+def test_object_pose_and_contact_points_are_inverse_to_each_other(robot: Robot, hand: three_finger_hand.Hand) -> None:
     rng = np.random.default_rng(3)
     for T in moves(robot, rng, 50, shift=0.5, turn=3.0):
         points = hand.contacts_of(T)
@@ -83,7 +82,7 @@ def test_all_sixty_four_branches_appear_for_long_outer_links() -> None:
     assert len(robot.ik_all(robot.fk(robot.home))) == 64
 
 
-def test_inverse_follows_the_object_next_to_the_seed(robot: Robot, hand: Hand) -> None:
+def test_inverse_follows_the_object_next_to_the_seed(robot: Robot, hand: three_finger_hand.Hand) -> None:
     rng = np.random.default_rng(5)
     for T in moves(robot, rng, 300):
         result = robot.ik(T)
@@ -95,10 +94,10 @@ def test_inverse_follows_the_object_next_to_the_seed(robot: Robot, hand: Hand) -
         assert math.isclose(np.abs(result.q - robot.home).max(), nearest, abs_tol=SOLVED)
 
 
-def test_fingers_spread_too_far_cannot_hold_and_say_so(robot: Robot, hand: Hand) -> None:
+def test_fingers_spread_too_far_cannot_hold_and_say_so(robot: Robot, hand: three_finger_hand.Hand) -> None:
     actuated = np.array([[-1.3, 0.5], [1.3, 0.5], [0.0, -1.5]])
     result = hand.hold(actuated, np.zeros(3))
-    assert result.status == Grasp.CANNOT_HOLD
+    assert result.status == three_finger_hand.Grasp.CANNOT_HOLD
     assert np.isfinite(result.q).all()
     assert result.residual > 1e-3
 
@@ -131,7 +130,7 @@ def test_a_path_over_a_finger_axis_keeps_its_steps_and_goes_on(beside: float) ->
     robot = load_robot("three_finger_hand")
     base = np.array([0.0, -robot.geometry["d"], robot.geometry["h"]])
     home = robot.fk(robot.home)
-    corner = Hand(robot.geometry).contacts_of(home)[0]
+    corner = three_finger_hand.Hand(robot.geometry).contacts_of(home)[0]
     over = base + np.array([-0.01, beside, -0.04]) - corner
     shares = np.array([*np.sin(np.linspace(0.0, math.pi, 3000)), *np.zeros(300)])
     path = np.repeat(home[None], len(shares), axis=0)
@@ -140,7 +139,7 @@ def test_a_path_over_a_finger_axis_keeps_its_steps_and_goes_on(beside: float) ->
     assert np.allclose(robot.fk(found[-1]), home, atol=1e-6)
 
 
-def test_bad_hands_and_questions_are_refused(robot: Robot, hand: Hand) -> None:
+def test_bad_hands_and_questions_are_refused(robot: Robot, hand: three_finger_hand.Hand) -> None:
     assert "three_finger_hand" in list_robots()
     for symbol, value in (("l12", 0.0), ("side", -1.0), ("side", 1.0), ("d", math.inf)):
         with pytest.raises(ParameterError) as refusal:

@@ -15,8 +15,7 @@ from teleop_core.robots import load_robot
 from teleop_core.robots.robot import Robot
 from teleop_core.session.configuration import configure
 from teleop_core.session.virtual import VirtualTime
-from teleop_core.shapes.box import BoxParameters
-from teleop_core.shapes.hole import HoleParameters
+from teleop_core.shapes import box, hole
 from teleop_core.slave.slave_sim import SlaveSim
 
 STILL = np.zeros((1, 6))
@@ -132,10 +131,10 @@ def wandering(seed: int, ticks: int, size: float = 4e-3, turn: float = 0.1, slow
 
 SOLIDS = {
     "plane": ((0.0, 0.0, 0.0), (0.6, 0.0, -0.8), None, 0.0),
-    "box": ((0.0, 0.0, 0.017), (1.0, 0.0, 0.0), BoxParameters(size=(0.06, 0.06, 0.03)), 0.003),
+    "box": ((0.0, 0.0, 0.017), (1.0, 0.0, 0.0), box.BoxParameters(size=(0.06, 0.06, 0.03)), 0.003),
     "sphere": ((0.0, 0.0, 0.015), (0.0, 0.6, -0.8), None, 0.003),
     "capsule": ((0.0, 0.0, 0.012), (1.0, 0.0, 0.0), None, 0.003),
-    "hole": ((0.0, 0.0, -0.015), (0.0, 0.0, -1.0), HoleParameters(), 0.005),
+    "hole": ((0.0, 0.0, -0.015), (0.0, 0.0, -1.0), hole.HoleParameters(), 0.005),
 }
 """Where a tool wanders, its axis, the object's shape, and the tool's radius."""
 

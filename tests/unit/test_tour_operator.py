@@ -11,8 +11,7 @@ from scipy.interpolate import CubicHermiteSpline
 
 import teleop_core as tc
 from present import present
-from teleop_core.base.errors import ParameterError
-from teleop_core.base.parameters import build
+from teleop_core.base import ParameterError, build
 from teleop_core.chain.operators import OPERATORS, Setting
 from teleop_core.chain.operators.parameters import OperatorParameters
 from teleop_core.chain.operators.shapes import PHASES

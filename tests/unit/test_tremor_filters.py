@@ -16,21 +16,16 @@ from scipy.signal import butter, freqz, iirnotch, sosfreqz
 import teleop_core as tc
 from forgotten_parts import own_parts  # noqa: F401
 from present import present
-from teleop_core.base.errors import ParameterError, PartError
-from teleop_core.base.parameters import NoParameters, build
+from teleop_core.base import NoParameters, ParameterError, PartError, build
 from teleop_core.chain.filters import LONGEST_NS, MEMORY, TREMOR_FILTERS, tremor_filter
 from teleop_core.chain.filters.wflc import RATE
-from teleop_core.chain.mapping.motion_scaling import MOTION_SCALING
-from teleop_core.chain.mapping.parameters import MotionScalingParameters
+from teleop_core.chain.mapping import motion_scaling, parameters
 from teleop_core.evaluation.metrics.tremor_filter import passage
 from teleop_core.evaluation.motion_measures import RATE as SAMPLED
 from teleop_core.evaluation.motion_measures import tremor_power, velocities
-from teleop_core.graph.graph import build_graph
-from teleop_core.graph.topics import MASTER_CONTACT
-from teleop_core.kernels import kernel
-from teleop_core.kernels.geometry import Array
-from teleop_core.session.configuration import configure
-from teleop_core.session.virtual import VirtualTime
+from teleop_core.graph import build_graph, topics
+from teleop_core.kernels import Array, kernel
+from teleop_core.session import configuration, virtual
 
 MS = 1_000_000
 KINDS = ("notch", "band_stop", "kalman", "wflc")
@@ -352,7 +347,7 @@ def test_a_hand_that_is_thrown_elsewhere_is_followed_from_there_as_from_the_firs
 
 def commands(runner: tremor_filter.RunningTremorFilter, places: Array) -> Array:
     """What the mapping commands (N, 3) behind a filter, with a slave that is where it is led."""
-    scaling = MOTION_SCALING.run(MotionScalingParameters())
+    scaling = motion_scaling.MOTION_SCALING.run(parameters.MotionScalingParameters())
     row, found = scaling.signals, []
     row["slave_setpoint_cp"] = [0.3, 0.0, 0.2, 1.0, 0.0, 0.0, 0.0]
     for i, place in enumerate(places):
@@ -481,8 +476,8 @@ def test_the_widest_notch_that_is_taken_comes_to_rest_at_any_period(frequency: f
     assert np.abs(answer[-100:]).max() < 1e-9
 
 
-def session(*given: str, scenario: str = "human") -> VirtualTime:
-    return VirtualTime(configure(scenario, settings=["teleop.stages=[tremor_filter]", *given]))
+def session(*given: str, scenario: str = "human") -> virtual.VirtualTime:
+    return virtual.VirtualTime(configuration.configure(scenario, settings=["teleop.stages=[tremor_filter]", *given]))
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -503,7 +498,7 @@ def touches(scenario: str, seconds: float, *given: Any) -> Any:
     """Energies of the contacts of a session: shares given back."""
     rows = session(*given, scenario=scenario).run(round(1000 * seconds))
     contact = rows["master_contact"]
-    taken, returned = (contact[:, MASTER_CONTACT.columns.index(n)] for n in ("taken", "returned"))
+    taken, returned = (contact[:, topics.MASTER_CONTACT.columns.index(n)] for n in ("taken", "returned"))
     ends = np.flatnonzero(np.diff(contact[:, 0], append=-1.0))
     counts = taken[ends] > 1e-6
     return returned[ends][counts] / taken[ends][counts]

@@ -10,8 +10,7 @@ import teleop_core as tc
 from teleop_core.bags.reader import Bag
 from teleop_core.graph.signals import TICK_NS
 from teleop_core.kernels.geometry import Array
-from teleop_core.session.configuration import configure
-from teleop_core.session.virtual import VirtualTime
+from teleop_core.session import configuration, virtual
 from teleop_core.slave.pair import ArmParameters, SimulatedArm
 
 MS = 1_000_000
@@ -22,7 +21,7 @@ STAMPED_THERE = ("network_measured_cp_ns", "network_measured_cf_ns", "network_sl
 def session(*given: str, scenario: str = "palpation", stages: str = "[network]") -> Any:
     """Session whose sides are 50 ms apart, there and back."""
     settings = [f"teleop.stages={stages}", "network.there.least_delay=0.05", "network.back.least_delay=0.05", *given]
-    return VirtualTime(configure(scenario, settings=settings))
+    return virtual.VirtualTime(configuration.configure(scenario, settings=settings))
 
 
 @pytest.mark.parametrize(("offset", "drift"), [(0.5, 100.0), (-0.5, -100.0), (3600.0, 0.0)])

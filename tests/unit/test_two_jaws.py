@@ -7,14 +7,11 @@ import pytest
 from scipy.optimize import minimize
 
 import teleop_core as tc
-from teleop_core.graph import topics
-from teleop_core.graph.signals import TICK_NS
-from teleop_core.kernels import kernel
-from teleop_core.kernels.geometry import Array
+from teleop_core.graph import TICK_NS, topics
+from teleop_core.kernels import Array, kernel
 from teleop_core.session.links import link_texts
+from teleop_core.slave.jaw import jaw_sim, sharing
 from teleop_core.slave.jaw.grip import WEIGHT
-from teleop_core.slave.jaw.jaw_sim import GripObjectParameters, JawSim, JawSimParameters
-from teleop_core.slave.jaw.sharing import share_speed
 
 PLACE = np.array([0.2, -0.1, 0.05])
 BASE = np.array([0.5, -0.2, 0.1])  # of the second arm in the first one's
@@ -31,10 +28,10 @@ class Pair:
     """Two jaws whose tips and setpoints are led by hand; each hears of the other a tick later."""
 
     def __init__(self, places: Any = PLACE, **thing: float) -> None:
-        given = JawSimParameters(
-            second_base=tuple(BASE), object=GripObjectParameters(place=tuple(np.ravel(places)), **thing)
+        given = jaw_sim.JawSimParameters(
+            second_base=tuple(BASE), object=jaw_sim.GripObjectParameters(place=tuple(np.ravel(places)), **thing)
         )
-        self.sims = JawSim(given), JawSim(given)
+        self.sims = jaw_sim.JawSim(given), jaw_sim.JawSim(given)
         self.rows = [sim.signals for sim in self.sims]
         self._steps = [sim.load() for sim in self.sims]
         self.tips = [at(0.0, 0.0, 0.1), at(0.1, 0.0, 0.1)]  # in the first one's base
@@ -163,7 +160,7 @@ def test_two_jaws_hold_what_is_too_heavy_for_one() -> None:
 @kernel
 def shared(own: Array, tip: Array, most: float, other: Array, against: float) -> None:
     """Call the inner kernel."""
-    share_speed(own, tip, most, other, against)
+    sharing.share_speed(own, tip, most, other, against)
 
 
 def test_the_speed_between_two_jaws_is_the_least_of_a_convex_function() -> None:

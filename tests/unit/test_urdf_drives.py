@@ -11,12 +11,11 @@ import teleop_core as tc
 from present import present
 from teleop_core.base.errors import ParameterError, RecordingError, UnknownNameError
 from teleop_core.kernels.geometry import Array
-from teleop_core.robots import load_robot
-from teleop_core.robots.drives import ENTRIES
+from teleop_core.robots import drives, load_robot
 
 URDF = str(Path(__file__).parents[2] / "examples" / "any_arm.urdf")
 JOINTS = ("waist", "shoulder", "elbow", "roll", "pitch", "turn")
-FULL = dict(zip(ENTRIES, (0.4, 12.0, 3.0, 0.02, 90.0, 1.5, 1e-5, 70.0), strict=True))
+FULL = dict(zip(drives.ENTRIES, (0.4, 12.0, 3.0, 0.02, 90.0, 1.5, 1e-5, 70.0), strict=True))
 
 
 def arm(folder: Path, content: str | dict[str, dict[str, float]], **geometry: str) -> tc.Robot:
@@ -36,7 +35,7 @@ def test_entries_of_the_file_stand_above_those_of_the_urdf_and_all_others_stay(t
 
 
 def test_what_the_file_states_of_every_joint_is_assumed_no_more(tmp_path: Path) -> None:
-    for entry in ENTRIES:
+    for entry in drives.ENTRIES:
         before = set(present(load_robot(URDF, tip="tool0").drives).assumed)
         after = present(arm(tmp_path, {joint: {entry: FULL[entry]} for joint in JOINTS}).drives).assumed
         assert set(after) == before - {entry}

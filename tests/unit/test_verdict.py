@@ -12,16 +12,13 @@ import pytest
 from rich.console import Console
 
 import teleop_core as tc
-from teleop_core.base.parameters import NoParameters
-from teleop_core.base.registry import Registry
+from teleop_core.base import NoParameters, Registry
 from teleop_core.evaluation.command import evaluate_bags
 from teleop_core.evaluation.rows import fixed, number
 from teleop_core.evaluation.verdict import verdict_of
-from teleop_core.graph.stage import STAGES, Stage, register_stage
-from teleop_core.graph.topics import SLAVE_MEASURED_CP, Kind, Topic, passed_on
+from teleop_core.graph import STAGES, Stage, register_stage, topics
 from teleop_core.robots import ROBOTS, load_robot, register_robot
-from teleop_core.shapes import SHAPES, register_shape
-from teleop_core.shapes.sphere import SPHERE
+from teleop_core.shapes import SHAPES, register_shape, sphere
 from teleop_core.slave.controllers import CONTROLLERS, register_controller
 from teleop_core.slave.controllers.source_pid import SOURCE_PID
 
@@ -172,7 +169,7 @@ def test_scores_are_a_row_of_a_data_frame_each(drifting: tc.Recording) -> None:
 
 
 def slab() -> dict[str, Any]:
-    register_shape(replace(SPHERE, name="slab"))
+    register_shape(replace(sphere.SPHERE, name="slab"))
     return {"fixture": "slab"}
 
 
@@ -182,12 +179,12 @@ def law() -> dict[str, Any]:
 
 
 def mirror() -> dict[str, Any]:
-    topic = Topic("test/mirror", Kind.POSE, passed_on("slave/measured_cp"))
+    topic = topics.Topic("test/mirror", topics.Kind.POSE, topics.passed_on("slave/measured_cp"))
 
     def step(parameters: Any, state: Any, signals: Any, dt: Any) -> None:
         signals["test_mirror"] = signals["slave_measured_cp"]
 
-    register_stage(Stage("mirror", NoParameters, (SLAVE_MEASURED_CP,), (topic,), step=step))
+    register_stage(Stage("mirror", NoParameters, (topics.SLAVE_MEASURED_CP,), (topic,), step=step))
     return {"stages": ["mirror"]}
 
 

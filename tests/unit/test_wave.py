@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from teleop_core.base.errors import ParameterError
+from teleop_core.base import ParameterError
 from teleop_core.chain.passivity.port import (
     DRIFT,
     IMPEDANCE,
@@ -22,11 +22,9 @@ from teleop_core.chain.passivity.port import (
     hear_energy,
 )
 from teleop_core.chain.passivity.wave import draw, wave_hand, wave_slave
-from teleop_core.graph.topics import ENERGY
-from teleop_core.kernels import kernel
-from teleop_core.kernels.geometry import Array
-from teleop_core.session.configuration import configure
-from teleop_core.session.virtual import VirtualTime
+from teleop_core.graph import topics
+from teleop_core.kernels import Array, kernel
+from teleop_core.session import configuration, virtual
 
 DT, ARM, STEP = 1e-3, 0.05, 55e-6
 """Tick [s], lag of the arm [s], step of the device's reading [m]."""
@@ -129,7 +127,7 @@ def driven(
     ways: Array, there: NDArray[np.int64], back: NDArray[np.int64], stiffness: float = 200.0, preload: float = 0.0
 ) -> tuple[Array, Array, Array]:
     """Ports of hand and arm (N, columns), and what is seen, of :func:`drive`."""
-    hand, arm = np.zeros((2, len(ways), len(ENERGY)))
+    hand, arm = np.zeros((2, len(ways), len(topics.ENERGY)))
     seen = np.zeros((len(ways), 6))
     drive(ways, there, back, stiffness, preload, B, SLAVE, hand, arm, seen)
     return hand, arm, seen
@@ -200,7 +198,7 @@ def test_half_of_all_packets_lost_leave_no_drift_in_the_air() -> None:
     """Without the slave's making up: integrals travel."""
     ways = motion(np.random.default_rng(6))
     ways[2000:] = 0.0
-    hand, arm = np.zeros((2, len(ways), len(ENERGY)))
+    hand, arm = np.zeros((2, len(ways), len(topics.ENERGY)))
     seen, still = np.zeros((len(ways), 6)), SLAVE.copy()
     still[1] = 0.0
     there = constant(50)
@@ -236,7 +234,7 @@ def pressing(*texts: str, ticks: int = 12_000, scenario: str = "palpation") -> N
         "gimbal_noise=0.0",
         "reflection.passivity=wave",
     )
-    return VirtualTime(configure(scenario, settings=[*settings, *texts])).run(ticks)
+    return virtual.VirtualTime(configuration.configure(scenario, settings=[*settings, *texts])).run(ticks)
 
 
 @pytest.mark.parametrize("direction", [(0.0, 0.0, 1.0), (0.6, 0.0, 0.8)])
@@ -246,7 +244,7 @@ def test_an_arm_that_is_overdrawn_goes_back_before_force_whatever_wave_comes(
     """At the speed at which drift is made up for, with 5 N at the tip: nothing is lent then."""
     away, force = np.array(direction), np.zeros(6)
     force[:3] = 5.0 * away
-    port, heard, memory = np.zeros(len(ENERGY)), np.zeros(len(ENERGY)), np.zeros(12)
+    port, heard, memory = np.zeros(len(topics.ENERGY)), np.zeros(len(topics.ENERGY)), np.zeros(12)
     begin_round(port, 3.0, 1.0)
     begin_round(heard, 3.0, 1.0)
     tip = np.array([0.1, 0.2, 0.3, 1.0, 0.0, 0.0, 0.0])
@@ -304,17 +302,17 @@ def test_a_hand_that_is_clutched_leads_nothing() -> None:
 
 
 def test_a_hand_that_moves_without_leading_feels_no_drag_and_sends_no_wave() -> None:
-    port, memory, push, still = np.zeros(len(ENERGY)), np.zeros(12), np.zeros(3), np.zeros(3)
+    port, memory, push, still = np.zeros(len(topics.ENERGY)), np.zeros(12), np.zeros(3), np.zeros(3)
     begin_round(port, 3.0, 1.0)
     for leads in (0.0, 1.0):
         moved = np.array([1e-4, 0.0, 0.0])
         flow = np.array([0.0, 1e-3, 0.0])
         numbers = np.array([B])
-        wave_hand(numbers, memory, still, moved, leads * moved, flow, np.zeros(len(ENERGY)), port, push, 1.0, DT)
+        wave_hand(numbers, memory, still, moved, leads * moved, flow, np.zeros(len(topics.ENERGY)), port, push, 1.0, DT)
         assert push.any() == port[WAVE : WAVE + 3].any() == bool(leads)
     assert push[0] < 0.0
 
 
 def test_waves_without_the_slaves_side_are_refused_with_what_they_need() -> None:
     with pytest.raises(ParameterError, match=r"teleop.stages=\[passivity\]"):
-        configure("palpation", settings=["reflection.passivity=wave"])
+        configuration.configure("palpation", settings=["reflection.passivity=wave"])

@@ -13,8 +13,7 @@ from present import present
 from teleop_core.base.errors import ParameterError
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot
-from teleop_core.session.configuration import configure
-from teleop_core.session.virtual import VirtualTime
+from teleop_core.session import configuration, virtual
 from teleop_core.slave.slave_sim import SlaveSim
 from teleop_core.slave.world.parameters import MATERIALS
 
@@ -24,7 +23,7 @@ BLOCK = [0.241, -0.236, -0.087]
 
 def pressed(*texts: str, ticks: int = 20_000, seconds: float = 12.0) -> NDArray[np.void]:
     """Signals of the scenario ``palpation`` from ``seconds`` on."""
-    session = VirtualTime(configure("palpation", settings=list(texts)))
+    session = virtual.VirtualTime(configuration.configure("palpation", settings=list(texts)))
     return session.run(ticks)[round(1e3 * seconds) :]
 
 
@@ -42,7 +41,7 @@ def after_a_tick(robot: tc.Robot, joints: Array, texts: list[str], plant: str = 
     """Speeds (n,) that an arm at rest has after a tick, and what its tip felt at its begin (3,)."""
     zero = [0.0] * robot.n
     settings = [f"robot={robot.name}", f"plant={plant}", f"slave_sim.coulomb={zero}", *texts]
-    arm = SlaveSim(configure("free_motion", settings=settings).group("slave_sim"))
+    arm = SlaveSim(configuration.configure("free_motion", settings=settings).group("slave_sim"))
     arm.arm.q[:] = arm.state["link"] = arm.state["carried"] = joints
     arm.signals["slave_setpoint_js"] = joints
     arm.step()
@@ -134,15 +133,15 @@ def test_dry_friction_holds_a_tip_that_is_dragged_less_than_it_carries() -> None
 def test_an_object_that_the_tip_begins_in_is_refused_with_its_depth() -> None:
     table, wall = ["world=plane"], ["world=plane", "world.plane.normal=[1.0,0.0,0.0]"]
     with pytest.raises(ParameterError, match="mm inside the object"):
-        VirtualTime(configure("free_motion", settings=table))
+        virtual.VirtualTime(configuration.configure("free_motion", settings=table))
     with pytest.raises(ParameterError, match="cannot lie straight below"):
-        VirtualTime(configure("free_motion", settings=wall))
+        virtual.VirtualTime(configuration.configure("free_motion", settings=wall))
     with pytest.raises(ParameterError, match="x, y, z, or empty"):
-        configure("free_motion", settings=["world=box", "world.place=[0.1,0.2]"])
+        configuration.configure("free_motion", settings=["world=box", "world.place=[0.1,0.2]"])
     with pytest.raises(ParameterError, match="given for scara_stewart"):
-        VirtualTime(configure("free_motion", settings=["world=box", "robot=scara_stewart"]))
+        virtual.VirtualTime(configuration.configure("free_motion", settings=["world=box", "robot=scara_stewart"]))
     with pytest.raises(ParameterError, match="a direction"):
-        configure("free_motion", settings=["world=plane", "world.plane.normal=[0.0,0.0,0.0]"])
+        configuration.configure("free_motion", settings=["world=plane", "world.plane.normal=[0.0,0.0,0.0]"])
 
 
 def test_the_hand_feels_the_push_along_its_own_axes_and_no_more_than_asked() -> None:
@@ -238,7 +237,7 @@ def test_a_tank_is_passive_but_for_a_step_of_the_reading_whatever_is_touched(
 
 
 def test_force_that_falls_silent_fades_within_a_tenth_of_a_second() -> None:
-    session = VirtualTime(configure("palpation", settings=["feedback_timeout=0.05"]))
+    session = virtual.VirtualTime(configuration.configure("palpation", settings=["feedback_timeout=0.05"]))
     stage = session.stages["motion_scaling"]
     row = stage.signals
     session.run(15_800)

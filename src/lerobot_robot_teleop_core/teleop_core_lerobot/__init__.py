@@ -1,8 +1,7 @@
 """Sides of a session for loops of another program: a slave that follows joints, a master.
 
-Each side is a session in virtual time, which a call of the loop advances by one period. Nothing
-here needs LeRobot; ``lerobot_robot_teleop_core`` and ``lerobot_teleoperator_teleop_core`` give both
-to it.
+Each side is a session in virtual time, which a call of the loop advances by one period. Nothing here needs LeRobot;
+``lerobot_robot_teleop_core`` and ``lerobot_teleoperator_teleop_core`` give both to it.
 """
 
 from collections.abc import Mapping, Sequence
@@ -14,8 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import teleop_core as tc
-from teleop_core.graph.signals import TICK_NS
-from teleop_core.graph.topics import SLAVE_MEASURED_CF, SLAVE_SERVO_JP, in_force
+from teleop_core.graph import TICK_NS, topics
 from teleop_core.kernels.fields import PerJoint, Wrench
 from teleop_core.session.runner import record_blocks
 
@@ -23,7 +21,7 @@ __all__ = ["Connection", "MasterSide", "SessionFields", "Side", "SlaveSide"]
 
 _SECOND_NS = 1_000_000_000
 _FORCE = ("force.x", "force.y", "force.z")
-GIVEN_JP = tc.Topic("given/servo_jp", tc.Kind.JOINTS, in_force("slave/servo_jp"), "slave_base")
+GIVEN_JP = tc.Topic("given/servo_jp", tc.Kind.JOINTS, topics.in_force("slave/servo_jp"), "slave_base")
 """Joint references that the loop gave last, under the time at which they came."""
 GIVEN_CF = tc.Topic("given/measured_cf", tc.Kind.WRENCH, frame_id="slave_base", is_seldom=True)
 """Force on the tip that the loop gave last; before: the force on the simulated slave's tip."""
@@ -74,20 +72,20 @@ def _give_force(p: Any, s: GivenForce, row: GivenForceRow, dt: float) -> None:
 GIVEN_JOINTS = tc.Stage(
     "given_joints",
     tc.RobotParameters,
-    reads=(SLAVE_SERVO_JP,),
+    reads=(topics.SLAVE_SERVO_JP,),
     writes=(GIVEN_JP,),
     step=_give_joints,
     state=GivenJoints,
-    replaces=SLAVE_SERVO_JP,
+    replaces=topics.SLAVE_SERVO_JP,
 )
 GIVEN_FORCE = tc.Stage(
     "given_force",
     tc.NoParameters,
-    reads=(SLAVE_MEASURED_CF,),
+    reads=(topics.SLAVE_MEASURED_CF,),
     writes=(GIVEN_CF,),
     step=_give_force,
     state=GivenForce,
-    replaces=SLAVE_MEASURED_CF,
+    replaces=topics.SLAVE_MEASURED_CF,
 )
 for _stage in (GIVEN_JOINTS, GIVEN_FORCE):
     tc.register_stage(_stage, replace=True)
@@ -237,8 +235,7 @@ class SlaveSide(Side):
 class MasterSide(Side):
     """The master, from the hand to the joint references that it asks of a slave.
 
-    The session has a simulated slave of its own, which the hand sees and feels until a force is
-    given.
+    The session has a simulated slave of its own, which the hand sees and feels until a force is given.
     """
 
     feedback_keys = _FORCE

@@ -11,8 +11,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any, NoReturn
 
-from teleop_core.base.errors import SessionError, TeleopError, TeleopWarning
-from teleop_core.base.texts import one_line
+from teleop_core.base import SessionError, TeleopError, TeleopWarning, one_line
 from teleop_core.commands import compiling, devices, installed, operate
 from teleop_core.commands.arguments import (
     command,
@@ -112,7 +111,6 @@ def _command_of(words: list[str]) -> str | None:
 
 @cache
 def _parser() -> argparse.ArgumentParser:
-    """Parser of all commands, those of installed packages too."""
     parser, commands = _core()
     installed.add(commands)
     return parser

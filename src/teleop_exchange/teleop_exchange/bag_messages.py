@@ -109,7 +109,6 @@ class PoseReader:
         return chosen.header, chosen.pose.position, chosen.pose.orientation
 
     def _parts(self, message: Any) -> list["_Part"]:
-        """Poses in a message."""
         if self._type in TRANSFORMS:
             return [_Part(t.header, t.child_frame_id, t.transform) for t in message.transforms]
         where, has_header = POSES[self._type]

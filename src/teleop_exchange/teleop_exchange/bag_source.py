@@ -9,15 +9,12 @@ from typing import Any
 import numpy as np
 
 from teleop_core.bags.reader import Bag
-from teleop_core.base.damage import damage_told
-from teleop_core.base.errors import ParameterError, RecordingError, UnknownNameError
-from teleop_core.graph.topics import MASTER_BUTTONS, MASTER_MEASURED_CP
+from teleop_core.base import ParameterError, RecordingError, UnknownNameError, damage_told
+from teleop_core.graph import topics
 from teleop_core.kernels.geometry import Array
+from teleop_exchange import orientation, ros_bags, source
 from teleop_exchange.bag_messages import JOY, POSES, TRANSFORMS, Frames, JoyReader, PoseReader, Rows, frames, plain
 from teleop_exchange.options import BUTTONS, ORIENTATIONS, ImportOptions, button_map
-from teleop_exchange.orientation import Attitudes
-from teleop_exchange.ros_bags import OurBag, RosBag, is_plain_mcap, opened_by_rosbags
-from teleop_exchange.source import Block, Presses
 from teleop_exchange.transform_chain import chain_to, composed
 
 _LOOKED_AT = 1000
@@ -43,12 +40,12 @@ class BagSource:
     def __init__(self, path: Path, options: ImportOptions) -> None:
         self.path, self._options = path, options
         self.unit = "m" if options.unit == "auto" else options.unit
-        self.attitudes = Attitudes("quaternion", "wxyz")
+        self.attitudes = orientation.Attitudes("quaternion", "wxyz")
         self.told: list[str] = []
         if given := [name for name in _TABLE_OPTIONS if getattr(options, name)]:
             text = "left out: a recording of ROS has topics, not columns (--topic, --buttons)"
             raise ParameterError(f"--{given[0].replace('_', '-')}", "given", text)
-        self._bag = Bag(path) if is_plain_mcap(path) else None
+        self._bag = Bag(path) if ros_bags.is_plain_mcap(path) else None
         with self._opened() as bag:
             self._types = bag.types
             transforms = [name for name, kind in self._types.items() if kind in TRANSFORMS]
@@ -60,7 +57,7 @@ class BagSource:
             self._numbers = self._button_numbers(bag)
 
     @contextmanager
-    def _opened(self) -> Iterator[RosBag]:
+    def _opened(self) -> Iterator[ros_bags.RosBag]:
         """The recording, to be read message by message.
 
         Raises:
@@ -68,12 +65,12 @@ class BagSource:
         """
         with damage_told(self.path):
             if self._bag is not None:
-                yield OurBag(self._bag)
+                yield ros_bags.OurBag(self._bag)
                 return
             if self.path.is_dir() and not _holds(self.path, ".db3", ".mcap", ".zstd"):
                 reason = "is no recording: it holds no .mcap and no .db3; of ROS 1 give the .bag"
                 raise RecordingError(self.path, f"{reason} file")
-            with opened_by_rosbags(self.path) as bag:
+            with ros_bags.opened_by_rosbags(self.path) as bag:
                 yield bag
 
     # -- which topics ----------------------------------------------------------------------------
@@ -96,13 +93,13 @@ class BagSource:
             listed = ", ".join(f"{n} ({kind})" for n, kind in sorted(self._types.items()))
             raise RecordingError(self.path, f"holds no topic of poses; it has {listed or 'nothing'}")
         stamped = [name for name in found if self._types[name] not in TRANSFORMS]
-        for few in ([n for n in found if n == MASTER_MEASURED_CP.name], found, stamped):
+        for few in ([n for n in found if n == topics.MASTER_MEASURED_CP.name], found, stamped):
             if len(few) == 1:
                 self.told.append(f"poses of {few[0]} ({self._types[few[0]]})")
                 return few[0]
         raise UnknownNameError("--topic", "", sorted(found))
 
-    def _way(self, bag: RosBag) -> list[tuple[str, Frames]]:
+    def _way(self, bag: ros_bags.RosBag) -> list[tuple[str, Frames]]:
         """Transforms from the frame up to the one in which it is taken, each with its topic.
 
         A parent is named where a frame has several. Empty where the topic holds all that is needed.
@@ -138,8 +135,8 @@ class BagSource:
             if wanted is None:
                 raise UnknownNameError("--buttons-topic", plain(given), sorted(found) or ["none"])
             return wanted
-        if MASTER_BUTTONS.name in found or len(found) == 1:
-            return MASTER_BUTTONS.name if MASTER_BUTTONS.name in found else found[0]
+        if topics.MASTER_BUTTONS.name in found or len(found) == 1:
+            return topics.MASTER_BUTTONS.name if topics.MASTER_BUTTONS.name in found else found[0]
         if found and self._options.buttons:
             raise UnknownNameError("--buttons-topic", "", sorted(found))
         if found:
@@ -148,7 +145,7 @@ class BagSource:
             raise ParameterError("--buttons", self._options.buttons, "left out: there is no Joy")
         return ""
 
-    def _button_numbers(self, bag: RosBag) -> tuple[int, ...]:
+    def _button_numbers(self, bag: ros_bags.RosBag) -> tuple[int, ...]:
         """Numbers of clutch, fixture and mode among the buttons; -1 for those that are not."""
         if not self._joy:
             return ()
@@ -166,12 +163,11 @@ class BagSource:
 
     # -- messages --------------------------------------------------------------------------------
 
-    def _pose_reader(self, bag: RosBag, topic: str, frame: str = "", parent: str = "") -> PoseReader:
+    def _pose_reader(self, bag: ros_bags.RosBag, topic: str, frame: str = "", parent: str = "") -> PoseReader:
         kind = self._types[topic]
         return PoseReader(bag.typestore, kind, is_ros2=bag.is_ros2, frame=frame, parent=parent)
 
-    def _composed(self, bag: RosBag) -> Rows:
-        """Poses along the chain."""
+    def _composed(self, bag: ros_bags.RosBag) -> Rows:
         edges, told = [], []
         top = ""
         for topic, (parent, child) in self._chain:
@@ -187,7 +183,7 @@ class BagSource:
             self.told.append(f"{early} poses before the first of all of these are left out")
         return found
 
-    def blocks(self) -> Iterator[Block]:
+    def blocks(self) -> Iterator[source.Block]:
         """As of any source.
 
         Raises:
@@ -209,11 +205,11 @@ class BagSource:
         if child:
             self.told.append(f"poses of {child} in {parent or 'a frame without a name'}")
 
-    def _block(self, stamps: Any, logs: Any, poses: Array) -> Block:
+    def _block(self, stamps: Any, logs: Any, poses: Array) -> source.Block:
         quaternions = self.attitudes.quaternions(poses[:, 3:])
-        return Block(stamps, poses[:, :3], quaternions, log_ns=logs)
+        return source.Block(stamps, poses[:, :3], quaternions, log_ns=logs)
 
-    def presses(self) -> Presses | None:
+    def presses(self) -> source.Presses | None:
         """As of any source."""
         if not self._joy:
             return None
@@ -221,7 +217,7 @@ class BagSource:
             joy = JoyReader(bag.typestore, is_ros2=bag.is_ros2, numbers=self._numbers)
             stamps, logs, pressed = joy.read(bag.raw(self._joy))
         order = np.argsort(logs, kind="stable")
-        return Presses(stamps[order], logs[order], pressed[order])
+        return source.Presses(stamps[order], logs[order], pressed[order])
 
     def check(self, finite: Array) -> None:
         """As of any source."""
@@ -241,5 +237,4 @@ def _named(wanted: str, names: Iterable[str]) -> str | None:
 
 
 def _holds(path: Path, *ends: str) -> bool:
-    """Whether a directory has a file with one of these ends."""
     return any(file.suffix in ends for file in path.iterdir())

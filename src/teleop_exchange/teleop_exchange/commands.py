@@ -6,8 +6,7 @@ import shlex
 from pathlib import Path
 from typing import Any, NoReturn
 
-from teleop_core.base.errors import ParameterError
-from teleop_core.base.texts import printable
+from teleop_core.base import ParameterError, printable
 from teleop_core.commands.arguments import command, out_argument
 from teleop_exchange.options import BUTTONS, LENGTHS, TIMES_NS, ImportOptions
 

@@ -5,8 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from teleop_core.base.errors import ParameterError, RecordingError, UnknownNameError
-from teleop_exchange import names
-from teleop_exchange.tables import Numbers, Table
+from teleop_exchange import names, tables
 
 _LISTED = 8
 _NEEDED = "left out: no column is called episode_index or the like"
@@ -23,13 +22,13 @@ class Episodes:
         ParameterError: An episode is wanted, and no column says which there are.
     """
 
-    def __init__(self, table: Table, wanted: int | None) -> None:
+    def __init__(self, table: tables.Table, wanted: int | None) -> None:
         self._table, self._wanted, self._found = table, wanted, set[float]()
         self._column = _column(table)
         if wanted is not None and self._column is None:
             raise ParameterError("--episode", wanted, _NEEDED)
 
-    def blocks(self, columns: list[int]) -> Iterator[list[Numbers]]:
+    def blocks(self, columns: list[int]) -> Iterator[list[tables.Numbers]]:
         """Some columns of the table, block by block.
 
         Raises:
@@ -62,7 +61,7 @@ class Episodes:
         return [f"episode {self._wanted} of {len(self._found)}"] * (self._wanted is not None)
 
 
-def numbers_of(table: Table) -> list[int]:
+def numbers_of(table: tables.Table) -> list[int]:
     """Numbers of the episodes of a table.
 
     Raises:
@@ -77,8 +76,7 @@ def numbers_of(table: Table) -> list[int]:
     return sorted(found)
 
 
-def _column(table: Table) -> int | None:
-    """Column of numbers that says which episode a row is of."""
+def _column(table: tables.Table) -> int | None:
     column = names.find_episode(table.names) if table.is_named else None
     is_number = column is not None and np.isfinite(table.sample(column)).all()
     return column if is_number else None

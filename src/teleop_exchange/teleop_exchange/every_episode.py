@@ -9,10 +9,7 @@ from types import MappingProxyType
 from teleop_core.bags.finding import METADATA
 from teleop_core.base.errors import RecordingError, TeleopError
 from teleop_core.session.recording import open_recording
-from teleop_exchange.episodes import numbers_of
-from teleop_exchange.import_report import ImportReport
-from teleop_exchange.imported_motion import open_table
-from teleop_exchange.importing import command_of, import_recording
+from teleop_exchange import episodes, import_report, imported_motion, importing
 from teleop_exchange.options import Changes, ImportOptions, Option, options_of
 
 
@@ -28,7 +25,7 @@ class EpisodesReport:
     """
 
     out: Path
-    made: Mapping[int, ImportReport]
+    made: Mapping[int, import_report.ImportReport]
     kept: tuple[int, ...]
     refused: Mapping[int, str]
 
@@ -66,19 +63,19 @@ def import_episodes(
     base, out = options or ImportOptions(), Path(out)
     options_of(base, arms, changes)  # refused here, not once for each episode
     files = files_of(Path(file), base.changed(**changes))
-    made: dict[int, ImportReport] = {}
+    made: dict[int, import_report.ImportReport] = {}
     kept, refused = [], dict[int, str]()
     for count, (number, path) in enumerate(sorted(files.items()), start=1):
         target, of_one = out / f"episode_{number:06d}", replace(base, episode=number)
         where = f"{target.name} ({count} of {len(files)})"
         wanted = options_of(of_one, arms, changes)
         try:
-            if _is_there(target, command_of(path, target, wanted)):
+            if _is_there(target, importing.command_of(path, target, wanted)):
                 kept.append(number)
                 say(f"{where}: kept")
                 continue
             out.mkdir(parents=True, exist_ok=True)
-            made[number] = import_recording(path, target, of_one, arms=arms, **changes)
+            made[number] = importing.import_recording(path, target, of_one, arms=arms, **changes)
             say(f"{where}: {made[number].duration:.1f} s imported")
         except TeleopError as error:
             refused[number] = str(error)
@@ -103,7 +100,7 @@ def files_of(path: Path, options: ImportOptions) -> dict[int, Path]:
         raise RecordingError(path, reason)
     found: dict[int, Path] = {}
     for file in files:
-        for number in numbers_of(open_table(file, options)):
+        for number in episodes.numbers_of(imported_motion.open_table(file, options)):
             if number in found:
                 raise RecordingError(path, f"holds episode {number} in {found[number]} and {file}")
             found[number] = file

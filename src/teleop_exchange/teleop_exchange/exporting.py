@@ -93,23 +93,20 @@ def export_recording(
 ) -> ExportReport:
     """Write recordings in a format of others.
 
-    Tables have the time [s] since the recording began in their first column and then a column for
-    each number of each topic, called as :meth:`teleop_core.Recording.frame` does:
-    ``slave/measured_cp.x``. A row stands wherever a topic has a message; what has none there is
-    empty, but the columns of reports such as ``teleop/state`` keep their values. The columns of
-    Parquet have their units as metadata.
+    Tables have the time [s] since the recording began in their first column and then a column for each number of each
+    topic, called as :meth:`teleop_core.Recording.frame` does: ``slave/measured_cp.x``. A row stands wherever a topic
+    has a message; what has none there is empty, but the columns of reports such as ``teleop/state`` keep their values.
+    The columns of Parquet have their units as metadata.
 
-    A data set of LeRobot (version 3.0 of its format, without pictures) has one episode per
-    recording: ``observation.state``, the slave's joints and the pose of its tip; ``action``, what
-    they were told.
+    A data set of LeRobot (version 3.0 of its format, without pictures) has one episode per recording:
+    ``observation.state``, the slave's joints and the pose of its tip; ``action``, what they were told.
 
     Args:
         recording: A recording or where it is; several for a data set.
         out: File to make, or directory of a data set; nothing is left there after an error.
         format: ``csv``, ``parquet`` or ``lerobot``; None: as the name of ``out`` ends.
         topics: Topics of a table; all if empty.
-        rate: Rows per second [Hz], each with the newest values; None for a row per message, in a
-            data set 50 Hz.
+        rate: Rows per second [Hz], each with the newest values; None for a row per message, in a data set 50 Hz.
         units: Whether names of columns end with the unit, as ``slave/measured_cp.x [m]``.
         action: Of a data set: ``joints`` (``slave/servo_jp``) or ``tip`` (``slave/servo_cp``).
         task: Of a data set: what is done in it, in words.
@@ -201,7 +198,6 @@ def _remove(draft: Path) -> None:
 
 
 def _schema(streams: Streams, *, units: bool) -> pa.Schema:
-    """Names of the columns, with their units as metadata."""
     found = [("time", "s")]
     for topic, columns in streams.columns.items():
         found += [(f"{topic}.{column}", unit_of(topic, column)) for column in columns]
@@ -214,7 +210,6 @@ def _schema(streams: Streams, *, units: bool) -> pa.Schema:
 def _write(
     streams: Streams, rows: Iterable[Joined], schema: pa.Schema, draft: Path, chosen: str, *, is_packed: bool
 ) -> int:
-    """Write all rows; their number."""
     written = 0
     packed = "gzip" if is_packed and chosen == "csv" else None
     with pa.output_stream(str(draft), compression=packed) as file:

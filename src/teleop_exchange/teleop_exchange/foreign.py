@@ -13,18 +13,16 @@ from pathlib import Path
 
 import numpy as np
 
-from teleop_core.bags.memory import MemoryBag
-from teleop_core.bags.reader import Bag
+from teleop_core.bags import memory, reader
 from teleop_core.bags.series import Series
-from teleop_core.base.damage import damage_told
-from teleop_core.base.errors import RecordingError, TeleopError, TeleopWarning
-from teleop_core.graph.topics import MASTER_BUTTONS, MASTER_MEASURED_CP, Kind, Topic
+from teleop_core.base import RecordingError, TeleopError, TeleopWarning, damage_told
+from teleop_core.graph import topics
 from teleop_core.session.recorded_hand import COLUMNS
 from teleop_exchange.imported_motion import Motion
 from teleop_exchange.options import ImportOptions
 
 
-def master_of_others(path: Path, bag: Bag | None, prefixes: Sequence[str]) -> MemoryBag:
+def master_of_others(path: Path, bag: reader.Bag | None, prefixes: Sequence[str]) -> memory.MemoryBag:
     """Copy of the master's topics in memory, with the same stamps and metadata.
 
     Args:
@@ -37,11 +35,11 @@ def master_of_others(path: Path, bag: Bag | None, prefixes: Sequence[str]) -> Me
         ParameterError: It has several topics of poses.
     """
     wanted = columns_of(path)
-    series: dict[Topic, Series] = {}
+    series: dict[topics.Topic, Series] = {}
     for prefix in prefixes or [""]:
         chosen = wanted if bag is None else _of_arm(bag, prefix, wanted)
         series |= _read(path, prefix.rstrip("/"), chosen)
-    return MemoryBag(str(path), series, {}, {} if bag is None else bag.metadata)
+    return memory.MemoryBag(str(path), series, {}, {} if bag is None else bag.metadata)
 
 
 def columns_of(path: Path) -> ImportOptions:
@@ -67,24 +65,23 @@ def columns_of(path: Path) -> ImportOptions:
     ).changed(**{name: name for name in COLUMNS[7:] if name in head})
 
 
-def _of_arm(bag: Bag, prefix: str, options: ImportOptions) -> ImportOptions:
+def _of_arm(bag: reader.Bag, prefix: str, options: ImportOptions) -> ImportOptions:
     """Options that take an arm's topics, where it has them and nothing else is wanted."""
-    poses, buttons = prefix + MASTER_MEASURED_CP.name, prefix + MASTER_BUTTONS.name
+    poses, buttons = prefix + topics.MASTER_MEASURED_CP.name, prefix + topics.MASTER_BUTTONS.name
     topic = options.topic or (poses if poses in bag.topics else "")
     known = bag.topics.get(buttons)
-    is_joy = known is not None and known.count and known.type == Kind.BUTTONS.ros_type
+    is_joy = known is not None and known.count and known.type == topics.Kind.BUTTONS.ros_type
     return replace(options, topic=topic, buttons_topic=options.buttons_topic or (buttons if is_joy else ""))
 
 
-def _read(path: Path, arm: str, options: ImportOptions) -> dict[Topic, Series]:
-    """Streams of one arm."""
+def _read(path: Path, arm: str, options: ImportOptions) -> dict[topics.Topic, Series]:
     with _options_told(path):
         motion = Motion(path, options)
     presses, stamps = motion.presses(), motion.stamp_ns
-    topic = MASTER_MEASURED_CP.of_arm(arm)
+    topic = topics.MASTER_MEASURED_CP.of_arm(arm)
     found = {topic: Series(stamps, stamps, motion.poses, (), topic.frame_id)}
     if presses is not None:
-        topic = MASTER_BUTTONS.of_arm(arm)
+        topic = topics.MASTER_BUTTONS.of_arm(arm)
         at, pressed = presses
         found[topic] = Series(at, at, pressed.astype(np.float64), (), topic.frame_id)
     if notes := [*motion.told, *motion.losses()]:

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from teleop_core.kernels.geometry import Array
-from teleop_core.kernels.portable import dot, length
+from teleop_core.kernels import Array, dot, length
 from teleop_exchange.imported_motion import Counts, Motion
 from teleop_exchange.times import Stamps, spread_ms
 

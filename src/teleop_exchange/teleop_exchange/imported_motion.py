@@ -7,14 +7,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from teleop_core.base.damage import damage_told
-from teleop_core.base.errors import RecordingError
-from teleop_core.kernels import geometry
-from teleop_core.kernels.portable import product
-from teleop_exchange.gathering import gather
+from teleop_core.base import RecordingError, damage_told
+from teleop_core.kernels import geometry, product
+from teleop_exchange import gathering, source, times
 from teleop_exchange.options import ImportOptions
-from teleop_exchange.source import Source
-from teleop_exchange.times import SECOND_NS, Stamps, gaps, ordered, restarts
 
 if TYPE_CHECKING:
     from teleop_exchange.tables import Table
@@ -69,7 +65,7 @@ class Motion:
     """
 
     def __init__(self, path: Path, options: ImportOptions) -> None:
-        gathered = gather(open_source(path, options), options)
+        gathered = gathering.gather(open_source(path, options), options)
         self._path, self._gathered, self._options = path, gathered, options
         self.told, self.strange = list(gathered.told), gathered.strange
         usable: NDArray[np.integer] = np.flatnonzero(gathered.is_usable)
@@ -77,9 +73,9 @@ class Motion:
             usable = gathered.order[gathered.is_usable[gathered.order]]
         stamps = gathered.stamp_ns[usable]
         self._refuse_several(stamps)
-        order = ordered(stamps, is_sorted=options.backwards == "sort")
+        order = times.ordered(stamps, is_sorted=options.backwards == "sort")
         self._rows = usable[order.rows]
-        self.stamp_ns: Stamps = stamps[order.rows]
+        self.stamp_ns: times.Stamps = stamps[order.rows]
         self.counts = Counts(
             rows=len(gathered.rows) + gathered.bad_rows,
             samples=len(self._rows),
@@ -89,18 +85,18 @@ class Motion:
             damaged=gathered.bad_rows,
         )
         self._check()
-        self.gaps = gaps(self.stamp_ns, options.gap)
+        self.gaps = times.gaps(self.stamp_ns, options.gap)
         self._shift_ns = 0
         self.poses = self._in_axes_of_master(gathered.rows)
         gathered.rows = gathered.rows[:0]
 
-    def _refuse_several(self, stamps: Stamps) -> None:
+    def _refuse_several(self, stamps: times.Stamps) -> None:
         """Refuse several recordings in one table: no policy makes one hand of them.
 
         Raises:
             RecordingError: Says where they begin.
         """
-        if len(rows := restarts(stamps)):
+        if len(rows := times.restarts(stamps)):
             listed = ", ".join(str(row + 1) for row in rows[:5]) + (", …" if len(rows) > 5 else "")
             reason = f"holds {len(rows) + 1} recordings: the time begins anew in row {listed}"
             raise RecordingError(self._path, f"{reason}; give a file for each, or --stamps log for a bag")
@@ -128,10 +124,10 @@ class Motion:
 
     def begin(self, first_ns: int) -> None:
         """Move the stamps, once, so that a time [ns] near 0 becomes 1 s; later ones stay."""
-        if first_ns >= SECOND_NS:
+        if first_ns >= times.SECOND_NS:
             return
-        self.told.append(f"stamps begin at 1 s (in the file at {first_ns / SECOND_NS:g} s)")
-        self._shift_ns = SECOND_NS - first_ns
+        self.told.append(f"stamps begin at 1 s (in the file at {first_ns / times.SECOND_NS:g} s)")
+        self._shift_ns = times.SECOND_NS - first_ns
         self.stamp_ns += self._shift_ns
 
     def losses(self) -> list[str]:
@@ -172,12 +168,12 @@ class Motion:
         # A turn of the file about an axis is the opposite turn about the mirrored axis.
         return np.column_stack((quaternions[:, 0], -product(quaternions[:, 1:], axes.T)))
 
-    def presses(self) -> tuple[Stamps, NDArray[np.uint8]] | None:
+    def presses(self) -> tuple[times.Stamps, NDArray[np.uint8]] | None:
         """Stamps (n,) [ns] and buttons (n, 3) where they change, the first time; None without."""
         g = self._gathered
         if g.presses is not None:
             stamps, pressed = g.presses.stamp_ns + self._shift_ns, g.presses.pressed
-            order = ordered(stamps, is_sorted=True)
+            order = times.ordered(stamps, is_sorted=True)
             stamps, pressed = stamps[order.rows], pressed[order.rows]
         elif g.buttons is not None:
             stamps, pressed = self.stamp_ns, g.buttons[self._rows]
@@ -199,7 +195,7 @@ def is_bag(path: Path) -> bool:
     return path.is_dir() or path.suffix.lower() in _BAGS
 
 
-def open_source(path: Path, options: ImportOptions) -> Source:
+def open_source(path: Path, options: ImportOptions) -> source.Source:
     """Source that reads a file.
 
     Raises:

@@ -35,9 +35,8 @@ def import_recording(
 ) -> ImportReport:
     """Make a recording of a file: CSV, TSV, Parquet, rosbag2 (MCAP, db3) or a ROS 1 bag.
 
-    The recording holds ``master/measured_cp`` with every usable sample at its own time, and
-    ``master/buttons`` where buttons were found. :func:`teleop_core.replay` runs it through the
-    graph.
+    The recording holds ``master/measured_cp`` with every usable sample at its own time, and ``master/buttons`` where
+    buttons were found. :func:`teleop_core.replay` runs it through the graph.
 
     Args:
         file: What is imported.

@@ -6,8 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from teleop_core.bags.memory import MemoryBag
-from teleop_core.bags.reader import Bag
+from teleop_core.bags import memory, reader
 from teleop_core.bags.series import Series, kind_of
 from teleop_core.base.errors import TeleopWarning, UnknownNameError
 from teleop_core.evaluation.windows import CONTEXT_NS, whole, windows
@@ -135,12 +134,12 @@ class Streams:
     def _is_in_order(self) -> bool:
         """Whether no chunk of the file begins long before the end of the one before it."""
         newest = -(2**62)
-        for block in () if isinstance(self._bag, MemoryBag) else self._bag.blocks(self._names):
+        for block in () if isinstance(self._bag, memory.MemoryBag) else self._bag.blocks(self._names):
             logs = [series.log_ns for series in block.values() if len(series)]
             if logs and min(int(log.min()) for log in logs) <= newest - CONTEXT_NS:
                 return False
             newest = max([newest, *(int(log.max()) for log in logs)])
-        return not isinstance(self._bag, MemoryBag)
+        return not isinstance(self._bag, memory.MemoryBag)
 
 
 def _numbers(since_ns: Stamps, step: float, first: int) -> Stamps:
@@ -181,12 +180,12 @@ def has_columns(name: str) -> bool:
     return any(columns)
 
 
-def is_report(bag: Bag, name: str) -> bool:
+def is_report(bag: reader.Bag, name: str) -> bool:
     """Whether a topic carries reports."""
     return kind_of(name, bag.topics[name].type) is Kind.REPORT
 
 
-def columns_of(bag: Bag, name: str, series: Series) -> tuple[str, ...]:
+def columns_of(bag: reader.Bag, name: str, series: Series) -> tuple[str, ...]:
     """Names of the columns of a stream, as a recording calls them."""
     kind = kind_of(name, bag.topics[name].type)
     assert kind is not None

@@ -145,7 +145,6 @@ def _episode(recording: Recording, fps: int, action: str) -> tuple[dict[str, lis
 
 
 def _counters(count: int, episode: int, before: int, fps: int) -> Numbers:
-    """Times and numbers of an episode's frames."""
     frame = np.arange(count, dtype=np.int64)
     return {
         "timestamp": (frame / fps).astype(np.float32),
@@ -187,7 +186,6 @@ def statistics(numbers: Numbers) -> Statistics:
 
 
 def _about(numbers: Numbers, episode: int, before: int, task: str, place: tuple[int, int]) -> dict[str, object]:
-    """Row of an episode."""
     count = len(numbers[STATE])
     row: dict[str, object] = {
         "episode_index": episode,
@@ -215,7 +213,6 @@ def _write_meta(out: Path, episodes: Sequence[dict[str, object]], found: Statist
 def _info(
     recording: Recording, names: Mapping[str, Sequence[str]], fps: int, episodes: int, frames: int
 ) -> dict[str, object]:
-    """Content of ``meta/info.json``."""
     features: dict[str, object] = {
         key: {"dtype": "float32", "shape": [len(found)], "names": list(found)} for key, found in names.items()
     }

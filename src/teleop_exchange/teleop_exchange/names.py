@@ -154,8 +154,7 @@ def _series(names: Sequence[str], letters: str, without: str = "") -> dict[str, 
 
     Those that have a column with another letter, ``without``, beside them are left out.
 
-    ``pose_position_x`` has the stem ``pose_position_``; ``qx`` has ``q_``, so that it is told from
-    a bare ``x``.
+    ``pose_position_x`` has the stem ``pose_position_``; ``qx`` has ``q_``, so that it is told from a bare ``x``.
     """
     found: dict[str, dict[str, int]] = {}
     for column, name in enumerate(names):

@@ -80,9 +80,8 @@ class ImportOptions:
         topic: Topic of the poses in a bag, or its end; empty if there is only one.
         frame: Child frame, for a topic that has several.
         parent: Frame in which the poses stand, for a topic that has several.
-        buttons_topic: Topic of the Joy messages, or its end; empty if there is at most one. Of
-            several with ``|`` between them the first one there is taken; an empty last one stands
-            for no buttons.
+        buttons_topic: Topic of the Joy messages, or its end; empty if there is at most one. Of several with ``|``
+            between them the first one there is taken; an empty last one stands for no buttons.
         buttons: Which button of the Joy is which: ``"clutch=0,mode=2"``; ``none``: no buttons.
         axes: The master's x, y and z as axes of the file: ``("+y", "-x", "+z")``.
         handedness: Of the file's axes: ``right``; or ``left``, as in game engines: ``axes`` then
@@ -90,8 +89,7 @@ class ImportOptions:
         scale: All positions are multiplied by it.
         center: What comes to zero: ``mean`` of the positions, ``middle`` of their range, or their
             ``start``; ``keep``: nothing.
-        backwards: Rows whose time goes back: ``refuse``, ``drop``, ``sort``; ``auto``: drop up to
-            1 %, refuse more.
+        backwards: Rows whose time goes back: ``refuse``, ``drop``, ``sort``; ``auto``: drop up to 1 %, refuse more.
         gap: A gap is told that is longer than so many periods.
     """
 

@@ -8,9 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from teleop_core.kernels import kernel
-from teleop_core.kernels.geometry import Array, quaternion_from_rotation
-from teleop_core.kernels.portable import dot, length, product
+from teleop_core.kernels import Array, dot, kernel, length, product
+from teleop_core.kernels.geometry import quaternion_from_rotation
 
 TOLERANCE = 0.1
 """How far a quaternion's length, or a matrix from being a rotation, may be off."""

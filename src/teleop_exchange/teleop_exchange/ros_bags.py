@@ -15,8 +15,7 @@ from typing import Any, Protocol
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from teleop_core.bags import ros_types
-from teleop_core.bags.finding import METADATA, compression_mode
+from teleop_core.bags import finding, ros_types
 from teleop_core.bags.reader import Bag
 from teleop_core.base.errors import RecordingError, TeleopWarning
 from teleop_exchange.bag_messages import Raw, plain
@@ -87,7 +86,7 @@ def is_plain_mcap(path: Path) -> bool:
     """
     if not path.is_dir():
         return path.suffix.lower() == ".mcap"
-    is_packed = (path / METADATA).exists() and compression_mode(path / METADATA) != "none"
+    is_packed = (path / finding.METADATA).exists() and finding.compression_mode(path / finding.METADATA) != "none"
     return not is_packed and any(file.suffix == ".mcap" for file in path.iterdir())
 
 

@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from teleop_core.kernels.geometry import Array
-from teleop_exchange.orientation import Attitudes
-from teleop_exchange.times import Stamps
+from teleop_exchange import orientation, times
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,11 +24,11 @@ class Block:
         log_ns: Times of recording (n,) [ns], for bags.
     """
 
-    time: Array | Stamps
+    time: Array | times.Stamps
     position: Array
     quaternion: Array
     buttons: NDArray[np.uint8] | None = None
-    log_ns: Stamps | None = None
+    log_ns: times.Stamps | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,8 +41,8 @@ class Presses:
         pressed: Clutch, fixture, mode (n, 3).
     """
 
-    stamp_ns: Stamps
-    log_ns: Stamps
+    stamp_ns: times.Stamps
+    log_ns: times.Stamps
     pressed: NDArray[np.uint8]
 
 
@@ -65,7 +64,7 @@ class Source(Protocol):
     time_unit: str
     unit: str
     is_unit_said: bool
-    attitudes: Attitudes
+    attitudes: orientation.Attitudes
     has_time: bool
 
     def blocks(self) -> Iterator[Block]:

@@ -7,16 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from teleop_core.base.errors import ParameterError, RecordingError
-from teleop_core.kernels.geometry import Array
-from teleop_core.kernels.portable import length
-from teleop_exchange import names
-from teleop_exchange.episodes import Episodes
+from teleop_core.base import ParameterError, RecordingError
+from teleop_core.kernels import Array, length
+from teleop_exchange import episodes, names, source, tables, times
 from teleop_exchange.options import BUTTONS, CHOICES, ImportOptions, option
 from teleop_exchange.orientation import TOLERANCE, Attitudes
-from teleop_exchange.source import Block, Presses
-from teleop_exchange.tables import Numbers, Table, column_of
-from teleop_exchange.times import SECOND_NS, nanoseconds
 
 _TOLD = 8  # columns that are told by name
 
@@ -44,7 +39,7 @@ class TableSource:
         ParameterError: An option does not fit a table.
     """
 
-    def __init__(self, table: Table, options: ImportOptions) -> None:
+    def __init__(self, table: tables.Table, options: ImportOptions) -> None:
         self.path, self._table, self._options = table.path, table, options
         self.told: list[str] = []
         for name in ("topic", "buttons_topic", "frame", "parent"):
@@ -55,7 +50,7 @@ class TableSource:
         self.attitudes, orientation = self._orientation({*position, *time})
         taken = {*position, *time, *orientation}
         self._columns = Columns(time, position, orientation, self._buttons(taken))
-        self._episodes = Episodes(table, options.episode)
+        self._episodes = episodes.Episodes(table, options.episode)
         self.has_time = bool(time)
         self.time_unit = self._time_unit(time)
         self.unit, self.is_unit_said = self._unit(position)
@@ -66,7 +61,7 @@ class TableSource:
     def _given(self, name: str) -> tuple[int, ...]:
         wanted: tuple[str, ...] = getattr(self._options, name)
         wanted = wanted[1:] if name == "euler" else wanted
-        return tuple(column_of(self._table, one, option(name)) for one in wanted)
+        return tuple(tables.column_of(self._table, one, option(name)) for one in wanted)
 
     def _told(self, what: str, columns: Sequence[int], more: str = "") -> tuple[int, ...]:
         listed = ", ".join(repr(self._table.names[column]) for column in columns)
@@ -205,7 +200,7 @@ class TableSource:
         for button in BUTTONS:
             wanted = getattr(self._options, button)
             if wanted:
-                found[button] = column_of(self._table, wanted, option(button))
+                found[button] = tables.column_of(self._table, wanted, option(button))
             elif self._table.is_named:
                 column = names.find_button(self._table.names, button)
                 if column is None or column in taken:
@@ -266,11 +261,11 @@ class TableSource:
         """Rows with too few or too many cells."""
         return self._table.bad_rows
 
-    def presses(self) -> Presses | None:
+    def presses(self) -> source.Presses | None:
         """None: buttons stand in the rows."""
         return None
 
-    def blocks(self) -> Iterator[Block]:
+    def blocks(self) -> Iterator[source.Block]:
         """As of any source.
 
         Raises:
@@ -283,7 +278,7 @@ class TableSource:
             turned = columns[second : second + len(c.orientation)]
             count = len(columns[first])
             rows = np.column_stack(turned) if turned else np.empty((count, 0))
-            yield Block(
+            yield source.Block(
                 _time(columns[:first], count),
                 np.column_stack(columns[first:second]).astype(np.float64, copy=False),
                 self.attitudes.quaternions(rows.astype(np.float64, copy=False)),
@@ -291,7 +286,7 @@ class TableSource:
             )
         self.told += self._episodes.told()
 
-    def _pressed(self, columns: Sequence[Numbers], count: int) -> NDArray[np.uint8] | None:
+    def _pressed(self, columns: Sequence[tables.Numbers], count: int) -> NDArray[np.uint8] | None:
         if not columns:
             return None
         pressed = np.zeros((count, len(BUTTONS)), np.uint8)
@@ -319,12 +314,12 @@ class TableSource:
             raise RecordingError(self.path, reason)
 
 
-def _time(columns: Sequence[Numbers], count: int) -> Numbers:
+def _time(columns: Sequence[tables.Numbers], count: int) -> tables.Numbers:
     """Times of one column, or [ns] of one of seconds and one of nanoseconds; of none zeros."""
     if not columns:
         return np.zeros(count)
     if len(columns) == 1:
         return columns[0]
     if all(np.isfinite(column).all() for column in columns):
-        return nanoseconds(columns[0], "s") + nanoseconds(columns[1], "ns")
-    return np.asarray(columns[0] * SECOND_NS + columns[1])
+        return times.nanoseconds(columns[0], "s") + times.nanoseconds(columns[1], "ns")
+    return np.asarray(columns[0] * times.SECOND_NS + columns[1])

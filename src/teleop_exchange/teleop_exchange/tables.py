@@ -9,8 +9,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
-from teleop_core.base.damage import damage_told
-from teleop_core.base.errors import RecordingError, UnknownNameError
+from teleop_core.base import RecordingError, UnknownNameError, damage_told
 
 Numbers = NDArray[np.float64] | NDArray[np.int64]
 """A column; whole numbers where the file has them, such as times in nanoseconds."""

@@ -12,8 +12,7 @@ import pandas as pd
 import pyarrow as pa
 import pyarrow.csv as pc
 
-from teleop_core.base.damage import damage_told
-from teleop_core.base.errors import RecordingError
+from teleop_core.base import RecordingError, damage_told
 from teleop_exchange.tables import SAMPLE, Numbers, numbers, unique
 
 _HEAD_BYTES = 1 << 18
@@ -74,7 +73,6 @@ class TextTable:
         return pa.input_stream(str(self.path), compression=self._packed)
 
     def _rows(self) -> pa.NativeFile:
-        """The file; with one blank between cells where blanks part them."""
         if self._form.separator != _BLANK:
             return self._stream()
         with self._stream() as stream:
@@ -230,8 +228,7 @@ def _lines_before(lines: list[str], first: int, count: int) -> int:
 def _head(rows: list[list[str]], width: int) -> tuple[str, ...]:
     """Names of the columns from the lines before the numbers; units of a second line behind them.
 
-    The line of names is the last one that has as many cells as there are columns, except for a
-    line of units below it.
+    The line of names is the last one that has as many cells as there are columns, except for a line of units below it.
     """
     padded = [[*row, ""] if len(row) == width - 1 else _cut(row, width) for row in rows]
     fitting = [row for row in padded if len(row) == width and any(cell.strip() for cell in row)]

@@ -96,11 +96,10 @@ class _TaskEnv(gymnasium.Env[Observed, Observed]):
 class ReachEnv(_TaskEnv):
     """Lead the slave's tip to a goal.
 
-    An action (3,) in -1 to 1 moves the hand by up to ``reach`` along the axes of the slave, over a
-    step of 20 ms; as in :mod:`teleop_core`, the hand holds a device and the arm follows. The
-    observation (9,) has the way to the goal, the velocity of the tip and the way from the hand's
-    command to the tip, in 20 mm and 20 mm/s. The reward is minus the distance in 20 mm, and 10 at
-    the goal, where the episode ends. It is truncated after 10 s.
+    An action (3,) in -1 to 1 moves the hand by up to ``reach`` along the axes of the slave, over a step of 20 ms; as in
+    :mod:`teleop_core`, the hand holds a device and the arm follows. The observation (9,) has the way to the goal, the
+    velocity of the tip and the way from the hand's command to the tip, in 20 mm and 20 mm/s. The reward is minus the
+    distance in 20 mm, and 10 at the goal, where the episode ends. It is truncated after 10 s.
 
     Args:
         settings: Parameters of the session, such as ``{"display.latency": 0.2}`` or those of a
@@ -125,12 +124,11 @@ class ReachEnv(_TaskEnv):
 class PegTransferEnv(_TaskEnv):
     """Bring three blocks with the slave's jaw from their pegs to those of their colours.
 
-    An action (4,) moves the hand as in :class:`ReachEnv`; a fourth number above 0 closes the jaw.
-    The observation (12,) has those of ``ReachEnv``, the jaw's angle [rad], whether it grips a
-    block, and whether the task asks for a closed jaw. The goal is that of the present step of the
-    task: reach, grasp, lift, carry, place. The reward is minus the distance in 20 mm, 5 for each
-    step that is done, 20 for each block on its peg and -20 for one that is elsewhere. The episode
-    ends with the third block, and is truncated after 90 s.
+    An action (4,) moves the hand as in :class:`ReachEnv`; a fourth number above 0 closes the jaw. The observation (12,)
+    has those of ``ReachEnv``, the jaw's angle [rad], whether it grips a block, and whether the task asks for a closed
+    jaw. The goal is that of the present step of the task: reach, grasp, lift, carry, place. The reward is minus the
+    distance in 20 mm, 5 for each step that is done, 20 for each block on its peg and -20 for one that is elsewhere. The
+    episode ends with the third block, and is truncated after 90 s.
 
     Args:
         settings: As of :class:`ReachEnv`.

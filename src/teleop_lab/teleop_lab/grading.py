@@ -37,9 +37,8 @@ def grade(
 ) -> "pandas.DataFrame":
     """Figures of every episode, the oddest first.
 
-    An episode is as odd as its oddest figure: by how many robust standard deviations (1.4826 times
-    the median absolute deviation) it is off the median of all episodes. That says which to look at,
-    not which are wrong.
+    An episode is as odd as its oddest figure: by how many robust standard deviations (1.4826 times the median absolute
+    deviation) it is off the median of all episodes. That says which to look at, not which are wrong.
 
     Args:
         data: Folder of a LeRobot data set, or a table with a column of episodes.

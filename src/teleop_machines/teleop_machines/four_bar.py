@@ -1,11 +1,10 @@
 """Four-bar: a crank that moves a point of the coupler along a plane curve.
 
-q is the crank angle theta1 alone; the tip is the point of the coupler at distance ``a`` from the
-crank, with x along the coupler. ``ik`` takes the point of its curve nearest to the wanted x and
-y, and everything else is residual. ``mode``, 1 or -1, is the sign in front of the arc cosine of
-the closure. Outside its range :meth:`Robot.fk` refuses a crank, and :meth:`Robot.solve_fk` says
-NOT_CLOSED and gives the loop torn as little as possible; :class:`FourBar` answers for both modes
-and in all forms of the closure.
+q is the crank angle theta1 alone; the tip is the point of the coupler at distance ``a`` from the crank, with x along
+the coupler. ``ik`` takes the point of its curve nearest to the wanted x and y, and everything else is residual.
+``mode``, 1 or -1, is the sign in front of the arc cosine of the closure. Outside its range :meth:`Robot.fk` refuses a
+crank, and :meth:`Robot.solve_fk` says NOT_CLOSED and gives the loop torn as little as possible; :class:`FourBar`
+answers for both modes and in all forms of the closure.
 
 Source:
     Ghosal 2020, lecture 11, section on the planar 4-bar; Freudenstein 1954.
@@ -16,11 +15,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from teleop_core.base.errors import ParameterError
-from teleop_core.kernels import inner, kernel
-from teleop_core.kernels.geometry import Array
-from teleop_core.robots import kinematics
-from teleop_core.robots.branches import bounded, turned, wrapped
+from teleop_core.base import ParameterError
+from teleop_core.kernels import Array, inner, kernel
+from teleop_core.robots import branches, kinematics
 from teleop_core.robots.robot import Robot, geometry_of
 from teleop_machines.bodies.planar import four_bar_bodies
 from teleop_machines.drives import geared_motors
@@ -199,7 +196,7 @@ def _nearest(T: Array, seed: float, limits: Array, g: Array) -> float:
     best, cost = seed, math.inf
     middle, half = _candidates(T, g)
     for side in (1.0, -1.0):
-        angle = turned(middle + side * half, seed, lower, upper, False)
+        angle = branches.turned(middle + side * half, seed, lower, upper, False)
         is_nearer = abs(angle - seed) < cost and lower - _ROUNDING <= angle <= upper + _ROUNDING
         if is_nearer and _distance(angle, T, g) <= kinematics.REACHED:
             best, cost = angle, abs(angle - seed)
@@ -224,7 +221,7 @@ def ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual
     if not kinematics.is_askable(T, seed):
         return -1
     lower, upper = limits[0, 0], limits[1, 0]
-    start = bounded(seed[0], seed[0], lower, upper, math.inf)
+    start = branches.bounded(seed[0], seed[0], lower, upper, math.inf)
     if math.isinf(limits[2, 0]):
         start = _nearest(T, start, limits, geometry)
     else:
@@ -247,9 +244,9 @@ def ik_all(T: Array, geometry: Array, solutions: Array) -> int:
     count = 0
     middle, half = _candidates(T, geometry)
     for side in (1.0, -1.0):
-        angle = wrapped(middle + side * half)
+        angle = branches.wrapped(middle + side * half)
         is_exact = _distance(angle, T, geometry) <= kinematics.REACHED
-        if is_exact and (count == 0 or abs(wrapped(angle - solutions[0, 0])) > kinematics.REACHED):
+        if is_exact and (count == 0 or abs(branches.wrapped(angle - solutions[0, 0])) > kinematics.REACHED):
             solutions[count, 0] = angle
             count += 1
     return count

@@ -1,9 +1,8 @@
 """Planar four-bar loop: all four forms of its closure and its two assembly modes.
 
-Ground ``l0`` lies along x from the left to the right pivot, crank ``l1`` turns by theta1 at the
-left one, rocker ``l3`` by phi1 at the right one, coupler ``l2`` joins their ends. phi2 is the
-angle from crank to coupler, phi3 from coupler to rocker, taken from the coupler's end downward to
-the right pivot.
+Ground ``l0`` lies along x from the left to the right pivot, crank ``l1`` turns by theta1 at the left one, rocker ``l3``
+by phi1 at the right one, coupler ``l2`` joins their ends. phi2 is the angle from crank to coupler, phi3 from coupler to
+rocker, taken from the coupler's end downward to the right pivot.
 
 Source:
     Ghosal 2020, lecture 11, eqs. 2-5, corrected (coupler form: pi; last form: l0 restored).
@@ -16,9 +15,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from teleop_core.base.errors import ParameterError
-from teleop_core.kernels.geometry import Array
-from teleop_core.kernels.portable import arctangent
+from teleop_core.base import ParameterError
+from teleop_core.kernels import Array, arctangent
 
 _ROUNDING = 1e-12
 

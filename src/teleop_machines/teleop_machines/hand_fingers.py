@@ -11,8 +11,7 @@ Source:
 import math
 from typing import NamedTuple
 
-from teleop_core.kernels import inner, kernel
-from teleop_core.kernels.geometry import Array
+from teleop_core.kernels import Array, inner, kernel
 from teleop_core.robots.branches import bounded, turned, wrapped
 
 # Sine of phi of a straight finger: shortens it by less than rounding, and has a sign, so that a

@@ -16,9 +16,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from teleop_core.base.errors import ParameterError, ShapeError
-from teleop_core.kernels import inner, kernel
-from teleop_core.kernels.geometry import Array, checked_array, is_rigid
+from teleop_core.base import ParameterError, ShapeError
+from teleop_core.kernels import Array, checked_array, inner, is_rigid, kernel
 from teleop_core.robots.kinematics import REACHED
 from teleop_core.robots.robot import geometry_of
 from teleop_machines.hand_fingers import Triple, finger_branch, finger_jacobian, finger_point

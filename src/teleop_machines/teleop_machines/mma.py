@@ -8,9 +8,8 @@ Joint readings q = (θ1, θ2, θ3, θ3', θ6, θ8, θ10). Links 3, 3a, 3b and 4 
 - ``model="A"``: the conventional table, kept for comparison. It loses four offsets (the tool is
   127 mm off at home) and turns the tool frame by 90°.
 
-The source gives no joint limits, sensors, drives or rates: one turn about home and the drive
-table are *assumed*. As a master it needs only :meth:`Robot.fk`; :func:`holding_torques` is for
-force feedback.
+The source gives no joint limits, sensors, drives or rates: one turn about home and the drive table are *assumed*. As a
+master it needs only :meth:`Robot.fk`; :func:`holding_torques` is for force feedback.
 
 Source:
     Singh 2014, Kinematic study of a spatial hybrid manipulator for robot-assisted surgery.
@@ -20,17 +19,13 @@ import math
 
 import numpy as np
 
-from teleop_core.base.errors import ParameterError, UnknownNameError
-from teleop_core.kernels.geometry import Array
-from teleop_core.kernels.portable import product
+from teleop_core.base import ParameterError, UnknownNameError
+from teleop_core.kernels import Array, product
 from teleop_core.robots.drives import ENTRIES, Drives
 from teleop_core.robots.kinematics import Kernels
 from teleop_core.robots.robot import Robot, geometry_of
+from teleop_machines import mma_balance, mma_forward, mma_ik, mma_models
 from teleop_machines.bodies.mma_bodies import mma_bodies
-from teleop_machines.mma_balance import ShoulderSpring, shoulder_load
-from teleop_machines.mma_forward import GEOMETRY, MODEL_A, fk, jacobian
-from teleop_machines.mma_ik import ik, ik_all
-from teleop_machines.mma_models import MODELS, vector
 
 JOINTS = ("theta1", "theta2", "theta3", "theta3_prime", "theta6", "theta8", "theta10")
 HOME = np.radians([0.0, -90.0, 0.0, 90.0, 90.0, 0.0, 0.0])
@@ -65,9 +60,9 @@ def make(model: str = "C", **geometry: float) -> Robot:
         UnknownNameError: No such model or symbol.
         ParameterError: A length is not possible.
     """
-    if model not in MODELS:
-        raise UnknownNameError("model", model, MODELS)
-    row = geometry_of(GEOMETRY, (MODEL_A if model == "A" else {}) | geometry)
+    if model not in mma_models.MODELS:
+        raise UnknownNameError("model", model, mma_models.MODELS)
+    row = geometry_of(mma_forward.GEOMETRY, (mma_forward.MODEL_A if model == "A" else {}) | geometry)
     for symbol, value in row.items():
         smallest = 1e-3 if symbol in {"a2", "a3"} else 0.0
         if symbol != "theta12" and not smallest <= value <= 1.0:
@@ -78,20 +73,19 @@ def make(model: str = "C", **geometry: float) -> Robot:
         lower=HOME - math.pi,
         upper=HOME + math.pi,
         home=HOME,
-        start=START if row == GEOMETRY else None,
+        start=START if row == mma_forward.GEOMETRY else None,
         geometry=row,
-        kernels=Kernels(fk=fk, jacobian=jacobian, ik=ik, ik_all=ik_all),
+        kernels=Kernels(fk=mma_forward.fk, jacobian=mma_forward.jacobian, ik=mma_ik.ik, ik_all=mma_ik.ik_all),
         drives=DRIVES,
         describe=mma_bodies,
     )
 
 
-def holding_torques(robot: Robot, q: object, wrench: object, spring: ShoulderSpring | None = None) -> Array:
+def holding_torques(robot: Robot, q: object, wrench: object, spring: mma_balance.ShoulderSpring | None = None) -> Array:
     """Joint torques with which the handle stands still and pushes on the hand.
 
-    Gravity is known for joint 2 only (the source weighs the links but prints no mass centres), in
-    poses whose links beyond the shoulder keep the attitude of home; all other joints count as
-    balanced.
+    Gravity is known for joint 2 only (the source weighs the links but prints no mass centres), in poses whose links
+    beyond the shoulder keep the attitude of home; all other joints count as balanced.
 
     Args:
         robot: The MMA.
@@ -106,7 +100,7 @@ def holding_torques(robot: Robot, q: object, wrench: object, spring: ShoulderSpr
         ShapeError: Another shape.
         ParameterError: NaN or infinity.
     """
-    push, joints = vector("wrench", wrench, 6), vector("q", q, 7)
+    push, joints = mma_models.vector("wrench", wrench, 6), mma_models.vector("q", q, 7)
     torques = product(robot.jacobian(joints).T, push)
-    torques[1] -= shoulder_load(joints[1], spring).residual
+    torques[1] -= mma_balance.shoulder_load(joints[1], spring).residual
     return torques

@@ -1,8 +1,7 @@
 """Forward kinematics, Jacobian and loop closure of the MMA, in closed form.
 
-Joint vector q = (θ1, θ2, θ3, θ3', θ6, θ8, θ10): yaw, shoulder pitch, the two links of the
-parallelogram against link 2, and the three wrist axes. Abbreviations: index 23 means θ2 + θ3,
-index 23' means θ2 + θ3'.
+Joint vector q = (θ1, θ2, θ3, θ3', θ6, θ8, θ10): yaw, shoulder pitch, the two links of the parallelogram against link 2,
+and the three wrist axes. Abbreviations: index 23 means θ2 + θ3, index 23' means θ2 + θ3'.
 
 Source:
     Singh 2014, tables 4.4 and 4.10, eqs. 4.43-4.81, misprints corrected.
@@ -12,8 +11,7 @@ import math
 
 import numpy as np
 
-from teleop_core.kernels import inner, kernel
-from teleop_core.kernels.geometry import Array
+from teleop_core.kernels import Array, inner, kernel
 
 # Lengths [m] in the symbols of table 4.4; magnitudes, so d7 and d9 enter tables with a minus.
 # a3 is the long side of the parallelogram (a3' = a3'' in table 4.10) and d5 the sum of what
@@ -96,8 +94,7 @@ def _turn(J: Array, column: int, axis: tuple[float, float, float], x: float, y: 
 def jacobian_at(q: Array, geometry: Array, T: Array, J: Array) -> None:
     """Write the geometric Jacobian (6, 7) where the tip is known to be at T: :func:`jacobian`.
 
-    The axes of the wrist are read from T: before θ10 and the fixed turn θ12 its columns are
-    col1, K and X.
+    The axes of the wrist are read from T: before θ10 and the fixed turn θ12 its columns are col1, K and X.
     """
     _, S, F, G = groups(geometry)
     x, y, z = T[0, 3], T[1, 3], T[2, 3] - geometry[0]

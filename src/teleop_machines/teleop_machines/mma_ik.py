@@ -13,13 +13,11 @@ import math
 
 import numpy as np
 
-from teleop_core.kernels import inner, kernel
-from teleop_core.kernels.geometry import Array
+from teleop_core.kernels import Array, inner, kernel
 from teleop_core.robots.branches import bounded
 from teleop_core.robots.chains import damped
 from teleop_core.robots.kinematics import IkStatus, is_askable, pose_residual
-from teleop_machines.mma_branches import BRANCHES, branch, least_miss, nearest_branch, unwrapped
-from teleop_machines.mma_forward import fk, groups, jacobian_at
+from teleop_machines import mma_branches, mma_forward
 
 LENGTH = 0.1  # distance [m] that weighs as much as one radian
 _ROUNDS, _PATH_ROUNDS = 60, 12  # of the local search
@@ -52,7 +50,7 @@ def _descend(T: Array, box: Array, geometry: Array, rounds: int, q: Array) -> fl
     damped.assign(trial, q)
     square, damping = math.inf, _DAMPING
     for _ in range(rounds):
-        fk(trial, geometry, reached)
+        mma_forward.fk(trial, geometry, reached)
         trial_square = damped.pose_error(reached, T, LENGTH, left)
         if trial_square < square:
             is_stalled = trial_square > (1.0 - _STALLED) * square
@@ -61,7 +59,7 @@ def _descend(T: Array, box: Array, geometry: Array, rounds: int, q: Array) -> fl
             damped.assign(q, trial)
             if square <= damped.ZERO or is_stalled:
                 break
-            jacobian_at(q, geometry, reached, J)
+            mma_forward.jacobian_at(q, geometry, reached, J)
             damped.weigh(J, LENGTH)
             if damped.free_joints(J, error, q, box, is_free) <= 1e-9 * math.sqrt(square):
                 break
@@ -77,9 +75,8 @@ def _descend(T: Array, box: Array, geometry: Array, rounds: int, q: Array) -> fl
 def _approach(T: Array, box: Array, geometry: Array, rounds: int, q: Array) -> float:
     """Move ``q`` (7,) inside a box to the pose T, or as near as a neighbourhood allows.
 
-    Where the error points along a direction that the arm has just lost, no step lowers it at
-    first order; a small move of all joints then leaves the stand-still, and is kept only if the
-    error becomes less.
+    Where the error points along a direction that the arm has just lost, no step lowers it at first order; a small move
+    of all joints then leaves the stand-still, and is kept only if the error becomes less.
 
     Returns:
         Squared weighted error that is left.
@@ -101,9 +98,9 @@ def _approach(T: Array, box: Array, geometry: Array, rounds: int, q: Array) -> f
 @inner
 def _cost(T: Array, turn: float, choice: int, seed: Array, limits: Array, geometry: Array, q: Array) -> float:
     """Write one branch; its largest joint move, infinity when it does not reach or is outside."""
-    if branch(T, turn, choice, geometry, seed, q) > 0.0:
+    if mma_branches.branch(T, turn, choice, geometry, seed, q) > 0.0:
         return math.inf
-    return float(unwrapped(q, seed, limits))
+    return float(mma_branches.unwrapped(q, seed, limits))
 
 
 @kernel
@@ -120,7 +117,7 @@ def _scan(T: Array, seed: Array, limits: Array, geometry: Array, bound: float, f
         turn = _STEP * ((k + 1) // 2) * (1.0 if k % 2 == 0 else -1.0)
         if abs(turn) >= best:
             break
-        best = nearest_branch(T, seed[6] + turn, seed, limits, geometry, best, found)
+        best = mma_branches.nearest_branch(T, seed[6] + turn, seed, limits, geometry, best, found)
     return float(best)
 
 
@@ -148,22 +145,22 @@ def _nearest_miss(T: Array, seed: Array, geometry: Array, q: Array) -> float:
     found, least, width = np.empty(2), math.inf, 2.0 * _STEP
     found[0], found[1] = seed[6], 0.0
     for k in range(36):
-        least = least_miss(T, seed[6] + width * k, seed, geometry, least, found)
+        least = mma_branches.least_miss(T, seed[6] + width * k, seed, geometry, least, found)
         if least == 0.0:
             break
     while least > 0.0 and width > 1e-3:
         width *= 0.5
         centre = found[0]
-        least = least_miss(T, centre + width, seed, geometry, least, found)
-        least = least_miss(T, centre - width, seed, geometry, least, found)
-    branch(T, found[0], int(found[1]), geometry, seed, q)
+        least = mma_branches.least_miss(T, centre + width, seed, geometry, least, found)
+        least = mma_branches.least_miss(T, centre - width, seed, geometry, least, found)
+    mma_branches.branch(T, found[0], int(found[1]), geometry, seed, q)
     return float(least)
 
 
 @inner
 def _can_reach(T: Array, q: Array, geometry: Array) -> bool:
     """Whether any joint vector reaches a pose, limits or not, searched from θ10 of ``q``."""
-    H, S, F, G = groups(geometry)
+    H, S, F, G = mma_forward.groups(geometry)
     arm = math.hypot(geometry[1] + geometry[2] + H, geometry[4]) + math.hypot(F, S + G)
     square = T[0, 3] * T[0, 3] + T[1, 3] * T[1, 3] + (T[2, 3] - geometry[0]) ** 2
     if square > arm * arm:
@@ -185,12 +182,12 @@ def _search_branches(T: Array, seed: Array, limits: Array, geometry: Array, left
     """
     found, trial, bound = np.empty(2), np.empty(7), math.inf
     if left <= damped.ZERO:
-        bound = unwrapped(q, seed, limits)
+        bound = mma_branches.unwrapped(q, seed, limits)
     if _scan(T, seed, limits, geometry, bound, found) < bound:
         _refine(T, seed, limits, geometry, found, q)
     elif left > damped.ZERO:
         _nearest_miss(T, seed, geometry, trial)
-        unwrapped(trial, seed, limits)
+        mma_branches.unwrapped(trial, seed, limits)
         if _approach(T, limits, geometry, _ROUNDS, trial) < left:
             damped.assign(q, trial)
 
@@ -213,10 +210,10 @@ def ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual
     left = _approach(T, box, geometry, _PATH_ROUNDS if is_path else _ROUNDS, q)
     if not is_path:
         _search_branches(T, seed, limits, geometry, left, q)
-    fk(q, geometry, reached)
+    mma_forward.fk(q, geometry, reached)
     if not pose_residual(reached, T, residual):
         return _LIMITED if _can_reach(T, q, geometry) else _UNREACHABLE
-    jacobian_at(q, geometry, reached, J)
+    mma_forward.jacobian_at(q, geometry, reached, J)
     return _NEAR_SINGULAR if damped.is_near_singular(J, LENGTH, _NEAR) else _FOLLOWED
 
 
@@ -231,11 +228,11 @@ def ik_all(T: Array, geometry: Array, solutions: Array) -> int:
     home[1], home[3], home[4] = -0.5 * math.pi, 0.5 * math.pi, 0.5 * math.pi
     for i in range(7):
         free[0, i], free[1, i] = -math.inf, math.inf
-    for choice in range(BRANCHES):
+    for choice in range(mma_branches.BRANCHES):
         for k in range(73):
             turn = _STEP * ((k + 1) // 2) * (1.0 if k % 2 == 0 else -1.0)
-            if branch(T, turn, choice, geometry, home, solutions[count]) == 0.0:
-                unwrapped(solutions[count], home, free)
+            if mma_branches.branch(T, turn, choice, geometry, home, solutions[count]) == 0.0:
+                mma_branches.unwrapped(solutions[count], home, free)
                 count += 1
                 break
     return count

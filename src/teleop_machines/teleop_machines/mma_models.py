@@ -19,9 +19,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from teleop_core.base.errors import ShapeError, UnknownNameError
-from teleop_core.kernels.geometry import Array, checked_array
-from teleop_core.kernels.portable import product
+from teleop_core.base import ShapeError, UnknownNameError
+from teleop_core.kernels import Array, checked_array, product
 from teleop_core.robots.arms.dh import DhJoint, DhRow, DhTable
 
 # Half of d5: the thesis only gives the sum of the two equal symbols a3 + a4'.

@@ -12,9 +12,8 @@ import math
 
 import numpy as np
 
-from teleop_core.base.errors import ParameterError
-from teleop_core.kernels import kernel
-from teleop_core.kernels.geometry import Array
+from teleop_core.base import ParameterError
+from teleop_core.kernels import Array, kernel
 from teleop_core.robots.branches import bounded, turned
 from teleop_core.robots.kinematics import REACHED, IkStatus, Kernels, is_askable, pose_residual
 from teleop_core.robots.robot import Robot, geometry_of

@@ -4,10 +4,9 @@ Hinges R_i are at distance ``b`` from the base centre, ball joints S_i at distan
 platform centre, both at 0, 120 and 240°; theta_i is the leg's angle above the base, measured from
 the direction to the centre. The tip is the platform centre, with x towards S1.
 
-The three slides set the height and the direction of the platform's normal; each leg stays in its
-plane, which makes the turn about the normal nothing (zero torsion) and moves the centre sideways:
-with R12 = R21, x = a/2 (R11 - R22) and y = -a R21. So ``task_mask`` is z and two tilts, and ``ik``
-leaves the rest as residual.
+The three slides set the height and the direction of the platform's normal; each leg stays in its plane, which makes the
+turn about the normal nothing (zero torsion) and moves the centre sideways: with R12 = R21, x = a/2 (R11 - R22) and y =
+-a R21. So ``task_mask`` is z and two tilts, and ``ik`` leaves the rest as residual.
 
 Direct kinematics has up to 16 assembly modes, in pairs above and below the base:
 :func:`assembly_modes` and :meth:`Robot.fk_all` find all. ``fk`` takes the one next to legs that
@@ -23,11 +22,9 @@ import math
 
 import numpy as np
 
-from teleop_core.base.errors import ParameterError
-from teleop_core.kernels import inner, kernel
-from teleop_core.kernels.geometry import Array
-from teleop_core.robots import kinematics
-from teleop_core.robots.branches import slowed
+from teleop_core.base import ParameterError
+from teleop_core.kernels import Array, inner, kernel
+from teleop_core.robots import branches, kinematics
 from teleop_core.robots.robot import Robot, geometry_of
 from teleop_machines.bodies.parallel import rps3_bodies
 from teleop_machines.drives import electric_cylinders
@@ -124,7 +121,7 @@ def ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual
     if not kinematics.is_askable(T, seed):
         return -1
     _legs(T, geometry, q)
-    is_there = slowed(q, seed, limits, q)
+    is_there = branches.slowed(q, seed, limits, q)
     theta, S, reached = np.empty(3), np.empty((3, 3)), np.empty((4, 4))
     _close(q, geometry, theta)
     points(q, theta, geometry[0], S)

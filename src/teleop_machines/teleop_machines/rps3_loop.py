@@ -8,8 +8,7 @@ import math
 
 import numpy as np
 
-from teleop_core.kernels import inner, kernel
-from teleop_core.kernels.geometry import Array
+from teleop_core.kernels import Array, inner, kernel
 
 _ITERATIONS = 100
 _ROUNDING = 1e-28  # squared relative error that more iterations cannot improve

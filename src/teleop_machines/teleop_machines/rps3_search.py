@@ -1,8 +1,7 @@
 """Assemblies of the 3-RPS: the one next to a seed, and the search for others, as kernels.
 
-Given theta1, two loop equations give theta2 and theta3 with two signs each. From these four, at
-angles theta1 spread over half a turn, leg angles are moved to where the loop closes; the other
-half is the mirror image below the base.
+Given theta1, two loop equations give theta2 and theta3 with two signs each. From these four, at angles theta1 spread
+over half a turn, leg angles are moved to where the loop closes; the other half is the mirror image below the base.
 
 Source:
     Lee and Shah 1988; Ghosal 2020, lectures 6 and 11; search derived from them.

@@ -19,16 +19,12 @@ import math
 
 import numpy as np
 
-from teleop_core.base.errors import ParameterError, UnknownNameError
-from teleop_core.kernels import inner, kernel
-from teleop_core.kernels.geometry import Array
-from teleop_core.robots import kinematics
-from teleop_core.robots.branches import bounded, hold, is_allowed, move_cost, slowed, turned
+from teleop_core.base import ParameterError, UnknownNameError
+from teleop_core.kernels import Array, inner, kernel
+from teleop_core.robots import branches, kinematics
 from teleop_core.robots.robot import Robot, geometry_of
-from teleop_machines import scara_stewart_drives, scara_stewart_legs
+from teleop_machines import scara_stewart_drives, scara_stewart_legs, stewart_legs, stewart_search
 from teleop_machines.bodies.hybrid_bodies import scara_stewart_bodies
-from teleop_machines.stewart_legs import invert
-from teleop_machines.stewart_search import closing_poses
 
 JOINTS = ("theta1", "theta2", "d3", "leg1", "leg2", "leg3", "leg4", "leg5", "leg6")
 # r_b to sigma_m are handed to the leg kernels as they stand here.
@@ -107,7 +103,7 @@ def assemblies(q: Array, geometry: Array, found: Array) -> int:
     if scara_stewart_legs.is_similar(g[3], g[4]):
         return 1 if assemble(q, geometry, np.zeros(2), found[0], out) < _NOT_CLOSED else 0
     scara_stewart_legs.layout(g, joints)
-    count = closing_poses(q[3:], joints[0], joints[1], g[1], kinematics.SEARCH_ALL, found)
+    count = stewart_search.closing_poses(q[3:], joints[0], joints[1], g[1], kinematics.SEARCH_ALL, found)
     for k in range(count):
         _place(q, geometry, found[k].copy(), found[k])
     return count
@@ -138,7 +134,7 @@ def _twists(platform: Array, g: Array, twists: Array) -> None:
     J = np.empty((6, 6))
     scara_stewart_legs.leg_slopes(platform, g, J)
     if not scara_stewart_legs.is_similar(g[3], g[4]):
-        invert(J, twists)
+        stewart_legs.invert(J, twists)
         return
     gram, inverse = np.empty((3, 3)), np.empty((3, 3))
     for r in range(3):
@@ -146,7 +142,7 @@ def _twists(platform: Array, g: Array, twists: Array) -> None:
             gram[r, s] = 1e-12 * g[1] * g[1] if r == s else 0.0
             for i in range(6):
                 gram[r, s] += J[i, 3 + r] * J[i, 3 + s]
-    invert(gram, inverse)
+    stewart_legs.invert(gram, inverse)
     twists[:] = 0.0
     for r in range(3):
         for i in range(6):
@@ -212,13 +208,13 @@ def _arm(T: Array, g: Array, is_left: bool, seed: float, arm: Array) -> bool:
 @inner
 def _cost(T: Array, seed: Array, limits: Array, g: Array, q: Array) -> float:
     """Largest move of an elbow's joints from the seed; of the legs only if the elbow turns them."""
-    q[0] = turned(q[0], seed[0], limits[0, 0], limits[1, 0], False)
+    q[0] = branches.turned(q[0], seed[0], limits[0, 0], limits[1, 0], False)
     if g[_CARRIED] == 0.0:
-        return move_cost(q, seed, limits, 0, 3)
+        return branches.move_cost(q, seed, limits, 0, 3)
     platform = np.empty((4, 4))
     scara_stewart_legs.wanted_platform(T, q[0] + q[1], g[_W], platform)
     scara_stewart_legs.leg_lengths(platform, g[_LEGS:_CARRIED], q[3:])
-    return move_cost(q, seed, limits, 0, 9)
+    return branches.move_cost(q, seed, limits, 0, 9)
 
 
 @inner
@@ -248,7 +244,7 @@ def _swung(angle: float, seed: float, lower: float, upper: float, is_path: bool)
     A path over the axis of joint 1 asks for half a turn either way; the way that an end stop does
     not bar is taken then. At its end stop a joint waits until the target is within such a swing.
     """
-    near = turned(angle, seed, lower, upper, is_path)
+    near = branches.turned(angle, seed, lower, upper, is_path)
     if is_path and not lower <= near <= upper:
         other = near - math.copysign(2.0 * math.pi, near)
         if lower <= other <= upper and abs(other - seed) <= _SWING:
@@ -265,7 +261,7 @@ def _held_arm(T: Array, seed: Array, limits: Array, g: Array, q: Array) -> bool:
     is_reachable = _choose(T, seed, limits, g, q)
     is_path = math.isfinite(limits[2, 0])
     wanted = _swung(q[0], seed[0], limits[0, 0], limits[1, 0], is_path)
-    q[0] = bounded(wanted, seed[0], limits[0, 0], limits[1, 0], limits[2, 0])
+    q[0] = branches.bounded(wanted, seed[0], limits[0, 0], limits[1, 0], limits[2, 0])
     if abs(q[0] - wanted) > 1e-12:
         x = T[0, 3] - g[_E] * T[0, 2] - g[_L1] * math.cos(q[0])
         y = T[1, 3] - g[_E] * T[1, 2] - g[_L1] * math.sin(q[0])
@@ -273,7 +269,7 @@ def _held_arm(T: Array, seed: Array, limits: Array, g: Array, q: Array) -> bool:
             turn = math.atan2(y, x) - q[0]
             q[1] = _swung(turn, seed[1], limits[0, 1], limits[1, 1], is_path)
     for i in range(1, 3):
-        hold(q, i, seed, limits)
+        branches.hold(q, i, seed, limits)
     return is_reachable
 
 
@@ -294,8 +290,8 @@ def ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual
     platform, reached = np.empty((4, 4)), np.empty((4, 4))
     scara_stewart_legs.wanted_platform(T, geometry[_CARRIED] * (q[0] + q[1]), g[2], platform)
     turning = scara_stewart_legs.leg_lengths(platform, g, q[3:])
-    is_held = not is_allowed(q, seed, limits)
-    if is_held and not slowed(q[3:], seed[3:], limits[:, 3:], q[3:]):
+    is_held = not branches.is_allowed(q, seed, limits)
+    if is_held and not branches.slowed(q[3:], seed[3:], limits[:, 3:], q[3:]):
         scara_stewart_legs.platform_pose(q[3:], g, platform)
     _place(q, geometry, platform, reached)
     if not kinematics.pose_residual(reached, T, residual):
@@ -312,7 +308,7 @@ def ik_all(T: Array, geometry: Array, solutions: Array) -> int:
         q = solutions[elbow]
         if not _arm(T, geometry, elbow == 0, 0.0, q):
             return 0
-        q[0] = turned(q[0], 0.0, -math.pi, math.pi, False)
+        q[0] = branches.turned(q[0], 0.0, -math.pi, math.pi, False)
         scara_stewart_legs.wanted_platform(T, geometry[_CARRIED] * (q[0] + q[1]), g[2], platform)
         scara_stewart_legs.leg_lengths(platform, g, q[3:])
     return 2 if T[2, 2] > 0.0 and math.hypot(T[2, 0], T[2, 1]) <= scara_stewart_legs.TILT else 0

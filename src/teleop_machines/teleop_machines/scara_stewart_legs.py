@@ -16,11 +16,9 @@ import math
 
 import numpy as np
 
-from teleop_core.kernels import inner, kernel
-from teleop_core.kernels.geometry import Array
+from teleop_core.kernels import Array, inner, kernel
 from teleop_core.robots.kinematics import AGREED, FkStatus
-from teleop_machines.stewart_legs import direct, leg_system
-from teleop_machines.stewart_search import close_legs, side_of
+from teleop_machines import stewart_legs, stewart_search
 
 # Sine of sigma_b + sigma_m under which the layout counts as similar hexagons.
 _SIMILAR = 1e-9
@@ -74,7 +72,7 @@ def leg_slopes(T: Array, g: Array, J: Array) -> None:
     """Write the leg Jacobian (6, 6) of a platform pose (4, 4)."""
     joints, legs = np.empty((2, 6, 3)), np.empty(6)
     layout(g, joints)
-    leg_system(T, joints[0], joints[1], legs, J)
+    stewart_legs.leg_system(T, joints[0], joints[1], legs, J)
 
 
 @inner
@@ -193,7 +191,7 @@ def platform_pose(legs: Array, g: Array, T: Array) -> None:
         return
     joints = np.empty((2, 6, 3))
     layout(g, joints)
-    direct(legs, joints[0], joints[1], g[1], is_similar(g[3], g[4]), T)
+    stewart_legs.direct(legs, joints[0], joints[1], g[1], is_similar(g[3], g[4]), T)
 
 
 @inner
@@ -204,7 +202,7 @@ def home_side(g: Array) -> float:
     T[0, 3] = T[1, 3] = T[3, 0] = T[3, 1] = T[3, 2] = 0.0
     T[2, 3], T[3, 3] = g[2], 1.0
     leg_slopes(T, g, J)
-    return float(side_of(J))
+    return float(stewart_search.side_of(J))
 
 
 @inner
@@ -233,7 +231,7 @@ def close_platform(legs: Array, g: Array, ask: Array, T: Array, out: Array) -> i
         return _NEAR_SINGULAR if is_blind(T, turning, g) else _CLOSED
     if ask[1] == 0.0:
         orientation(legs, g, T)
-    status = close_legs(legs, joints[0], joints[1], g[1], int(ask[0]), 0.0, T, out)
+    status = stewart_search.close_legs(legs, joints[0], joints[1], g[1], int(ask[0]), 0.0, T, out)
     out[1] *= home_side(g)
     return _OTHER_MODE if status == _CLOSED and ask[1] == 0.0 and out[1] < 0.0 else status
 

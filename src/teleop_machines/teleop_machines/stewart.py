@@ -1,16 +1,14 @@
 """Stewart-Gough platform: a body on six legs of any layout (6-UPS).
 
-A :class:`Layout` holds the twelve joint points and answers: leg lengths of a pose, the pose of leg
-lengths from a seed, leg Jacobian and rank. On an architecturally singular layout, such as two
-similar hexagons one above the other, the legs never fix the platform, whatever the pose; direct
-kinematics is refused there with a status.
+A :class:`Layout` holds the twelve joint points and answers: leg lengths of a pose, the pose of leg lengths from a seed,
+leg Jacobian and rank. On an architecturally singular layout, such as two similar hexagons one above the other, the legs
+never fix the platform, whatever the pose; direct kinematics is refused there with a status.
 
-As a robot, q is the six leg lengths, the tip is the platform frame, and ``fk`` is direct
-kinematics from the home pose: the level platform ``z0`` above the base. Where the wanted pose
-belongs to another assembly than the one next to home, ``ik`` gives its legs and says UNREACHABLE.
-Where none is next to home, :meth:`Robot.fk` searches, and :meth:`Robot.fk_all` finds up to 40. On
-an architecturally singular layout legs fix no pose: :meth:`Robot.solve_fk` says UNDETERMINED,
-``fk`` and ``jacobian`` refuse, their kernels write NaN, and ``ik`` says NEAR_SINGULAR.
+As a robot, q is the six leg lengths, the tip is the platform frame, and ``fk`` is direct kinematics from the home pose:
+the level platform ``z0`` above the base. Where the wanted pose belongs to another assembly than the one next to home,
+``ik`` gives its legs and says UNREACHABLE. Where none is next to home, :meth:`Robot.fk` searches, and
+:meth:`Robot.fk_all` finds up to 40. On an architecturally singular layout legs fix no pose: :meth:`Robot.solve_fk` says
+UNDETERMINED, ``fk`` and ``jacobian`` refuse, their kernels write NaN, and ``ik`` says NEAR_SINGULAR.
 ``load_robot("stewart", **layout.symbols())`` takes any layout.
 
 Source:
@@ -24,12 +22,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from teleop_core.base.errors import ParameterError, ShapeError
-from teleop_core.kernels import inner, kernel
-from teleop_core.kernels.geometry import Array, checked_array, is_rigid
-from teleop_core.kernels.portable import length
-from teleop_core.robots import kinematics
-from teleop_core.robots.branches import slowed
+from teleop_core.base import ParameterError, ShapeError
+from teleop_core.kernels import Array, checked_array, inner, is_rigid, kernel, length
+from teleop_core.robots import branches, kinematics
 from teleop_core.robots.chains.damped import is_near_singular
 from teleop_core.robots.robot import Robot, geometry_of
 from teleop_machines.bodies.parallel import stewart_bodies
@@ -198,9 +193,8 @@ def _at_home(geometry: Array, T: Array) -> None:
 def fk(q: Array, geometry: Array, T: Array) -> None:
     """Write ``T_base_tip`` (4, 4) of leg lengths (6,) [m], found from the home pose.
 
-    Of least error where nothing closes next to home: with the joints in pairs none of the poses
-    that are turned by up to 1 rad, 0.2 % up to 1.3 rad, 8 % up to half a turn, as measured over
-    legal legs. :func:`assemble` says so.
+    Of least error where nothing closes next to home: with the joints in pairs none of the poses that are turned by up
+    to 1 rad, 0.2 % up to 1.3 rad, 8 % up to half a turn, as measured over legal legs. :func:`assemble` says so.
     """
     _at_home(geometry, T)
     base, platform = geometry[:18].reshape((6, 3)), geometry[18:36].reshape((6, 3))
@@ -259,7 +253,7 @@ def ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual
     base, platform = geometry[:18].reshape((6, 3)), geometry[18:36].reshape((6, 3))
     size, legs, reached = geometry[_SIZE], np.empty((6, 6)), np.empty((4, 4))
     leg_system(T, base, platform, q, legs)
-    is_there = slowed(q, seed, limits, q)
+    is_there = branches.slowed(q, seed, limits, q)
     if geometry[_SINGULAR] > 0.0:
         # The legs of the pose, though they do not hold it; a pose next to it if they fell short.
         reached[:] = T

@@ -1,11 +1,10 @@
 """Three-fingered hand: three R-R-R fingers that hold a triangle, contacts as ball joints.
 
-The hand has six freedoms (nine joints less three distances between contacts). As a robot, q is
-all nine joints, theta, psi, phi of each finger; ``fk`` is the object's frame at the three contact
-points, if the joints hold the object to 0.1 mm; ``ik`` keeps every finger on the contact point of
-the wanted object pose, so it only returns joints that hold the object unless a finger cannot
-follow. :class:`Hand` answers for contact points, single fingers, and the three joints that follow
-from six actuated ones.
+The hand has six freedoms (nine joints less three distances between contacts). As a robot, q is all nine joints, theta,
+psi, phi of each finger; ``fk`` is the object's frame at the three contact points, if the joints hold the object to 0.1
+mm; ``ik`` keeps every finger on the contact point of the wanted object pose, so it only returns joints that hold the
+object unless a finger cannot follow. :class:`Hand` answers for contact points, single fingers, and the three joints
+that follow from six actuated ones.
 
 Source:
     Ghosal 2020, lectures 6 and 11, after Salisbury 1982; six freedoms, not three as spoken.
@@ -15,14 +14,13 @@ import math
 
 import numpy as np
 
-from teleop_core.base.errors import ParameterError
-from teleop_core.kernels import inner, kernel
-from teleop_core.kernels.geometry import Array
+from teleop_core.base import ParameterError
+from teleop_core.kernels import Array, inner, kernel
 from teleop_core.robots import kinematics
 from teleop_core.robots.robot import Robot
+from teleop_machines import hand_fingers, rps3_loop
 from teleop_machines.bodies.hand_bodies import hand_bodies
 from teleop_machines.drives import finger_motors
-from teleop_machines.hand_fingers import Triple, finger_branch, finger_joints
 from teleop_machines.hand_grasp import (
     FINGERS,
     GEOMETRY,
@@ -37,7 +35,6 @@ from teleop_machines.hand_grasp import (
     local_point,
     wanted_contact,
 )
-from teleop_machines.rps3_loop import frame
 
 __all__ = ["GEOMETRY", "Grasp", "GraspResult", "Hand", "make"]
 
@@ -53,7 +50,7 @@ def fk(q: Array, geometry: Array, T: Array) -> None:
     """Write ``T_base_object`` (4, 4) of nine joints."""
     points = np.empty((3, 3))
     contacts(q, geometry, points)
-    frame(points, T)
+    rps3_loop.frame(points, T)
 
 
 @kernel
@@ -65,7 +62,7 @@ def assemble(q: Array, geometry: Array, ask: Array, T: Array, out: Array) -> int
     """
     points = np.empty((3, 3))
     contacts(q, geometry, points)
-    frame(points, T)
+    rps3_loop.frame(points, T)
     out[0], out[1] = 0.0, 1.0
     for i in range(FINGERS):
         j = (i + 1) % FINGERS
@@ -96,7 +93,7 @@ def jacobian(q: Array, geometry: Array, J: Array) -> None:
 
 
 @inner
-def _is_near_singular(p: Triple, phi: float, links: Triple) -> bool:
+def _is_near_singular(p: hand_fingers.Triple, phi: float, links: hand_fingers.Triple) -> bool:
     """Whether a finger is straight, folded, or touches its own axis."""
     reach = math.sqrt(p[0] * p[0] + p[1] * p[1])
     return bool(abs(math.sin(phi)) < _NEAR or reach < _NEAR * (links[0] + links[1] + links[2]))
@@ -111,7 +108,7 @@ def ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual
     points, reached = np.empty((3, 3)), np.empty((4, 4))
     for i in range(FINGERS):
         links, p = links_of(i, geometry), local_point(i, geometry, wanted_contact(i, T, geometry))
-        is_finger = finger_joints(p, links, seed, limits, 3 * i, q)
+        is_finger = hand_fingers.finger_joints(p, links, seed, limits, 3 * i, q)
         is_reachable = is_reachable and is_finger
         is_near = is_near or _is_near_singular(p, q[3 * i + 2], links)
     contacts(q, geometry, points)
@@ -119,7 +116,7 @@ def ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual
         x, y, z = wanted_contact(i, T, geometry)
         off = max(abs(points[i, 0] - x), abs(points[i, 1] - y), abs(points[i, 2] - z))
         is_touching = is_touching and off <= kinematics.REACHED
-    frame(points, reached)
+    rps3_loop.frame(points, reached)
     kinematics.pose_residual(reached, T, residual)
     if not is_touching:
         return _LIMITED if is_reachable else _UNREACHABLE
@@ -133,7 +130,7 @@ def ik_all(T: Array, geometry: Array, solutions: Array) -> int:
     for i in range(FINGERS):
         links, p = links_of(i, geometry), local_point(i, geometry, wanted_contact(i, T, geometry))
         for branch in range(4):
-            theta, psi, phi, is_reachable = finger_branch(p, links, branch, 0.0)
+            theta, psi, phi, is_reachable = hand_fingers.finger_branch(p, links, branch, 0.0)
             if is_reachable:
                 joints = fingers[i, counts[i]]
                 joints[0], joints[1], joints[2] = theta, psi, phi
@@ -160,7 +157,7 @@ def make(**geometry: float | str) -> Robot:
     home, T, side = np.empty(9), np.empty((4, 4)), row["side"]
     reach = row["l11"] + 2.0 / 3.0 * (row["l12"] + row["l13"])
     corners = np.array([[0.0, -0.5, 0.5 / 3**0.5], [0.0, 0.5, 0.5 / 3**0.5], [0.0, 0.0, -1 / 3**0.5]])
-    frame(side * corners + [reach, 0.0, 0.5 * row["h"]], T)
+    rps3_loop.frame(side * corners + [reach, 0.0, 0.5 * row["h"]], T)
     hand = Hand(row)
     for i, point in enumerate(hand.contacts_of(T)):
         bent = 1 if i < FINGERS - 1 else 0

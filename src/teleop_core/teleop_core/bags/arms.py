@@ -8,9 +8,8 @@ in which the nodes of an arm are called ``left/slave``.
 What a recorder records in a namespace is below that as well, which the metadata tell under
 ``namespace``: arms keep their names, and ``left`` of ``/lab`` is below ``lab/left/``.
 
-Where no metadata name the arms, as in what a recorder records alone in a namespace, an arm is
-whatever measures a slave's pose: ``left/slave/measured_cp``. Then there may be no default arm with
-plain topics.
+Where no metadata name the arms, as in what a recorder records alone in a namespace, an arm is whatever measures a
+slave's pose: ``left/slave/measured_cp``. Then there may be no default arm with plain topics.
 """
 
 from collections.abc import Iterable, Iterator

@@ -34,8 +34,7 @@ def decompress(name: str, data: bytes, size: int) -> bytes:
         size: Bytes it must have, [bytes].
 
     Raises:
-        ValueError: Another size, too large, or an unknown compression. Damage raises one of
-            DamagedError.
+        ValueError: Another size, too large, or an unknown compression. Damage raises one of DamagedError.
     """
     if name not in {"zstd", "lz4", ""}:
         raise ValueError(f"compressed with {shown(name)}, must be zstd, lz4 or none")

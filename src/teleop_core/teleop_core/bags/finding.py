@@ -3,9 +3,7 @@
 from collections.abc import Mapping
 from pathlib import Path
 
-from teleop_core.base import plain_yaml
-from teleop_core.base.errors import RecordingError
-from teleop_core.base.texts import shown
+from teleop_core.base import RecordingError, plain_yaml, shown
 
 METADATA = "metadata.yaml"
 

@@ -1,11 +1,10 @@
 """Kept files: what is replayed, scored and drawn is what was recorded.
 
-A recording holds the text of a robot's file (a URDF, a table of links) under ``robot_file`` beside
-``robot``. All other files stand there by their digests: a mesh or field of heights that is touched
-under ``mesh_file`` beside ``mesh``; the mesh of a fixture under ``fixture_mesh_file``; drives of a
-URDF under ``drives_file``; the meshes that a robot's links look like under ``robot_meshes``, in a
-line of digest and name each. Under each digest are the packed bytes, once for all arms, as long as
-there is room for them. Where a file is gone or says something else by now, what was recorded is
+A recording holds the text of a robot's file (a URDF, a table of links) under ``robot_file`` beside ``robot``. All other
+files stand there by their digests: a mesh or field of heights that is touched under ``mesh_file`` beside ``mesh``; the
+mesh of a fixture under ``fixture_mesh_file``; drives of a URDF under ``drives_file``; the meshes that a robot's links
+look like under ``robot_meshes``, in a line of digest and name each. Under each digest are the packed bytes, once for
+all arms, as long as there is room for them. Where a file is gone or says something else by now, what was recorded is
 written to a temporary folder and takes its place.
 """
 
@@ -18,11 +17,9 @@ from collections.abc import Iterable, Mapping
 from functools import cache
 from pathlib import Path
 
-from teleop_core.base.errors import TeleopWarning
-from teleop_core.base.texts import printable
+from teleop_core.base import TeleopWarning, printable
 from teleop_core.robots import geometry_of
-from teleop_core.robots.files.visuals import kept_mesh, meshes_of
-from teleop_core.robots.files.xacro_files import EXPANDED, xml_of
+from teleop_core.robots.files import visuals, xacro_files
 from teleop_core.robots.parts import DESCRIPTION, arguments_of, file_of
 
 TOUCHED, FIXTURE = "mesh", "fixture_mesh"
@@ -56,8 +53,7 @@ class KeptFiles:
 
         Args:
             name: The robot's name or path.
-            settings: Its geometry; arguments among them have expanded a xacro, of which the URDF is
-                stored.
+            settings: Its geometry; arguments among them have expanded a xacro, of which the URDF is stored.
             prefix: What stands before the names of its arm.
         """
         found = file_of(name)
@@ -66,7 +62,7 @@ class KeptFiles:
         path, text, geometry = found[0], None, geometry_of(settings)
         if path.suffix.lower() == ".xacro":
             arguments = found[1] | arguments_of(geometry)
-            text = printable(xml_of(path, arguments).decode())
+            text = printable(xacro_files.xml_of(path, arguments).decode())
         else:
             text = _text(path)
         if text is None:
@@ -74,7 +70,7 @@ class KeptFiles:
         self._texts[f"{prefix}{_ROBOT}{_FILE}"] = text
         if drives := str(geometry.get(_DRIVES, "")):
             self._name(f"{prefix}{_DRIVES}", drives)
-        digests = {mesh: self._add(file) for mesh, file in meshes_of(text, path).items()}
+        digests = {mesh: self._add(file) for mesh, file in visuals.meshes_of(text, path).items()}
         if lines := [f"{digest} {mesh}" for mesh, digest in digests.items() if digest]:
             self._texts[f"{prefix}{_ROBOT}{_MESHES}"] = "\n".join(lines)
 
@@ -110,8 +106,7 @@ class KeptFiles:
 def recorded_files(metadata: Mapping[str, str], arm: str = "") -> dict[str, str]:
     """Path of each recorded file of an arm, by the path under which it was recorded.
 
-    A file of which only the digest was kept, and that is gone or another by now, is told by a
-    warning.
+    A file of which only the digest was kept, and that is gone or another by now, is told by a warning.
 
     Args:
         metadata: Names and texts of a recording.
@@ -161,12 +156,12 @@ def recorded_geometry(settings: Iterable[str], files: Mapping[str, str]) -> tupl
 def _robot_now(name: str, text: str, digests: Mapping[str, str], metadata: Mapping[str, str]) -> str:
     """Path of a robot's file, with the meshes of its links as they were recorded."""
     path = Path(name).expanduser()
-    files = meshes_of(text, path)
+    files = visuals.meshes_of(text, path)
     same = {mesh for mesh, digest in digests.items() if _digest_now(files.get(mesh)) == digest}
     if _text(path) == text and len(same) == len(digests):
         return name
     is_made = path.name.lower().endswith((".xacro", DESCRIPTION))
-    copy = _place(f"{text}{digests}") / (path.name + EXPANDED * is_made)
+    copy = _place(f"{text}{digests}") / (path.name + xacro_files.EXPANDED * is_made)
     room = _MOST
     for mesh, digest in digests.items():
         data = _unpacked(metadata, digest, room)
@@ -176,7 +171,7 @@ def _robot_now(name: str, text: str, digests: Mapping[str, str], metadata: Mappi
         if data is None:
             _tell(mesh, files.get(mesh))
         else:
-            _written(kept_mesh(mesh, copy), data)
+            _written(visuals.kept_mesh(mesh, copy), data)
     return str(_written(copy, text.encode()))
 
 

@@ -15,12 +15,8 @@ from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
 from mcap.records import Channel, Chunk, ChunkIndex, Footer, Metadata, MetadataIndex, Schema, Statistics
 
-from teleop_core.bags import walk
-from teleop_core.bags.compression import decompress
-from teleop_core.bags.layouts import Bytes, Stamps
-from teleop_core.bags.mcap_file import MAGIC
-from teleop_core.base.damage import damage_told
-from teleop_core.base.errors import RecordingError
+from teleop_core.bags import compression, layouts, mcap_file, walk
+from teleop_core.base import RecordingError, damage_told
 
 CUT_OFF = "was cut off while being recorded; `teleop recover {path}` saves what is there"
 _FOOTER_SIZE = 9 + 20
@@ -32,11 +28,11 @@ _UNREAD = "{} is damaged ({{}}); `teleop recover` saves the whole parts"
 class Records(NamedTuple):
     """Messages of one stretch of a file: message i is ``data[begin[i] : begin[i] + size[i]]``."""
 
-    data: Bytes
-    channel: Stamps
-    log_ns: Stamps
-    begin: Stamps
-    size: Stamps
+    data: layouts.Bytes
+    channel: layouts.Stamps
+    log_ns: layouts.Stamps
+    begin: layouts.Stamps
+    size: layouts.Stamps
 
 
 @dataclass(frozen=True)
@@ -80,16 +76,16 @@ class McapSource:
             self.contents = (is_whole and self._summary()) or self._scan(is_whole=is_whole)
 
     def _check_magic(self, file: BinaryIO, is_whole: bool) -> None:
-        begin = file.read(len(MAGIC))
+        begin = file.read(len(mcap_file.MAGIC))
         if not begin:
             raise RecordingError(self.path, "is an empty file: nothing was recorded")
-        if begin != MAGIC:
+        if begin != mcap_file.MAGIC:
             kind = "an SQLite file, no MCAP" if begin == b"SQLite f" else "no MCAP file"
             hint = f"`teleop import {self.path} --out DIR` makes a recording of tables and bags"
             raise RecordingError(self.path, f"is {kind}, as recordings must be; {hint}")
         size = file.seek(0, 2)
-        file.seek(max(0, size - len(MAGIC)))
-        has_end = size > 2 * len(MAGIC) + _FOOTER_SIZE and file.read() == MAGIC
+        file.seek(max(0, size - len(mcap_file.MAGIC)))
+        has_end = size > 2 * len(mcap_file.MAGIC) + _FOOTER_SIZE and file.read() == mcap_file.MAGIC
         if is_whole and not has_end:
             raise RecordingError(self.path, CUT_OFF.format(path=self.path))
 
@@ -99,9 +95,9 @@ class McapSource:
         The index is walked as any other stretch of the file: no length in it leads beyond its end.
         """
         data = self.mapped()
-        footer = len(data) - len(MAGIC) - _FOOTER_SIZE
+        footer = len(data) - len(mcap_file.MAGIC) - _FOOTER_SIZE
         start = Footer.read(_stream(data, footer + 9, 20)).summary_start
-        if not len(MAGIC) <= start < footer:
+        if not len(mcap_file.MAGIC) <= start < footer:
             return None
         rows, end = walk.walk(data, start, footer)
         if end != footer:
@@ -127,7 +123,7 @@ class McapSource:
         """Contents by reading the file; damaged chunks are left out if it need not be whole."""
         found = Contents()
         data = self.mapped()
-        rows, found.end = walk.walk(data, len(MAGIC), len(data))
+        rows, found.end = walk.walk(data, len(mcap_file.MAGIC), len(data))
         _note_cold(found, data, rows)
         for begin, size in rows[rows[:, walk.OPCODE] == Opcode.CHUNK, 1:3].tolist():
             try:
@@ -140,7 +136,7 @@ class McapSource:
         found.places += _loose(found, rows)
         return found
 
-    def mapped(self) -> Bytes:
+    def mapped(self) -> layouts.Bytes:
         """The file as an array that is read where it is looked at."""
         return np.memmap(self.path, np.uint8, "r").view(np.ndarray)
 
@@ -157,7 +153,7 @@ class McapSource:
             RecordingError: A chunk is damaged.
         """
         with self.path.open("rb") as file, ThreadPoolExecutor(1) as pool:
-            ahead: deque[Future[Bytes]] = deque()
+            ahead: deque[Future[layouts.Bytes]] = deque()
             for index, place in enumerate(places):
                 for later in places[index + len(ahead) : index + _LOOK_AHEAD]:
                     ahead.append(pool.submit(self._load, file, later))
@@ -167,14 +163,14 @@ class McapSource:
                 else:
                     yield _table(data, walk.walk(data, 0, len(data))[0])
 
-    def _load(self, file: BinaryIO, place: Place) -> Bytes:
+    def _load(self, file: BinaryIO, place: Place) -> layouts.Bytes:
         if place.end:
             return self.mapped()
         with damage_told(self.path, _UNREAD.format(f"the chunk at byte {place.offset}")):
             return _uncompressed(_chunk_at(file, place.offset))
 
 
-def _stream(data: Bytes, begin: int, size: int) -> ReadDataStream:
+def _stream(data: layouts.Bytes, begin: int, size: int) -> ReadDataStream:
     """Stream of some bytes of a file, as the mcap library reads records from."""
     return ReadDataStream(BytesIO(data[begin : begin + size].tobytes()))
 
@@ -197,19 +193,19 @@ def _chunk_at(file: BinaryIO, offset: int) -> Chunk:
     return Chunk.read(ReadDataStream(BytesIO(file.read(length))))
 
 
-def _uncompressed(chunk: Chunk) -> Bytes:
-    data = decompress(chunk.compression, chunk.data, chunk.uncompressed_size)
+def _uncompressed(chunk: Chunk) -> layouts.Bytes:
+    data = compression.decompress(chunk.compression, chunk.data, chunk.uncompressed_size)
     if chunk.uncompressed_crc and zlib.crc32(data) != chunk.uncompressed_crc:
         raise ValueError("its checksum is wrong")
     return np.frombuffer(data, np.uint8)
 
 
-def _table(data: Bytes, rows: walk.Rows) -> Records:
+def _table(data: layouts.Bytes, rows: walk.Rows) -> Records:
     rows = rows[rows[:, walk.OPCODE] == Opcode.MESSAGE]
     return Records(data, rows[:, walk.CHANNEL], rows[:, walk.LOG], rows[:, walk.BEGIN], rows[:, walk.SIZE])
 
 
-def _windows(data: Bytes, place: Place, window: int) -> Iterator[Records]:
+def _windows(data: layouts.Bytes, place: Place, window: int) -> Iterator[Records]:
     """Messages outside of chunks, some megabytes at a time."""
     at = place.offset
     while at < place.end:
@@ -223,7 +219,7 @@ def _windows(data: Bytes, place: Place, window: int) -> Iterator[Records]:
         at = stop
 
 
-def _note_cold(found: Contents, data: Bytes, rows: walk.Rows) -> None:
+def _note_cold(found: Contents, data: layouts.Bytes, rows: walk.Rows) -> None:
     """Note schemas, channels and metadata among records."""
     is_cold = np.isin(rows[:, walk.OPCODE], (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.METADATA))
     for opcode, begin, size in rows[is_cold, :3].tolist():
@@ -238,7 +234,7 @@ def _note_cold(found: Contents, data: Bytes, rows: walk.Rows) -> None:
             found.metadata.append(Metadata.read(stream))
 
 
-def _note_chunk(found: Contents, data: Bytes, offset: int) -> None:
+def _note_chunk(found: Contents, data: layouts.Bytes, offset: int) -> None:
     rows, _ = walk.walk(data, 0, len(data))
     _note_cold(found, data, rows)
     messages = rows[rows[:, walk.OPCODE] == Opcode.MESSAGE]

@@ -5,9 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from teleop_core.bags.layouts import layout
-from teleop_core.bags.messages import read_reports
-from teleop_core.bags.reader import Bag, TopicInfo
+from teleop_core.bags import layouts, messages, reader
 from teleop_core.bags.reports import Report
 from teleop_core.bags.series import Series
 from teleop_core.base.errors import RecordingError
@@ -17,7 +15,7 @@ Message = tuple[int, bytes]
 """Log time [ns] and CDR bytes."""
 
 
-class MemoryBag(Bag):
+class MemoryBag(reader.Bag):
     """Recording held in arrays.
 
     Args:
@@ -43,7 +41,7 @@ class MemoryBag(Bag):
         self._reports = {topic.name: found for topic, found in reports.items()}
         counts = {topic: len(found) for topic, found in series.items()}
         counts |= {topic: len(found) for topic, found in reports.items()}
-        self.topics = {t.name: TopicInfo(t.kind.ros_type, n) for t, n in counts.items()}
+        self.topics = {t.name: reader.TopicInfo(t.kind.ros_type, n) for t, n in counts.items()}
         logs = [found.log_ns for found in series.values() if len(found)]
         if not logs:
             raise RecordingError(self.path, "holds no messages; record it again")
@@ -70,7 +68,7 @@ class MemoryBag(Bag):
         """As of any recording."""
         self.require([topic])
         name = topic.name if isinstance(topic, Topic) else topic.strip("/")
-        return [one for _, data in self._reports.get(name, ()) for one in read_reports(data)]
+        return [one for _, data in self._reports.get(name, ()) for one in messages.read_reports(data)]
 
     def raw(self, topics: Iterable[Topic | str] | None = None) -> Iterator[tuple[str, str, int, bytes]]:
         """As of any recording; the bytes are made as they are asked for."""
@@ -86,7 +84,7 @@ class MemoryBag(Bag):
                 yield name, Kind.REPORT.ros_type, log_ns, data
             if (topic := by_name.get(name)) is not None:
                 series = self._series[name]
-                form = layout(topic, series.names)
+                form = layouts.layout(topic, series.names)
                 for i in range(len(series)):
                     data = form.encode_one(int(series.stamp_ns[i]), series.values[i])
                     yield name, topic.kind.ros_type, int(series.log_ns[i]), data

@@ -75,8 +75,7 @@ def read_values(
     Args:
         kind: What the values are.
         message: From rclpy, or deserialised by rosbags.
-        joint_names: Wanted order of the joints; others in the message are left out. Empty takes
-            them as they come.
+        joint_names: Wanted order of the joints; others in the message are left out. Empty takes them as they come.
         buttons: Which buttons of the message are clutch, fixture and mode; -1: it has none.
 
     Returns:

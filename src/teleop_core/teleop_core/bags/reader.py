@@ -13,14 +13,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from teleop_core.bags.finding import mcap_files
-from teleop_core.bags.mcap_source import McapSource, Records
-from teleop_core.bags.messages import Refusal, Report, read_reports
+from teleop_core.bags import finding, mcap_source, messages, writer
 from teleop_core.bags.recovery import recover
 from teleop_core.bags.series import Column, Series, join, kind_of
-from teleop_core.bags.writer import METADATA_NAME
-from teleop_core.base.errors import RecordingError, TeleopWarning
-from teleop_core.base.texts import printable
+from teleop_core.base import RecordingError, TeleopWarning, printable
 from teleop_core.graph.topics import Kind, Topic
 
 
@@ -30,14 +26,14 @@ class _Message(NamedTuple):
     channel: int
     begin: int
     end: int
-    records: Records
+    records: mcap_source.Records
 
 
 _log_time = itemgetter(0)
 _order = itemgetter(0, 1)
 
 
-def in_order(source: McapSource, channels: frozenset[int]) -> Iterator[tuple[int, int, bytes]]:
+def in_order(source: mcap_source.McapSource, channels: frozenset[int]) -> Iterator[tuple[int, int, bytes]]:
     """Channel, log time [ns] and CDR bytes of messages; equal times in the order of the file.
 
     Chunks may overlap in time: a message is held back until no later chunk can precede it.
@@ -59,7 +55,7 @@ def in_order(source: McapSource, channels: frozenset[int]) -> Iterator[tuple[int
         del waiting[:ready]
 
 
-def _messages(place: int, records: Records, channels: frozenset[int]) -> Iterator[_Message]:
+def _messages(place: int, records: mcap_source.Records, channels: frozenset[int]) -> Iterator[_Message]:
     own = np.flatnonzero(np.isin(records.channel, list(channels)))
     ends = (records.begin + records.size)[own]
     columns = (records.log_ns[own], records.channel[own], records.begin[own], ends)
@@ -85,7 +81,7 @@ def _name(topic: Topic | str) -> str:
     return topic.name if isinstance(topic, Topic) else printable(topic.removeprefix("/"))
 
 
-def _begin_ns(source: McapSource) -> int:
+def _begin_ns(source: mcap_source.McapSource) -> int:
     """First log time of a file [ns]; an index may list files in another order than that of time."""
     return min((place.start_ns for place in source.contents.places), default=0)
 
@@ -112,8 +108,8 @@ class Bag:
     def __init__(self, path: Path | str) -> None:
         self.path = Path(path)
         # Of each file the channels of each topic; several publishers may have made several.
-        self._numbers: dict[McapSource, dict[str, list[int]]] = {
-            source: {} for source in sorted(map(McapSource, mcap_files(self.path)), key=_begin_ns)
+        self._numbers: dict[mcap_source.McapSource, dict[str, list[int]]] = {
+            source: {} for source in sorted(map(mcap_source.McapSource, finding.mcap_files(self.path)), key=_begin_ns)
         }
         counts: Counter[str] = Counter()
         types: dict[str, str] = {}
@@ -129,7 +125,7 @@ class Bag:
                 types[name] = printable(schema.name) if schema else ""
                 self.is_ros1 |= channel.message_encoding == "ros1"
             for record in found.metadata:
-                if record.name == METADATA_NAME:
+                if record.name == writer.METADATA_NAME:
                     self.metadata |= {n: printable(text) for n, text in record.metadata.items()}
         self.topics = {name: TopicInfo(types[name], counts[name]) for name in types}
         places = [place for source in self._numbers for place in source.contents.places]
@@ -228,7 +224,7 @@ class Bag:
             for note in column.notes():
                 warnings.warn(f"{self.path.name}: {note}", TeleopWarning, stacklevel=4)
 
-    def _records(self, names: Iterable[str]) -> Iterator[tuple[McapSource, Records]]:
+    def _records(self, names: Iterable[str]) -> Iterator[tuple[mcap_source.McapSource, mcap_source.Records]]:
         for source, channels in self._numbers.items():
             numbers = {number for name in names for number in channels.get(name, [])}
             places = [place for place in source.contents.places if place.channels is None or place.channels & numbers]
@@ -237,22 +233,22 @@ class Bag:
 
     # -- single messages -------------------------------------------------------------------------
 
-    def reports(self, topic: Topic | str) -> list[Report]:
+    def reports(self, topic: Topic | str) -> list[messages.Report]:
         """All reports of a topic.
 
         Raises:
             RecordingError: The topic is missing or carries something else.
         """
         self.require([topic])
-        out: list[Report] = []
+        out: list[messages.Report] = []
         left_out = 0
         for _, _, _, data in self.raw([topic]):
             try:
-                out += read_reports(data)
+                out += messages.read_reports(data)
             except ValueError:
                 left_out += 1
         if left_out:
-            note = f"{_name(topic)}: {left_out} messages, each {Refusal.MALFORMED.value}"
+            note = f"{_name(topic)}: {left_out} messages, each {messages.Refusal.MALFORMED.value}"
             if not out:
                 raise RecordingError(self.path, f"has nothing to read: {note}")
             warnings.warn(f"{self.path.name}: left out of {note}", TeleopWarning, stacklevel=2)

@@ -4,9 +4,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from teleop_core.bags import compression
-from teleop_core.base.errors import ParameterError, UnknownNameError
-from teleop_core.base.parameters import parameter
-from teleop_core.graph.stage import Stage
+from teleop_core.base import ParameterError, UnknownNameError, parameter
+from teleop_core.graph import Stage
 from teleop_core.graph.topics import BY_NAME, Kind, Quality, Stamp, Topic
 
 

@@ -5,10 +5,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from teleop_core.bags import compression, rosbag2
-from teleop_core.bags.chunks import HEADER, Chunk
-from teleop_core.bags.mcap_file import McapFile
-from teleop_core.bags.mcap_source import McapSource, Records
+from teleop_core.bags import chunks, compression, mcap_file, mcap_source, rosbag2
 from teleop_core.base.errors import RecordingError
 
 
@@ -26,7 +23,7 @@ def recover(path: Path | str, out: Path | str | None = None) -> tuple[Path, int]
         RecordingError: There is nothing to recover, or the new directory exists or is not writable.
     """
     path = Path(path)
-    source = McapSource(_only_file(path), is_whole=False)
+    source = mcap_source.McapSource(_only_file(path), is_whole=False)
     found = source.contents
     if not found.places:
         raise RecordingError(path, "holds no whole chunk of messages; nothing can be recovered")
@@ -45,10 +42,10 @@ def _only_file(path: Path) -> Path:
     return files[0]
 
 
-def _copy(source: McapSource, target: Path) -> int:
+def _copy(source: mcap_source.McapSource, target: Path) -> int:
     found = source.contents
     schemas, channels = list(found.schemas.values()), list(found.channels.values())
-    file = McapFile(
+    file = mcap_file.McapFile(
         target,
         schemas,
         channels,
@@ -70,11 +67,11 @@ def _copy(source: McapSource, target: Path) -> int:
     return int(statistics.message_count)
 
 
-def _chunk(records: Records, chosen: NDArray[np.bool_]) -> Chunk:
+def _chunk(records: mcap_source.Records, chosen: NDArray[np.bool_]) -> chunks.Chunk:
     """The chosen messages in the same order, with an index."""
     channels, log_ns = records.channel[chosen], records.log_ns[chosen]
-    begins, sizes = records.begin[chosen] - HEADER.size, records.size[chosen] + HEADER.size
+    begins, sizes = records.begin[chosen] - chunks.HEADER.size, records.size[chosen] + chunks.HEADER.size
     pieces = [records.data[b : b + n] for b, n in zip(begins.tolist(), sizes.tolist(), strict=True)]
     entries = np.column_stack((log_ns, np.cumsum(sizes) - sizes)).astype("<u8")
     index = {number: entries[channels == number] for number in np.unique(channels).tolist()}
-    return Chunk(np.concatenate(pieces), int(log_ns.min()), int(log_ns.max()), index)
+    return chunks.Chunk(np.concatenate(pieces), int(log_ns.min()), int(log_ns.max()), index)

@@ -3,8 +3,7 @@
 from collections.abc import Mapping
 from typing import NamedTuple
 
-from teleop_core.bags import ros_types
-from teleop_core.bags.layouts import SECOND_NS
+from teleop_core.bags import layouts, ros_types
 from teleop_core.base.texts import printable
 from teleop_core.graph.topics import Kind
 
@@ -33,7 +32,7 @@ def report(stamp_ns: int, name: str, level: int, message: str, values: Mapping[s
     types = ros_types.typestore().types
     pairs = [types["diagnostic_msgs/msg/KeyValue"](key, text) for key, text in values.items()]
     status = types["diagnostic_msgs/msg/DiagnosticStatus"](level, name, message, hardware, pairs)
-    time = types["builtin_interfaces/msg/Time"](*divmod(stamp_ns, SECOND_NS))
+    time = types["builtin_interfaces/msg/Time"](*divmod(stamp_ns, layouts.SECOND_NS))
     header = types["std_msgs/msg/Header"](time, "")
     return ros_types.serialise(types[Kind.REPORT.ros_type](header, [status]))
 
@@ -46,7 +45,7 @@ def read_reports(data: bytes) -> list[Report]:
     """
     array = ros_types.deserialise(data, Kind.REPORT.ros_type)
     stamp = array.header.stamp
-    stamp_ns = stamp.sec * SECOND_NS + stamp.nanosec
+    stamp_ns = stamp.sec * layouts.SECOND_NS + stamp.nanosec
     return [
         Report(
             stamp_ns,

@@ -10,8 +10,7 @@ from typing import Any
 from mcap.records import Channel, Schema, Statistics
 
 from teleop_core.bags import ros_types
-from teleop_core.base import plain_yaml
-from teleop_core.base.errors import RecordingError
+from teleop_core.base import RecordingError, plain_yaml
 from teleop_core.graph.topics import Quality, Topic
 
 VERSION = 9

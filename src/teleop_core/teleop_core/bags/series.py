@@ -7,10 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from teleop_core.bags import ros_types
+from teleop_core.bags import messages, ros_types, walk
 from teleop_core.bags.layouts import Bytes, Layout, Stamps, Values, discover, frame_of
-from teleop_core.bags.messages import Refusal, read_any
-from teleop_core.bags.walk import gather
 from teleop_core.graph.topics import BY_NAME, Kind
 
 
@@ -85,7 +83,7 @@ class Column:
         self.names: tuple[str, ...] = ()
         self.frame_id = ""
         self._is_new = True
-        self.total, self.left_out, self._frames = 0, Counter[Refusal](), Counter[str]()
+        self.total, self.left_out, self._frames = 0, Counter[messages.Refusal](), Counter[str]()
 
     def read(self, data: Bytes, begins: Stamps, sizes: Stamps, log_ns: Stamps) -> Series:
         """Series of messages ``data[begins[i] : begins[i] + sizes[i]]``.
@@ -142,7 +140,7 @@ class Column:
         form = self._layout
         if form is None or not len(sizes) or sizes.min() != sizes.max() or sizes[0] < form.size:
             return None
-        rows = gather(data, begins, form.size)
+        rows = walk.gather(data, begins, form.size)
         if not form.matches(rows):
             return None
         stamps, values = form.decode(rows)
@@ -159,8 +157,8 @@ class Column:
         values: list[Values] = []
         kept: list[int] = []
         for i, (begin, size) in enumerate(zip(begins.tolist(), sizes.tolist(), strict=True)):
-            result = read_any(self.kind, bytes(data[begin : begin + size]), self.names)
-            if isinstance(result, Refusal):
+            result = messages.read_any(self.kind, bytes(data[begin : begin + size]), self.names)
+            if isinstance(result, messages.Refusal):
                 self.left_out[result] += 1
                 continue
             kept.append(i)

@@ -3,9 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from teleop_core.bags import ros_types
+from teleop_core.bags import layouts, ros_types
 from teleop_core.bags.cdr import Template
-from teleop_core.bags.layouts import SECOND_NS, Bytes, Stamps
 from teleop_core.base.errors import ShapeError
 from teleop_core.graph.topics import Kind, Quality, Stamp, Topic
 from teleop_core.kernels.geometry import Array
@@ -38,12 +37,12 @@ class TransformMessages:
             cdr.string(parent)
             cdr.string(child)
             cdr.gap("d", slice(7 * index, 7 * index + 7))
-        self._template: Bytes = np.frombuffer(bytes(cdr.template), np.uint8)
+        self._template: layouts.Bytes = np.frombuffer(bytes(cdr.template), np.uint8)
         # Where the bytes of all stamps, and of all numbers, stand in a message.
         self._stamps = _places([at for at, code, *_ in cdr.gaps if code == "i"], 8)
         self._numbers = _places([at for at, code, *_ in cdr.gaps if code == "d"], 56)
 
-    def encode(self, stamp_ns: Stamps, poses: Array) -> list[bytes]:
+    def encode(self, stamp_ns: layouts.Stamps, poses: Array) -> list[bytes]:
         """Messages of N times.
 
         Args:
@@ -57,8 +56,8 @@ class TransformMessages:
             raise ShapeError("poses", (len(stamp_ns), len(self.frames), 7), poses.shape)
         rows = np.empty((len(stamp_ns), len(self._template)), np.uint8)
         rows[:] = self._template
-        seconds = stamp_ns // SECOND_NS
-        stamps = np.stack((seconds, stamp_ns - seconds * SECOND_NS), axis=1).astype("<u4")
+        seconds = stamp_ns // layouts.SECOND_NS
+        stamps = np.stack((seconds, stamp_ns - seconds * layouts.SECOND_NS), axis=1).astype("<u4")
         rows[:, self._stamps] = np.tile(stamps.view(np.uint8), len(self.frames))
         numbers = np.ascontiguousarray(poses[..., _MESSAGE_ORDER], dtype="<f8")
         rows[:, self._numbers] = numbers.reshape(len(rows), 7 * len(self.frames)).view(np.uint8)

@@ -65,9 +65,8 @@ def walk(data: Bytes, begin: int, end: int) -> tuple[Rows, int]:
         end: Where the last one ends at the latest.
 
     Returns:
-        Rows of (opcode, begin of the payload, its size, channel, log time [ns]), shape (n, 5),
-        where the payload of a message is its CDR, and other records have channel and time -1; and
-        where the last whole record ends.
+        Rows of (opcode, begin of the payload, its size, channel, log time [ns]), shape (n, 5), where the payload of a
+        message is its CDR, and other records have channel and time -1; and where the last whole record ends.
     """
     parts = []
     while True:

@@ -49,8 +49,7 @@ class BagWriter:
     Args:
         path: Directory to make.
         topics: Topics that may be written; those that the parameters deselect are passed over.
-        joint_names: Joints of the robot, in the order of the columns; with several arms those of
-            each by its namespace.
+        joint_names: Joints of the robot, in the order of the columns; with several arms those of each by its namespace.
         parameters: Which topics are recorded, at what rate and how compressed.
         compression: Takes the place of ``parameters.compression``.
         metadata: Names and texts stored with the recording: configuration, seed.

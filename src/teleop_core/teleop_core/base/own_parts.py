@@ -1,8 +1,7 @@
 """Own parts: Python files that register parts, for commands and for processes they start.
 
-A package that is installed registers its parts by entry points; a single file is named once, by
-``teleop --parts FILE.py`` or in the environment variable ``TELEOP_PARTS``, and holds for every
-process of the session.
+A package that is installed registers its parts by entry points; a single file is named once, by ``teleop --parts
+FILE.py`` or in the environment variable ``TELEOP_PARTS``, and holds for every process of the session.
 """
 
 import os

@@ -33,8 +33,7 @@ class Registry(Generic[Part]):
         kind: What a part is, in the singular, for messages: "fixture".
         kinds: The plural; the entry-point group is ``<package>.<kinds>``.
         builtin: Names to places ``module:attribute`` in the package.
-        check: Raises :class:`~teleop_core.base.errors.PartError` for what is no such part, else
-            returns it.
+        check: Raises :class:`~teleop_core.base.errors.PartError` for what is no such part, else returns it.
         trial: Tries a part that is not of the package, and raises as ``check`` does.
         package: Whose registry it is.
         others: What serves in place of a name, for messages: "FILE.urdf".

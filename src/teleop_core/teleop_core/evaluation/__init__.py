@@ -5,50 +5,40 @@ metrics, one file each in ``evaluation/metrics``; a user's own is a class below 
 is added to :data:`METRICS`, and stands in every table, page and JSON from then on.
 """
 
-from teleop_core.evaluation.accumulators import Delay, Distribution, Moments, Spread
-from teleop_core.evaluation.context import Context
-from teleop_core.evaluation.figure import Figure, line, time_axis
-from teleop_core.evaluation.metric import Key, Metric
-from teleop_core.evaluation.registry import METRICS
-from teleop_core.evaluation.rows import Row, row, spread_rows
-from teleop_core.evaluation.score import Score, Session, frame_of, key_table, keys
-from teleop_core.evaluation.scoring import evaluate, measure, scores
-from teleop_core.evaluation.traces import Envelope
-from teleop_core.evaluation.tracking import Tracked, tracked
-from teleop_core.evaluation.windows import Window
+from typing import TYPE_CHECKING
 
-__all__ = [
-    "METRICS",
-    "Context",
-    "Delay",
-    "Distribution",
-    "Envelope",
-    "Figure",
-    "Key",
-    "Metric",
-    "Moments",
-    "Row",
-    "Score",
-    "Session",
-    "Spread",
-    "Tracked",
-    "Window",
-    "evaluate",
-    "frame_of",
-    "key_table",
-    "keys",
-    "line",
-    "measure",
-    "register_metric",
-    "row",
-    "scores",
-    "spread_rows",
-    "time_axis",
-    "tracked",
-]
+import lazy_loader
 
-
-def register_metric(metric: type[Metric], *, replace: bool = False) -> type[Metric]:
-    """Add a metric under its own name for the rest of the program; see :meth:`Registry.add`."""
-    fallback = getattr(metric, "__name__", type(metric).__name__)
-    return METRICS.add(getattr(metric, "name", fallback), metric, replace=replace)
+if TYPE_CHECKING:
+    from teleop_core.evaluation.accumulators import *  # noqa: F403
+    from teleop_core.evaluation.context import *  # noqa: F403
+    from teleop_core.evaluation.figure import *  # noqa: F403
+    from teleop_core.evaluation.metric import SPREAD_MEANING as SPREAD_MEANING
+    from teleop_core.evaluation.metric import Key as Key
+    from teleop_core.evaluation.metric import Metric as Metric
+    from teleop_core.evaluation.metric import keys_of as keys_of
+    from teleop_core.evaluation.pairing import *  # noqa: F403
+    from teleop_core.evaluation.registry import *  # noqa: F403
+    from teleop_core.evaluation.rows import *  # noqa: F403
+    from teleop_core.evaluation.score import *  # noqa: F403
+    from teleop_core.evaluation.scoring import *  # noqa: F403
+    from teleop_core.evaluation.traces import *  # noqa: F403
+    from teleop_core.evaluation.tracking import *  # noqa: F403
+    from teleop_core.evaluation.windows import *  # noqa: F403
+else:  # loaded with their first use
+    _NAMES = {
+        "accumulators": ("Delay", "Distribution", "Integers", "Moments", "Spread"),
+        "context": ("Context",),
+        "figure": ("COMMAND", "DARK", "FIRST", "FIXTURE", "Figure", "MEASURED", "SECOND", "THIRD", "axis_suffix",
+            "line", "time_axis"),
+        "metric": ("Key", "Metric", "SPREAD_MEANING", "keys_of"),
+        "pairing": ("latest", "same_stamp"),
+        "registry": ("METRICS", "register_metric"),
+        "rows": ("MISSING", "Row", "error_rows", "fixed", "number", "row", "spread_rows"),
+        "score": ("Score", "Session", "frame_of", "key_table", "keys"),
+        "scoring": ("evaluate", "measure", "scores", "study"),
+        "traces": ("Envelope", "spacing_s"),
+        "tracking": ("TRACKED", "Tracked", "tracked"),
+        "windows": ("Window",),
+    }  # fmt: skip
+    __getattr__, __dir__, __all__ = lazy_loader.attach(__name__, None, _NAMES)

@@ -7,25 +7,24 @@ from numpy.typing import NDArray
 
 from teleop_core.evaluation.context import Context
 from teleop_core.evaluation.state_history import StateHistory
-from teleop_core.graph.signals import STATE
-from teleop_core.graph.topics import Limit
+from teleop_core.graph import STATE, topics
 from teleop_core.kernels.geometry import Array
 
 _STRETCHES = 20_000  # per cause; more than a screen has pixels
 _FINEST_S = 1e-3
 # Told apart without seeing red or green too; none is the colour of a curve.
 LIMIT_COLORS = {
-    Limit.JOINT: "#e8590c",
-    Limit.WORKSPACE: "#7048e8",
-    Limit.SINGULARITY: "#d6336c",
-    Limit.SPEED: "#15aabf",
+    topics.Limit.JOINT: "#e8590c",
+    topics.Limit.WORKSPACE: "#7048e8",
+    topics.Limit.SINGULARITY: "#d6336c",
+    topics.Limit.SPEED: "#15aabf",
 }
 """Colour of each cause on every page, as in CSS."""
 _COLORS = {
-    Limit.JOINT: ("joint limit", LIMIT_COLORS[Limit.JOINT]),
-    Limit.WORKSPACE: ("outside of the workspace", LIMIT_COLORS[Limit.WORKSPACE]),
-    Limit.SINGULARITY: ("near a singularity", LIMIT_COLORS[Limit.SINGULARITY]),
-    Limit.SPEED: ("speed limit", LIMIT_COLORS[Limit.SPEED]),
+    topics.Limit.JOINT: ("joint limit", LIMIT_COLORS[topics.Limit.JOINT]),
+    topics.Limit.WORKSPACE: ("outside of the workspace", LIMIT_COLORS[topics.Limit.WORKSPACE]),
+    topics.Limit.SINGULARITY: ("near a singularity", LIMIT_COLORS[topics.Limit.SINGULARITY]),
+    topics.Limit.SPEED: ("speed limit", LIMIT_COLORS[topics.Limit.SPEED]),
 }
 _CLUTCHED = ("clutched", "#adb5bd")
 
@@ -100,7 +99,7 @@ def merged(stretches: Array, count: int = _STRETCHES) -> Array:
 
 
 def _named(cause: str, history: StateHistory, is_so: NDArray[np.bool_]) -> str:
-    if cause != _COLORS[Limit.JOINT][0]:
+    if cause != _COLORS[topics.Limit.JOINT][0]:
         return cause
     joints = np.unique(history.rows[is_so, STATE["limited_joint"]])
     names = [str(int(joint) + 1) for joint in joints if joint >= 0.0]

@@ -8,8 +8,7 @@ from pathlib import Path
 from rich.console import Console
 
 from teleop_core.bags.reader import Bag
-from teleop_core.base.errors import EvaluationError
-from teleop_core.base.texts import printable
+from teleop_core.base import EvaluationError, printable
 from teleop_core.evaluation.score import Score
 from teleop_core.evaluation.score_table import score_tables
 from teleop_core.evaluation.scoring import studies

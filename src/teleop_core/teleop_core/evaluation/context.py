@@ -6,8 +6,7 @@ from typing import Protocol, TypeVar, cast
 
 from teleop_core.bags.kept_files import recorded_files, recorded_geometry
 from teleop_core.bags.reader import Bag
-from teleop_core.base.errors import EvaluationError, TeleopError
-from teleop_core.base.texts import shown
+from teleop_core.base import EvaluationError, TeleopError, shown
 from teleop_core.evaluation.origin import Origin
 from teleop_core.evaluation.state_history import StateHistory
 from teleop_core.evaluation.windows import Span, Window
@@ -90,8 +89,7 @@ class Context:
     def shared(self, kind: Callable[["Context"], Shared]) -> Shared:
         """The one accumulator of a kind, metrics included, that all metrics of a score share.
 
-        It is made when it is first asked for, gets every window once, and gets it before those
-        who asked for it.
+        It is made when it is first asked for, gets every window once, and gets it before those who asked for it.
 
         Args:
             kind: Its class, or another maker.

@@ -101,7 +101,6 @@ class Kinematics:
         return np.ones(len(self.times), np.bool_)
 
     def _parts(self, mask: Mask) -> list[slice]:
-        """Stretches of samples of the mask, without gaps."""
         edges = np.union1d(np.flatnonzero(np.diff(mask)) + 1, self._ends)
         ends = [0, *edges.tolist(), len(mask)]
         return [slice(a, b) for a, b in pairwise(ends) if b > a and mask[a]]

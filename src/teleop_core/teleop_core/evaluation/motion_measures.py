@@ -149,8 +149,7 @@ def velocity_spectrum(parts: Iterable[Array]) -> tuple[Array, Array]:
         Frequencies (129,) [Hz] and densities (129,) [m²/s]; zeros without motion.
 
     Source:
-        Welch 1967; Hann windows of :data:`SPECTRUM_SAMPLES`, half overlapping, each segment
-        without its mean.
+        Welch 1967; Hann windows of :data:`SPECTRUM_SAMPLES`, half overlapping, each segment without its mean.
     """
     total, weight = np.zeros(SPECTRUM_SAMPLES // 2 + 1), 0
     for velocity in parts:
@@ -239,8 +238,7 @@ def tremor_power(position: Array, rate: float) -> float:
         rate: Samples per second [Hz].
 
     Returns:
-        Power of the Hann-windowed spectrum in the band, without the straight line through the
-        window.
+        Power of the Hann-windowed spectrum in the band, without the straight line through the window.
     """
     count = len(position)
     window = 0.5 - 0.5 * np.cos(2.0 * np.pi * np.arange(count) / count)

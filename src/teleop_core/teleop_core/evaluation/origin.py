@@ -6,23 +6,17 @@ from functools import cached_property
 from itertools import pairwise
 from typing import Any
 
-from teleop_core.bags.arms import PLAYED_KEY
-from teleop_core.bags.reader import Bag
-from teleop_core.base import plain_yaml
-from teleop_core.base.errors import TeleopError
-from teleop_core.base.parameters import build, specs
-from teleop_core.base.texts import shown
+from teleop_core.bags import arms, reader
+from teleop_core.base import TeleopError, build, plain_yaml, shown, specs
 from teleop_core.chain.mapping.motion_scaling import MOTION_SCALING
 from teleop_core.chain.mapping.parameters import MotionScalingParameters, axis_map, tool_maps
 from teleop_core.chain.master.operator import OPERATOR
+from teleop_core.graph import HAND, SESSION, STAGES, Graph, Layer, SessionParameters, build_graph, topics
 from teleop_core.graph.former_shapes import present_layer
-from teleop_core.graph.graph import DEVICE, HAND, Graph, build_graph
-from teleop_core.graph.layers import SESSION, Layer, SessionParameters, parse_layer
-from teleop_core.graph.stage import STAGES
-from teleop_core.graph.topics import Topic
+from teleop_core.graph.graph import DEVICE
+from teleop_core.graph.layers import parse_layer
 from teleop_core.kernels.geometry import Array
-from teleop_core.slave.slave import SLAVE
-from teleop_core.slave.slave_sim import SLAVE_SIM
+from teleop_core.slave import slave, slave_sim
 
 _BEGINS = (HAND, DEVICE)
 _GRAPH = ("arms", "stages", "delays")
@@ -39,8 +33,7 @@ class Origin:
         axes: Rotation (3, 3) from the master's base to the slave's axes.
         operator: What is stored of the stage ``operator``, by names.
         interpolation: How the slave goes from command to command; None if it is not told.
-        plant: What the simulated slave was; "ideal" of versions that knew no other, None if no
-            simulator is told of.
+        plant: What the simulated slave was; "ideal" of versions that knew no other, None if no simulator is told of.
         controller: Its control law; None if it is not told.
         geometry: Settings that its robot was made with.
         lag: By how many setpoints a measured pose comes after that which it was sampled with: by
@@ -66,12 +59,12 @@ class Origin:
     begin: str = ""
 
     @cached_property
-    def chain(self) -> tuple[tuple[str, Topic], ...]:
+    def chain(self) -> tuple[tuple[str, topics.Topic], ...]:
         """Way of a master's sample to the slave: stages, each with the topic it answers with."""
         return self.graph.chain()
 
     @property
-    def streams(self) -> tuple[Topic, ...]:
+    def streams(self) -> tuple[topics.Topic, ...]:
         """Topics of an arm with one message per step."""
         return tuple(topic for topic in self.graph.streams if not topic.arm)
 
@@ -83,7 +76,7 @@ class Origin:
         return sum(link.delay for link in links if (link.topic, link.reader.stage.name) in steps)
 
     @property
-    def sources(self) -> dict[str, Topic]:
+    def sources(self) -> dict[str, topics.Topic]:
         """Topic whose stamps each passes on, by its name."""
         return {
             written.name: link.topic
@@ -98,13 +91,13 @@ class Origin:
         stages = (member.stage for member in self.graph.played(self.begin) if not member.arm)
         return frozenset(topic.name for stage in stages for topic in stage.writes)
 
-    def writer(self, topic: Topic) -> str:
+    def writer(self, topic: topics.Topic) -> str:
         """Name of the stage that writes a topic; empty if none does."""
         names = (stage.name for stage in self.graph.stages if topic in stage.writes)
         return next(names, "")
 
 
-def read_origin(bag: Bag, arm: str = "") -> Origin:
+def read_origin(bag: reader.Bag, arm: str = "") -> Origin:
     """Origin of a recording.
 
     What is missing, or cannot be built any more, is that of the built-in stages with their
@@ -115,16 +108,16 @@ def read_origin(bag: Bag, arm: str = "") -> Origin:
         arm: Name of the arm.
     """
     content = _content(bag)
-    layer, has_server = _layer(bag, content), any(_stage(name) == SLAVE.name for name in content)
+    layer, has_server = _layer(bag, content), any(_stage(name) == slave.SLAVE.name for name in content)
     return Origin(
         _graph(layer), _axes(layer, arm), _operator(layer, arm), _interpolation(layer, arm),
         _tool(layer, arm), *_slave(layer, arm), _geometry(layer, arm),
         int(has_server), _world(layer, arm), tuple(dict.fromkeys(_missing(layer, arm))),
-        begin if (begin := bag.metadata.get(PLAYED_KEY, "")) in _BEGINS else "",
+        begin if (begin := bag.metadata.get(arms.PLAYED_KEY, "")) in _BEGINS else "",
     )  # fmt: skip
 
 
-def _content(bag: Bag) -> Mapping[Any, Any]:
+def _content(bag: reader.Bag) -> Mapping[Any, Any]:
     """What is stored about stages, installed or not."""
     try:
         content = plain_yaml.parse(bag.metadata.get("configuration", ""))
@@ -137,7 +130,7 @@ def _stage(name: object) -> str:
     return str(name).rpartition("/")[2]
 
 
-def _layer(bag: Bag, content: Mapping[Any, Any]) -> Layer:
+def _layer(bag: reader.Bag, content: Mapping[Any, Any]) -> Layer:
     """What is stored about stages that are installed."""
     known = {SESSION, *STAGES}
     kept = {name: said for name, said in content.items() if _stage(name) in known}
@@ -180,13 +173,13 @@ def _said(layer: Layer, stage: str, arm: str) -> dict[str, object]:
 
 def _interpolation(layer: Layer, arm: str) -> str | None:
     """Way of the slave between commands, if it is told."""
-    said = _said(layer, SLAVE.name, arm).get("interpolation")
+    said = _said(layer, slave.SLAVE.name, arm).get("interpolation")
     return said if isinstance(said, str) else None
 
 
 def _slave(layer: Layer, arm: str) -> tuple[str | None, str | None]:
     """Plant and control law of the slave."""
-    said = _said(layer, SLAVE_SIM.name, arm)
+    said = _said(layer, slave_sim.SLAVE_SIM.name, arm)
     if not said:
         return None, None
     law = said.get("controller.kind", "pid")
@@ -194,13 +187,13 @@ def _slave(layer: Layer, arm: str) -> tuple[str | None, str | None]:
 
 
 def _geometry(layer: Layer, arm: str) -> tuple[str, ...]:
-    said = _said(layer, SLAVE_SIM.name, arm).get("geometry")
+    said = _said(layer, slave_sim.SLAVE_SIM.name, arm).get("geometry")
     return tuple(map(str, said)) if isinstance(said, list | tuple) else ()
 
 
 def _world(layer: Layer, arm: str) -> dict[str, object]:
     """Parameters of the object that the slave touches, by names without what is before them."""
-    said = _said(layer, SLAVE_SIM.name, arm).items()
+    said = _said(layer, slave_sim.SLAVE_SIM.name, arm).items()
     return {name[len(_WORLD) :]: value for name, value in said if name.startswith(_WORLD)}
 
 

@@ -20,8 +20,7 @@ POSITION_SHARE, ANGLE_FACTOR = 0.15, 1.6
 class Published:
     """Root mean square and maximum of one mode: position [mm], angles [deg].
 
-    Angles have our names, roll about x and yaw about z; the source calls them yaw and roll
-    (its eqs. 2.7.1-2.7.6).
+    Angles have our names, roll about x and yaw about z; the source calls them yaw and roll (its eqs. 2.7.1-2.7.6).
     """
 
     mode: str

@@ -7,10 +7,9 @@ through ``METRICS.add("jerk", JerkMetric)``. Every metric of the registry is in 
 import inspect
 from collections.abc import Callable, Iterable
 
-from teleop_core.base.errors import PartError
-from teleop_core.base.registry import Registry
+from teleop_core.base import PartError, Registry
 from teleop_core.evaluation.metric import Key, Metric
-from teleop_core.graph.topics import Kind, Topic
+from teleop_core.graph import topics
 
 SESSION = "session"
 """Name in JSON that no metric may have."""
@@ -46,7 +45,7 @@ def check_metric(name: str, part: object) -> type[Metric]:
 
 
 def _is_stream(topic: object) -> bool:
-    return isinstance(topic, Topic) and topic.kind is not Kind.REPORT
+    return isinstance(topic, topics.Topic) and topic.kind is not topics.Kind.REPORT
 
 
 def _takes(method: Callable[..., object] | None, count: int) -> bool:
@@ -135,3 +134,9 @@ def all_metrics(further: Iterable[type[Metric]] = ()) -> list[type[Metric]]:
             raise PartError("metric", name, "a name that is free; this one is used already")
         found[name] = check_metric(name, part)
     return list(found.values())
+
+
+def register_metric(metric: type[Metric], *, replace: bool = False) -> type[Metric]:
+    """Add a metric under its own name for the rest of the program; see :meth:`Registry.add`."""
+    fallback = getattr(metric, "__name__", type(metric).__name__)
+    return METRICS.add(getattr(metric, "name", fallback), metric, replace=replace)

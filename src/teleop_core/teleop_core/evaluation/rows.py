@@ -104,8 +104,7 @@ def summary(score: "Score") -> list[Row]:
 def side_by_side(scores: "Sequence[Score]") -> list[Line]:
     """Lines of a table of several scores; a row that a score lacks is a dash.
 
-    Lines that say nothing of any of them are left out: dashes, and delays of nothing, as in virtual
-    time.
+    Lines that say nothing of any of them are left out: dashes, and delays of nothing, as in virtual time.
     """
     found = [{_place(row): row for row in summary(score)} for score in scores]
     places = dict.fromkeys(place for rows in found for place in rows)

@@ -6,15 +6,12 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from teleop_core.bags.kept_files import recorded_files
-from teleop_core.bags.messages import Report
-from teleop_core.bags.reader import Bag
-from teleop_core.base.errors import EvaluationError, TeleopWarning
+from teleop_core.bags import kept_files, messages, reader
+from teleop_core.base import EvaluationError, TeleopWarning
 from teleop_core.chain.fixtures.reported_fixture import ReportedFixture, reported_fixture
 from teleop_core.evaluation.accumulators import Integers
 from teleop_core.evaluation.pairing import NONE, latest
-from teleop_core.graph.signals import STATE, STATE_FIELDS
-from teleop_core.graph.topics import TELEOP_STATE
+from teleop_core.graph import STATE, STATE_FIELDS, topics
 from teleop_core.kernels.geometry import Array
 
 _CENTER = slice(STATE["fixture_center_x"], STATE["fixture_center_x"] + 3)
@@ -95,7 +92,7 @@ NO_HISTORY: StateHistory = StateHistory(np.empty(0, np.int64), np.empty((0, len(
 """That of a recording without teleop/state."""
 
 
-def read_history(bag: Bag) -> StateHistory:
+def read_history(bag: reader.Bag) -> StateHistory:
     """State history of a recording; empty if it has no teleop/state.
 
     Reports of others that lack a field, or have one that is no number, are left out with a warning.
@@ -104,14 +101,14 @@ def read_history(bag: Bag) -> StateHistory:
         EvaluationError: No report can be read.
         RecordingError: The topic carries something else.
     """
-    info = bag.topics.get(TELEOP_STATE.name)
+    info = bag.topics.get(topics.TELEOP_STATE.name)
     stamps: list[int] = []
     rows: list[Array] = []
     fixtures: dict[ReportedFixture, int] = {}
     which: list[int] = []
     wrong: list[EvaluationError] = []
-    files = recorded_files(bag.metadata)
-    for report in bag.reports(TELEOP_STATE) if info is not None and info.count else ():
+    files = kept_files.recorded_files(bag.metadata)
+    for report in bag.reports(topics.TELEOP_STATE) if info is not None and info.count else ():
         try:
             row = _row(bag, report)
             fixture = reported_fixture(report.values, row[_SIZE], files)
@@ -131,15 +128,15 @@ def read_history(bag: Bag) -> StateHistory:
     return StateHistory(times[order], columns[order], told[order], tuple(fixtures))
 
 
-def _row(bag: Bag, report: Report) -> Array:
+def _row(bag: reader.Bag, report: messages.Report) -> Array:
     return np.array([_number(bag, name, report.values.get(name, _SINCE.get(name))) for name in STATE_FIELDS])
 
 
-def _number(bag: Bag, name: str, text: str | None) -> float:
+def _number(bag: reader.Bag, name: str, text: str | None) -> float:
     if text is None:
-        raise EvaluationError(f"{bag.path}: a {TELEOP_STATE.name} report lacks {name}")
+        raise EvaluationError(f"{bag.path}: a {topics.TELEOP_STATE.name} report lacks {name}")
     try:
         return float(text)
     except ValueError as error:
         reason = f"{name} is {text!r}, must be a number"
-        raise EvaluationError(f"{bag.path}: in {TELEOP_STATE.name}, {reason}") from error
+        raise EvaluationError(f"{bag.path}: in {topics.TELEOP_STATE.name}, {reason}") from error

@@ -62,8 +62,7 @@ class Envelope:
     def line(self) -> tuple[Array, Rows]:
         """Times (M,) [s] from the start and values (M, columns), through all samples or extremes.
 
-        Each stretch of a long recording gives two points, in the order in which the line rises or
-        falls there.
+        Each stretch of a long recording gives two points, in the order in which the line rises or falls there.
         """
         if self._buckets is not None:
             return self._buckets.line()

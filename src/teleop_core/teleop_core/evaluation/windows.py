@@ -1,10 +1,9 @@
 """Windows: a recording as some seconds of all topics at a time, each with what surrounds it.
 
-Samples of different topics belong together although they stand in different chunks. A window
-holds its own stretch of log time and a second of context on both sides, so that partners are found
-across its ends. A span is the stretch that is scored, all of it unless something else is wanted:
-samples count that were recorded within it. What they belong to may lie before it: the command that
-was in force when the span began, and what teleop/state had said, hold on.
+Samples of different topics belong together although they stand in different chunks. A window holds its own stretch of
+log time and a second of context on both sides, so that partners are found across its ends. A span is the stretch that
+is scored, all of it unless something else is wanted: samples count that were recorded within it. What they belong to
+may lie before it: the command that was in force when the span began, and what teleop/state had said, hold on.
 """
 
 import math
@@ -92,8 +91,7 @@ def windows(
     """Windows of a recording in the order of time; memory does not grow with its length.
 
     Raises:
-        DisorderError: A sample belongs to a window that was handed out already; :func:`whole`
-            reads such a file.
+        DisorderError: A sample belongs to a window that was handed out already; :func:`whole` reads such a file.
     """
     pending: dict[str, Series] = {}
     waiting: list[dict[str, Series]] = []

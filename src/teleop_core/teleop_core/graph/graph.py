@@ -226,7 +226,6 @@ class Graph:
                     yield Link(own, Member(stage, arm), reader, port, delay, is_late)
 
     def _source(self, reader: Stage, port: Topic) -> tuple[Stage, Topic] | None:
-        """Who writes what a stage reads at a port: the topic itself, or what replaces it."""
         found = None
         for stage in self.stages:
             for topic in stage.writes:

@@ -7,10 +7,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from teleop_core.base import plain_yaml
-from teleop_core.base.errors import TeleopError, UnknownNameError
-from teleop_core.base.parameters import Spec, parameter, specs
-from teleop_core.base.texts import LONGEST_VALUE, shown
+from teleop_core.base import Spec, TeleopError, UnknownNameError, parameter, plain_yaml, shown, specs
+from teleop_core.base.texts import LONGEST_VALUE
 from teleop_core.graph.stage import STAGES
 
 

@@ -12,13 +12,12 @@ from collections.abc import Iterable
 from typing import Any
 
 from teleop_core.graph.topics import TELEOP_STATE, Kind, Topic
-from teleop_core.kernels import kernel, records
+from teleop_core.kernels import Array, kernel, records
 from teleop_core.kernels.fields import Field
-from teleop_core.kernels.geometry import Array
 
 TICK_NS = 1_000_000
 """Control period of every stage unless a session says otherwise [ns]."""
-DT = TICK_NS / 1e9
+DT: float = TICK_NS / 1e9
 """The same in seconds."""
 
 STATE_FIELDS = TELEOP_STATE.columns

@@ -13,13 +13,11 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from teleop_core.base.errors import PartError
-from teleop_core.base.parameters import Value, specs, values_of
-from teleop_core.base.registry import Registry
+from teleop_core.base import PartError, Registry, Value, specs, values_of
 from teleop_core.graph.signals import DT, assign, make_signals
 from teleop_core.graph.topics import Topic
-from teleop_core.kernels import bound, raise_pending, records
-from teleop_core.kernels.fields import Field, Fields, fields_of
+from teleop_core.kernels import Fields, bound, fields_of, raise_pending, records
+from teleop_core.kernels.fields import Field
 
 __all__ = ["STAGES", "Runner", "RunningStage", "Stage", "joints_of", "register_stage"]
 
@@ -27,9 +25,8 @@ __all__ = ["STAGES", "Runner", "RunningStage", "Stage", "joints_of", "register_s
 class Runner(Protocol):
     """A stage at work: what virtual time and nodes need of it.
 
-    ``kernel(*arguments, signals, dt)`` makes one step from the inputs in ``signals`` to the outputs
-    there; a kernel that is compiled becomes part of the compiled tick, any other callable is
-    called from Python.
+    ``kernel(*arguments, signals, dt)`` makes one step from the inputs in ``signals`` to the outputs there; a kernel
+    that is compiled becomes part of the compiled tick, any other callable is called from Python.
     """
 
     signals: Any
@@ -91,8 +88,7 @@ class Stage:
             them.
         make: In place of ``step`` and ``state``: makes the :class:`Runner` from parameters and the
             length of a tick [s].
-        late: Those of ``reads`` that are taken as they were at the end of the last tick. A cycle
-            of stages needs one.
+        late: Those of ``reads`` that are taken as they were at the end of the last tick. A cycle of stages needs one.
         optional: Those of ``reads`` that no stage has to write; zeros where none does.
         trigger: The topic whose messages it answers, one step each; None for a stage with a clock
             of its own, which makes one step per tick.

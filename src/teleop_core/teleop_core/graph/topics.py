@@ -139,9 +139,8 @@ class Stamp:
     Attributes:
         text: The rule in words.
         of: Name of the topic whose stamp is passed on; empty where it is the time of sampling.
-        is_in_force: Whether the writer itself says which command's stamp it is, because it may
-            hold an older one. Such a stamp may come again, and is :data:`NO_COMMAND_NS` before the
-            first command.
+        is_in_force: Whether the writer itself says which command's stamp it is, because it may hold an older one. Such
+            a stamp may come again, and is :data:`NO_COMMAND_NS` before the first command.
     """
 
     text: str
@@ -150,8 +149,7 @@ class Stamp:
 
 
 NO_COMMAND_NS = 1
-"""Stamp of what is in force before the first command [ns]: older than any, but not 0, which CRTK
-reads as invalid."""
+"""Stamp of what is in force before the first command [ns]: older than any, but not 0, which CRTK reads as invalid."""
 SAMPLED = Stamp("sampling time")
 
 
@@ -320,11 +318,10 @@ ENERGY = (
     "turn_in", "turn_out", "drift_x", "drift_y", "drift_z",
     "impedance", "wave_x", "wave_y", "wave_z",
 )  # fmt: skip
-"""Numbers of a port's energies since a round began, in the slave's scale [J]: the kind of
-passivity, by its place among them; when the round began [s]; what went in and out; how much the
-other side was told that it may give, and how much it told; what is left to be given; what was kept
-from going out; what torques took in and gave out; by how much a command is held
-back [m]; of waves, their impedance [N s/m], and the integral of what was told [√W s]."""
+"""Numbers of a port's energies since a round began, in the slave's scale [J]: the kind of passivity, by its place among
+them; when the round began [s]; what went in and out; how much the other side was told that it may give, and how much it
+told; what is left to be given; what was kept from going out; what torques took in and gave out; by how much a command
+is held back [m]; of waves, their impedance [N s/m], and the integral of what was told [√W s]."""
 MASTER_ENERGY = Topic(
     "master/energy", Kind.NUMBERS, passed_on("master/measured_cp"), "master_base", columns=ENERGY, is_seldom=True
 )
@@ -378,9 +375,8 @@ SLAVE_JAW_BOARD = Topic(
     is_seldom=True,
     columns=("transferred", "dropped", "pull", *(f"{axis}{i}" for i in range(JAW_OBJECTS) for axis in "xyz")),
 )
-"""What only a simulator knows: how many objects came onto another peg, how many came to rest on
-none, and the pull of a peg on the gripped one, across [N]. Then the middle of each object [m], all
-zeros for one that is not there."""
+"""What only a simulator knows: how many objects came onto another peg, how many came to rest on none, and the pull of a
+peg on the gripped one, across [N]. Then the middle of each object [m], all zeros for one that is not there."""
 FIRST_JAW_BOARD = replace(SLAVE_JAW_BOARD, name=f"first/{SLAVE_JAW_BOARD.name}")
 """Port of the second arm at which the first one's topic arrives; see :meth:`Graph.links`."""
 FIRST_JAW_GRIP = replace(SLAVE_JAW_GRIP, name=f"first/{SLAVE_JAW_GRIP.name}")
@@ -414,14 +410,12 @@ TASK_STATE = Topic(
     ),
 )  # fmt: skip
 """What a task asks for now, and what came of it: how many goals there were, what to do at this one
-(:class:`~teleop_core.chain.tasks.Act`), where it is and how wide [m]; attempts, successes and
-errors so far; of the last attempt: the way to its goal [m], how far the tip was beyond the goal
-along it [m], the time it took [s], and what was wrong with it
-(:class:`~teleop_core.chain.tasks.Miss`); the step of the present one, where a task has several."""
+(:class:`~teleop_core.chain.tasks.Act`), where it is and how wide [m]; attempts, successes and errors so far; of the
+last attempt: the way to its goal [m], how far the tip was beyond the goal along it [m], the time it took [s], and what
+was wrong with it (:class:`~teleop_core.chain.tasks.Miss`); the step of the present one, where a task has several."""
 OPERATOR_SERVO_CP = Topic("operator/servo_cp", Kind.POSE, SAMPLED, "master_base")
-"""Where a person who is elsewhere wants the stylus, at any rate: ``operator=remote`` leads the hand
-there. Silence lets go. As ``operator/buttons`` it comes from outside: no stage writes it, and it is
-not recorded."""
+"""Where a person who is elsewhere wants the stylus, at any rate: ``operator=remote`` leads the hand there. Silence lets
+go. As ``operator/buttons`` it comes from outside: no stage writes it, and it is not recorded."""
 OPERATOR_BUTTONS = Topic("operator/buttons", Kind.BUTTONS, SAMPLED, "master_base", quality=Quality.REPORT)
 """Buttons that this person presses and releases: each message counts, so it is sent reliably."""
 DIAGNOSTICS = Topic("diagnostics", Kind.REPORT, Stamp("time of the report"), quality=Quality.REPORT)

@@ -8,11 +8,10 @@ only other kernels call it::
         for i in range(3):
             force[i] = -stiffness * position[i]
 
-It is compiled when it is first called, for the types of that call, and kept on disk. What is kept
-is thrown away when anything changes that it was made from: its file, a kernel that it calls, the
-value of a constant that either refers to, numba or this package. There is no ``fastmath`` and no
-reordering: results are the same in every way of running, and on every x86-64 processor since 2013
-with the same C library.
+It is compiled when it is first called, for the types of that call, and kept on disk. What is kept is thrown away when
+anything changes that it was made from: its file, a kernel that it calls, the value of a constant that either refers to,
+numba or this package. There is no ``fastmath`` and no reordering: results are the same in every way of running, and on
+every x86-64 processor since 2013 with the same C library.
 
 With ``NUMBA_DISABLE_JIT=1`` in the environment all kernels stay Python functions: a debugger steps
 through them, coverage counts their lines, and everything is some hundred times slower.
@@ -23,8 +22,9 @@ from collections.abc import Callable, Iterable, Mapping
 from difflib import get_close_matches
 from functools import partial
 from types import FunctionType
-from typing import Any, ParamSpec, Protocol, TypeVar, cast
+from typing import TYPE_CHECKING, Any, ParamSpec, Protocol, TypeVar, cast
 
+import lazy_loader
 import numba
 import numpy as np
 
@@ -129,8 +129,7 @@ def kernel_from_source(text: str, name: str, names: Mapping[str, object]) -> Any
     constants, is compiled once. Tracebacks show its lines.
 
     Args:
-        text: Python source that defines a function; it makes no arrays, but kernels that it calls
-            may.
+        text: Python source that defines a function; it makes no arrays, but kernels that it calls may.
         name: Name of that function.
         names: What the text refers to: kernels, constants, modules.
     """
@@ -159,7 +158,6 @@ def _executed(text: str, name: str, names: Mapping[str, object], key: str) -> Fu
 
 
 def _plain(function: Any) -> Any:
-    """Kernel of the pure-Python mode: the function itself."""
     function.py_func = function
     return function
 
@@ -197,8 +195,7 @@ def records(fields: Any, count: int = 1) -> Any:
         count: Number of records.
 
     Returns:
-        Array of :class:`~teleop_core.kernels.Record`; take ``[0]`` for one record that
-        shares its memory.
+        Array of :class:`~teleop_core.kernels.Record`; take ``[0]`` for one record that shares its memory.
     """
     return np.zeros(count, record_dtype(fields))
 
@@ -269,8 +266,7 @@ def _types(arguments: tuple[object, ...]) -> tuple[Any, ...]:
 class _Memory:
     """What compiled code asks a record for: its bytes.
 
-    NumPy answers with a description of all fields besides, anew in each call: 5 µs for a record
-    of a hundred.
+    NumPy answers with a description of all fields besides, anew in each call: 5 µs for a record of a hundred.
     """
 
     __slots__ = ("data",)
@@ -329,3 +325,20 @@ def record_dtype(fields: Any) -> np.dtype[Any]:
         fields: What :class:`numpy.dtype` takes: pairs of name and type, or a dtype.
     """
     return np.dtype((Record, np.dtype(fields)))
+
+
+if TYPE_CHECKING:
+    from teleop_core.kernels.fields import *  # noqa: F403
+    from teleop_core.kernels.geometry import *  # noqa: F403
+    from teleop_core.kernels.parts import *  # noqa: F403
+    from teleop_core.kernels.portable import *  # noqa: F403
+else:  # loaded with their first use
+    _NAMES = {
+        "fields": ("Fields", "IntegerPerJoint", "Integers", "PerJoint", "PoseRow", "Quaternion", "Vector3", "Wrench",
+            "fields_of", "record", "record_array"),
+        "geometry": ("Array", "checked_array", "is_rigid", "multiply_quaternions", "pose_from_transform", "rotation",
+            "rotations_from_quaternions", "transform", "turn_by"),
+        "parts": ("fenced", "is_whole", "numbers_of"),
+        "portable": ("arctangent", "dot", "inverse_motion", "length", "product"),
+    }  # fmt: skip
+    __getattr__ = lazy_loader.attach(__name__, None, _NAMES)[0]

@@ -22,8 +22,6 @@ from numpy.typing import NDArray
 from teleop_core.kernels import records
 from teleop_core.kernels.geometry import Array
 
-__all__ = ["Cells", "Field", "Fields", "fields_of", "record", "record_array"]
-
 Field = tuple[str, str] | tuple[str, str, tuple[int, ...]]
 """Name and type of a field, and its shape if it is an array."""
 Integers = NDArray[np.int64]
@@ -72,7 +70,7 @@ class Cells:
         self._own[name][...] = value
 
 
-R = TypeVar("R", bound=Fields)
+_R = TypeVar("_R", bound=Fields)
 
 
 def fields_of(kind: type[Fields], joints: int = 0) -> list[Field]:
@@ -97,11 +95,11 @@ def _field(name: str, hint: Any, joints: int) -> Field:
     return name, "i8" if array == Integers else "f8", sizes
 
 
-def record(kind: type[R], joints: int = 0) -> R:
+def record(kind: type[_R], joints: int = 0) -> _R:
     """One record of a kind, zero everywhere."""
-    return cast(R, records(fields_of(kind, joints))[0])
+    return cast(_R, records(fields_of(kind, joints))[0])
 
 
-def record_array(kind: type[R], count: int, joints: int = 0) -> Any:
-    """Records (count,) of a kind, zero everywhere; each is an ``R``."""
+def record_array(kind: type[_R], count: int, joints: int = 0) -> Any:
+    """Records (count,) of a kind, zero everywhere; each is one of that kind."""
     return records(fields_of(kind, joints), count)

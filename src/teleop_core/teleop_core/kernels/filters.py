@@ -9,9 +9,8 @@ def lag_step(
 ) -> float:
     """Next output of the first-order lag ``gain (s + zero) / (s + pole)`` by forward Euler.
 
-    ``c(k) = (1 - pole T) c(k-1) + gain (zero T - 1) r(k-1) + gain r(k)``. The defaults of the
-    source, 0.1 (s + 100)/(s + 10), pass slow motion unchanged and fast motion at a tenth, and lag
-    behind a ramp by 90 ms.
+    ``c(k) = (1 - pole T) c(k-1) + gain (zero T - 1) r(k-1) + gain r(k)``. The defaults of the source, 0.1 (s + 100)/(s
+    + 10), pass slow motion unchanged and fast motion at a tenth, and lag behind a ramp by 90 ms.
 
     Args:
         value: Input of this tick.

@@ -36,8 +36,7 @@ def rotation_from_quaternion(quaternion: Array, rotation: Array) -> None:
 def quaternion_from_rotation(rotation: Array, quaternion: Array) -> None:
     """Write the unit quaternion w, x, y, z (w >= 0) of a rotation matrix into ``quaternion``.
 
-    The largest of the four components is computed first, which keeps all digits for every
-    rotation (Shepperd 1978).
+    The largest of the four components is computed first, which keeps all digits for every rotation (Shepperd 1978).
     """
     r00, r11, r22 = rotation[0, 0], rotation[1, 1], rotation[2, 2]
     if r00 + r11 + r22 > 0.0:
@@ -298,8 +297,7 @@ def rotation_vectors(quaternions: Array) -> Array:
     """Turns since the first of a series of unit quaternions (N, 4), w, x, y, z.
 
     Returns:
-        Rotation vectors (N, 3) [rad] in the axes of the first. They run on beyond half a turn, up
-        to a whole one.
+        Rotation vectors (N, 3) [rad] in the axes of the first. They run on beyond half a turn, up to a whole one.
     """
     signs = np.where((quaternions[1:] * quaternions[:-1]).sum(axis=1) < 0.0, -1.0, 1.0)
     q = quaternions * np.concatenate(([1.0], np.cumprod(signs)))[:, None]

@@ -64,11 +64,10 @@ _generated: set[FunctionType] = set()
 def _roomy(function: Callable[..., Any]) -> Callable[..., Any]:
     """Function whose frame is so large that all it calls finds room beside it.
 
-    CPython keeps frames in chunks of 16 KiB. A deep compiler crosses the end of a chunk thousands
-    of times, each time with a system call. A large frame gets a large chunk, the rest of which
-    serves the frames after it. Measured on Python 3.11 without a cache, as the mean of three: the
-    kernels of rcrt1 and mma take 3.9 s of processor time with it and 4.4 s without, of which 0.17 s
-    and 0.79 s in the system.
+    CPython keeps frames in chunks of 16 KiB. A deep compiler crosses the end of a chunk thousands of times, each time
+    with a system call. A large frame gets a large chunk, the rest of which serves the frames after it. Measured on
+    Python 3.11 without a cache, as the mean of three: the kernels of rcrt1 and mma take 3.9 s of processor time with it
+    and 4.4 s without, of which 0.17 s and 0.79 s in the system.
     """
     function.__code__ = function.__code__.replace(co_stacksize=70_000)  # 560 KB of 1 MiB
     return function
@@ -173,8 +172,7 @@ def dispatcher(function: Callable[..., Any], *, is_inner: bool = False) -> Any:
 def generated_dispatcher(function: FunctionType) -> Any:
     """Kernel without a source file, whose qualified name alone says under what it is cached.
 
-    It makes no arrays: without counting who holds those that it is handed, a tick is a fifth
-    faster.
+    It makes no arrays: without counting who holds those that it is handed, a tick is a fifth faster.
     """
     _generated.add(function)
     return Dispatcher(function, targetoptions={**_OPTIONS, "_nrt": False})

@@ -1,11 +1,10 @@
 """Portable arithmetic: products, lengths and functions with the same bits on every processor.
 
-NumPy hands ``@``, ``np.dot`` and ``np.linalg`` to OpenBLAS, which adds in an order of its own on
-each processor. Most of its functions, such as ``exp`` and ``x**3``, come from vector code that
-rounds otherwise with AVX-512 than without. Whatever decides the bits of a session is computed with
-what stands here, in compiled kernels, or with NumPy's sums, ``sin``, ``cos``, ``sqrt`` and
-``hypot``, which do not differ. What is left is the C library: its sines differ from version to
-version, and on processors without fused multiply-add (before 2013).
+NumPy hands ``@``, ``np.dot`` and ``np.linalg`` to OpenBLAS, which adds in an order of its own on each processor. Most
+of its functions, such as ``exp`` and ``x**3``, come from vector code that rounds otherwise with AVX-512 than without.
+Whatever decides the bits of a session is computed with what stands here, in compiled kernels, or with NumPy's sums,
+``sin``, ``cos``, ``sqrt`` and ``hypot``, which do not differ. What is left is the C library: its sines differ from
+version to version, and on processors without fused multiply-add (before 2013).
 """
 
 import math

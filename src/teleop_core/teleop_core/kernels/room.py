@@ -1,8 +1,7 @@
 """Room: small arrays that a kernel needs only until it returns, without the cost of making one.
 
-An array of ``np.empty`` takes 0.015 µs to make and to free, and kernels that make some count the
-holders of all others too (:mod:`teleop_core.kernels.borrowing`). :func:`room` takes its memory from
-the kernel's own frame.
+An array of ``np.empty`` takes 0.015 µs to make and to free, and kernels that make some count the holders of all others
+too (:mod:`teleop_core.kernels.borrowing`). :func:`room` takes its memory from the kernel's own frame.
 """
 
 import math

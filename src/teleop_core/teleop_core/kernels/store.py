@@ -1,8 +1,7 @@
 """Store: where compiled kernels are kept for this user, by what they were made from.
 
-A kernel that one copy of a source compiled serves every other copy with the same text: a second
-clone, another environment, a fresh checkout of a test run. Old versions stay until nobody has
-asked for them for :data:`KEPT_DAYS`.
+A kernel that one copy of a source compiled serves every other copy with the same text: a second clone, another
+environment, a fresh checkout of a test run. Old versions stay until nobody has asked for them for :data:`KEPT_DAYS`.
 """
 
 import os

@@ -19,20 +19,7 @@ from rclpy.signals import SignalHandlerOptions
 
 from teleop_core.bags.background import SYSTEM, Background
 from teleop_core.graph.layers import RealTimeParameters
-from teleop_core.middleware.real_time import apply_options
-from teleop_core.middleware.ros_lifecycle import RosLifecycleNode
-from teleop_core.middleware.ros_node import RosNode
-from teleop_core.middleware.world import (
-    Executor,
-    Hooks,
-    LifecycleNode,
-    Line,
-    Listener,
-    Lock,
-    Thread,
-    World,
-    WorldEndedError,
-)
+from teleop_core.middleware import real_time, ros_lifecycle, ros_node, world
 from teleop_core.middleware.world import Node as LocalNode
 
 BAD_ARGUMENTS = (
@@ -60,13 +47,13 @@ class RosWorld:
     time_ns = staticmethod(time.time_ns)
     sleep = staticmethod(time.sleep)
     thread_ident = staticmethod(threading.get_ident)
-    take_real_time: Callable[[RealTimeParameters], list[str]] = staticmethod(apply_options)
+    take_real_time: Callable[[RealTimeParameters], list[str]] = staticmethod(real_time.apply_options)
 
-    def lock(self) -> Lock:
+    def lock(self) -> world.Lock:
         """As of :class:`~teleop_core.middleware.world.World`."""
         return threading.Lock()
 
-    def thread(self, name: str, work: Callable[[], None]) -> Thread:
+    def thread(self, name: str, work: Callable[[], None]) -> world.Thread:
         """As of :class:`~teleop_core.middleware.world.World`."""
         return threading.Thread(target=work, name=name, daemon=True)
 
@@ -74,7 +61,7 @@ class RosWorld:
         """As of :class:`~teleop_core.middleware.world.World`."""
         gc.collect()  # compiling leaves millions of objects; to look through them takes seconds
 
-    def connect(self, place: str) -> Line:
+    def connect(self, place: str) -> world.Line:
         """As of :class:`~teleop_core.middleware.world.World`."""
         line = socket.socket(socket.AF_UNIX)
         line.setblocking(False)
@@ -85,7 +72,7 @@ class RosWorld:
             raise
         return line
 
-    def listen(self, place: str) -> Listener:
+    def listen(self, place: str) -> world.Listener:
         """As of :class:`~teleop_core.middleware.world.World`."""
         return _Listener(place)
 
@@ -95,17 +82,17 @@ class RosWorld:
 
     def node(self, name: str, **options: Any) -> LocalNode:
         """As of :class:`~teleop_core.middleware.world.World`."""
-        return RosNode(Node(name, context=self._context, **options))
+        return ros_node.RosNode(Node(name, context=self._context, **options))
 
-    def lifecycle_node(self, name: str, hooks: Hooks, **options: Any) -> LifecycleNode:
+    def lifecycle_node(self, name: str, hooks: world.Hooks, **options: Any) -> world.LifecycleNode:
         """As of :class:`~teleop_core.middleware.world.World`."""
-        return RosLifecycleNode(name, hooks, **options)
+        return ros_lifecycle.RosLifecycleNode(name, hooks, **options)
 
-    def executor(self) -> Executor:
+    def executor(self) -> world.Executor:
         """As of :class:`~teleop_core.middleware.world.World`."""
         return RosExecutor(self._context)
 
-    def guest(self, domain: int | None = None) -> World:
+    def guest(self, domain: int | None = None) -> world.World:
         """As of :class:`~teleop_core.middleware.world.World`."""
         context = Context()
         context.init(args=[], domain_id=domain)
@@ -139,7 +126,7 @@ class RosExecutor:
         try:
             self._own.spin_once(timeout_sec)
         except ExternalShutdownException as error:
-            raise WorldEndedError from error
+            raise world.WorldEndedError from error
 
     def wake(self) -> None:
         """Let :meth:`spin_once` return; from any thread."""
@@ -167,7 +154,7 @@ class _Listener:
             self._own.close()
             raise
 
-    def accept(self) -> Line | None:
+    def accept(self) -> world.Line | None:
         """Next line of a process of this user; None if there is none."""
         while True:
             try:

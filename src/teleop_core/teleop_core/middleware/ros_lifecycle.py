@@ -9,8 +9,7 @@ from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from rclpy.parameter import Parameter
 
-from teleop_core.base.errors import ParameterError
-from teleop_core.base.parameters import Spec, Value
+from teleop_core.base import ParameterError, Spec, Value
 from teleop_core.middleware.ros_node import RosNode, RosPublisher, profile_of
 from teleop_core.middleware.ros_parameters import declare, plain, typed
 from teleop_core.middleware.ros_taking import Unattended

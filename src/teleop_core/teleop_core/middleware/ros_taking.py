@@ -133,8 +133,7 @@ class RosTaker:
     def lost(self) -> int:
         """Messages of all its senders that the middleware should have handed over and did not.
 
-        Those of a sender that is heard for the first time count too, which numbers do not tell.
-        A look takes 1 µs.
+        Those of a sender that is heard for the first time count too, which numbers do not tell. A look takes 1 µs.
         """
         return int(self._loss.take_event().total_count) if self._is_open else 0
 

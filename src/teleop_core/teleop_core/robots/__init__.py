@@ -1,9 +1,8 @@
 """Robots: one interface for every arm, whether built in, described by a table or your own.
 
-``load_robot("rcrt1")`` takes a name of :func:`list_robots` or the path of a Denavit-Hartenberg
-table. A table becomes a robot with ``robot_from_table({...})``; :func:`register_robot`, or the
-entry-point group ``teleop_core.robots`` of an installed package, gives a robot a name that
-``--set robot=`` takes::
+``load_robot("rcrt1")`` takes a name of :func:`list_robots` or the path of a Denavit-Hartenberg table. A table becomes a
+robot with ``robot_from_table({...})``; :func:`register_robot`, or the entry-point group ``teleop_core.robots`` of an
+installed package, gives a robot a name that ``--set robot=`` takes::
 
     from teleop_core.robots import register_robot, robot_from_table
 

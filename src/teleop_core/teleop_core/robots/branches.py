@@ -2,8 +2,7 @@
 
 import math
 
-from teleop_core.kernels import inner
-from teleop_core.kernels.geometry import Array
+from teleop_core.kernels import Array, inner
 
 SLACK = 1e-12
 """Rounding that a joint on its limit may show [rad or m]."""
@@ -67,8 +66,7 @@ def slowed(wanted: Array, seed: Array, limits: Array, q: Array) -> bool:
 def turned(angle: float, seed: float, lower: float, upper: float, is_path: bool) -> float:
     """Same angle by whole turns [rad]: next to the seed, inside the limits where one is.
 
-    In a path only the neighbour of the seed counts: a joint at its end stop stays there instead
-    of unwinding by a turn.
+    In a path only the neighbour of the seed counts: a joint at its end stop stays there instead of unwinding by a turn.
     """
     near = seed if is_path else min(max(seed, lower), upper)
     angle -= 2.0 * math.pi * math.floor((angle - near) / (2.0 * math.pi) + 0.5)

@@ -85,10 +85,9 @@ def manipulability(robot: Robot, q: object, length: float = 1.0) -> float:
 def sample_workspace(robot: Robot, count: int, rng: np.random.Generator, length: float = 1.0) -> tuple[Array, Array]:
     """Tip positions and manipulability of joint vectors drawn evenly inside the limits.
 
-    Even in the joints is not even in space: the density of points says how many postures reach a
-    place. Joints with which a robot's loops do not close in home's assembly are left out; where no
-    draw closes, as with the joints of a hand, which hold an object by no chance, all count with
-    their pose of least error.
+    Even in the joints is not even in space: the density of points says how many postures reach a place. Joints with
+    which a robot's loops do not close in home's assembly are left out; where no draw closes, as with the joints of a
+    hand, which hold an object by no chance, all count with their pose of least error.
 
     Args:
         robot: The arm.

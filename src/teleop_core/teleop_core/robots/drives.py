@@ -8,9 +8,8 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
-from teleop_core.base.errors import ParameterError, ShapeError, UnknownNameError
-from teleop_core.kernels import kernel
-from teleop_core.kernels.geometry import Array
+from teleop_core.base import ParameterError, ShapeError, UnknownNameError
+from teleop_core.kernels import Array, kernel
 from teleop_core.robots.inertias import LinkInertia, check_possible
 
 _ROW = types.float64[::1]
@@ -100,9 +99,8 @@ class Drives:
 class Dynamics:
     """Rigid-body model of a slave over its ``parameters`` row; arrays are read-only copies.
 
-    ``acceleration(q, dq, effort, parameters, ddq)`` and ``gravity(q, parameters, effort)`` write
-    their last argument (n,); both are kernels or plain Python. They take writable arrays: hand
-    them a copy of ``parameters``.
+    ``acceleration(q, dq, effort, parameters, ddq)`` and ``gravity(q, parameters, effort)`` write their last argument
+    (n,); both are kernels or plain Python. They take writable arrays: hand them a copy of ``parameters``.
 
     Args:
         acceleration: Joint accelerations under the net effort.
@@ -117,8 +115,7 @@ class Dynamics:
 
     Raises:
         ShapeError: ``parameters`` are not a vector, or there is not one frame for each link.
-        ParameterError: ``parameters`` that are not finite, or a link whose inertia no body can
-            have.
+        ParameterError: ``parameters`` that are not finite, or a link whose inertia no body can have.
     """
 
     acceleration: AccelerationKernel

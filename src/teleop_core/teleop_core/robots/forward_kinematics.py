@@ -2,18 +2,16 @@
 
 import numpy as np
 
-from teleop_core.base.errors import ClosureError, ParameterError, ShapeError
-from teleop_core.kernels import raise_pending
-from teleop_core.kernels.geometry import Array, checked_array, is_rigid
-from teleop_core.robots import kinematics
-from teleop_core.robots.arm import Arm
+from teleop_core.base import ClosureError, ParameterError, ShapeError
+from teleop_core.kernels import Array, checked_array, is_rigid, raise_pending
+from teleop_core.robots import arm, kinematics
 from teleop_core.robots.kinematics import MAX_ASSEMBLIES, SEARCH, FkBatch, FkOne, FkResult, FkStatus
 
 _NOT_CLOSED = int(FkStatus.NOT_CLOSED)
 _STATUS = tuple(FkStatus)
 
 
-def solved_one(robot: Arm, q: Array, seed: object, *, search: bool = True) -> FkOne:
+def solved_one(robot: arm.Arm, q: Array, seed: object, *, search: bool = True) -> FkOne:
     """Pose of a joint vector (n,), by the rules of :meth:`Robot.solve_fk`.
 
     Raises:
@@ -31,7 +29,7 @@ def solved_one(robot: Arm, q: Array, seed: object, *, search: bool = True) -> Fk
     return FkResult(T, _STATUS[status], float(numbers[0]), int(numbers[1]))
 
 
-def solved(robot: Arm, joints: Array, seed: object, *, search: bool = True, is_path: bool = False) -> FkBatch:
+def solved(robot: arm.Arm, joints: Array, seed: object, *, search: bool = True, is_path: bool = False) -> FkBatch:
     """Poses of joint vectors (N, n), by the rules of :meth:`Robot.solve_fk`.
 
     Raises:
@@ -62,7 +60,7 @@ def solved(robot: Arm, joints: Array, seed: object, *, search: bool = True, is_p
     return FkResult(transforms, statuses, numbers[:, 0], numbers[:, 1].astype(np.int64))
 
 
-def closed_poses(robot: Arm, joints: Array) -> Array:
+def closed_poses(robot: arm.Arm, joints: Array) -> Array:
     """Poses of joint vectors (n,) or (N, n) whose loops close.
 
     Raises:
@@ -82,7 +80,7 @@ def closed_poses(robot: Arm, joints: Array) -> Array:
     return answer.T
 
 
-def all_poses(robot: Arm, joints: Array) -> Array:
+def all_poses(robot: arm.Arm, joints: Array) -> Array:
     """All poses (k, 4, 4) of a joint vector (n,), by the rules of :meth:`Robot.fk_all`."""
     first = robot.solve_fk(joints)
     if robot.kernels.assemblies is None:

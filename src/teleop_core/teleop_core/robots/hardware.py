@@ -9,8 +9,7 @@ import numpy as np
 from teleop_core.base.errors import ParameterError, ShapeError, UnknownNameError
 from teleop_core.base.parameters import MARKS
 from teleop_core.kernels.geometry import Array
-from teleop_core.robots.drives import read_only
-from teleop_core.robots.link_errors import LinkErrors
+from teleop_core.robots import drives, link_errors
 
 NUMBERS = ("coulomb", "bias", "wander", "play")
 ENTRIES = (*NUMBERS, "coupling", "links", "dynamics", "motors")
@@ -46,14 +45,14 @@ class Hardware:
     wander: Array
     play: Array
     coupling: Array
-    links: LinkErrors | None = None
+    links: link_errors.LinkErrors | None = None
     dynamics: Array = field(default_factory=lambda: np.zeros(0))
     motors: Array = field(default_factory=lambda: np.zeros(0))
     sources: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         for name in NUMBERS:
-            array = read_only(name, getattr(self, name), np.shape(self.coulomb))
+            array = drives.read_only(name, getattr(self, name), np.shape(self.coulomb))
             if name in NOT_NEGATIVE and not (array >= 0.0).all():
                 raise ParameterError(f"hardware.{name}", array.tolist(), ">= 0 for every joint")
             object.__setattr__(self, name, array)
@@ -67,8 +66,8 @@ class Hardware:
         object.__setattr__(self, "coupling", coupling)
         if self.links is not None and self.links.n != n:
             raise ShapeError("hardware.links", n, self.links.n)
-        object.__setattr__(self, "dynamics", read_only("dynamics", self.dynamics))
-        object.__setattr__(self, "motors", read_only("motors", self.motors))
+        object.__setattr__(self, "dynamics", drives.read_only("dynamics", self.dynamics))
+        object.__setattr__(self, "motors", drives.read_only("motors", self.motors))
         self._check_sources()
 
     def _check_sources(self) -> None:

@@ -35,9 +35,8 @@ AGREED = 1e-4
 MAX_BRANCHES = 64
 # Most poses that one joint vector can have: a platform on six legs has 40 (Dietmaier 1998).
 MAX_ASSEMBLIES = 64
-# Starts of the search for an assembly where the one next to the seed does not close, and of the
-# search for all of them. Of the leg sets that have an assembly, a quarter of the starts and more
-# end in one.
+# Starts of the search for an assembly where the one next to the seed does not close, and of the search for all of them.
+# Of the leg sets that have an assembly, a quarter of the starts and more end in one.
 SEARCH, SEARCH_ALL = 64, 384
 
 
@@ -119,14 +118,13 @@ class Kernels:
     ``ik_all(T, geometry, solutions)`` fills rows of ``solutions`` (:data:`MAX_BRANCHES`, n) and
     returns how many, without regard to limits.
 
-    Robots with loops have two more. ``assemble(q, geometry, ask, T, out)`` writes the pose T, and
-    ``out`` (2,): residual and mode of :class:`FkResult`; it returns an :class:`FkStatus`. ``ask``
-    (2,) is how many starts a search may take where the assembly next to the seed does not close,
-    0 for none, and 1 if T holds the seed, 0 if home is meant: then T is what ``fk`` writes, unless
-    that does not close and the search finds another. ``assemblies(q, geometry, found)`` fills
-    ``found`` (:data:`MAX_ASSEMBLIES`, 4, 4) with all poses it finds and returns how many. ``fk``
-    itself never searches, so that it takes microseconds in a tick, and never fails: where nothing
-    closes next to home it writes the pose of least error.
+    Robots with loops have two more. ``assemble(q, geometry, ask, T, out)`` writes the pose T, and ``out`` (2,):
+    residual and mode of :class:`FkResult`; it returns an :class:`FkStatus`. ``ask`` (2,) is how many starts a search
+    may take where the assembly next to the seed does not close, 0 for none, and 1 if T holds the seed, 0 if home is
+    meant: then T is what ``fk`` writes, unless that does not close and the search finds another. ``assemblies(q,
+    geometry, found)`` fills ``found`` (:data:`MAX_ASSEMBLIES`, 4, 4) with all poses it finds and returns how many.
+    ``fk`` itself never searches, so that it takes microseconds in a tick, and never fails: where nothing closes next to
+    home it writes the pose of least error.
 
     Shapes: ``q`` and ``seed`` (n,), ``T`` (4, 4), ``J`` (6, n), ``residual`` (2,), all float64 in
     C order and writable: for read-only arrays numba would compile a second time.

@@ -1,23 +1,20 @@
 """Link errors: how a built arm differs from its drawing, as deltas of Denavit-Hartenberg numbers.
 
-Link i of a chain is T_i = Rz(theta) Tz(d) Tx(a) Rx(alpha), the standard convention. A built arm has
-theta + its error of theta and so on; joint offsets are errors of theta on turning and of d on
-sliding joints. :func:`~teleop_core.robots.arms.as_chain.true_chain` gives the geometry row of the
-arm as built, on which :func:`teleop_core.robots.chains.dh_kernels.fk` says where its tip really
-is::
+Link i of a chain is T_i = Rz(theta) Tz(d) Tx(a) Rx(alpha), the standard convention. A built arm has theta + its error
+of theta and so on; joint offsets are errors of theta on turning and of d on sliding joints.
+:func:`~teleop_core.robots.arms.as_chain.true_chain` gives the geometry row of the arm as built, on which
+:func:`teleop_core.robots.chains.dh_kernels.fk` says where its tip really is::
 
     errors = LinkErrors.of(robot, {"d3": 5.5e-3})
     dh_kernels.fk(q, true_chain(robot, errors), T_base_tip)
 
-Arms described in other conventions are brought to this one: every pair of successive axes has a
-common normal, along which a is measured, pointing to the later axis. Where axes are parallel it is
-any of them; the small turn of the later axis out of the plane of both is then no error of the four
-numbers (Hayati and Mirmirani 1985). A pair of nearly parallel axes can be built in a way that they
-do not describe.
+Arms described in other conventions are brought to this one: every pair of successive axes has a common normal, along
+which a is measured, pointing to the later axis. Where axes are parallel it is any of them; the small turn of the later
+axis out of the plane of both is then no error of the four numbers (Hayati and Mirmirani 1985). A pair of nearly
+parallel axes can be built in a way that they do not describe.
 
 Source:
-    Denavit and Hartenberg 1955; Mooring, Roth and Driels 1991, Fundamentals of manipulator
-    calibration.
+    Denavit and Hartenberg 1955; Mooring, Roth and Driels 1991, Fundamentals of manipulator calibration.
 """
 
 import math
@@ -27,11 +24,9 @@ from functools import reduce
 
 import numpy as np
 
-from teleop_core.base.errors import ParameterError, UnknownNameError
-from teleop_core.kernels.geometry import Array, rotation, transform
-from teleop_core.kernels.portable import inverse_motion, product
-from teleop_core.robots.arm import Arm
-from teleop_core.robots.drives import read_only
+from teleop_core.base import ParameterError, UnknownNameError
+from teleop_core.kernels import Array, inverse_motion, product, rotation, transform
+from teleop_core.robots import arm, drives
 
 SYMBOLS = ("a", "alpha", "d", "theta")
 """Kinds of errors, in the order of every vector of them: a1 ... an, alpha1 ... thetan."""
@@ -62,7 +57,7 @@ class LinkErrors:
 
     def __post_init__(self) -> None:
         for name in SYMBOLS:
-            values = read_only(name, getattr(self, name), np.shape(self.a))
+            values = drives.read_only(name, getattr(self, name), np.shape(self.a))
             object.__setattr__(self, name, values)
 
     @property
@@ -92,7 +87,7 @@ class LinkErrors:
         return LinkErrors.from_vector(np.zeros(4 * n))
 
     @staticmethod
-    def of(robot: Arm, given: Mapping[str, float]) -> "LinkErrors":
+    def of(robot: arm.Arm, given: Mapping[str, float]) -> "LinkErrors":
         """Errors by name, such as ``{"d3": 5.5e-3}``; all others are zero.
 
         Raises:

@@ -8,9 +8,8 @@ from typing import Protocol, TypeAlias, TypeVar, runtime_checkable
 
 import numpy as np
 
-from teleop_core.base.errors import ParameterError, PartError, TeleopError, UnknownNameError
+from teleop_core.base import ParameterError, PartError, Registry, TeleopError, UnknownNameError
 from teleop_core.base.ranges import MOST_OF_ARM, check
-from teleop_core.base.registry import Registry
 from teleop_core.robots.robot import Robot
 
 _BUILT_IN = {"rcrt1": "arms.rcrt1:make"} | {

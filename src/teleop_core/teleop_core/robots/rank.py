@@ -1,9 +1,8 @@
 """Rank: in how many directions a tip can move at once, and which of them to control.
 
-An arm of five joints cannot hold every pose: asked for all six directions it follows none of them
-well. Of the sets of directions that it can move in at once, those count that hold most of the
-position. Of these the one is taken in which the worst direction needs the least motion of the
-joints, in the median of postures spread evenly over the limits.
+An arm of five joints cannot hold every pose: asked for all six directions it follows none of them well. Of the sets of
+directions that it can move in at once, those count that hold most of the position. Of these the one is taken in which
+the worst direction needs the least motion of the joints, in the median of postures spread evenly over the limits.
 """
 
 from itertools import combinations
@@ -12,9 +11,8 @@ from typing import NamedTuple
 import numpy as np
 
 from teleop_core.kernels.geometry import Array
-from teleop_core.robots.arm import Arm
+from teleop_core.robots import arm, room
 from teleop_core.robots.kinematics import DIRECTIONS
-from teleop_core.robots.room import samples
 
 _POSTURES, _FEW = 128, 4
 _NONE = 1e-6  # singular value, over the lever, of a direction in which the tip cannot move
@@ -28,7 +26,7 @@ class Directions(NamedTuple):
     best: tuple[str, ...]
 
 
-def directions_of(robot: Arm, lever: float) -> Directions:
+def directions_of(robot: arm.Arm, lever: float) -> Directions:
     """Directions that a robot can control, of all six: it may control fewer.
 
     Args:
@@ -38,7 +36,7 @@ def directions_of(robot: Arm, lever: float) -> Directions:
     Source:
         The least singular value as a measure of dexterity: Klein and Blaho 1987, IJRR 6(2).
     """
-    postures = samples(robot)[:_POSTURES]
+    postures = room.samples(robot)[:_POSTURES]
     if _rank(_jacobians(robot, postures[:_FEW], lever)) == len(DIRECTIONS):
         return Directions(len(DIRECTIONS), DIRECTIONS)
     jacobians = _jacobians(robot, postures, lever)
@@ -59,7 +57,7 @@ def _rank(jacobians: Array) -> int:
     return int((np.linalg.svd(jacobians, compute_uv=False) > _NONE).sum(axis=1).max())
 
 
-def _jacobians(robot: Arm, postures: Array, lever: float) -> Array:
+def _jacobians(robot: arm.Arm, postures: Array, lever: float) -> Array:
     """Jacobians (k, 6, n) at postures (k, n), with linear rows over the lever."""
     found, row = np.empty((len(postures), 6, robot.n)), robot.geometry_row
     for q, jacobian in zip(postures, found, strict=True):

@@ -9,11 +9,9 @@ from typing import TYPE_CHECKING, cast, overload
 
 import numpy as np
 
-from teleop_core.base.errors import ParameterError, ShapeError, UnknownNameError
-from teleop_core.kernels import direct, pointer, raise_pending
-from teleop_core.kernels.geometry import Array, checked_array, is_rigid
-from teleop_core.kernels.portable import product
-from teleop_core.robots import description, forward_kinematics, kinematics
+from teleop_core.base import ParameterError, ShapeError, UnknownNameError
+from teleop_core.kernels import Array, checked_array, direct, is_rigid, pointer, product, raise_pending
+from teleop_core.robots import description, forward_kinematics, kinematics, room
 from teleop_core.robots.drives import Drives, Dynamics, independent_axes, read_only
 from teleop_core.robots.hardware import Hardware
 from teleop_core.robots.kinematics import (
@@ -33,7 +31,6 @@ from teleop_core.robots.kinematics import (
     WriteKernel,
     is_ready,
 )
-from teleop_core.robots.room import start_of
 
 if TYPE_CHECKING:
     from teleop_core.robots.bodies.body import Bodies
@@ -51,7 +48,7 @@ class _Start:
         if robot is None:
             return None  # the field's default
         if robot.__dict__["start"] is None:
-            posture = read_only("start", start_of(robot), (robot.n,))
+            posture = read_only("start", room.start_of(robot), (robot.n,))
             robot.__dict__["start"] = posture
         return cast("Array", robot.__dict__["start"])
 
@@ -73,11 +70,9 @@ class Robot:
         home: Joint vector (n,) of the published or natural zero, inside the limits.
         home_is_assumed: Whether nobody says that home is a posture to work from: the zero of a
             URDF, at which many arms are stretched out. No session starts there.
-        start: Joint vector (n,) at which a session starts, inside the limits; None for one with
-            room in all directions (:func:`teleop_core.robots.room.start_posture`), looked for
-            when it is first asked for.
-        geometry: Symbols and their values [m, rad], in the order the kernels expect if there is no
-            row.
+        start: Joint vector (n,) at which a session starts, inside the limits; None for one with room in all directions
+            (:func:`teleop_core.robots.room.start_posture`), looked for when it is first asked for.
+        geometry: Symbols and their values [m, rad], in the order the kernels expect if there is no row.
         kernels: Compiled functions.
         row: Numbers that the kernels take (k,); None for the values of the geometry.
         drives: Drive table, None for robots that are not used as slaves.
@@ -311,8 +306,7 @@ class Robot:
             q: Joint vector (n,) [rad, m].
 
         Returns:
-            (6, n): linear velocity of the tip point [m/s], then angular velocity [rad/s], per
-            unit joint speed.
+            (6, n): linear velocity of the tip point [m/s], then angular velocity [rad/s], per unit joint speed.
 
         Raises:
             ShapeError: Another shape.

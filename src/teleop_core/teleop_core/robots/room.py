@@ -1,9 +1,8 @@
 """Room: how far the tip can go in every direction, and the posture a slave starts from.
 
-The tip is walked away from a posture along 26 directions, and turned about as many axes, in small
-steps, as the hand will move it. A direction ends where a joint limit ends it, and where the arm
-comes beside a singularity: there a joint has to move :data:`SWIFT` times as far as the tool. What
-is left in the worst direction is the room there.
+The tip is walked away from a posture along 26 directions, and turned about as many axes, in small steps, as the hand
+will move it. A direction ends where a joint limit ends it, and where the arm comes beside a singularity: there a joint
+has to move :data:`SWIFT` times as far as the tool. What is left in the worst direction is the room there.
 """
 
 import itertools
@@ -13,11 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from teleop_core.kernels import raise_pending
-from teleop_core.kernels.geometry import Array, rotations_from_quaternions
-from teleop_core.kernels.portable import length, product
-from teleop_core.robots import kinematics
-from teleop_core.robots.arm import Arm
+from teleop_core.kernels import Array, length, product, raise_pending, rotations_from_quaternions
+from teleop_core.robots import arm, kinematics
 from teleop_core.robots.kinematics import IkStatus
 
 # One step of the walk turns the tool so far [rad], or takes it as far as a lever of reach/pi would.
@@ -46,7 +42,7 @@ class Room(NamedTuple):
     """Turn about the tip in place; inf if no rotation is controlled."""
 
 
-def room(robot: Arm, q: object) -> Room:
+def room(robot: arm.Arm, q: object) -> Room:
     """How far the tip can go from a posture in every direction.
 
     Args:
@@ -65,16 +61,15 @@ def room(robot: Arm, q: object) -> Room:
     return Room(float(moves[0]) * STEP * lever(robot), float(turns[0]) * STEP)
 
 
-def lever(robot: Arm) -> float:
+def lever(robot: arm.Arm) -> float:
     """Distance [m] that counts as much as a radian: reach/pi.
 
-    The reach is the largest distance of the tip from the base's origin over the postures that are
-    looked at.
+    The reach is the largest distance of the tip from the base's origin over the postures that are looked at.
     """
     return float(length(_poses(robot, samples(robot))[:, :3, 3]).max()) / math.pi
 
 
-def samples(robot: Arm) -> Array:
+def samples(robot: arm.Arm) -> Array:
     """Joint vectors (:data:`SAMPLES`, n) spread evenly inside the limits, the same every time.
 
     Source:
@@ -88,7 +83,7 @@ def samples(robot: Arm) -> Array:
     return robot.lower + (shares % 1.0) * (robot.upper - robot.lower)
 
 
-def start_of(robot: Arm) -> Array:
+def start_of(robot: arm.Arm) -> Array:
     """:func:`start_posture`, looked for once per program for robots that are alike."""
     arrays = (robot.lower, robot.upper, robot.home, robot.geometry_row, np.array(robot.task_mask))
     key = (robot.kernels, *(array.tobytes() for array in arrays))
@@ -97,13 +92,12 @@ def start_of(robot: Arm) -> Array:
     return _KNOWN[key]
 
 
-def start_posture(robot: Arm) -> Array:
+def start_posture(robot: arm.Arm) -> Array:
     """Posture from which the tip has room in all directions, by a rule without chance.
 
-    Home, if it has room enough: a turn by 30 degrees and a move by reach/15. Else of the
-    postures looked at that hold the tool as home does, where some can turn and move by 30
-    degrees, or else of all, those within :data:`EQUAL` of the most room; of these the one nearest
-    to home, by the largest share of a joint's range.
+    Home, if it has room enough: a turn by 30 degrees and a move by reach/15. Else of the postures looked at that hold
+    the tool as home does, where some can turn and move by 30 degrees, or else of all, those within :data:`EQUAL` of the
+    most room; of these the one nearest to home, by the largest share of a joint's range.
 
     Args:
         robot: The arm.
@@ -128,7 +122,7 @@ def start_posture(robot: Arm) -> Array:
     return np.asarray(good[int(away.argmin())])
 
 
-def roomy_postures(robot: Arm, count: int) -> Array:
+def roomy_postures(robot: arm.Arm, count: int) -> Array:
     """Postures with room all around, the start first, then those looked at with the most room.
 
     Args:
@@ -145,12 +139,12 @@ def roomy_postures(robot: Arm, count: int) -> Array:
     return np.vstack((robot.start, wide[: count - 1]))
 
 
-def _poses(robot: Arm, postures: Array) -> Array:
+def _poses(robot: arm.Arm, postures: Array) -> Array:
     """Poses (N, 4, 4) next to home, of least error where joints spread evenly do not assemble."""
     return robot.solve_fk_batch(postures, search=False).T
 
 
-def _steps(robot: Arm, postures: Array) -> tuple[Array, Array]:
+def _steps(robot: arm.Arm, postures: Array) -> tuple[Array, Array]:
     """Steps (N,) that every posture has in its worst direction: of moving, of turning; or inf."""
     mask = np.array(robot.task_mask)
     return (
@@ -166,7 +160,7 @@ def _directions(controlled: NDArray[np.bool_]) -> Array:
     return kept / length(kept)[:, None]
 
 
-def _walk(robot: Arm, postures: Array, directions: Array, *, is_turn: bool) -> Array:
+def _walk(robot: arm.Arm, postures: Array, directions: Array, *, is_turn: bool) -> Array:
     """Steps (N,) that each posture has in its worst direction."""
     count, fan = len(postures), len(directions)
     if not fan:
@@ -202,7 +196,7 @@ def _moved(begin: Array, offsets: Array, is_turn: bool) -> Array:
     return poses.reshape(-1, 4, 4)
 
 
-def _solve(robot: Arm, poses: Array, seeds: Array, limits: Array) -> tuple[Array, NDArray[np.int64]]:
+def _solve(robot: arm.Arm, poses: Array, seeds: Array, limits: Array) -> tuple[Array, NDArray[np.int64]]:
     q, residual = np.empty_like(seeds), np.empty((len(seeds), 2))
     status = np.zeros(len(seeds), np.int64)
     kinematics.ik_batch(robot.ik_pointer, poses, seeds, False, limits, robot.geometry_row, q, residual, status)

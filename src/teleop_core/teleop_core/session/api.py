@@ -18,21 +18,17 @@ from numpy.typing import NDArray
 
 from teleop_core.bags.memory import MemoryBag, Message
 from teleop_core.bags.series import Series
-from teleop_core.base.errors import ParameterError, TeleopError, TeleopWarning
+from teleop_core.base import ParameterError, TeleopError, TeleopWarning
 from teleop_core.chain.operators import OPERATORS, Motion, Operator, following
-from teleop_core.graph.graph import DEVICE, HAND
-from teleop_core.graph.layers import SESSION, Layer, config_folder, load_file, parse_setting, scenario_file, setting
-from teleop_core.graph.stage import STAGES, Stage
-from teleop_core.graph.topics import Topic
+from teleop_core.graph import HAND, SESSION, STAGES, Layer, Stage, config_folder, topics
+from teleop_core.graph.graph import DEVICE
+from teleop_core.graph.layers import load_file, parse_setting, scenario_file, setting
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots import ROBOTS, Robot
 from teleop_core.robots.arms.dh import DhTable
-from teleop_core.session import runner
+from teleop_core.session import length, notes, runner, virtual
 from teleop_core.session.configuration import Configuration
-from teleop_core.session.length import as_long_as_followed
-from teleop_core.session.notes import notes_of
 from teleop_core.session.recording import Recording, open_recording
-from teleop_core.session.virtual import VirtualTime
 from teleop_core.shapes import SHAPES, Shape
 from teleop_core.slave.controllers import CONTROLLERS, Controller
 from teleop_core.slave.plants import PLANTS, Plant
@@ -122,7 +118,7 @@ def configuration(
     given += [setting(key, _plain(value)) for key, value in (named | dict(settings or {})).items()]
     given += [parse_setting(text) for text in texts]
     made = Configuration.from_layers([*layers, *given], scenario or "")
-    return as_long_as_followed(made, given)
+    return length.as_long_as_followed(made, given)
 
 
 def run(
@@ -185,9 +181,9 @@ def run(
             controller=controller, plant=plant, robot=robot, stages=stages, arms=arms,
             delays=delays, **parameters,
         )  # fmt: skip
-    for note in notes_of(made):
+    for note in notes.notes_of(made):
         warnings.warn(note, TeleopWarning, stacklevel=2)
-    session = VirtualTime(made)
+    session = virtual.VirtualTime(made)
     ticks = runner.session_ticks(made, session)
     return _kept(session, made, runner.run_blocks(session, ticks), ticks, out, progress)
 
@@ -209,8 +205,7 @@ def replay(
 ) -> Recording:
     """Run the recorded masters of a session through the graph again, in virtual time.
 
-    Without changes a recording of virtual time gives the same slave motion, bit for bit, wherever
-    it begins.
+    Without changes a recording of virtual time gives the same slave motion, bit for bit, wherever it begins.
 
     Args:
         recording: What was recorded; its own configuration is the start.
@@ -237,20 +232,19 @@ def replay(
     made = Configuration.from_layers(layers, scenario)
     if begin not in _BEGINS:
         raise ParameterError("begin", begin, " or ".join(_BEGINS))
-    session = VirtualTime(made, played=_BEGINS[begin])
+    session = virtual.VirtualTime(made, played=_BEGINS[begin])
     blocks, ticks = runner.replayed_blocks(session, bag)
     return _kept(session, made, blocks, ticks, out, progress)
 
 
 def _kept(
-    session: VirtualTime,
+    session: virtual.VirtualTime,
     made: Configuration,
     blocks: Iterable[NDArray[np.void]],
     ticks: int,
     out: Path | str | None,
     progress: Progress,
 ) -> Recording:
-    """Recording of blocks, on disk or in memory."""
     if out is not None:
         runner.record_blocks(session, made, Path(out), blocks, ticks, progress)
         return open_recording(out)
@@ -264,11 +258,11 @@ def _kept(
 class _Memory:
     """Takes blocks as a writer does."""
 
-    def __init__(self, session: VirtualTime) -> None:
+    def __init__(self, session: virtual.VirtualTime) -> None:
         self._session, self._reports = session, runner.StateReports(session)
         self._is_new = runner.NewSamples()
-        self._parts: dict[Topic, list[Sequence[NDArray[Any]]]] = {topic: [] for topic in session.graph.streams}
-        self._messages: dict[Topic, list[Message]] = {
+        self._parts: dict[topics.Topic, list[Sequence[NDArray[Any]]]] = {topic: [] for topic in session.graph.streams}
+        self._messages: dict[topics.Topic, list[Message]] = {
             topic: [] for topic in session.graph.topics if topic not in self._parts
         }
         self.ticks = 0
@@ -280,7 +274,7 @@ class _Memory:
             parts.append([np.array(part) for part in self._is_new.of(topic, block, log_ns)])
         self._reports.write(self, block)
 
-    def write(self, topic: Topic, log_ns: int, data: bytes) -> None:
+    def write(self, topic: topics.Topic, log_ns: int, data: bytes) -> None:
         """Take one message of a report."""
         self._messages[topic].append((log_ns, data))
 

@@ -1,9 +1,8 @@
 """Compose: the tick of a graph as one compiled kernel, from generated source.
 
-The source is a loop over ticks. It copies values from record to record along the links, calls the
-kernel of each stage, stamps what it wrote and copies it to the row that is recorded. Stages that
-are plain Python cut it into segments, between which they are called. What was compiled once is
-loaded from disk by every later session of the same graph.
+The source is a loop over ticks. It copies values from record to record along the links, calls the kernel of each stage,
+stamps what it wrote and copies it to the row that is recorded. Stages that are plain Python cut it into segments,
+between which they are called. What was compiled once is loaded from disk by every later session of the same graph.
 """
 
 import traceback
@@ -106,8 +105,7 @@ class Tick:
         Args:
             first_ns: Time of the first tick [ns].
             tick_ns: From tick to tick [ns].
-            samples: Recorded rows in place of stages that are played, as long as ``block``; None
-                where none is.
+            samples: Recorded rows in place of stages that are played, as long as ``block``; None where none is.
             block: Rows of :func:`block_dtype`.
 
         Raises:

@@ -5,15 +5,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from teleop_core.base.errors import ParameterError, PartError, UnknownNameError
-from teleop_core.base.parameters import build, specs, values_of
+from teleop_core.base import ParameterError, PartError, UnknownNameError, build, specs, values_of
 from teleop_core.base.plain_yaml import written
-from teleop_core.chain.architectures import ARCHITECTURES
-from teleop_core.chain.architectures.impedance import IMPEDANCE
+from teleop_core.chain.architectures import ARCHITECTURES, impedance
 from teleop_core.chain.operators import OPERATORS
 from teleop_core.chain.passivity import PASSIVITIES
 from teleop_core.chain.passivity.slave_side import PASSIVITY
-from teleop_core.graph.graph import DEVICE, HAND, RECORDER_NAME, Graph, Member, build_graph
+from teleop_core.graph import HAND, RECORDER_NAME, STAGES, Graph, Member, build_graph
+from teleop_core.graph.graph import DEVICE
 from teleop_core.graph.layers import (
     SESSION,
     Layer,
@@ -24,7 +23,6 @@ from teleop_core.graph.layers import (
     parse_setting,
     scenario_file,
 )
-from teleop_core.graph.stage import STAGES
 
 
 @dataclass(frozen=True)
@@ -176,16 +174,16 @@ def _check_sides(graph: Graph, groups: Mapping[str, Any], arm: str) -> None:
         if is_whole and PASSIVITY.name not in names:
             needed = f"a session with the stage {PASSIVITY.name}: teleop.stages=[{PASSIVITY.name}]"
             raise ParameterError("reflection.passivity", passivity, needed)
-        if is_whole and IMPEDANCE.name in names:
+        if is_whole and impedance.IMPEDANCE.name in names:
             kinds = [PASSIVITIES.find(name) for name in PASSIVITIES]
             others = ", ".join(kind.name for kind in kinds if not kind.needs_slave)
-            needed = f"one of {others} with the stage {IMPEDANCE.name}, for it leads the tip itself"
+            needed = f"one of {others} with the stage {impedance.IMPEDANCE.name}, for it leads the tip itself"
             raise ParameterError("reflection.passivity", passivity, needed)
-        if ARCHITECTURES.find(law).needs_impedance and IMPEDANCE.name not in names:
+        if ARCHITECTURES.find(law).needs_impedance and impedance.IMPEDANCE.name not in names:
             parts = [ARCHITECTURES.find(name) for name in ARCHITECTURES]
             others = ", ".join(part.name for part in parts if not part.needs_impedance)
-            stages = f"teleop.stages=[{IMPEDANCE.name}]"
-            needed = f"in a session with the stage {IMPEDANCE.name}, {stages}, or one of {others}"
+            stages = f"teleop.stages=[{impedance.IMPEDANCE.name}]"
+            needed = f"in a session with the stage {impedance.IMPEDANCE.name}, {stages}, or one of {others}"
             raise ParameterError("reflection.architecture", law, needed)
 
 
@@ -208,12 +206,12 @@ def _check_order(stages: Iterable[str]) -> None:
     Raises:
         PartError: The stages are named in another order.
     """
-    sides = ["network", IMPEDANCE.name, PASSIVITY.name]
+    sides = ["network", impedance.IMPEDANCE.name, PASSIVITY.name]
     order = [name for name in stages if name in sides]
     wanted = sorted(order, key=sides.index)
-    if IMPEDANCE.name in order and order != wanted:
+    if impedance.IMPEDANCE.name in order and order != wanted:
         text = f"named in the order teleop.stages=[{', '.join(wanted)}], not {', '.join(order)}"
-        raise PartError("stage", IMPEDANCE.name, text)
+        raise PartError("stage", impedance.IMPEDANCE.name, text)
 
 
 def configure(scenario: str | None = None, files: Iterable[Path] = (), settings: Iterable[str] = ()) -> Configuration:

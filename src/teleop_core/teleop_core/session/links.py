@@ -7,9 +7,8 @@ def link_texts(graph: Graph, member: Member) -> list[str]:
     """Links of a member that differ from "every port is fed by the topic of its name".
 
     Returns:
-        Texts ``port=topic`` or ``port=topic@delay``, below the arm's namespace, with the delay in
-        seconds; ``../topic`` is one beside that namespace. Topics of one port are added, the first
-        is the one whose stamp counts.
+        Texts ``port=topic`` or ``port=topic@delay``, below the arm's namespace, with the delay in seconds; ``../topic``
+        is one beside that namespace. Topics of one port are added, the first is the one whose stamp counts.
     """
     texts = []
     for port in member.stage.reads:

@@ -8,12 +8,10 @@ import numpy as np
 from teleop_core.bags.markers import Color, Marker, Shape
 from teleop_core.chain.fixtures.reported_fixture import ReportedFixture, reported_fixture
 from teleop_core.chain.mapping.parameters import MotionScalingParameters, axis_map
-from teleop_core.kernels.geometry import Array
-from teleop_core.kernels.portable import length
+from teleop_core.kernels import Array, length
 from teleop_core.session.model import MASTER, SLAVE
+from teleop_core.shapes import box, sphere
 from teleop_core.shapes.basis.drawing import segments_of
-from teleop_core.shapes.box import BOX
-from teleop_core.shapes.sphere import SPHERE
 
 TAIL = 200
 """Points of a path."""
@@ -23,7 +21,7 @@ _TOUCH = 0.05  # force of a wall that somebody touches [N]
 _FREE: Color = (0.26, 0.52, 0.96, 0.25)
 _TOUCHED: Color = (0.90, 0.20, 0.15, 0.40)
 _WIDTH = 0.001  # of the lines of a fixture [m]
-_BODIES = {BOX.name: Shape.CUBE, SPHERE.name: Shape.SPHERE}
+_BODIES = {box.BOX.name: Shape.CUBE, sphere.SPHERE.name: Shape.SPHERE}
 _FORCE: Color = (0.90, 0.45, 0.10, 1.0)
 _MEASURED: Color = (0.76, 0.22, 0.04, 1.0)
 _COMMANDED: Color = (0.26, 0.52, 0.96, 1.0)

@@ -8,9 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from teleop_core.bags.memory import MemoryBag
-from teleop_core.bags.messages import QUATERNION_TOLERANCE
-from teleop_core.bags.reader import Bag
+from teleop_core.bags import memory, messages, reader
 from teleop_core.base.errors import RecordingError
 from teleop_core.graph.topics import MASTER_BUTTONS, MASTER_MEASURED_CP, Kind
 from teleop_core.kernels.portable import length
@@ -19,7 +17,7 @@ READERS = "teleop_core.readers"
 """Entry-point group of functions ``reader(path, bag, prefixes)``: see :func:`as_master_bag`."""
 
 
-def as_master_bag(recording: Path | str | Bag) -> Bag:
+def as_master_bag(recording: Path | str | reader.Bag) -> reader.Bag:
     """Recording with ``master/measured_cp`` of its arms, and ``master/buttons`` where it has some.
 
     What had to be guessed, changed or left out is told as a warning.
@@ -36,38 +34,38 @@ def as_master_bag(recording: Path | str | Bag) -> Bag:
         RecordingError: It cannot be read, holds no motion, or needs a reader that is not installed.
         ParameterError: It has several topics of poses.
     """
-    if isinstance(recording, MemoryBag):
+    if isinstance(recording, memory.MemoryBag):
         return recording
-    path = recording.path if isinstance(recording, Bag) else Path(recording)
-    ours = recording if isinstance(recording, Bag) else _ours(path)
+    path = recording.path if isinstance(recording, reader.Bag) else Path(recording)
+    ours = recording if isinstance(recording, reader.Bag) else _ours(path)
     prefixes = [] if ours is None else _prefixes(ours)
     if ours is not None and prefixes and all(is_sound(ours, prefix) for prefix in prefixes):
         return ours
     for entry in entry_points(group=READERS):
-        found: Bag = entry.load()(path, ours, prefixes)
+        found: reader.Bag = entry.load()(path, ours, prefixes)
         return found
     reason = "holds no sound motion of a master; install teleop_exchange, which reads others"
     raise RecordingError(path, reason)
 
 
-def _ours(path: Path) -> Bag | None:
+def _ours(path: Path) -> reader.Bag | None:
     """The recording as we read it; None for other files."""
     if not path.exists() or not (path.is_dir() or path.suffix == ".mcap"):
         return None
     try:
-        return Bag(path)
+        return reader.Bag(path)
     except RecordingError:
         return None
 
 
-def _prefixes(bag: Bag) -> list[str]:
+def _prefixes(bag: reader.Bag) -> list[str]:
     """What stands before ``master/measured_cp`` of each arm that has such poses."""
     name, kind = MASTER_MEASURED_CP.name, MASTER_MEASURED_CP.kind.ros_type
     ends = [n for n, info in bag.topics.items() if info.count and info.type == kind]
     return [n.removesuffix(name) for n in ends if n == name or n.endswith(f"/{name}")]
 
 
-def is_sound(bag: Bag, prefix: str) -> bool:
+def is_sound(bag: reader.Bag, prefix: str) -> bool:
     """Whether an arm's poses and buttons can be taken as they are.
 
     Poses are finite, of unit quaternions, and their stamps do not go back or stand still; buttons
@@ -81,7 +79,7 @@ def is_sound(bag: Bag, prefix: str) -> bool:
         lengths = length(series.values[:, 3:])
         first = int(series.stamp_ns[0]) if first < 0 else first
         is_rising = series.stamp_ns[0] >= last and (np.diff(series.stamp_ns) >= 0).all()
-        is_unit = (np.abs(lengths - 1.0) <= QUATERNION_TOLERANCE).all()  # NaN is not
+        is_unit = (np.abs(lengths - 1.0) <= messages.QUATERNION_TOLERANCE).all()  # NaN is not
         if not (is_rising and is_unit and np.isfinite(series.values[:, :3]).all()):
             return False
         last = int(series.stamp_ns[-1])
@@ -89,7 +87,7 @@ def is_sound(bag: Bag, prefix: str) -> bool:
     return (last > first or is_one) and _are_sound(bag, prefix + MASTER_BUTTONS.name)
 
 
-def _are_sound(bag: Bag, name: str) -> bool:
+def _are_sound(bag: reader.Bag, name: str) -> bool:
     """Whether buttons can be taken as they are; true if there are none."""
     info = bag.topics.get(name)
     if info is None or not info.count:

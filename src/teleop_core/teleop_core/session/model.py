@@ -1,8 +1,7 @@
 """Model: robots and frames of a session as other tools draw them, from the recording alone.
 
-Frames stand in ``world``: each slave's base, its links and its tip, the master's base beside it,
-turned so that stylus and tip move alike, and its stylus. Where bases stand to each other nobody
-measures: it is a picture.
+Frames stand in ``world``: each slave's base, its links and its tip, the master's base beside it, turned so that stylus
+and tip move alike, and its stylus. Where bases stand to each other nobody measures: it is a picture.
 """
 
 from dataclasses import dataclass

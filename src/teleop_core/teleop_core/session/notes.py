@@ -1,12 +1,9 @@
 """Notes: what runs but may not be meant, of a configuration before its session begins."""
 
-from teleop_core.chain.mapping.parameters import FixtureParameters, MotionScalingParameters
-from teleop_core.chain.mapping.walls import WALLS, passive_stiffness
+from teleop_core.chain.mapping import parameters, walls
 from teleop_core.chain.master.device import DeviceParameters
 from teleop_core.chain.master.haptic_master import HapticMasterParameters
-from teleop_core.graph.graph import BUILT_IN
-from teleop_core.graph.signals import DT
-from teleop_core.graph.topics import MASTER_MEASURED_CP, MASTER_SERVO_CF
+from teleop_core.graph import BUILT_IN, DT, topics
 from teleop_core.robots import load_robot_set
 from teleop_core.robots.parts import is_urdf
 from teleop_core.robots.robot_notes import assumed_note, notes_on_robot
@@ -21,13 +18,12 @@ def notes_of(configuration: Configuration, transport: float = 0.0) -> list[str]:
 
     Args:
         configuration: Of the session.
-        transport: Time that a sample takes from the device to the wall and back, beside declared
-            delays [s].
+        transport: Time that a sample takes from the device to the wall and back, beside declared delays [s].
     """
     found = list(configuration.graph.notes)
     for arm in configuration.graph.namespaces:
         master, mapping = (configuration.group(name, arm) for name in BUILT_IN[1:3])
-        if isinstance(master, HapticMasterParameters) and isinstance(mapping, MotionScalingParameters):
+        if isinstance(master, HapticMasterParameters) and isinstance(mapping, parameters.MotionScalingParameters):
             delay = transport + _delay(configuration, arm)
             told = (rendered_note(master.device, mapping.fixture), passive_note(master.device, mapping.fixture, delay))
             found += [f"arm {arm!r}: {note}" if arm else note for note in told if note]
@@ -43,8 +39,8 @@ def notes_of(configuration: Configuration, transport: float = 0.0) -> list[str]:
 
 def _delay(configuration: Configuration, arm: str) -> float:
     """Declared delays on the way from the device's samples to its force [s]."""
-    around = (MASTER_MEASURED_CP.name, MASTER_SERVO_CF.name)
-    ends = {MASTER_MEASURED_CP.name: _MAPPING, MASTER_SERVO_CF.name: _MASTER}
+    around = (topics.MASTER_MEASURED_CP.name, topics.MASTER_SERVO_CF.name)
+    ends = {topics.MASTER_MEASURED_CP.name: _MAPPING, topics.MASTER_SERVO_CF.name: _MASTER}
     return sum(
         link.delay
         for link in configuration.graph.links
@@ -52,7 +48,7 @@ def _delay(configuration: Configuration, arm: str) -> float:
     )
 
 
-def passive_note(device: DeviceParameters, fixture: FixtureParameters, delay: float) -> str:
+def passive_note(device: DeviceParameters, fixture: parameters.FixtureParameters, delay: float) -> str:
     """What a wall gives back that is stiffer than passive; empty where it is not.
 
     Args:
@@ -60,10 +56,10 @@ def passive_note(device: DeviceParameters, fixture: FixtureParameters, delay: fl
         fixture: The wall.
         delay: Of its force beyond the tick [s].
     """
-    wall = WALLS[fixture.wall]
+    wall = walls.WALLS[fixture.wall]
     stiffness = wall.spring(fixture.stiffness, fixture.max_force)
     damping = fixture.damping if wall.is_damped else 0.0
-    most = passive_stiffness(damping, DT, delay, device.friction, device.position_resolution)
+    most = walls.passive_stiffness(damping, DT, delay, device.friction, device.position_resolution)
     if stiffness <= most * (1.0 + 1e-9) or not fixture.pushes:
         return ""
     until = f"with {1e3 * (DT + delay):.3g} ms from sample to force it is passive up to {most:.0f} N/m"
@@ -72,12 +68,12 @@ def passive_note(device: DeviceParameters, fixture: FixtureParameters, delay: fl
     return f"the {fixture.wall} wall of {stiffness:.0f} N/m may give back more energy than it took: {until}"
 
 
-def rendered_note(device: DeviceParameters, fixture: FixtureParameters) -> str:
+def rendered_note(device: DeviceParameters, fixture: parameters.FixtureParameters) -> str:
     """What becomes of a wall that is stiffer than the device; empty where none is.
 
     The device bends by force over its stiffness, so wall and device are two springs in series.
     """
-    stiffness = WALLS[fixture.wall].spring(fixture.stiffness, fixture.max_force)
+    stiffness = walls.WALLS[fixture.wall].spring(fixture.stiffness, fixture.max_force)
     soft = [i for i in range(3) if stiffness > device.stiffness[i]]
     if not soft or not fixture.pushes:
         return ""

@@ -14,12 +14,11 @@ from typing import NamedTuple
 import numpy as np
 
 from teleop_core.bags.reader import Bag
-from teleop_core.base.errors import ParameterError, RecordingError, TeleopWarning
-from teleop_core.base.parameters import parameter
+from teleop_core.base import ParameterError, RecordingError, TeleopWarning, parameter
 from teleop_core.chain.operators import Motion, Operator, Setting
 from teleop_core.chain.operators.rest import REST_TILT
 from teleop_core.chain.operators.shapes import minimum_jerk
-from teleop_core.graph.topics import HAND_JAW, MASTER_BUTTONS, MASTER_MEASURED_CP, Topic
+from teleop_core.graph import topics
 from teleop_core.kernels.geometry import Array, continuous, quaternion_products
 from teleop_core.kernels.portable import arctangent, length
 from teleop_core.session.master_bag import as_master_bag
@@ -48,8 +47,7 @@ class Samples(NamedTuple):
     Attributes:
         at: Times (N,) [s] since the first sample.
         moves: Places (N, 3) [m], in the master's axes.
-        turns: Turns since the first sample, quaternions (N, 4) in the master's axes; their signs
-            do not jump.
+        turns: Turns since the first sample, quaternions (N, 4) in the master's axes; their signs do not jump.
         pressed_at: Times (K,) [s] at which buttons change.
         pressed: Clutch, fixture, mode from then on (K, 3).
         closed_at: Times (M,) [s] at which the hand closes the jaw farther or less far.
@@ -127,18 +125,18 @@ def samples_of(path: Path) -> Samples:
 @lru_cache(maxsize=2)
 def _read(path: Path, changed_ns: int) -> Samples:
     bag = as_master_bag(path)
-    bag.require((MASTER_MEASURED_CP,))
-    series = bag.read(MASTER_MEASURED_CP)
+    bag.require((topics.MASTER_MEASURED_CP,))
+    series = bag.read(topics.MASTER_MEASURED_CP)
     new = np.concatenate(([True], np.diff(series.stamp_ns) > 0))
     stamps, values = series.stamp_ns[new], series.values[new]
     start_ns, first = int(stamps[0]), values[0, 3:] * (1.0, -1.0, -1.0, -1.0)
     turns = continuous(quaternion_products(values[:, 3:], first), np.array([1.0, 0.0, 0.0, 0.0]))
     at: Array = (stamps - start_ns) * np.float64(1e-9)
-    pressed, closed = _changes(bag, MASTER_BUTTONS, start_ns), _changes(bag, HAND_JAW, start_ns)
+    pressed, closed = _changes(bag, topics.MASTER_BUTTONS, start_ns), _changes(bag, topics.HAND_JAW, start_ns)
     return Samples(at, values[:, :3] - values[0, :3], turns, *pressed, *closed)
 
 
-def _changes(bag: Bag, topic: Topic, start_ns: int) -> tuple[Array, Array]:
+def _changes(bag: Bag, topic: topics.Topic, start_ns: int) -> tuple[Array, Array]:
     """Times (K,) [s] since a stamp [ns], and values (K, width) of a topic; none without it."""
     if topic.name not in bag.topics or not bag.topics[topic.name].count:
         return np.zeros(0), np.zeros((0, topic.width(0)))

@@ -9,11 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from teleop_core.bags import layouts, memory, reader, recording
 from teleop_core.bags.arms import arm_names
-from teleop_core.bags.layouts import SECOND_NS
-from teleop_core.bags.memory import MemoryBag
-from teleop_core.bags.reader import Bag
-from teleop_core.bags.recording import RecordingParameters
 from teleop_core.bags.series import Series, kind_of
 from teleop_core.bags.writer import BagWriter
 from teleop_core.base.errors import RecordingError, TeleopError, UnknownNameError
@@ -104,18 +101,18 @@ class Recording:
         bag: Where it is, in memory or on disk.
     """
 
-    def __init__(self, bag: Bag) -> None:
+    def __init__(self, bag: reader.Bag) -> None:
         self._bag = bag
 
     @property
-    def bag(self) -> Bag:
+    def bag(self) -> reader.Bag:
         """The recording message by message, for replay and for tools."""
         return self._bag
 
     @property
     def path(self) -> Path | None:
         """Where it is on disk; None if it is in memory."""
-        return None if isinstance(self._bag, MemoryBag) else self._bag.path
+        return None if isinstance(self._bag, memory.MemoryBag) else self._bag.path
 
     @property
     def topics(self) -> tuple[str, ...]:
@@ -232,7 +229,7 @@ class Recording:
         Raises:
             RecordingError: The directory exists or cannot be written.
         """
-        if not isinstance(self._bag, MemoryBag):
+        if not isinstance(self._bag, memory.MemoryBag):
             return self._copied(Path(path))
         bag = self._bag
         from teleop_core.session.model import write_model_of
@@ -243,7 +240,7 @@ class Recording:
         topics = [*bag.streams, *(t for t in reports if t.name in bag.topics)]
         model = _model_of(bag)
         with BagWriter(
-            path, (*topics, *model.topics), names, parameters=RecordingParameters(), metadata=bag.metadata
+            path, (*topics, *model.topics), names, parameters=recording.RecordingParameters(), metadata=bag.metadata
         ) as writer:
             for begin, end in _seconds(bag.start_ns, [s.log_ns for s in bag.streams.values()]):
                 writer.write_block({t: _between(s, begin, end) for t, s in bag.streams.items()})
@@ -277,7 +274,7 @@ class Recording:
         return sketch(self)
 
 
-def _model_of(bag: Bag) -> "Model":
+def _model_of(bag: reader.Bag) -> "Model":
     """Robots of a recording of ours, by the configuration that is stored with it; else none."""
     from teleop_core.session.configuration import Configuration
     from teleop_core.session.model import Model
@@ -302,9 +299,9 @@ def _columns(kind: Kind | None, series: Series) -> tuple[str, ...]:
 
 def _seconds(start_ns: int, logs: list[NDArray[np.int64]]) -> list[tuple[int, int]]:
     """Begin and end [ns] of every second since the start in which something was recorded."""
-    found = np.unique(np.concatenate([(log_ns - start_ns) // SECOND_NS for log_ns in logs]))
-    begins = [start_ns + second * SECOND_NS for second in found.tolist()]
-    return [(begin, begin + SECOND_NS) for begin in begins]
+    found = np.unique(np.concatenate([(log_ns - start_ns) // layouts.SECOND_NS for log_ns in logs]))
+    begins = [start_ns + second * layouts.SECOND_NS for second in found.tolist()]
+    return [(begin, begin + layouts.SECOND_NS) for begin in begins]
 
 
 def _between(series: Series, begin_ns: int, end_ns: int) -> tuple[NDArray[np.int64], Array, NDArray[np.int64]]:
@@ -323,4 +320,4 @@ def open_recording(path: Path | str) -> Recording:
     Raises:
         RecordingError: The path is missing, or is no recording, or was cut off, or is empty.
     """
-    return Recording(Bag(path))
+    return Recording(reader.Bag(path))

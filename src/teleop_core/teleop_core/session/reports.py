@@ -3,13 +3,12 @@
 from collections.abc import Mapping
 
 from teleop_core.bags.reports import report
-from teleop_core.graph.signals import STATE_FIELDS
-from teleop_core.graph.topics import OPERATION, Topic, limit_text
+from teleop_core.graph import STATE_FIELDS, topics
 from teleop_core.kernels.geometry import Array
 from teleop_core.slave.operation import operation_level, operation_text
 
 
-def report_of(topic: Topic, stamp_ns: int, row: Array, described: Mapping[str, str] | None = None) -> bytes:
+def report_of(topic: topics.Topic, stamp_ns: int, row: Array, described: Mapping[str, str] | None = None) -> bytes:
     """Message of a report's topic, as CDR bytes.
 
     Args:
@@ -22,8 +21,8 @@ def report_of(topic: Topic, stamp_ns: int, row: Array, described: Mapping[str, s
     more, name, level, text = dict(described or {}), topic.name, 0, ""
     if topic.columns == STATE_FIELDS:
         name, text = "teleop", state_text(row, more.get("fixture", "box"))
-    elif topic.columns == OPERATION:
-        numbers = dict(zip(OPERATION, row.tolist(), strict=True))
+    elif topic.columns == topics.OPERATION:
+        numbers = dict(zip(topics.OPERATION, row.tolist(), strict=True))
         names = tuple(more.pop("joints", "").split())
         level, text = operation_level(numbers), operation_text(numbers, names)
     return report(stamp_ns, name, level, text, values | more)
@@ -38,4 +37,4 @@ def state_text(state: Array, fixture: str = "box") -> str:
     mode = "fine" if named["is_fine"] else "coarse"
     text = f"{doing} {mode}{f', {fixture} on' if named['is_fixture_on'] else ''}"
     limit, joint = int(named["limit"]), int(named["limited_joint"])
-    return f"{text}, held back: {limit_text(limit, joint)}" if limit else text
+    return f"{text}, held back: {topics.limit_text(limit, joint)}" if limit else text

@@ -11,19 +11,17 @@ from teleop_core.bags import kept_files
 from teleop_core.bags.arms import ARMS_KEY, PLAYED_KEY
 from teleop_core.bags.reader import Bag, Series
 from teleop_core.bags.writer import BagWriter
-from teleop_core.base.errors import RecordingError
+from teleop_core.base import RecordingError
+from teleop_core.graph import RECORDER_NAME, SESSION, TICK_NS, Layer, Member, topics
 from teleop_core.graph.former_shapes import present_layer
-from teleop_core.graph.graph import DEVICE, RECORDER_NAME, Member
-from teleop_core.graph.layers import SESSION, Layer, parse_text
-from teleop_core.graph.signals import TICK_NS
-from teleop_core.graph.topics import SELDOM_NS, TELEOP_STATE, Kind, Topic
+from teleop_core.graph.graph import DEVICE
+from teleop_core.graph.layers import parse_text
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot_set
+from teleop_core.session import replayed_span, virtual
 from teleop_core.session.configuration import Configuration
 from teleop_core.session.model import Model, ModelRecords
-from teleop_core.session.replayed_span import in_order, replayed_span, tick_times
 from teleop_core.session.reports import report_of
-from teleop_core.session.virtual import BLOCK, VirtualTime
 from teleop_core.shapes import files_of, moved
 
 Progress = Callable[[int, int], None]
@@ -47,32 +45,31 @@ def simulate(configuration: Configuration, out: Path, progress: Progress = silen
     Raises:
         RecordingError: The directory exists, cannot be written, or the disk is full.
     """
-    session = VirtualTime(configuration)
+    session = virtual.VirtualTime(configuration)
     ticks = session_ticks(configuration, session)
     return record_blocks(session, configuration, out, run_blocks(session, ticks), ticks, progress)
 
 
-def session_ticks(configuration: Configuration, session: VirtualTime) -> int:
+def session_ticks(configuration: Configuration, session: virtual.VirtualTime) -> int:
     """Ticks until the hand has moved for the configured duration; it waits for the arms first."""
     return session.lead + max(1, round(configuration.groups[SESSION].duration * 1e9 / TICK_NS))
 
 
-def run_blocks(session: VirtualTime, ticks: int) -> Iterator[Any]:
+def run_blocks(session: virtual.VirtualTime, ticks: int) -> Iterator[Any]:
     """Rows of the next ticks, a block at a time; each block takes the place of the one before."""
-    rows = session.rows(min(BLOCK, ticks))
-    for done in range(0, ticks, BLOCK):
-        count = min(BLOCK, ticks - done)
+    rows = session.rows(min(virtual.BLOCK, ticks))
+    for done in range(0, ticks, virtual.BLOCK):
+        count = min(virtual.BLOCK, ticks - done)
         yield session.run(count, rows[:count])
 
 
 def replay(bag: Bag, configuration: Configuration, out: Path, progress: Progress = silent, begin: str = DEVICE) -> int:
     """Run recorded masters, or hands, through the graph again, in virtual time, and record it.
 
-    Ticks are 1 ms apart, from the first to the last recorded sample; each sample is answered once,
-    at the first tick that is not before it. For a recording of virtual time every tick has its own
-    sample, so the same configuration gives the same slave motion, bit for bit. Recordings that are
-    not ours, or whose hand did not wait as long, begin with the time that the arms need to get
-    ready.
+    Ticks are 1 ms apart, from the first to the last recorded sample; each sample is answered once, at the first tick
+    that is not before it. For a recording of virtual time every tick has its own sample, so the same configuration
+    gives the same slave motion, bit for bit. Recordings that are not ours, or whose hand did not wait as long, begin
+    with the time that the arms need to get ready.
 
     Args:
         bag: Recording with master/measured_cp of every arm, or hand/servo_cp.
@@ -87,21 +84,21 @@ def replay(bag: Bag, configuration: Configuration, out: Path, progress: Progress
     Raises:
         RecordingError: The bag lacks a topic, or the directory is as in :func:`simulate`.
     """
-    session = VirtualTime(configuration, played=begin)
+    session = virtual.VirtualTime(configuration, played=begin)
     samples, ticks = replayed_blocks(session, bag)
     return record_blocks(session, configuration, out, samples, ticks, progress)
 
 
-def replayed_blocks(session: VirtualTime, bag: Bag) -> tuple[Iterator[Any], int]:
+def replayed_blocks(session: virtual.VirtualTime, bag: Bag) -> tuple[Iterator[Any], int]:
     """Rows of a replay, a block at a time, and the number of ticks; raises as :func:`replay`."""
     played = session.played_topics
     needed = session.needed_topics
     bag.require(needed)
     session.plays_file = PLAYED_KEY in bag.metadata or not bag.metadata.get("configuration")
     recorded = [t for t in played if t.name in bag.topics and bag.topics[t.name].count]
-    series = {name: in_order(found) for name, found in bag.read_many(recorded).items()}
+    series = {name: replayed_span.in_order(found) for name, found in bag.read_many(recorded).items()}
     name = needed[0].name
-    first_ns, last_ns = replayed_span(bag.path, name, series[name].stamp_ns)
+    first_ns, last_ns = replayed_span.replayed_span(bag.path, name, series[name].stamp_ns)
     lead_ns = _lead_ns(session, bag, first_ns)
     later_ns = max(0, TICK_NS + lead_ns - first_ns)  # stamps are positive
     # The last tick is the first one that is not before the last sample.
@@ -109,9 +106,9 @@ def replayed_blocks(session: VirtualTime, bag: Bag) -> tuple[Iterator[Any], int]
     ticks = -(-(last_ns + later_ns + TICK_NS - begin_ns) // TICK_NS)
 
     def blocks() -> Iterator[Any]:
-        for done in range(0, ticks, BLOCK):
-            samples = session.rows(min(BLOCK, ticks - done))
-            samples["now_ns"] = tick_times(begin_ns + done * TICK_NS, len(samples))
+        for done in range(0, ticks, virtual.BLOCK):
+            samples = session.rows(min(virtual.BLOCK, ticks - done))
+            samples["now_ns"] = replayed_span.tick_times(begin_ns + done * TICK_NS, len(samples))
             for topic in recorded:
                 _hold(series[topic.name], later_ns, samples, topic.field)
             yield session.replay(samples)
@@ -119,10 +116,10 @@ def replayed_blocks(session: VirtualTime, bag: Bag) -> tuple[Iterator[Any], int]
     return blocks(), ticks
 
 
-def _lead_ns(session: VirtualTime, bag: Bag, first_ns: int) -> int:
+def _lead_ns(session: virtual.VirtualTime, bag: Bag, first_ns: int) -> int:
     """Time [ns] that arms need before the first sample; none where the hand waited as long."""
     lead_ns = session.lead * TICK_NS
-    states = [TELEOP_STATE.of_arm(arm) for arm in session.graph.namespaces]
+    states = [topics.TELEOP_STATE.of_arm(arm) for arm in session.graph.namespaces]
     is_known = all(state.name in bag.topics for state in states)
     if not lead_ns or "configuration" not in bag.metadata or not is_known:
         return lead_ns
@@ -130,7 +127,7 @@ def _lead_ns(session: VirtualTime, bag: Bag, first_ns: int) -> int:
     return lead_ns if None in begins else max(0, lead_ns - (max(filter(None, begins)) - first_ns))
 
 
-def _follows_ns(bag: Bag, state: Topic) -> int | None:
+def _follows_ns(bag: Bag, state: topics.Topic) -> int | None:
     """When an arm began to follow its hand [ns]; None if it never did."""
     told = (r.stamp_ns for r in bag.reports(state) if r.values.get("is_following") == "1.0")
     return min(told, default=None)
@@ -182,7 +179,7 @@ def _begin_at_home(layer: Layer) -> None:
 
 
 def record_blocks(
-    session: VirtualTime,
+    session: virtual.VirtualTime,
     configuration: Configuration,
     out: Path,
     blocks: Iterable[Any],
@@ -221,7 +218,7 @@ def record_blocks(
 
 
 def open_writer(
-    session: VirtualTime, configuration: Configuration, out: Path, further: tuple[Topic, ...] = ()
+    session: virtual.VirtualTime, configuration: Configuration, out: Path, further: tuple[topics.Topic, ...] = ()
 ) -> BagWriter:
     """Writer of everything that a session's stages write, and of further topics."""
     return BagWriter(
@@ -267,7 +264,7 @@ class NewSamples:
         self._periods: dict[str, int] = {}
 
     def of(
-        self, topic: Topic, block: Any, log_ns: NDArray[np.int64]
+        self, topic: topics.Topic, block: Any, log_ns: NDArray[np.int64]
     ) -> tuple[NDArray[np.int64], Array, NDArray[np.int64]]:
         """Stamps (N,), values (N, width) and log times (N,) of the messages in the next rows."""
         stamps, values = block[f"{topic.field}_ns"], block[topic.field]
@@ -283,13 +280,13 @@ class NewSamples:
             return stamps, values, log_ns
         return stamps[is_new], values[is_new], log_ns[is_new]
 
-    def _is_due(self, topic: Topic, values: Array, stamps: NDArray[np.int64]) -> NDArray[np.bool_]:
+    def _is_due(self, topic: topics.Topic, values: Array, stamps: NDArray[np.int64]) -> NDArray[np.bool_]:
         """Which rows (N,) change, or come when it is time to say it again."""
         before = self._values.get(topic.name, np.full((1, values.shape[1]), np.nan))
         self._values[topic.name] = values[-1:].copy()
         changes = (np.concatenate((before, values[:-1])) != values).any(axis=1)
         # Stamps of a session that was live are no whole periods.
-        periods = stamps // SELDOM_NS
+        periods = stamps // topics.SELDOM_NS
         last = self._periods.get(topic.name, int(periods[0]))
         self._periods[topic.name] = int(periods[-1])
         due: NDArray[np.bool_] = changes | (np.diff(periods, prepend=last) != 0)
@@ -299,19 +296,19 @@ class NewSamples:
 class ReportWriter(Protocol):
     """What takes single messages."""
 
-    def write(self, topic: Topic, log_ns: int, data: bytes) -> None:
+    def write(self, topic: topics.Topic, log_ns: int, data: bytes) -> None:
         """Take one message."""
 
 
 class StateReports:
     """Recorder of the reports of a session's stages, where they change."""
 
-    def __init__(self, session: VirtualTime) -> None:
+    def __init__(self, session: virtual.VirtualTime) -> None:
         self._reports = [
             _Report(session, member, topic)
             for member in session.graph.members
             for topic in member.writes
-            if topic.kind is Kind.REPORT
+            if topic.kind is topics.Kind.REPORT
         ]
 
     def write(self, writer: ReportWriter, block: Any) -> None:
@@ -321,7 +318,7 @@ class StateReports:
 
 
 class _Report:
-    def __init__(self, session: VirtualTime, member: Member, topic: Topic) -> None:
+    def __init__(self, session: virtual.VirtualTime, member: Member, topic: topics.Topic) -> None:
         self._topic, self._stage = topic, session.stages.get(member.name)
         self._last = np.full(len(topic.columns), np.nan)
 

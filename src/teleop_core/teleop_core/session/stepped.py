@@ -7,17 +7,15 @@ from pathlib import Path
 
 import numpy as np
 
-from teleop_core.base.errors import ParameterError, SessionError, ShapeError, UnknownNameError
+from teleop_core.base import ParameterError, SessionError, ShapeError, UnknownNameError
 from teleop_core.chain.operators import Operator
-from teleop_core.graph.signals import STATE, TICK_NS
-from teleop_core.graph.topics import OPERATION
+from teleop_core.graph import STATE, TICK_NS, topics
 from teleop_core.kernels.geometry import Array
-from teleop_core.session.api import Setting, configuration
-from teleop_core.session.virtual import VirtualTime
+from teleop_core.session import api, virtual
 from teleop_core.slave.operation import State
 
 _NUMBERS = count()
-_STATE = OPERATION.index("state")
+_STATE = topics.OPERATION.index("state")
 _PATIENCE = 60.0  # an arm that does not follow by then will not [s]
 
 
@@ -99,16 +97,16 @@ class Session:
         scenario: str | None = None,
         *,
         files: Iterable[Path | str] = (),
-        settings: Mapping[str, Setting] | None = None,
+        settings: Mapping[str, api.Setting] | None = None,
         period: float = 0.02,
     ) -> None:
         self._ticks = round(period * 1e9 / TICK_NS)
         if not (self._ticks >= 1 and abs(self._ticks * TICK_NS - period * 1e9) < 1.0):
             raise ParameterError("period", period, "whole milliseconds, 0.001 or more")
         hand = Operator(f"program_{next(_NUMBERS)}", lambda *_: self._motion, ahead=self._ticks)
-        given: dict[str, Setting] = {"tremor_amplitude": 0.0} | dict(settings or {})
-        made = configuration(scenario, files=files, settings=given, operator=hand)
-        self.runner = VirtualTime(made)
+        given: dict[str, api.Setting] = {"tremor_amplitude": 0.0} | dict(settings or {})
+        made = api.configuration(scenario, files=files, settings=given, operator=hand)
+        self.runner = virtual.VirtualTime(made)
         half = 0.5 * np.array(made.group("haptic_master").device.workspace)
         most = np.array([*half, *[np.pi] * 3])
         names = ("x", "y", "z", "turn_x", "turn_y", "turn_z")

@@ -6,12 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from teleop_core.bags.arms import PLAYED_KEY
-from teleop_core.base.errors import PartError, ShapeError
+from teleop_core.base import PartError, ShapeError
 from teleop_core.chain.operators.parameters import insist_on_virtual
-from teleop_core.graph.graph import BUILT_IN
-from teleop_core.graph.signals import TICK_NS, assign
-from teleop_core.graph.stage import Runner, joints_of
-from teleop_core.graph.topics import Kind, Topic
+from teleop_core.graph import BUILT_IN, TICK_NS, Runner, assign, topics
+from teleop_core.graph.stage import joints_of
 from teleop_core.kernels import records
 from teleop_core.session.compose import Rings, Tick, block_dtype, compose
 from teleop_core.session.configuration import Configuration
@@ -92,10 +90,10 @@ class VirtualTime:
         return self._tick.source
 
     @property
-    def needed_topics(self) -> tuple[Topic, ...]:
+    def needed_topics(self) -> tuple[topics.Topic, ...]:
         """Those of :attr:`played_topics` without which there is nothing to replay."""
         members = [m for m in self.graph.members if m.stage.name == self._last_played]
-        return tuple(t for member in members for t in member.writes if t.kind is Kind.POSE)
+        return tuple(t for member in members for t in member.writes if t.kind is topics.Kind.POSE)
 
     @property
     def about(self) -> dict[str, str]:
@@ -103,7 +101,7 @@ class VirtualTime:
         return {PLAYED_KEY: self._last_played} if self.plays_file else {}
 
     @property
-    def played_topics(self) -> tuple[Topic, ...]:
+    def played_topics(self) -> tuple[topics.Topic, ...]:
         """Topics that :meth:`replay` takes from samples."""
         members = [m for m in self.graph.members if m.name in self._played]
         return tuple(topic for member in members for topic in member.writes)
@@ -138,8 +136,7 @@ class VirtualTime:
     def reset(self) -> None:
         """Back to before the first tick, so that the session repeats itself to the bit.
 
-        Parameters that were changed since stay changed; a stage of your own begins anew as far as
-        its ``reset`` does.
+        Parameters that were changed since stay changed; a stage of your own begins anew as far as its ``reset`` does.
         """
         for name, stage in self.stages.items():
             assign(stage.signals, self._begin[name])

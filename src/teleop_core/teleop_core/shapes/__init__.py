@@ -14,12 +14,9 @@ from typing import Any
 import numpy as np
 from numba import types
 
-from teleop_core.base.errors import PartError
-from teleop_core.base.parameters import values_of
-from teleop_core.base.registry import Registry, part_check, places, tried
-from teleop_core.kernels import pointer
-from teleop_core.kernels.geometry import Array
-from teleop_core.kernels.parts import fenced, is_whole, numbers_of
+from teleop_core.base import PartError, Registry, part_check, values_of
+from teleop_core.base.registry import places, tried
+from teleop_core.kernels import Array, fenced, is_whole, numbers_of, pointer
 
 __all__ = ["SHAPES", "Shape", "files_of", "moved", "register_shape"]
 

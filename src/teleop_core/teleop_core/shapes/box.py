@@ -3,9 +3,8 @@
 import math
 from dataclasses import dataclass
 
-from teleop_core.base.parameters import parameter
-from teleop_core.kernels import kernel
-from teleop_core.kernels.geometry import Array
+from teleop_core.base import parameter
+from teleop_core.kernels import Array, kernel
 from teleop_core.shapes import Shape
 from teleop_core.shapes.basis.drawing import edges_of
 

@@ -7,9 +7,8 @@ import numpy as np
 
 from teleop_core.base.parameters import parameter
 from teleop_core.kernels.geometry import Array
-from teleop_core.shapes import Shape
+from teleop_core.shapes import Shape, line
 from teleop_core.shapes.basis import directions, drawing
-from teleop_core.shapes.line import rod_distance
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,4 +36,4 @@ def capsule_outline(parameters: CapsuleParameters) -> Array:
     return drawing.with_lifts(loops)
 
 
-CAPSULE = Shape("capsule", CapsuleParameters, rod_distance, capsule_outline)
+CAPSULE = Shape("capsule", CapsuleParameters, line.rod_distance, capsule_outline)

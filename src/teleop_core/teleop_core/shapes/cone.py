@@ -5,10 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from teleop_core.base.parameters import parameter
-from teleop_core.kernels import kernel
-from teleop_core.kernels.geometry import Array
-from teleop_core.kernels.portable import dot
+from teleop_core.base import parameter
+from teleop_core.kernels import Array, dot, kernel
 from teleop_core.shapes import Shape
 from teleop_core.shapes.basis import directions, drawing
 

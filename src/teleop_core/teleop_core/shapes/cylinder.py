@@ -5,12 +5,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from teleop_core.base.parameters import parameter
-from teleop_core.kernels import kernel
-from teleop_core.kernels.geometry import Array
-from teleop_core.shapes import Shape
+from teleop_core.base import parameter
+from teleop_core.kernels import Array, kernel
+from teleop_core.shapes import Shape, line
 from teleop_core.shapes.basis import directions, drawing
-from teleop_core.shapes.line import endless_if_zero
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -74,4 +72,4 @@ def cylinder_outline(parameters: CylinderParameters) -> Array:
     return drawing.with_lifts([*ends, *sides])
 
 
-CYLINDER = Shape("cylinder", CylinderParameters, cylinder_distance, cylinder_outline, endless_if_zero)
+CYLINDER = Shape("cylinder", CylinderParameters, cylinder_distance, cylinder_outline, line.endless_if_zero)

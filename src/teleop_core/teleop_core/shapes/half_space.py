@@ -6,9 +6,8 @@ import numpy as np
 
 from teleop_core.base.parameters import parameter
 from teleop_core.kernels.geometry import Array
-from teleop_core.shapes import Shape
+from teleop_core.shapes import Shape, plane
 from teleop_core.shapes.basis import directions, drawing
-from teleop_core.shapes.plane import plane_distance
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,4 +42,4 @@ def half_space_outline(parameters: HalfSpaceParameters) -> Array:
     return drawn
 
 
-HALF_SPACE = Shape("half_space", HalfSpaceParameters, plane_distance, half_space_outline, half_space_numbers)
+HALF_SPACE = Shape("half_space", HalfSpaceParameters, plane.plane_distance, half_space_outline, half_space_numbers)

@@ -3,10 +3,8 @@
 import math
 from dataclasses import dataclass
 
-from teleop_core.base.errors import ParameterError
-from teleop_core.base.parameters import parameter
-from teleop_core.kernels import inner, kernel
-from teleop_core.kernels.geometry import Array
+from teleop_core.base import ParameterError, parameter
+from teleop_core.kernels import Array, inner, kernel
 from teleop_core.shapes import Shape
 from teleop_core.shapes.basis import directions, drawing
 

@@ -4,11 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from teleop_core.kernels import inner, kernel
-from teleop_core.kernels.geometry import Array
+from teleop_core.kernels import Array, inner, kernel
 from teleop_core.shapes import Shape
-from teleop_core.shapes.basis import combined
-from teleop_core.shapes.basis.directions import MIDDLE, length_of, scale_to
+from teleop_core.shapes.basis import combined, directions
 
 _ROUNDS = 200  # at most
 _STILL = 1e-12  # moves that count [m]
@@ -42,7 +40,7 @@ def _project(numbers: Array, place: Array) -> None:
         for part in range(int(numbers[0])):
             for i in range(3):
                 here[i] = place[i] + kept[part, i]
-            scale_to(way, max(combined.part_distance(here, numbers, first, way), 0.0))
+            directions.scale_to(way, max(combined.part_distance(here, numbers, first, way), 0.0))
             for i in range(3):
                 moved = max(moved, abs(way[i] - kept[part, i]))
                 kept[part, i] = way[i]
@@ -70,8 +68,8 @@ def intersection_distance(offset: Array, numbers: Array, out: Array) -> float:
     is_inside = combined.extreme_part(place, numbers, 1.0, way) <= _INSIDE
     for i in range(3):
         way[i] = offset[i] - place[i]
-    distance = length_of(way)
-    if not is_inside or distance <= MIDDLE:
+    distance = directions.length_of(way)
+    if not is_inside or distance <= directions.MIDDLE:
         return farthest
     for i in range(3):
         out[i] = way[i]

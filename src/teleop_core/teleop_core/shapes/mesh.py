@@ -7,13 +7,10 @@ they are a cubic spline, so that the normal, which is its gradient, turns withou
 import math
 from dataclasses import dataclass
 
-from teleop_core.base.parameters import parameter
-from teleop_core.kernels import inner, kernel
-from teleop_core.kernels.geometry import Array
+from teleop_core.base import parameter
+from teleop_core.kernels import Array, inner, kernel
 from teleop_core.shapes import Shape
-from teleop_core.shapes.basis.directions import length_of, make_unit
-from teleop_core.shapes.basis.distance_grid import EDGE, HEADER, DistanceGrid, GridRequest, distance_grid
-from teleop_core.shapes.basis.spline import slopes, weights
+from teleop_core.shapes.basis import directions, distance_grid, spline
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,8 +46,8 @@ def _cell(offset: float, shape: Array, axis: int) -> tuple[int, float, float]:
         Second of the four nodes around it; share of a step behind that; how far it is beyond [m].
     """
     wanted = (offset - shape[4 + axis]) / shape[3]
-    last = shape[axis] - 1.0 - EDGE
-    at = min(max(wanted, float(EDGE)), last)
+    last = shape[axis] - 1.0 - distance_grid.EDGE
+    at = min(max(wanted, float(distance_grid.EDGE)), last)
     node = min(int(at), int(last) - 1)
     return node, at - node, (wanted - at) * shape[3]
 
@@ -58,14 +55,14 @@ def _cell(offset: float, shape: Array, axis: int) -> tuple[int, float, float]:
 @inner
 def _gradient(shape: Array, at: tuple[int, int, int], share: tuple[float, float, float], gradient: Array) -> float:
     """Write the gradient (3,) of the spline behind a node; returns its value [m]."""
-    wx, wy, wz = weights(share[0]), weights(share[1]), weights(share[2])
-    sx, sy, sz = slopes(share[0]), slopes(share[1]), slopes(share[2])
+    wx, wy, wz = spline.weights(share[0]), spline.weights(share[1]), spline.weights(share[2])
+    sx, sy, sz = spline.slopes(share[0]), spline.slopes(share[1]), spline.slopes(share[2])
     rows, columns = int(shape[1]), int(shape[2])
     value = along_x = along_y = along_z = 0.0
     for i in range(4):
         plane = across = upwards = 0.0
         for j in range(4):
-            first = HEADER + ((at[0] - 1 + i) * rows + at[1] - 1 + j) * columns + at[2] - 1
+            first = distance_grid.HEADER + ((at[0] - 1 + i) * rows + at[1] - 1 + j) * columns + at[2] - 1
             a, b, c, d = shape[first], shape[first + 1], shape[first + 2], shape[first + 3]
             line = wz[0] * a + wz[1] * b + wz[2] * c + wz[3] * d
             slope = sz[0] * a + sz[1] * b + sz[2] * c + sz[3] * d
@@ -93,21 +90,21 @@ def mesh_distance(offset: Array, numbers: Array, out: Array) -> float:
     j, v, y = _cell(offset[1], numbers, 1)
     k, w, z = _cell(offset[2], numbers, 2)
     value = _gradient(numbers, (i, j, k), (u, v, w), out)
-    slope = length_of(out)
+    slope = directions.length_of(out)
     if slope > 0.0:
-        make_unit(out)
+        directions.make_unit(out)
     else:
         out[2] = 1.0
     if x == 0.0 and y == 0.0 and z == 0.0:
         return value * slope
     out[0], out[1], out[2] = x + value * out[0], y + value * out[1], z + value * out[2]
-    distance = length_of(out)
-    make_unit(out)
+    distance = directions.length_of(out)
+    directions.make_unit(out)
     return distance
 
 
-def _grid(p: MeshParameters) -> DistanceGrid:
-    return distance_grid(GridRequest(p.file, p.scale, p.angles, p.step))
+def _grid(p: MeshParameters) -> distance_grid.DistanceGrid:
+    return distance_grid.distance_grid(distance_grid.GridRequest(p.file, p.scale, p.angles, p.step))
 
 
 def mesh_numbers(parameters: MeshParameters) -> Array:

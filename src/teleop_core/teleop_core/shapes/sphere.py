@@ -3,12 +3,10 @@
 import math
 from dataclasses import dataclass
 
-from teleop_core.base.parameters import parameter
-from teleop_core.kernels import kernel
-from teleop_core.kernels.geometry import Array
+from teleop_core.base import parameter
+from teleop_core.kernels import Array, kernel
 from teleop_core.shapes import Shape
-from teleop_core.shapes.basis.directions import MIDDLE
-from teleop_core.shapes.basis.drawing import great_circles
+from teleop_core.shapes.basis import directions, drawing
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,14 +29,14 @@ def sphere_distance(offset: Array, numbers: Array, out: Array) -> float:
     x, y, z = offset[0], offset[1], offset[2]
     distance = math.sqrt(x * x + y * y + z * z)  # products, for powers round otherwise in Python
     out[0], out[1], out[2] = x, y, z
-    if distance <= MIDDLE:
+    if distance <= directions.MIDDLE:
         out[2] = 1.0
     return distance - numbers[0]
 
 
 def sphere_outline(parameters: SphereParameters) -> Array:
     """Three great circles, (N, 3) [m] around the middle."""
-    return great_circles(parameters.radius)
+    return drawing.great_circles(parameters.radius)
 
 
 SPHERE = Shape("sphere", SphereParameters, sphere_distance, sphere_outline)

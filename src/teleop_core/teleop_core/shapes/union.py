@@ -2,8 +2,7 @@
 
 from dataclasses import dataclass
 
-from teleop_core.kernels import kernel
-from teleop_core.kernels.geometry import Array
+from teleop_core.kernels import Array, kernel
 from teleop_core.shapes import Shape
 from teleop_core.shapes.basis import combined
 

@@ -3,12 +3,9 @@
 import math
 from enum import IntEnum
 
-from teleop_core.graph.row import Row
-from teleop_core.graph.signals import copy
-from teleop_core.kernels import inner
-from teleop_core.kernels.fields import PerJoint, Wrench
+from teleop_core.graph import Row, copy
+from teleop_core.kernels import Array, PerJoint, Wrench, inner
 from teleop_core.kernels.filters import lag_step
-from teleop_core.kernels.geometry import Array
 from teleop_core.slave.arm import ArmModel
 from teleop_core.slave.interpolation import WayParameters, WayState, begin_way
 from teleop_core.slave.operation.faults import Fault
@@ -187,9 +184,8 @@ def _age_of_command(p: SlaveNumbers, s: SlaveState, now_ns: int) -> int:
 def take_command(p: SlaveNumbers, s: SlaveState, row: SlaveRow, dt: float) -> int:
     """Accept a new servo_jp unless it is a jump; returns the :class:`CommandStatus`.
 
-    A jump is farther from the command in force than full speed reaches in the command timeout, or
-    in the time since the message before. That time is half a second at most, which is what the
-    first one has: no stream can be that far.
+    A jump is farther from the command in force than full speed reaches in the command timeout, or in the time since the
+    message before. That time is half a second at most, which is what the first one has: no stream can be that far.
     """
     stamp, now_ns = row.slave_servo_jp_ns, row.now_ns
     if stamp > now_ns + _FUTURE_NS:  # taken, it would make every later command an old one

@@ -9,10 +9,8 @@ from typing import Annotated
 
 import numpy as np
 
-from teleop_core.graph.signals import copy
-from teleop_core.kernels import inner, kernel
-from teleop_core.kernels.fields import Fields, PerJoint
-from teleop_core.kernels.geometry import Array
+from teleop_core.graph import copy
+from teleop_core.kernels import Array, Fields, PerJoint, inner, kernel
 from teleop_core.kernels.room import room
 from teleop_core.robots.chains.rigid_body import invert_positive, write_model
 from teleop_core.slave.arm import Arm
@@ -77,9 +75,8 @@ def _observe(p: ObserverNumbers, s: ObserverState, model: Array, dt: float) -> N
         dt: Tick [s].
 
     Source:
-        De Luca and Mattone 2003; De Luca, Albu-Schäffer, Haddadin and Hirzinger 2006:
-        r = K (p - ∫(τ + Cᵀ dq - g + r) dt), with Cᵀ dq = dM/dt dq - C dq. Steps take the new
-        r, so that every gain is stable.
+        De Luca and Mattone 2003; De Luca, Albu-Schäffer, Haddadin and Hirzinger 2006: r = K (p - ∫(τ + Cᵀ dq - g + r)
+        dt), with Cᵀ dq = dM/dt dq - C dq. Steps take the new r, so that every gain is stable.
     """
     n = s.speed.shape[0]
     for i in range(n):

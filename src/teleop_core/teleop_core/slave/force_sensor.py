@@ -9,11 +9,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from teleop_core.base.parameters import parameter
-from teleop_core.graph.noise import Noise
-from teleop_core.graph.row import Row
-from teleop_core.kernels import inner
-from teleop_core.kernels.fields import Fields, Wrench
+from teleop_core.base import parameter
+from teleop_core.graph import Noise, Row
+from teleop_core.kernels import Fields, Wrench, inner
 from teleop_core.slave.arm import Arm
 
 STANDARD_GRAVITY = 9.80665

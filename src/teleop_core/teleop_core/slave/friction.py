@@ -1,18 +1,16 @@
 """Friction: viscous, and dry friction that either grows smoothly with speed or sticks.
 
-Friction that sticks is the LuGre bristle in the elasto-plastic form of Dupont, Hayward, Armstrong
-and Altpeter (2002), with the deflection of break-away equal to that of steady sliding: the bristle
-bends with the joint until it carries the dry friction, and then slips. Of the known models it is
-the one that holds a load below dry friction always (plain LuGre creeps under vibration) and
-needs no switch between two sets of equations (Karnopp's does). What makes LuGre stiff, the slip
-at high speed, is the return of the bristle to its bound here, which is exact at any step.
+Friction that sticks is the LuGre bristle in the elasto-plastic form of Dupont, Hayward, Armstrong and Altpeter (2002),
+with the deflection of break-away equal to that of steady sliding: the bristle bends with the joint until it carries the
+dry friction, and then slips. Of the known models it is the one that holds a load below dry friction always (plain LuGre
+creeps under vibration) and needs no switch between two sets of equations (Karnopp's does). What makes LuGre stiff, the
+slip at high speed, is the return of the bristle to its bound here, which is exact at any step.
 """
 
 import math
 from typing import Any
 
-from teleop_core.kernels import inner
-from teleop_core.kernels.fields import Fields, IntegerPerJoint, PerJoint
+from teleop_core.kernels import Fields, IntegerPerJoint, PerJoint, inner
 
 # Noise: the multiplicative generator of Lewis, Goodman and Miller (1969), multiplier of Park,
 # Miller and Stockmeyer (1993).

@@ -12,8 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from teleop_core.kernels import kernel
-from teleop_core.kernels.geometry import Array
+from teleop_core.kernels import Array, kernel
 from teleop_core.slave.arm import Arm
 
 _NO_LIMIT = 1e6  # times a drive's: what would be cut off counts as well

@@ -1,8 +1,6 @@
 """Interpolation: the way from command to command where they come slower than the ticks."""
 
-from teleop_core.kernels import inner
-from teleop_core.kernels.fields import Fields, PerJoint
-from teleop_core.kernels.geometry import Array
+from teleop_core.kernels import Array, Fields, PerJoint, inner
 
 _LINEAR, _MINIMUM_JERK = 1, 2
 
@@ -84,8 +82,7 @@ def _slopes(s: WayState, i: int) -> tuple[float, float]:
 def advance_on_way(p: WayParameters, s: WayState) -> None:
     """Move the command on by one tick; at the end of the way it is the newest command, exactly.
 
-    The polynomial of fifth degree with given position, speed and acceleration at its ends is the
-    way with least jerk.
+    The polynomial of fifth degree with given position, speed and acceleration at its ends is the way with least jerk.
 
     Source:
         Flash and Hogan 1985, eq. 3.

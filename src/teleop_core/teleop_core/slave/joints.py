@@ -4,8 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from teleop_core.kernels import inner, kernel
-from teleop_core.kernels.geometry import Array
+from teleop_core.kernels import Array, inner, kernel
 from teleop_core.slave.friction import FrictionNumbers, FrictionState, bend, friction
 from teleop_core.slave.world.contact import WorldNumbers, add_push
 

@@ -125,8 +125,7 @@ class MotionCommands:
         """Drive joints at speeds until the command timeout is over; then brake to rest.
 
         Args:
-            speed: Joint speeds (n,) [rad/s or m/s]; faster ones than the drives' are cut in
-                proportion.
+            speed: Joint speeds (n,) [rad/s or m/s]; faster ones than the drives' are cut in proportion.
             now_ns: Time of arrival, on the clock of the ticks [ns].
 
         Raises:

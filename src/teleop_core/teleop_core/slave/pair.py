@@ -3,29 +3,24 @@
 from dataclasses import dataclass, fields
 from typing import Any
 
-from teleop_core.graph.signals import DT, assign
-from teleop_core.graph.stage import RunningStage, Stage
+from teleop_core.graph import DT, RunningStage, Stage, assign
 from teleop_core.kernels import apart, kernel
-from teleop_core.slave.commands import SlaveRow
-from teleop_core.slave.simulation import simulation_step
-from teleop_core.slave.slave import SLAVE, Slave, SlaveParameters
-from teleop_core.slave.slave_sim import SLAVE_SIM, SlaveSim, SlaveSimParameters
-from teleop_core.slave.step import slave_step
+from teleop_core.slave import commands, simulation, slave, slave_sim, step
 
 
 @dataclass(frozen=True, kw_only=True)
-class ArmParameters(SlaveParameters, SlaveSimParameters):
+class ArmParameters(slave.SlaveParameters, slave_sim.SlaveSimParameters):
     """Parameters of a server and of its simulated arm."""
 
     @staticmethod
-    def of(server: SlaveParameters, simulated: SlaveSimParameters) -> "ArmParameters":
+    def of(server: slave.SlaveParameters, simulated: slave_sim.SlaveSimParameters) -> "ArmParameters":
         """Those of two groups, which must name the same robot."""
         groups = (simulated, server)
         return ArmParameters(**{f.name: getattr(g, f.name) for g in groups for f in fields(g)})
 
 
 @kernel
-def arm_step(steps: Any, server: Any, simulated: Any, row: SlaveRow, dt: float) -> None:
+def arm_step(steps: Any, server: Any, simulated: Any, row: commands.SlaveRow, dt: float) -> None:
     """One tick of both on one row of signals.
 
     Args:
@@ -57,13 +52,16 @@ class SimulatedArm(RunningStage):
     """
 
     def __init__(self, parameters: ArmParameters, dt: float = DT) -> None:
-        self.server, self.simulated = Slave(parameters, dt), SlaveSim(parameters, dt)
+        self.server, self.simulated = slave.Slave(parameters, dt), slave_sim.SlaveSim(parameters, dt)
         self.robot = self.server.robot
         super().__init__(_PAIR, self.robot.n, dt)
         for stage in (self.server, self.simulated):
             stage.signals = self.signals
         server, simulated = self.server.arguments, self.simulated.arguments
-        steps = (apart(slave_step, *server, self.signals, dt), apart(simulation_step, *simulated, self.signals, dt))
+        steps = (
+            apart(step.slave_step, *server, self.signals, dt),
+            apart(simulation.simulation_step, *simulated, self.signals, dt),
+        )
         self.kernel, self.arguments = arm_step, (steps, server, simulated)
         self._begin = self.signals.copy()
         self.reset()
@@ -92,9 +90,9 @@ class SimulatedArm(RunningStage):
 _PAIR = Stage(
     "arm",
     ArmParameters,
-    reads=SLAVE.reads,
-    writes=(*SLAVE.writes, *SLAVE_SIM.writes),
-    late=SLAVE.late,
-    notes=SLAVE.notes,
+    reads=slave.SLAVE.reads,
+    writes=(*slave.SLAVE.writes, *slave_sim.SLAVE_SIM.writes),
+    late=slave.SLAVE.late,
+    notes=slave.SLAVE.notes,
     make=SimulatedArm,
 )

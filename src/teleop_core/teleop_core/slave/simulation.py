@@ -2,12 +2,8 @@
 
 import math
 
-from teleop_core.graph.row import Row
-from teleop_core.graph.signals import copy
-from teleop_core.graph.topics import OPERATION
-from teleop_core.kernels import inner, kernel
-from teleop_core.kernels.fields import PerJoint
-from teleop_core.kernels.geometry import Array, pose_from_transform
+from teleop_core.graph import Row, copy, topics
+from teleop_core.kernels import Array, PerJoint, inner, kernel, pose_from_transform
 from teleop_core.robots.chains.rigid_body import write_model
 from teleop_core.slave.arm import Arm
 from teleop_core.slave.elastic import ElasticNumbers, ElasticState, integrate_elastic
@@ -22,7 +18,7 @@ from teleop_core.slave.world.contact import touch
 _ASTRAY = 10.0
 SPEED_LAG = 5e-3
 """Time constant of the low-pass of measured speeds [s]."""
-_BRAKED = OPERATION.index("is_braked")
+_BRAKED = topics.OPERATION.index("is_braked")
 
 
 class SimulationNumbers(ElasticNumbers, DriveNumbers, SensorNumbers, ObserverNumbers):

@@ -9,28 +9,17 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from teleop_core.base.errors import ParameterError
-from teleop_core.base.parameters import parameter
-from teleop_core.graph import topics
-from teleop_core.graph.signals import DT, assign
-from teleop_core.graph.stage import RunningStage, Stage
-from teleop_core.kernels import kernel, pointer, records
-from teleop_core.kernels.fields import record
-from teleop_core.kernels.geometry import Array, pose_from_transform
-from teleop_core.kernels.portable import length
+from teleop_core.base import ParameterError, parameter
+from teleop_core.graph import DT, RunningStage, Stage, assign, topics
+from teleop_core.kernels import Array, kernel, length, pointer, pose_from_transform, record, records
 from teleop_core.robots import load_robot_set
 from teleop_core.robots.kinematics import FK
 from teleop_core.robots.parameters import RobotParameters
 from teleop_core.robots.robot import Robot
-from teleop_core.slave.arm import ArmModel
-from teleop_core.slave.commands import SlaveNumbers, SlaveState
-from teleop_core.slave.motion_commands import MotionCommands
+from teleop_core.slave import arm, commands, motion_commands, simulation, step, trajectory
 from teleop_core.slave.operation import Answer, Event, Fault, OperationParameters, State, command_event
 from teleop_core.slave.operation.states import answer_text, change
 from teleop_core.slave.operation.watch import fail
-from teleop_core.slave.simulation import SPEED_LAG
-from teleop_core.slave.step import slave_step
-from teleop_core.slave.trajectory import shortest_move_time
 
 _TIMES = {
     "heartbeat": "heartbeat_ns",
@@ -115,9 +104,9 @@ class Slave(RunningStage):
             raise ParameterError("slave.robot", parameters.robot, "a robot with drives")
         n = self.robot.n
         super().__init__(SLAVE, n, dt)
-        self.parameters = record(SlaveNumbers, n)
-        self.state = record(SlaveState, n)
-        self.arm = ArmModel(
+        self.parameters = record(commands.SlaveNumbers, n)
+        self.state = record(commands.SlaveState, n)
+        self.arm = arm.ArmModel(
             fk=self.robot.fk_pointer,
             jacobian=pointer(self.robot.kernels.jacobian, FK),
             geometry=self.robot.geometry_row.copy(),
@@ -125,8 +114,8 @@ class Slave(RunningStage):
             speeds=np.zeros(n), is_free=np.zeros(n), twist=np.zeros(6), J=np.zeros((6, n)),
             A=np.zeros((6, 6)), b=np.zeros(6),
         )  # fmt: skip
-        self.kernel, self.arguments = slave_step, (self.parameters, self.state, self.arm)
-        self.motion = MotionCommands(self)
+        self.kernel, self.arguments = step.slave_step, (self.parameters, self.state, self.arm)
+        self.motion = motion_commands.MotionCommands(self)
         self._take_start(parameters)
         self._take_script(parameters.operation)
         self.retune(parameters)
@@ -177,7 +166,7 @@ class Slave(RunningStage):
             needed = f"inside the limits, {limits}"
             raise ParameterError("slave.start", parameters.start, needed)
         speed = robot.drives.speed_limit * parameters.start_speed
-        time = shortest_move_time(robot.home, start, speed)
+        time = trajectory.shortest_move_time(robot.home, start, speed)
         p["start"], self._start_ticks = start, math.ceil(time / self.dt)
 
     @property
@@ -223,7 +212,7 @@ class Slave(RunningStage):
         p["lag"] = drives.speed_limit * given.longest_lag
         p["tip_error"] = given.tip_error or p["tool_speed"] * given.longest_lag
         p["overspeed"] = given.overspeed
-        p["rest_speed"] = 0.01 * drives.speed_limit + drives.encoder_step / SPEED_LAG
+        p["rest_speed"] = 0.01 * drives.speed_limit + drives.encoder_step / simulation.SPEED_LAG
         for name, field_ns in _TIMES.items():
             p[field_ns] = round(getattr(given, name) * 1e9)
         p["brakes"] = given.standstill == "brake"
@@ -294,7 +283,7 @@ class Slave(RunningStage):
 
 
 @kernel
-def _request(p: SlaveNumbers, s: SlaveState, event: int) -> int:
+def _request(p: commands.SlaveNumbers, s: commands.SlaveState, event: int) -> int:
     """Take a command; of a stop the fault is told."""
     if event == _STOP:
         was = s.is_stopped
@@ -304,7 +293,7 @@ def _request(p: SlaveNumbers, s: SlaveState, event: int) -> int:
 
 
 @kernel
-def _fail(p: SlaveNumbers, s: SlaveState, fault: int, value: float, bound: float) -> None:
+def _fail(p: commands.SlaveNumbers, s: commands.SlaveState, fault: int, value: float, bound: float) -> None:
     fail(p, s, fault, -1, value, bound)
 
 

@@ -4,34 +4,24 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from teleop_core.base.errors import ClosureError, ParameterError
-from teleop_core.base.parameters import Choice, choice, parameter
-from teleop_core.graph import topics
-from teleop_core.graph.signals import DT, assign
-from teleop_core.graph.stage import RunningStage, Stage
-from teleop_core.kernels import pointer
-from teleop_core.kernels.fields import fields_of, record, record_array
-from teleop_core.kernels.geometry import Array
+from teleop_core.base import Choice, ClosureError, ParameterError, choice, parameter
+from teleop_core.graph import DT, RunningStage, Stage, assign, topics
+from teleop_core.kernels import Array, fields_of, pointer, record, record_array
 from teleop_core.robots import load_robot_set
 from teleop_core.robots.chains import dh_kernels
 from teleop_core.robots.drives import ACCELERATION, GRAVITY
 from teleop_core.robots.kinematics import FK
 from teleop_core.robots.parameters import RobotParameters
+from teleop_core.slave import handover, simulation, stability, transmission
 from teleop_core.slave.arm import Arm
 from teleop_core.slave.controllers import CONTROLLERS, per_joint
 from teleop_core.slave.elastic import gear_damping
 from teleop_core.slave.force_sensor import ForceSensorParameters, SensorNoise
 from teleop_core.slave.friction import bristle_damping
-from teleop_core.slave.handover import missing_effort
 from teleop_core.slave.plants import PER_JOINT, PLANTS, Physics
-from teleop_core.slave.simulation import SimulationNumbers, SimulationState, simulation_step
-from teleop_core.slave.stability import Loop, check_friction, check_stable, loop_key
-from teleop_core.slave.transmission import LONGEST_DELAY
-from teleop_core.slave.world import WORLD_OBJECTS
+from teleop_core.slave.world import WORLD_OBJECTS, contact, puncture
 from teleop_core.slave.world.button import ButtonNumbers
-from teleop_core.slave.world.contact import ContactState
 from teleop_core.slave.world.parameters import WorldParameters
-from teleop_core.slave.world.puncture import PunctureNumbers
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -95,8 +85,8 @@ class SlaveSim(RunningStage):
             raise ParameterError("slave_sim.robot", parameters.robot, "a robot with drives")
         n, model = self.robot.n, self.robot.dynamics
         super().__init__(SLAVE_SIM, n, dt)
-        self.parameters = record(SimulationNumbers, n)
-        self.state = record(SimulationState, n)
+        self.parameters = record(simulation.SimulationNumbers, n)
+        self.state = record(simulation.SimulationState, n)
         self._law = CONTROLLERS.find(parameters.controller.kind.kind)
         self._seed, physics = parameters.seed, self._physics(parameters)
         self._noise = SensorNoise(parameters.seed)
@@ -127,19 +117,19 @@ class SlaveSim(RunningStage):
             tip=np.zeros(n),
             T=np.zeros((4, 4)),
             shape=parameters.world.shape.copy(),
-            contacts=record_array(ContactState, parameters.world.tool_points, n),
+            contacts=record_array(contact.ContactState, parameters.world.tool_points, n),
             offset=np.zeros(3),
             normal=np.zeros(3),
             J=np.zeros((6, n)),
             noises=self._noise.rows,
         )
-        self.kernel, self.arguments = simulation_step, (self.parameters, self.state, self.arm)
+        self.kernel, self.arguments = simulation.simulation_step, (self.parameters, self.state, self.arm)
         self._take(parameters)
         self.reset()
         self._check_world(parameters.world)
         self._check_loop(parameters)
         self._examined, self._gains_in_force = parameters, self.arm.gains.copy()
-        missing_effort(self.arm, np.zeros(n), self.arm.gains, dt, ticks=0)  # compiles it
+        handover.missing_effort(self.arm, np.zeros(n), self.arm.gains, dt, ticks=0)  # compiles it
 
     def reset(self) -> None:
         """Back to home, at rest."""
@@ -200,7 +190,7 @@ class SlaveSim(RunningStage):
                 than drives or integrator can take; or an error would grow, or not come back.
         """
         trial = SlaveSim(parameters, self.dt)
-        if loop_key(trial.parameters, trial.arm) != loop_key(self.parameters, self.arm):
+        if stability.loop_key(trial.parameters, trial.arm) != stability.loop_key(self.parameters, self.arm):
             trial._rest_at(self.arm.q.clip(self.robot.lower, self.robot.upper))
             trial._check_loop(parameters)
         self._examined = parameters
@@ -209,8 +199,7 @@ class SlaveSim(RunningStage):
         """Take new parameters from the next tick on; a law that can shift takes over what it gave.
 
         Raises:
-            ParameterError: What :meth:`examine` refuses, unless these were examined; nothing
-                has changed then.
+            ParameterError: What :meth:`examine` refuses, unless these were examined; nothing has changed then.
         """
         if parameters is not self._examined:
             self.examine(parameters)
@@ -229,7 +218,7 @@ class SlaveSim(RunningStage):
         p["bristle_damping"] = bristle_damping(physics.bristle, drives.inertia)
         p["gear_damping"] = gear_damping(physics.gear_stiffness, physics.motor_inertia)
         p["has_gears"] = np.any(physics.gear_stiffness)
-        p["delay_ticks"] = min(round(physics.effort_delay / self.dt), LONGEST_DELAY)
+        p["delay_ticks"] = min(round(physics.effort_delay / self.dt), transmission.LONGEST_DELAY)
         p["effort_limit"], p["speed_limit"] = drives.effort_limit, drives.speed_limit
         self.arm.limit[:] = drives.effort_limit
         self._take_world(parameters.world)
@@ -251,7 +240,7 @@ class SlaveSim(RunningStage):
         p["tool_length"], p["tool_radius"] = world.tool_length, world.tool_radius
         p["world_stiffness"], p["world_damping"] = made_of.stiffness, made_of.damping
         p["world_friction"] = made_of.friction
-        for name, *_ in fields_of(PunctureNumbers):
+        for name, *_ in fields_of(puncture.PunctureNumbers):
             p[name] = getattr(world, name)
         for name, *_ in fields_of(ButtonNumbers):
             p[name] = getattr(world.kind.parameters, name, 0.0)
@@ -284,9 +273,9 @@ class SlaveSim(RunningStage):
     def _check_loop(self, parameters: SlaveSimParameters) -> None:
         """Try the loop as it is set, where the arm is; see :mod:`teleop_core.slave.stability`."""
         assert self.robot.drives is not None
-        check_friction(self.parameters, self.robot.drives.inertia, self.dt)
-        loop = Loop(self.parameters, self.state, self.arm, self.signals, self.dt)
-        check_stable(self._law, self.robot, loop, are_large_tried=parameters.trials == "all")
+        stability.check_friction(self.parameters, self.robot.drives.inertia, self.dt)
+        loop = stability.Loop(self.parameters, self.state, self.arm, self.signals, self.dt)
+        stability.check_stable(self._law, self.robot, loop, are_large_tried=parameters.trials == "all")
 
     def _hand_over(self) -> None:
         """Let the integrators take over what new gains give less, once these are in force."""
@@ -294,7 +283,7 @@ class SlaveSim(RunningStage):
             return
         if self.signals["now_ns"] > 0:  # before the first tick nothing moves, or is compensated
             speed = np.array(self.state["speed"])
-            missing = missing_effort(self.arm, speed, self._gains_in_force, self.dt)
+            missing = handover.missing_effort(self.arm, speed, self._gains_in_force, self.dt)
             self._law.shift(self.arm.memory, missing)
         self._gains_in_force = self.arm.gains.copy()
 

@@ -9,11 +9,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from teleop_core.base.errors import ParameterError
-from teleop_core.graph.row import Row
-from teleop_core.kernels import IS_COMPILED, bound, records
+from teleop_core.base import ParameterError
+from teleop_core.graph import Row
+from teleop_core.kernels import IS_COMPILED, Array, bound, records
 from teleop_core.kernels.callables import raise_pending
-from teleop_core.kernels.geometry import Array
 from teleop_core.robots.robot import Robot
 from teleop_core.slave.arm import Arm
 from teleop_core.slave.controllers import Controller

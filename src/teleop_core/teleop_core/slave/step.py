@@ -1,37 +1,18 @@
 """Step of the slave: one tick of the arm's server, on records of parameters, state and signals."""
 
-from teleop_core.graph.signals import copy
-from teleop_core.graph.topics import NO_COMMAND_NS
-from teleop_core.kernels import inner, kernel
-from teleop_core.kernels.geometry import Array, pose_from_transform
+from teleop_core.graph import copy, topics
+from teleop_core.kernels import Array, inner, kernel, pose_from_transform
+from teleop_core.slave import commands, interpolation, velocity
 from teleop_core.slave.arm import ArmModel
-from teleop_core.slave.commands import (
-    AT_LIMITS,
-    AT_ONCE,
-    WITH_ARM,
-    CommandStatus,
-    SlaveNumbers,
-    SlaveRow,
-    SlaveState,
-    advance_move,
-    advance_setpoint,
-    come_to_rest,
-    follows,
-    limit_tool,
-    plan_move,
-    take_command,
-)
-from teleop_core.slave.interpolation import advance_on_way
 from teleop_core.slave.operation import watch
 from teleop_core.slave.operation.states import Event, State, change
-from teleop_core.slave.velocity import advance_velocity
 
 _ENABLED, _FAULT = int(State.ENABLED), int(State.FAULT)
-_ARRIVED, _HOME, _BLIND = int(Event.ARRIVED), int(Event.HOME), int(CommandStatus.BLIND)
+_ARRIVED, _HOME, _BLIND = int(Event.ARRIVED), int(Event.HOME), int(commands.CommandStatus.BLIND)
 
 
 @inner
-def _moves(p: SlaveNumbers, s: SlaveState) -> bool:
+def _moves(p: commands.SlaveNumbers, s: commands.SlaveState) -> bool:
     """Whether setpoint or arm move in this tick."""
     moving = 0
     for i in range(s.setpoint.shape[0]):
@@ -40,7 +21,7 @@ def _moves(p: SlaveNumbers, s: SlaveState) -> bool:
 
 
 @inner
-def _is_still(s: SlaveState) -> bool:
+def _is_still(s: commands.SlaveState) -> bool:
     moves = 0
     for i in range(s.step.shape[0]):
         moves += s.step[i] != 0.0
@@ -48,7 +29,7 @@ def _is_still(s: SlaveState) -> bool:
 
 
 @inner
-def _is_near(p: SlaveNumbers, s: SlaveState) -> bool:
+def _is_near(p: commands.SlaveNumbers, s: commands.SlaveState) -> bool:
     """Whether the arm stands at its setpoint."""
     off = 0
     for i in range(s.setpoint.shape[0]):
@@ -57,7 +38,7 @@ def _is_near(p: SlaveNumbers, s: SlaveState) -> bool:
 
 
 @inner
-def _begin_where_it_is(p: SlaveNumbers, s: SlaveState, arm: ArmModel, row: SlaveRow) -> None:
+def _begin_where_it_is(p: commands.SlaveNumbers, s: commands.SlaveState, arm: ArmModel, row: commands.SlaveRow) -> None:
     """Let the setpoint of an arm that is not at home begin where it is; it homes from there."""
     if _is_near(p, s):
         return
@@ -72,7 +53,7 @@ def _begin_where_it_is(p: SlaveNumbers, s: SlaveState, arm: ArmModel, row: Slave
 
 
 @inner
-def _take_measured(p: SlaveNumbers, s: SlaveState, arm: ArmModel, row: SlaveRow) -> None:
+def _take_measured(p: commands.SlaveNumbers, s: commands.SlaveState, arm: ArmModel, row: commands.SlaveRow) -> None:
     """Take what the arm says of itself, if it is new, and look for what is wrong with it.
 
     It was sampled together with the setpoint that is still in force.
@@ -105,28 +86,32 @@ def _take_measured(p: SlaveNumbers, s: SlaveState, arm: ArmModel, row: SlaveRow)
 
 
 @inner
-def _go_on(p: SlaveNumbers, s: SlaveState, arm: ArmModel, row: SlaveRow, before: Array, dt: float) -> None:
+def _go_on(
+    p: commands.SlaveNumbers, s: commands.SlaveState, arm: ArmModel, row: commands.SlaveRow, before: Array, dt: float
+) -> None:
     """Move the setpoint: to a goal, at a speed, after the command, or to rest."""
     if s.state != _FAULT:
         s.must_join = 0
     if s.state == _ENABLED and s.is_busy and not s.must_plan:
-        advance_move(s)
+        commands.advance_move(s)
     elif s.state == _ENABLED and s.is_busy:  # a way to a goal begins at rest
-        come_to_rest(p, s, AT_LIMITS, dt)
+        commands.come_to_rest(p, s, commands.AT_LIMITS, dt)
     elif s.state == _ENABLED and s.motion != 0:
-        advance_velocity(p, s, arm, row.now_ns, dt)
-    elif row.command_status != _BLIND and follows(p, s, row.now_ns):
-        advance_on_way(p, s)
-        advance_setpoint(p, s, before, dt)
+        velocity.advance_velocity(p, s, arm, row.now_ns, dt)
+    elif row.command_status != _BLIND and commands.follows(p, s, row.now_ns):
+        interpolation.advance_on_way(p, s)
+        commands.advance_setpoint(p, s, before, dt)
     elif watch.is_braked(p, s) or s.must_join:
-        come_to_rest(p, s, WITH_ARM, dt)
+        commands.come_to_rest(p, s, commands.WITH_ARM, dt)
         s.must_join = s.must_join and not (_is_near(p, s) or _is_still(s))
     else:
-        come_to_rest(p, s, AT_ONCE if s.state == _FAULT else AT_LIMITS, dt)
+        commands.come_to_rest(p, s, commands.AT_ONCE if s.state == _FAULT else commands.AT_LIMITS, dt)
 
 
 @kernel
-def slave_step(p: SlaveNumbers, s: SlaveState, arm: ArmModel, row: SlaveRow, dt: float) -> None:
+def slave_step(
+    p: commands.SlaveNumbers, s: commands.SlaveState, arm: ArmModel, row: commands.SlaveRow, dt: float
+) -> None:
     """One tick of the arm's server: write the slave's setpoint, measured pose and operation.
 
     What is measured is of the last tick, and judged against the setpoint of that one.
@@ -144,7 +129,7 @@ def slave_step(p: SlaveNumbers, s: SlaveState, arm: ArmModel, row: SlaveRow, dt:
     if s.asked_ns != 0:  # as a message of servo_jp would
         copy(s.asked, row.slave_servo_jp)
         row.slave_servo_jp_ns, s.asked_ns = s.asked_ns, 0
-    row.command_status = take_command(p, s, row, dt)
+    row.command_status = commands.take_command(p, s, row, dt)
     if s.state != _ENABLED:
         s.motion = 0
     elif watch.is_blind(p, s, row.now_ns):  # a move goes on from wherever the arm is then
@@ -152,11 +137,11 @@ def slave_step(p: SlaveNumbers, s: SlaveState, arm: ArmModel, row: SlaveRow, dt:
     if s.must_plan and row.command_status != _BLIND and _is_still(s):
         if s.is_homing:
             copy(p.start, s.move_to)
-        plan_move(p, s, arm, dt)
-        s.command_stamp_ns, s.motion = NO_COMMAND_NS, 0
+        commands.plan_move(p, s, arm, dt)
+        s.command_stamp_ns, s.motion = topics.NO_COMMAND_NS, 0
     copy(s.command, joints)
     _go_on(p, s, arm, row, joints, dt)
-    limit_tool(p, s, arm, row.slave_setpoint_cp, dt)
+    commands.limit_tool(p, s, arm, row.slave_setpoint_cp, dt)
     if s.is_busy and not s.must_plan and s.moved_ticks >= s.move_ticks:
         change(s, _ARRIVED)
     pose_from_transform(arm.T, row.slave_setpoint_cp)

@@ -2,9 +2,7 @@
 
 from typing import Annotated
 
-from teleop_core.kernels import inner
-from teleop_core.kernels.fields import Fields, PerJoint
-from teleop_core.kernels.geometry import Array
+from teleop_core.kernels import Array, Fields, PerJoint, inner
 from teleop_core.slave.arm import Arm
 
 LONGEST_DELAY = 30

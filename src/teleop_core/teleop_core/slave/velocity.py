@@ -3,9 +3,8 @@
 import math
 from enum import IntEnum
 
-from teleop_core.graph.signals import copy
-from teleop_core.kernels import inner
-from teleop_core.kernels.geometry import Array
+from teleop_core.graph import copy
+from teleop_core.kernels import Array, inner
 from teleop_core.robots.chains.damped import eliminate, gram, weigh
 from teleop_core.slave.arm import ArmModel
 from teleop_core.slave.commands import SlaveNumbers, SlaveState
@@ -35,8 +34,7 @@ def joint_speeds(arm: ArmModel, q: Array, twist: Array, speed: Array) -> None:
     singularity the tip lags instead of the joints racing; what a robot cannot do is left out.
 
     Args:
-        arm: Its ``jacobian`` and ``geometry``; its rooms ``J``, ``A``, ``b`` and ``is_free`` are
-            written.
+        arm: Its ``jacobian`` and ``geometry``; its rooms ``J``, ``A``, ``b`` and ``is_free`` are written.
         q: Joints (n,) [rad or m].
         twist: Of the tip (6,) in base axes [m/s, rad/s].
         speed: Joint speeds (n,) [rad/s or m/s]; written.

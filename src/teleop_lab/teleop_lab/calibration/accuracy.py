@@ -13,8 +13,7 @@ from teleop_lab.calibration.model import FRAME
 
 AXES, TOTAL = ("x", "y", "z"), "total"
 _FOLDS = 5
-# What is left of a reading, over the typical, from which on it looks misread: of normal noise one
-# in a million is.
+# What is left of a reading, over the typical, from which on it looks misread: of normal noise one in a million is.
 _MISREAD = 5.0
 
 

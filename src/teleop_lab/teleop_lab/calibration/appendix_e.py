@@ -1,9 +1,8 @@
 """Appendix E: the accuracy test of the RCRT-1 with a ruler, as printed, and the poses behind it.
 
-Ten targets along each axis, 10 mm apart, with the tool as at home. Along x and z the moves begin at
-home; along y, where home lies on the edge of what can be reached, 30 mm before it, and the ruler
-lies between home and the tip all the same. The source prints no directions: -x, +y and +z are those
-that can be reached (±y mirror each other).
+Ten targets along each axis, 10 mm apart, with the tool as at home. Along x and z the moves begin at home; along y,
+where home lies on the edge of what can be reached, 30 mm before it, and the ruler lies between home and the tip all the
+same. The source prints no directions: -x, +y and +z are those that can be reached (±y mirror each other).
 
 Source:
     Vongbunyong 2008, appendix E.1, tables E.1-E.3.

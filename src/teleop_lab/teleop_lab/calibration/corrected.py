@@ -81,7 +81,6 @@ def _with_joint(constant: float, is_against: bool) -> str:
 
 
 def _joint(robot: Robot, i: int) -> Row:
-    """Name, limits and postures of a joint."""
     return {
         "name": robot.joint_names[i],
         "lower": float(robot.lower[i]),

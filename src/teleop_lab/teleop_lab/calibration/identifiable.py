@@ -5,9 +5,8 @@ long as the ratio of the largest to the smallest is above a bound, one entry of 
 combination is left at zero, a length or a twist before a joint offset.
 
 Source:
-    Bound of 100: Schröer 1993, as quoted in the chapter on model identification by Hollerbach,
-    Khalil and Gautier of the Springer handbook of robotics, 2016, which has the elimination by
-    singular values too.
+    Bound of 100: Schröer 1993, as quoted in the chapter on model identification by Hollerbach, Khalil and Gautier of
+    the Springer handbook of robotics, 2016, which has the elimination by singular values too.
 """
 
 from collections.abc import Sequence

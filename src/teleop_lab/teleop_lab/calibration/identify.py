@@ -121,8 +121,7 @@ def identify(
     Args:
         model: The arm as drawn.
         measured: Readings.
-        fit: "all" link errors, joint "offsets", or names of entries, which then all must be
-            told apart.
+        fit: "all" link errors, joint "offsets", or names of entries, which then all must be told apart.
         finds_frame: Whether the base's place in the frame of the measurement is found too.
         keeps_all: Whether entries stay whose confidence interval holds zero; without it they are
             left at zero, the least certain first, unless they were named. An entry that is not

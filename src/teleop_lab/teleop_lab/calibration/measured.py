@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from teleop_core.base.damage import damage_told
-from teleop_core.base.errors import ParameterError, ShapeError, TeleopError
+from teleop_core.base import ParameterError, ShapeError, TeleopError, damage_told
 from teleop_core.kernels.geometry import Array, checked_array
 from teleop_core.robots.robot import Robot
 from teleop_exchange.names import without_unit
@@ -102,9 +101,8 @@ class Measured:
 def read_measured(path: Path, robot: Robot) -> Measured:
     """Measured poses from a CSV file: a column per joint, and x, y, z of the tip.
 
-    Joints are called as the robot calls them, or q1 ... qn, in metres and radians; ``x [mm]``,
-    ``theta1_deg`` and their like say another unit. Cells of x, y, z may be empty. Other columns
-    are left out.
+    Joints are called as the robot calls them, or q1 ... qn, in metres and radians; ``x [mm]``, ``theta1_deg`` and their
+    like say another unit. Cells of x, y, z may be empty. Other columns are left out.
 
     Raises:
         RecordingError: It cannot be read, or is no table of text.

@@ -31,8 +31,7 @@ def optimal_poses(model: Model, count: int, names: Sequence[str], rng: np.random
         rng: Source of the candidates.
 
     Source:
-        Fedorov 1972, Theory of optimal experiments: forward steps; for calibration
-        Borm and Menq 1991.
+        Fedorov 1972, Theory of optimal experiments: forward steps; for calibration Borm and Menq 1991.
     """
     pool = random_poses(model.robot, max(CANDIDATES, 2 * count), rng)
     J = model.jacobian(pool, np.zeros(len(model.names)))

@@ -32,7 +32,6 @@ def text(calibration: "Calibration") -> str:
 
 
 def _errors(calibration: "Calibration") -> Iterator[str]:
-    """Value, interval and truth of each entry."""
     found, known = calibration.found, calibration.equivalent
     if not found.names:
         yield "no error is told from zero: the arm is as drawn, as far as these readings tell"
@@ -47,7 +46,6 @@ def _errors(calibration: "Calibration") -> Iterator[str]:
 
 
 def _table(accuracy: "Accuracy") -> Iterator[str]:
-    """Spreads before and after, in millimetres."""
     yield f"tip error [mm] {accuracy.where}"
     yield f"{'':8}{'before: RMS':>14}{'S.D.':>9}{'max':>9}{'after: RMS':>14}{'S.D.':>9}{'max':>9}"
     for name, before in accuracy.before.items():

@@ -8,16 +8,14 @@ from teleop_core.base.errors import ParameterError, UnknownNameError
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots.link_errors import LinkErrors
 from teleop_core.robots.robot import Robot
-from teleop_lab.calibration import appendix_e
-from teleop_lab.calibration.identifiable import WORST_CONDITION, select
+from teleop_lab.calibration import appendix_e, identifiable
 from teleop_lab.calibration.identify import wanted_names
 from teleop_lab.calibration.measured import CalibrationError, Measured
 from teleop_lab.calibration.model import Model, rotation_of
 from teleop_lab.calibration.poses import optimal_poses, random_poses
 
 TOLERANCES = {"cnc": 20e-6, "prototype": 100e-6}
-"""Half widths of tolerances [m], published: Vongbunyong 2008, chapter 3, of milled and of
-rapid-prototyped parts."""
+"""Half widths of tolerances [m], published: Vongbunyong 2008, chapter 3, of milled and of rapid-prototyped parts."""
 SEAT = 0.05
 """Lever [m] over which a tolerance turns an axis; assumed: the size of a bearing seat or a link."""
 RULER = "ruler"
@@ -88,7 +86,7 @@ def chosen_poses(model: Model, count: int, choose: str, fit: str | Sequence[str]
         return random_poses(model.robot, count, rng)
     names, pool = wanted_names(model, fit), random_poses(model.robot, 100, rng)
     J = model.jacobian(pool, np.zeros(len(model.names))).reshape(-1, len(model.names))
-    kept, _ = select(model, J, names, WORST_CONDITION)
+    kept, _ = identifiable.select(model, J, names, identifiable.WORST_CONDITION)
     return optimal_poses(model, count, kept or names, rng)
 
 

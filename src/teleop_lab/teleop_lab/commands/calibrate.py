@@ -90,7 +90,6 @@ def _run(arguments: argparse.Namespace) -> int:
 
 
 def _fit(arguments: argparse.Namespace) -> str | list[str] | None:
-    """What is to be found, as the API takes it."""
     given: list[str] | None = arguments.fit
     if given is not None and len(given) == 1 and given[0] in ("all", "offsets"):
         return given[0]

@@ -67,7 +67,6 @@ def _text(value: object) -> str:
 
 
 def _table(tuning: "Tuning", tuned: "Tuned") -> str:
-    """The best trials, the best one first."""
     from teleop_lab.studies.summary import table_text
 
     scored = [(n, trial) for n, trial in enumerate(tuned.trials, 1) if trial.score is not None]

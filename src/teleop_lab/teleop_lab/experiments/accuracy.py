@@ -13,9 +13,8 @@ from teleop_core.robots import Robot, load_robot
 from teleop_core.slave.pair import ArmParameters
 from teleop_lab.calibration.appendix_e import ESCAPE, OFFSET_OF_D3, READ, STEP
 from teleop_lab.drawing import axis, joined, published_points
+from teleop_lab.experiments import conditions, experiment
 from teleop_lab.experiments.bench import Bench
-from teleop_lab.experiments.conditions import RESTING
-from teleop_lab.experiments.experiment import Experiment
 from teleop_lab.experiments.outcome import Findings, Row, absolute
 from teleop_lab.fitting.rests import Mover
 
@@ -140,7 +139,7 @@ def _joints(robot: Robot, place: Array) -> Array:
 def _measure(bench: Bench) -> Findings:
     robot = load_robot("rcrt1")
     longer = {n: readings(robot, w, longer_d3(robot, D3_OFFSET_MM)) for n, w in AXES.items()}
-    plant = bench.slave(RESTING)
+    plant = bench.slave(conditions.RESTING)
     exact = {name: readings(robot, which, moved_plant(plant)) for name, which in AXES.items()}
     rows, figures = [], []
     for name, which in AXES.items():
@@ -231,7 +230,7 @@ def _figure(name: str, which: Axis, exact: Array, longer: Array) -> Figure:
     return Figure(f"Accuracy along {name}", sentence, traces, layout, 320)
 
 
-ACCURACY = Experiment(
+ACCURACY = experiment.Experiment(
     "accuracy",
     "moves of the slave alone, measured with a ruler: what its encoders do not see",
     "Vongbunyong 2008, appendix E, tables E.1-E.4",

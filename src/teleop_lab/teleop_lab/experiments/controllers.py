@@ -10,9 +10,8 @@ from teleop_core.evaluation.published import COARSE, FINE
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot
 from teleop_lab.drawing import DARK, Trace, axis, level, line, points
+from teleop_lab.experiments import experiment, joint_steps
 from teleop_lab.experiments.bench import Bench, Session, Settings, mean, pooled
-from teleop_lab.experiments.experiment import Experiment
-from teleop_lab.experiments.joint_steps import StepAnswer, answer_to_steps
 from teleop_lab.experiments.outcome import Findings, Row, percent
 
 _PLANT: Settings = {"plant": "hardware"}
@@ -95,9 +94,9 @@ def compared(bench: Bench, scenario: str, law: str) -> list[Session]:
     return bench.sessions(scenario, {**_PLANT, **LAWS[law]})
 
 
-def steps_of(bench: Bench, law: str) -> StepAnswer:
+def steps_of(bench: Bench, law: str) -> joint_steps.StepAnswer:
     """Answer to steps of the joints, with the reference filter off, on the hardware plant."""
-    return answer_to_steps(bench.slave({**_PLANT, **LAWS[law], **_STEPS}))
+    return joint_steps.answer_to_steps(bench.slave({**_PLANT, **LAWS[law], **_STEPS}))
 
 
 _TRACKED: tuple[tuple[str, str, str, Callable[..., float]], ...] = (
@@ -134,7 +133,7 @@ def _tracking_rows(scenario: str, found: Mapping[str, list[Tracking]]) -> list[R
     return rows
 
 
-def _step_rows(answers: Mapping[str, StepAnswer]) -> list[Row]:
+def _step_rows(answers: Mapping[str, joint_steps.StepAnswer]) -> list[Row]:
     rows = []
     for text, unit, value in (
         ("step of a joint, no filter: overshoot, largest of the joints", "%", lambda one: 100.0 * one.overshoot.max()),
@@ -201,7 +200,7 @@ def _error_figure(scenario: str, traces: list[Trace]) -> Figure:
     return Figure(f"Tracking error, {MODES[scenario].mode}", sentence, traces, layout, 420)
 
 
-CONTROLLERS = Experiment(
+CONTROLLERS = experiment.Experiment(
     "controllers",
     "all control laws on the plant that predicts the built machine: errors, effort, noise, rest",
     "predicted; published is the source's PID (Vongbunyong 2008, table 8.2)",

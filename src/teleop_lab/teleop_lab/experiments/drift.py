@@ -10,10 +10,9 @@ from teleop_core.chain.passivity.port import IN, OUT
 from teleop_core.evaluation.figure import FIRST, FIXTURE, SECOND, THIRD, Figure
 from teleop_core.kernels.geometry import Array
 from teleop_lab.drawing import axis, joined, level
+from teleop_lab.experiments import experiment, transmission
 from teleop_lab.experiments.bench import Bench
-from teleop_lab.experiments.experiment import Experiment
 from teleop_lab.experiments.outcome import Findings, Row, absolute
-from teleop_lab.experiments.transmission import far_settings
 
 MATERIALS = ("tissue", "silicone", "steel")
 PASSIVITIES = ("none", "tank", "tdpa", "wave")
@@ -71,7 +70,7 @@ def measure_drift(bench: Bench, job: Job) -> Drift:
     """
     material, passivity, round_trip = job
     settings = {
-        **far_settings(round_trip),
+        **transmission.far_settings(round_trip),
         "stages": ("network", "passivity"),
         "reflection.passivity": passivity,
         "world.material": material,
@@ -174,7 +173,7 @@ def _measure(bench: Bench) -> Findings:
     return report(dict(zip(jobs, bench.map(measure_drift, jobs), strict=True)))
 
 
-DRIFT = Experiment(
+DRIFT = experiment.Experiment(
     "drift",
     "by how much the slave is off the hand after contacts far away, by material and passivity",
     "compensator of drift of Coelho, Ott, Singh, Lizarralde and Kondak 2019",

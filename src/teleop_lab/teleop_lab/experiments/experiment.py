@@ -3,8 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from teleop_core.base.errors import PartError
-from teleop_core.base.registry import Registry
+from teleop_core.base import PartError, Registry
 from teleop_lab.experiments.bench import Bench
 from teleop_lab.experiments.outcome import Findings, Outcome
 

@@ -2,9 +2,8 @@
 
 import math
 
+from teleop_lab.experiments import experiment, look_and_move
 from teleop_lab.experiments.bench import Bench
-from teleop_lab.experiments.experiment import Experiment
-from teleop_lab.experiments.look_and_move import CYCLE, movement_time
 from teleop_lab.experiments.outcome import Findings, Row, percent
 
 LAGS = (0.0083, 0.025, 0.075, 0.225)
@@ -22,7 +21,7 @@ LATENCIES = (0.033, 0.133, 0.333)
 def _laws() -> list[Row]:
     rows = []
     for lag, time in zip(LAGS, TIMES, strict=True):
-        found = [movement_time(way, width, lag)[0] for way in WAYS for width in WIDTHS]
+        found = [look_and_move.movement_time(way, width, lag)[0] for way in WAYS for width in WIDTHS]
         rows.append(
             Row(
                 quantity=f"time of movement, {1e3 * lag:g} ms late",
@@ -43,7 +42,7 @@ def _sessions(bench: Bench) -> list[Row]:
         times.append(float(session.score.value("task.time_s") or math.nan))
     rows = []
     for latency, time in zip(LATENCIES[1:], times[1:], strict=True):
-        law = times[0] * (CYCLE + latency) / (CYCLE + LATENCIES[0])
+        law = times[0] * (look_and_move.CYCLE + latency) / (look_and_move.CYCLE + LATENCIES[0])
         rows.append(
             Row(
                 quantity=f"time of an attempt, display {1e3 * latency:g} ms late",
@@ -73,7 +72,7 @@ def _measure(bench: Bench) -> Findings:
     return Findings((*_laws(), *_sessions(bench)), (), _NOTES)
 
 
-FITTS = Experiment(
+FITTS = experiment.Experiment(
     "fitts",
     "times to press in targets that are seen late, of people and of the operator who sees",
     "MacKenzie and Ware 1993",

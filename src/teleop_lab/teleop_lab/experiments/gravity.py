@@ -5,10 +5,8 @@ import numpy as np
 from teleop_core.evaluation.figure import COMMAND, MEASURED, Figure, time_axis
 from teleop_core.robots import load_robot
 from teleop_lab.drawing import axis, line
+from teleop_lab.experiments import conditions, experiment, master_slave
 from teleop_lab.experiments.bench import Bench, Session, pooled
-from teleop_lab.experiments.conditions import OURS, PREDICTED
-from teleop_lab.experiments.experiment import Experiment
-from teleop_lab.experiments.master_slave import MODES, drawn_of
 from teleop_lab.experiments.outcome import Findings, Row, percent
 
 _OFF = {"gravity_compensation": "none"}
@@ -21,12 +19,12 @@ def _rms(sessions: list[Session]) -> float:
 
 def _measure(bench: Bench) -> Findings:
     rows, figures = [], []
-    for name, printed in MODES.items():
+    for name, printed in master_slave.MODES.items():
         group = f"position error, RMS, {printed.mode}"
-        on, off = bench.sessions(name, PREDICTED), bench.sessions(name, {**PREDICTED, **_OFF})
+        on, off = bench.sessions(name, conditions.PREDICTED), bench.sessions(name, {**conditions.PREDICTED, **_OFF})
         with_it, without = _rms(on), _rms(off)
-        ours = _rms(bench.sessions(name, OURS))
-        ours_off = _rms(bench.sessions(name, {**OURS, **_OFF}))
+        ours = _rms(bench.sessions(name, conditions.OURS))
+        ours_off = _rms(bench.sessions(name, {**conditions.OURS, **_OFF}))
         rows += [
             Row(
                 quantity="with compensation",
@@ -78,7 +76,7 @@ def _effort_rows() -> list[Row]:
 def _figure(mode: str, on: Session, off: Session) -> Figure:
     traces = []
     for session, name, color in ((off, "without", COMMAND), (on, "with compensation", MEASURED)):
-        found = drawn_of(session)
+        found = master_slave.drawn_of(session)
         error = np.linalg.norm(found.measured - found.reference, axis=1)[::_CURVE]
         traces.append(line(found.times[::_CURVE], error, name, color, 1.2))
     layout = {"xaxis": time_axis(), "yaxis": axis("position error", "mm", rangemode="tozero")}
@@ -86,7 +84,7 @@ def _figure(mode: str, on: Session, off: Session) -> Figure:
     return Figure(f"Gravity compensation, {mode}", sentence, traces, layout, 340)
 
 
-GRAVITY = Experiment(
+GRAVITY = experiment.Experiment(
     "gravity",
     "what compensation of gravity on axis 2 does for the errors",
     "Vongbunyong 2008, sections 4.6, 6.1 and 7.6",

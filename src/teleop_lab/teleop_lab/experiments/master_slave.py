@@ -4,25 +4,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from teleop_core.evaluation.figure import (
-    COMMAND,
-    FIRST,
-    MEASURED,
-    REFERENCE,
-    SECOND,
-    THIRD,
-    Figure,
-    axis_suffix,
-    stacked_axes,
-    time_axis,
-)
+from teleop_core.evaluation import COMMAND, FIRST, MEASURED, SECOND, THIRD, Figure, axis_suffix, time_axis
+from teleop_core.evaluation.figure import REFERENCE, stacked_axes
 from teleop_core.evaluation.published import ANGLE_FACTOR, BOX_OVERSHOOT_MM, COARSE, FINE, POSITION_SHARE, Published
 from teleop_core.kernels.geometry import Array, roll_pitch_yaw, rotations_from_quaternions
 from teleop_core.shapes.basis.drawing import edges_of
 from teleop_lab.drawing import FIXTURE, axis, in_planes, in_space, level, line, scene
+from teleop_lab.experiments import conditions, experiment
 from teleop_lab.experiments.bench import Bench, Session, mean, pooled
-from teleop_lab.experiments.conditions import OURS, PREDICTED
-from teleop_lab.experiments.experiment import Experiment
 from teleop_lab.experiments.outcome import Findings, Row, Tolerance, absolute, factor, percent
 
 MODES = {"coarse_box": COARSE, "fine_box": FINE}
@@ -120,9 +109,9 @@ def _mode_rows(name: str, found: list[Figures], ours: list[Figures]) -> list[Row
 
 
 def _measure(bench: Bench) -> Findings:
-    sessions = {name: bench.sessions(name, PREDICTED) for name in MODES}
+    sessions = {name: bench.sessions(name, conditions.PREDICTED) for name in MODES}
     found = {name: [figures_of(s) for s in several] for name, several in sessions.items()}
-    ours = {name: [figures_of(s) for s in bench.sessions(name, OURS)] for name in MODES}
+    ours = {name: [figures_of(s) for s in bench.sessions(name, conditions.OURS)] for name in MODES}
     rows = [row for name in MODES for row in _mode_rows(name, found[name], ours[name])]
     ratios, others = (_ratios(which) for which in (found, ours))
     rows.append(_row("position RMS, fine over coarse", "", round(_RATIO, 3), ratios, others, absolute(0.12), "both"))
@@ -283,7 +272,7 @@ def _both_boxes(sessions: dict[str, Session]) -> Figure:
     return Figure("Both boxes", sentence, traces, scene("mm"), 480)
 
 
-MASTER_SLAVE = Experiment(
+MASTER_SLAVE = experiment.Experiment(
     "master_slave",
     "random motion of a hand in a box, coarse and fine: errors of the slave, and the box",
     "Vongbunyong 2008, tables 7.8, 7.9 and 8.2, figures 7.16-7.24",

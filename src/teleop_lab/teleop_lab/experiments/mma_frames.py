@@ -8,8 +8,7 @@ from teleop_lab.drawing import PUBLISHED, in_space, scene
 from teleop_lab.experiments.bench import Bench
 from teleop_lab.experiments.experiment import Experiment
 from teleop_lab.experiments.outcome import EXACT, Findings, Row, absolute
-from teleop_machines.mma_models import JOINTS, LINKS, frames, model_table
-from teleop_machines.mobility import PLANAR, degrees_of_freedom, independent_loops
+from teleop_machines import mma_models, mobility
 
 # Frame: printed model, measured prototype [mm].
 TABLE_4_7 = {
@@ -27,7 +26,7 @@ _PRINTED, _BY_HAND = absolute(0.07), absolute(3.0)
 
 def _measure(_: Bench) -> Findings:
     mma = load_robot("mma")
-    found = frames(model_table("B", mma.geometry), _SERIAL_HOME)
+    found = mma_models.frames(mma_models.model_table("B", mma.geometry), _SERIAL_HOME)
     places = {name: 1e3 * found[name][:3, 3] for name in TABLE_4_7}
     rows = [
         Row(quantity=f"frame {name}, {letter}", unit="mm", published=column[k],
@@ -46,10 +45,10 @@ def _measure(_: Bench) -> Findings:
         Row(quantity="freedoms", published=7.0, predicted=float(mma.n), within=EXACT,
             group="mobility, section 3.5"),
         Row(quantity="independent loops", published=1.0,
-            predicted=float(independent_loops(LINKS, JOINTS)), within=EXACT,
+            predicted=float(mobility.independent_loops(mma_models.LINKS, mma_models.JOINTS)), within=EXACT,
             group="mobility, section 3.5"),
         Row(quantity="freedoms of the parallelogram", published=2.0,
-            predicted=float(degrees_of_freedom(5, 5, 5, space=PLANAR)), within=EXACT,
+            predicted=float(mobility.degrees_of_freedom(5, 5, 5, space=mobility.PLANAR)), within=EXACT,
             group="mobility, section 3.5"),
     ]  # fmt: skip
     chain = np.vstack([np.zeros(3), *(1e3 * T[:3, 3] for T in found.values())])

@@ -8,8 +8,7 @@ from typing import Any
 
 from plotly.offline import get_plotlyjs, get_plotlyjs_version
 
-from teleop_console.report.packing import Arrays, deflated
-from teleop_console.report.page_template import PAGE, POLICY, TIMES, script, style
+from teleop_console.report import packing, page_template
 from teleop_core.evaluation.figure import Figure, is_against_time
 from teleop_lab.experiments.experiment_table import MARKS, empty, numbers, spread, summary, within
 from teleop_lab.experiments.outcome import BASES, Outcome, Row
@@ -34,7 +33,7 @@ def experiments_page(outcomes: Sequence[Outcome]) -> str:
     Args:
         outcomes: What was found, in the order of the page.
     """
-    arrays, drawn, sections = Arrays(), [], []
+    arrays, drawn, sections = packing.Arrays(), [], []
     for number, outcome in enumerate(outcomes):
         places = [f"plot-{number}-{i}" for i in range(len(outcome.figures))]
         sections.append(_section(number, outcome, places))
@@ -45,15 +44,15 @@ def experiments_page(outcomes: Sequence[Outcome]) -> str:
     recordings = [{"duration": _duration(o), "bands": [], "kept": 0} for o in outcomes]
     found = {"recordings": recordings, "arrays": arrays.packed(), "figures": drawn}
     data = json.dumps(found, allow_nan=False)
-    return PAGE.format(
-        policy=POLICY,
+    return page_template.PAGE.format(
+        policy=page_template.POLICY,
         title="Experiments: published and predicted",
-        style=style() + _STYLE,
+        style=page_template.style() + _STYLE,
         body="\n".join((_head(outcomes), *sections)),
         data=data.replace("<", "\\u003c"),  # nothing inside can end the script element
-        plotly=deflated(get_plotlyjs().encode()),
+        plotly=packing.deflated(get_plotlyjs().encode()),
         library=f"plotly.js {get_plotlyjs_version()}",
-        script=script(),
+        script=page_template.script(),
     )
 
 
@@ -109,7 +108,7 @@ def _section(number: int, outcome: Outcome, places: Sequence[str]) -> str:
         *(f'<p class="note">{escape(note)}</p>' for note in outcome.notes),
     ]
     if any(map(is_against_time, outcome.figures)):
-        parts.append(TIMES.format(place=f"times-{number}", duration=f"{_duration(outcome):.1f}"))
+        parts.append(page_template.TIMES.format(place=f"times-{number}", duration=f"{_duration(outcome):.1f}"))
     parts += [_card(*pair) for pair in zip(outcome.figures, places, strict=True)]
     return "\n".join((*parts, "</section>"))
 

@@ -7,8 +7,7 @@ from teleop_lab.drawing import axis, line
 from teleop_lab.experiments.bench import Bench
 from teleop_lab.experiments.experiment import Experiment
 from teleop_lab.experiments.outcome import EXACT, Findings, Row
-from teleop_machines import mobility
-from teleop_machines.four_bar_loop import FourBar
+from teleop_machines import four_bar_loop, mobility
 
 # Mechanism: space, links, joints, freedoms of the joints, and the printed freedom.
 _COUNTS = {
@@ -17,7 +16,7 @@ _COUNTS = {
     "three-fingered hand": (mobility.SPATIAL, 11, 12, 18, 6),
     "Stewart platform": (mobility.SPATIAL, 14, 18, 36, 6),
 }
-_LOOP = FourBar(4.0, 1.0, 3.5, 2.5)
+_LOOP = four_bar_loop.FourBar(4.0, 1.0, 3.5, 2.5)
 
 
 def _count_rows() -> list[Row]:

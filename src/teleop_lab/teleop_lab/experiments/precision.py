@@ -11,9 +11,8 @@ from teleop_core.robots import load_robot
 from teleop_core.session.configuration import configure
 from teleop_core.slave.pair import ArmParameters
 from teleop_lab.drawing import axis, points, published_points
+from teleop_lab.experiments import conditions, experiment
 from teleop_lab.experiments.bench import Bench, Settings
-from teleop_lab.experiments.conditions import OURS, PREDICTED
-from teleop_lab.experiments.experiment import Experiment
 from teleop_lab.experiments.outcome import Findings, Row, factor, percent
 from teleop_lab.experiments.pose_measures import accuracy, repeatability
 from teleop_lab.fitting.rest_table import PUBLISHED, RestTable, read_rests
@@ -85,7 +84,7 @@ def _rms(values: Array) -> float:
 
 
 def _measure_precision(bench: Bench) -> Findings:
-    predicted, ours = simulated_rests(bench, PREDICTED), simulated_rests(bench, OURS)
+    predicted, ours = simulated_rests(bench, conditions.PREDICTED), simulated_rests(bench, conditions.OURS)
     rows = [
         Row(quantity="precision: largest error", unit="mm", published=_PRECISION_MM,
             predicted=predicted.errors_mm.max(), ours=ours.errors_mm.max(), within=percent(15.0)),
@@ -143,7 +142,7 @@ def _joint_figures(predicted: Rests) -> list[Figure]:
 
 
 def _measure_repeatability(bench: Bench) -> Findings:
-    predicted, ours = simulated_rests(bench, PREDICTED), simulated_rests(bench, OURS)
+    predicted, ours = simulated_rests(bench, conditions.PREDICTED), simulated_rests(bench, conditions.OURS)
     spread, spread_ours = (2.0 * r.errors_mm.std(axis=1, ddof=1) for r in (predicted, ours))
     rows = [
         Row(
@@ -180,9 +179,9 @@ def _measure_repeatability(bench: Bench) -> Findings:
     return Findings(tuple(rows), (), (text, also))
 
 
-PRECISION = Experiment(
+PRECISION = experiment.Experiment(
     "precision", "six points, ten moves from home to each: how far the tip rests off", _SOURCE, _measure_precision
 )
-REPEATABILITY = Experiment(
+REPEATABILITY = experiment.Experiment(
     "repeatability", "the same moves: how much the rests of ten runs differ", _SOURCE, _measure_repeatability
 )

@@ -6,26 +6,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from teleop_core.evaluation.figure import (
-    FIRST,
-    MEASURED,
-    REFERENCE,
-    SECOND,
-    THIRD,
-    Figure,
-    axis_suffix,
-    stacked_axes,
-    time_axis,
-)
+from teleop_core.evaluation import FIRST, MEASURED, SECOND, THIRD, Figure, axis_suffix, time_axis
+from teleop_core.evaluation.figure import REFERENCE, stacked_axes
 from teleop_core.graph.signals import TICK_NS
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot
-from teleop_core.slave.pair import ArmParameters, SimulatedArm
-from teleop_core.slave.trajectory import cubic_move, shortest_move_time
+from teleop_core.slave import pair, trajectory
 from teleop_lab.drawing import axis, level, line
+from teleop_lab.experiments import conditions, experiment
 from teleop_lab.experiments.bench import Bench, Settings
-from teleop_lab.experiments.conditions import OURS, PREDICTED
-from teleop_lab.experiments.experiment import Experiment
 from teleop_lab.experiments.outcome import Findings, Row, factor
 from teleop_lab.fitting.rest_table import PUBLISHED, read_rests
 
@@ -67,15 +56,15 @@ class Response(NamedTuple):
         return self.reached_mm - self.wanted_mm
 
 
-def response(parameters: ArmParameters, target: Array) -> Response:
+def response(parameters: pair.ArmParameters, target: Array) -> Response:
     """Move the slave from home to a joint target (n,) by a cubic, and let it rest there."""
     robot = load_robot(parameters.robot)
     assert robot.drives is not None
-    slave = SimulatedArm(replace(parameters, start=tuple(robot.home.tolist())))
+    slave = pair.SimulatedArm(replace(parameters, start=tuple(robot.home.tolist())))
     goal = np.clip(target, robot.lower, robot.upper)
-    move_time = shortest_move_time(robot.home, goal, _SPEED * robot.drives.speed_limit)
+    move_time = trajectory.shortest_move_time(robot.home, goal, _SPEED * robot.drives.speed_limit)
     times = slave.dt * np.arange(1.0, round((move_time + _SETTLE_S) / slave.dt) + 1.0)
-    way = cubic_move(robot.home, goal, move_time, times)[0]
+    way = trajectory.cubic_move(robot.home, goal, move_time, times)[0]
     reference, measured = np.empty_like(way), np.empty_like(way)
     signals = slave.signals
     for k, joints in enumerate(way):
@@ -107,7 +96,7 @@ def _transient(found: Response) -> tuple[float, float, float]:
 
 
 def _measure(bench: Bench) -> Findings:
-    predicted, ours = _responses(bench, PREDICTED), _responses(bench, OURS)
+    predicted, ours = _responses(bench, conditions.PREDICTED), _responses(bench, conditions.OURS)
     rows = [
         Row(
             quantity=f"error at rest, point {k}",
@@ -205,7 +194,7 @@ def _joint_figure(point: int, found: Response) -> Figure:
     return Figure(title, "References and encoders of all joints.", traces, layout, 760)
 
 
-RESPONSES = Experiment(
+RESPONSES = experiment.Experiment(
     "responses",
     "one move from home to each point of the precision test, against time",
     "Vongbunyong 2008, section 7.3, figures 7.3-7.15 and E.1-E.6",

@@ -10,9 +10,8 @@ from teleop_core.robots import load_robot
 from teleop_core.slave.pair import SimulatedArm
 from teleop_core.slave.plants.hardware import faults_of
 from teleop_lab.drawing import DARK, axis
+from teleop_lab.experiments import controllers, experiment
 from teleop_lab.experiments.bench import Bench, Settings
-from teleop_lab.experiments.controllers import tracking_of
-from teleop_lab.experiments.experiment import Experiment
 from teleop_lab.experiments.outcome import Findings, Row
 
 _PLANT: Settings = {"plant": "hardware", "robot": "rcrt1"}
@@ -59,7 +58,7 @@ def error_of(bench: Bench, law: str, disturbance: str) -> tuple[float, float] | 
     """
     given = {**_PLANT, **LAWS[law], **DISTURBANCES[disturbance], "duration": _SECONDS}
     try:
-        found = tracking_of(bench.session("coarse_box", settings=given))
+        found = controllers.tracking_of(bench.session("coarse_box", settings=given))
     except ParameterError:
         return None
     return found.rms, found.largest
@@ -165,7 +164,7 @@ def _figure(found: Mapping[tuple[str, str], tuple[float, float] | None]) -> Figu
     return Figure("Laws on other plants", sentence, traces, layout, 460)
 
 
-ROBUSTNESS = Experiment(
+ROBUSTNESS = experiment.Experiment(
     "robustness",
     "all control laws on plants with delay, elastic gears, weak drives and more friction",
     "of our model; the disturbances are assumed",

@@ -7,8 +7,7 @@ import numpy as np
 
 from teleop_core.chain.mapping.walls import wall_force
 from teleop_core.chain.master.haptic_master import HapticMaster
-from teleop_core.graph.signals import DT
-from teleop_core.graph.topics import MASTER_CONTACT
+from teleop_core.graph import DT, topics
 from teleop_core.kernels.geometry import Array
 from teleop_lab.experiments import one_axis
 
@@ -20,7 +19,7 @@ _DELAYS, _SETTLED = 40, 10  # the same besides, in delays of the force
 _DEAD = 1e-12  # mean square root of speeds [m/s] below which rounding speaks
 _SHARES = (0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875)
 """Parts of a step of the wall's force by which a push exceeds one step."""
-_TAKEN, _RETURNED = (MASTER_CONTACT.columns.index(name) for name in ("taken", "returned"))
+_TAKEN, _RETURNED = (topics.MASTER_CONTACT.columns.index(name) for name in ("taken", "returned"))
 
 
 @dataclass(frozen=True)
@@ -136,9 +135,8 @@ def wall_boundary(grip: one_axis.Grip, damping: float, late: int) -> float:
 def press_energy(damping: float, wall: Wall, length: int, speed: float) -> float:
     """Energy [J] that a hand gets of a press in a wall: in at one speed, out at the same.
 
-    The hand is one that nothing stops. It has pressed once before, so the press begins within the
-    wall. The wall's work is that of ``master/contact``; our device has no viscous friction, so what
-    that takes of the press is counted here.
+    The hand is one that nothing stops. It has pressed once before, so the press begins within the wall. The wall's work
+    is that of ``master/contact``; our device has no viscous friction, so what that takes of the press is counted here.
 
     Args:
         damping: Viscous friction of the device [N·s/m].

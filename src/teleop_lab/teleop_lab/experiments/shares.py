@@ -5,15 +5,14 @@ import numpy as np
 from teleop_core.evaluation.figure import FIRST, SECOND, Figure
 from teleop_core.slave.plants.hardware import FAULTS
 from teleop_lab.drawing import axis
+from teleop_lab.experiments import conditions, experiment
 from teleop_lab.experiments.bench import Bench, Session, Settings
-from teleop_lab.experiments.conditions import PREDICTED
-from teleop_lab.experiments.experiment import Experiment
 from teleop_lab.experiments.outcome import Findings, Row
 
 
 def _without(bench: Bench, *faults: str) -> Session:
     off: Settings = {"plant.hardware.without": faults}
-    return bench.session("coarse_box", settings={**PREDICTED, **off})
+    return bench.session("coarse_box", settings={**conditions.PREDICTED, **off})
 
 
 def _errors(session: Session) -> tuple[float, float]:
@@ -54,7 +53,7 @@ def _figure(whole: tuple[float, float], alone: dict[str, tuple[float, float]]) -
     return Figure("What each fault adds", sentence, traces, layout, 380)
 
 
-SHARES = Experiment(
+SHARES = experiment.Experiment(
     "shares",
     "what each fault of the plant adds to the errors in coarse_box",
     "of our model; Vongbunyong 2008 names the faults in chapter 8",

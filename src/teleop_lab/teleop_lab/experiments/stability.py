@@ -9,23 +9,21 @@ from teleop_core.chain.master.device import DeviceParameters
 from teleop_core.evaluation.figure import DARK, FIRST, FIXTURE, SECOND, THIRD, Figure
 from teleop_core.graph.signals import DT
 from teleop_lab.drawing import PUBLISHED, axis, joined, line
+from teleop_lab.experiments import experiment, one_axis, transmission
 from teleop_lab.experiments.bench import Bench, Settings
-from teleop_lab.experiments.experiment import Experiment
-from teleop_lab.experiments.one_axis import Grip, exact_boundary, found_boundary
 from teleop_lab.experiments.outcome import Findings, Row, percent
-from teleop_lab.experiments.transmission import CHANNELS, Way
 
-GRIPS: Mapping[str, Grip] = {
-    "loose": Grip(0.25, 100.0, 5.0),
-    "medium": Grip(0.25, 300.0, 12.0),
-    "firm": Grip(0.25, 1000.0, 25.0),
+GRIPS: Mapping[str, one_axis.Grip] = {
+    "loose": one_axis.Grip(0.25, 100.0, 5.0),
+    "medium": one_axis.Grip(0.25, 300.0, 12.0),
+    "firm": one_axis.Grip(0.25, 1000.0, 25.0),
 }
 """Hands that hold the stylus: mass with the device, stiffness and damping; assumed."""
 DELAYS = (0.0, 0.02, 0.05, 0.1, 0.2)
 """By which the force comes later [s]."""
 SOFTEST, STIFFEST = 20.0, 50_000.0
 """Objects that are tried [N/m]: softer than tissue, and steel."""
-_WAYS: tuple[Way, ...] = (
+_WAYS: tuple[transmission.Way, ...] = (
     ("position_force", "none"),
     ("position_force", "tank"),
     ("position_position", "none"),
@@ -43,9 +41,9 @@ _COLORS = (FIRST, SECOND, FIXTURE)
 _APPARENT_MASS = DeviceParameters().apparent_mass
 
 
-def _settings(grip: Grip, delay: float, stiffness: float, way: Way) -> Settings:
+def _settings(grip: one_axis.Grip, delay: float, stiffness: float, way: transmission.Way) -> Settings:
     architecture, passivity = way
-    channels, ports = CHANNELS[architecture], ("passivity",) if passivity in _TWO_PORTS else ()
+    channels, ports = transmission.CHANNELS[architecture], ("passivity",) if passivity in _TWO_PORTS else ()
     late = [f"slave/measured_{kind}@motion_scaling={delay + 1e-3}" for kind in ("cf", "cp")]
     late += [f"slave/energy@motion_scaling={delay + 1e-3}" for _ in ports]
     return {
@@ -67,7 +65,7 @@ def _settings(grip: Grip, delay: float, stiffness: float, way: Way) -> Settings:
     }
 
 
-def fastest(bench: Bench, grip: Grip, delay: float, stiffness: float, way: Way) -> float:
+def fastest(bench: Bench, grip: one_axis.Grip, delay: float, stiffness: float, way: transmission.Way) -> float:
     """Fastest that the hand gets [m/s] in ``palpation``, of an object without damper or friction.
 
     Args:
@@ -83,7 +81,7 @@ def fastest(bench: Bench, grip: Grip, delay: float, stiffness: float, way: Way) 
     return float(ways.max()) / (_WINDOW * 1e-3)
 
 
-def chain_boundary(bench: Bench, grip: Grip, delay: float, way: Way) -> float:
+def chain_boundary(bench: Bench, grip: one_axis.Grip, delay: float, way: transmission.Way) -> float:
     """Stiffness [N/m] up to which the whole chain leaves the hand calm, from 20 to 50 000 N/m.
 
     The device has its friction and its steps, the arm its lag and the reference its filter.
@@ -108,14 +106,14 @@ def _measure(bench: Bench) -> Findings:
     for name, grip in GRIPS.items():
         for delay in DELAYS:
             told = f"force {1e3 * delay:.0f} ms later"
-            exact = exact_boundary(grip, delay + DT)
+            exact = one_axis.exact_boundary(grip, delay + DT)
             rows.append(
                 Row(
                     quantity=told,
                     unit="N/m",
                     published=exact,
                     basis="law",
-                    predicted=found_boundary(grip, delay),
+                    predicted=one_axis.found_boundary(grip, delay),
                     within=percent(2.0),
                     group=f"one axis before a spring, {name} grip",
                 )
@@ -154,7 +152,7 @@ def _figure(found: Mapping[tuple[str, float], tuple[float, ...]]) -> Figure:
     smooth = np.linspace(0.0, DELAYS[-1], 101)
     traces = []
     for (name, grip), color in zip(GRIPS.items(), _COLORS, strict=True):
-        exact = np.array([exact_boundary(grip, delay + DT) for delay in smooth])
+        exact = np.array([one_axis.exact_boundary(grip, delay + DT) for delay in smooth])
         whole, tank, spring, tdpa = np.array([found[name, delay] for delay in DELAYS]).T
         traces += [
             {
@@ -172,7 +170,7 @@ def _figure(found: Mapping[tuple[str, float], tuple[float, ...]]) -> Figure:
     return Figure("How stiff a thing may be", sentence, traces, layout, 460)
 
 
-STABILITY = Experiment(
+STABILITY = experiment.Experiment(
     "stability",
     "how stiff a thing may be whose force comes late, by grip, architecture and passivity",
     "exact boundary of one axis",

@@ -117,8 +117,7 @@ def _stray(values: Complex) -> float:
 def hybrid_matrix(experiments: Sequence[Ports]) -> Complex:
     """Hybrid matrix (L, 2, 2) that explains some experiments best.
 
-    It maps speed of the hand and force on the world to force of the hand and the negative speed of
-    the tip.
+    It maps speed of the hand and force on the world to force of the hand and the negative speed of the tip.
 
     Raises:
         ParameterError: The experiments do not differ, such as with one world alone.

@@ -1,7 +1,6 @@
 """UVA: times of a user study of fifteen people, predicted before its table was read.
 
-The prediction stands in ``uva_prediction.csv`` as it was written down; ``docs/predicted_study.md``
-says when and how.
+The prediction stands in ``uva_prediction.csv`` as it was written down; ``docs/predicted_study.md`` says when and how.
 """
 
 import csv
@@ -19,8 +18,7 @@ LATENCY = 0.033 + 0.050
 """Of the station by itself [s]: two frames at 60 Hz, and a video's encoder and decoder, which take
 50 ms (Nankaku et al. 2022)."""
 TOTAL = 22.1
-"""Mean time of a transfer without faults [s], printed: the one number of the study that scales the
-prediction."""
+"""Mean time of a transfer without faults [s], printed: the one number of the study that scales the prediction."""
 
 
 class Primitive(NamedTuple):
@@ -92,9 +90,8 @@ def _mackenzie(primitive: Primitive, level: Level) -> float:
 def predict() -> dict[str, dict[str, dict[str, float]]]:
     """Times [s] by model, level and primitive; each model takes :data:`TOTAL` without faults.
 
-    ``looks`` is the prediction; ``constant`` slows every primitive of every level by the same
-    factor, the mean of the printed totals; ``mackenzie`` is the law for pointing, which knows
-    delays alone.
+    ``looks`` is the prediction; ``constant`` slows every primitive of every level by the same factor, the mean of the
+    printed totals; ``mackenzie`` is the law for pointing, which knows delays alone.
     """
     slower = sum((22.1, 24.4, 26.6, 36.2, 27.1, 34.1, 47.9, 28.9, 47.4, 64.3)) / 10.0 / TOTAL
     normal = LEVELS[0]

@@ -10,14 +10,11 @@ from teleop_core.chain.master.device import DeviceParameters
 from teleop_core.evaluation.figure import FIRST, FIXTURE, SECOND, Figure
 from teleop_core.graph.signals import DT
 from teleop_lab.drawing import Trace, axis, level, line, points
+from teleop_lab.experiments import experiment, one_axis, sampled_wall, stability
 from teleop_lab.experiments.bench import Bench
-from teleop_lab.experiments.experiment import Experiment
-from teleop_lab.experiments.one_axis import Grip, sampled_boundary
 from teleop_lab.experiments.outcome import Findings, Row, absolute, percent
-from teleop_lab.experiments.sampled_wall import passive_boundary, restless_boundary, wall_boundary
-from teleop_lab.experiments.stability import GRIPS
 
-BARE = Grip(0.045, 1.0, 2.0)
+BARE = one_axis.Grip(0.045, 1.0, 2.0)
 """Our device's mass in a hand that holds it as loosely as the parameters allow, and its viscous
 friction; the friction is assumed."""
 LATE = (0, 1, 2, 3, 5, 10)
@@ -98,7 +95,7 @@ def _stability(found: Boundaries) -> list[Row]:
     """Rows of the linear law for every damping, then of the exact axis."""
     laws, exact = [], []
     for (wall_damping, late), predicted in found.items():
-        axis_ = sampled_boundary(BARE, late, wall_damping)
+        axis_ = one_axis.sampled_boundary(BARE, late, wall_damping)
         law = linear_law(BARE.damping, wall_damping, 1e-3 * late)
         where = f"B = {wall_damping:g} N·s/m"
         row = Row(
@@ -135,13 +132,13 @@ def _energy(found: Bounds) -> list[Row]:
 
 
 def _divergence() -> Row:
-    grip = GRIPS["loose"]  # b of 5 N·s/m and 0.25 kg
+    grip = stability.GRIPS["loose"]  # b of 5 N·s/m and 0.25 kg
     return Row(
         quantity="b = B = 5 N·s/m, 0.25 kg",
         unit="N/m",
-        published=round(sampled_boundary(grip, 0, grip.damping), 1),
+        published=round(one_axis.sampled_boundary(grip, 0, grip.damping), 1),
         basis="law",
-        predicted=wall_boundary(grip, grip.damping, 0),
+        predicted=sampled_wall.wall_boundary(grip, grip.damping, 0),
         within=_EXACT,
         group="diverges, exact sampled axis",
         note="passive: 0",
@@ -154,7 +151,7 @@ def _quiet(friction: float, resolution: float) -> Row:
         unit="N/m",
         published=round(quiet_law(friction, resolution), 1),
         basis="law",
-        predicted=restless_boundary(friction, resolution),
+        predicted=sampled_wall.restless_boundary(friction, resolution),
         within=_WITHIN,
         group="rests under a loose hand, Abbott and Okamura 2005",
     )
@@ -164,14 +161,14 @@ def _measure(bench: Bench) -> Findings:
     total, steps = len(_CASES) + 1 + len(DAMPINGS) + len(DEVICES), count(1)
     stable: dict[tuple[float, int], float] = {}
     for case in _CASES:
-        stable[case] = wall_boundary(BARE, *case)
+        stable[case] = sampled_wall.wall_boundary(BARE, *case)
         bench.progress(next(steps), total)
     diverging = _divergence()
     bench.progress(next(steps), total)
     passive: dict[tuple[float, float, int], float] = {}
     for dampings in DAMPINGS:
         for length in PRESSES:
-            bounds = [passive_boundary(*dampings, length, speed) for speed in SPEEDS]
+            bounds = [sampled_wall.passive_boundary(*dampings, length, speed) for speed in SPEEDS]
             passive[(*dampings, length)] = min(bounds)
         bench.progress(next(steps), total)
     quiet = []
@@ -207,7 +204,7 @@ def _delay_figure(found: Boundaries) -> Figure:
     traces: list[Trace] = []
     for wall_damping, color in zip(WALL_DAMPINGS, _COLORS, strict=True):
         law = np.array([linear_law(BARE.damping, wall_damping, 1e-3 * late) for late in smooth])
-        exact = np.array([sampled_boundary(BARE, late, wall_damping) for late in LATE])
+        exact = np.array([one_axis.sampled_boundary(BARE, late, wall_damping) for late in LATE])
         name = f"B = {wall_damping:g} N·s/m"
         traces += [
             {
@@ -243,7 +240,7 @@ def _press_figure(found: Bounds, diverging: Row) -> Figure:
     return Figure("Passivity and divergence, b = B = 5 N·s/m", sentence, traces, layout, 460)
 
 
-ZWIDTH = Experiment(
+ZWIDTH = experiment.Experiment(
     "zwidth",
     "how stiff a fixture the device renders: stable, passive, and at rest",
     "laws of Gil 2009, Colgate and Schenkel 1997, Abbott and Okamura 2005",

@@ -15,12 +15,10 @@ from scipy.stats import chi2, t
 
 from teleop_core.base.errors import ParameterError, TeleopError, UnknownNameError
 from teleop_core.kernels.geometry import Array
-from teleop_core.robots import load_robot_set
-from teleop_core.robots.hardware import Hardware
+from teleop_core.robots import hardware, load_robot_set
 from teleop_core.robots.robot import Robot
-from teleop_core.slave.pair import ArmParameters
+from teleop_core.slave import pair, slave_sim
 from teleop_core.slave.plants.hardware import faults_of
-from teleop_core.slave.slave_sim import SlaveSim
 from teleop_lab.fitting.rest_table import RestTable
 from teleop_lab.fitting.rests import rest_positions
 
@@ -128,9 +126,9 @@ class FitResult:
 class _Problem:
     """Rests of a robot as a function of scaled numbers; 1 is of the size that the table shows."""
 
-    def __init__(self, robot: Robot, parameters: ArmParameters, table: RestTable, free: Sequence[str]) -> None:
+    def __init__(self, robot: Robot, parameters: pair.ArmParameters, table: RestTable, free: Sequence[str]) -> None:
         self.robot, self.parameters, self.table, self.free = robot, parameters, table, tuple(free)
-        stiffness = np.abs(SlaveSim(parameters).arm.gains[:, 0])
+        stiffness = np.abs(slave_sim.SlaveSim(parameters).arm.gains[:, 0])
         off = np.abs(table.mean).mean(axis=0)
         self.scales = np.array([self._scale(name, off * stiffness) for name in free])
         self.one_sided = one_sided(robot, table)
@@ -155,7 +153,7 @@ class _Problem:
             raise ParameterError("free", name, "a weight that loads a joint at home")
         return float(effort[axis] / lever[axis])
 
-    def faults(self, x: Array, wander: Array | None = None) -> Hardware:
+    def faults(self, x: Array, wander: Array | None = None) -> hardware.Hardware:
         """The arm's faults with scaled numbers ``x`` in their place."""
         base, model = faults_of(self.robot), self.robot.dynamics
         assert model is not None
@@ -205,9 +203,8 @@ def one_sided(robot: Robot, table: RestTable) -> NDArray[np.bool_]:
 def default_free(robot: Robot, table: RestTable) -> tuple[str, ...]:
     """What a table can tell of a robot: names for :func:`fit`.
 
-    Dry friction of every axis that gravity does not leave to an integrator; the bias of those among
-    them that are approached from both sides and not loaded by gravity; and weights that no source
-    states.
+    Dry friction of every axis that gravity does not leave to an integrator; the bias of those among them that are
+    approached from both sides and not loaded by gravity; and weights that no source states.
     """
     from teleop_core.slave.controllers.source_pid import loaded_axes
 
@@ -229,7 +226,7 @@ def default_free(robot: Robot, table: RestTable) -> tuple[str, ...]:
 
 def fit(
     table: RestTable,
-    parameters: ArmParameters,
+    parameters: pair.ArmParameters,
     free: Sequence[str] | None = None,
     progress: Callable[[float], None] = lambda share: None,
     *,
@@ -237,9 +234,8 @@ def fit(
 ) -> FitResult:
     """Fit numbers of the plant ``hardware`` to where a machine came to rest.
 
-    Residuals count in standard deviations of the runs; Cauchy's loss lets go of points that no
-    such model explains. Intervals are those of M-estimates. The wandering of friction
-    follows afterwards, from the spread of the runs.
+    Residuals count in standard deviations of the runs; Cauchy's loss lets go of points that no such model explains.
+    Intervals are those of M-estimates. The wandering of friction follows afterwards, from the spread of the runs.
 
     Args:
         table: Measured rests.

@@ -6,8 +6,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from teleop_core.base.damage import damage_told
-from teleop_core.base.errors import TeleopError
+from teleop_core.base import TeleopError, damage_told
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots.robot import Robot
 
@@ -51,8 +50,7 @@ def read_rests(file: Path, robot: Robot) -> RestTable:
         robot: Whose joints it has.
 
     Raises:
-        TeleopError: It cannot be read, columns or numbers are missing, or a point has one run
-            alone or several targets.
+        TeleopError: It cannot be read, columns or numbers are missing, or a point has one run alone or several targets.
     """
     with damage_told(file):
         table = pd.read_csv(file)

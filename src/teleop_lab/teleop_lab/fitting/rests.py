@@ -6,9 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from teleop_core.graph.signals import TICK_NS
-from teleop_core.kernels import kernel
-from teleop_core.kernels.geometry import Array
+from teleop_core.graph import TICK_NS
+from teleop_core.kernels import Array, kernel
 from teleop_core.robots import load_robot_set
 from teleop_core.robots.hardware import Hardware
 from teleop_core.slave.commands import SlaveRow

@@ -13,9 +13,7 @@ from teleop_core.evaluation.bands import LIMIT_COLORS
 from teleop_core.graph.topics import Limit
 from teleop_core.kernels.geometry import Array, rotation_vectors
 from teleop_core.robots.dexterity import sample_workspace
-from teleop_lab.planning.asked import AskedPath
-from teleop_lab.planning.reach_table import LABELS, text
-from teleop_lab.planning.walk import Walked
+from teleop_lab.planning import asked, reach_table, walk
 
 if TYPE_CHECKING:
     from teleop_lab.planning.reach import Followed, Reach
@@ -68,7 +66,7 @@ def write_reach_page(reaches: "Sequence[Reach]", file: Path) -> None:
     parts = [_HEAD.format(title=escape(title), style=_STYLE)]
     for reach in reaches:
         parts.append(f"<h1>{escape(reach.path.name)}: reach of {escape(reach.robot.name)}</h1>")
-        parts += [f"<pre>{escape(text(reach))}</pre>", _NOTES, '<div class="pair">']
+        parts += [f"<pre>{escape(reach_table.text(reach))}</pre>", _NOTES, '<div class="pair">']
         kinds = [("as given", reach.given)]
         kinds += [] if reach.is_given else [("proposed", reach.proposed)]
         for name, followed in kinds:
@@ -132,7 +130,7 @@ def _in_space(followed: "Followed") -> list[Any]:
     return traces
 
 
-def _add_times(figure: Any, path: AskedPath, walked: Walked) -> None:
+def _add_times(figure: Any, path: asked.AskedPath, walked: walk.Walked) -> None:
     """Curves of position and turn since the start, with bands where the slave does not follow."""
     kept, time = _spread(len(path), _POINTS), path.time
     moves = 1e3 * (walked.asked[:, :3] - walked.asked[0, :3])
@@ -172,7 +170,7 @@ def _add_band(figure: Any, row: int, bins: tuple[Array, Array], cause: Limit) ->
     figure.add_trace(band, row=row, col=1, secondary_y=False)
 
 
-def _bands(path: AskedPath, walked: Walked) -> Iterable[tuple[Limit, tuple[Array, Array]]]:
+def _bands(path: asked.AskedPath, walked: walk.Walked) -> Iterable[tuple[Limit, tuple[Array, Array]]]:
     """Causes that occur, with begins of bins of time (M,) [s] and 1 where it occurs in one, or 0.
 
     No stretch is too short to be seen.
@@ -189,7 +187,7 @@ def _bands(path: AskedPath, walked: Walked) -> Iterable[tuple[Limit, tuple[Array
 
 
 def _label(cause: Limit) -> str:
-    return "followed" if cause is Limit.NONE else LABELS[cause.name.lower()]
+    return "followed" if cause is Limit.NONE else reach_table.LABELS[cause.name.lower()]
 
 
 def _spread(count: int, most: int) -> Any:

@@ -4,24 +4,12 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from teleop_core.bags.arms import of_arm
-from teleop_core.bags.reader import Bag
-from teleop_core.base.errors import ParameterError, RecordingError, UnknownNameError
-from teleop_core.graph.layers import (
-    Layer,
-    config_folder,
-    list_scenarios,
-    load_file,
-    parse_setting,
-    scenario_file,
-    setting,
-)
+from teleop_core.bags import arms, reader
+from teleop_core.base import ParameterError, RecordingError, UnknownNameError
+from teleop_core.graph import Layer, config_folder
+from teleop_core.graph.layers import list_scenarios, load_file, parse_setting, scenario_file, setting
 from teleop_core.robots.robot import Robot
-from teleop_core.session.api import run
-from teleop_core.session.configuration import Configuration
-from teleop_core.session.master_bag import as_master_bag
-from teleop_core.session.recording import Recording
-from teleop_core.session.runner import recorded_configuration, silent
+from teleop_core.session import api, configuration, master_bag, recording, runner
 from teleop_lab.planning.aim import Aim
 from teleop_lab.planning.asked import AskedPath, asked_path
 from teleop_lab.planning.placement import Placement
@@ -37,8 +25,7 @@ _WHOLE, _EXCERPT = 150_000, 6_000
 _EXCERPT_RATE = 20.0  # Hz
 # Walks that a search usually takes, for the progress.
 _USUAL_WALKS = 500
-# The short excerpt is easier to follow than the whole path, so the search raises its goal up to
-# this many times.
+# The short excerpt is easier to follow than the whole path, so the search raises its goal up to this many times.
 _ATTEMPTS = 3
 
 
@@ -114,14 +101,14 @@ class Reach:
 
 
 def reach(
-    source: Recording | Path | str,
+    source: recording.Recording | Path | str,
     *,
     robot: str | None = None,
     geometry: Iterable[str] = (),
     share: float = GOAL,
     arm: str = "",
     keeps_axes: bool = False,
-    progress: Progress = silent,
+    progress: Progress = runner.silent,
     files: Iterable[Path | str] = (),
     settings: Mapping[str, Setting] | None = None,
     texts: Iterable[str] = (),
@@ -129,9 +116,8 @@ def reach(
     """How much of a hand's motion a slave can follow, and with what it follows most of it.
 
     Args:
-        source: A recording, its path, or the name of a scenario, which is run first. Its own
-            configuration is the start; of a recording of others, in any file that replay takes,
-            the default one.
+        source: A recording, its path, or the name of a scenario, which is run first. Its own configuration is the
+            start; of a recording of others, in any file that replay takes, the default one.
         robot: The slave, in place of the configuration's; its start then is the robot's own.
         geometry: Its lengths [m, rad] as ``symbol=value``.
         share: Share of the time that is to be followed, above 0 and at most 1.
@@ -154,7 +140,7 @@ def reach(
         raise ParameterError("share", share, "above 0 and at most 1")
     changes = _changes(robot, geometry, files, settings or {}, texts)
     made, bag = _configured(source, changes)
-    path = asked_path(of_arm(bag, arm))
+    path = asked_path(arms.of_arm(bag, arm))
     return _reach(path, made, share, arm, progress, keeps_axes=keeps_axes)
 
 
@@ -174,7 +160,9 @@ def _changes(
     return layers + [parse_setting(text) for text in texts]
 
 
-def _configured(source: Recording | Path | str, changes: list[Layer]) -> tuple[Configuration, Bag]:
+def _configured(
+    source: recording.Recording | Path | str, changes: list[Layer]
+) -> tuple[configuration.Configuration, reader.Bag]:
     """Configuration with the changes, and the recording; of a scenario one that is made now."""
     if isinstance(source, str) and not Path(source).exists():
         if Path(source).name != source or Path(source).suffix:
@@ -183,21 +171,21 @@ def _configured(source: Recording | Path | str, changes: list[Layer]) -> tuple[C
         if source not in list_scenarios():
             raise UnknownNameError("recording or scenario", source, list_scenarios())
         made = _of_scenario(source, changes)
-        return made, run(made).bag
-    bag = as_master_bag(source.bag if isinstance(source, Recording) else source)
-    layer, scenario = recorded_configuration(bag)
-    return Configuration.from_layers([layer, *changes], scenario), bag
+        return made, api.run(made).bag
+    bag = master_bag.as_master_bag(source.bag if isinstance(source, recording.Recording) else source)
+    layer, scenario = runner.recorded_configuration(bag)
+    return configuration.Configuration.from_layers([layer, *changes], scenario), bag
 
 
-def _of_scenario(name: str, changes: list[Layer]) -> Configuration:
+def _of_scenario(name: str, changes: list[Layer]) -> configuration.Configuration:
     """Configuration of a scenario in which the hand does not feel the slave's limits."""
     files = [config_folder() / "teleop.yaml", scenario_file(name)]
     free = setting("motion_scaling.reach_force.is_on", False)
-    return Configuration.from_layers([*map(load_file, files), *changes, free], name)
+    return configuration.Configuration.from_layers([*map(load_file, files), *changes, free], name)
 
 
 def _reach(
-    path: AskedPath, made: Configuration, goal: float, arm: str, progress: Progress, *, keeps_axes: bool
+    path: AskedPath, made: configuration.Configuration, goal: float, arm: str, progress: Progress, *, keeps_axes: bool
 ) -> Reach:
     scaling, solving = made.group("motion_scaling", arm), made.group("inverse_kinematics", arm)
     whole = Walker(path.limited(_WHOLE), scaling, solving)

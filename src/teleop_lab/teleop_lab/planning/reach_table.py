@@ -34,7 +34,6 @@ def text(reach: "Reach") -> str:
 
 
 def _rows(columns: "list[Followed]") -> Iterator[tuple[str, list[str]]]:
-    """Label and cells of each line."""
     yield "followed in a session", [_percent(c.share) for c in columns]
     for cause, label in LABELS.items():
         yield f"  not: {label}", [_percent(c.session.causes[cause]) for c in columns]

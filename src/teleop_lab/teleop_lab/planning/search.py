@@ -1,8 +1,7 @@
 """Search: the placement, turn and gains with which a slave follows a hand's motion.
 
-The largest rotation gain that can reach the goal comes first, then the largest gain. Where the
-motion drifts against a limit the start is moved by what was cut off, which is how far from the
-middle of its room the arm began.
+The largest rotation gain that can reach the goal comes first, then the largest gain. Where the motion drifts against a
+limit the start is moved by what was cut off, which is how far from the middle of its room the arm began.
 """
 
 import math
@@ -14,10 +13,9 @@ import numpy as np
 from teleop_core.kernels.geometry import Array, multiply_quaternions, transform_from_pose
 from teleop_core.robots.kinematics import IkStatus
 from teleop_core.robots.room import roomy_postures
+from teleop_lab.planning import turns, walk
 from teleop_lab.planning.aim import Aim
 from teleop_lab.planning.placement import Placement
-from teleop_lab.planning.turns import turns
-from teleop_lab.planning.walk import Walker
 
 ROTATION_GAINS = (1.0, 0.75, 0.5, 0.25, 0.1, 0.0)
 """Rotation gains that are tried, the largest first."""
@@ -28,8 +26,7 @@ STARTS = 24
 CUT = 0.03
 """By how much less of the time than a session follows the path may be followed where it is, with
 nothing cut off: a placement lives from motion that fits, not from motion that is cut to fit."""
-# Another start, which the eye, and another turn, which the hand has to get used to, must be worth
-# this factor of gain.
+# Another start, which the eye, and another turn, which the hand has to get used to, must be worth this factor of gain.
 _WORTH = 1.25
 _IMPROVED = 3  # of those tried, the best so many
 _ROUNDS, _BISECTIONS = 3, 6
@@ -51,9 +48,9 @@ class Search:
     """
 
     def __init__(
-        self, walker: Walker, given: Placement, aim: Aim, tell: Callable[[], None], *, keeps_axes: bool = False
+        self, walker: walk.Walker, given: Placement, aim: Aim, tell: Callable[[], None], *, keeps_axes: bool = False
     ) -> None:
-        self._turns = () if keeps_axes else turns()
+        self._turns = () if keeps_axes else turns.turns()
         self._walker, self._given, self._aim, self._tell = walker, given, aim, tell
         self._goal = 1.0
         self._known: dict[Placement, float] = {}

@@ -1,8 +1,7 @@
 """Walk: a hand's path through motion scaling and inverse kinematics alone.
 
-The stages of a session answer sample after sample, with a slave that is at once where it is told
-to be. So what is followed, what is cut off and why comes out as in a session, some hundred times
-faster.
+The stages of a session answer sample after sample, with a slave that is at once where it is told to be. So what is
+followed, what is cut off and why comes out as in a session, some hundred times faster.
 """
 
 from dataclasses import dataclass, replace
@@ -14,14 +13,12 @@ from numpy.typing import NDArray
 from teleop_core.chain.mapping.inverse_kinematics import InverseKinematics, InverseKinematicsParameters
 from teleop_core.chain.mapping.motion_scaling import MotionScaling
 from teleop_core.chain.mapping.parameters import MotionScalingParameters
-from teleop_core.graph.signals import DT, assign, copy
-from teleop_core.graph.topics import SLAVE_REACH, Limit
-from teleop_core.kernels import apart, bound, kernel_from_source, raise_pending, records
-from teleop_core.kernels.geometry import Array, pose_from_transform
+from teleop_core.graph import DT, assign, copy, topics
+from teleop_core.kernels import Array, apart, bound, kernel_from_source, pose_from_transform, raise_pending, records
 from teleop_lab.planning.asked import AskedPath
 from teleop_lab.planning.placement import Placement
 
-_COLUMN = {name: column for column, name in enumerate(SLAVE_REACH.columns)}
+_COLUMN = {name: column for column, name in enumerate(topics.SLAVE_REACH.columns)}
 # Larger than any speed limit [rad/s or m/s].
 _ANY_SPEED = 1e6
 _SOURCE = """\
@@ -75,12 +72,12 @@ class Walked:
     @property
     def share(self) -> float:
         """Share of the time in which the slave does what it is asked for."""
-        return float(self.weights[self.limit == Limit.NONE].sum())
+        return float(self.weights[self.limit == topics.Limit.NONE].sum())
 
     @property
     def causes(self) -> dict[str, float]:
         """Share of the time for each cause for which it does not, by its name."""
-        causes = (limit for limit in Limit if limit is not Limit.NONE)
+        causes = (limit for limit in topics.Limit if limit is not topics.Limit.NONE)
         return {c.name.lower(): float(self.weights[self.limit == c].sum()) for c in causes}
 
 
@@ -117,7 +114,7 @@ class Walker:
         self._samples = records(fields, count)
         self._samples["stamp_ns"] = self.path.stamp_ns
         self._samples["pose"], self._samples["buttons"] = self.path.poses, self.path.buttons
-        width = len(SLAVE_REACH.columns)
+        width = len(topics.SLAVE_REACH.columns)
         kinds = [("command", "f8", (7,)), ("reached", "f8", (7,)), ("q", "f8", (n,))]
         self._answers = records([*kinds, ("reach", "f8", (width,))], count)
         self._switch = np.zeros(1)
@@ -141,7 +138,7 @@ class Walker:
     def share(self, placement: Placement, *, is_cut: bool = True) -> float:
         """Share of the time that a placement follows, as in :attr:`Walked.share`; see `walk`."""
         self._run(placement, is_cut=is_cut, is_fast=False)
-        is_followed = self._answers["reach"][:, _COLUMN["limit"]] == Limit.NONE
+        is_followed = self._answers["reach"][:, _COLUMN["limit"]] == topics.Limit.NONE
         return float(self.weights[is_followed].sum())
 
     def walk(self, placement: Placement, *, is_cut: bool = True, is_fast: bool = False) -> Walked:

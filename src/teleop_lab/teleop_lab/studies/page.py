@@ -91,7 +91,6 @@ def _label(found: "xarray.Dataset", metric: str) -> dict[str, Any]:
 
 
 def _lines(study: "Study", found: "xarray.Dataset", metric: str) -> tuple[Any, Any] | None:
-    """A line over the first parameter for each combination of the others."""
     if not study.swept:
         return None
     name = next(iter(study.swept))

@@ -12,8 +12,7 @@ from pathlib import Path
 import teleop_core
 from teleop_core.base.errors import TeleopError
 from teleop_core.evaluation import measure
-from teleop_core.session.api import Setting, run
-from teleop_core.session.configuration import Configuration
+from teleop_core.session import api, configuration
 
 
 @dataclass(frozen=True)
@@ -37,9 +36,9 @@ class Point:
         key: What its result depends on.
     """
 
-    place: Mapping[str, Setting]
+    place: Mapping[str, api.Setting]
     scenario: str | None
-    settings: Mapping[str, Setting]
+    settings: Mapping[str, api.Setting]
     seed: int
     length: float
     key: Key
@@ -88,7 +87,7 @@ class Result:
             raise ValueError(str(error)) from error
 
 
-def recipe_of(made: Configuration) -> str:
+def recipe_of(made: configuration.Configuration) -> str:
     """Digest of a whole configuration, whatever its seed."""
     lines = [line for line in made.text().splitlines() if line.strip().partition(":")[0] != "seed"]
     return hashlib.sha256("\n".join(lines).encode()).hexdigest()[:20]
@@ -117,7 +116,7 @@ def compute(point: Point, metrics: Sequence[str], recordings: Path | None) -> Re
     error = ""
     try:
         out = recordings / point.name if recordings is not None else None
-        session = run(point.scenario, seed=point.seed, settings=point.settings, out=out)
+        session = api.run(point.scenario, seed=point.seed, settings=point.settings, out=out)
         scores = measure(session.bag, metrics)
     except TeleopError as raised:
         error = " ".join(str(raised).split())

@@ -13,8 +13,7 @@ from teleop_core.base.own_parts import load_own_parts
 from teleop_core.base.plain_yaml import load
 from teleop_core.evaluation.score import keys
 from teleop_core.graph.layers import SESSION
-from teleop_core.session.api import Setting, configuration
-from teleop_core.session.runner import silent
+from teleop_core.session import api, runner
 from teleop_lab.studies.point import Point, code_digest, point_key, recipe_of
 from teleop_lab.studies.store import Store
 
@@ -81,10 +80,10 @@ class Study:
     """
 
     scenario: str | None
-    swept: Mapping[str, Sequence[Setting]]
+    swept: Mapping[str, Sequence[api.Setting]]
     seeds: Sequence[int]
     metrics: Sequence[str]
-    settings: Mapping[str, Setting] = field(default_factory=dict)
+    settings: Mapping[str, api.Setting] = field(default_factory=dict)
     parts: Sequence[Path] = ()
 
     def __post_init__(self) -> None:
@@ -120,7 +119,7 @@ class Study:
             found += self.points_at(dict(zip(self.swept, values, strict=True)))
         return found
 
-    def points_at(self, chosen: Mapping[str, Setting]) -> list[Point]:
+    def points_at(self, chosen: Mapping[str, api.Setting]) -> list[Point]:
         """Points of all seeds at a value for each swept parameter, be it one of the study or not.
 
         Raises:
@@ -128,7 +127,7 @@ class Study:
         """
         found, code = [], code_digest()
         given = {**self.settings, **chosen}
-        made = configuration(self.scenario, settings=given)
+        made = api.configuration(self.scenario, settings=given)
         recipe, length = recipe_of(made), float(made.groups[SESSION].duration)
         for seed in self.seeds:
             place = {**chosen, SEED: int(seed)}
@@ -166,7 +165,7 @@ class Study:
         jobs: int | None = None,
         client: "Client | None" = None,
         recordings: Path | str | None = None,
-        progress: Callable[[int, int], None] = silent,
+        progress: Callable[[int, int], None] = runner.silent,
     ) -> "xarray.Dataset":
         """Run what is missing, failed or changed, and give all results.
 
@@ -175,10 +174,8 @@ class Study:
 
         Args:
             store: Directory of the results, made if it is missing; None keeps them in memory.
-            jobs: Processes of this machine, a session at a time in each; None: as many as
-                processors.
-            client: A Dask client whose workers run the sessions in place of processes; nothing but
-                values travels.
+            jobs: Processes of this machine, a session at a time in each; None: as many as processors.
+            client: A Dask client whose workers run the sessions in place of processes; nothing but values travels.
             recordings: Directory for a recording of each session; None: none are kept.
             progress: Told how many points are done, and how many there are.
 
@@ -209,13 +206,13 @@ def sweep(
     *,
     metrics: Sequence[str],
     seed: Iterable[int] = range(1, 2),
-    settings: Mapping[str, Setting | Sequence[Setting]] | None = None,
+    settings: Mapping[str, api.Setting | Sequence[api.Setting]] | None = None,
     parts: Sequence[Path | str] = (),
     store: Path | str | None = None,
     jobs: int | None = None,
     client: "Client | None" = None,
-    progress: Callable[[int, int], None] = silent,
-    **parameters: Setting | Sequence[Setting],
+    progress: Callable[[int, int], None] = runner.silent,
+    **parameters: api.Setting | Sequence[api.Setting],
 ) -> "xarray.Dataset":
     """Scores over named values of parameters: a dimension each, and one for the seed.
 
@@ -246,7 +243,6 @@ def _study(
     given: Mapping[str, Any],
     parts: Iterable[Path | str],
 ) -> Study:
-    """Study in which lists are swept."""
     swept = {name: tuple(v) for name, v in given.items() if isinstance(v, list | range)}
     fixed = {name: value for name, value in given.items() if name not in swept}
     return Study(scenario, swept, tuple(seeds), tuple(metrics), fixed, tuple(Path(part) for part in parts))

@@ -7,8 +7,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from teleop_core.base.errors import ParameterError, SessionError, TeleopError
-from teleop_core.session.api import Setting
-from teleop_core.session.runner import silent
+from teleop_core.session import api, runner
 from teleop_lab.studies.point import Result
 from teleop_lab.studies.store import Store
 from teleop_lab.studies.study import Study, common, named, read_entries
@@ -43,7 +42,7 @@ class Trial(NamedTuple):
         error: Why there is none.
     """
 
-    values: Mapping[str, Setting]
+    values: Mapping[str, api.Setting]
     score: float | None
     error: str
 
@@ -67,8 +66,7 @@ class Tuning:
 
     Attributes:
         scenario: One of ``teleop scenarios``; None for the defaults.
-        searched: A :class:`Range` or a list of choices for each parameter, named as on the command
-            line.
+        searched: A :class:`Range` or a list of choices for each parameter, named as on the command line.
         seeds: Hands over which a score is averaged: values that suit one alone are no use.
         metric: Key of the score, such as ``task.time_s``.
         is_largest: Whether the largest score is the best one.
@@ -80,11 +78,11 @@ class Tuning:
     """
 
     scenario: str | None
-    searched: Mapping[str, Range | Sequence[Setting]]
+    searched: Mapping[str, Range | Sequence[api.Setting]]
     seeds: Sequence[int]
     metric: str
     is_largest: bool = False
-    settings: Mapping[str, Setting] = field(default_factory=dict)
+    settings: Mapping[str, api.Setting] = field(default_factory=dict)
     parts: Sequence[Path] = ()
 
     def __post_init__(self) -> None:
@@ -112,7 +110,7 @@ class Tuning:
         *,
         trials: int = 30,
         jobs: int | None = None,
-        progress: Callable[[int, int], None] = silent,
+        progress: Callable[[int, int], None] = runner.silent,
     ) -> Tuned:
         """Try values, each chosen by what those before it were worth.
 
@@ -154,9 +152,8 @@ class Tuning:
         sign = -1.0 if self.is_largest else 1.0
         return Tuned(tuple(done), min(scored, key=lambda trial: sign * (trial.score or 0.0)))
 
-    def _values(self, trial: Any) -> dict[str, Setting]:
-        """Values of a trial of Optuna."""
-        found: dict[str, Setting] = {}
+    def _values(self, trial: Any) -> dict[str, api.Setting]:
+        found: dict[str, api.Setting] = {}
         for name, where in self.searched.items():
             if not isinstance(where, Range):
                 # Optuna knows plain values alone: a list is chosen by its place.
@@ -167,7 +164,7 @@ class Tuning:
                 found[name] = trial.suggest_float(name, where.low, where.high, log=where.is_log)
         return found
 
-    def _scores(self, study: Study, chosen: list[dict[str, Setting]], kept: Store, jobs: int | None) -> list[Trial]:
+    def _scores(self, study: Study, chosen: list[dict[str, api.Setting]], kept: Store, jobs: int | None) -> list[Trial]:
         """What some values are worth; sessions that the store does not have are run."""
         points, refused = [], []
         for values in chosen:
@@ -186,7 +183,7 @@ class Tuning:
             found.append(self._trial(values, [one for one in results if one is not None], why))
         return found
 
-    def _trial(self, values: dict[str, Setting], results: list[Result], error: str) -> Trial:
+    def _trial(self, values: dict[str, api.Setting], results: list[Result], error: str) -> Trial:
         scores = [one.scores.get(self.metric) for one in results]
         error = error or next((one.error for one in results if one.error), "")
         if error or None in scores:
@@ -215,14 +212,14 @@ def read_tuning(path: Path | str) -> Tuning:
     metrics = [(word, content[word]) for word in ("minimize", "maximize") if word in content]
     if len(metrics) != 1:
         raise ParameterError("minimize, maximize", dict(metrics), "one of them: key of a score")
-    searched: dict[str, Range | Sequence[Setting]] = {}
+    searched: dict[str, Range | Sequence[api.Setting]] = {}
     for name, where in named(content, "tune").items():
         searched[name] = _range(name, where)
     ((word, metric),) = metrics
     return Tuning(searched=searched, metric=str(metric), is_largest=word == "maximize", **common(content, Path(path)))
 
 
-def _range(name: str, where: object) -> Range | Sequence[Setting]:
+def _range(name: str, where: object) -> Range | Sequence[api.Setting]:
     if isinstance(where, list):
         return where
     hint = "a list of choices, or {low: 0.1, high: 1.0}, with log: true for equal ratios"

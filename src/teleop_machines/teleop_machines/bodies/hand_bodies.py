@@ -9,9 +9,8 @@ from teleop_core.robots.bodies.body import HERE, Bodies, Body, Joint
 from teleop_core.robots.bodies.frames import pose, tips
 from teleop_core.robots.bodies.solids import ball, capsule, rim
 from teleop_core.robots.robot import Robot
+from teleop_machines import hand_grasp, rps3_loop
 from teleop_machines.bodies.planar import pivoted
-from teleop_machines.hand_grasp import FINGERS
-from teleop_machines.rps3_loop import COSINES, SINES
 
 _UP = np.array([0.0, 0.0, 1.0])
 
@@ -27,7 +26,7 @@ def hand_bodies(robot: Robot) -> Bodies:
     for finger, root in enumerate(roots):
         lengths = tuple(g[f"l{finger + 1}{link}"] for link in (1, 2, 3))
         bodies += _finger(finger, root, lengths, radius)
-    corners = g["side"] / math.sqrt(3.0) * np.stack((COSINES, SINES, np.zeros(3)), axis=-1)
+    corners = g["side"] / math.sqrt(3.0) * np.stack((rps3_loop.COSINES, rps3_loop.SINES, np.zeros(3)), axis=-1)
     held = Body("object", rim(corners, 0.5 * radius, "platform"), 0, Joint.FREE, HERE, 0)
     tip = Body("tip", (ball(np.zeros(3), 0.8 * radius, "tool"),), 0, Joint.FREE, HERE, 0)
 
@@ -35,7 +34,7 @@ def hand_bodies(robot: Robot) -> Bodies:
         return q, tips(robot, q)[1][:, None]
 
     size = g["h"] + g["l11"] + g["l12"] + g["l13"]
-    moved = tuple(range(1, 3 * FINGERS + 1))
+    moved = tuple(range(1, 3 * hand_grasp.FINGERS + 1))
     return Bodies((*bodies, held, tip), robot.n, coordinates, moved, size)
 
 

@@ -4,15 +4,12 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from teleop_core.kernels import kernel
-from teleop_core.kernels.geometry import Array
-from teleop_core.kernels.portable import product
+from teleop_core.kernels import Array, kernel, product
 from teleop_core.robots.bodies.body import HERE, Bodies, Body, Coordinates, Joint
 from teleop_core.robots.bodies.frames import pose, tips
 from teleop_core.robots.bodies.solids import ball, capsule, cylinder
 from teleop_core.robots.robot import Robot
-from teleop_machines.bodies.parallel import Telescope, plate
-from teleop_machines.bodies.planar import pivoted
+from teleop_machines.bodies import parallel, planar
 from teleop_machines.scara_stewart_legs import layout
 
 _LEGS = slice(4, 9)  # of the geometry: what the leg kernels take
@@ -34,11 +31,11 @@ def scara_stewart_bodies(robot: Robot) -> Bodies:
     joint_points(robot.geometry_row[_LEGS], points)
     arm = _arm(robot, points[0])
     radius = 0.06 * robot.geometry["r_m"]
-    legs = Telescope(float(robot.lower[3:].min()), float(robot.upper[3:].max()), radius)
+    legs = parallel.Telescope(float(robot.lower[3:].min()), float(robot.upper[3:].max()), radius)
     count = 6 * legs.tubes
     bodies = [*arm, *legs.bodies(6)]
     tool = capsule(np.zeros(3), robot.geometry["e_eff"] * _UP, 2.0 * radius, "platform")
-    bodies.append(Body("platform", (*plate(points[1], radius), tool), 0, Joint.FREE, HERE, count))
+    bodies.append(Body("platform", (*parallel.plate(points[1], radius), tool), 0, Joint.FREE, HERE, count))
     origin = pose(z=robot.geometry["e_eff"])
     bodies.append(Body("tip", (ball(np.zeros(3), 3.0 * radius, "tool"),), len(bodies) - 1, origin=origin))
     upper = tuple(len(arm) + (leg + 1) * legs.tubes - 1 for leg in range(6))
@@ -54,14 +51,14 @@ def _arm(robot: Robot, joints: Array) -> list[Body]:
     rod = capsule(-stroke * _UP, np.zeros(3), 0.6 * radius, "link")
     return [
         Body("base", (foot, column), -1),
-        Body("link1", pivoted(g["l1"], radius), 0, Joint.REVOLUTE, pose(z=g["h1"]), 0),
-        Body("link2", pivoted(g["l2"], 0.9 * radius), 1, Joint.REVOLUTE, pose(x=g["l1"]), 1),
+        Body("link1", planar.pivoted(g["l1"], radius), 0, Joint.REVOLUTE, pose(z=g["h1"]), 0),
+        Body("link2", planar.pivoted(g["l2"], 0.9 * radius), 1, Joint.REVOLUTE, pose(x=g["l1"]), 1),
         Body("rod", (rod,), 2, Joint.PRISMATIC, pose(x=g["l2"]), 2),
-        Body("stewart_base", plate(joints, 0.3 * radius), 3, Joint.REVOLUTE, HERE, 9),
+        Body("stewart_base", parallel.plate(joints, 0.3 * radius), 3, Joint.REVOLUTE, HERE, 9),
     ]
 
 
-def _coordinates(robot: Robot, legs: Telescope, points: Array) -> Coordinates:
+def _coordinates(robot: Robot, legs: parallel.Telescope, points: Array) -> Coordinates:
     g, is_carried = robot.geometry, robot.geometry["carried"]
 
     def coordinates(q: Array) -> tuple[Array, Array]:

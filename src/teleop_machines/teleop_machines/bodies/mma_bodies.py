@@ -9,11 +9,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from teleop_core.kernels.geometry import Array
-from teleop_core.kernels.portable import product
+from teleop_core.kernels import Array, product
+from teleop_core.robots.bodies import chain, frames
 from teleop_core.robots.bodies.body import Bodies, Body, Joint
-from teleop_core.robots.bodies.chain import axes_of, chain, places, tip_of
-from teleop_core.robots.bodies.frames import moved, pose, pose_of
 from teleop_core.robots.robot import Robot
 from teleop_machines.bodies.planar import pivoted
 from teleop_machines.mma_models import SHORT_SIDE
@@ -27,17 +25,17 @@ _ELBOW, _ANKLE = 3, 4  # bodies that turn about these: link 3, link 4
 def mma_bodies(robot: Robot) -> Bodies:
     """Links of the chain, both links of the parallelogram's other side, and the tip."""
     home = robot.fk(robot.home)
-    tip, reference = pose_of(home), _coordinates(robot.home[None])[0][0]
+    tip, reference = frames.pose_of(home), _coordinates(robot.home[None])[0][0]
     mixing = np.zeros((7, 7))  # joint speeds per speed of the chain's coordinates
     for column, joint in enumerate((0, 1, 3, 2, 4, 5, 6)):
         mixing[joint, column] = 1.0
     mixing[2, 2] = 1.0  # θ3 = θ3' + (θ3 - θ3')
-    axes = axes_of(product(robot.jacobian(robot.home), mixing), tip[:3])
+    axes = chain.axes_of(product(robot.jacobian(robot.home), mixing), tip[:3])
     assert axes is not None, "the MMA's joints all turn"
-    chained = places(axes, np.zeros(7), tip[:3])
-    bodies, reach = chain(chained, _NAMES, _CHAIN, reference[list(_CHAIN)], np.zeros(7), tip)
+    chained = chain.places(axes, np.zeros(7), tip[:3])
+    bodies, reach = chain.chain(chained, _NAMES, _CHAIN, reference[list(_CHAIN)], np.zeros(7), tip)
     placed = Bodies(tuple(bodies), 7, _coordinates, (), reach).poses(robot.home)
-    end = tip_of(bodies, placed[-1], tip, reach)
+    end = chain.tip_of(bodies, placed[-1], tip, reach)
     bodies += _other_side(bodies, robot.geometry["a3"])
     moves = (1, 2, len(_NAMES) + 1, _ELBOW, 5, 6, 7)
     return Bodies((*bodies, end), 7, _coordinates, moves, reach)
@@ -51,9 +49,9 @@ def _coordinates(q: Array) -> tuple[Array, Array]:
 def _other_side(bodies: Sequence[Body], long_side: float) -> tuple[Body, Body]:
     """Link 3a on link 2, about the axis of link 3, and link 3b on it, parallel to link 3."""
     x, y = bodies[_ANKLE].origin[:2]  # link 3 runs there, in its own frame
-    root = moved(bodies[_ELBOW].origin, Joint.REVOLUTE, math.atan2(y, x))
+    root = frames.moved(bodies[_ELBOW].origin, Joint.REVOLUTE, math.atan2(y, x))
     radius = 0.03 * long_side
     count = len(bodies)
     short = Body("link3a", pivoted(SHORT_SIDE, radius), 2, Joint.REVOLUTE, root, 2)
-    long = Body("link3b", pivoted(long_side, radius), count, Joint.REVOLUTE, pose(SHORT_SIDE), 8)
+    long = Body("link3b", pivoted(long_side, radius), count, Joint.REVOLUTE, frames.pose(SHORT_SIDE), 8)
     return short, long

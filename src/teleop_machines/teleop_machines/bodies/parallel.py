@@ -5,8 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from teleop_core.kernels.geometry import Array
-from teleop_core.kernels.portable import arctangent, length, product
+from teleop_core.kernels import Array, arctangent, length, product
 from teleop_core.robots.bodies.body import HERE, Bodies, Body, Joint
 from teleop_core.robots.bodies.frames import tips
 from teleop_core.robots.bodies.solids import Solid, along, ball, capsule, rim

@@ -1,8 +1,7 @@
 """Architectures: what the hand feels of the slave, one file per kind.
 
-A kind turns the force on the slave's tip, and how far the tip is from where the hand leads it, into
-a push. Axes, silence, the largest push and passivity are the same for all
-(:mod:`teleop_core.chain.mapping.reflection`).
+A kind turns the force on the slave's tip, and how far the tip is from where the hand leads it, into a push. Axes,
+silence, the largest push and passivity are the same for all (:mod:`teleop_core.chain.mapping.reflection`).
 """
 
 from collections.abc import Callable
@@ -13,11 +12,9 @@ from typing import Any
 import numpy as np
 from numba import types
 
-from teleop_core.base.errors import PartError
-from teleop_core.base.registry import Registry, part_check, places, tried
-from teleop_core.kernels import pointer
-from teleop_core.kernels.geometry import Array
-from teleop_core.kernels.parts import fenced, is_whole, numbers_of
+from teleop_core.base import PartError, Registry, part_check
+from teleop_core.base.registry import places, tried
+from teleop_core.kernels import Array, fenced, is_whole, numbers_of, pointer
 
 __all__ = ["ARCHITECTURES", "MEMORY", "Architecture", "register_architecture"]
 
@@ -45,13 +42,12 @@ class Architecture:
     Attributes:
         name: What ``--set reflection.architecture=`` calls it.
         parameters: Its parameter group.
-        push: ``push(numbers, memory, felt, away, period, out)``, a kernel or a plain function,
-            called for every sample of the master. ``numbers`` are those of the parameters;
-            ``memory`` (12,) is kept from sample to sample, and zero at the start; ``felt`` (3,) is
-            the force on the tip [N]; ``away`` (3,) the way from where the hand leads the tip to
-            where the tip was measured [m]; both along the slave's base, as late as they come, and
-            zero where nothing comes; ``period`` is the time since the sample before [s]. Writes the
-            push (3,) along the slave's base [N].
+        push: ``push(numbers, memory, felt, away, period, out)``, a kernel or a plain function, called for every sample
+            of the master. ``numbers`` are those of the parameters; ``memory`` (12,) is kept from sample to sample, and
+            zero at the start; ``felt`` (3,) is the force on the tip [N]; ``away`` (3,) the way from where the hand
+            leads the tip to where the tip was measured [m]; both along the slave's base, as late as they come, and zero
+            where nothing comes; ``period`` is the time since the sample before [s]. Writes the push (3,) along the
+            slave's base [N].
         numbers: ``numbers(parameters)`` gives what ``push`` takes, if that is
             something else than the numbers of the parameters in their order.
         force_scale: ``force_scale(parameters)`` gives the force at the hand over the one on the

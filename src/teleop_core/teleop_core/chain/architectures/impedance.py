@@ -8,20 +8,9 @@ stage holds as before: passivity, reach, limits and faults see the one command t
 import math
 from dataclasses import dataclass
 
-from teleop_core.base.parameters import parameter
-from teleop_core.graph.row import Row
-from teleop_core.graph.signals import copy
-from teleop_core.graph.stage import Stage
-from teleop_core.graph.topics import (
-    IMPEDANCE_SERVO_CP,
-    NO_COMMAND_NS,
-    SLAVE_MEASURED_CF,
-    SLAVE_SERVO_CF,
-    SLAVE_SERVO_CP,
-    SLAVE_SETPOINT_CP,
-)
-from teleop_core.kernels import inner, kernel
-from teleop_core.kernels.fields import Fields, Vector3
+from teleop_core.base import parameter
+from teleop_core.graph import Row, Stage, copy, topics
+from teleop_core.kernels import Fields, Vector3, inner, kernel
 
 _LONGEST = 0.1
 """Time for which it yields at once [s], after a pause of the commands."""
@@ -74,7 +63,7 @@ class ImpedanceState(Fields):
 @inner
 def _yield(p: ImpedanceParameters, s: ImpedanceState, row: Row, time: float) -> None:
     """Step way and speed by a time [s] under both forces."""
-    lead = 1.0 if row.slave_setpoint_cp_ns > NO_COMMAND_NS else 0.0
+    lead = 1.0 if row.slave_setpoint_cp_ns > topics.NO_COMMAND_NS else 0.0
     inertia, square = p.mass + time * (p.damping + time * p.stiffness), 0.0
     for i in range(3):
         force = lead * (row.slave_servo_cf[i] + p.force_gain * row.slave_measured_cf[i])
@@ -117,12 +106,12 @@ def impedance_step(p: ImpedanceParameters, s: ImpedanceState, row: Row, dt: floa
 IMPEDANCE = Stage(
     "impedance",
     ImpedanceParameters,
-    reads=(SLAVE_SERVO_CP, SLAVE_SERVO_CF, SLAVE_MEASURED_CF, SLAVE_SETPOINT_CP),
-    writes=(IMPEDANCE_SERVO_CP,),
+    reads=(topics.SLAVE_SERVO_CP, topics.SLAVE_SERVO_CF, topics.SLAVE_MEASURED_CF, topics.SLAVE_SETPOINT_CP),
+    writes=(topics.IMPEDANCE_SERVO_CP,),
     step=impedance_step,
     state=ImpedanceState,
-    late=(SLAVE_MEASURED_CF, SLAVE_SETPOINT_CP),
-    trigger=SLAVE_SERVO_CP,
-    replaces=SLAVE_SERVO_CP,
-    needs=(SLAVE_MEASURED_CF,),
+    late=(topics.SLAVE_MEASURED_CF, topics.SLAVE_SETPOINT_CP),
+    trigger=topics.SLAVE_SERVO_CP,
+    replaces=topics.SLAVE_SERVO_CP,
+    needs=(topics.SLAVE_MEASURED_CF,),
 )

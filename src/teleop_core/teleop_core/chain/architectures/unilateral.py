@@ -1,9 +1,8 @@
 """Unilateral: the slave gets the hand's place, the hand gets nothing back."""
 
-from teleop_core.base.parameters import NoParameters
+from teleop_core.base import NoParameters
 from teleop_core.chain.architectures import Architecture
-from teleop_core.kernels import kernel
-from teleop_core.kernels.geometry import Array
+from teleop_core.kernels import Array, kernel
 
 
 @kernel

@@ -8,10 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from teleop_core.base.errors import SessionError
-from teleop_core.base.parameters import parameter
-from teleop_core.chain.devices import Reading
-from teleop_core.chain.devices.pilot import PilotParameters
+from teleop_core.base import SessionError, parameter
+from teleop_core.chain.devices import Reading, pilot
 from teleop_core.chain.operators import Operator
 from teleop_core.chain.operators.remote import AHEAD, make_remote
 
@@ -26,7 +24,7 @@ _HINTS = {
 
 
 @dataclass(frozen=True, kw_only=True)
-class GamepadParameters(PilotParameters):
+class GamepadParameters(pilot.PilotParameters):
     """How a gamepad moves the stylus, and how it tells the force."""
 
     rumble: float = parameter(1.0, lower=0.0, upper=1.0, fixed=True, doc="rumble at the device's peak force; 0: none")
@@ -69,10 +67,9 @@ class Sdl:
 class Gamepad:
     """A gamepad that is open; see :class:`teleop_core.chain.devices.Device`.
 
-    The left stick moves the stylus to the sides and away, the right one up, and turns it about the
-    vertical; the triggers roll it, or the right one closes the jaw; the cross tips it. It moves
-    while a shoulder button is held. The lower button of the right hand (A) is the fixture, the
-    right one (B) the mode.
+    The left stick moves the stylus to the sides and away, the right one up, and turns it about the vertical; the
+    triggers roll it, or the right one closes the jaw; the cross tips it. It moves while a shoulder button is held. The
+    lower button of the right hand (A) is the fixture, the right one (B) the mode.
 
     Args:
         wanted: Part of its name; empty: the first.

@@ -4,11 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from teleop_core.base.parameters import parameter
+from teleop_core.base import parameter
 from teleop_core.chain.devices import Reading
 from teleop_core.chain.operators.remote import RemoteHand
-from teleop_core.kernels.geometry import Array, turn_by
-from teleop_core.kernels.portable import length
+from teleop_core.kernels import Array, length, turn_by
 
 _NEAR = 0.02  # share of the jaw's way: a trigger that is as far pressed as before
 _LONGEST = 0.05  # a reader that slept longer has lost time, not made way [s]
@@ -104,8 +103,7 @@ class Pilot:
     def _close(self, reading: Reading) -> None:
         """Close the jaw as far as the device says.
 
-        One that came back says that nothing is pressed. It leads the jaw again once it was closed
-        as far as it is.
+        One that came back says that nothing is pressed. It leads the jaw again once it was closed as far as it is.
         """
         if reading.jaw is None:
             return

@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 
 from teleop_core.base.errors import SessionError
-from teleop_core.chain.devices import Reading
-from teleop_core.chain.devices.pilot import PilotParameters
+from teleop_core.chain.devices import Reading, pilot
 from teleop_core.chain.operators import Operator
 from teleop_core.chain.operators.remote import AHEAD, make_remote
 from teleop_core.kernels.geometry import Array
@@ -25,7 +24,7 @@ _REST = 0.5  # a cap at rest for longer is let go of; one that is silent for lon
 
 
 @dataclass(frozen=True, kw_only=True)
-class SpaceMouseParameters(PilotParameters):
+class SpaceMouseParameters(pilot.PilotParameters):
     """How a 3-D mouse moves the stylus."""
 
 
@@ -68,8 +67,7 @@ class Reports:
 class SpaceMouse:
     """A 3-D mouse that is open; see :class:`teleop_core.chain.devices.Device`.
 
-    It moves the stylus while its cap is touched. Its first button is the fixture, its second one
-    the mode.
+    It moves the stylus while its cap is touched. Its first button is the fixture, its second one the mode.
 
     Args:
         wanted: Part of its name; empty: the first.

@@ -13,11 +13,9 @@ from typing import Any
 import numpy as np
 from numba import types
 
-from teleop_core.base.errors import PartError
-from teleop_core.base.registry import Registry, part_check, places, tried
-from teleop_core.kernels import pointer
-from teleop_core.kernels.geometry import Array
-from teleop_core.kernels.parts import fenced, is_whole, numbers_of
+from teleop_core.base import PartError, Registry, part_check
+from teleop_core.base.registry import places, tried
+from teleop_core.kernels import Array, fenced, is_whole, numbers_of, pointer
 
 __all__ = ["LONGEST_NS", "MEMORY", "TREMOR_FILTERS", "TremorFilter", "register_tremor_filter"]
 
@@ -37,12 +35,11 @@ class TremorFilter:
     Attributes:
         name: What ``--set tremor_filter.kind=`` calls it.
         parameters: Its parameter group.
-        filter: ``filter(numbers, memory, value, period)``, a kernel or a plain function, called
-            for every sample of each coordinate but the one with which it begins. ``numbers`` are
-            those of the parameters; ``memory`` (32,) is kept from sample to sample, and zero where
-            the filter begins; ``value`` is the way from the place where it began [m]; ``period`` is
-            the time since the sample before [s], 10 ms at most. Returns the filtered value [m]; as
-            long as all values are 0 it returns 0.
+        filter: ``filter(numbers, memory, value, period)``, a kernel or a plain function, called for every sample of
+            each coordinate but the one with which it begins. ``numbers`` are those of the parameters; ``memory`` (32,)
+            is kept from sample to sample, and zero where the filter begins; ``value`` is the way from the place where
+            it began [m]; ``period`` is the time since the sample before [s], 10 ms at most. Returns the filtered value
+            [m]; as long as all values are 0 it returns 0.
         numbers: ``numbers(parameters)`` gives what ``filter`` takes, if that is
             something else than the numbers of the parameters in their order.
     """

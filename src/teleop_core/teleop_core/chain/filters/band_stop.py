@@ -3,12 +3,9 @@
 import math
 from dataclasses import dataclass
 
-from teleop_core.base.errors import ParameterError
-from teleop_core.base.parameters import parameter
-from teleop_core.chain.filters import TremorFilter
-from teleop_core.chain.filters.sections import WIDTH, advance_section
-from teleop_core.kernels import inner, kernel
-from teleop_core.kernels.geometry import Array
+from teleop_core.base import ParameterError, parameter
+from teleop_core.chain.filters import TremorFilter, sections
+from teleop_core.kernels import Array, inner, kernel
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -30,7 +27,7 @@ def _section(memory: Array, at: int, value: float, real: float, imaginary: float
     square = real * real + imaginary * imaginary
     slope = math.sqrt(square)
     damping = -2.0 * real / slope
-    advance_section(memory, at, value, slope, damping)
+    sections.advance_section(memory, at, value, slope, damping)
     return value - damping * memory[at] + (center / square - 1.0) * memory[at + 1]
 
 
@@ -55,7 +52,7 @@ def band_stop_filter(numbers: Array, memory: Array, value: float, period: float)
     imaginary = math.sqrt(0.5 * (length + center))
     real = product / imaginary
     value = _section(memory, 0, value, -half + real, -half + imaginary, center)
-    return _section(memory, WIDTH, value, -half - real, -half - imaginary, center)
+    return _section(memory, sections.WIDTH, value, -half - real, -half - imaginary, center)
 
 
 BAND_STOP = TremorFilter("band_stop", BandStopParameters, band_stop_filter)

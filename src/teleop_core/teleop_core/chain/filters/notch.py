@@ -3,12 +3,9 @@
 import math
 from dataclasses import dataclass
 
-from teleop_core.base.errors import ParameterError
-from teleop_core.base.parameters import parameter
-from teleop_core.chain.filters import LONGEST_NS, TremorFilter
-from teleop_core.chain.filters.sections import advance_section
-from teleop_core.kernels import kernel
-from teleop_core.kernels.geometry import Array
+from teleop_core.base import ParameterError, parameter
+from teleop_core.chain.filters import LONGEST_NS, TremorFilter, sections
+from teleop_core.kernels import Array, kernel
 
 _WIDEST = 0.45
 """Width of a notch times the period of samples, below the pole of its tangent at a half."""
@@ -46,7 +43,7 @@ def notch_filter(numbers: Array, memory: Array, value: float, period: float) -> 
     """
     angle = 2.0 * math.pi * numbers[0] * period
     damping = 2.0 * math.tan(0.5 * angle / numbers[1]) / math.sin(angle)
-    advance_section(memory, 0, value, math.tan(0.5 * angle), damping)
+    sections.advance_section(memory, 0, value, math.tan(0.5 * angle), damping)
     return value - damping * memory[0]
 
 

@@ -1,7 +1,6 @@
 """Sections: filters of second order from which notch, band stop and high-pass are made."""
 
-from teleop_core.kernels import inner
-from teleop_core.kernels.geometry import Array
+from teleop_core.kernels import Array, inner
 
 WIDTH = 3
 """Numbers that a section remembers: band-pass, low-pass, and its input."""
@@ -11,10 +10,9 @@ WIDTH = 3
 def advance_section(memory: Array, at: int, value: float, slope: float, damping: float) -> None:
     """Bring the band-pass and the low-pass of a section to the next sample.
 
-    With the input u, band-pass b and low-pass l obey ``db/dt = w (u - l - damping b)`` and
-    ``dl/dt = w b``. They are integrated by the trapezoidal rule, which is the bilinear transform
-    where the period stays the same and never diverges where it changes. The high-pass of the
-    section is ``u - damping b - l``, its notch ``u - damping b``.
+    With the input u, band-pass b and low-pass l obey ``db/dt = w (u - l - damping b)`` and ``dl/dt = w b``. They are
+    integrated by the trapezoidal rule, which is the bilinear transform where the period stays the same and never
+    diverges where it changes. The high-pass of the section is ``u - damping b - l``, its notch ``u - damping b``.
 
     Args:
         memory: What is remembered; written.

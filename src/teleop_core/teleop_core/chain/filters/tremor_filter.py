@@ -11,16 +11,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from teleop_core.base.parameters import Choice, choice, parameter
+from teleop_core.base import Choice, choice, parameter
 from teleop_core.chain.filters import LONGEST_NS, MEMORY, TREMOR_FILTERS
 from teleop_core.chain.mapping import plausibility
-from teleop_core.graph.row import Row
-from teleop_core.graph.signals import DT, assign
-from teleop_core.graph.stage import RunningStage, Stage
-from teleop_core.graph.topics import MASTER_FILTERED_CP, MASTER_FILTERED_OUT, MASTER_MEASURED_CP
-from teleop_core.kernels import inner, kernel
-from teleop_core.kernels.fields import Vector3, record
-from teleop_core.kernels.geometry import Array
+from teleop_core.graph import DT, Row, RunningStage, Stage, assign, topics
+from teleop_core.kernels import Array, Vector3, inner, kernel, record
 
 _FADE = 0.2
 """Time constant with which the difference between old and new parameters goes away [s]."""
@@ -119,11 +114,10 @@ def _follow(s: FilterState, part: Part, pose: Array, elapsed_ns: int, filtered: 
 def tremor_filter_step(p: plausibility.PlausibilityNumbers, s: FilterState, part: Part, row: Row, dt: float) -> None:
     """One master sample: write master_filtered_cp and master_filtered_out.
 
-    The position is filtered coordinate by coordinate, over the time between stamps; the orientation
-    passes. A reading that is not finite, or of the same stamp as the last one, changes nothing:
-    what was written stays. The filter begins anew at the first reading, after a pause, where stamps
-    go back, and at a reading that no hand can have made. That passes as it is, so that
-    ``motion_scaling`` judges the same jump. Nothing rings after it.
+    The position is filtered coordinate by coordinate, over the time between stamps; the orientation passes. A reading
+    that is not finite, or of the same stamp as the last one, changes nothing: what was written stays. The filter begins
+    anew at the first reading, after a pause, where stamps go back, and at a reading that no hand can have made. That
+    passes as it is, so that ``motion_scaling`` judges the same jump. Nothing rings after it.
 
     Args:
         p: Parameter record.
@@ -195,10 +189,10 @@ class RunningTremorFilter(RunningStage):
 TREMOR_FILTER = Stage(
     "tremor_filter",
     TremorFilterParameters,
-    reads=(MASTER_MEASURED_CP,),
-    writes=(MASTER_FILTERED_CP, MASTER_FILTERED_OUT),
-    trigger=MASTER_MEASURED_CP,
-    replaces=MASTER_MEASURED_CP,
+    reads=(topics.MASTER_MEASURED_CP,),
+    writes=(topics.MASTER_FILTERED_CP, topics.MASTER_FILTERED_OUT),
+    trigger=topics.MASTER_MEASURED_CP,
+    replaces=topics.MASTER_MEASURED_CP,
     spares=("operator",),
     make=RunningTremorFilter,
 )

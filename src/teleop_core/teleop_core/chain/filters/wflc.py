@@ -3,14 +3,12 @@
 import math
 from dataclasses import dataclass
 
-from teleop_core.base.parameters import parameter
-from teleop_core.chain.filters import TremorFilter
-from teleop_core.chain.filters.sections import WIDTH, advance_section
-from teleop_core.kernels import inner, kernel
-from teleop_core.kernels.geometry import Array
+from teleop_core.base import parameter
+from teleop_core.chain.filters import TremorFilter, sections
+from teleop_core.kernels import Array, inner, kernel
 
-_SECOND, _THIRD = WIDTH, 2 * WIDTH
-_PHASE, RATE, _HEARD, _SUBTRACTED = range(3 * WIDTH, 3 * WIDTH + 8, 2)
+_SECOND, _THIRD = sections.WIDTH, 2 * sections.WIDTH
+_PHASE, RATE, _HEARD, _SUBTRACTED = range(3 * sections.WIDTH, 3 * sections.WIDTH + 8, 2)
 """Places in the memory behind three sections: phase [rad]; by how much the rate is
 above the one at the beginning [rad/s]; weights of sine and cosine [m] of the first combiner, which
 finds the rate, and of the second, which is subtracted."""
@@ -50,7 +48,7 @@ class WflcParameters:
 
 @inner
 def _band_pass(memory: Array, at: int, value: float, slope: float) -> float:
-    advance_section(memory, at, value, slope, _WIDE)
+    sections.advance_section(memory, at, value, slope, _WIDE)
     return _WIDE * memory[at]
 
 
@@ -58,12 +56,11 @@ def _band_pass(memory: Array, at: int, value: float, slope: float) -> float:
 def wflc_filter(numbers: Array, memory: Array, value: float, period: float) -> float:
     """Value without the sine that has been learned.
 
-    Two combiners learn the weights of the same sine by least mean squares. The second one hears
-    the value behind a high-pass and is subtracted. The first one hears it behind two band-passes
-    more, so that hardly any meant motion is left, and finds the rate: by its error times the sine's
-    derivative, here over the squared amplitude, so that large and small tremors are learned alike.
-    The high-pass turns the tremor's phase and takes from its amplitude; at the learned rate both
-    are known, and what is subtracted is the sine before the pass.
+    Two combiners learn the weights of the same sine by least mean squares. The second one hears the value behind a
+    high-pass and is subtracted. The first one hears it behind two band-passes more, so that hardly any meant motion is
+    left, and finds the rate: by its error times the sine's derivative, here over the squared amplitude, so that large
+    and small tremors are learned alike. The high-pass turns the tremor's phase and takes from its amplitude; at the
+    learned rate both are known, and what is subtracted is the sine before the pass.
 
     Source:
         Riviere, Rader and Thakor 1998 (IEEE Trans. Biomed. Eng. 45, 7): the weighted-frequency
@@ -71,7 +68,7 @@ def wflc_filter(numbers: Array, memory: Array, value: float, period: float) -> f
         second one hears everything; the high-pass and what makes up for it are ours.
     """
     corner = math.tan(math.pi * numbers[1] * period)
-    advance_section(memory, 0, value, corner, _DAMPING)
+    sections.advance_section(memory, 0, value, corner, _DAMPING)
     passed = value - _DAMPING * memory[0] - memory[1]
     middle = math.tan(math.pi * numbers[0] * period)
     heard = _band_pass(memory, _SECOND, passed, middle)

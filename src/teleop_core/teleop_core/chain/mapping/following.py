@@ -1,15 +1,12 @@
 """Following: whether the slave follows the hand, and what is sent where it does not.
 
-What is heard of the slave may be old, as by way of a network: a slave follows as long as the stamps
-of what it has in force rise. Where they do no longer, the last command is held for as long as an
-answer takes, for it may be followed still; then the slave goes its own way, and the command is
-where it is.
+What is heard of the slave may be old, as by way of a network: a slave follows as long as the stamps of what it has in
+force rise. Where they do no longer, the last command is held for as long as an answer takes, for it may be followed
+still; then the slave goes its own way, and the command is where it is.
 """
 
-from teleop_core.graph.row import Row
-from teleop_core.graph.topics import NO_COMMAND_NS, SELDOM_NS
-from teleop_core.kernels import inner
-from teleop_core.kernels.fields import Fields
+from teleop_core.graph import Row, topics
+from teleop_core.kernels import Fields, inner
 
 
 class FollowingNumbers(Fields):
@@ -43,7 +40,7 @@ def hear(s: FollowingState, row: Row) -> None:
         row: Signals.
     """
     now_ns, stamp_ns = row.master_measured_cp_ns, row.slave_setpoint_cp_ns
-    if stamp_ns > s.in_force_ns > NO_COMMAND_NS:
+    if stamp_ns > s.in_force_ns > topics.NO_COMMAND_NS:
         # Against the last command: a pause of the master is no lag of the slave.
         s.rose_ns, s.lag_ns = now_ns, s.last_ns - stamp_ns
     if row.slave_measured_cf_ns > s.felt_ns:
@@ -56,7 +53,7 @@ def hear(s: FollowingState, row: Row) -> None:
 @inner
 def is_felt(p: FollowingNumbers, s: FollowingState, row: Row) -> bool:
     """Whether the slave's force was heard of lately; one that does not change is sent seldom."""
-    return bool(row.master_measured_cp_ns - s.felt_at_ns <= p.timeout_ns + SELDOM_NS)
+    return bool(row.master_measured_cp_ns - s.felt_at_ns <= p.timeout_ns + topics.SELDOM_NS)
 
 
 @inner
@@ -72,7 +69,7 @@ def follows(p: FollowingNumbers, s: FollowingState, row: Row) -> bool:
     It does not after a pause of the master.
     """
     pause_ns = row.master_measured_cp_ns - s.last_ns
-    is_known = row.slave_setpoint_cp_ns > NO_COMMAND_NS and s.last_ns != 0
+    is_known = row.slave_setpoint_cp_ns > topics.NO_COMMAND_NS and s.last_ns != 0
     lag_ns = s.last_ns - max(row.slave_setpoint_cp_ns, s.rose_ns)
     return is_known and pause_ns <= p.pause_ns and lag_ns <= max(p.timeout_ns, 2 * pause_ns)
 

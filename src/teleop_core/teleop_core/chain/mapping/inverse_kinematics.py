@@ -6,22 +6,10 @@ from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
-from teleop_core.base.parameters import parameter
-from teleop_core.graph.row import Row
-from teleop_core.graph.signals import DT, assign, copy
-from teleop_core.graph.stage import RunningStage, Stage
-from teleop_core.graph.topics import (
-    NO_COMMAND_NS,
-    SLAVE_REACH,
-    SLAVE_SERVO_CP,
-    SLAVE_SERVO_JP,
-    SLAVE_SETPOINT_JS,
-    Limit,
-    limit_text,
-)
-from teleop_core.kernels import inner, kernel
-from teleop_core.kernels.fields import Fields, PerJoint, record
-from teleop_core.kernels.geometry import Array, rotation_vector_between, transform_from_pose
+from teleop_core.base import parameter
+from teleop_core.graph import DT, Row, RunningStage, Stage, assign, copy, topics
+from teleop_core.kernels import Array, Fields, PerJoint, inner, kernel, record
+from teleop_core.kernels.geometry import rotation_vector_between, transform_from_pose
 from teleop_core.robots import load_robot_set
 from teleop_core.robots.kinematics import IkStatus
 from teleop_core.robots.parameters import RobotParameters
@@ -98,8 +86,8 @@ class Solver(NamedTuple):
 
 
 _STATUS, _LIMIT, _JOINT, _RESIDUAL, _CUT = 0, 1, 2, 3, 5
-_NONE, _AT_JOINT, _BEYOND = int(Limit.NONE), int(Limit.JOINT), int(Limit.WORKSPACE)
-_SINGULAR, _SLOW = int(Limit.SINGULARITY), int(Limit.SPEED)
+_NONE, _AT_JOINT, _BEYOND = int(topics.Limit.NONE), int(topics.Limit.JOINT), int(topics.Limit.WORKSPACE)
+_SINGULAR, _SLOW = int(topics.Limit.SINGULARITY), int(topics.Limit.SPEED)
 _FOLLOWED, _NEAR_SINGULAR = int(IkStatus.FOLLOWED), int(IkStatus.NEAR_SINGULAR)
 # A step [rad or m] that no speed limit is: a path still, but one that has all the time it needs.
 _ANY_STEP = 1e6
@@ -160,7 +148,7 @@ def _explain(p: SolverNumbers, solver: Solver, reach: Array) -> None:
 @inner
 def _has_own_way(s: SolverState, solver: Solver, row: Row, timeout_ns: int) -> bool:
     """Whether the slave does not follow: its setpoint is an old one, or moves by itself."""
-    if row.slave_setpoint_js_ns > NO_COMMAND_NS:
+    if row.slave_setpoint_js_ns > topics.NO_COMMAND_NS:
         return bool(s.last_ns - row.slave_setpoint_js_ns > timeout_ns)
     moves = False
     for i in range(solver.before.shape[0]):
@@ -268,7 +256,7 @@ class InverseKinematics(RunningStage):
         self._told = asked, limited
         if share <= 0.0:
             return []
-        why = limit_text(int(self.state["limit"]), int(self.state["joint"]), self.robot.joint_names)
+        why = topics.limit_text(int(self.state["limit"]), int(self.state["joint"]), self.robot.joint_names)
         return [f"the slave cannot follow {share:.0%} of the commands: {why}"]
 
     def retune(self, parameters: InverseKinematicsParameters) -> None:
@@ -285,10 +273,10 @@ class InverseKinematics(RunningStage):
 INVERSE_KINEMATICS = Stage(
     "inverse_kinematics",
     InverseKinematicsParameters,
-    reads=(SLAVE_SERVO_CP, SLAVE_SETPOINT_JS),
-    writes=(SLAVE_SERVO_JP, SLAVE_REACH),
-    late=(SLAVE_SETPOINT_JS,),
-    trigger=SLAVE_SERVO_CP,
-    needs=(SLAVE_SETPOINT_JS,),
+    reads=(topics.SLAVE_SERVO_CP, topics.SLAVE_SETPOINT_JS),
+    writes=(topics.SLAVE_SERVO_JP, topics.SLAVE_REACH),
+    late=(topics.SLAVE_SETPOINT_JS,),
+    trigger=topics.SLAVE_SERVO_CP,
+    needs=(topics.SLAVE_SETPOINT_JS,),
     make=InverseKinematics,
 )

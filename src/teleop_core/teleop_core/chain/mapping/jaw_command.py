@@ -5,13 +5,9 @@ It comes from the hand itself, as far as that closes its handle, or from a butto
 
 from dataclasses import dataclass
 
-from teleop_core.base.errors import ParameterError
-from teleop_core.base.parameters import parameter
-from teleop_core.graph import topics
-from teleop_core.graph.row import Row
-from teleop_core.graph.stage import Stage
-from teleop_core.kernels import kernel
-from teleop_core.kernels.fields import Fields
+from teleop_core.base import ParameterError, parameter
+from teleop_core.graph import Row, Stage, topics
+from teleop_core.kernels import Fields, kernel
 
 SOURCES = ("hand", "clutch", "fixture", "mode")
 """What closes the jaw: the hand's handle, or a button, in the order of ``master/buttons``."""

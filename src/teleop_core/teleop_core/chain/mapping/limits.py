@@ -8,10 +8,8 @@ beyond which the limit is dragged along; that is what the hand feels and what th
 import math
 from collections.abc import Sequence
 
-from teleop_core.graph.row import Row
-from teleop_core.graph.topics import SLAVE_REACH, Limit
-from teleop_core.kernels import geometry, inner
-from teleop_core.kernels.fields import Fields, PoseRow, Quaternion, Vector3
+from teleop_core.graph import Row, topics
+from teleop_core.kernels import Fields, PoseRow, Quaternion, Vector3, geometry, inner
 from teleop_core.kernels.room import room
 
 SENT = 8192
@@ -54,8 +52,8 @@ class LimitState(Fields):
     turn_met: float
 
 
-_LIMIT, _JOINT, _CUT = (SLAVE_REACH.columns.index(name) for name in ("limit", "joint", "cut_x"))
-_NONE, _AT_JOINT, _BEYOND = int(Limit.NONE), int(Limit.JOINT), int(Limit.WORKSPACE)
+_LIMIT, _JOINT, _CUT = (topics.SLAVE_REACH.columns.index(name) for name in ("limit", "joint", "cut_x"))
+_NONE, _AT_JOINT, _BEYOND = int(topics.Limit.NONE), int(topics.Limit.JOINT), int(topics.Limit.WORKSPACE)
 # A limit is told for this long after the last command that met it [ns].
 _TOLD_NS = 100_000_000
 # A turn beyond a limit counts up to this [rad].

@@ -8,7 +8,7 @@ import numpy as np
 
 from teleop_core.chain.architectures import ARCHITECTURES
 from teleop_core.chain.fixtures import Held, fixture_depth
-from teleop_core.chain.mapping import following, limits, plausibility, walls
+from teleop_core.chain.mapping import following, limits, plausibility, side, walls
 from teleop_core.chain.mapping.parameters import (
     MODES,
     FixtureParameters,
@@ -26,26 +26,8 @@ from teleop_core.chain.mapping.reflection import (
     make_law,
     reflect,
 )
-from teleop_core.chain.mapping.side import SideNumbers, SideState, Walled, hold_slave, let_go
 from teleop_core.chain.passivity import PASSIVITIES
-from teleop_core.graph.row import Row
-from teleop_core.graph.signals import DT, STATE, assign, copy
-from teleop_core.graph.stage import RunningStage, Stage
-from teleop_core.graph.topics import (
-    MASTER_BUTTONS,
-    MASTER_ENERGY,
-    MASTER_FILTERED_OUT,
-    MASTER_MEASURED_CP,
-    MASTER_SERVO_CF,
-    SLAVE_ENERGY,
-    SLAVE_MEASURED_CF,
-    SLAVE_MEASURED_CP,
-    SLAVE_REACH,
-    SLAVE_SERVO_CF,
-    SLAVE_SERVO_CP,
-    SLAVE_SETPOINT_CP,
-    TELEOP_STATE,
-)
+from teleop_core.graph import DT, STATE, Row, RunningStage, Stage, assign, copy, topics
 from teleop_core.kernels import inner, kernel
 from teleop_core.kernels.fields import Integers, Quaternion, Vector3, record, record_array
 from teleop_core.kernels.geometry import Array, multiply_quaternions, rotate_by_vector, turn_within
@@ -53,7 +35,7 @@ from teleop_core.kernels.room import room
 
 
 class ScalingNumbers(
-    walls.WallNumbers, SideNumbers, ReflectionNumbers, plausibility.PlausibilityNumbers, following.FollowingNumbers
+    walls.WallNumbers, side.SideNumbers, ReflectionNumbers, plausibility.PlausibilityNumbers, following.FollowingNumbers
 ):
     """Parameter record of the motion scaling."""
 
@@ -71,7 +53,7 @@ class ScalingNumbers(
 class ScalingState(
     limits.LimitState,
     walls.WallState,
-    SideState,
+    side.SideState,
     plausibility.PlausibilityState,
     ReflectionState,
     following.FollowingState,
@@ -154,15 +136,15 @@ def _latch(s: ScalingState, stylus: Array) -> None:
 
 
 @inner
-def _move(p: ScalingNumbers, s: ScalingState, fixture: Walled, gain: float, position: Array, turn: Array) -> None:
+def _move(p: ScalingNumbers, s: ScalingState, fixture: side.Walled, gain: float, position: Array, turn: Array) -> None:
     """Add the scaled step of the hand to the command; turn the tool as the stylus."""
     step = room(3)
     for i in range(3):
         step[i] = position[i] - s.master[i]
     if s.is_fixture_on and p.holds_slave:
-        hold_slave(s, fixture, step)
+        side.hold_slave(s, fixture, step)
     else:
-        let_go(s)
+        side.let_go(s)
     to_slave_axes(p, step, step)
     for i in range(3):
         s.command[i] += gain * step[i]
@@ -181,7 +163,7 @@ def _move(p: ScalingNumbers, s: ScalingState, fixture: Walled, gain: float, posi
 
 
 @inner
-def _wall(p: ScalingNumbers, s: ScalingState, fixture: Walled, period: float, stylus: Array, force: Array) -> None:
+def _wall(p: ScalingNumbers, s: ScalingState, fixture: side.Walled, period: float, stylus: Array, force: Array) -> None:
     """Write the push (3,) [N] of the fixture's wall; after a pause it begins anew."""
     length = 0.0
     if s.is_fixture_on and p.holds_hand:
@@ -255,7 +237,7 @@ def _refuse(
 
 @kernel
 def motion_scaling_step(
-    p: ScalingNumbers, s: ScalingState, sent: Sequence[limits.Sent], fixture: Walled, law: Law, row: Row, dt: float
+    p: ScalingNumbers, s: ScalingState, sent: Sequence[limits.Sent], fixture: side.Walled, law: Law, row: Row, dt: float
 ) -> None:
     """One master sample: write slave_servo_cp, master_servo_cf and teleop_state.
 
@@ -268,13 +250,12 @@ def motion_scaling_step(
         row: Signals.
         dt: Tick [s].
 
-    Position is incremental (X_S += gain X_P), so a change of gain alone moves nothing;
-    orientation follows the stylus absolutely, up to an alignment that is latched whenever the
-    slave is engaged anew. While clutched the command is held; while the slave does not follow it
-    is the slave's own setpoint. What the arm cannot reach is cut off, and motion goes on from
-    there: see :mod:`teleop_core.chain.mapping.limits`. The slave is led by the pose, which a tremor
-    filter may have made late; what pushes the hand goes by the stylus, tremor and all. A fixture
-    that holds the slave cuts the steps of the command: see :mod:`teleop_core.chain.mapping.side`.
+    Position is incremental (X_S += gain X_P), so a change of gain alone moves nothing; orientation follows the stylus
+    absolutely, up to an alignment that is latched whenever the slave is engaged anew. While clutched the command is
+    held; while the slave does not follow it is the slave's own setpoint. What the arm cannot reach is cut off, and
+    motion goes on from there: see :mod:`teleop_core.chain.mapping.limits`. The slave is led by the pose, which a tremor
+    filter may have made late; what pushes the hand goes by the stylus, tremor and all. A fixture that holds the slave
+    cuts the steps of the command: see :mod:`teleop_core.chain.mapping.side`.
 
     Source:
         Vongbunyong 2008, sections 6.2-6.3.
@@ -335,7 +316,7 @@ class MotionScaling(RunningStage):
         self._values = parameters
         self.kernel = motion_scaling_step
         nothing = Held(None, np.empty(0), np.empty(4))
-        self._walled = Walled(nothing, np.zeros(3), np.zeros(3))
+        self._walled = side.Walled(nothing, np.zeros(3), np.zeros(3))
         self._law = make_law(ARCHITECTURES.find("unilateral"), np.empty(0), PASSIVITIES.find("none"), np.empty(0))
         self.reset()
         self.retune(parameters)
@@ -459,20 +440,32 @@ MOTION_SCALING = Stage(
     "motion_scaling",
     MotionScalingParameters,
     reads=(
-        MASTER_MEASURED_CP,
-        MASTER_BUTTONS,
-        SLAVE_SETPOINT_CP,
-        SLAVE_REACH,
-        SLAVE_MEASURED_CF,
-        SLAVE_MEASURED_CP,
-        MASTER_FILTERED_OUT,
-        SLAVE_ENERGY,
+        topics.MASTER_MEASURED_CP,
+        topics.MASTER_BUTTONS,
+        topics.SLAVE_SETPOINT_CP,
+        topics.SLAVE_REACH,
+        topics.SLAVE_MEASURED_CF,
+        topics.SLAVE_MEASURED_CP,
+        topics.MASTER_FILTERED_OUT,
+        topics.SLAVE_ENERGY,
     ),
-    writes=(SLAVE_SERVO_CP, MASTER_SERVO_CF, TELEOP_STATE, MASTER_ENERGY, SLAVE_SERVO_CF),
-    late=(SLAVE_SETPOINT_CP, SLAVE_REACH, SLAVE_MEASURED_CF, SLAVE_MEASURED_CP, SLAVE_ENERGY),
-    optional=(MASTER_FILTERED_OUT, SLAVE_ENERGY),
-    on_demand=(MASTER_ENERGY, SLAVE_SERVO_CF),
-    trigger=MASTER_MEASURED_CP,
-    needs=(SLAVE_SETPOINT_CP,),
+    writes=(
+        topics.SLAVE_SERVO_CP,
+        topics.MASTER_SERVO_CF,
+        topics.TELEOP_STATE,
+        topics.MASTER_ENERGY,
+        topics.SLAVE_SERVO_CF,
+    ),
+    late=(
+        topics.SLAVE_SETPOINT_CP,
+        topics.SLAVE_REACH,
+        topics.SLAVE_MEASURED_CF,
+        topics.SLAVE_MEASURED_CP,
+        topics.SLAVE_ENERGY,
+    ),
+    optional=(topics.MASTER_FILTERED_OUT, topics.SLAVE_ENERGY),
+    on_demand=(topics.MASTER_ENERGY, topics.SLAVE_SERVO_CF),
+    trigger=topics.MASTER_MEASURED_CP,
+    needs=(topics.SLAVE_SETPOINT_CP,),
     make=MotionScaling,
 )

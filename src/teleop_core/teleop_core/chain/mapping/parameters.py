@@ -6,13 +6,11 @@ from functools import cached_property
 
 import numpy as np
 
-from teleop_core.base.errors import ParameterError
-from teleop_core.base.parameters import Choice, choice, parameter
+from teleop_core.base import Choice, ParameterError, choice, parameter
 from teleop_core.chain.architectures import ARCHITECTURES
 from teleop_core.chain.fixtures import Fixture
-from teleop_core.chain.mapping.plausibility import PlausibilityParameters
+from teleop_core.chain.mapping import plausibility, walls
 from teleop_core.chain.mapping.side import SIDES
-from teleop_core.chain.mapping.walls import WALLS
 from teleop_core.chain.passivity import PASSIVITIES
 from teleop_core.kernels.geometry import Array, quaternion_from_rotation, rotation
 from teleop_core.kernels.portable import product
@@ -44,7 +42,7 @@ class FixtureParameters:
     )
     wall: str = parameter(
         "damped",
-        choices=tuple(WALLS),
+        choices=tuple(walls.WALLS),
         doc="damped: spring and damper up to max_force, passive if soft enough (up to 1000 N/m); "
         "hard: the same, as steep as sampling allows; source: the published spring, full after "
         "1 mm; soft: a spring; step: max_force at once, which buzzes",
@@ -189,7 +187,7 @@ class MotionScalingParameters:
     fixture: FixtureParameters = field(default_factory=FixtureParameters)
     reach_force: ReachForceParameters = field(default_factory=ReachForceParameters)
     reflection: ReflectionParameters = field(default_factory=ReflectionParameters)
-    plausible: PlausibilityParameters = field(default_factory=PlausibilityParameters)
+    plausible: plausibility.PlausibilityParameters = field(default_factory=plausibility.PlausibilityParameters)
 
     def __post_init__(self) -> None:
         if self.fine_gain > self.coarse_gain:

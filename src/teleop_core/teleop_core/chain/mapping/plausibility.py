@@ -9,11 +9,9 @@ from where it is then. So a teleport moves nothing, and neither do random poses.
 import math
 from dataclasses import dataclass
 
-from teleop_core.base.parameters import parameter
-from teleop_core.graph.row import Row
-from teleop_core.kernels import inner
-from teleop_core.kernels.fields import Fields, PoseRow, Vector3
-from teleop_core.kernels.geometry import Array
+from teleop_core.base import parameter
+from teleop_core.graph import Row
+from teleop_core.kernels import Array, Fields, PoseRow, Vector3, inner
 
 
 @dataclass(frozen=True, kw_only=True)

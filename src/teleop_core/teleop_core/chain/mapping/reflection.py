@@ -23,12 +23,8 @@ from teleop_core.chain.passivity.port import (
     port_work,
 )
 from teleop_core.chain.passivity.tdpa import pay_push
-from teleop_core.graph.row import Row
-from teleop_core.graph.signals import copy
-from teleop_core.graph.topics import ENERGY
-from teleop_core.kernels import inner
-from teleop_core.kernels.fields import Integers, PoseRow, Vector3
-from teleop_core.kernels.geometry import Array
+from teleop_core.graph import Row, copy, topics
+from teleop_core.kernels import Array, Integers, PoseRow, Vector3, inner
 
 
 class ReflectionNumbers(FollowingNumbers):
@@ -98,8 +94,8 @@ def make_law(part: Architecture, numbers: Array, passivity: Passivity, kept: Arr
     return Law(
         part.push_pointer, numbers, np.zeros(MEMORY), np.zeros(3), np.zeros(3), np.zeros(3),
         passivity.hand_pointer, kept, np.zeros(PASSIVE_MEMORY), np.zeros(3), np.zeros(3),
-        np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(len(ENERGY)), np.zeros(len(ENERGY)),
-        np.zeros(3), np.zeros(len(ENERGY)),
+        np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(len(topics.ENERGY)), np.zeros(len(topics.ENERGY)),
+        np.zeros(3), np.zeros(len(topics.ENERGY)),
     )  # fmt: skip
 
 

@@ -8,17 +8,14 @@ The proxy never moves farther than the hand does at the same sample, so the slav
 where a shape has two ways back that are equally short, and not where the shape was changed.
 
 Source:
-    Zilles and Salisbury 1995, a constraint-based god-object method; bounded by the hand's steps
-    here.
+    Zilles and Salisbury 1995, a constraint-based god-object method; bounded by the hand's steps here.
 """
 
 import math
 from typing import NamedTuple
 
 from teleop_core.chain.fixtures import Held, fixture_depth
-from teleop_core.kernels import inner
-from teleop_core.kernels.fields import Fields, Vector3
-from teleop_core.kernels.geometry import Array
+from teleop_core.kernels import Array, Fields, Vector3, inner
 from teleop_core.kernels.room import room
 
 SIDES = ("hand", "slave", "both")
@@ -92,8 +89,7 @@ def _draw_in(fixture: Walled, place: Array) -> bool:
 def _approach(fixture: Walled, last: Array, aim: Array, most: float) -> None:
     """Move an aim (3,) to where the proxy may be next on its way there, ``most`` [m] away.
 
-    A proxy that is outside, as after a change of the shape, goes the shortest way in. One that has
-    no way stays.
+    A proxy that is outside, as after a change of the shape, goes the shortest way in. One that has no way stays.
     """
     target, share = aim.copy(), most / max(_distance(aim, last), most)
     for _ in range(_SHARES):

@@ -14,9 +14,7 @@ bends it switches on and off, and contacts that the damper alone makes passive g
 import math
 from typing import NamedTuple
 
-from teleop_core.kernels import inner, kernel
-from teleop_core.kernels.fields import Fields, Vector3
-from teleop_core.kernels.geometry import Array
+from teleop_core.kernels import Array, Fields, Vector3, inner, kernel
 
 
 class WallNumbers(Fields):

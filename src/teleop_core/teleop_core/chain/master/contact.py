@@ -2,13 +2,11 @@
 
 import math
 
-from teleop_core.graph.topics import MASTER_CONTACT
-from teleop_core.kernels import inner
-from teleop_core.kernels.fields import Fields, Vector3
-from teleop_core.kernels.geometry import Array
+from teleop_core.graph import topics
+from teleop_core.kernels import Array, Fields, Vector3, inner
 
 _NUMBER, _TAKEN, _RETURNED, _FRICTION = (
-    MASTER_CONTACT.columns.index(name) for name in ("number", "taken", "returned", "friction")
+    topics.MASTER_CONTACT.columns.index(name) for name in ("number", "taken", "returned", "friction")
 )
 
 
@@ -23,10 +21,9 @@ class ContactState(Fields):
 def account(s: ContactState, force: Array, friction: float, moved: float, place: Array, contact: Array) -> None:
     """Add the energy of a tick to the present contact; a new one begins where force begins.
 
-    The force is constant within a tick, so force times the way of the device is its work, without
-    any error: the wall takes energy where the hand pushes the device against the force, and gives
-    it back where the device goes along. What the device's structure keeps in bending is not in it:
-    of what is given back a part never reaches the hand.
+    The force is constant within a tick, so force times the way of the device is its work, without any error: the wall
+    takes energy where the hand pushes the device against the force, and gives it back where the device goes along. What
+    the device's structure keeps in bending is not in it: of what is given back a part never reaches the hand.
 
     Args:
         s: State; written.

@@ -5,9 +5,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from teleop_core.base.parameters import parameter
-from teleop_core.kernels import inner, kernel
-from teleop_core.kernels.fields import Fields, Quaternion, Vector3
+from teleop_core.base import parameter
+from teleop_core.kernels import Fields, Quaternion, Vector3, inner, inverse_motion, kernel, product
 from teleop_core.kernels.geometry import (
     Array,
     compose,
@@ -16,7 +15,6 @@ from teleop_core.kernels.geometry import (
     rotate_by_vector,
     transform_from_pose,
 )
-from teleop_core.kernels.portable import inverse_motion, product
 from teleop_core.kernels.room import room
 from teleop_core.robots import load_robot_set
 

@@ -3,14 +3,9 @@
 from dataclasses import dataclass
 from typing import Annotated
 
-from teleop_core.base.errors import ParameterError
-from teleop_core.base.parameters import parameter
-from teleop_core.graph.row import Row
-from teleop_core.graph.stage import Stage
-from teleop_core.graph.topics import DISPLAY_MEASURED_CP, SLAVE_MEASURED_CP, SLAVE_SERVO_CP
-from teleop_core.kernels import kernel
-from teleop_core.kernels.fields import Fields, Integers
-from teleop_core.kernels.geometry import Array
+from teleop_core.base import ParameterError, parameter
+from teleop_core.graph import Row, Stage, topics
+from teleop_core.kernels import Array, Fields, Integers, kernel
 
 _FRAMES = 512
 """Frames that can be on their way to the screen."""
@@ -102,10 +97,10 @@ def display_step(p: DisplayNumbers, s: DisplayState, row: Row, dt: float) -> Non
 DISPLAY = Stage(
     "display",
     DisplayParameters,
-    reads=(SLAVE_MEASURED_CP, SLAVE_SERVO_CP),
-    writes=(DISPLAY_MEASURED_CP,),
+    reads=(topics.SLAVE_MEASURED_CP, topics.SLAVE_SERVO_CP),
+    writes=(topics.DISPLAY_MEASURED_CP,),
     step=display_step,
     state=DisplayState,
-    replaces=SLAVE_MEASURED_CP,
+    replaces=topics.SLAVE_MEASURED_CP,
     serves=("operator",),
 )

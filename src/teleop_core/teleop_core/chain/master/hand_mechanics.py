@@ -6,11 +6,9 @@ from typing import Annotated
 
 import numpy as np
 
-from teleop_core.base.parameters import parameter
+from teleop_core.base import parameter
 from teleop_core.chain.master.device import DeviceParameters
-from teleop_core.kernels import inner
-from teleop_core.kernels.fields import Fields, Vector3
-from teleop_core.kernels.geometry import Array
+from teleop_core.kernels import Array, Fields, Vector3, inner
 from teleop_core.kernels.portable import matrix_exponential
 from teleop_core.kernels.room import room
 
@@ -77,16 +75,14 @@ class HandState(Fields):
 def move_hand(p: HandNumbers, s: HandState, wanted: Array, force: Array, dt: float) -> None:
     """Move hand and device on by one tick under the motors' force (3,) [N].
 
-    Two masses on each axis: the hand, which a spring and a damper pull along its path, and the
-    device with its motors, encoders and dry friction; between them the device's structure, a spring
-    and a damper. The motors' force is held and the path is straight within the tick, so each step
-    is exact. Friction is a force of any direction up to its bound, held for a step. It takes all
-    speed that it can, so the device sticks, without creep, until what pulls is larger.
+    Two masses on each axis: the hand, which a spring and a damper pull along its path, and the device with its motors,
+    encoders and dry friction; between them the device's structure, a spring and a damper. The motors' force is held and
+    the path is straight within the tick, so each step is exact. Friction is a force of any direction up to its bound,
+    held for a step. It takes all speed that it can, so the device sticks, without creep, until what pulls is larger.
 
     Source:
-        Exact step of a linear system under held input, as in any book on sampled control (Astrom
-        and Wittenmark 1997, section 2.3). Friction as a set of forces: Kikuuwe, Takesue, Sano,
-        Mochiyama and Fujimoto 2006; Moreau 1988.
+        Exact step of a linear system under held input, as in any book on sampled control (Astrom and Wittenmark 1997,
+        section 2.3). Friction as a set of forces: Kikuuwe, Takesue, Sano, Mochiyama and Fujimoto 2006; Moreau 1988.
     """
     h, aim_speed = dt / p.steps, room(3)
     for i in range(3):
@@ -139,10 +135,9 @@ def _flows(row: Array, given: Array) -> float:
 def join(p: HandNumbers, hand: HandParameters, device: DeviceParameters, dt: float) -> None:
     """Write the exact step of hand and device, and how many of them make a tick.
 
-    ``flow[0]`` (3, 4, 6) gives on each axis the way of the device, its speed, the way of the hand
-    and its speed after a step, from: the speeds of device and hand, the hand from the device, the
-    aim from the hand, the speed of the aim, and the force on the device. ``flow[1]`` is the same
-    while friction holds the device.
+    ``flow[0]`` (3, 4, 6) gives on each axis the way of the device, its speed, the way of the hand and its speed after a
+    step, from: the speeds of device and hand, the hand from the device, the aim from the hand, the speed of the aim,
+    and the force on the device. ``flow[1]`` is the same while friction holds the device.
 
     Args:
         p: Parameter record; ``flow`` and ``steps`` are written.

@@ -5,9 +5,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from teleop_core.base.parameters import parameter
-from teleop_core.chain.master import hand_mechanics
-from teleop_core.chain.master.contact import ContactState, account, distance
+from teleop_core.base import parameter
+from teleop_core.chain.master import contact, hand_mechanics, rendering
 from teleop_core.chain.master.device import (
     DeviceParameters,
     Handle,
@@ -18,29 +17,10 @@ from teleop_core.chain.master.device import (
     read_handle,
     read_phantom,
 )
-from teleop_core.chain.master.rendering import RenderingNumbers, RenderingState, render
 from teleop_core.chain.operators.rest import REST_POSITION, REST_TILT, rest_pose
 from teleop_core.chain.operators.shapes import PHASES
-from teleop_core.graph.noise import Noise
-from teleop_core.graph.row import Row
-from teleop_core.graph.signals import DT, assign
-from teleop_core.graph.stage import RunningStage, Stage
-from teleop_core.graph.topics import (
-    HAND_BUTTONS,
-    HAND_SERVO_CP,
-    HAND_TREMOR,
-    MASTER_BUTTONS,
-    MASTER_CONTACT,
-    MASTER_MEASURED_CF,
-    MASTER_MEASURED_CP,
-    MASTER_MEASURED_CV,
-    MASTER_SERVO_CF,
-    OPERATION,
-    SLAVE_OPERATION,
-)
-from teleop_core.kernels import inner, kernel
-from teleop_core.kernels.fields import PoseRow, record
-from teleop_core.kernels.geometry import Array, rotation, transform
+from teleop_core.graph import DT, Noise, Row, RunningStage, Stage, assign, topics
+from teleop_core.kernels import Array, PoseRow, inner, kernel, record, rotation, transform
 from teleop_core.kernels.room import room
 from teleop_core.slave.operation.states import State
 
@@ -82,14 +62,14 @@ class HapticMasterParameters:
     hand: hand_mechanics.HandParameters = field(default_factory=hand_mechanics.HandParameters)
 
 
-class MasterNumbers(hand_mechanics.HandNumbers, ReadingNumbers, RenderingNumbers):
+class MasterNumbers(hand_mechanics.HandNumbers, ReadingNumbers, rendering.RenderingNumbers):
     """Parameter record of the haptic master."""
 
     force_range: float  # beyond which a force is not given [N]
     silence_ns: int
 
 
-class MasterState(hand_mechanics.HandState, ReadingState, RenderingState, ContactState):
+class MasterState(hand_mechanics.HandState, ReadingState, rendering.RenderingState, contact.ContactState):
     """State record of the haptic master."""
 
     next_noise: int
@@ -103,8 +83,8 @@ class MasterState(hand_mechanics.HandState, ReadingState, RenderingState, Contac
     doubted: float  # force that was out of range [N]
 
 
-_STATE_OF_SLAVE, _FAULT = OPERATION.index("state"), int(State.FAULT)
-_MOST = MASTER_CONTACT.columns.index("largest_force")
+_STATE_OF_SLAVE, _FAULT = topics.OPERATION.index("state"), int(State.FAULT)
+_MOST = topics.MASTER_CONTACT.columns.index("largest_force")
 
 
 @inner
@@ -130,7 +110,7 @@ def _holds(p: MasterNumbers, s: MasterState, row: Row) -> bool:
         reach = _FASTEST * max(1e-9 * silence_ns if s.told_ns > 0 else 0.0, 1e-3)
         if s.told_ns > 0 and silence_ns > p.silence_ns:
             reach = _NEAR
-        if distance(s.aim, row.hand_servo_cp) > reach:
+        if contact.distance(s.aim, row.hand_servo_cp) > reach:
             s.free_ns = row.now_ns
         s.told_ns, s.heard_ns, silence_ns = row.hand_servo_cp_ns, row.now_ns, 0
         for i in range(7):
@@ -147,10 +127,8 @@ def haptic_master_step(p: MasterNumbers, s: MasterState, handle: Handle, noises:
     Args:
         p: Parameter record.
         s: State record; written.
-        handle: None for the Phantom, else as :func:`teleop_core.chain.master.device.make_handle`
-            gives.
-        noises: Standard normal numbers of the coming ticks (N, 6), of which the last three shake
-            the gimbal's readings.
+        handle: None for the Phantom, else as :func:`teleop_core.chain.master.device.make_handle` gives.
+        noises: Standard normal numbers of the coming ticks (N, 6), of which the last three shake the gimbal's readings.
         row: Signals.
         dt: Tick [s].
     """
@@ -162,13 +140,13 @@ def haptic_master_step(p: MasterNumbers, s: MasterState, handle: Handle, noises:
     noise, force = noises[s.next_noise], room(3)
     s.next_noise += 1
     before, place = room(3), room(3)
-    row.master_contact[_MOST] = render(p, s, row.master_servo_cf, force)
+    row.master_contact[_MOST] = rendering.render(p, s, row.master_servo_cf, force)
     for i in range(3):
         before[i] = s.position[i]
     hand_mechanics.move_hand(p, s, s.aim[0:3], force, dt)
     for i in range(3):
         place[i] = s.position[i] + row.hand_tremor[i]
-    account(s, force, p.friction, distance(before, s.position), place, row.master_contact)
+    contact.account(s, force, p.friction, contact.distance(before, s.position), place, row.master_contact)
     if handle is None:
         read_phantom(p, place, s.aim[3:7], noise[3:6], row.master_measured_cp)
     else:
@@ -185,8 +163,7 @@ def haptic_master_step(p: MasterNumbers, s: MasterState, handle: Handle, noises:
 class HapticMaster(RunningStage):
     """Stage that simulates the device and the mechanics of the hand.
 
-    The same parameters give the same motion, bit for bit, as long as the same hand and the same
-    forces act on it.
+    The same parameters give the same motion, bit for bit, as long as the same hand and the same forces act on it.
 
     Args:
         parameters: What device and hand are.
@@ -259,9 +236,21 @@ class HapticMaster(RunningStage):
 HAPTIC_MASTER = Stage(
     "haptic_master",
     HapticMasterParameters,
-    reads=(HAND_SERVO_CP, HAND_BUTTONS, HAND_TREMOR, MASTER_SERVO_CF, SLAVE_OPERATION),
-    writes=(MASTER_MEASURED_CP, MASTER_MEASURED_CV, MASTER_MEASURED_CF, MASTER_BUTTONS, MASTER_CONTACT),
-    late=(MASTER_SERVO_CF, SLAVE_OPERATION),
+    reads=(
+        topics.HAND_SERVO_CP,
+        topics.HAND_BUTTONS,
+        topics.HAND_TREMOR,
+        topics.MASTER_SERVO_CF,
+        topics.SLAVE_OPERATION,
+    ),
+    writes=(
+        topics.MASTER_MEASURED_CP,
+        topics.MASTER_MEASURED_CV,
+        topics.MASTER_MEASURED_CF,
+        topics.MASTER_BUTTONS,
+        topics.MASTER_CONTACT,
+    ),
+    late=(topics.MASTER_SERVO_CF, topics.SLAVE_OPERATION),
     make=HapticMaster,
     node="teleop_core.nodes.haptic_master:HapticMasterNode",
 )

@@ -5,10 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from teleop_core.base.parameters import parameter
+from teleop_core.base import parameter
 from teleop_core.chain.devices.pilot import RateParameters, beyond
-from teleop_core.kernels.geometry import Array, turn_by
-from teleop_core.kernels.portable import length
+from teleop_core.kernels import Array, length, turn_by
 
 _LONGEST = 0.1  # a driver that was silent for longer has lost time, not made way [s]
 

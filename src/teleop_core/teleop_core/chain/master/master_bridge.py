@@ -11,15 +11,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from teleop_core.base.errors import ParameterError
-from teleop_core.base.parameters import parameter
+from teleop_core.base import ParameterError, parameter
 from teleop_core.chain.mapping.parameters import AXES, axis_map
 from teleop_core.chain.master.joy_rates import JoyParameters, JoyRates
-from teleop_core.graph.signals import DT
-from teleop_core.graph.stage import RunningStage, Stage
-from teleop_core.graph.topics import MASTER_BUTTONS, MASTER_MEASURED_CP, MASTER_SERVO_CF
-from teleop_core.kernels import geometry
-from teleop_core.kernels.portable import dot
+from teleop_core.graph import DT, RunningStage, Stage, topics
+from teleop_core.kernels import dot, geometry
 from teleop_core.robots import load_robot_set
 from teleop_core.slave.bridges.hearing import wrong_stamp
 from teleop_core.slave.bridges.names import JointMap
@@ -285,8 +281,8 @@ def _nothing(row: object, dt: float) -> None:
 MASTER_BRIDGE = Stage(
     "master_bridge",
     MasterBridgeParameters,
-    reads=(MASTER_SERVO_CF,),
-    writes=(MASTER_MEASURED_CP, MASTER_BUTTONS),
+    reads=(topics.MASTER_SERVO_CF,),
+    writes=(topics.MASTER_MEASURED_CP, topics.MASTER_BUTTONS),
     make=MasterBridge,
     node="teleop_core.nodes.master_bridge:MasterBridgeNode",
 )

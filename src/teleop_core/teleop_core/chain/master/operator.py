@@ -6,31 +6,16 @@ from typing import Any
 
 import numpy as np
 
-from teleop_core.base.errors import PartError, TeleopError
-from teleop_core.chain.operators import OPERATORS, Seen, Setting
-from teleop_core.chain.operators.follower import MOST, Wanted
+from teleop_core.base import PartError, TeleopError
+from teleop_core.chain.operators import OPERATORS, Seen, Setting, follower
 from teleop_core.chain.operators.parameters import PRESS_TIME, OperatorParameters
 from teleop_core.chain.operators.remote import RemoteHand
 from teleop_core.chain.operators.rest import REST_POSITION, rest_pose
 from teleop_core.chain.operators.shapes import PHASES
-from teleop_core.graph.noise import BLOCK, Noise
-from teleop_core.graph.row import Row
-from teleop_core.graph.signals import DT, STATE, assign
-from teleop_core.graph.stage import RunningStage, Stage
-from teleop_core.graph.topics import (
-    HAND_BUTTONS,
-    HAND_JAW,
-    HAND_SERVO_CP,
-    HAND_TREMOR,
-    MASTER_MEASURED_CF,
-    MASTER_MEASURED_CP,
-    SLAVE_MEASURED_CP,
-    TASK_STATE,
-    TELEOP_STATE,
-)
-from teleop_core.kernels import inner, kernel
-from teleop_core.kernels.fields import Fields, Vector3, record, record_array
-from teleop_core.kernels.geometry import Array, rotate_by_vector
+from teleop_core.graph import DT, STATE, Noise, Row, RunningStage, Stage, assign, topics
+from teleop_core.graph.noise import BLOCK
+from teleop_core.kernels import Array, Fields, Vector3, inner, kernel, record, record_array
+from teleop_core.kernels.geometry import rotate_by_vector
 from teleop_core.kernels.room import room
 
 
@@ -85,7 +70,7 @@ def tremble(p: OperatorNumbers, s: OperatorState, noise: Array, tremor: Array, d
 
 @kernel
 def operator_step(
-    p: OperatorNumbers, s: OperatorState, wanted: Sequence[Wanted], noises: Array, row: Row, dt: float
+    p: OperatorNumbers, s: OperatorState, wanted: Sequence[follower.Wanted], noises: Array, row: Row, dt: float
 ) -> None:
     """One tick: write where the hand is wanted, its tremor and the buttons.
 
@@ -94,10 +79,9 @@ def operator_step(
     Args:
         p: Parameter record.
         s: State record; written.
-        wanted: What is wanted, now and in the coming ticks, record by record: ``wanted`` (3,) [m]
-            in the master's base, ``attitude`` of the stylus, quaternion (4,), ``buttons`` (3,):
-            clutch, fixture, mode, ``tremor`` (3,) [m], which the tip makes whatever friction and
-            force are, and how far the ``jaw`` is closed.
+        wanted: What is wanted, now and in the coming ticks, record by record: ``wanted`` (3,) [m] in the master's base,
+            ``attitude`` of the stylus, quaternion (4,), ``buttons`` (3,): clutch, fixture, mode, ``tremor`` (3,) [m],
+            which the tip makes whatever friction and force are, and how far the ``jaw`` is closed.
         noises: Standard normal numbers of the coming ticks (N, 6), of which x, y, z shake the hand.
         row: Signals.
         dt: Tick [s].
@@ -119,8 +103,7 @@ def operator_step(
 class RunningOperator(RunningStage):
     """Stage of the operator.
 
-    The same parameters give the same motion, bit for bit, of whoever does not answer to what is
-    seen.
+    The same parameters give the same motion, bit for bit, of whoever does not answer to what is seen.
 
     Args:
         parameters: Who it is.
@@ -134,7 +117,7 @@ class RunningOperator(RunningStage):
         super().__init__(OPERATOR, 0, dt)
         self.parameters, self.state = record(OperatorNumbers), record(OperatorState)
         # The first record of what is wanted is that of the present tick.
-        self._wanted, self._noise = record_array(Wanted, BLOCK + 1), Noise()
+        self._wanted, self._noise = record_array(follower.Wanted, BLOCK + 1), Noise()
         self._fixed = parameters
         self.kernel = operator_step
         self.arguments = (self.parameters, self.state, self._wanted, self._noise.rows)
@@ -161,8 +144,8 @@ class RunningOperator(RunningStage):
         self._rest = rest[3:]
         now["wanted"], now["attitude"], now["buttons"] = rest[:3], rest[3:], 0.0
         now["tremor"] = now["jaw"] = 0.0
-        row[HAND_SERVO_CP.field], row[MASTER_MEASURED_CP.field] = rest, rest
-        row[HAND_BUTTONS.field] = row[HAND_TREMOR.field] = row[HAND_JAW.field] = 0.0
+        row[topics.HAND_SERVO_CP.field], row[topics.MASTER_MEASURED_CP.field] = rest, rest
+        row[topics.HAND_BUTTONS.field] = row[topics.HAND_TREMOR.field] = row[topics.HAND_JAW.field] = 0.0
 
     def retune(self, parameters: OperatorParameters) -> None:
         """Take new tremor and patience from the next tick on; the motion goes on."""
@@ -197,9 +180,8 @@ class RunningOperator(RunningStage):
         self._draw(self._wanted[left : self._end])
 
     def _draw(self, drawn: Any) -> None:
-        """Fill records with what the operator wants in the ticks that follow."""
         count = len(drawn)
-        if self._person is not None and count <= MOST:  # faster than by way of turns
+        if self._person is not None and count <= follower.MOST:  # faster than by way of turns
             drawn[:] = self._person.draw((self._tick + 1) * self.dt, self.dt, count)
             self._tick += count
             return
@@ -275,11 +257,23 @@ def _turn_all(rest: Array, turns: Array, attitudes: Array) -> None:
 OPERATOR = Stage(
     "operator",
     OperatorParameters,
-    reads=(SLAVE_MEASURED_CP, MASTER_MEASURED_CP, MASTER_MEASURED_CF, TELEOP_STATE, TASK_STATE),
-    writes=(HAND_SERVO_CP, HAND_BUTTONS, HAND_TREMOR, HAND_JAW),
-    late=(SLAVE_MEASURED_CP, MASTER_MEASURED_CP, MASTER_MEASURED_CF, TELEOP_STATE, TASK_STATE),
-    optional=(TASK_STATE,),
-    on_demand=(HAND_JAW,),
+    reads=(
+        topics.SLAVE_MEASURED_CP,
+        topics.MASTER_MEASURED_CP,
+        topics.MASTER_MEASURED_CF,
+        topics.TELEOP_STATE,
+        topics.TASK_STATE,
+    ),
+    writes=(topics.HAND_SERVO_CP, topics.HAND_BUTTONS, topics.HAND_TREMOR, topics.HAND_JAW),
+    late=(
+        topics.SLAVE_MEASURED_CP,
+        topics.MASTER_MEASURED_CP,
+        topics.MASTER_MEASURED_CF,
+        topics.TELEOP_STATE,
+        topics.TASK_STATE,
+    ),
+    optional=(topics.TASK_STATE,),
+    on_demand=(topics.HAND_JAW,),
     make=RunningOperator,
     node="teleop_core.nodes.operator:OperatorNode",
 )

@@ -2,12 +2,9 @@
 
 import math
 
-from teleop_core.kernels import inner
-from teleop_core.kernels.fields import Fields
-from teleop_core.kernels.geometry import Array
+from teleop_core.kernels import Array, Fields, inner
 
-# The peak force falls to the continuous one while the motors take up the last quarter of the heat
-# that they bear.
+# The peak force falls to the continuous one while the motors take up the last quarter of the heat that they bear.
 _LAST = 0.25
 
 

@@ -13,11 +13,9 @@ from typing import Any
 import numpy as np
 from numba import types
 
-from teleop_core.base.errors import PartError
-from teleop_core.base.registry import Registry, part_check, places, tried
-from teleop_core.kernels import pointer
-from teleop_core.kernels.geometry import Array
-from teleop_core.kernels.parts import fenced, is_whole, numbers_of
+from teleop_core.base import PartError, Registry, part_check
+from teleop_core.base.registry import places, tried
+from teleop_core.kernels import Array, fenced, is_whole, numbers_of, pointer
 
 __all__ = ["CHANCES", "LOST", "MEMORY", "NETWORKS", "Network", "register_network"]
 
@@ -37,11 +35,10 @@ class Network:
     Attributes:
         name: What ``--set network.there.kind=`` calls it.
         parameters: Its parameter group.
-        draw: ``draw(numbers, memory, chances, now)``, a kernel or a plain function, called once for
-            every packet. ``numbers`` are those of the parameters; ``memory`` (4,) is kept from
-            packet to packet, and zero at the start; ``chances`` (3,) are random numbers, even from
-            0 to 1; ``now`` is the time since the start [s]. Returns the time on the way beside the
-            least one [s], or :data:`LOST`.
+        draw: ``draw(numbers, memory, chances, now)``, a kernel or a plain function, called once for every packet.
+            ``numbers`` are those of the parameters; ``memory`` (4,) is kept from packet to packet, and zero at the
+            start; ``chances`` (3,) are random numbers, even from 0 to 1; ``now`` is the time since the start [s].
+            Returns the time on the way beside the least one [s], or :data:`LOST`.
         numbers: ``numbers(parameters)`` gives what ``draw`` takes, if that is
             something else than the numbers of the parameters in their order.
     """

@@ -1,9 +1,8 @@
 """Constant: every packet takes the least time."""
 
-from teleop_core.base.parameters import NoParameters
+from teleop_core.base import NoParameters
 from teleop_core.chain.network import Network
-from teleop_core.kernels import kernel
-from teleop_core.kernels.geometry import Array
+from teleop_core.kernels import Array, kernel
 
 
 @kernel

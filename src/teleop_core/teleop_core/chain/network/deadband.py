@@ -13,11 +13,9 @@ import math
 from dataclasses import dataclass
 from typing import Annotated
 
-from teleop_core.base.parameters import parameter
+from teleop_core.base import parameter
 from teleop_core.chain.network.link import LinkState
-from teleop_core.kernels import inner
-from teleop_core.kernels.fields import Fields
-from teleop_core.kernels.geometry import Array
+from teleop_core.kernels import Array, Fields, inner
 
 
 class DeadbandNumbers(Fields):

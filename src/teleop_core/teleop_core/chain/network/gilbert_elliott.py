@@ -2,10 +2,9 @@
 
 from dataclasses import dataclass
 
-from teleop_core.base.parameters import parameter
+from teleop_core.base import parameter
 from teleop_core.chain.network import LOST, Network
-from teleop_core.kernels import kernel
-from teleop_core.kernels.geometry import Array
+from teleop_core.kernels import Array, kernel
 
 _LEVEL = "published: UVA-DSA telesurgery QoS analysis 2026, loss of 10 %"
 

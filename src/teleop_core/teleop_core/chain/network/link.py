@@ -1,21 +1,17 @@
 """Link: packets on their way, one direction of a network.
 
-A packet waits in a queue while the line is busy with those before it. Its transmission begins at
-``max(sent, end of the one before)`` and takes its size over the bandwidth: a queue of one server
-(Kleinrock 1975, section 1.2). Every packet is due at a tick, found when its transmission begins.
-What is due at the same tick shares a place in a calendar of ticks, where the newest packet stays;
-so a tick costs the same with any delay.
+A packet waits in a queue while the line is busy with those before it. Its transmission begins at ``max(sent, end of the
+one before)`` and takes its size over the bandwidth: a queue of one server (Kleinrock 1975, section 1.2). Every packet
+is due at a tick, found when its transmission begins. What is due at the same tick shares a place in a calendar of
+ticks, where the newest packet stays; so a tick costs the same with any delay.
 """
 
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
-from teleop_core.chain.network import CHANCES, MEMORY
-from teleop_core.chain.network.packet_size import HEADER
-from teleop_core.kernels import inner
-from teleop_core.kernels.fields import Fields, Integers
-from teleop_core.kernels.geometry import Array
+from teleop_core.chain.network import CHANCES, MEMORY, packet_size
+from teleop_core.kernels import Array, Fields, Integers, inner
 
 LONGEST = 16384
 """Ticks that a packet may be on the way; one that would take longer is lost."""
@@ -123,7 +119,7 @@ def _due(p: LinkNumbers, s: LinkState, way: Way, k: int, dt: float) -> int:
 @inner
 def _packet_bytes(way: Way) -> float:
     """Bytes of ``way.packet``: a topic that nobody has written yet is not in it."""
-    size = float(HEADER)
+    size = float(packet_size.HEADER)
     for i in range(way.sizes.shape[0]):
         if way.packet_ns[i] != 0:
             size += way.sizes[i]

@@ -8,12 +8,9 @@ import math
 
 import numpy as np
 
-from teleop_core.chain.network import CHANCES, NETWORKS, deadband, link
-from teleop_core.chain.network.packet_size import message_sizes
+from teleop_core.chain.network import CHANCES, NETWORKS, deadband, link, packet_size
 from teleop_core.chain.network.parameters import NetworkParameters, WayParameters
-from teleop_core.graph.row import Row
-from teleop_core.graph.signals import DT, assign
-from teleop_core.graph.stage import RunningStage, Stage
+from teleop_core.graph import DT, Row, RunningStage, Stage, assign
 from teleop_core.graph.topics import (
     ENERGY,
     MASTER_ENERGY,
@@ -38,9 +35,7 @@ from teleop_core.graph.topics import (
     SLAVE_SETPOINT_CP,
     Topic,
 )
-from teleop_core.kernels import inner, kernel
-from teleop_core.kernels.fields import Vector3, record
-from teleop_core.kernels.geometry import Array
+from teleop_core.kernels import Array, Vector3, inner, kernel, record
 
 THERE, BACK = 0, 1
 _TOLD = 20
@@ -241,7 +236,7 @@ class NetworkLink(RunningStage):
     def _made(width: int, topics: tuple[Topic, ...], given: WayParameters) -> link.Way:
         kind = NETWORKS.find(given.kind.kind)
         numbers = kind.numbers(given.kind.parameters)
-        return link.make_way(width, message_sizes(topics), kind.draw_pointer, numbers)
+        return link.make_way(width, packet_size.message_sizes(topics), kind.draw_pointer, numbers)
 
     def reset(self) -> None:
         """Nothing is on the way, and the random numbers of the seed begin anew."""

@@ -6,9 +6,8 @@ from typing import Any
 
 from teleop_core.base.parameters import Choice, build, choice, parameter
 from teleop_core.base.ranges import LONGEST_DELAY
-from teleop_core.chain.network import NETWORKS
+from teleop_core.chain.network import NETWORKS, link
 from teleop_core.chain.network.deadband import DeadbandParameters
-from teleop_core.chain.network.link import QUEUE
 
 _QOS = "UVA-DSA telesurgery QoS analysis 2026"
 
@@ -89,7 +88,7 @@ class WayParameters:
     queue: int = parameter(
         100,
         lower=1,
-        upper=QUEUE,
+        upper=link.QUEUE,
         doc="packets that wait for the line at most; one more costs the oldest of them, or where order is kept itself",
         source="assumed",
     )

@@ -7,12 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
-from teleop_core.base.errors import ParameterError
-from teleop_core.base.parameters import parameter
+from teleop_core.base import ParameterError, parameter
 from teleop_core.base.ranges import LATEST_S, LONGEST_DELAY
 from teleop_core.chain.network import LOST, Network
-from teleop_core.kernels import kernel
-from teleop_core.kernels.geometry import Array
+from teleop_core.kernels import Array, kernel
 
 _NAME = "trace.file"
 _SLOW = 20.0  # [s] from row to row: a session would hardly see the network change

@@ -11,9 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from teleop_core.base.errors import PartError
-from teleop_core.base.parameters import NoParameters
-from teleop_core.base.registry import Registry
+from teleop_core.base import NoParameters, PartError, Registry
 from teleop_core.kernels.geometry import Array
 
 if TYPE_CHECKING:
@@ -24,10 +22,9 @@ __all__ = ["OPERATORS", "Motion", "Operator", "Seen", "Setting", "following", "r
 Motion = Callable[[Array], Array]
 """Times (N,) since the start [s] to rows (N, 3), (N, 6), (N, 9), (N, 12) or (N, 13).
 
-Columns: position x, y, z [m] and rotation vector [rad] relative to the start, in the master's base;
-then the buttons clutch, fixture, mode (1 pressed); then tremor x, y, z [m], by which the tip is
-off whatever the device's friction is; then how far the jaw is closed, from 0 to 1. What is left out
-is zero.
+Columns: position x, y, z [m] and rotation vector [rad] relative to the start, in the master's base; then the buttons
+clutch, fixture, mode (1 pressed); then tremor x, y, z [m], by which the tip is off whatever the device's friction is;
+then how far the jaw is closed, from 0 to 1. What is left out is zero.
 """
 
 
@@ -42,8 +39,7 @@ class Seen(NamedTuple):
         slave: Pose (7,) of the slave's tip in its base; zero before it is told.
         stylus: Pose (7,) of the stylus in the master's base.
         force: Force and torque (6,) that the device gives the hand.
-        state: Numbers of ``teleop/state``, as :data:`~teleop_core.graph.topics.TELEOP_STATE` names
-            them.
+        state: Numbers of ``teleop/state``, as :data:`~teleop_core.graph.topics.TELEOP_STATE` names them.
         task: Numbers of ``task/state``, as :data:`~teleop_core.graph.topics.TASK_STATE` names them;
             zero without a task, and before it begins.
     """
@@ -80,10 +76,8 @@ class Operator:
         make: ``make(parameters, setting)`` gives the :data:`Motion` of one session.
         parameters: Its parameter group, beside those that all operators share.
         ahead: Ticks for which it can be asked at once: 1 for one who answers to what happens.
-        trembles: Whether its motion has all its tremor, so that ``operator.tremor_amplitude`` is
-            not added.
-        approaches: Whether it begins with a smooth move to ``operator.center`` that takes
-            ``operator.approach_time``.
+        trembles: Whether its motion has all its tremor, so that ``operator.tremor_amplitude`` is not added.
+        approaches: Whether it begins with a smooth move to ``operator.center`` that takes ``operator.approach_time``.
         length: ``length(parameters, setting)`` says how long its motion lasts [s], which a session
             then does too if its duration is not given; None for a motion without end.
         needs: Names of stages without which it does nothing.

@@ -1,8 +1,7 @@
 """Follower: a stylus that follows wanted poses smoothly, with a stated delay and bounded motion.
 
-Place and attitude each follow as a critically damped system of second order. What it wants to do
-is bounded: its speed, its acceleration, and the room that it stays in. So no jump of what is wanted
-ever comes out as one.
+Place and attitude each follow as a critically damped system of second order. What it wants to do is bounded: its speed,
+its acceleration, and the room that it stays in. So no jump of what is wanted ever comes out as one.
 """
 
 import math

@@ -14,13 +14,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from teleop_core.base.errors import ParameterError
-from teleop_core.base.parameters import parameter
+from teleop_core.base import ParameterError, parameter
 from teleop_core.chain.operators import Motion, Operator, Setting
 from teleop_core.chain.operators.parameters import OperatorParameters
 from teleop_core.chain.operators.shapes import minimum_jerk
-from teleop_core.kernels.geometry import Array
-from teleop_core.kernels.portable import dot, length
+from teleop_core.kernels import Array, dot, length
 
 _TRIES = 50  # targets that are drawn before one anywhere in the region is taken
 _LINES = 16  # sines that tremor is made of, per axis

@@ -1,9 +1,8 @@
 """Observer: an operator who looks at the slave, plans from what it saw, moves, and looks again.
 
-Each look-move cycle is one submovement towards the goal of a task, with the noise of a fast hand.
-Its end is seen as late as display, network and eye make it, and only then the next one begins. So
-a delay slows it down by its share of the cycle, and nothing in here knows how long the delay is.
-Where the constants come from stands in ``docs/tasks.md``.
+Each look-move cycle is one submovement towards the goal of a task, with the noise of a fast hand. Its end is seen as
+late as display, network and eye make it, and only then the next one begins. So a delay slows it down by its share of
+the cycle, and nothing in here knows how long the delay is. Where the constants come from stands in ``docs/tasks.md``.
 """
 
 import math
@@ -13,20 +12,18 @@ from typing import NamedTuple
 
 import numpy as np
 
-from teleop_core.base.parameters import parameter
+from teleop_core.base import parameter
 from teleop_core.chain.mapping.parameters import axis_map
 from teleop_core.chain.operators import Operator, Setting
 from teleop_core.chain.operators.shapes import minimum_jerk
 from teleop_core.chain.tasks import Act
-from teleop_core.graph.signals import STATE
-from teleop_core.graph.topics import TASK_STATE
-from teleop_core.kernels.geometry import Array
-from teleop_core.kernels.portable import dot, length, product
+from teleop_core.graph import STATE, topics
+from teleop_core.kernels import Array, dot, length, product
 
 AHEAD = 16
 """Ticks for which it is asked at once, about a frame: the eye needs longer, so nothing is late."""
 _GAIN = STATE["gain"]
-_NUMBER, _ACT, _GOAL, _WIDTH = (TASK_STATE.columns.index(name) for name in ("number", "act", "goal_x", "width"))
+_NUMBER, _ACT, _GOAL, _WIDTH = (topics.TASK_STATE.columns.index(name) for name in ("number", "act", "goal_x", "width"))
 _PRESS_TIME = 0.06  # for which the hand stays closed [s]
 _STILL_TIME, _STILL = 0.02, 0.05  # at rest: in this time [s] it goes this share of its way
 _SHORTEST = 0.1  # of a width: a way that is not worth a submovement

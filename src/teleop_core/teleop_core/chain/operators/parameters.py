@@ -3,8 +3,7 @@
 from dataclasses import dataclass, field
 from itertools import pairwise
 
-from teleop_core.base.errors import ParameterError
-from teleop_core.base.parameters import Choice, choice, parameter
+from teleop_core.base import Choice, ParameterError, choice, parameter
 from teleop_core.chain.operators import OPERATORS
 
 PRESS_TIME = 0.1

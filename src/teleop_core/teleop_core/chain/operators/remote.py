@@ -12,16 +12,13 @@ from typing import Any, NamedTuple, cast
 
 import numpy as np
 
-from teleop_core.base.errors import ShapeError, UnknownNameError
-from teleop_core.base.parameters import parameter
-from teleop_core.chain.operators import Motion, Operator, Setting
-from teleop_core.chain.operators.follower import MOST, Follower
-from teleop_core.chain.operators.rest import rest_pose
+from teleop_core.base import ShapeError, UnknownNameError, parameter
+from teleop_core.chain.operators import Motion, Operator, Setting, follower, rest
 from teleop_core.kernels import geometry
 
 __all__ = ["REMOTE", "Person", "RemoteHand", "RemoteParameters", "remote_operator"]
 
-AHEAD = MOST
+AHEAD = follower.MOST
 """Largest number of ticks per call. A new target takes effect at most this many ticks late."""
 BUTTONS = ("clutch", "fixture", "mode")
 _PRESSED, _BETWEEN = 0.1, 0.05  # how long a button is pressed, and released at least [s]
@@ -96,8 +93,7 @@ Person = Callable[["RemoteHand", float], None]
 class _Wanted(NamedTuple):
     """What was said last.
 
-    ``time`` is when [s], NaN for when it is first looked at; ``grip`` how often the stylus had been
-    let go of before.
+    ``time`` is when [s], NaN for when it is first looked at; ``grip`` how often the stylus had been let go of before.
     """
 
     pose: geometry.Array
@@ -108,9 +104,8 @@ class _Wanted(NamedTuple):
 class RemoteHand:
     """Hand of a person who is not here: follows poses that are wanted, and lets go in silence.
 
-    A grip is relative: its first pose is taken as where the stylus is then, later ones move it by
-    the difference. :meth:`want`, :meth:`press` and :meth:`let_go` may be called by one other thread
-    than :meth:`motion`.
+    A grip is relative: its first pose is taken as where the stylus is then, later ones move it by the difference.
+    :meth:`want`, :meth:`press` and :meth:`let_go` may be called by one other thread than :meth:`motion`.
 
     Args:
         parameters: Delay, timeout and bounds.
@@ -131,10 +126,10 @@ class RemoteHand:
         room: tuple[geometry.Array, geometry.Array] | None = None,
     ) -> None:
         p = self._parameters = parameters or RemoteParameters()
-        begin = rest_pose() if start is None else _row("start", start)
+        begin = rest.rest_pose() if start is None else _row("start", start)
         corners = (np.full(3, -_FARTHEST), np.full(3, _FARTHEST)) if room is None else room
         self.room = corners
-        self._follower = Follower(
+        self._follower = follower.Follower(
             p.delay, (p.speed, p.turn_speed), (p.acceleration, p.turn_acceleration), begin, corners
         )
         self._wanted = self._seen = _Wanted(begin, math.nan, 0)
@@ -156,8 +151,7 @@ class RemoteHand:
             time: When it was wanted, in the time of :meth:`motion` [s]; None for now.
 
         Returns:
-            Whether it is used: not if it is not finite, its quaternion is none, or it is more than
-            10 m away.
+            Whether it is used: not if it is not finite, its quaternion is none, or it is more than 10 m away.
 
         Raises:
             ShapeError: It has another shape.
@@ -234,8 +228,8 @@ class RemoteHand:
         """
         rows = np.zeros((len(times), 13))
         tick = float(times[1] - times[0]) if len(times) > 1 else 0.0
-        for first in range(0, len(times), MOST):
-            part = rows[first : first + MOST]
+        for first in range(0, len(times), follower.MOST):
+            part = rows[first : first + follower.MOST]
             drawn = self.draw(float(times[first]), tick, len(part))
             part[:, :3] = drawn["wanted"] - self._start[:3]
             part[:, 6:9], part[:, 12] = drawn["buttons"], drawn["jaw"]
@@ -350,7 +344,7 @@ def _row(name: str, pose: object) -> geometry.Array:
 def hand_of(setting: Setting) -> RemoteHand:
     """Hand for a session, within the room of its device; its parameters are ``operator.remote``."""
     p = cast(RemoteParameters, setting.common.kind.groups["remote"])
-    start, device = rest_pose(), setting.common.device
+    start, device = rest.rest_pose(), setting.common.device
     middle, half = start[:3] - np.array(device.start), 0.5 * np.array(device.workspace)
     low, high = np.minimum(middle - half, start[:3]), np.maximum(middle + half, start[:3])
     return RemoteHand(p, start, (low, high))

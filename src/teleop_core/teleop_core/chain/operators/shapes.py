@@ -8,8 +8,7 @@ import numpy as np
 
 from teleop_core.chain.operators import Motion, Operator, Setting
 from teleop_core.chain.operators.parameters import OperatorParameters
-from teleop_core.kernels.geometry import Array
-from teleop_core.kernels.portable import dot
+from teleop_core.kernels import Array, dot
 
 
 def minimum_jerk(share: Array) -> Array:

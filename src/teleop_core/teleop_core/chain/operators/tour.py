@@ -9,8 +9,7 @@ from typing import cast
 
 import numpy as np
 
-from teleop_core.base.errors import ParameterError
-from teleop_core.base.parameters import parameter
+from teleop_core.base import ParameterError, parameter
 from teleop_core.chain.operators import Motion, Operator, Setting
 from teleop_core.chain.operators.parameters import OperatorParameters
 from teleop_core.chain.operators.shapes import minimum_jerk, smooth
@@ -75,8 +74,7 @@ class TourParameters:
 def through(points: Array, share: Array) -> Array:
     """Smooth line (M, 3) through points (N, 3), N >= 2, at shares (M,) of its way, 0 to 1.
 
-    Between neighbours it is a cubic whose slope at a point is that from the point before to the
-    point after.
+    Between neighbours it is a cubic whose slope at a point is that from the point before to the point after.
 
     Source:
         Catmull and Rom 1974.

@@ -14,12 +14,10 @@ from typing import Any
 import numpy as np
 from numba import types
 
-from teleop_core.base.errors import PartError
-from teleop_core.base.registry import Registry, part_check, tried
-from teleop_core.graph.topics import ENERGY
-from teleop_core.kernels import kernel, pointer
-from teleop_core.kernels.geometry import Array
-from teleop_core.kernels.parts import fenced, is_whole, numbers_of
+from teleop_core.base import PartError, Registry, part_check
+from teleop_core.base.registry import tried
+from teleop_core.graph import topics
+from teleop_core.kernels import Array, fenced, is_whole, kernel, numbers_of, pointer
 
 __all__ = ["MEMORY", "PASSIVITIES", "Passivity", "leave_command", "register_passivity"]
 
@@ -43,26 +41,23 @@ def leave_command(
 class Passivity:
     """A kind of passivity: what it makes of the push on the hand, and of the slave's command.
 
-    Both kernels may write to ``port``, their row of :data:`~teleop_core.graph.topics.ENERGY`, and
-    get ``heard``, the other side's, as it arrived; energies are those of the slave [J]. ``flow``
-    (3,) is what the other side told since the last call, what went in and what went out at this
-    port. ``memory`` (12,) is kept from call to call, and zero at the start; energies begin anew
-    with every ``round``, and at the slave ``memory`` with them.
+    Both kernels may write to ``port``, their row of :data:`~teleop_core.graph.topics.ENERGY`, and get ``heard``, the
+    other side's, as it arrived; energies are those of the slave [J]. ``flow`` (3,) is what the other side told since
+    the last call, what went in and what went out at this port. ``memory`` (12,) is kept from call to call, and zero at
+    the start; energies begin anew with every ``round``, and at the slave ``memory`` with them.
 
     Attributes:
         name: What ``--set reflection.passivity=`` calls it.
         parameters: Its parameter group.
-        hand: ``hand(numbers, memory, last, moved, led, flow, heard, port, push, scale, period)``,
-            called for every sample of the master. ``last`` (3,) is the push since the sample before
-            [N]; ``moved`` (3,) how far the hand went under it; ``led`` (3,) how far it led the
-            slave, over the gain of motion [m]; all along the master's base;
-            ``push`` (3,) the one that is asked for, to be made the one that is given; ``scale`` the
-            hand's energy over that of the slave; ``period`` the time since the sample before [s].
-        slave: ``slave(numbers, memory, flow, force, tip, last, heard, port, command, period)``,
-            called for every command that arrives, with a stage ``passivity`` alone. ``numbers`` are
-            those of that stage; ``force`` (6,) is on the tip [N, N m], whose pose is ``tip`` (7,);
-            ``last`` (7,) the command before it, as it was given; ``command`` (7,) the one that
-            came, to be made the one that is given.
+        hand: ``hand(numbers, memory, last, moved, led, flow, heard, port, push, scale, period)``, called for every
+            sample of the master. ``last`` (3,) is the push since the sample before [N]; ``moved`` (3,) how far the hand
+            went under it; ``led`` (3,) how far it led the slave, over the gain of motion [m]; all along the master's
+            base; ``push`` (3,) the one that is asked for, to be made the one that is given; ``scale`` the hand's energy
+            over that of the slave; ``period`` the time since the sample before [s].
+        slave: ``slave(numbers, memory, flow, force, tip, last, heard, port, command, period)``, called for every
+            command that arrives, with a stage ``passivity`` alone. ``numbers`` are those of that stage; ``force`` (6,)
+            is on the tip [N, N m], whose pose is ``tip`` (7,); ``last`` (7,) the command before it, as it was given;
+            ``command`` (7,) the one that came, to be made the one that is given.
         numbers: ``numbers(parameters)`` gives what ``hand`` takes; None for the numbers of the
             parameters in their order.
         needs_slave: Whether it works with a stage ``passivity`` alone.
@@ -97,7 +92,7 @@ def _try(part: Passivity) -> None:
         "and parameters that all have defaults"
     )
     with tried("passivity", part.name, needs):
-        numbers, width = part.numbers_of(part.parameters()), len(ENERGY)
+        numbers, width = part.numbers_of(part.parameters()), len(topics.ENERGY)
         memory, fence = fenced(np.zeros(MEMORY))
         push, behind = fenced(np.zeros(3))
         command, after = fenced(np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]))

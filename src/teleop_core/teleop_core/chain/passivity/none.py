@@ -1,9 +1,8 @@
 """None: the hand gets what is asked for, and the slave what is commanded."""
 
-from teleop_core.base.parameters import NoParameters
+from teleop_core.base import NoParameters
 from teleop_core.chain.passivity import Passivity
-from teleop_core.kernels import kernel
-from teleop_core.kernels.geometry import Array
+from teleop_core.kernels import Array, kernel
 
 
 @kernel

@@ -9,12 +9,11 @@ Source:
     over a link whose delay varies.
 """
 
-from teleop_core.graph.topics import ENERGY
-from teleop_core.kernels import inner, kernel
-from teleop_core.kernels.geometry import Array
+from teleop_core.graph import topics
+from teleop_core.kernels import Array, inner, kernel
 
 LAW, ROUND, IN, OUT, TOLD, HEARD, MARGIN, WITHHELD, TURN_IN, TURN_OUT, DRIFT, IMPEDANCE, WAVE = (
-    ENERGY.index(name) for name in (
+    topics.ENERGY.index(name) for name in (
         "law", "round", "energy_in", "energy_out", "told", "heard", "margin", "withheld",
         "turn_in", "turn_out", "drift_x", "impedance", "wave_x",
     )

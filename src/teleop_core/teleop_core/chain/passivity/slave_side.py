@@ -9,23 +9,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from teleop_core.base.parameters import parameter
+from teleop_core.base import parameter
 from teleop_core.chain.passivity import MEMORY, PASSIVITIES
 from teleop_core.chain.passivity.port import IN, LAW, ROUND, TURN_IN, begin_round, count, hear_energy, port_work
-from teleop_core.graph.row import Row
-from teleop_core.graph.signals import DT, assign, copy
-from teleop_core.graph.stage import RunningStage, Stage
-from teleop_core.graph.topics import (
-    MASTER_ENERGY,
-    PASSIVITY_SERVO_CP,
-    SLAVE_ENERGY,
-    SLAVE_MEASURED_CF,
-    SLAVE_MEASURED_CP,
-    SLAVE_SERVO_CP,
-)
-from teleop_core.kernels import inner, kernel, records
-from teleop_core.kernels.fields import Fields, PoseRow, Wrench, record
-from teleop_core.kernels.geometry import Array, turn_between
+from teleop_core.graph import DT, Row, RunningStage, Stage, assign, copy, topics
+from teleop_core.kernels import Array, Fields, PoseRow, Wrench, inner, kernel, record, records
+from teleop_core.kernels.geometry import turn_between
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -227,9 +216,9 @@ class SlaveSide(RunningStage):
 PASSIVITY = Stage(
     "passivity",
     PassivityParameters,
-    reads=(SLAVE_SERVO_CP, MASTER_ENERGY, SLAVE_MEASURED_CF, SLAVE_MEASURED_CP),
-    writes=(PASSIVITY_SERVO_CP, SLAVE_ENERGY),
-    late=(SLAVE_MEASURED_CF, SLAVE_MEASURED_CP),
-    replaces=SLAVE_SERVO_CP,
+    reads=(topics.SLAVE_SERVO_CP, topics.MASTER_ENERGY, topics.SLAVE_MEASURED_CF, topics.SLAVE_MEASURED_CP),
+    writes=(topics.PASSIVITY_SERVO_CP, topics.SLAVE_ENERGY),
+    late=(topics.SLAVE_MEASURED_CF, topics.SLAVE_MEASURED_CP),
+    replaces=topics.SLAVE_SERVO_CP,
     make=SlaveSide,
 )

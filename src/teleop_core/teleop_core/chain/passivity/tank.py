@@ -7,8 +7,7 @@ it has. With the stage the slave's command stops there by the force on the tip.
 
 from teleop_core.chain.passivity import Passivity
 from teleop_core.chain.passivity.tdpa import StoreParameters, lead_slave, tdpa_hand
-from teleop_core.kernels import kernel
-from teleop_core.kernels.geometry import Array
+from teleop_core.kernels import Array, kernel
 
 
 @kernel

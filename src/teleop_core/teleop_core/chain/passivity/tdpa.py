@@ -9,12 +9,10 @@ that can be paid. While the slave has little, the hand pays by a drag.
 import math
 from dataclasses import dataclass
 
-from teleop_core.base.parameters import parameter
-from teleop_core.chain.passivity import Passivity
-from teleop_core.chain.passivity.held_back import hold_lead, make_up, met_way, norm
+from teleop_core.base import parameter
+from teleop_core.chain.passivity import Passivity, held_back
 from teleop_core.chain.passivity.port import DRIFT, HEARD, IN, LAW, MARGIN, ROUND, TOLD
-from teleop_core.kernels import inner, kernel
-from teleop_core.kernels.geometry import Array
+from teleop_core.kernels import Array, inner, kernel
 
 READING = 0.06e-3
 """A step of the device's reading [m]."""
@@ -74,10 +72,9 @@ def tdpa_hand(
 ) -> None:  # fmt: skip
     """Make the push (3,) [N] no larger than what is left can pay for until the next sample.
 
-    What is left is what was heard and what came in, less what was told and what went out. A touch
-    that is over leaves nothing, but what is owed stays owed. Where a slave's port is heard of, it
-    is told what came in; while it has less than its store, or energy is owed here, a drag on the
-    hand brings some in.
+    What is left is what was heard and what came in, less what was told and what went out. A touch that is over leaves
+    nothing, but what is owed stays owed. Where a slave's port is heard of, it is told what came in; while it has less
+    than its store, or energy is owed here, a drag on the hand brings some in.
 
     Source:
         Ryu, Artigas and Preusche 2010 for the law. Theirs is a damper by a measured speed; the
@@ -133,11 +130,11 @@ def lead_slave(
 ) -> None:  # fmt: skip
     """Make of the command (7,) that came the one that is given; see :func:`tdpa_slave`."""
     left, drift = keep_account(numbers, flow, force, port), port[DRIFT : DRIFT + 3]
-    met = met_way(command, last, drift) if norm(force) <= numbers[2] else 0.0
-    make_up(numbers, drift, met, period)
+    met = held_back.met_way(command, last, drift) if held_back.norm(force) <= numbers[2] else 0.0
+    held_back.make_up(numbers, drift, met, period)
     for i in range(3):
         command[i] -= drift[i]
-    hold_lead(numbers, memory, left, stop, force, tip, port, command)
+    held_back.hold_lead(numbers, memory, left, stop, force, tip, port, command)
 
 
 @kernel

@@ -1,8 +1,7 @@
 """Wave: hand and slave exchange waves, each a mix of force and speed.
 
-A wave carries energy: what the two-port holds is what is on its way. Its integral and its energy
-travel, which are both sums, so a packet that is lost, late or doubled takes nothing away from the
-next one and adds no energy.
+A wave carries energy: what the two-port holds is what is on its way. Its integral and its energy travel, which are both
+sums, so a packet that is lost, late or doubled takes nothing away from the next one and adds no energy.
 """
 
 import math
@@ -10,13 +9,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from teleop_core.base.parameters import parameter
-from teleop_core.chain.passivity import Passivity
-from teleop_core.chain.passivity.held_back import hold_back, make_up, norm
+from teleop_core.base import parameter
+from teleop_core.chain.passivity import Passivity, held_back
 from teleop_core.chain.passivity.port import DRIFT, HEARD, IMPEDANCE, MARGIN, ROUND, TOLD, WAVE
 from teleop_core.chain.passivity.tdpa import SPEED_TIME, pay_push
-from teleop_core.kernels import inner, kernel
-from teleop_core.kernels.geometry import Array
+from teleop_core.kernels import Array, inner, kernel
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -132,7 +129,7 @@ def wave_hand(
         memory[OWED + i] += at_slave * led[i] - wave[i] * period
         push[i] = at_hand * wave[i]
         way += abs(moved[i])
-    size = norm(push)
+    size = held_back.norm(push)
     _tell(memory, port, KEPT_WAY * size / scale, period)
     pay_push(port, push, size, way, scale)
     for i in range(3):
@@ -147,11 +144,11 @@ def pay_command(
 
     Arguments are those of :func:`wave_slave`.
     """
-    size = norm(force)
+    size = held_back.norm(force)
     lent = numbers[3] * min(max(2.0 - size / numbers[4], 0.0), 1.0)
     # What is overdrawn is given back by going back, no faster than drift goes away.
     left = max(min(port[MARGIN], memory[0]) + lent, -size * numbers[1] * period)
-    inwards = hold_back(force, size, last, left, numbers[2], port, command)
+    inwards = held_back.hold_back(force, size, last, left, numbers[2], port, command)
     memory[0] -= max(inwards, 0.0)
 
 
@@ -174,7 +171,7 @@ def wave_slave(
     if b <= 0.0:
         return
     port[IMPEDANCE] = b
-    is_free, root, before = norm(force) <= numbers[2], math.sqrt(2.0 * b), port[MARGIN]
+    is_free, root, before = held_back.norm(force) <= numbers[2], math.sqrt(2.0 * b), port[MARGIN]
     wave = _take(memory, flow[0], heard, port, period)
     memory[0] += port[MARGIN] - before + flow[1]
     port[MARGIN] += flow[1] - flow[2]
@@ -190,7 +187,7 @@ def wave_slave(
     _tell(memory, port, 0.0, period)
     memory[0] -= port[TOLD] - told
     if is_free:
-        make_up(numbers, port[DRIFT : DRIFT + 3], 0.0, period)
+        held_back.make_up(numbers, port[DRIFT : DRIFT + 3], 0.0, period)
     for i in range(3):
         command[i] -= port[DRIFT + i]
     pay_command(numbers, memory, force, last, port, command, period)

@@ -14,12 +14,10 @@ from typing import Any
 import numpy as np
 from numba import types
 
-from teleop_core.base.errors import PartError
-from teleop_core.base.registry import Registry, part_check, places, tried
-from teleop_core.graph.topics import JAW_OBJECTS, TASK_STATE
-from teleop_core.kernels import pointer
-from teleop_core.kernels.geometry import Array
-from teleop_core.kernels.parts import fenced, is_whole, numbers_of
+from teleop_core.base import PartError, Registry, part_check
+from teleop_core.base.registry import places, tried
+from teleop_core.graph import topics
+from teleop_core.kernels import Array, fenced, is_whole, numbers_of, pointer
 
 __all__ = ["MEMORY", "SCENE", "TASKS", "Act", "Miss", "Task", "register_task"]
 
@@ -31,12 +29,11 @@ MEMORY = 64
 SCENE = (
     "time", "x", "y", "z", "qw", "qx", "qy", "qz", "closing", "fx", "fy", "fz", "is_second",
     "grips", "other_grips", "transferred", "dropped",
-    *(f"{axis}{i}" for i in range(JAW_OBJECTS) for axis in "xyz"),
+    *(f"{axis}{i}" for i in range(topics.JAW_OBJECTS) for axis in "xyz"),
 )  # fmt: skip
-"""What a task sees: time since it began [s]; the tip's true pose in slave_base [m]; how far the
-hand closes, 0 to 1; the world's force on the tip [N]; whether the arm is the second one; whether
-its jaw grips, and that of the other arm; how many blocks came onto another peg, and onto none; the
-middle of each block [m], zero for one that is not there."""
+"""What a task sees: time since it began [s]; the tip's true pose in slave_base [m]; how far the hand closes, 0 to 1;
+the world's force on the tip [N]; whether the arm is the second one; whether its jaw grips, and that of the other arm;
+how many blocks came onto another peg, and onto none; the middle of each block [m], zero for one that is not there."""
 
 
 class Act(IntEnum):
@@ -89,7 +86,7 @@ def _try(part: Task) -> None:
     with tried("task", part.name, needs):
         numbers = part.numbers(part.parameters())
         memory, fence = fenced(np.zeros(MEMORY))
-        state, beyond = fenced(np.zeros(len(TASK_STATE.columns)))
+        state, beyond = fenced(np.zeros(len(topics.TASK_STATE.columns)))
         scene = np.zeros(len(SCENE))
         scene[SCENE.index("qw")] = 1.0
         for i in range(64):
@@ -98,7 +95,7 @@ def _try(part: Task) -> None:
     if not (np.isfinite(state).all() and is_whole(fence) and is_whole(beyond)):
         text = f"one that writes {len(state)} finite numbers and remembers {MEMORY}"
         raise PartError("task", part.name, f"{text}; it writes {state.tolist()}")
-    if not (state[0] >= 1.0 and state[TASK_STATE.columns.index("width")] > 0.0):
+    if not (state[0] >= 1.0 and state[topics.TASK_STATE.columns.index("width")] > 0.0):
         text = "one that sets a first goal at once, with a width > 0"
         raise PartError("task", part.name, f"{text}; it writes {state.tolist()}")
 

@@ -7,18 +7,17 @@ time then [s], and whether the hand was closed.
 import math
 from dataclasses import dataclass
 
-from teleop_core.base.parameters import parameter
+from teleop_core.base import parameter
 from teleop_core.chain.tasks import SCENE, Act, Miss
-from teleop_core.graph.topics import TASK_STATE
-from teleop_core.kernels import inner
-from teleop_core.kernels.geometry import Array
+from teleop_core.graph import topics
+from teleop_core.kernels import Array, inner
 
 KEPT = 59
 _PASS = int(Act.PASS)
 _SINCE, _CLOSED = KEPT + 3, KEPT + 4
 _OPENS, _CLOSES = 0.4, 0.6  # closing at which a hand counts as open and closed again
 (_NUMBER, _ACT, _GOAL, _, _, _WIDTH, _ATTEMPTS, _SUCCESSES, _ERRORS, _WAY, _OFF, _TIME, _MISS, _) = range(
-    len(TASK_STATE.columns)
+    len(topics.TASK_STATE.columns)
 )
 _NONE, _BESIDE, _LATE, _FORCE = (int(m) for m in (Miss.NONE, Miss.BESIDE, Miss.LATE, Miss.FORCE))
 _PUSH = SCENE.index("fx")

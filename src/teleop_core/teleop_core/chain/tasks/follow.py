@@ -3,18 +3,16 @@
 import math
 from dataclasses import dataclass
 
-from teleop_core.base.parameters import parameter
-from teleop_core.chain.tasks import Task
-from teleop_core.chain.tasks.attempts import LedParameters, lead_on
-from teleop_core.kernels import kernel
-from teleop_core.kernels.geometry import Array
+from teleop_core.base import parameter
+from teleop_core.chain.tasks import Task, attempts
+from teleop_core.kernels import Array, kernel
 
 # Rounds in a period, three for each of y and z: prime numbers, so that nothing comes again in it.
 _ROUNDS = (2, 5, 11, 3, 7, 13)
 
 
 @dataclass(frozen=True, kw_only=True)
-class FollowParameters(LedParameters):
+class FollowParameters(attempts.LedParameters):
     """A point that wanders in the slave's y-z plane, from where the task begins.
 
     Source:
@@ -36,7 +34,7 @@ def follow_judge(numbers: Array, memory: Array, scene: Array, state: Array) -> N
         share = numbers[2] * (0.5, 0.3, 0.2)[i]
         y += share * math.sin(_ROUNDS[i] * angle)
         z += share * math.sin(_ROUNDS[3 + i] * angle)
-    lead_on(numbers, memory, scene, state, y, z)
+    attempts.lead_on(numbers, memory, scene, state, y, z)
 
 
 FOLLOW = Task("follow", FollowParameters, follow_judge)

@@ -3,10 +3,9 @@
 import math
 from dataclasses import dataclass
 
-from teleop_core.base.parameters import parameter
+from teleop_core.base import parameter
 from teleop_core.chain.tasks import Act, Miss, Task, attempts
-from teleop_core.kernels import kernel
-from teleop_core.kernels.geometry import Array
+from teleop_core.kernels import Array, kernel
 
 _PASS, _NONE = int(Act.PASS), int(Miss.NONE)
 

@@ -5,13 +5,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from teleop_core.base.errors import ParameterError
-from teleop_core.base.parameters import parameter
-from teleop_core.chain.tasks import SCENE, Act, Miss, Task
-from teleop_core.chain.tasks.attempts import begin_goal, end_attempt, is_at_goal, move_goal, waited
-from teleop_core.graph.topics import JAW_OBJECTS, TASK_STATE
-from teleop_core.kernels import inner, kernel
-from teleop_core.kernels.geometry import Array
+from teleop_core.base import ParameterError, parameter
+from teleop_core.chain.tasks import SCENE, Act, Miss, Task, attempts
+from teleop_core.graph import topics
+from teleop_core.kernels import Array, inner, kernel
 
 KINDS = ("one", "two", "hand_over")
 """Who transfers: one arm all blocks; each arm every other one; the second takes from the first."""
@@ -21,7 +18,7 @@ STEPS = ("wait", "reach", "grasp", "lift", "meet", "take", "release", "retreat",
 _TWO, _HAND_OVER = KINDS.index("two"), KINDS.index("hand_over")
 _GRIP, _LET_GO = int(Act.GRIP), int(Act.LET_GO)
 _NONE, _LATE, _DROP, _WRONG = (int(m) for m in (Miss.NONE, Miss.LATE, Miss.DROP, Miss.WRONG))
-_STEP = TASK_STATE.columns.index("step")
+_STEP = topics.TASK_STATE.columns.index("step")
 _SECOND, _X0 = SCENE.index("is_second"), SCENE.index("x0")
 _STARTS = 4  # places of the blocks at the beginning, in the memory
 _MEETS = 0.01  # a block that is no farther from where both meet is there [m]
@@ -57,14 +54,14 @@ class PegTransferParameters:
     longest: float = parameter(60.0, unit="s", lower=1.0, upper=600.0, doc="a transfer that takes longer is an error")
 
     def __post_init__(self) -> None:
-        if len(self.ways) not in {2, 2 * JAW_OBJECTS}:
-            needed = f"x, y of one way, or of {JAW_OBJECTS}"
+        if len(self.ways) not in {2, 2 * topics.JAW_OBJECTS}:
+            needed = f"x, y of one way, or of {topics.JAW_OBJECTS}"
             raise ParameterError("task.peg_transfer.ways", self.ways, needed)
 
 
 def numbers(p: PegTransferParameters) -> Array:
     """Numbers that the judge takes: lift, width, longest, kind, six ways, clearance."""
-    ways, kind = np.resize(p.ways, 2 * JAW_OBJECTS), KINDS.index(p.arms)
+    ways, kind = np.resize(p.ways, 2 * topics.JAW_OBJECTS), KINDS.index(p.arms)
     return np.array([p.lift, p.width, p.longest, kind, *ways, p.clearance], dtype=np.float64)
 
 
@@ -75,8 +72,8 @@ def _verdict(numbers: Array, memory: Array, scene: Array, block: int) -> int:
     is_high = scene[now + 2] - memory[_STARTS + 3 * block + 2] > _RESTS
     if is_high or brought + scene[_SECOND + 4] - memory[3] == 0.0:
         return -1
-    best, nearest = _DROP, numbers[4 + 2 * JAW_OBJECTS] + 1e-9
-    for i in range(JAW_OBJECTS):
+    best, nearest = _DROP, numbers[4 + 2 * topics.JAW_OBJECTS] + 1e-9
+    for i in range(topics.JAW_OBJECTS):
         x = memory[_STARTS + 3 * i] + numbers[4 + 2 * i] - scene[now]
         y = memory[_STARTS + 3 * i + 1] + numbers[5 + 2 * i] - scene[now + 1]
         if brought > 0.0 and math.hypot(x, y) <= nearest:
@@ -86,7 +83,6 @@ def _verdict(numbers: Array, memory: Array, scene: Array, block: int) -> int:
 
 @inner
 def _begin_step(numbers: Array, memory: Array, scene: Array, state: Array, step: int) -> None:
-    """Set the goal of a step."""
     block, lift, width = max(int(memory[0]), 0), numbers[0], numbers[1]
     start, now = _STARTS + 3 * block, _X0 + 3 * block
     way_x, way_y = numbers[4 + 2 * block], numbers[5 + 2 * block]
@@ -108,9 +104,9 @@ def _begin_step(numbers: Array, memory: Array, scene: Array, state: Array, step:
     is_closed = is_closed or step == _TAKE or (step == _RELEASE and scene[_SECOND] > 0.0)
     act = _GRIP if is_closed else _LET_GO
     if step == _REACH or (step == _MEET and scene[_SECOND] > 0.0):
-        begin_goal(memory, scene, state, act, x, y, z, width)
+        attempts.begin_goal(memory, scene, state, act, x, y, z, width)
     else:
-        move_goal(state, act, x, y, z, width)
+        attempts.move_goal(state, act, x, y, z, width)
 
 
 @inner
@@ -128,12 +124,11 @@ def _is_done(numbers: Array, memory: Array, scene: Array, state: Array) -> bool:
         return not (other if is_second else grips)
     if step in (_GRASP, _TAKE):
         return grips if step == _GRASP or is_second else other
-    return step not in (_WAIT, _PLACE) and is_at_goal(scene, state)
+    return step not in (_WAIT, _PLACE) and attempts.is_at_goal(scene, state)
 
 
 @inner
 def _next_step(numbers: Array, memory: Array, scene: Array, step: int) -> int:
-    """Step that comes after one that is done."""
     if step == _RETREAT:
         return _WAIT
     if step == _CARRY:  # first above the peg, then down
@@ -157,7 +152,7 @@ def _next_block(numbers: Array, memory: Array, scene: Array, state: Array) -> No
         memory[0] += stride
     memory[2], memory[3] = scene[_SECOND + 3], scene[_SECOND + 4]
     begin = _MEET if int(numbers[3]) == _HAND_OVER and is_second else _REACH
-    if memory[0] >= JAW_OBJECTS or memory[_STARTS + 3 * int(memory[0])] == 0.0:
+    if memory[0] >= topics.JAW_OBJECTS or memory[_STARTS + 3 * int(memory[0])] == 0.0:
         memory[0], begin = -1.0, _WAIT
     _begin_step(numbers, memory, scene, state, begin)
 
@@ -171,7 +166,7 @@ def peg_transfer_judge(numbers: Array, memory: Array, scene: Array, state: Array
     From the fifth on it holds the first places of all.
     """
     if state[0] == 0.0:
-        for i in range(3 * JAW_OBJECTS):
+        for i in range(3 * topics.JAW_OBJECTS):
             memory[_STARTS + i] = scene[_X0 + i]
         _next_block(numbers, memory, scene, state)
     if memory[0] < 0.0:
@@ -180,10 +175,10 @@ def peg_transfer_judge(numbers: Array, memory: Array, scene: Array, state: Array
     is_others = int(numbers[3]) == _HAND_OVER and scene[_SECOND + 2] > 0.0
     if scene[_SECOND + 1] == 0.0 and not is_others and (step > _LIFT or step == _WAIT):
         miss = _verdict(numbers, memory, scene, block)
-    if miss < 0 and waited(memory, scene) > numbers[2]:
+    if miss < 0 and attempts.waited(memory, scene) > numbers[2]:
         miss = _LATE
     if miss >= 0:
-        end_attempt(memory, scene, state, miss)
+        attempts.end_attempt(memory, scene, state, miss)
         _next_block(numbers, memory, scene, state)
         return
     if step == _TAKE and scene[_SECOND] > 0.0:  # from a hand that is never quite still

@@ -3,11 +3,9 @@
 import math
 from dataclasses import dataclass
 
-from teleop_core.base.parameters import parameter
-from teleop_core.chain.tasks import Act, Task
-from teleop_core.chain.tasks.attempts import begin_goal, tell_attempt, was_pressed
-from teleop_core.kernels import kernel
-from teleop_core.kernels.geometry import Array
+from teleop_core.base import parameter
+from teleop_core.chain.tasks import Act, Task, attempts
+from teleop_core.kernels import Array, kernel
 
 _PRESS = int(Act.PRESS)
 
@@ -46,10 +44,10 @@ def point_judge(numbers: Array, memory: Array, scene: Array, state: Array) -> No
     if state[0] == 0.0:
         for i in range(3):
             memory[i] = scene[1 + i]
-    elif not was_pressed(memory, scene[8]):
+    elif not attempts.was_pressed(memory, scene[8]):
         return
     else:
-        tell_attempt(memory, scene, state)
+        attempts.tell_attempt(memory, scene, state)
     n, radius = int(numbers[0]), 0.5 * numbers[1]
     at = int(state[0]) * ((n + 1) // 2) % n
     angle = 2.0 * math.pi * at / n
@@ -63,7 +61,7 @@ def point_judge(numbers: Array, memory: Array, scene: Array, state: Array) -> No
     goal_x = memory[0] + along * ax - across * z * ay
     goal_y = memory[1] + along * ay + across * z * ax
     goal_z = memory[2] + across * (x * ay - y * ax)
-    begin_goal(memory, scene, state, _PRESS, goal_x, goal_y, goal_z, numbers[2])
+    attempts.begin_goal(memory, scene, state, _PRESS, goal_x, goal_y, goal_z, numbers[2])
 
 
 POINT = Task("point", PointParameters, point_judge)

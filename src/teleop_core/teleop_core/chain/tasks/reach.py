@@ -2,11 +2,9 @@
 
 from dataclasses import dataclass
 
-from teleop_core.base.parameters import parameter
-from teleop_core.chain.tasks import Act, Miss, Task
-from teleop_core.chain.tasks.attempts import begin_goal, end_attempt, is_at_goal, tell_attempt, waited
-from teleop_core.kernels import kernel
-from teleop_core.kernels.geometry import Array
+from teleop_core.base import parameter
+from teleop_core.chain.tasks import Act, Miss, Task, attempts
+from teleop_core.kernels import Array, kernel
 
 _PASS, _LATE = int(Act.PASS), int(Miss.LATE)
 # Powers of the inverse of the plastic number's relative in three dimensions, 1.2207440846…
@@ -34,17 +32,17 @@ def reach_judge(numbers: Array, memory: Array, scene: Array, state: Array) -> No
     if state[0] == 0.0:
         for i in range(3):
             memory[i] = scene[1 + i]
-    elif is_at_goal(scene, state):
-        tell_attempt(memory, scene, state)
-    elif waited(memory, scene) >= numbers[4]:
-        end_attempt(memory, scene, state, _LATE)
+    elif attempts.is_at_goal(scene, state):
+        attempts.tell_attempt(memory, scene, state)
+    elif attempts.waited(memory, scene) >= numbers[4]:
+        attempts.end_attempt(memory, scene, state, _LATE)
     else:
         return
     at = state[0] + numbers[5] + 1.0
     goal_x = memory[0] + numbers[0] * ((0.5 + at * _STEPS[0]) % 1.0 - 0.5)
     goal_y = memory[1] + numbers[1] * ((0.5 + at * _STEPS[1]) % 1.0 - 0.5)
     goal_z = memory[2] + numbers[2] * ((0.5 + at * _STEPS[2]) % 1.0 - 0.5)
-    begin_goal(memory, scene, state, _PASS, goal_x, goal_y, goal_z, numbers[3])
+    attempts.begin_goal(memory, scene, state, _PASS, goal_x, goal_y, goal_z, numbers[3])
 
 
 REACH = Task("reach", ReachTaskParameters, reach_judge)

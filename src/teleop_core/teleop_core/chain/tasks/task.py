@@ -5,29 +5,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from teleop_core.base.parameters import Choice, choice
+from teleop_core.base import Choice, choice
 from teleop_core.chain.tasks import MEMORY, SCENE, TASKS
-from teleop_core.graph.row import Row
-from teleop_core.graph.signals import DT, STATE, assign
-from teleop_core.graph.stage import RunningStage, Stage
-from teleop_core.graph.topics import (
-    FIRST_JAW_GRIP,
-    HAND_JAW,
-    SECOND_JAW_GRIP,
-    SLAVE_JAW_BOARD,
-    SLAVE_JAW_GRIP,
-    SLAVE_TRUE_CF,
-    SLAVE_TRUE_CP,
-    TASK_STATE,
-    TELEOP_STATE,
-)
-from teleop_core.kernels import kernel
-from teleop_core.kernels.fields import Fields, record
-from teleop_core.kernels.geometry import Array
+from teleop_core.graph import DT, STATE, Row, RunningStage, Stage, assign, topics
+from teleop_core.kernels import Array, Fields, kernel, record
 
 _IS_FOLLOWING = STATE["is_following"]
-_JAWS = (SLAVE_JAW_GRIP, FIRST_JAW_GRIP, SECOND_JAW_GRIP, SLAVE_JAW_BOARD)
-_GRIPS, _BOARD = SLAVE_JAW_GRIP.columns.index("is_gripped"), SLAVE_JAW_BOARD.columns.index("x0")
+_JAWS = (topics.SLAVE_JAW_GRIP, topics.FIRST_JAW_GRIP, topics.SECOND_JAW_GRIP, topics.SLAVE_JAW_BOARD)
+_GRIPS, _BOARD = topics.SLAVE_JAW_GRIP.columns.index("is_gripped"), topics.SLAVE_JAW_BOARD.columns.index("x0")
 _SECOND, _FIRST_BLOCK = SCENE.index("is_second"), SCENE.index("x0")
 
 
@@ -113,9 +98,9 @@ class RunningTask(RunningStage):
 TASK = Stage(
     "task",
     TaskParameters,
-    reads=(SLAVE_TRUE_CP, HAND_JAW, TELEOP_STATE, SLAVE_TRUE_CF, *_JAWS),
-    writes=(TASK_STATE,),
-    late=(HAND_JAW, TELEOP_STATE, FIRST_JAW_GRIP, SECOND_JAW_GRIP),
-    optional=(SLAVE_TRUE_CF, *_JAWS),
+    reads=(topics.SLAVE_TRUE_CP, topics.HAND_JAW, topics.TELEOP_STATE, topics.SLAVE_TRUE_CF, *_JAWS),
+    writes=(topics.TASK_STATE,),
+    late=(topics.HAND_JAW, topics.TELEOP_STATE, topics.FIRST_JAW_GRIP, topics.SECOND_JAW_GRIP),
+    optional=(topics.SLAVE_TRUE_CF, *_JAWS),
     make=RunningTask,
 )

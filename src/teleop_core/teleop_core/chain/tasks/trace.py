@@ -3,15 +3,13 @@
 import math
 from dataclasses import dataclass
 
-from teleop_core.base.parameters import parameter
-from teleop_core.chain.tasks import Task
-from teleop_core.chain.tasks.attempts import LedParameters, lead_on
-from teleop_core.kernels import kernel
-from teleop_core.kernels.geometry import Array
+from teleop_core.base import parameter
+from teleop_core.chain.tasks import Task, attempts
+from teleop_core.kernels import Array, kernel
 
 
 @dataclass(frozen=True, kw_only=True)
-class TraceParameters(LedParameters):
+class TraceParameters(attempts.LedParameters):
     """A ring in the slave's y-z plane, on which the place where the task begins lies lowest."""
 
     diameter: float = parameter(0.03, unit="m", lower=1e-3, upper=0.5, doc="of the ring")
@@ -23,7 +21,7 @@ def trace_judge(numbers: Array, memory: Array, scene: Array, state: Array) -> No
     """Move the goal on, and count at each step whether the tip is near it."""
     radius, angle = 0.5 * numbers[2], 2.0 * math.pi * scene[0] / numbers[3]
     y, z = radius * math.sin(angle), radius * (1.0 - math.cos(angle))
-    lead_on(numbers, memory, scene, state, y, z)
+    attempts.lead_on(numbers, memory, scene, state, y, z)
 
 
 TRACE = Task("trace", TraceParameters, trace_judge)

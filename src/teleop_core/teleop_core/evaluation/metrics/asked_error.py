@@ -3,12 +3,10 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from teleop_core.evaluation.accumulators import Integers
-from teleop_core.evaluation.context import Context
-from teleop_core.evaluation.metric import SPREAD_MEANING, Key, SpreadMetric
-from teleop_core.evaluation.pairing import NONE, latest, same_stamp
+from teleop_core.evaluation import SPREAD_MEANING, Context, Integers, Key, Window, latest, same_stamp
+from teleop_core.evaluation.metric import SpreadMetric
+from teleop_core.evaluation.pairing import NONE
 from teleop_core.evaluation.tracking import angles_between
-from teleop_core.evaluation.windows import Window
 from teleop_core.graph.signals import STATE
 from teleop_core.graph.topics import MASTER_MEASURED_CP, SLAVE_MEASURED_CP, SLAVE_SERVO_CP
 from teleop_core.kernels.geometry import Array, quaternion_products

@@ -4,11 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from teleop_core.evaluation.context import Context
-from teleop_core.evaluation.metric import Metric, figure, keys_of
+from teleop_core.evaluation import Context, Metric, Row, Window, keys_of, number, row
+from teleop_core.evaluation.metric import figure
 from teleop_core.evaluation.metrics.fixture import GROUP
-from teleop_core.evaluation.rows import Row, number, row
-from teleop_core.evaluation.windows import Window
 from teleop_core.graph.topics import MASTER_CONTACT
 from teleop_core.kernels.geometry import Array
 

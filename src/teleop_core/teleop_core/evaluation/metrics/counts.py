@@ -5,12 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from teleop_core.bags.reader import Bag
-from teleop_core.evaluation.context import Context
-from teleop_core.evaluation.metric import Key, Metric, figure, keys_of
-from teleop_core.evaluation.rows import MISSING, Row
+from teleop_core.evaluation import MISSING, TRACKED, Context, Key, Metric, Row, Window, keys_of, tracked
+from teleop_core.evaluation.metric import figure
 from teleop_core.evaluation.stamps import StampTallies
-from teleop_core.evaluation.tracking import TRACKED, tracked
-from teleop_core.evaluation.windows import Window
 from teleop_core.graph.graph import RECORDER_NAME
 from teleop_core.graph.topics import DIAGNOSTICS, SLAVE_MEASURED_CP
 

@@ -6,14 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from teleop_core.chain.fixtures.reported_fixture import ReportedFixture
-from teleop_core.evaluation.accumulators import Moments
-from teleop_core.evaluation.context import Context
-from teleop_core.evaluation.metric import Metric, figure, keys_of
+from teleop_core.evaluation import MISSING, Context, Metric, Moments, Row, Window, keys_of, row
+from teleop_core.evaluation.metric import figure
 from teleop_core.evaluation.published import BOX_OVERSHOOT_MM, Gains
-from teleop_core.evaluation.rows import MISSING, Row, row
 from teleop_core.evaluation.stamps import StampTallies
 from teleop_core.evaluation.state_history import States
-from teleop_core.evaluation.windows import Window
 from teleop_core.graph.topics import SLAVE_MEASURED_CP, SLAVE_SERVO_CP, Topic
 from teleop_core.kernels.geometry import Array
 from teleop_core.shapes.box import BOX

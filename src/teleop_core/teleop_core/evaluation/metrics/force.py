@@ -2,15 +2,11 @@
 
 import numpy as np
 
-from teleop_core.evaluation.accumulators import Moments, Spread
-from teleop_core.evaluation.context import Context
+from teleop_core.evaluation import Context, Envelope, Moments, Row, Spread, Window, number, row
 from teleop_core.evaluation.figure import DARK, FIRST, SECOND, THIRD, Figure, line, time_axis
 from teleop_core.evaluation.metric import SPREAD_MEANING, Key, Metric
 from teleop_core.evaluation.metrics.fixture import GROUP
 from teleop_core.evaluation.outlines import kinds_of, outlines_of
-from teleop_core.evaluation.rows import Row, number, row
-from teleop_core.evaluation.traces import Envelope
-from teleop_core.evaluation.windows import Window
 from teleop_core.graph.topics import MASTER_MEASURED_CF
 
 

@@ -2,9 +2,7 @@
 
 import numpy as np
 
-from teleop_core.evaluation.context import Context
-from teleop_core.evaluation.metric import Key, Metric
-from teleop_core.evaluation.windows import Window
+from teleop_core.evaluation import Context, Key, Metric, Window
 from teleop_core.graph.topics import SLAVE_TRUE_CF
 
 _STEP = 0.1  # by which the force rises before a peak, and falls after it [N]

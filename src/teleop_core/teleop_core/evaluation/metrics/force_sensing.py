@@ -4,12 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from teleop_core.evaluation.accumulators import Moments
-from teleop_core.evaluation.context import Context
-from teleop_core.evaluation.metric import Metric, figure, keys_of
-from teleop_core.evaluation.pairing import latest
-from teleop_core.evaluation.rows import Row, row
-from teleop_core.evaluation.windows import Window
+from teleop_core.evaluation import Context, Metric, Moments, Row, Window, keys_of, latest, row
+from teleop_core.evaluation.metric import figure
 from teleop_core.graph.topics import SLAVE_ESTIMATED_CF, SLAVE_MEASURED_CF, SLAVE_TRUE_CF, Topic
 from teleop_core.kernels.geometry import Array
 

@@ -4,14 +4,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from teleop_core.evaluation.context import Context
-from teleop_core.evaluation.metric import Metric, figure, keys_of
+from teleop_core.evaluation import Context, Metric, Row, Window, keys_of, row
+from teleop_core.evaluation.metric import figure
 from teleop_core.evaluation.metrics.touch import object_of
-from teleop_core.evaluation.rows import Row, row
-from teleop_core.evaluation.windows import Window
 from teleop_core.graph.topics import SLAVE_TRUE_CF, SLAVE_TRUE_CP
-from teleop_core.kernels.geometry import Array
-from teleop_core.kernels.portable import length
+from teleop_core.kernels import Array, length
 from teleop_core.shapes.hole import HoleParameters
 
 GROUP = "insertion"

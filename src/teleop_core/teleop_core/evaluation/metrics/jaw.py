@@ -4,13 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from teleop_core.evaluation.context import Context
+from teleop_core.evaluation import Context, Envelope, Metric, Row, Window, keys_of, number, row
 from teleop_core.evaluation.figure import COMMAND, DARK, MEASURED, Figure, line, time_axis
-from teleop_core.evaluation.metric import Metric, figure, keys_of
+from teleop_core.evaluation.metric import figure
 from teleop_core.evaluation.pairing import mean_wait_s
-from teleop_core.evaluation.rows import Row, number, row
-from teleop_core.evaluation.traces import Envelope
-from teleop_core.evaluation.windows import Window
 from teleop_core.graph.topics import SLAVE_JAW_GRIP, SLAVE_JAW_MEASURED_JS, SLAVE_JAW_SERVO_JP
 
 GROUP = "the jaw"

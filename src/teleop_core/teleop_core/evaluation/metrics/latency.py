@@ -4,13 +4,10 @@ from itertools import cycle
 
 import numpy as np
 
+from teleop_core.evaluation import MISSING, Context, Key, Metric, Row, Window, fixed, number, same_stamp
 from teleop_core.evaluation.accumulators import Delay, Distribution, Integers
-from teleop_core.evaluation.context import Context
 from teleop_core.evaluation.figure import DARK, FIRST, SECOND, THIRD, Figure, line
-from teleop_core.evaluation.metric import Key, Metric
-from teleop_core.evaluation.pairing import NONE, same_stamp
-from teleop_core.evaluation.rows import MISSING, Row, fixed, number
-from teleop_core.evaluation.windows import Window
+from teleop_core.evaluation.pairing import NONE
 from teleop_core.graph.topics import NETWORK_SERVO_CP, Topic
 
 _NEVER = 2**62

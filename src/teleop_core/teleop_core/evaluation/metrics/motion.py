@@ -5,20 +5,16 @@ from itertools import pairwise
 
 import numpy as np
 
-from teleop_core.base.errors import TeleopError
-from teleop_core.base.parameters import build
+from teleop_core.base import TeleopError, build
 from teleop_core.chain.operators import OPERATORS
 from teleop_core.chain.operators.parameters import OperatorParameters
-from teleop_core.evaluation.context import Context
+from teleop_core.evaluation import Context, Key, Metric, Row, Window, keys_of, number, row
 from teleop_core.evaluation.figure import DARK, MEASURED, Figure, line, time_axis
-from teleop_core.evaluation.metric import Key, Metric, keys_of
 from teleop_core.evaluation.motion_figures import Kinematics, Mask, MotionFigures
 from teleop_core.evaluation.motion_measures import RATE
 from teleop_core.evaluation.motion_samples import MotionSamples
-from teleop_core.evaluation.rows import Row, number, row
 from teleop_core.evaluation.state_history import States
-from teleop_core.evaluation.windows import Window
-from teleop_core.graph.signals import STATE
+from teleop_core.graph import STATE
 from teleop_core.graph.topics import MASTER_MEASURED_CP, SLAVE_MEASURED_CP, Topic
 
 
@@ -239,7 +235,6 @@ class _Stream:
 
 
 def _segments(hand: Kinematics, mask: Mask) -> dict[str, dict[str, float | None]]:
-    """Figures of each stretch of a mask."""
     edges = np.flatnonzero(np.diff(np.concatenate(([False], mask, [False]))))
     found: dict[str, dict[str, float | None]] = {}
     for begin, end in list(pairwise(edges.tolist()))[::2]:

@@ -8,14 +8,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from teleop_core.evaluation import Context, Envelope, Metric, Row, Window, keys_of, latest, number, row
 from teleop_core.evaluation.accumulators import Distribution, Integers
-from teleop_core.evaluation.context import Context
 from teleop_core.evaluation.figure import FIRST, SECOND, Figure, line, time_axis
-from teleop_core.evaluation.metric import Metric, figure, keys_of
-from teleop_core.evaluation.pairing import latest
-from teleop_core.evaluation.rows import Row, number, row
-from teleop_core.evaluation.traces import Envelope
-from teleop_core.evaluation.windows import Window
+from teleop_core.evaluation.metric import figure
 from teleop_core.graph.signals import TICK_NS
 from teleop_core.graph.topics import NETWORK_MEASURED_CP, NETWORK_SERVO_CP, NETWORK_STATE, NO_COMMAND_NS
 

@@ -2,15 +2,12 @@
 
 from dataclasses import dataclass
 
-from teleop_core.evaluation import figure
-from teleop_core.evaluation.accumulators import Moments, Spread
-from teleop_core.evaluation.context import Context
+from teleop_core.evaluation import TRACKED, Context, Moments, Spread, Window, figure, tracked
 from teleop_core.evaluation.metric import SPREAD_MEANING, Key, Metric
 from teleop_core.evaluation.metrics.position_error import COMMAND_GROUP, GROUP
 from teleop_core.evaluation.published import ANGLE_FACTOR, Gains, agrees_by_factor
 from teleop_core.evaluation.rows import Row, error_rows, number, spread_rows
-from teleop_core.evaluation.tracking import TRACKED, ErrorTrace, PoseErrors, tracked
-from teleop_core.evaluation.windows import Window
+from teleop_core.evaluation.tracking import ErrorTrace, PoseErrors
 
 TURNS = ("roll", "pitch", "yaw")
 

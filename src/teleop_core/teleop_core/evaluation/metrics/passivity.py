@@ -5,13 +5,10 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from teleop_core.chain.passivity.port import DRIFT, HEARD, IN, LAW, MARGIN, OUT, ROUND, WITHHELD
-from teleop_core.evaluation.accumulators import Integers
-from teleop_core.evaluation.context import Context
+from teleop_core.evaluation import Context, Envelope, Integers, Metric, Row, Window, keys_of, number, row
 from teleop_core.evaluation.figure import FIRST, FIXTURE, SECOND, THIRD, Figure, line, time_axis
-from teleop_core.evaluation.metric import Metric, figure, keys_of
-from teleop_core.evaluation.rows import Row, number, row
-from teleop_core.evaluation.traces import Envelope, Rows
-from teleop_core.evaluation.windows import Window
+from teleop_core.evaluation.metric import figure
+from teleop_core.evaluation.traces import Rows
 from teleop_core.graph.topics import MASTER_ENERGY, MASTER_SERVO_CF, SLAVE_ENERGY
 from teleop_core.kernels.geometry import Array
 

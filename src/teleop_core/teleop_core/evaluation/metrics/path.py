@@ -4,17 +4,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from teleop_core.evaluation import figure
-from teleop_core.evaluation.context import Context
-from teleop_core.evaluation.metric import Metric
-from teleop_core.evaluation.metrics.fixture import FixtureMetric
-from teleop_core.evaluation.metrics.position_error import PositionErrorMetric
+from teleop_core.evaluation import TRACKED, Context, Envelope, Metric, Window, figure, number, tracked
+from teleop_core.evaluation.metrics import fixture, position_error
 from teleop_core.evaluation.outlines import Outline, kinds_of, largest, outlines_of
 from teleop_core.evaluation.plain import Values
-from teleop_core.evaluation.rows import number
-from teleop_core.evaluation.traces import Envelope
-from teleop_core.evaluation.tracking import TRACKED, tracked
-from teleop_core.evaluation.windows import Window
 from teleop_core.graph.signals import STATE
 
 _PLANES = ((0, 1), (0, 2), (1, 2))
@@ -55,8 +48,8 @@ class PathMetric(Metric):
 
     def __init__(self, context: Context) -> None:
         self._context = context
-        self._error = context.shared(PositionErrorMetric)
-        self._fixture = context.shared(FixtureMetric)
+        self._error = context.shared(position_error.PositionErrorMetric)
+        self._fixture = context.shared(fixture.FixtureMetric)
         # x, y, z of command, setpoint and measured, [mm].
         self._position = Envelope(context.bag.start_ns, context.bag.end_ns, columns=9)
 

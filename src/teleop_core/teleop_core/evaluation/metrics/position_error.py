@@ -6,14 +6,12 @@ true tip is behind what the encoders see.
 
 import numpy as np
 
-from teleop_core.evaluation.context import Context
+from teleop_core.evaluation import SPREAD_MEANING, TRACKED, Context, Key, Window, same_stamp, tracked
 from teleop_core.evaluation.figure import COMMAND, MEASURED, Figure, line, time_axis
-from teleop_core.evaluation.metric import SPREAD_MEANING, Key, SpreadMetric
-from teleop_core.evaluation.pairing import same_stamp
+from teleop_core.evaluation.metric import SpreadMetric
 from teleop_core.evaluation.published import POSITION_SHARE, Gains, agrees
 from teleop_core.evaluation.rows import Row, number, spread_rows
-from teleop_core.evaluation.tracking import TRACKED, ErrorTrace, pose_errors, rows_of, tracked
-from teleop_core.evaluation.windows import Window
+from teleop_core.evaluation.tracking import ErrorTrace, pose_errors, rows_of
 from teleop_core.graph.topics import SLAVE_TRUE_CP
 from teleop_core.kernels.geometry import Array
 

@@ -6,12 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from teleop_core.evaluation.accumulators import Integers, Moments, Spread
-from teleop_core.evaluation.context import Context
+from teleop_core.evaluation import MISSING, Context, Integers, Moments, Row, Spread, Window, error_rows, row
 from teleop_core.evaluation.metric import SPREAD_MEANING, Metric, figure, keys_of
-from teleop_core.evaluation.rows import MISSING, Row, error_rows, row
 from teleop_core.evaluation.stamps import StampTallies
-from teleop_core.evaluation.windows import Window
 from teleop_core.graph.signals import DT
 from teleop_core.graph.topics import SLAVE_REACH, SLAVE_SERVO_CP, Limit
 from teleop_core.kernels.geometry import Array

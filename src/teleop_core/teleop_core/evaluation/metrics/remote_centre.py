@@ -4,12 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from teleop_core.evaluation.accumulators import Moments
-from teleop_core.evaluation.context import Context
-from teleop_core.evaluation.metric import Metric, figure, keys_of
+from teleop_core.evaluation import Context, Metric, Moments, Row, Window, keys_of, row
+from teleop_core.evaluation.metric import figure
 from teleop_core.evaluation.metrics.motion import approach_end_ns
-from teleop_core.evaluation.rows import Row, row
-from teleop_core.evaluation.windows import Window
 from teleop_core.graph.topics import REMOTE_CENTRE, SLAVE_MEASURED_CP
 from teleop_core.kernels.geometry import Array, rotations_from_quaternions
 

@@ -3,9 +3,7 @@
 import numpy as np
 
 from teleop_core.chain.tasks.peg_transfer import STEPS
-from teleop_core.evaluation.context import Context
-from teleop_core.evaluation.metric import Key, Metric
-from teleop_core.evaluation.windows import Window
+from teleop_core.evaluation import Context, Key, Metric, Window
 from teleop_core.graph.topics import TASK_STATE
 
 _ATTEMPTS, _STEP = (TASK_STATE.columns.index(name) for name in ("attempts", "step"))

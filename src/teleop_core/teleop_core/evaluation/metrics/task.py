@@ -4,10 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from teleop_core.evaluation.context import Context
-from teleop_core.evaluation.metric import Metric, figure, keys_of
-from teleop_core.evaluation.rows import Row, row
-from teleop_core.evaluation.windows import Window
+from teleop_core.evaluation import Context, Metric, Row, Window, keys_of, row
+from teleop_core.evaluation.metric import figure
 from teleop_core.graph.topics import DISPLAY_MEASURED_CP, NO_COMMAND_NS, TASK_STATE
 
 GROUP = "task"

@@ -5,15 +5,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from teleop_core.base.errors import TeleopError
-from teleop_core.base.parameters import build
-from teleop_core.evaluation.accumulators import Moments
-from teleop_core.evaluation.context import Context
+from teleop_core.base import TeleopError, build
+from teleop_core.evaluation import Context, Envelope, Metric, Moments, Row, Window, keys_of, number, row
 from teleop_core.evaluation.figure import DARK, FIRST, SECOND, THIRD, Figure, line, time_axis
-from teleop_core.evaluation.metric import Metric, figure, keys_of
-from teleop_core.evaluation.rows import Row, number, row
-from teleop_core.evaluation.traces import Envelope
-from teleop_core.evaluation.windows import Window
+from teleop_core.evaluation.metric import figure
 from teleop_core.graph.topics import SLAVE_MEASURED_CF, SLAVE_TRUE_CF, SLAVE_TRUE_CP
 from teleop_core.kernels.geometry import Array
 from teleop_core.slave.world.button import ButtonParameters, count_presses

@@ -4,11 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from teleop_core.evaluation.context import Context
-from teleop_core.evaluation.metric import Metric, figure, keys_of
+from teleop_core.evaluation import Context, Metric, Row, Window, keys_of, row
+from teleop_core.evaluation.metric import figure
 from teleop_core.evaluation.pairing import mean_wait_s
-from teleop_core.evaluation.rows import Row, row
-from teleop_core.evaluation.windows import Window
 from teleop_core.graph.topics import SLAVE_JAW_BOARD, SLAVE_JAW_GRIP
 
 GROUP = "peg transfer"

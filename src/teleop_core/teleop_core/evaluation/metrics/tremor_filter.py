@@ -4,14 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from teleop_core.evaluation import motion_measures
-from teleop_core.evaluation.accumulators import Integers
-from teleop_core.evaluation.context import Context
-from teleop_core.evaluation.metric import Metric, figure, keys_of
+from teleop_core.evaluation import Context, Integers, Metric, Row, Window, keys_of, motion_measures, row
+from teleop_core.evaluation.metric import figure
 from teleop_core.evaluation.metrics.motion import approach_end_ns
 from teleop_core.evaluation.motion_samples import MotionSamples
-from teleop_core.evaluation.rows import Row, row
-from teleop_core.evaluation.windows import Window
 from teleop_core.graph.topics import HAND_TREMOR, MASTER_FILTERED_CP, MASTER_MEASURED_CP
 from teleop_core.kernels.geometry import Array
 
@@ -46,10 +42,9 @@ class TremorFilterScore:
 def passage(before: Array, after: Array) -> tuple[float, float] | None:
     """Delay [s] and gain of motion below :data:`MEANT` from one motion to another.
 
-    Segments of :data:`SPECTRUM_SAMPLES`, half overlapping and Hann-windowed, give the
-    cross-spectrum S of both velocities, summed over the axes. The delay is the one whose phase
-    ``-2πf delay`` fits best: ``-Σ|S| 2πf arg S / Σ|S| (2πf)²``. The gain is
-    ``|Σ S exp(2πjf delay)|`` over the power of the first motion.
+    Segments of :data:`SPECTRUM_SAMPLES`, half overlapping and Hann-windowed, give the cross-spectrum S of both
+    velocities, summed over the axes. The delay is the one whose phase ``-2πf delay`` fits best: ``-Σ|S| 2πf arg S /
+    Σ|S| (2πf)²``. The gain is ``|Σ S exp(2πjf delay)|`` over the power of the first motion.
 
     Args:
         before: Velocities (N, 3) at :data:`RATE`.

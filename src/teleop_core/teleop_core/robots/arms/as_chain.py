@@ -7,8 +7,7 @@ import numpy as np
 
 from teleop_core.base.errors import ParameterError
 from teleop_core.kernels.geometry import Array
-from teleop_core.robots.arms import rcrt1
-from teleop_core.robots.arms.dh import robot_from_table
+from teleop_core.robots.arms import dh, rcrt1
 from teleop_core.robots.chains import dh_kernels
 from teleop_core.robots.link_errors import Chain, LinkErrors
 from teleop_core.robots.robot import Robot
@@ -19,7 +18,7 @@ def chain_of(robot: Robot) -> Chain | None:
     if "motions" in robot.geometry:
         return None
     if robot.kernels.fk is rcrt1.fk:
-        row = robot_from_table(_table(robot)).geometry_row
+        row = dh.robot_from_table(_table(robot)).geometry_row
     elif robot.kernels.fk is dh_kernels.fk:
         row = robot.geometry_row
     else:

@@ -1,7 +1,6 @@
 """Denavit-Hartenberg chains from a table: standard, modified and Sheth-Uicker, as robots.
 
-A table is YAML, one row per link, written as in a textbook with ``q`` in the place of the joint
-variable::
+A table is YAML, one row per link, written as in a textbook with ``q`` in the place of the joint variable::
 
     name: scara
     convention: modified        # alpha, a: of the link before; standard: of the link itself
@@ -12,11 +11,10 @@ variable::
       - {a: 0.3, d: -q, lower: 0.0, upper: 0.2, name: d3}
       - {theta: q - 90}
 
-Entries that are left out are 0. A row without ``q`` is a fixed frame, such as a tool. Turning
-joints without limits have ±180 degrees; sliding ones must state theirs. ``home`` is the posture of
-the published or natural zero; ``start`` the one at which sessions start, which joints without it
-start at home; if no row has it, one with room in all directions is looked for
-(:mod:`teleop_core.robots.room`).
+Entries that are left out are 0. A row without ``q`` is a fixed frame, such as a tool. Turning joints without limits
+have ±180 degrees; sliding ones must state theirs. ``home`` is the posture of the published or natural zero; ``start``
+the one at which sessions start, which joints without it start at home; if no row has it, one with room in all
+directions is looked for (:mod:`teleop_core.robots.room`).
 
 Every chain can be a slave. What its drives are stands, joint by joint, in a section of its own::
 
@@ -24,11 +22,10 @@ Every chain can be a slave. What its drives are stands, joint by joint, in a sec
       q1: {inertia: 0.6, speed_limit: 200, effort_limit: 60}
       d3: {inertia: 6.0, speed_limit: 1.0}
 
-The entries are those of :class:`~teleop_core.robots.drives.Drives`: ``speed_limit``,
-``friction_speed`` (per second) and ``encoder_step`` of turning joints are in the table's unit of
-angles, all others in SI units (N·m·s/rad, rad/s). What is left out is assumed
-(:mod:`teleop_core.robots.arms.dh_drives`), and ``Robot.drives.assumed`` names it. Axes do not act
-on each other, and gravity counts as balanced.
+The entries are those of :class:`~teleop_core.robots.drives.Drives`: ``speed_limit``, ``friction_speed`` (per second)
+and ``encoder_step`` of turning joints are in the table's unit of angles, all others in SI units (N·m·s/rad, rad/s).
+What is left out is assumed (:mod:`teleop_core.robots.arms.dh_drives`), and ``Robot.drives.assumed`` names it. Axes do
+not act on each other, and gravity counts as balanced.
 
 Source:
     Denavit and Hartenberg 1955 (standard, also distal); Craig 2005 (modified, proximal); Sheth
@@ -42,9 +39,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from teleop_core.base import plain_yaml
-from teleop_core.base.damage import damage_told
-from teleop_core.base.errors import ParameterError, UnknownNameError
+from teleop_core.base import ParameterError, UnknownNameError, damage_told, plain_yaml
 from teleop_core.base.ranges import MOST_OF_ARM, check
 from teleop_core.robots.arms.dh_chain import CONVENTIONS, DhJoint, DhRow, DhTable, elementary
 from teleop_core.robots.arms.dh_drives import parse_drives

@@ -6,9 +6,8 @@ from types import MappingProxyType
 
 import numpy as np
 
-from teleop_core.base.errors import ShapeError
-from teleop_core.kernels.geometry import Array, checked_array, rotation, transform
-from teleop_core.kernels.portable import product
+from teleop_core.base import ShapeError
+from teleop_core.kernels import Array, checked_array, product, rotation, transform
 from teleop_core.robots.arms.dh_drives import drives_of
 from teleop_core.robots.chains.followers import Followers
 from teleop_core.robots.closed_form.decomposition import SEARCH, Solution, solution_of

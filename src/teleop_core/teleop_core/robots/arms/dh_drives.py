@@ -12,9 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from teleop_core.base import plain_yaml
-from teleop_core.base.damage import damage_told
-from teleop_core.base.errors import ParameterError, UnknownNameError
+from teleop_core.base import ParameterError, UnknownNameError, damage_told, plain_yaml
 from teleop_core.base.ranges import check
 from teleop_core.robots.drives import ENTRIES, MAY_BE_ZERO, Drives
 

@@ -13,9 +13,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from teleop_core.base.errors import ParameterError
-from teleop_core.kernels import inner, kernel
-from teleop_core.kernels.geometry import Array
+from teleop_core.base import ParameterError
+from teleop_core.kernels import Array, inner, kernel
 from teleop_core.kernels.room import room
 from teleop_core.robots.arms import rcrt1_dynamics, rcrt1_hardware
 from teleop_core.robots.branches import BESIDE, bounded, cost_of, hold, is_allowed, turn, wrapped
@@ -244,10 +243,9 @@ def _settle(T: Array, seed: Array, limits: Array, M: Array, q: Array) -> None:
 def ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual: Array) -> int:
     """Write joints (6,) for ``T_base_tip``; see :class:`teleop_core.robots.robot.Kernels`.
 
-    Where a limit or step holds a joint back, the joints after it make the best of it: the wrist
-    turns the tool as wanted from where the arm really is, joint 5 and then 6 from where joint 4
-    really is. At the wrist singularity joint 4 lags, joint 5 passes through zero with its sign,
-    and motion goes on at the other side.
+    Where a limit or step holds a joint back, the joints after it make the best of it: the wrist turns the tool as
+    wanted from where the arm really is, joint 5 and then 6 from where joint 4 really is. At the wrist singularity joint
+    4 lags, joint 5 passes through zero with its sign, and motion goes on at the other side.
 
     Source:
         Vongbunyong 2008, eqs. 4.5.1-4.5.9, atan2 throughout, and its rule for q5 = 0.

@@ -20,12 +20,9 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from teleop_core.kernels import kernel
-from teleop_core.kernels.geometry import Array, rotation, transform
-from teleop_core.kernels.portable import product
+from teleop_core.kernels import Array, kernel, product, rotation, transform
 from teleop_core.kernels.room import room
-from teleop_core.robots.drives import Drives, Dynamics
-from teleop_core.robots.inertias import LinkInertia
+from teleop_core.robots import drives, inertias
 
 # Symbols as in the source: moments about the link-frame origins [kg·m²], centres of mass G [m].
 # Published (table A.1); products as +∫xy dm, signs derived as said above.
@@ -56,13 +53,13 @@ def link_row(**symbols: float) -> Array:
     return np.array(list({**LINKS, **symbols}.values()), dtype=np.float64)
 
 
-def link_inertias(symbols: Mapping[str, float] = LINKS) -> tuple[LinkInertia, ...]:
+def link_inertias(symbols: Mapping[str, float] = LINKS) -> tuple[inertias.LinkInertia, ...]:
     """Links 1 to 3 in their frames, as table A.1 lumps them: 2a rides on 2, the wrist on 3.
 
     Args:
         symbols: All of :data:`LINKS`, for links 2 and 3 and the I1yy of link 1.
     """
-    p, one, about_origin = symbols, LINK_1, LinkInertia.about_origin
+    p, one, about_origin = symbols, LINK_1, inertias.LinkInertia.about_origin
     return (
         about_origin(
             "link 1",
@@ -176,7 +173,7 @@ def acceleration(q: Array, dq: Array, effort: Array, p: Array, ddq: Array) -> No
         ddq[i] = effort[i] / p[_J1 + i]
 
 
-DYNAMICS = Dynamics(
+DYNAMICS = drives.Dynamics(
     acceleration=acceleration,
     gravity=gravity_effort,
     parameters=link_row(),
@@ -186,7 +183,7 @@ DYNAMICS = Dynamics(
 )
 
 _RPM = 2.0 * math.pi / 60.0
-DRIVES = Drives(
+DRIVES = drives.Drives(
     # Derived of axes 1-3: motors plus, at home, the links. Assumed of the wrist: its rotors.
     inertia=np.array([0.1213, 0.1199, 26.95, LINKS["J4"], LINKS["J5"], LINKS["J6"]]),
     viscous=np.array([0.4, 0.4, 30.0, 0.004, 0.002, 0.002]),  # assumed

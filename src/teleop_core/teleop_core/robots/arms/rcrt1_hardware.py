@@ -12,12 +12,10 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from teleop_core.base.errors import ParameterError
-from teleop_core.kernels.geometry import Array
-from teleop_core.kernels.portable import product
+from teleop_core.base import ParameterError
+from teleop_core.kernels import Array, product
+from teleop_core.robots import hardware, link_errors
 from teleop_core.robots.arms.rcrt1_dynamics import LINKS, link_row
-from teleop_core.robots.hardware import Hardware
-from teleop_core.robots.link_errors import LinkErrors
 
 _FIT = "fitted: to tables 7.1-7.6 with the gains of source_pid, by `teleop fit`"
 # What is left of the accuracy test once d3 is mended, 0.352 mm, over the 37 mm from wrist to tip
@@ -33,13 +31,13 @@ _DRAWN = np.random.default_rng(2008).uniform(-1.0, 1.0, (4, 6)) * np.stack(
 )
 _DRAWN[2, 2] = 5.5e-3  # d3
 
-HARDWARE = Hardware(
+HARDWARE = hardware.Hardware(
     coulomb=np.array([0.0880, 0.251, 1.0, 6.08e-3, 5.62e-4, 5.10e-4]),
     bias=np.array([0.0445, 0.0, 0.0, 0.0, 0.0, 0.0]),
     wander=np.array([0.27, 0.16, 0.16, 0.30, 0.62, 0.76]),
     play=np.array([0.0, 0.0, 0.0, 0.0, _PLAY, _PLAY]),
     coupling=_COUPLING,
-    links=LinkErrors.from_vector(_DRAWN.ravel()),
+    links=link_errors.LinkErrors.from_vector(_DRAWN.ravel()),
     dynamics=link_row(m2b_L0b=0.0135),
     motors=np.array([LINKS[f"J{i}"] for i in range(1, 7)]),
     sources={

@@ -9,9 +9,8 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from teleop_core.base.errors import ShapeError
-from teleop_core.kernels import inner, kernel
-from teleop_core.kernels.geometry import Array, multiply_quaternions
+from teleop_core.base import ShapeError
+from teleop_core.kernels import Array, inner, kernel, multiply_quaternions
 from teleop_core.robots.bodies.solids import Solid
 
 Indices = NDArray[np.int64]

@@ -6,8 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from teleop_core.kernels.geometry import Array
-from teleop_core.kernels.portable import dot, length
+from teleop_core.kernels import Array, dot, length
 from teleop_core.robots.bodies.body import HERE, Body, Joint
 from teleop_core.robots.bodies.frames import inverse, moved, product, seen_from
 from teleop_core.robots.bodies.solids import Role, Solid, along, ball, capsule, cylinder

@@ -1,9 +1,8 @@
 """Describing robots: which description of its bodies a robot has, and that of serial robots.
 
-Serial robots are described from kinematics alone, by the product of exponentials: the Jacobian at
-home gives every joint's screw axis; the placement of link i is the product of the motions of joints
-1 to i, exact for every robot whose joints are a chain. What is neither serial nor described is a
-base, a dotted line to the tip, and the tip.
+Serial robots are described from kinematics alone, by the product of exponentials: the Jacobian at home gives every
+joint's screw axis; the placement of link i is the product of the motions of joints 1 to i, exact for every robot whose
+joints are a chain. What is neither serial nor described is a base, a dotted line to the tip, and the tip.
 
 Source:
     Lynch and Park 2017, chapter 4.
@@ -13,8 +12,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from teleop_core.kernels.geometry import Array, rotations_from_quaternions
-from teleop_core.kernels.portable import length
+from teleop_core.kernels import Array, length, rotations_from_quaternions
 from teleop_core.robots.bodies.body import HERE, Bodies, Body, Joint
 from teleop_core.robots.bodies.chain import axes_of, chain, places, tip_of
 from teleop_core.robots.bodies.frames import pose_of, tips
@@ -28,9 +26,8 @@ _KNOWN: "WeakKeyDictionary[Robot, Bodies]" = WeakKeyDictionary()
 def bodies_of(robot: Robot) -> Bodies:
     """Bodies of a robot: the same object each time it is asked for the same robot.
 
-    A robot may describe itself (``Robot.describe``), as those with loops do; of every other robot
-    whose joints are a chain the axes follow from its kinematics. What is neither is drawn as its
-    base, a dotted line, and its tip.
+    A robot may describe itself (``Robot.describe``), as those with loops do; of every other robot whose joints are a
+    chain the axes follow from its kinematics. What is neither is drawn as its base, a dotted line, and its tip.
     """
     if robot not in _KNOWN:
         _KNOWN[robot] = _described(robot)

@@ -8,8 +8,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from teleop_core.kernels.geometry import Array, rotations_from_quaternions, transform
-from teleop_core.kernels.portable import inverse_motion, product
+from teleop_core.kernels import Array, inverse_motion, product, rotations_from_quaternions, transform
 from teleop_core.robots.bodies.body import Bodies
 from teleop_core.robots.bodies.solids import Solid
 from teleop_core.robots.chains.chain_dynamics import chain_acceleration, pseudo_inertias

@@ -4,9 +4,8 @@ import warnings
 
 import numpy as np
 
-from teleop_core.base.errors import ParameterError, TeleopError, TeleopWarning
-from teleop_core.kernels.geometry import rotations_from_quaternions
-from teleop_core.kernels.portable import product
+from teleop_core.base import ParameterError, TeleopError, TeleopWarning
+from teleop_core.kernels import product, rotations_from_quaternions
 from teleop_core.robots.bodies.body import HERE
 from teleop_core.robots.bodies.describe import bodies_of
 from teleop_core.robots.bodies.meshes import Mesh, merged, mesh_of

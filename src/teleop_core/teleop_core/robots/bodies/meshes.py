@@ -5,8 +5,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from teleop_core.kernels.geometry import Array, rotations_from_quaternions
-from teleop_core.kernels.portable import product
+from teleop_core.kernels import Array, product, rotations_from_quaternions
 from teleop_core.robots.bodies.solids import Solid
 
 Faces = NDArray[np.int64]

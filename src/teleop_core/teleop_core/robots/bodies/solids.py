@@ -5,9 +5,8 @@ from typing import Literal
 
 import numpy as np
 
-from teleop_core.base.errors import ParameterError, ShapeError
-from teleop_core.kernels.geometry import Array
-from teleop_core.kernels.portable import length
+from teleop_core.base import ParameterError, ShapeError
+from teleop_core.kernels import Array, length
 
 Kind = Literal["capsule", "box", "sphere", "cylinder"]
 Role = Literal["base", "link", "joint", "leg", "platform", "tool"]

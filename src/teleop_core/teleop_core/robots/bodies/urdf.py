@@ -1,10 +1,9 @@
 """URDF: bodies of a robot as the XML that RViz, Foxglove and physics engines read.
 
-Joints that move one body stand there with axis and limits; a body that follows one joint by a
-factor and an offset has a joint with ``mimic``. What the format has no joint for, legs and
-platforms of robots with loops and links that several joints move, hangs on floating joints: it is
-placed by ``/tf``. A capsule, which the format lacks, is a cylinder with two spheres. Each shape is
-there to see and to collide with.
+Joints that move one body stand there with axis and limits; a body that follows one joint by a factor and an offset has
+a joint with ``mimic``. What the format has no joint for, legs and platforms of robots with loops and links that several
+joints move, hangs on floating joints: it is placed by ``/tf``. A capsule, which the format lacks, is a cylinder with
+two spheres. Each shape is there to see and to collide with.
 """
 
 import math
@@ -13,8 +12,7 @@ from xml.etree import ElementTree as Xml
 
 import numpy as np
 
-from teleop_core.kernels.geometry import Array, rotation, rotations_from_quaternions
-from teleop_core.kernels.portable import product
+from teleop_core.kernels import Array, product, rotation, rotations_from_quaternions
 from teleop_core.robots.bodies.body import HERE, Bodies, Body, Joint
 from teleop_core.robots.bodies.describe import bodies_of
 from teleop_core.robots.bodies.inertials import DENSITY, has_own_links, inertials_of
@@ -44,11 +42,10 @@ def urdf_of(robot: Robot, name: str = "", prefix: str = "") -> str:
             the root is ``slave_base``.
 
     Returns:
-        The XML. Limits are those of the robot, speeds and efforts those of its drives; 0 where
-        it has none. Inertias are those of the robot's own links where its model has them, else
-        assumed (:mod:`~teleop_core.robots.bodies.inertials`); a comment at the head says which,
-        and what has none. The base has none, since readers warn of a root that has. The format
-        has no place for the inertia of a motor.
+        The XML. Limits are those of the robot, speeds and efforts those of its drives; 0 where it has none. Inertias
+        are those of the robot's own links where its model has them, else assumed
+        (:mod:`~teleop_core.robots.bodies.inertials`); a comment at the head says which, and what has none. The base has
+        none, since readers warn of a root that has. The format has no place for the inertia of a motor.
     """
     bodies = bodies_of(robot)
     inertials = inertials_of(robot, bodies)

@@ -15,10 +15,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from teleop_core.kernels import inner, kernel
-from teleop_core.kernels.geometry import Array
-from teleop_core.robots.chains.dh_kernels import append_fixed, jacobian, move_joint
-from teleop_core.robots.chains.rigid_body import invert_positive
+from teleop_core.kernels import Array, inner, kernel
+from teleop_core.robots.chains import dh_kernels, rigid_body
 from teleop_core.robots.drives import Dynamics
 
 GRAVITY = (0.0, 0.0, -9.81)
@@ -72,7 +70,7 @@ def _place(q: Array, row: Array, axes: Array, bodies: Array) -> None:
     for i in range(4):
         for j in range(4):
             T[i, j] = 1.0 if i == j else 0.0
-    append_fixed(row, n, 0, T)
+    dh_kernels.append_fixed(row, n, 0, T)
     for k in range(n):
         sign = 1.0 if row[k] > 0.0 else -1.0
         for i in range(3):
@@ -82,9 +80,9 @@ def _place(q: Array, row: Array, axes: Array, bodies: Array) -> None:
             else:
                 axes[k, i] = sign * T[i, 2]
                 axes[k, 3 + i] = sign * (T[a, 3] * T[b, 2] - T[b, 3] * T[a, 2])
-        move_joint(row[k], q[k], T)
+        dh_kernels.move_joint(row[k], q[k], T)
         _carry(T, row[at + _BODY * k : at + _BODY * (k + 1)], R, bodies[k])
-        append_fixed(row, n, k + 1, T)
+        dh_kernels.append_fixed(row, n, k + 1, T)
 
 
 @inner
@@ -207,7 +205,7 @@ def tip_efforts(q: Array, wrench: Array, row: Array, effort: Array) -> None:
     """
     n = q.shape[0]
     J = np.empty((6, n))
-    jacobian(q, row, J)
+    dh_kernels.jacobian(q, row, J)
     for i in range(n):
         effort[i] = 0.0
         for j in range(6):
@@ -272,7 +270,7 @@ def chain_acceleration(q: Array, dq: Array, effort: Array, row: Array, ddq: Arra
     _place(q, row, axes, bodies)
     _efforts(axes, bodies, dq, still, row, bias)
     _inertias(axes, bodies, row, M)
-    invert_positive(M)
+    rigid_body.invert_positive(M)
     for i in range(n):
         ddq[i] = 0.0
         for j in range(n):

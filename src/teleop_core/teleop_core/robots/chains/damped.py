@@ -1,9 +1,8 @@
 """Damped least squares: the joint vector of a box that comes next to a pose, for any arm.
 
-The box is the joint limits, or one speed-limited step around the last joint vector; inside it the
-error is driven to zero where that is possible and to its least where it is not, through
-singularities too. Damping that shrinks with the error keeps the steps bounded far away and the
-convergence quadratic close by.
+The box is the joint limits, or one speed-limited step around the last joint vector; inside it the error is driven to
+zero where that is possible and to its least where it is not, through singularities too. Damping that shrinks with the
+error keeps the steps bounded far away and the convergence quadratic close by.
 
 Source:
     Nakamura and Hanafusa 1986 (damping); Yamashita and Fukushima 2001 (damping by the error).
@@ -11,8 +10,7 @@ Source:
 
 import math
 
-from teleop_core.kernels import inner, kernel
-from teleop_core.kernels.geometry import Array
+from teleop_core.kernels import Array, inner, kernel
 from teleop_core.kernels.room import room
 
 # Squared weighted error that counts as zero: 1e-12 m at a length of 0.1 m, 1e-11 rad.

@@ -5,18 +5,16 @@ the local z axis and Fi constant. The geometry row holds, for n joints: n kinds 
 or -2 a slide, negative against its axis); the reach [m]; six weights of the controlled directions
 (1 or 0); and n + 1 transforms of twelve numbers, row by row.
 
-In a chain of m motions of which some follow others (:mod:`teleop_core.robots.chains.followers`)
-there stand, in place of the transforms: m + 1, which is no entry of a rotation, as the first one
-is; for all motions their joints, then their factors, then their offsets; and the row of the m
-motions.
+In a chain of m motions of which some follow others (:mod:`teleop_core.robots.chains.followers`) there stand, in place
+of the transforms: m + 1, which is no entry of a rotation, as the first one is; for all motions their joints, then their
+factors, then their offsets; and the row of the m motions.
 """
 
 import math
 
 import numpy as np
 
-from teleop_core.kernels import inner, kernel
-from teleop_core.kernels.geometry import Array
+from teleop_core.kernels import Array, inner, kernel
 from teleop_core.kernels.room import room
 from teleop_core.robots.chains.damped import ZERO, damped_move, free_joints, pose_error
 from teleop_core.robots.kinematics import REACHED, IkStatus, is_askable, pose_residual
@@ -238,7 +236,6 @@ def _start(number: int, box: Array, q: Array) -> None:
 
 @inner
 def _distance(a: Array, b: Array) -> float:
-    """Largest difference of two joint vectors."""
     worst = 0.0
     for i in range(a.shape[0]):
         worst = max(worst, abs(a[i] - b[i]))
@@ -330,11 +327,10 @@ def _status(q: Array, T: Array, box: Array, geometry: Array, residual: Array) ->
 def ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual: Array) -> int:
     """Write joints (n,) next to ``T_base_tip``; see :class:`teleop_core.robots.robot.Kernels`.
 
-    Damped least squares from the seed inside the limits; if that fails and steps are free, from a
-    fixed set of starts. In a path one search inside the step around the seed, so that the branch
-    stays. A numeric search cannot prove that nothing reaches: with a joint on its bound the
-    status is LIMITED, else UNREACHABLE. Likewise the branch is next to the seed as a rule, not
-    by proof.
+    Damped least squares from the seed inside the limits; if that fails and steps are free, from a fixed set of starts.
+    In a path one search inside the step around the seed, so that the branch stays. A numeric search cannot prove that
+    nothing reaches: with a joint on its bound the status is LIMITED, else UNREACHABLE. Likewise the branch is next to
+    the seed as a rule, not by proof.
     """
     if not is_askable(T, seed):
         return -1

@@ -1,9 +1,8 @@
 """Followers: chains in which one joint moves several motions, each by a factor and an offset.
 
-The ``mimic`` of a URDF. With joints q (n,) and motions p (m,) of the chain, p = A q + b, where each
-row of A has one factor. Then the Jacobian of the joints is J A; by the principle of virtual work
-their efforts are Aᵀ times those of the motions, and their inertia is Aᵀ M A. A is constant, so that
-accelerations bring no term of their own.
+The ``mimic`` of a URDF. With joints q (n,) and motions p (m,) of the chain, p = A q + b, where each row of A has one
+factor. Then the Jacobian of the joints is J A; by the principle of virtual work their efforts are Aᵀ times those of the
+motions, and their inertia is Aᵀ M A. A is constant, so that accelerations bring no term of their own.
 
 The row of a dynamics here holds m, then leader, factor and offset of each motion (m,), and the
 inertias (n,) of the motors at the joints. Behind them stands the row of
@@ -17,11 +16,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from teleop_core.kernels import inner, kernel
-from teleop_core.kernels.geometry import Array
-from teleop_core.robots.chains.chain_dynamics import inertia_matrix, inverse_dynamics
-from teleop_core.robots.chains.dh_kernels import jacobian, spread
-from teleop_core.robots.chains.rigid_body import invert_positive
+from teleop_core.kernels import Array, inner, kernel
+from teleop_core.robots.chains import chain_dynamics, dh_kernels, rigid_body
 from teleop_core.robots.drives import Dynamics
 from teleop_core.robots.robot import Robot
 
@@ -72,7 +68,7 @@ class Followers:
     def chain_jacobian(self, geometry: Array, motions: Array) -> Array:
         """Geometric Jacobian (6, m) of the motions, from the row of their robot."""
         out = np.empty((6, len(self.motions)))
-        jacobian(motions, geometry[len(self.kinds) + 8 + 3 * len(self.motions) :].copy(), out)
+        dh_kernels.jacobian(motions, geometry[len(self.kinds) + 8 + 3 * len(self.motions) :].copy(), out)
         return out
 
 
@@ -117,10 +113,10 @@ def _efforts(q: Array, dq: Array, row: Array, effort: Array) -> None:
     """Write the efforts (n,) of the joints at these places and speeds, without acceleration."""
     n, m = q.shape[0], int(row[0])
     p, dp, still, felt = np.empty(m), np.empty(m), np.zeros(m), np.empty(m)
-    spread(q, row[1:], p)
+    dh_kernels.spread(q, row[1:], p)
     for i in range(m):
         dp[i] = row[1 + m + i] * dq[int(row[1 + i])]
-    inverse_dynamics(p, dp, still, row[1 + 3 * m + n :], felt)
+    chain_dynamics.inverse_dynamics(p, dp, still, row[1 + 3 * m + n :], felt)
     for j in range(n):
         effort[j] = 0.0
     for i in range(m):
@@ -132,8 +128,8 @@ def follower_inertia(q: Array, row: Array, M: Array) -> None:
     """Write the inertia (n, n) [kg·m², kg·m or kg] at joints (n,) [rad or m], motors included."""
     n, m = q.shape[0], int(row[0])
     p, whole = np.empty(m), np.empty((m, m))
-    spread(q, row[1:], p)
-    inertia_matrix(p, row[1 + 3 * m + n :], whole)
+    dh_kernels.spread(q, row[1:], p)
+    chain_dynamics.inertia_matrix(p, row[1 + 3 * m + n :], whole)
     for j in range(n):
         for k in range(n):
             M[j, k] = row[1 + 3 * m + j] if j == k else 0.0
@@ -156,7 +152,7 @@ def follower_acceleration(q: Array, dq: Array, effort: Array, row: Array, ddq: A
     M, bias = np.empty((n, n)), np.empty(n)
     _efforts(q, dq, row, bias)
     follower_inertia(q, row, M)
-    invert_positive(M)
+    rigid_body.invert_positive(M)
     for i in range(n):
         ddq[i] = 0.0
         for j in range(n):

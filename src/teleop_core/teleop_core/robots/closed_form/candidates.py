@@ -1,11 +1,10 @@
 """Closed forms of chains: what all of them share, from the pose that is asked to the status.
 
-A closed form sees the arm as G = Rz(q1) F1 Rz(q2) F2 ... Rz(qn), with constant transforms between
-the joints and every joint about its own z axis; for arms that decompose from the tip it is the arm
-from tip to base. Its constants stand behind the chain's in the geometry row
-(:mod:`teleop_core.robots.chains.dh_kernels`): 1 or -1 for the order, n signs, n groups, then
-transforms of twelve numbers each: before and after G, and those between the joints. Behind them
-stands what a class of arms has beside, and last 1 for an arm that is of its class only nearly
+A closed form sees the arm as G = Rz(q1) F1 Rz(q2) F2 ... Rz(qn), with constant transforms between the joints and every
+joint about its own z axis; for arms that decompose from the tip it is the arm from tip to base. Its constants stand
+behind the chain's in the geometry row (:mod:`teleop_core.robots.chains.dh_kernels`): 1 or -1 for the order, n signs, n
+groups, then transforms of twelve numbers each: before and after G, and those between the joints. Behind them stands
+what a class of arms has beside, and last 1 for an arm that is of its class only nearly
 (:mod:`teleop_core.robots.closed_form.decomposition`).
 
 Branches are candidates: joint vectors in the arm's own order, with 1.0 behind those that reach the
@@ -18,12 +17,10 @@ import math
 
 import numpy as np
 
-from teleop_core.kernels import inner, kernel
-from teleop_core.kernels.geometry import Array
+from teleop_core.kernels import Array, inner, kernel
 from teleop_core.kernels.room import room
 from teleop_core.robots.branches import OUTSIDE, SLACK, cost_of, is_allowed, slowed, turn, turned, wrapped
-from teleop_core.robots.chains.damped import ZERO, assign, pose_error
-from teleop_core.robots.chains.dh_kernels import descend, descend_long, fk, pose_of_chain
+from teleop_core.robots.chains import damped, dh_kernels
 from teleop_core.robots.kinematics import IkStatus, pose_residual
 
 _ROUNDS, _PATH_ROUNDS = 60, 12  # of the search that makes the best of a branch out of limits
@@ -170,10 +167,9 @@ def choose(
 ) -> tuple[int, int]:
     """Write the best of the candidates (count, n + 1), each by whole turns next to the seed.
 
-    The best has the smallest largest move of a joint, inside limits before outside. In a path
-    limits do not count, and joints that choose the branch come before those that swing beside a
-    singularity, group by group; where two branches lie beside each other limits count after the
-    first group.
+    The best has the smallest largest move of a joint, inside limits before outside. In a path limits do not count, and
+    joints that choose the branch come before those that swing beside a singularity, group by group; where two branches
+    lie beside each other limits count after the first group.
 
     Returns:
         2 if it reaches the pose, 1 if only another candidate does, 0 if none does; and its place.
@@ -193,7 +189,7 @@ def choose(
         if cost < least:
             best, least = k, cost
     if best < 0:  # numbers that overflow
-        assign(q, seed)
+        damped.assign(q, seed)
         return 0, best
     for i in range(n):
         q[i] = found[best, i]
@@ -232,7 +228,7 @@ def _does_descend(T: Array, seed: Array, limits: Array, geometry: Array, q: Arra
     box_around(seed, limits, box)
     for i in range(n):
         q[i] = min(max(seed[i], box[0, i]), box[1, i])
-    return descend(T, box, geometry, _FEW_ROUNDS, q) <= ZERO and move_of(q, seed) < BESIDE_SEED
+    return dh_kernels.descend(T, box, geometry, _FEW_ROUNDS, q) <= damped.ZERO and move_of(q, seed) < BESIDE_SEED
 
 
 @inner
@@ -248,8 +244,7 @@ def move_of(q: Array, seed: Array) -> float:
 def _best_of_rest(T: Array, seed: Array, limits: Array, geometry: Array, found: Array, count: int, q: Array) -> None:
     """Replace ``q`` by the joints within limits that come nearest to the pose.
 
-    A search from the branch itself, from the seed and from all other branches, of which the least
-    error counts.
+    A search from the branch itself, from the seed and from all other branches, of which the least error counts.
     """
     n, box, trial, least = q.shape[0], np.empty((2, q.shape[0])), np.empty(q.shape[0]), math.inf
     box_around(seed, limits, box)
@@ -259,11 +254,11 @@ def _best_of_rest(T: Array, seed: Array, limits: Array, geometry: Array, found: 
         for i in range(n):
             start = found[k, i] if k >= 0 else (seed[i] if k == -1 else q[i])
             trial[i] = min(max(start, box[0, i]), box[1, i])
-        error = descend_long(T, box, geometry, trial)
+        error = dh_kernels.descend_long(T, box, geometry, trial)
         if error < least:
             least = error
-            assign(q, trial)
-        if error <= ZERO:
+            damped.assign(q, trial)
+        if error <= damped.ZERO:
             break
 
 
@@ -271,9 +266,8 @@ def _best_of_rest(T: Array, seed: Array, limits: Array, geometry: Array, found: 
 def _best_of_step(T: Array, seed: Array, limits: Array, geometry: Array, does_reach: bool, q: Array) -> None:
     """Replace ``q`` by the joints within limits and step that come nearest to the pose.
 
-    A search from the branch. Where that reaches the pose, joints that a step does not bring there
-    go at full speed. The others make the best of that, or go slower with them on the straight way,
-    whichever lags less.
+    A search from the branch. Where that reaches the pose, joints that a step does not bring there go at full speed. The
+    others make the best of that, or go slower with them on the straight way, whichever lags less.
     """
     n, box, trial = q.shape[0], np.empty((2, q.shape[0])), np.empty(q.shape[0])
     box_around(seed, limits, box)
@@ -283,19 +277,19 @@ def _best_of_step(T: Array, seed: Array, limits: Array, geometry: Array, does_re
         trial[i] = min(max(q[i], box[0, i]), box[1, i])
         if does_reach and trial[i] != q[i]:
             box[0, i] = box[1, i] = trial[i]
-    if descend(T, box, geometry, _PATH_ROUNDS, trial) > ZERO and does_reach:
+    if dh_kernels.descend(T, box, geometry, _PATH_ROUNDS, trial) > damped.ZERO and does_reach:
         slowed(q, seed, limits, q)
         if _lag(q, T, geometry) < _lag(trial, T, geometry):
             return
-    assign(q, trial)
+    damped.assign(q, trial)
 
 
 @inner
 def _lag(q: Array, T: Array, geometry: Array) -> float:
     """Squared error of a pose, of which a place counts as a turn at :data:`_LEVER`."""
     reached, error = room(4, 4), room(6)
-    fk(q, geometry, reached)
-    return pose_error(reached, T, _LEVER, error)
+    dh_kernels.fk(q, geometry, reached)
+    return damped.pose_error(reached, T, _LEVER, error)
 
 
 @kernel
@@ -317,7 +311,7 @@ def settled(
     """
     reached, J = room(4, 4), room(6, 7)
     if is_allowed(q, seed, limits):
-        is_flat = pose_of_chain(q, geometry, J, reached)
+        is_flat = dh_kernels.pose_of_chain(q, geometry, J, reached)
         if pose_residual(reached, T, residual):
             return _NEAR_SINGULAR if is_flat else _FOLLOWED
     if math.isfinite(limits[2, 0]):
@@ -331,7 +325,7 @@ def settled(
 def told(T: Array, geometry: Array, reach: int, q: Array, residual: Array) -> int:
     """Write the residual (2,) of joints within limits and steps, and say how well they do."""
     reached, J = room(4, 4), room(6, 7)
-    is_flat = pose_of_chain(q, geometry, J, reached)
+    is_flat = dh_kernels.pose_of_chain(q, geometry, J, reached)
     if not pose_residual(reached, T, residual):
         return _LIMITED if reach > 0 else _UNREACHABLE
     return _NEAR_SINGULAR if is_flat else _FOLLOWED
@@ -349,8 +343,7 @@ def forget(seed: Array, limits: Array) -> None:
 def kept(T: Array, found: Array, count: int, geometry: Array, solutions: Array) -> int:
     """Write the candidates (count, n + 1) that reach the pose into ``solutions``; how many do.
 
-    Angles are within ±pi. A class is recognised with a tolerance; a search takes away what it
-    leaves.
+    Angles are within ±pi. A class is recognised with a tolerance; a search takes away what it leaves.
     """
     n, number = solutions.shape[1], 0
     box, reached, residual = np.empty((2, n)), np.empty((4, 4)), np.empty(2)
@@ -361,9 +354,9 @@ def kept(T: Array, found: Array, count: int, geometry: Array, solutions: Array) 
         for i in range(n):
             q[i] = wrapped(found[k, i])
             box[0, i], box[1, i] = q[i] - 1.0, q[i] + 1.0
-        fk(q, geometry, reached)
+        dh_kernels.fk(q, geometry, reached)
         if not pose_residual(reached, T, residual):
-            descend(T, box, geometry, _ROUNDS, q)
+            dh_kernels.descend(T, box, geometry, _ROUNDS, q)
             for i in range(n):
                 q[i] = wrapped(q[i])
         number += 1

@@ -8,10 +8,9 @@ Classes, in the order in which they are looked for, from the base and, turned ro
 - *arm in a plane*: three parallel turning joints, with a slide along them, or with a joint before
   them that turns their plane, one behind them that rolls the tool in it, or both.
 
-Axes meet or are parallel within :data:`NEARLY`, as in files that say 1.571 for a quarter turn; what
-that leaves, Newton steps on the chain as it is take away. Arms in a plane must be so exactly. All
-others are solved by search (:mod:`teleop_core.robots.chains.dh_kernels`); those with six directions
-say by how much their axes miss a class.
+Axes meet or are parallel within :data:`NEARLY`, as in files that say 1.571 for a quarter turn; what that leaves, Newton
+steps on the chain as it is take away. Arms in a plane must be so exactly. All others are solved by search
+(:mod:`teleop_core.robots.chains.dh_kernels`); those with six directions say by how much their axes miss a class.
 """
 
 import math
@@ -21,8 +20,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from teleop_core.kernels.geometry import Array, rotation, transform
-from teleop_core.kernels.portable import arctangent, dot, inverse_motion, length, product
+from teleop_core.kernels import Array, arctangent, dot, inverse_motion, length, product, rotation, transform
 from teleop_core.robots.chains import dh_kernels
 from teleop_core.robots.closed_form import parallel_axes, plane_arm, spherical_wrist, swivel
 from teleop_core.robots.kinematics import Kernels
@@ -62,9 +60,8 @@ SEARCH = Solution(text="search: damped least squares from the seed, then from 24
 class _Chain:
     """Turning joints about z with constant transforms around them, from base to tip or back.
 
-    ``signs`` say which way the arm's own joints turn; ``order`` is -1 for a chain from the tip.
-    ``off`` is the largest angle or share of the reach that was taken for none, ``misses`` says what
-    it lacks to be of a class.
+    ``signs`` say which way the arm's own joints turn; ``order`` is -1 for a chain from the tip. ``off`` is the largest
+    angle or share of the reach that was taken for none, ``misses`` says what it lacks to be of a class.
     """
 
     order: float
@@ -165,7 +162,6 @@ def _degrees(sine: float) -> float:
 
 
 def _chains(kinds: Sequence[float], fixed: Sequence[Array], reach: float) -> tuple[_Chain, _Chain]:
-    """The chain from base to tip, and from tip to base."""
     back = [inverse_motion(matrix) for matrix in fixed[::-1]]
     turned = [-kind for kind in kinds[::-1]]
     return (
@@ -205,7 +201,6 @@ def solution_of(kinds: Sequence[float], fixed: Sequence[Array], reach: float, ta
 
 
 def _spherical_wrist(chain: _Chain) -> Solution | None:
-    """Six joints whose last three axes meet."""
     if not chain.do_meet((3, 4, 5)):
         return None
     chain.slide_next_to(1, 0)
@@ -239,7 +234,6 @@ def _spherical_wrist(chain: _Chain) -> Solution | None:
 
 
 def _parallel_axes(chain: _Chain) -> Solution | None:
-    """Six joints whose axes 2, 3 and 4 are parallel."""
     if not chain.is_parallel((1, 2, 3)):
         return None
     axes = [frame[:3, 2] for frame in chain.frames()]

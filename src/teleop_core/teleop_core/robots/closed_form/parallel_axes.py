@@ -1,10 +1,9 @@
 """Arms of six turning joints whose axes 2, 3 and 4 are parallel: closed form, up to eight branches.
 
-The three parallel joints move everything behind them in a plane. The height of axis 6 over that
-plane, and its slope to it, say where joints 1 and 5 are: two equations, linear in their sines and
-cosines. Where axes 5 and 6 meet, joint 5 is in one of them alone; else an equation of degree four
-is left. Then joint 6 follows, and the plane's arm of two links with its hand. An arm whose axes 3,
-4 and 5 are parallel is one of these, from tip to base.
+The three parallel joints move everything behind them in a plane. The height of axis 6 over that plane, and its slope to
+it, say where joints 1 and 5 are: two equations, linear in their sines and cosines. Where axes 5 and 6 meet, joint 5 is
+in one of them alone; else an equation of degree four is left. Then joint 6 follows, and the plane's arm of two links
+with its hand. An arm whose axes 3, 4 and 5 are parallel is one of these, from tip to base.
 
 Source:
     Elias and Wen 2022, section on three parallel axes; Hawkins 2013 for the arms of Universal
@@ -13,20 +12,17 @@ Source:
 
 import math
 
-from teleop_core.kernels import inner, kernel
-from teleop_core.kernels.geometry import Array
+from teleop_core.kernels import Array, inner, kernel
 from teleop_core.kernels.room import room
 from teleop_core.robots.branches import BESIDE, OUTSIDE
-from teleop_core.robots.closed_form import candidates
-from teleop_core.robots.closed_form.subproblems import close_pair, one_angle, open_pairs, turn_between
+from teleop_core.robots.closed_form import candidates, subproblems
 from teleop_core.robots.kinematics import is_askable
 
 _F1, _F2, _F3, _F4, _F5 = (37, 49, 61, 73, 85)
 RULE = 97
 """Place, among the constants, of the rule of the arm's pair of equations; then B and a length."""
 _LEVEL, _COST = 3, 4
-# A pair's row: joints 1 and 5, whether it reaches, 1.0 if both are known, the least cost of its
-# branches.
+# A pair's row: joints 1 and 5, whether it reaches, 1.0 if both are known, the least cost of its branches.
 _LATER = 1e9  # added to the cost of pairs that others go before, whatever else they are
 _ALIGNED = 1e-10  # sine under which axis 6 counts as parallel to 2, 3 and 4, and joint 6 is free
 
@@ -68,7 +64,7 @@ def _sixth(H: Array, K: Array, fifth: float, seed: float) -> float:
     y = u * K[_F5 + 1] + v * K[_F5 + 5] + w * K[_F5 + 9]
     if H[2, 0] * H[2, 0] + H[2, 1] * H[2, 1] <= _ALIGNED * _ALIGNED:
         return seed
-    return turn_between(H[2, 0], H[2, 1], x, y, seed)
+    return subproblems.turn_between(H[2, 0], H[2, 1], x, y, seed)
 
 
 @inner
@@ -88,11 +84,11 @@ def _plane(H: Array, M: Array, K: Array, seed: float, angles: Array) -> float:
     x, y = H[0, 3] - c * M[0, 3] + s * M[1, 3], H[1, 3] - s * M[0, 3] - c * M[1, 3]
     a0, a1, b0, b1 = K[_F2 + 3], K[_F2 + 7], K[_F3 + 3], K[_F3 + 7]
     rest = 0.5 * (x * x + y * y - a0 * a0 - a1 * a1 - b0 * b0 - b1 * b1)
-    base, spread, is_exact = one_angle(a0 * b0 + a1 * b1, a1 * b0 - a0 * b1, rest, 0.0)
+    base, spread, is_exact = subproblems.one_angle(a0 * b0 + a1 * b1, a1 * b0 - a0 * b1, rest, 0.0)
     for k in range(2):
         q3 = base + spread if k == 0 else base - spread
         c, s = math.cos(q3), math.sin(q3)
-        q2 = turn_between(a0 + c * b0 - s * b1, a1 + s * b0 + c * b1, x, y, seed)
+        q2 = subproblems.turn_between(a0 + c * b0 - s * b1, a1 + s * b0 + c * b1, x, y, seed)
         angles[k, 0], angles[k, 1], angles[k, 2] = q2, q3, whole - q2 - q3
     return is_exact
 
@@ -139,8 +135,7 @@ def _least_sine(G: Array, K: Array, pairs: Array, count: int) -> float:
 def _cost(pair: Array, K: Array, seed: Array, limits: Array, first: float, least: float) -> float:
     """Least cost of all branches of a pair, by what is known of its joints 1 and 5.
 
-    In a path joint 1 comes first: of pairs with its least move ``first`` joint 5 counts, all others
-    come later.
+    In a path joint 1 comes first: of pairs with its least move ``first`` joint 5 counts, all others come later.
     """
     is_path, is_closed = math.isfinite(limits[2, 0]), pair[_LEVEL] > 0.5
     one = candidates.angle_cost(K, 6, 0, pair[0], seed, limits, not is_path)
@@ -171,8 +166,7 @@ def _known_cost(q: Array, K: Array, seed: Array, limits: Array, least: float) ->
 def _branches(T: Array, geometry: Array, seed: Array, limits: Array, do_all: bool, found: Array) -> tuple[int, float]:
     """Write branches into ``found`` (8, 7), and whether each reaches the pose.
 
-    Unless all are wanted, pairs of joints 1 and 5 of the least moves come first, and none that
-    cannot win.
+    Unless all are wanted, pairs of joints 1 and 5 of the least moves come first, and none that cannot win.
 
     Returns:
         How many, and in a path the least sine between axis 6 and the parallel ones.
@@ -184,7 +178,7 @@ def _branches(T: Array, geometry: Array, seed: Array, limits: Array, do_all: boo
     candidates.wanted_motion(T, K, 6, M, G)
     _equations(G, K, A, B, h)
     seeds[0], seeds[1] = candidates.angle_of(K, 6, 0, seed), candidates.angle_of(K, 6, 4, seed)
-    count, first, best = open_pairs(A, B, h, rule, seeds, pairs), math.inf, math.inf
+    count, first, best = subproblems.open_pairs(A, B, h, rule, seeds, pairs), math.inf, math.inf
     least = _least_sine(G, K, pairs, count) if is_path else math.inf
     for k in range(count):
         found[2 * k, 6] = found[2 * k + 1, 6] = candidates.UNKNOWN
@@ -199,7 +193,7 @@ def _branches(T: Array, geometry: Array, seed: Array, limits: Array, do_all: boo
         if not cost < math.inf or (cost > best and (is_path or best < OUTSIDE)):
             return 2 * count, least
         if pairs[k, _LEVEL] < 0.5:
-            close_pair(A, B, h, rule, seeds, k, pairs)
+            subproblems.close_pair(A, B, h, rule, seeds, k, pairs)
             for other in range(k, k + 2):
                 cost = _cost(pairs[other], K, seed, limits, first, least)
                 pairs[other, _COST] = 0.0 if do_all else cost

@@ -17,13 +17,11 @@ Source:
 
 import math
 
-from teleop_core.kernels import inner, kernel
-from teleop_core.kernels.geometry import Array
+from teleop_core.kernels import Array, inner, kernel
 from teleop_core.kernels.room import room
 from teleop_core.robots.branches import OUTSIDE, cost_of, hold, is_allowed, turn, wrapped
 from teleop_core.robots.chains.dh_kernels import fk
-from teleop_core.robots.closed_form import candidates
-from teleop_core.robots.closed_form.subproblems import one_angle
+from teleop_core.robots.closed_form import candidates, subproblems
 from teleop_core.robots.kinematics import REACHED, IkStatus, is_askable, pose_residual
 
 FIRST, SHOULDER, ELBOW, HAND, ROLL = 0, 1, 2, 3, 4
@@ -113,7 +111,7 @@ def _sides(G: Array, K: Array, seed: Array) -> tuple[float, float, bool, float]:
     now = _get(K, FIRST, seed)
     if a * a + b * b <= _ON_AXIS * _ON_AXIS:
         return now, now + math.pi, abs(d) <= REACHED, 0.0
-    base, spread, is_exact = one_angle(a, b, d, now)
+    base, spread, is_exact = subproblems.one_angle(a, b, d, now)
     return base + spread, base - spread, is_exact > 0.5, math.sqrt(max(a * a + b * b - d * d, 0.0))
 
 

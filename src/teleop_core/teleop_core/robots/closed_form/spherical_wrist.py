@@ -1,11 +1,10 @@
 """Arms of six turning joints with a spherical wrist: closed form, up to eight branches.
 
-The last three axes meet in the wrist centre, whose place says where the first three joints are. In
-the frame of axis 2 its height and its distance from axis 2's origin do not change as joint 2
-turns: two equations in joints 1 and 3, linear in their sines and cosines. Axes 1 and 2, or 2 and
-3, that are parallel or meet take one joint out of one of them; skew ones leave an equation of
-degree four. The attitude that is left gives the wrist. An arm whose first three axes meet in a
-point is one of these, from tip to base.
+The last three axes meet in the wrist centre, whose place says where the first three joints are. In the frame of axis 2
+its height and its distance from axis 2's origin do not change as joint 2 turns: two equations in joints 1 and 3, linear
+in their sines and cosines. Axes 1 and 2, or 2 and 3, that are parallel or meet take one joint out of one of them; skew
+ones leave an equation of degree four. The attitude that is left gives the wrist. An arm whose first three axes meet in
+a point is one of these, from tip to base.
 
 Source:
     Pieper 1968 (three axes that meet decouple); Elias and Wen 2022, sections on spherical wrists.
@@ -14,12 +13,10 @@ Source:
 
 import math
 
-from teleop_core.kernels import inner, kernel
-from teleop_core.kernels.geometry import Array
+from teleop_core.kernels import Array, inner, kernel
 from teleop_core.kernels.room import room
 from teleop_core.robots.branches import BESIDE, OUTSIDE, hold, is_allowed, turn, wrapped
-from teleop_core.robots.closed_form import candidates
-from teleop_core.robots.closed_form.subproblems import close_pair, one_angle, open_pairs, turn_between
+from teleop_core.robots.closed_form import candidates, subproblems
 from teleop_core.robots.kinematics import is_askable
 
 _F1, _F2, _F3, _F4, _F5 = (37, 49, 61, 73, 85)
@@ -67,7 +64,7 @@ def _joint2(G: Array, K: Array, arm: Array, seed: float) -> float:
     z = K[_F3 + 11]
     has_x = K[_F2] * x + K[_F2 + 1] * y + K[_F2 + 2] * z + K[_F2 + 3]
     has_y = K[_F2 + 4] * x + K[_F2 + 5] * y + K[_F2 + 6] * z + K[_F2 + 7]
-    return turn_between(has_x, has_y, wanted_x, wanted_y, seed)
+    return subproblems.turn_between(has_x, has_y, wanted_x, wanted_y, seed)
 
 
 @inner
@@ -96,7 +93,7 @@ def middle_angle(M: Array, K: Array, at: int) -> tuple[float, float, float]:
     r0, r1, r2 = K[at + 8], K[at + 9], K[at + 10]
     a0, a1, a2 = K[at + 14], K[at + 18], K[at + 22]
     a, b, d = r0 * a0 + r1 * a1, r1 * a0 - r0 * a1, M[2, 2] - r2 * a2
-    base, spread, is_exact = one_angle(a, b, d, 0.0)
+    base, spread, is_exact = subproblems.one_angle(a, b, d, 0.0)
     if abs(r2 * a2) < _EVEN:  # digits that 1 - cos² loses where axes x and z are nearly in line
         spread = math.atan2(math.sqrt(M[0, 2] * M[0, 2] + M[1, 2] * M[1, 2]), d)
     return base, spread, is_exact
@@ -115,7 +112,7 @@ def wrist_at(M: Array, K: Array, at: int, y: float, seed: float, angles: Array) 
     u1 = K[at + 4] * v0 + K[at + 5] * v1 + K[at + 6] * a2
     x = seed
     if u0 * u0 + u1 * u1 > _ALIGNED * _ALIGNED:
-        x = turn_between(u0, u1, M[0, 2], M[1, 2], seed)
+        x = subproblems.turn_between(u0, u1, M[0, 2], M[1, 2], seed)
     angles[0], angles[1] = x, y
     angles[2] = _last_angle(M, K, at, math.cos(x), math.sin(x), c, s)
 
@@ -223,7 +220,7 @@ def _branches(T: Array, geometry: Array, seed: Array, limits: Array, do_all: boo
     candidates.wanted_motion(T, K, 6, M, G)
     _equations(G, K, A, B, h)
     seeds[0], seeds[1] = candidates.angle_of(K, 6, 0, seed), candidates.angle_of(K, 6, 2, seed)
-    count = open_pairs(A, B, h, rule, seeds, arms)
+    count = subproblems.open_pairs(A, B, h, rule, seeds, arms)
     for k in range(count):
         arms[k, _COST] = 0.0 if do_all else _arm_cost(arms[k], K, seed, limits)
     done, least, best = 0, math.inf, math.inf
@@ -235,7 +232,7 @@ def _branches(T: Array, geometry: Array, seed: Array, limits: Array, do_all: boo
         if not arm[_COST] < math.inf or (arm[_COST] >= best and best < OUTSIDE):
             return done, least
         if arm[_LEVEL] < 0.5:
-            close_pair(A, B, h, rule, seeds, k, arms)
+            subproblems.close_pair(A, B, h, rule, seeds, k, arms)
         elif arm[_LEVEL] < 1.5:
             arm[_SECOND] = _joint2(G, K, arm, candidates.angle_of(K, 6, 1, seed))
             arm[_LEVEL] = 2.0
@@ -277,7 +274,7 @@ def _settle(T: Array, seed: Array, limits: Array, geometry: Array, q: Array) -> 
     third, fourth = candidates.angle_of(K, 6, 2, q), candidates.angle_of(K, 6, 3, q)
     arm[0] = _held(K, 0, candidates.angle_of(K, 6, 0, q), seed, limits, q)
     d = h[1] - A[1, 0] * math.cos(arm[0]) - A[1, 1] * math.sin(arm[0])
-    base, spread, _ = one_angle(B[1, 0], B[1, 1], d, third)
+    base, spread, _ = subproblems.one_angle(B[1, 0], B[1, 1], d, third)
     if abs(wrapped(base + spread - third)) > abs(wrapped(base - spread - third)):
         spread = -spread
     arm[1] = _held(K, 2, base + spread, seed, limits, q)
@@ -288,7 +285,7 @@ def _settle(T: Array, seed: Array, limits: Array, geometry: Array, q: Array) -> 
     candidates.undo_turn(math.cos(angle), math.sin(angle), N, 3)
     candidates.undo_between(K, _F4, N, M, 3)
     fifth = candidates.angle_of(K, 6, 4, seed)
-    angle = turn_between(K[_F5 + 2], K[_F5 + 6], M[0, 2], M[1, 2], fifth)
+    angle = subproblems.turn_between(K[_F5 + 2], K[_F5 + 6], M[0, 2], M[1, 2], fifth)
     angle = _held(K, 4, angle, seed, limits, q)
     candidates.undo_turn(math.cos(angle), math.sin(angle), M, 3)
     candidates.undo_between(K, _F5, M, N, 3)

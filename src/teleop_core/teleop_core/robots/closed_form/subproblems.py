@@ -12,8 +12,7 @@ Source:
 
 import math
 
-from teleop_core.kernels import inner, kernel
-from teleop_core.kernels.geometry import Array
+from teleop_core.kernels import Array, inner, kernel
 from teleop_core.kernels.room import room
 
 # Relative to its squared amplitude, so much may be missing for an equation to count as solved.

@@ -11,13 +11,9 @@ Source:
 
 import math
 
-from teleop_core.kernels import inner, kernel
-from teleop_core.kernels.geometry import Array
+from teleop_core.kernels import Array, inner, kernel
 from teleop_core.robots.branches import turned, wrapped
-from teleop_core.robots.closed_form.candidates import joint_of
-from teleop_core.robots.closed_form.spherical_wrist import wrist_angles
-from teleop_core.robots.closed_form.subproblems import one_angle
-from teleop_core.robots.closed_form.swivel_families import F1, F5
+from teleop_core.robots.closed_form import candidates, spherical_wrist, subproblems, swivel_families
 
 MARGIN = 0.1
 """Angle psi [rad] to the ends of its arc, at most a quarter of the arc."""
@@ -40,7 +36,7 @@ def blend(S: Array, psi: float, M: Array) -> None:
 @inner
 def _cut(a: float, b: float, d: float, edges: Array, count: int) -> int:
     """Append the psi where a cos psi + b sin psi = d, if any; the new count."""
-    base, spread, is_exact = one_angle(a, b, d, 0.0)
+    base, spread, is_exact = subproblems.one_angle(a, b, d, 0.0)
     if is_exact > 0.5 and a * a + b * b > 1e-20:
         edges[count], edges[count + 1] = wrapped(base + spread), wrapped(base - spread)
         count += 2
@@ -56,16 +52,16 @@ def _cuts(S: Array, K: Array, at: int, i: int, limits: Array, edges: Array, coun
     for side in range(2):
         far = even + size if side == 0 else even - size
         count = _cut(S[2, 2], S[5, 2], far - S[8, 2], edges, count)
-        angle = K[1 + i] * limits[side, joint_of(K, 7, i)]
+        angle = K[1 + i] * limits[side, candidates.joint_of(K, 7, i)]
         c, s = math.cos(angle), math.sin(angle)
         x, y, z = c * K[at + 2] - s * K[at + 6], s * K[at + 2] + c * K[at + 6], K[at + 10]
         a, b = x * S[0, 2] + y * S[1, 2] + z * S[2, 2], x * S[3, 2] + y * S[4, 2] + z * S[5, 2]
         d = K[at + 22] - x * S[6, 2] - y * S[7, 2] - z * S[8, 2]
         count = _cut(a, b, d, edges, count)
-        angle = K[2 + i] * limits[side, joint_of(K, 7, i + 1)]
+        angle = K[2 + i] * limits[side, candidates.joint_of(K, 7, i + 1)]
         d = even + e0 * math.cos(angle) + e1 * math.sin(angle)
         count = _cut(S[2, 2], S[5, 2], d - S[8, 2], edges, count)
-        angle = K[3 + i] * limits[side, joint_of(K, 7, i + 2)]
+        angle = K[3 + i] * limits[side, candidates.joint_of(K, 7, i + 2)]
         c, s = math.cos(angle), math.sin(angle)
         x, y = c * K[at + 20] + s * K[at + 21], c * K[at + 21] - s * K[at + 20]
         z = K[at + 22]
@@ -91,7 +87,7 @@ def _legal(angles: Array, is_exact: float, K: Array, i: int, seed: Array, limits
     for k in range(2):
         is_in = is_exact > 0.5
         for j in range(3):
-            at = joint_of(K, 7, i + j)
+            at = candidates.joint_of(K, 7, i + j)
             low, high = limits[0, at], limits[1, at]
             value = turned(K[1 + i + j] * angles[k, j], seed[at], low, high, False)
             is_in = is_in and low - _SLACK <= value <= high + _SLACK
@@ -102,7 +98,7 @@ def _legal(angles: Array, is_exact: float, K: Array, i: int, seed: Array, limits
 @kernel
 def cut_circle(S: Array, W: Array, K: Array, limits: Array, arcs: Array) -> None:
     """Cut the circle of psi at the limits into pieces, in memory of shape :data:`ARCS`."""
-    count = _cuts(W, K, F5, 4, limits, arcs[0], _cuts(S, K, F1, 0, limits, arcs[0], 0))
+    count = _cuts(W, K, swivel_families.F5, 4, limits, arcs[0], _cuts(S, K, swivel_families.F1, 0, limits, arcs[0], 0))
     _sort(arcs[0], count)
     if count == 0:
         arcs[0, 0], count = -math.pi, 1
@@ -128,11 +124,11 @@ def _is_legal(j: int, branch: int, S: Array, W: Array, K: Array, seed: Array, li
     if arcs[1, k] == _UNKNOWN:
         middle = 0.5 * (_edge(arcs, k) + _edge(arcs, k + 1))
         blend(S, middle, M)
-        is_exact = wrist_angles(M, K, F1, 0.0, angles)[1]
+        is_exact = spherical_wrist.wrist_angles(M, K, swivel_families.F1, 0.0, angles)[1]
         bits = _legal(angles, is_exact, K, 0, seed, limits)
         if bits > 0:
             blend(W, middle, M)
-            is_exact = wrist_angles(M, K, F5, 0.0, angles)[1]
+            is_exact = spherical_wrist.wrist_angles(M, K, swivel_families.F5, 0.0, angles)[1]
             bits = 4 * bits + _legal(angles, is_exact, K, 4, seed, limits)
         arcs[1, k] = bits
     bits = int(arcs[1, k])

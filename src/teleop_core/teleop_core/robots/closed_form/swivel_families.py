@@ -10,8 +10,7 @@ Source:
 
 import math
 
-from teleop_core.kernels import inner
-from teleop_core.kernels.geometry import Array
+from teleop_core.kernels import Array, inner
 from teleop_core.kernels.room import room
 from teleop_core.robots.closed_form.subproblems import one_angle
 

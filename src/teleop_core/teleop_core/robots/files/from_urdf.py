@@ -1,14 +1,13 @@
 """Robots from URDF: the chain from the root link to a tip, with what the file says of its drives.
 
-What moves the tip are the joints between root and tip; all others stay at zero, and weigh. A joint
-between them that mimics another moves with it (:mod:`teleop_core.robots.chains.followers`). The
-kinematics are those of Denavit-Hartenberg chains (:mod:`teleop_core.robots.chains.dh_kernels`), the
-dynamics those of rigid bodies (:mod:`teleop_core.robots.chains.chain_dynamics`). Effort and
-velocity limits, damping and friction are the drives' where they stand in the file and are above
-zero. The inertia of a drive is that of the links at home; that of its motor is in no URDF. A file
-of drives may state it, and what else a URDF leaves out. Whatever is left out there too is assumed
-as for tables (:mod:`teleop_core.robots.arms.dh_drives`), and ``Robot.drives.assumed`` names it.
-Meshes are read where they are drawn (:mod:`teleop_core.robots.bodies.looks`).
+What moves the tip are the joints between root and tip; all others stay at zero, and weigh. A joint between them that
+mimics another moves with it (:mod:`teleop_core.robots.chains.followers`). The kinematics are those of
+Denavit-Hartenberg chains (:mod:`teleop_core.robots.chains.dh_kernels`), the dynamics those of rigid bodies
+(:mod:`teleop_core.robots.chains.chain_dynamics`). Effort and velocity limits, damping and friction are the drives'
+where they stand in the file and are above zero. The inertia of a drive is that of the links at home; that of its motor
+is in no URDF. A file of drives may state it, and what else a URDF leaves out. Whatever is left out there too is assumed
+as for tables (:mod:`teleop_core.robots.arms.dh_drives`), and ``Robot.drives.assumed`` names it. Meshes are read where
+they are drawn (:mod:`teleop_core.robots.bodies.looks`).
 
 Source:
     The XML specification of URDF, pages joint and link.
@@ -24,16 +23,14 @@ from xml.etree import ElementTree as Xml
 
 import numpy as np
 
-from teleop_core.base.errors import ParameterError, UnknownNameError
-from teleop_core.kernels.geometry import Array
-from teleop_core.kernels.portable import dot, length, product
-from teleop_core.robots.arms.dh_chain import DhJoint, chain_robot
-from teleop_core.robots.arms.dh_drives import drives_of, least_inertia, parse_drives, read_drives
+from teleop_core.base import ParameterError, UnknownNameError
+from teleop_core.kernels import Array, dot, length, product
+from teleop_core.robots.arms import dh_chain, dh_drives
 from teleop_core.robots.chains.chain_dynamics import body_row, chain_dynamics, chain_row
 from teleop_core.robots.chains.followers import Follower, Followers, dynamics_row, follower_dynamics, follower_inertia
 from teleop_core.robots.closed_form.decomposition import SEARCH, solution_of
 from teleop_core.robots.drives import ENTRIES, Drives, Dynamics
-from teleop_core.robots.files.urdf_notes import notes_on
+from teleop_core.robots.files import urdf_notes, xacro_files
 from teleop_core.robots.files.urdf_tree import (
     KINDS,
     UNITS,
@@ -53,7 +50,6 @@ from teleop_core.robots.files.urdf_tree import (
     turn_of_z,
 )
 from teleop_core.robots.files.visuals import visuals_of
-from teleop_core.robots.files.xacro_files import xml_of
 from teleop_core.robots.kinematics import DIRECTIONS
 from teleop_core.robots.rank import directions_of
 from teleop_core.robots.robot import Robot
@@ -84,9 +80,8 @@ def load_urdf(
         task: Directions that the arm is to control, of :data:`DIRECTIONS`, with blanks or commas
             between them; empty for all, or of an arm that cannot move in all of them at once for
             those of :func:`~teleop_core.robots.rank.directions_of`.
-        dynamics: Of :data:`MODELS`. independent: axes that do not act on each other, gravity
-            balanced. links: the bodies of the file, which weigh and act on each other; the
-            controller feeds their gravity forward.
+        dynamics: Of :data:`MODELS`. independent: axes that do not act on each other, gravity balanced. links: the
+            bodies of the file, which weigh and act on each other; the controller feeds their gravity forward.
         drives: YAML file of what the drives of the joints are, by their names, in the entries of
             :class:`~teleop_core.robots.drives.Drives`; it stands above the URDF. Inertia is that
             of the motor, to which that of the links is added.
@@ -106,7 +101,7 @@ def load_urdf(
     """
     if dynamics not in MODELS:
         raise UnknownNameError("dynamics", dynamics, MODELS)
-    root = root_of(Path(path), xml_of(Path(path), arguments or {}))
+    root = root_of(Path(path), xacro_files.xml_of(Path(path), arguments or {}))
     links = elements_of(root, "link")
     joints = [joint_of(name, element, links) for name, element in elements_of(root, "joint").items()]
     by_child = joints_by_child(joints)
@@ -128,7 +123,7 @@ def load_urdf(
     follower_inertia(home, dynamics_row(followers, chain_numbers, np.zeros(n)), inertia)
     table = _drives(trains, np.diag(inertia).tolist(), str(drives))
     make = partial(
-        chain_robot,
+        dh_chain.chain_robot,
         name=root.get("name") or Path(path).stem,
         joints=limits,
         kinds=kinds,
@@ -143,7 +138,7 @@ def load_urdf(
     coordinates = dict(zip((j.name for j in moving), followers.of(home).tolist(), strict=True))
     visuals = tuple(visuals_of(coordinates, links, by_child, Path(path)))
     # Without its start, for which a second's search would begin here: who needs it asks for it.
-    notes = tuple(notes_on(chain, links))
+    notes = tuple(urdf_notes.notes_on(chain, links))
     robot = replace(robot, visuals=visuals, notes=notes, home_is_assumed=True, start=None)
     if dynamics == "independent":
         return robot
@@ -229,7 +224,7 @@ def _task(task: str) -> tuple[str, ...]:
     return names
 
 
-def _narrowed(train: list[_Geared]) -> DhJoint:
+def _narrowed(train: list[_Geared]) -> dh_chain.DhJoint:
     """Joint with the limits in which it and all that follow it are within theirs."""
     leader = train[0].joint
     lower, upper = limits_of(leader)
@@ -242,7 +237,7 @@ def _narrowed(train: list[_Geared]) -> DhJoint:
         needed = f"lower < upper within the limits of {names}, by which it is followed"
         raise ParameterError(f"limits of joint {leader.name}", (lower, upper), needed)
     home = 0.0 if lower <= 0.0 <= upper else 0.5 * (lower + upper)
-    return DhJoint(name=leader.name, symbol="", sign=1.0, lower=lower, upper=upper, home=home)
+    return dh_chain.DhJoint(name=leader.name, symbol="", sign=1.0, lower=lower, upper=upper, home=home)
 
 
 def _frames(chain: list[UrdfJoint]) -> tuple[list[Array], list[float]]:
@@ -262,7 +257,7 @@ def _drives(trains: list[list[_Geared]], inertias: list[float], file: str) -> Dr
     """Drives of the leaders, which bear friction and keep speed limits of what follows them."""
     kinds, stated = [KINDS[train[0].joint.kind] for train in trains], {}
     names = [train[0].joint.name for train in trains]
-    given = read_drives(Path(file).expanduser(), names, kinds) if file else [{}] * len(trains)
+    given = dh_drives.read_drives(Path(file).expanduser(), names, kinds) if file else [{}] * len(trains)
     for train, kind, inertia, drive in zip(trains, kinds, inertias, given, strict=True):
         own: dict[str, float] = {}
         for geared in train:
@@ -275,13 +270,13 @@ def _drives(trains: list[list[_Geared]], inertias: list[float], file: str) -> Dr
                 elif geared is train[0]:
                     own[entry] = value
         own |= drive
-        least = least_inertia(kind, own.get("viscous", 0.0), own.get("coulomb", 0.0))
+        least = dh_drives.least_inertia(kind, own.get("viscous", 0.0), own.get("coulomb", 0.0))
         if "inertia" in drive:
             own["inertia"] = inertia + drive["inertia"]
         elif max(inertia, least) > _NO_INERTIA:
             own["inertia"] = max(inertia, least)
         stated[train[0].joint.name] = own
-    drives = drives_of(kinds, parse_drives(stated, names, kinds, 1.0))
+    drives = dh_drives.drives_of(kinds, dh_drives.parse_drives(stated, names, kinds, 1.0))
     motors = ("inertia",) * any("inertia" not in drive for drive in given)
     assumed = tuple(name for name in ENTRIES if name in (*motors, *drives.assumed))
     return replace(drives, assumed=assumed)
@@ -307,8 +302,7 @@ def _drive_entries(joint: UrdfJoint) -> dict[str, float]:
 def _bodies(moving: list[UrdfJoint], base: str, links: Links, joints: list[UrdfJoint], may_be_any: bool) -> Array:
     """What each joint moves up to the next, (n, 13), see :func:`body_row`; other joints at zero.
 
-    Files give many an inertia that no body has. It does no harm where nothing moves it, and where
-    ``may_be_any``.
+    Files give many an inertia that no body has. It does no harm where nothing moves it, and where ``may_be_any``.
     """
     carried: dict[str, list[UrdfJoint]] = {}
     for joint in joints:
@@ -353,8 +347,7 @@ def _mass(name: str, link: Xml.Element, may_be_any: bool) -> tuple[float, Array,
 def _is_possible(inertia: Array) -> bool:
     """Whether some body has this inertia: no principal moment exceeds the sum of the others.
 
-    That is so where half the trace less the inertia has no negative eigenvalue, and so no negative
-    principal minor.
+    That is so where half the trace less the inertia has no negative eigenvalue, and so no negative principal minor.
     """
     spread = 0.5 * float(np.trace(inertia))
     if spread == 0.0:

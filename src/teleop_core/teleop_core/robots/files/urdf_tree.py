@@ -12,11 +12,9 @@ from xml.etree import ElementTree as Xml
 
 import numpy as np
 
-from teleop_core.base.damage import damage_told
-from teleop_core.base.errors import ParameterError, UnknownNameError
+from teleop_core.base import ParameterError, UnknownNameError, damage_told
 from teleop_core.base.ranges import MOST_OF_ARM, RANGES, check
-from teleop_core.kernels.geometry import Array, rotation, transform
-from teleop_core.kernels.portable import length, product
+from teleop_core.kernels import Array, length, product, rotation, transform
 
 KINDS = {"revolute": "turn", "continuous": "turn", "prismatic": "slide"}
 """What each type of joint that moves does."""

@@ -11,9 +11,8 @@ from xml.etree import ElementTree as Xml
 
 import numpy as np
 
-from teleop_core.base.errors import ParameterError
-from teleop_core.kernels.geometry import Array, rotation, transform
-from teleop_core.kernels.portable import product
+from teleop_core.base import ParameterError
+from teleop_core.kernels import Array, product, rotation, transform
 from teleop_core.robots.files.urdf_tree import Links, UrdfJoint, chain_to, numbers_of, origin_of, tree_of, turn_of_z
 
 VisualKind = Literal["mesh", "box", "cylinder", "sphere"]

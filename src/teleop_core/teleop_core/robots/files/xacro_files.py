@@ -1,7 +1,6 @@
 """Xacro: a macro file of an arm, expanded to its URDF by the package ``xacro``.
 
-Expanding evaluates the expressions of the file and of all that it includes: a xacro is a program
-(docs/security.md).
+Expanding evaluates the expressions of the file and of all that it includes: a xacro is a program (docs/security.md).
 """
 
 import re
@@ -9,10 +8,8 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
-from teleop_core.base.damage import damage_told
-from teleop_core.base.errors import ParameterError, TeleopError, UnknownNameError
-from teleop_core.robots.files.urdf_tree import tree_of
-from teleop_core.robots.files.visuals import package_folder
+from teleop_core.base import ParameterError, TeleopError, UnknownNameError, damage_told
+from teleop_core.robots.files import urdf_tree, visuals
 
 EXPANDED = ".expanded.urdf"
 """Ending of the URDF that a recording keeps of a xacro; arguments may stand, and do nothing."""
@@ -91,10 +88,10 @@ def _our_files(path: Path) -> Iterator[None]:
     from xacro import substitution_args
 
     def find(name: str) -> str:
-        return str(package_folder(name, path))
+        return str(visuals.package_folder(name, path))
 
     def parse(source: object, filename: str) -> object:
-        tree_of(Path(filename).read_bytes())
+        urdf_tree.tree_of(Path(filename).read_bytes())
         return theirs(source, filename)
 
     theirs, found = xacro.parse, substitution_args._eval_find

@@ -8,10 +8,8 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from teleop_core.base.errors import ParameterError
-from teleop_core.base.parameters import build, parameter
-from teleop_core.kernels import inner, kernel_from_source
-from teleop_core.kernels.geometry import Array
+from teleop_core.base import ParameterError, build, parameter
+from teleop_core.kernels import Array, inner, kernel_from_source
 from teleop_core.shapes import SHAPES, Shape
 from teleop_core.shapes.basis.drawing import with_lifts
 

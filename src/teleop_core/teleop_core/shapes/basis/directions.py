@@ -2,9 +2,8 @@
 
 import math
 
-from teleop_core.base.errors import ParameterError
-from teleop_core.kernels import inner
-from teleop_core.kernels.geometry import Array
+from teleop_core.base import ParameterError
+from teleop_core.kernels import Array, inner
 
 NEAR = 5e-3
 """A tip that is farther outside of a shape [m] does not get there within a tick."""

@@ -16,14 +16,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from teleop_core.base.errors import ParameterError
-from teleop_core.kernels.geometry import Array, rotation
-from teleop_core.kernels.portable import dot, product
+from teleop_core.base import ParameterError
+from teleop_core.kernels import Array, dot, product, rotation
 from teleop_core.kernels.progress import told
 from teleop_core.kernels.store import user_cache
-from teleop_core.shapes.basis.directions import NEAR
-from teleop_core.shapes.basis.heights import read_heights
-from teleop_core.shapes.basis.spline import write_spline
+from teleop_core.shapes.basis import directions, heights, spline
 from teleop_core.shapes.basis.triangles import (
     Triangles,
     edges_of,
@@ -72,8 +69,7 @@ class DistanceGrid(NamedTuple):
     """Distances from a mesh, and how it is drawn.
 
     Attributes:
-        numbers: Header, then the coefficients of the cubic spline through the distances [m], along
-            z fastest.
+        numbers: Header, then the coefficients of the cubic spline through the distances [m], along z fastest.
         outline: Lines (N, 3) [m], a row of NaN between them.
     """
 
@@ -149,14 +145,14 @@ def _make(request: GridRequest) -> DistanceGrid:
             tell(f"{100 * i // nodes[0]} %")
             write_distances(tree, first + i * step * np.eye(3)[0], step, distances[i])
         for i in range(3):  # the spline along x, y and z
-            write_spline(distances.reshape(math.prod(nodes[:i]), nodes[i], -1))
+            spline.write_spline(distances.reshape(math.prod(nodes[:i]), nodes[i], -1))
     numbers = np.concatenate((nodes, (step,), first, distances.ravel()))
     return DistanceGrid(numbers, _outline(triangles))
 
 
 def _read(request: GridRequest, path: Path) -> Triangles:
     if request.kind != "mesh":
-        return read_heights(path, path.read_bytes(), request.scale, request.step)
+        return heights.read_heights(path, path.read_bytes(), request.scale, request.step)
     x, y, z = request.angles
     turned = product(rotation("z", z), product(rotation("y", y), rotation("x", x)))
     return read_triangles(path, path.read_bytes(), request.scale * turned)
@@ -164,7 +160,7 @@ def _read(request: GridRequest, path: Path) -> Triangles:
 
 def _nodes(size: Array, step: float) -> list[int]:
     """Nodes of a grid for a mesh of a size (3,) [m]; a tip at its end is not near."""
-    around = np.ceil((size + 2.0 * NEAR) / step).astype(np.int64)
+    around = np.ceil((size + 2.0 * directions.NEAR) / step).astype(np.int64)
     return (around + 3 + 2 * EDGE).tolist()
 
 

@@ -4,8 +4,7 @@ import math
 
 import numpy as np
 
-from teleop_core.kernels.geometry import Array
-from teleop_core.kernels.portable import length
+from teleop_core.kernels import Array, length
 
 DRAWN = 0.1
 """Length that is drawn of what has no end [m]."""

@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 
 from teleop_core.base.errors import ParameterError
 from teleop_core.kernels.geometry import Array
-from teleop_core.shapes.basis.spline import write_between, write_spline
-from teleop_core.shapes.basis.triangles import Triangles
+from teleop_core.shapes.basis import spline, triangles
 
 FIELD = "height_field"
 THICKNESS = 0.02
@@ -23,7 +22,7 @@ _LEAST = 4  # heights along x and along y
 _MOST = 400_000  # places of the surface
 
 
-def read_heights(path: Path, data: bytes, spacing: float, step: float) -> Triangles:
+def read_heights(path: Path, data: bytes, spacing: float, step: float) -> triangles.Triangles:
     """Read a table of heights and close it to a block, whose middle is at height 0.
 
     Args:
@@ -44,9 +43,9 @@ def read_heights(path: Path, data: bytes, spacing: float, step: float) -> Triang
         raise ParameterError(f"{FIELD}.step", step, text)
     for axis in range(2):
         lines = np.ascontiguousarray(np.moveaxis(heights, axis, 0))[None]
-        write_spline(lines)
+        spline.write_spline(lines)
         between = np.empty((1, nodes[axis], lines.shape[2]))
-        write_between(lines, between)
+        spline.write_between(lines, between)
         heights = np.moveaxis(between[0], 0, axis)
     return _block(np.ascontiguousarray(heights), spacing / parts)
 
@@ -73,7 +72,7 @@ def _table(path: Path, data: bytes) -> Array:
     return heights
 
 
-def _block(heights: Array, width: float) -> Triangles:
+def _block(heights: Array, width: float) -> triangles.Triangles:
     """Block below heights (N, M) [m] that are ``width`` [m] apart, with a flat bottom."""
     rows, columns = heights.shape
     x = width * (np.arange(rows) - 0.5 * (rows - 1))
@@ -91,6 +90,6 @@ def _block(heights: Array, width: float) -> Triangles:
     middle = np.full(len(rim), rows * columns + len(rim))
     after, low_after = np.roll(rim, -1), np.roll(low, -1)
     faces = ((a, b, c), (a, c, d), (rim, low, low_after), (rim, low_after, after), (low, middle, low_after))
-    return Triangles(
+    return triangles.Triangles(
         np.vstack((top, below, (0.0, 0.0, floor))), np.concatenate([np.stack(corners, axis=1) for corners in faces])
     )

@@ -8,11 +8,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from teleop_core.base.errors import ParameterError, TeleopError
+from teleop_core.base import ParameterError, TeleopError
 from teleop_core.base.ranges import check
-from teleop_core.kernels import inner, kernel
-from teleop_core.kernels.geometry import Array
-from teleop_core.kernels.portable import arctangent, dot, length, product
+from teleop_core.kernels import Array, arctangent, dot, inner, kernel, length, product
 
 _FLAT = 1e-6  # share of the cube around it that a mesh must fill
 _LEAF = 4  # triangles in a leaf of the tree, at least
@@ -203,8 +201,7 @@ def _nearest_on(  # noqa: PLR0911 - seven regions
     """Nearest place of a triangle (3, 3).
 
     Returns:
-        What it lies on, as the rows of :func:`_pseudonormals`; shares of the edges from corner 0 to
-        1 and from 0 to 2.
+        What it lies on, as the rows of :func:`_pseudonormals`; shares of the edges from corner 0 to 1 and from 0 to 2.
 
     Source:
         Ericson 2005, Real-Time Collision Detection, section 5.1.5: regions of corners and edges.

@@ -8,11 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from teleop_core.base.errors import ParameterError
-from teleop_core.base.parameters import Choice, choice, parameter
-from teleop_core.graph import topics
-from teleop_core.graph.signals import DT
-from teleop_core.graph.stage import RunningStage, Stage
+from teleop_core.base import Choice, ParameterError, choice, parameter
+from teleop_core.graph import DT, RunningStage, Stage, topics
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot_set
 from teleop_core.robots.parameters import RobotParameters

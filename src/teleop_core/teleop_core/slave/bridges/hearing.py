@@ -62,8 +62,7 @@ class Hearing:
         stamp_ns: Of the newest sound sample [ns]; 0 before the first.
         heard_ns: When it came [ns]; 0 before the first.
         wrong: What is wrong with the newest sample, in words; empty if it is sound.
-        strange: Names in a message without any of our joints, as a gripper's, since the newest
-            sound sample.
+        strange: Names in a message without any of our joints, as a gripper's, since the newest sound sample.
         has_jumped: Whether a joint jumped.
         refused: Number of samples that were not believed, by reason.
     """

@@ -8,14 +8,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from teleop_core.base.errors import ParameterError
-from teleop_core.base.parameters import parameter
-from teleop_core.graph.signals import DT
-from teleop_core.graph.stage import Stage
+from teleop_core.base import ParameterError, parameter
+from teleop_core.graph import DT, Stage
 from teleop_core.graph.topics import JAW, NO_COMMAND_NS, SLAVE_JAW_MEASURED_JS, SLAVE_JAW_SETPOINT_JS, SLAVE_OPERATION
-from teleop_core.slave.bridges import Command
-from teleop_core.slave.bridges.arm_bridge import BridgeParameters, ControllerBridge
-from teleop_core.slave.bridges.leading import Lead
+from teleop_core.slave.bridges import Command, arm_bridge, leading
 from teleop_core.slave.bridges.names import JointMap
 
 _UPPER = 3.0  # more than any jaw opens [rad]; its server has the limit
@@ -23,7 +19,7 @@ _SAME = 1e-3  # a setpoint that moved by less while the gripper was not led stay
 
 
 @dataclass(frozen=True, kw_only=True)
-class JawBridgeParameters(BridgeParameters):
+class JawBridgeParameters(arm_bridge.BridgeParameters):
     """Parameters of :class:`JawBridge`."""
 
     command_topic: str = parameter("/gripper_controller/commands", fixed=True, doc="where the gripper takes commands")
@@ -55,7 +51,7 @@ class JawBridgeParameters(BridgeParameters):
             raise ParameterError("jaw_bridge.scale", self.scale, "another number than 0")
 
 
-class JawBridge(ControllerBridge):
+class JawBridge(arm_bridge.ControllerBridge):
     """Stage that leads a real gripper, and says where its fingers are.
 
     The gripper is commanded nothing before the first command of the hand is followed. Where it was
@@ -67,7 +63,7 @@ class JawBridge(ControllerBridge):
         p, upper = parameters, np.array([_UPPER])
         speed = np.array([p.speed_limit])
         joints = JointMap(JAW, [f"{JAW[0]}={p.joint}"], [p.scale], [p.offset], owner="jaw_bridge.", is_scaled=True)
-        lead = Lead(-upper, upper, speed, _SAME, 1.0 / p.rate, presses=True)
+        lead = leading.Lead(-upper, upper, speed, _SAME, 1.0 / p.rate, presses=True)
         super().__init__(JAW_BRIDGE, p, joints, lead, speed, dt)
 
     def command(self, now_ns: int, setpoint_age: float, is_led: bool) -> Command | None:

@@ -13,12 +13,10 @@ from typing import Any
 import numpy as np
 from numba import types
 
-from teleop_core.base.errors import ParameterError, PartError
-from teleop_core.base.registry import Registry, part_check, places, tried
-from teleop_core.graph.signals import DT
-from teleop_core.kernels import pointer
-from teleop_core.kernels.geometry import Array
-from teleop_core.kernels.parts import fenced, is_whole
+from teleop_core.base import ParameterError, PartError, Registry, part_check
+from teleop_core.base.registry import places, tried
+from teleop_core.graph import DT
+from teleop_core.kernels import Array, fenced, is_whole, pointer
 from teleop_core.robots.drives import Drives
 from teleop_core.robots.robot import Robot
 
@@ -45,19 +43,17 @@ class Controller:
         gains: ``gains(parameters, robot, viscous)`` gives the table (n, k) that ``control`` takes;
             ``viscous`` (n,) is the friction in force [N·m·s/rad or N·s/m].
         memory: Numbers that it remembers of each joint, zero at the start.
-        control: ``control(gains, memory, setpoint, measured, feedforward, limit, dt, effort)``, a
-            kernel or a plain function over all joints. Setpoint and measured position [rad or m],
-            feedforward and limit [N·m or N] are (n,), ``memory`` (n, m) is its own to write, and
-            ``effort`` (n,) gets the drive efforts; they are cut at ±limit afterwards. The
-            feedforward is the gravity that is compensated.
+        control: ``control(gains, memory, setpoint, measured, feedforward, limit, dt, effort)``, a kernel or a plain
+            function over all joints. Setpoint and measured position [rad or m], feedforward and limit [N·m or N] are
+            (n,), ``memory`` (n, m) is its own to write, and ``effort`` (n,) gets the drive efforts; they are cut at
+            ±limit afterwards. The feedforward is the gravity that is compensated.
         begin: ``begin(memory, measured, effort)`` prepares the memory for an arm at rest at
             ``measured`` that needs ``effort`` to stay there.
         shift: ``shift(memory, effort)`` lets it give so much more from now on, because the
             feedforward, or a law with new gains, gives so much less.
-        uses_model: Whether the feedforward is (2 n + n²,): behind the gravity that is compensated
-            the model's bias, Coriolis, centrifugal and all gravity effort (n,) at measured
-            positions and speeds, and its inertia matrix (n, n), row by row. It is the model that is
-            known, not the plant; friction is in neither.
+        uses_model: Whether the feedforward is (2 n + n²,): behind the gravity that is compensated the model's bias,
+            Coriolis, centrifugal and all gravity effort (n,) at measured positions and speeds, and its inertia matrix
+            (n, n), row by row. It is the model that is known, not the plant; friction is in neither.
     """
 
     name: str

@@ -5,41 +5,23 @@ leads back to the setpoint, and a pull to that motion. What is left of the pull'
 parameters, each within bounds around what the drive table says.
 
 Source:
-    Slotine and Li 1987, eqs. 5-9, on each joint by itself; bounds and dead zone as in Slotine and
-    Li 1991, section 8.7.
+    Slotine and Li 1987, eqs. 5-9, on each joint by itself; bounds and dead zone as in Slotine and Li 1991, section 8.7.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from teleop_core.base.parameters import parameter
-from teleop_core.kernels import kernel
-from teleop_core.kernels.geometry import Array
+from teleop_core.base import parameter
+from teleop_core.kernels import Array, kernel
 from teleop_core.robots.robot import Robot
-from teleop_core.slave.controllers import Controller, drives_and_poles, fields
-from teleop_core.slave.controllers.motion_estimates import (
-    EXPECTED,
-    MEMORY,
-    SET_ACCELERATION,
-    SET_SPEED,
-    SPEED,
-    approach,
-    beyond,
-    closeness,
-    fading_of,
-    follow_motion,
-    friction_of_setpoint,
-    holding,
-    known_friction,
-    linear_range,
-)
+from teleop_core.slave.controllers import Controller, drives_and_poles, fields, motion_estimates
 
 # Columns of the table of gains.
 _INERTIA, _POLE, _VISCOUS, _FADING, _FRICTION, _TRAVEL, _DEAD_BAND, _RANGE = range(8)
 _RATE, _SPEED_SCALE, _ACCELERATION_SCALE, _SPAN = range(8, 12)
 # What was learned, as differences from what is known at the start: columns of the memory.
-_MORE_INERTIA, _MORE_VISCOUS, _MORE_FRICTION, _LOAD = range(MEMORY, MEMORY + 4)
+_MORE_INERTIA, _MORE_VISCOUS, _MORE_FRICTION, _LOAD = range(motion_estimates.MEMORY, motion_estimates.MEMORY + 4)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -93,13 +75,13 @@ def adaptive_control(
     for i in range(effort.shape[0]):
         gain, row = gains[i], memory[i]
         inertia, pole, viscous = gain[_INERTIA], gain[_POLE], gain[_VISCOUS]
-        follow_motion(row, setpoint[i], measured[i], gain[_FADING], dt)
-        direction = friction_of_setpoint(row, setpoint[i], 1.0, gain[_TRAVEL])
+        motion_estimates.follow_motion(row, setpoint[i], measured[i], gain[_FADING], dt)
+        direction = motion_estimates.friction_of_setpoint(row, setpoint[i], 1.0, gain[_TRAVEL])
         off = setpoint[i] - measured[i]
-        error, share = approach(off, gain[_RANGE]), closeness(off, gain[_RANGE])
-        wanted = share * row[SET_SPEED]
-        rate = wanted - row[SPEED]
-        speed, acceleration = wanted + pole * error, share * row[SET_ACCELERATION] + pole * rate
+        error, share = motion_estimates.approach(off, gain[_RANGE]), motion_estimates.closeness(off, gain[_RANGE])
+        wanted = share * row[motion_estimates.SET_SPEED]
+        rate = wanted - row[motion_estimates.SPEED]
+        speed, acceleration = wanted + pole * error, share * row[motion_estimates.SET_ACCELERATION] + pole * rate
         slip = rate + pole * error
         friction = (gain[_FRICTION] + row[_MORE_FRICTION]) * direction
         held = friction + row[_LOAD] + feedforward[i]
@@ -107,9 +89,9 @@ def adaptive_control(
         moving += (viscous + row[_MORE_VISCOUS]) * speed
         asked = moving + held + 2.0 * pole * inertia * slip
         effort[i] = min(max(asked, -limit[i]), limit[i])
-        row[EXPECTED] = (effort[i] - held - viscous * row[SPEED]) / inertia
+        row[motion_estimates.EXPECTED] = (effort[i] - held - viscous * row[motion_estimates.SPEED]) / inertia
         if effort[i] == asked and share == 1.0:
-            change = gain[_RATE] * beyond(slip, pole * gain[_DEAD_BAND]) * dt
+            change = gain[_RATE] * motion_estimates.beyond(slip, pole * gain[_DEAD_BAND]) * dt
             more = change * acceleration / gain[_ACCELERATION_SCALE] ** 2
             row[_MORE_INERTIA] = learn(row[_MORE_INERTIA], more, gain[_SPAN])
             more = change * speed / gain[_SPEED_SCALE] ** 2
@@ -126,17 +108,24 @@ def adaptive_gains(parameters: AdaptiveParameters, robot: Robot, viscous: Array)
     """
     p = parameters
     drives, pole = drives_and_poles(robot, "adaptive", p.bandwidth)
-    fading = fading_of(robot, pole, p.filter_ratio, stiffness=3.0, damping=3.0)
-    friction, count = p.friction_share * known_friction(robot), drives.encoder_step
+    fading = motion_estimates.fading_of(robot, pole, p.filter_ratio, stiffness=3.0, damping=3.0)
+    friction, count = p.friction_share * motion_estimates.known_friction(robot), drives.encoder_step
     table = np.empty((robot.n, 12))
     table[:, _INERTIA], table[:, _POLE], table[:, _VISCOUS] = drives.inertia, pole, viscous
     table[:, _FADING], table[:, _FRICTION] = fading, friction
     table[:, _TRAVEL], table[:, _DEAD_BAND] = p.friction_counts * count, p.dead_band * count
-    table[:, _RANGE] = linear_range(robot, pole, 3.0)
+    table[:, _RANGE] = motion_estimates.linear_range(robot, pole, 3.0)
     table[:, _RATE], table[:, _SPAN] = p.rate * pole**2 * drives.inertia, p.span * drives.inertia
     table[:, _SPEED_SCALE] = drives.speed_limit
     table[:, _ACCELERATION_SCALE] = drives.effort_limit / drives.inertia
     return table
 
 
-ADAPTIVE = Controller("adaptive", AdaptiveParameters, adaptive_gains, adaptive_control, MEMORY + 4, *holding(_LOAD))
+ADAPTIVE = Controller(
+    "adaptive",
+    AdaptiveParameters,
+    adaptive_gains,
+    adaptive_control,
+    motion_estimates.MEMORY + 4,
+    *motion_estimates.holding(_LOAD),
+)

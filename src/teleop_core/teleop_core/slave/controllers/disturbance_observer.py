@@ -14,8 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from teleop_core.kernels import kernel
-from teleop_core.kernels.geometry import Array
+from teleop_core.kernels import Array, kernel
 from teleop_core.robots.robot import Robot
 from teleop_core.slave.controllers import Controller, drives_and_poles, fields, motion_estimates
 

@@ -14,31 +14,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from teleop_core.kernels import kernel
-from teleop_core.kernels.geometry import Array
+from teleop_core.kernels import Array, kernel
 from teleop_core.robots.robot import Robot
-from teleop_core.slave.controllers import Controller, drives_and_poles, fields
-from teleop_core.slave.controllers.motion_estimates import (
-    EXPECTED,
-    MEMORY,
-    SET_ACCELERATION,
-    SET_SPEED,
-    SPEED,
-    approach,
-    beyond,
-    closeness,
-    fading_of,
-    follow_motion,
-    friction_of_setpoint,
-    holding,
-    known_friction,
-    linear_range,
-)
+from teleop_core.slave.controllers import Controller, drives_and_poles, fields, motion_estimates
 from teleop_core.slave.controllers.pid import critically_damped_gains
 
 # Columns of the table of gains.
 _KP, _KI, _KD, _INERTIA, _VISCOUS, _FADING, _FRICTION, _TRAVEL, _DEAD_BAND, _RANGE = range(10)
-_INTEGRAL = MEMORY
+_INTEGRAL = motion_estimates.MEMORY
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -71,21 +54,21 @@ def friction_compensation_control(
     for i in range(effort.shape[0]):
         gain, row = gains[i], memory[i]
         inertia, viscous = gain[_INERTIA], gain[_VISCOUS]
-        follow_motion(row, setpoint[i], measured[i], gain[_FADING], dt)
-        friction = friction_of_setpoint(row, setpoint[i], gain[_FRICTION], gain[_TRAVEL])
+        motion_estimates.follow_motion(row, setpoint[i], measured[i], gain[_FADING], dt)
+        friction = motion_estimates.friction_of_setpoint(row, setpoint[i], gain[_FRICTION], gain[_TRAVEL])
         off = setpoint[i] - measured[i]
-        error, share = approach(off, gain[_RANGE]), closeness(off, gain[_RANGE])
-        speed = share * row[SET_SPEED]
-        free = gain[_KP] * error + gain[_KD] * (speed - row[SPEED])
-        free += inertia * share * row[SET_ACCELERATION] + viscous * speed + friction + feedforward[i]
-        integral = row[_INTEGRAL] + gain[_KI] * beyond(error, gain[_DEAD_BAND]) * dt
+        error, share = motion_estimates.approach(off, gain[_RANGE]), motion_estimates.closeness(off, gain[_RANGE])
+        speed = share * row[motion_estimates.SET_SPEED]
+        free = gain[_KP] * error + gain[_KD] * (speed - row[motion_estimates.SPEED])
+        free += inertia * share * row[motion_estimates.SET_ACCELERATION] + viscous * speed + friction + feedforward[i]
+        integral = row[_INTEGRAL] + gain[_KI] * motion_estimates.beyond(error, gain[_DEAD_BAND]) * dt
         is_inside = abs(free + integral) <= limit[i] or (free + integral) * error < 0.0
         if share == 1.0 and is_inside:
             row[_INTEGRAL] = integral
         effort[i] = min(max(free + row[_INTEGRAL], -limit[i]), limit[i])
         # The load that the integral holds is not what accelerates.
         known = friction + feedforward[i] + row[_INTEGRAL]
-        row[EXPECTED] = (effort[i] - known - viscous * row[SPEED]) / inertia
+        row[motion_estimates.EXPECTED] = (effort[i] - known - viscous * row[motion_estimates.SPEED]) / inertia
 
 
 def friction_compensation_gains(parameters: FrictionCompensationParameters, robot: Robot, viscous: Array) -> Array:
@@ -97,13 +80,13 @@ def friction_compensation_gains(parameters: FrictionCompensationParameters, robo
     p = parameters
     drives, pole = drives_and_poles(robot, "friction_compensation", p.bandwidth)
     kp, ki, kd = critically_damped_gains(drives.inertia, viscous, pole)
-    fading = fading_of(robot, pole, p.filter_ratio, stiffness=3.0, damping=3.0)
-    friction, count = p.friction_share * known_friction(robot), drives.encoder_step
+    fading = motion_estimates.fading_of(robot, pole, p.filter_ratio, stiffness=3.0, damping=3.0)
+    friction, count = p.friction_share * motion_estimates.known_friction(robot), drives.encoder_step
     table = np.empty((robot.n, 10))
     table[:, _KP], table[:, _KI], table[:, _KD] = kp, ki, kd
     table[:, _INERTIA], table[:, _VISCOUS], table[:, _FADING] = drives.inertia, viscous, fading
     table[:, _FRICTION], table[:, _TRAVEL] = friction, p.friction_counts * count
-    table[:, _DEAD_BAND], table[:, _RANGE] = p.dead_band * count, linear_range(robot, pole, 3.0)
+    table[:, _DEAD_BAND], table[:, _RANGE] = p.dead_band * count, motion_estimates.linear_range(robot, pole, 3.0)
     return table
 
 
@@ -112,6 +95,6 @@ FRICTION_COMPENSATION = Controller(
     FrictionCompensationParameters,
     friction_compensation_gains,
     friction_compensation_control,
-    MEMORY + 1,
-    *holding(_INTEGRAL),
+    motion_estimates.MEMORY + 1,
+    *motion_estimates.holding(_INTEGRAL),
 )

@@ -16,9 +16,8 @@ import math
 
 import numpy as np
 
-from teleop_core.graph.signals import DT
-from teleop_core.kernels import kernel
-from teleop_core.kernels.geometry import Array
+from teleop_core.graph import DT
+from teleop_core.kernels import Array, kernel
 from teleop_core.kernels.portable import exponential
 from teleop_core.robots.robot import Robot
 from teleop_core.slave.controllers import Begin, Shift
@@ -47,8 +46,7 @@ def follow(memory: Array, at: int, value: float, expected: float, fading: float,
     """Take the next value of a position into its estimates, ``memory[at:at + 3]``.
 
     Args:
-        memory: Numbers of one joint; position, speed and acceleration (beside the expected one)
-            are written.
+        memory: Numbers of one joint; position, speed and acceleration (beside the expected one) are written.
         at: Where they begin.
         value: Position [rad or m].
         expected: Acceleration since the last value, as far as it is known [rad/s² or m/s²].
@@ -75,9 +73,8 @@ def follow_motion(memory: Array, setpoint: float, measured: float, fading: float
 def friction_of_setpoint(memory: Array, setpoint: float, most: float, travel: float) -> float:
     """Dry friction of a joint that moves as its setpoint does, smooth over a small travel.
 
-    A bristle that bends with the setpoint until it carries the friction, and slips then: it keeps
-    its value when the setpoint rests, turns over ``2 travel`` when it turns, and never chatters,
-    whatever is measured.
+    A bristle that bends with the setpoint until it carries the friction, and slips then: it keeps its value when the
+    setpoint rests, turns over ``2 travel`` when it turns, and never chatters, whatever is measured.
 
     Args:
         memory: Numbers of one joint, as :func:`follow_motion` has them; written.
@@ -132,8 +129,7 @@ def begin_motion(memory: Array, measured: Array, _effort: Array) -> None:
 def holding(column: int) -> tuple[Begin, Shift]:
     """``begin`` and ``shift`` of a law one column of whose memory holds the arm at rest.
 
-    It starts at rest with all the effort that the arm needs there, and takes over what the
-    feedforward no longer gives.
+    It starts at rest with all the effort that the arm needs there, and takes over what the feedforward no longer gives.
     """
 
     def begin(memory: Array, measured: Array, effort: Array) -> None:
@@ -165,11 +161,10 @@ def fading_of(
 ) -> Array:
     """Fading (n,) of the filters of a law, as fast as its own noise allows.
 
-    The rule: ``ratio`` times as fast as the loop, but so slow that one encoder count changes the
-    effort by no more than :data:`EFFORT_SHARE` of the drive's limit. It also changes it by no more
-    than :data:`FRICTION_SHARE` of known dry friction, so that the noise of an encoder shakes no
-    joint loose. It is :data:`SLOWEST_RATIO` times as fast all the same, without which the loop
-    would not be damped.
+    The rule: ``ratio`` times as fast as the loop, but so slow that one encoder count changes the effort by no more than
+    :data:`EFFORT_SHARE` of the drive's limit. It also changes it by no more than :data:`FRICTION_SHARE` of known dry
+    friction, so that the noise of an encoder shakes no joint loose. It is :data:`SLOWEST_RATIO` times as fast all the
+    same, without which the loop would not be damped.
 
     Args:
         robot: Robot with drives.

@@ -4,12 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from teleop_core.base.parameters import parameter
-from teleop_core.kernels import kernel
-from teleop_core.kernels.geometry import Array
+from teleop_core.base import parameter
+from teleop_core.kernels import Array, kernel
 from teleop_core.robots.robot import Robot
-from teleop_core.slave.controllers import Controller, drives_and_poles, per_joint
-from teleop_core.slave.controllers.motion_estimates import approach
+from teleop_core.slave.controllers import Controller, drives_and_poles, motion_estimates, per_joint
 
 THIRD = 1.0 / 3.0
 """Setpoint weight whose zero cancels one of three equal poles."""
@@ -42,13 +40,12 @@ class PidParameters:
 def critically_damped_gains(inertia: Array, viscous: Array, bandwidth: Array) -> tuple[Array, Array, Array]:
     """Gains that put all three closed-loop poles of an inertia with friction at one real place.
 
-    The loop ``inertia q'' + viscous q' = Kp (b r - q) + Ki ∫(r - q) - Kd q'`` has the
-    characteristic polynomial ``inertia (s + bandwidth)³``, critically damped: what disturbs it dies
-    away without swinging. Its answer to the setpoint r is ``bandwidth² (3 b s + bandwidth) / (s +
-    bandwidth)³``. With the whole setpoint in the proportional action, b = 1, the zero makes a step
-    overshoot by 25 % all the same. It is 20 % at 1 kHz, and less where the setpoint moves no faster
-    than the drive. With b = 1/3 it cancels a pole, ``bandwidth² / (s + bandwidth)²`` is left, and
-    no step overshoots.
+    The loop ``inertia q'' + viscous q' = Kp (b r - q) + Ki ∫(r - q) - Kd q'`` has the characteristic polynomial
+    ``inertia (s + bandwidth)³``, critically damped: what disturbs it dies away without swinging. Its answer to the
+    setpoint r is ``bandwidth² (3 b s + bandwidth) / (s + bandwidth)³``. With the whole setpoint in the proportional
+    action, b = 1, the zero makes a step overshoot by 25 % all the same. It is 20 % at 1 kHz, and less where the
+    setpoint moves no faster than the drive. With b = 1/3 it cancels a pole, ``bandwidth² / (s + bandwidth)²`` is left,
+    and no step overshoots.
 
     Args:
         inertia: Inertias (n,) [kg·m² or kg], > 0.
@@ -132,7 +129,7 @@ def weighted_setpoint(setpoint: float, measured: float, gains: Array, memory: Ar
         return setpoint
     linear = room / (max(weight, THIRD) * gains[_KP] + 1e-300)
     if abs(setpoint - measured) > linear:
-        near = measured + approach(setpoint - measured, linear)
+        near = measured + motion_estimates.approach(setpoint - measured, linear)
     memory[_LAGGED] += (near - memory[_LAGGED]) * (pull / (gains[_KP] + pull))
     return weight * near + (1.0 - weight) * memory[_LAGGED]
 

@@ -17,9 +17,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from teleop_core.base.parameters import parameter
-from teleop_core.kernels import kernel
-from teleop_core.kernels.geometry import Array
+from teleop_core.base import parameter
+from teleop_core.kernels import Array, kernel
 from teleop_core.robots.robot import Robot
 from teleop_core.slave.controllers import Controller, drives_and_poles, per_joint
 from teleop_core.slave.controllers.pid import critically_damped_gains

@@ -6,8 +6,7 @@ their pads are ``2 L sin(angle / 2)`` apart.
 
 import math
 
-from teleop_core.kernels import inner
-from teleop_core.kernels.fields import Fields
+from teleop_core.kernels import Fields, inner
 
 
 class DriveNumbers(Fields):

@@ -13,13 +13,9 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from teleop_core.graph.row import Row
-from teleop_core.graph.signals import copy
-from teleop_core.graph.topics import JAW_OBJECTS
-from teleop_core.kernels import geometry, inner, kernel
-from teleop_core.kernels.fields import Integers, Vector3
-from teleop_core.slave.jaw.drive import DriveNumbers, DriveState, width
-from teleop_core.slave.jaw.sharing import far_from, share_speed
+from teleop_core.graph import Row, copy, topics
+from teleop_core.kernels import Integers, Vector3, geometry, inner, kernel
+from teleop_core.slave.jaw import drive, sharing
 
 WEIGHT = 9.81
 """Standard weight per mass [m/s²], along -z of the slave's base."""
@@ -34,7 +30,7 @@ _OPEN = 1e-3  # fingers that are so much wider than the object have let go, othe
 _LETS_GO = 0.01  # a setpoint so much wider than the grip's tightest opens the jaw [rad], assumed
 
 
-class GripNumbers(DriveNumbers):
+class GripNumbers(drive.DriveNumbers):
     """Parameter record of the jaw."""
 
     objects: int  # how many there are
@@ -48,7 +44,7 @@ class GripNumbers(DriveNumbers):
     second_base: Vector3  # of the second arm, in the first one's [m]
 
 
-class GripState(DriveState):
+class GripState(drive.DriveState):
     """State record of the jaw; hands are the own one, and the second arm's."""
 
     tip_ns: int
@@ -56,10 +52,10 @@ class GripState(DriveState):
     held: Vector3  # of the second arm: the object's middle in the tip's frame as the grip began [m]
     forces: Annotated[geometry.Array, 2]  # of each hand's fingers on its object [N]
     numbers: Annotated[Integers, 2]  # of the object that each hand moves, or moved last
-    objects: Annotated[geometry.Array, 7 * JAW_OBJECTS]  # poses
-    motions: Annotated[geometry.Array, 3 * JAW_OBJECTS]  # [m/s]
-    pegs: Annotated[Integers, JAW_OBJECTS]  # that each is on; _NONE without
-    homes: Annotated[Integers, JAW_OBJECTS]  # peg where each rested last; _NONE: it dropped
+    objects: Annotated[geometry.Array, 7 * topics.JAW_OBJECTS]  # poses
+    motions: Annotated[geometry.Array, 3 * topics.JAW_OBJECTS]  # [m/s]
+    pegs: Annotated[Integers, topics.JAW_OBJECTS]  # that each is on; _NONE without
+    homes: Annotated[Integers, topics.JAW_OBJECTS]  # peg where each rested last; _NONE: it dropped
     pull: float  # of a peg on a gripped object, across [N]
     transferred: int
     dropped: int
@@ -124,7 +120,7 @@ def _rub(
     Returns:
         The speed that is left between them [m/s]; 0 where it sticks.
     """
-    apart, most = far_from(motion, tip), _most(p, force, dt)
+    apart, most = sharing.far_from(motion, tip), _most(p, force, dt)
     share = most / apart if apart > most else 1.0
     left = (1.0 - share) * apart
     if cut > 0.0:
@@ -150,7 +146,7 @@ def _count(p: GripNumbers, s: GripState, table: float, is_lost: bool) -> None:
     if s.force > 0.0 and s.is_gripped == 0:
         s.is_gripped, s.slid, s.tightest = 1, 0.0, s.setpoint
         s.grips += 1
-    elif s.is_gripped and (is_lost or width(p, s.angle) > p.size + _OPEN):
+    elif s.is_gripped and (is_lost or drive.width(p, s.angle) > p.size + _OPEN):
         s.is_gripped = 0
         height = s.objects[7 * s.numbers[0] + 2] - table
         if is_lost and not _is_opened(s) and height > _LOST:
@@ -186,7 +182,7 @@ def _find(p: GripNumbers, s: GripState, tip: geometry.Array) -> bool:
     is_lost = bool(s.is_between > 0 and not is_near)
     if is_lost:
         s.is_between = 0
-    elif is_near and width(p, s.angle) >= p.size:
+    elif is_near and drive.width(p, s.angle) >= p.size:
         s.is_between = 1
     return is_lost
 
@@ -313,8 +309,8 @@ def _hold(p: GripNumbers, s: GripState, room: GripRoom, number: int, hands: int,
     _tip_motion(s, room, first, pose, room.motion, dt)
     if hands == 3:
         most, against = _most(p, s.forces[0], dt), _most(p, s.forces[1], dt)
-        share_speed(motion, room.motion, most, room.second, against)
-        left = far_from(motion, room.motion)
+        sharing.share_speed(motion, room.motion, most, room.second, against)
+        left = sharing.far_from(motion, room.motion)
         is_stuck = left == 0.0
         copy(motion, room.second)
         _meet_peg(p, int(s.pegs[number]), pose, motion, room.second, dt)
@@ -421,7 +417,7 @@ def see_objects(p: GripNumbers, s: GripState, room: GripRoom, row: Row) -> None:
     copy(s.tips[0:7], s.tips[7:14])
     copy(row.slave_true_cp, s.tips[0:7])
     if s.is_gripped:
-        _slide(s, max(far_from(room.motion, s.held) - s.slid, 0.0))
+        _slide(s, max(sharing.far_from(room.motion, s.held) - s.slid, 0.0))
     else:
         copy(room.motion, s.held)
         _choose(p, s, 0, s.tips[0:7])

@@ -6,13 +6,9 @@ It leads the jaw's setpoint as ``slave`` leads the arm's. Where the jaw is, it i
 import math
 from dataclasses import dataclass
 
-from teleop_core.base.parameters import parameter
-from teleop_core.graph import topics
-from teleop_core.graph.row import Row
-from teleop_core.graph.signals import DT, assign
-from teleop_core.graph.stage import RunningStage, Stage
-from teleop_core.kernels import inner, kernel
-from teleop_core.kernels.fields import Fields, record
+from teleop_core.base import parameter
+from teleop_core.graph import DT, Row, RunningStage, Stage, assign, topics
+from teleop_core.kernels import Fields, inner, kernel, record
 from teleop_core.slave.operation.states import State
 
 _STATE, _ENABLED = topics.OPERATION.index("state"), int(State.ENABLED)
@@ -100,9 +96,8 @@ def _may_move(p: JawNumbers, s: JawState, row: Row) -> bool:
 def _is_led(s: JawState, wanted: float) -> bool:
     """Whether a command leads the jaw, which after a hold it does by the operator's doing alone.
 
-    It opens the jaw once one has asked for the angle held, or less: nothing falls because the hand
-    was opened during a stop. It closes the jaw once one has asked for the angle held, or more, or
-    while it closes.
+    It opens the jaw once one has asked for the angle held, or less: nothing falls because the hand was opened during a
+    stop. It closes the jaw once one has asked for the angle held, or more, or while it closes.
     """
     if s.is_led == 0:
         s.lowest, s.highest = min(s.lowest, wanted), max(s.highest, wanted)

@@ -5,14 +5,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from teleop_core.base.errors import ParameterError
-from teleop_core.base.parameters import parameter
-from teleop_core.graph import topics
-from teleop_core.graph.row import Row
-from teleop_core.graph.signals import DT, assign, copy
-from teleop_core.graph.stage import RunningStage, Stage
-from teleop_core.kernels import kernel
-from teleop_core.kernels.fields import record
+from teleop_core.base import ParameterError, parameter
+from teleop_core.graph import DT, Row, RunningStage, Stage, assign, copy, topics
+from teleop_core.kernels import kernel, record
 from teleop_core.slave.jaw.drive import drive
 from teleop_core.slave.jaw.grip import (
     PEGS,

@@ -2,8 +2,7 @@
 
 from dataclasses import dataclass
 
-from teleop_core.base.errors import ParameterError
-from teleop_core.base.parameters import parameter
+from teleop_core.base import ParameterError, parameter
 from teleop_core.slave.operation.faults import NAMES
 from teleop_core.slave.operation.states import COMMANDS, Event, command_event
 

@@ -7,11 +7,10 @@ class Presses:
     The stop is pressed while at least one button holds it. A button holds it from its press to its
     own release: what another button says releases nothing. :meth:`release` overrides them all.
 
-    Every button numbers its messages, 1 for the first. A missing number belongs to a message that
-    was lost: by a full queue, by a process that stood still, or on the way. It may have been a
-    press, so it counts as one. What a button said before it is heard for the first time may have
-    been sent to this listener too, so messages before the first one count as missing, unless the
-    listener is idle. A message that arrives twice, through two readers, counts once.
+    Every button numbers its messages, 1 for the first. A missing number belongs to a message that was lost: by a full
+    queue, by a process that stood still, or on the way. It may have been a press, so it counts as one. What a button
+    said before it is heard for the first time may have been sent to this listener too, so messages before the first one
+    count as missing, unless the listener is idle. A message that arrives twice, through two readers, counts once.
 
     Methods that take a message return what the stop is after it, oldest first: a press alone
     (True), followed by False where no button holds the stop any more.

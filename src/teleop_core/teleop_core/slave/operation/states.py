@@ -1,18 +1,16 @@
 """States of an arm and what leads from one to another: one table for all ways to run it.
 
-The states and commands are those of CRTK (Collaborative Robotics Toolkit, robot operating states),
-with two more commands: ``stop``, the emergency stop, which every state takes, and ``reset``, which
-alone ends it.
+The states and commands are those of CRTK (Collaborative Robotics Toolkit, robot operating states), with two more
+commands: ``stop``, the emergency stop, which every state takes, and ``reset``, which alone ends it.
 """
 
 from enum import IntEnum
 
 import numpy as np
 
-from teleop_core.base.errors import UnknownNameError
-from teleop_core.graph.topics import STATE_COMMANDS
-from teleop_core.kernels import inner
-from teleop_core.kernels.fields import Fields
+from teleop_core.base import UnknownNameError
+from teleop_core.graph import topics
+from teleop_core.kernels import Fields, inner
 
 
 class State(IntEnum):
@@ -41,7 +39,7 @@ class Event(IntEnum):
     LAPSED = 11  # commands were silent for so long that motion is resumed on purpose only
 
 
-COMMANDS = STATE_COMMANDS
+COMMANDS = topics.STATE_COMMANDS
 """Events that people and programs send, by name."""
 
 

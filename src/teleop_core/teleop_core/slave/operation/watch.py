@@ -4,10 +4,8 @@ from typing import Annotated
 
 import numpy as np
 
-from teleop_core.graph.signals import TICK_NS
-from teleop_core.kernels import inner
-from teleop_core.kernels.fields import Fields, IntegerPerJoint, Integers, PerJoint, Vector3
-from teleop_core.kernels.geometry import Array
+from teleop_core.graph import TICK_NS
+from teleop_core.kernels import Array, Fields, IntegerPerJoint, Integers, PerJoint, Vector3, inner
 from teleop_core.slave.operation.faults import FAULTS, Fault, Reaction
 from teleop_core.slave.operation.parameters import MOST_EVENTS
 from teleop_core.slave.operation.states import Event, OperatingState, State, change

@@ -30,8 +30,7 @@ class Physics:
     Args:
         viscous: Viscous friction [N·m·s/rad or N·s/m].
         coulomb: Dry friction [N·m or N].
-        friction_speed: Where dry friction that does not stick has 71 % of its value
-            [rad/s or m/s].
+        friction_speed: Where dry friction that does not stick has 71 % of its value [rad/s or m/s].
         bristle: Stiffness of dry friction that sticks [N·m/rad or N/m]; 0 where it does not.
         wander: Standard deviation of dry friction over its mean.
         wander_travel: Way that a joint slips while it changes [rad or m], > 0.
@@ -45,8 +44,7 @@ class Physics:
         dynamics: Parameter row of the true dynamics; empty for those that the control law knows.
         effort_delay: Time from an asked effort to the motor's, beyond the tick [s]: whole ticks.
         drive_gain: Effort that drives give over the one that is asked of them; None: 1.
-        gear_stiffness: Stiffness of gears that bend [N·m/rad or N/m]; 0, or None, for those that
-            do not.
+        gear_stiffness: Stiffness of gears that bend [N·m/rad or N/m]; 0, or None, for those that do not.
         motor_inertia: Inertia of the motors, seen through their gears [kg·m² or kg], which the
             dynamics contain; of use where gears bend.
     """

@@ -8,11 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from teleop_core.base.errors import ParameterError, UnknownNameError
-from teleop_core.base.parameters import parameter
-from teleop_core.graph.signals import DT
-from teleop_core.kernels import pointer
-from teleop_core.kernels.geometry import Array
+from teleop_core.base import ParameterError, UnknownNameError, parameter
+from teleop_core.graph import DT
+from teleop_core.kernels import Array, pointer
 from teleop_core.robots.arms.as_chain import true_chain
 from teleop_core.robots.chains.rigid_body import write_model
 from teleop_core.robots.drives import ACCELERATION, Drives
@@ -192,8 +190,7 @@ def _gears(robot: Robot, parameters: HardwareParameters) -> Array:
     """Stiffness of the gears (n,).
 
     Raises:
-        ParameterError: A gear that bends with no inertia of a link behind it, or that swings too
-            fast for the ticks.
+        ParameterError: A gear that bends with no inertia of a link behind it, or that swings too fast for the ticks.
     """
     given, n, model = parameters.gear_stiffness, robot.n, robot.dynamics
     stiffness = per_joint(robot, "plant.hardware.gear_stiffness", given, np.zeros(n))

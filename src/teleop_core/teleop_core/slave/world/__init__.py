@@ -1,8 +1,7 @@
 """World: what the slave's tool can touch.
 
-An object is a use of a shape (:mod:`teleop_core.shapes`), or one of the few in this folder that are
-objects alone. What it is made of, and how it pushes, is the same for all
-(:mod:`teleop_core.slave.world.contact`).
+An object is a use of a shape (:mod:`teleop_core.shapes`), or one of the few in this folder that are objects alone. What
+it is made of, and how it pushes, is the same for all (:mod:`teleop_core.slave.world.contact`).
 """
 
 from teleop_core.base.registry import Registry, part_check, places

@@ -9,11 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from teleop_core.base.errors import ParameterError
-from teleop_core.base.parameters import parameter
-from teleop_core.kernels import inner
-from teleop_core.kernels.fields import Fields
-from teleop_core.kernels.geometry import Array
+from teleop_core.base import ParameterError, parameter
+from teleop_core.kernels import Array, Fields, inner
 from teleop_core.shapes import Shape
 from teleop_core.shapes.basis import drawing
 from teleop_core.shapes.cylinder import CylinderParameters, cylinder_distance, cylinder_outline

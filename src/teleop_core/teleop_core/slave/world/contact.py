@@ -3,10 +3,9 @@
 The tool touches with one point, its tip, or with several along its axis. Each has a record of its
 own, with its surface, its bristle, and the Jacobian of the place where it touches.
 
-Where the points are against the object is found once in a tick. Within the tick the surface counts
-as flat there and the Jacobians as constant, so that every Runge-Kutta stage of the arm's motion
-feels the push of its own place and speed: a contact that is steep for the tick is smooth for the
-integrator.
+Where the points are against the object is found once in a tick. Within the tick the surface counts as flat there and
+the Jacobians as constant, so that every Runge-Kutta stage of the arm's motion feels the push of its own place and
+speed: a contact that is steep for the tick is smooth for the integrator.
 """
 
 import math
@@ -14,9 +13,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from teleop_core.kernels import inner
-from teleop_core.kernels.fields import PerJoint, Vector3
-from teleop_core.kernels.geometry import Array
+from teleop_core.kernels import Array, PerJoint, Vector3, inner
 from teleop_core.kernels.room import room
 from teleop_core.shapes.basis.directions import NEAR, make_unit
 from teleop_core.slave.arm import Arm

@@ -2,9 +2,8 @@
 
 import numpy as np
 
-from teleop_core.base.parameters import NoParameters
-from teleop_core.kernels import kernel
-from teleop_core.kernels.geometry import Array
+from teleop_core.base import NoParameters
+from teleop_core.kernels import Array, kernel
 from teleop_core.shapes import Shape
 
 

@@ -6,8 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from teleop_core.base.errors import ParameterError
-from teleop_core.base.parameters import Choice, Value, choice, parameter
+from teleop_core.base import Choice, ParameterError, Value, choice, parameter
 from teleop_core.kernels.geometry import Array
 from teleop_core.slave.world import WORLD_OBJECTS
 

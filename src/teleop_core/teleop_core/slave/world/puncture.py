@@ -1,19 +1,16 @@
 """Puncture: a surface that gives way to the tip, and the channel of the needle behind it.
 
-Once the push along the normal reaches the puncture force, the surface opens under the tip, and the
-spring of the surface is gone there. The tip then moves in a channel, straight along the normal of
-that place. In the channel the tip meets the cutting force where it goes deeper than before, and the
-dry friction of the shaft, which grows with depth. Both are springs that yield at a bound: they hold
-at rest, and give back no more than was stored in them.
+Once the push along the normal reaches the puncture force, the surface opens under the tip, and the spring of the
+surface is gone there. The tip then moves in a channel, straight along the normal of that place. In the channel the tip
+meets the cutting force where it goes deeper than before, and the dry friction of the shaft, which grows with depth.
+Both are springs that yield at a bound: they hold at rest, and give back no more than was stored in them.
 
 Source:
     Okamura, Simone and O'Leary 2004: stiffness before the puncture, then friction along the shaft
     and cutting. The yielding springs are those of :mod:`teleop_core.slave.friction`.
 """
 
-from teleop_core.kernels import inner
-from teleop_core.kernels.fields import Fields, Vector3
-from teleop_core.kernels.geometry import Array
+from teleop_core.kernels import Array, Fields, Vector3, inner
 
 
 class PunctureNumbers(Fields):
