@@ -4,6 +4,7 @@ import json
 import math
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from http import HTTPStatus
 from typing import Any
 
@@ -17,7 +18,7 @@ from patience import wait_until
 from teleop_console.curves import STRETCHES, TICKS, bands, thinned
 from teleop_console.drivers import Drivers
 from teleop_console.link import Arm, ArmView, View
-from teleop_console.past import DELAY, ERROR, ROWS, Past, Recorded, Seen
+from teleop_console.past import DELAY, ERROR, ROWS, Past, Recorded, Rows, Seen
 from teleop_console.recorded import RecordedLink
 from teleop_console.timeline import CURVES, FOUND, HELD, PIXELS, StripPage, Timeline
 from teleop_core.bags.memory import MemoryBag
@@ -38,12 +39,13 @@ WHOLE = {"begin": ["0"], "end": ["6"], "pixels": ["500"]}
 def session(tmp_path_factory: pytest.TempPathFactory) -> tc.Recording:
     """Six seconds on a disk, beside another session of two."""
     folder = tmp_path_factory.mktemp("timeline")
-    tc.run("mode_switching", duration=2.0, out=folder / "other", settings={"robot": "puma560"})
+    tc.run("coarse_box", duration=2.0, out=folder / "other")
     return tc.run("mode_switching", duration=6.0, out=folder / "session")
 
 
 @pytest.fixture
 def link(session: tc.Recording) -> RecordedLink:
+    assert session.path is not None
     return RecordedLink(session.path)
 
 
@@ -90,7 +92,8 @@ series = st.lists(
 def test_no_peak_is_lost_in_what_is_drawn_and_no_more_is_told_than_pixels_show(
     samples: list[tuple[float, float]], begin: float, length: float, pixels: int, is_held: bool
 ) -> None:
-    times, values = np.cumsum([step for step, _ in samples]), np.array([value for _, value in samples])
+    pair: Any = np.array(samples, np.float64).T
+    times, values = np.cumsum(pair[0]), pair[1]
     end = begin + length
     told = thinned((times, values), begin, end, pixels, is_held=is_held)
     assert len(told["times"]) <= 2 * (pixels + 2)
@@ -126,7 +129,8 @@ class Told(Past):
     """A past that says what a test gives it."""
 
     def __init__(self, operation: Array, marks: tuple[tuple[float, str], ...] = ()) -> None:
-        self.columns, self.joints, self._operation, self._marks = {}, {"": ARM.robot.joint_names}, operation, marks
+        super().__init__()
+        self.joints, self._operation, self._marks = {"": ARM.robot.joint_names}, operation, marks
 
     def rows(self, topic: str) -> Any:
         times = np.arange(len(self._operation)) * 1e-3
@@ -174,7 +178,7 @@ def test_states_that_no_version_knows_are_shown_as_unknown() -> None:
 def test_every_recorded_number_can_be_drawn_as_it_was_recorded(session: tc.Recording, link: RecordedLink) -> None:
     names = list(link.past.columns)
     for topic, column in (("slave/measured_cp", "y"), ("master/measured_cf", "fz"), ("slave/setpoint_js", "theta2")):
-        times, values = read(lambda name=f"{topic} {column}": link.past.samples(name))
+        times, values = read(partial(link.past.samples, f"{topic} {column}"))
         recorded = session[topic]
         np.testing.assert_allclose(values, recorded[column], rtol=1e-6, atol=1e-9)
         np.testing.assert_allclose(times, (recorded.log_ns - session.bag.start_ns) * 1e-9, atol=1e-9)
@@ -314,6 +318,13 @@ def view(time: float, x: float = 0.0, *, is_fresh: bool = True) -> View:
     return View(time, {"": arm}, is_fresh=is_fresh, delay=(0.001, 0.002))
 
 
+def known(seen: Seen, name: str) -> Rows:
+    """Samples of a column."""
+    found = seen.samples(name)
+    assert found is not None
+    return found
+
+
 def test_what_was_seen_is_kept_for_two_minutes_and_known_at_any_time_of_them() -> None:
     seen = Seen((ARM,))
     for i in range(ROWS + 500):
@@ -325,9 +336,9 @@ def test_what_was_seen_is_kept_for_two_minutes_and_known_at_any_time_of_them() -
         then = seen.view(time).arms[""]
         assert then.streams[topics.SLAVE_MEASURED_CP.name][0] == pytest.approx(1e-3 * math.floor(time * 30.0 + 1e-9))
         assert then.operation_text
-    times, error = seen.samples(ERROR) or ((), ())
+    times, error = known(seen, ERROR)
     np.testing.assert_allclose(error, 0.03 * np.array(times), atol=1e-9)
-    assert seen.samples(DELAY)[1][-1] == 0.001  # type: ignore[index]
+    assert known(seen, DELAY)[1][-1] == 0.001
 
 
 def test_what_was_not_known_is_no_number_and_silence_is_a_gap() -> None:
@@ -337,12 +348,10 @@ def test_what_was_not_known_is_no_number_and_silence_is_a_gap() -> None:
     late = view(100 / 30.0)
     late.arms[""].streams[topics.MASTER_MEASURED_CF.name] = np.ones(6)
     seen.add(late)
-    _, force = seen.samples("master/measured_cf fx") or ((), ())
+    _, force = known(seen, "master/measured_cf fx")
     assert np.isnan(force[:-1]).all()
     assert force[-1] == 1.0
-    found = seen.samples("slave/measured_cp x")
-    assert found is not None
-    assert thinned(found, 0.0, 4.0, 1000)["times"].count(None) == 1
+    assert thinned(known(seen, "slave/measured_cp x"), 0.0, 4.0, 1000)["times"].count(None) == 1
     assert topics.MASTER_MEASURED_CF.name not in seen.view(1.0).arms[""].streams
 
 

@@ -90,7 +90,8 @@ def bands(past: Past, begin: float, end: float) -> tuple[list[Told], list[Told]]
 
 def _hand_rows(found: Rows, label: str, joints: tuple[str, ...], begin: float, end: float) -> list[Told]:
     """Bands of hand, mode and what limits the slave."""
-    column, rows = _columns(found, TELEOP_STATE.columns), []
+    column = _columns(found, TELEOP_STATE.columns)
+    rows: list[Told] = []
     hand = np.where(column["is_clutched"] > 0.0, 1.0, np.where(column["is_following"] > 0.0, 2.0, 0.0))
     names = {
         "hand": (hand, (("rests", "idle"), ("clutched", "held"), ("follows", "good"))),

@@ -1,6 +1,7 @@
 """Past: the numbers of a session over time, by name: those that were recorded, or that the page saw."""
 
 import threading
+import time
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
@@ -36,7 +37,8 @@ DELAY = "session command_delay"
 """Column of the median delay from master sample to slave command [s], of live sessions."""
 ROWS = 4000
 """Times that are kept of a live session: two minutes at 30 Hz."""
-_KEPT = 8  # topics of a recording: more than can be drawn at once
+_KEPT = 8  # topics that are read at once; twice as many are kept
+_GATHER = 0.02  # time in which one request asks for all that it needs [s]
 _UNITS = {
     Kind.POSE: ("m",) * 3 + ("",) * 4,
     Kind.TWIST: ("m/s",) * 3 + ("rad/s",) * 3,
@@ -94,6 +96,10 @@ class Past(ABC):
     columns: dict[str, Column]
     joints: Mapping[str, tuple[str, ...]]
 
+    def __init__(self) -> None:
+        self.columns = {}
+        self._errors: dict[str, tuple[Rows, Rows, Rows]] = {}  # by arms, with what they are made of
+
     @abstractmethod
     def rows(self, topic: str) -> Rows | None:
         """All rows of a topic, none of an unknown one; None while they are being read."""
@@ -114,11 +120,16 @@ class Past(ABC):
         wanted, found = self.rows(arm + SLAVE_SERVO_CP.name), self.rows(arm + SLAVE_MEASURED_CP.name)
         if wanted is None or found is None:
             return None
+        known = self._errors.get(arm)
+        if known is not None and known[0] is wanted and known[1] is found:
+            return known[2]
         at = np.searchsorted(wanted[0], found[0], side="right") - 1
         if not len(wanted[0]):
             return found[0], np.full(len(at), np.nan)
         away = np.linalg.norm(found[1][:, :3] - wanted[1][np.maximum(at, 0), :3], axis=1)
-        return found[0], np.where(at < 0, np.nan, away)
+        errors = found[0], np.where(at < 0, np.nan, away)
+        self._errors[arm] = (wanted, found, errors)
+        return errors
 
     def _add(self, arm: str, topic: str, names: Sequence[str], units: Sequence[str], *, is_held: bool = False) -> None:
         """Take note of a topic's columns."""
@@ -145,6 +156,7 @@ class Seen(Past):
     """
 
     def __init__(self, arms: Sequence[Arm]) -> None:
+        super().__init__()
         self._arms = {arm.name: arm for arm in arms}
         self.joints = {arm.name: arm.robot.joint_names for arm in arms}
         self._lock = threading.Lock()
@@ -229,15 +241,16 @@ class Recorded(Past):
     """
 
     def __init__(self, bag: Bag, robots: Mapping[str, Robot] | None = None) -> None:
+        super().__init__()
         robots = robots or {}
         self._start_ns, self._lock = bag.start_ns, threading.Lock()
         self.duration = (bag.end_ns - bag.start_ns) * 1e-9
         self._bags = {name: of_arm(bag, arm) for name, arm in namespaces(bag).items()}
-        self.columns, self.joints = {}, {name: robot.joint_names for name, robot in robots.items()}
+        self.joints = {name: robot.joint_names for name, robot in robots.items()}
         self._end_ns = bag.end_ns
         self._marks: tuple[tuple[float, str], ...] | None = None
         self._read: dict[str, Rows] = {}
-        self._reading = ""
+        self._wanted, self._is_reading = set[str](), False
         self._topics = {_below(arm, topic): (arm, topic) for arm, one in self._bags.items() for topic in one.topics}
         for arm, topic in self._topics.values():
             self._note(arm, topic, robots.get(arm))
@@ -262,45 +275,57 @@ class Recorded(Past):
             return ()
 
     def rows(self, topic: str) -> Rows | None:
-        """All rows of a topic, one topic being read at a time; None until they are there."""
+        """All rows of a topic; None until they are there. Topics asked for together are read together."""
         with self._lock:
             if topic in self._read:
                 return self._read[topic]
             if topic not in self._topics:
                 return _NONE
-            if not self._reading:
-                self._reading = topic
-                threading.Thread(target=self._take, args=(topic,), name="console past", daemon=True).start()
+            if len(self._wanted) < _KEPT:
+                self._wanted.add(topic)
+            if not self._is_reading:
+                self._is_reading = True
+                threading.Thread(target=self._take, name="console past", daemon=True).start()
             return None
 
-    def _take(self, topic: str) -> None:
-        found = _NONE
+    def _take(self) -> None:
+        time.sleep(_GATHER)
+        with self._lock:
+            wanted, self._wanted = self._wanted, set()
+        found = dict.fromkeys(wanted, _NONE)
         try:
-            found = self._rows_of(*self._topics[topic])
+            for arm in self._bags:
+                own = [self._topics[topic][1] for topic in wanted if self._topics[topic][0] == arm]
+                found |= {_below(arm, topic): rows for topic, rows in self._rows_of(arm, own).items()}
         except TeleopError:  # damaged there: nothing can be drawn
             pass
         finally:
             with self._lock:
-                self._reading = ""
-                for old in list(self._read)[: max(0, len(self._read) - _KEPT + 1)]:
-                    del self._read[old]
-                self._read[topic] = found
+                self._is_reading = False
+                kept = list(self._read.items())[-max(1, 2 * _KEPT - len(found)) :]
+                self._read = dict(kept) | found
 
-    def _rows_of(self, arm: str, topic: str) -> Rows:
-        bag = self._bags[arm]
-        if topic in {one.name for one in REPORTS}:
-            series = reports_of(bag, BY_NAME[topic])
-            return _NONE if series is None else self._sorted((series.log_ns - self._start_ns) * 1e-9, series.values)
-        joints = self.joints.get(arm, ()) if topic in BY_NAME else ()
-        kept: Envelope | None = None
-        for block in bag.blocks([topic], joints or None):
-            if (series := block.get(topic)) is not None:
-                kept = kept or Envelope(self._start_ns, self._end_ns, series.values.shape[1])
-                kept.add(series.log_ns, series.values)
-        return _NONE if kept is None else self._sorted(*kept.line())
+    def _rows_of(self, arm: str, own: list[str]) -> dict[str, Rows]:
+        """Rows of topics of an arm: of streams in one pass."""
+        bag, found = self._bags[arm], dict[str, Rows]()
+        reports = {one.name for one in REPORTS} & set(own)
+        for topic in reports:
+            if (series := reports_of(bag, BY_NAME[topic])) is not None:
+                found[topic] = self._sorted((series.log_ns - self._start_ns) * 1e-9, series.values)
+        known = [topic for topic in own if topic in BY_NAME and topic not in reports]
+        foreign = [topic for topic in own if topic not in BY_NAME]
+        for streams, joints in ((known, self.joints.get(arm)), (foreign, None)):
+            kept = dict[str, Envelope]()
+            for block in bag.blocks(streams, joints or None) if streams else ():
+                for topic, rows in block.items():
+                    if topic not in kept:
+                        kept[topic] = Envelope(self._start_ns, self._end_ns, rows.values.shape[1])
+                    kept[topic].add(rows.log_ns, rows.values)
+            found |= {topic: self._sorted(*one.line()) for topic, one in kept.items()}
+        return found
 
     @staticmethod
-    def _sorted(times: Array, values: Any) -> Rows:
+    def _sorted(times: Any, values: Any) -> Rows:
         """Rows in the order of their times; those of several writers may stand otherwise."""
         if len(times) and (np.diff(times) < 0.0).any():
             order = np.argsort(times, kind="stable")

@@ -33,7 +33,7 @@
   const sign = (text) => text.replace('-', '−');
   const clamp = (value, low, high) => Math.min(high, Math.max(low, value));
   let state = null, at = 0, asked = 0, window_ = null, names = null, told = null, session = '';
-  let left = 0, wide = 0, folded = innerWidth < 576, found = [], picked = 0, looks = false, past = null, again = 0;
+  let left = 0, wide = 0, folded = innerWidth < 576 || innerHeight < 700, found = [], picked = 0, looks = false, past = null, again = 0;
 
   async function ask(path, words = []) {
     const answer = await fetch(`${path}?${new URLSearchParams(words)}`, { cache: 'no-store',
@@ -82,7 +82,7 @@
     if (!said.title) { state = null; strip.hidden = true; place(); return; }
     if (session !== said.title + said.is_live) {
       session = said.title + said.is_live;
-      window_ = told = past = null; names = said.first; search.value = ''; folded = innerWidth < 576;
+      window_ = told = past = null; names = said.first; search.value = ''; folded = innerWidth < 576 || innerHeight < 700;
       list.hidden = true; fill();
     }
     [state, at, asked] = [said, said.time, performance.now()];
@@ -150,6 +150,7 @@
 
   function draw() {
     if (!state || strip.hidden) return;
+    [canvas.dataset.begin, canvas.dataset.end] = range();
     const style = getComputedStyle(document.documentElement), ratio = devicePixelRatio || 1;
     const color = (name) => style.getPropertyValue(`--t-color-${name}`).trim();
     const rows = told?.bands || [], panes = groups();
@@ -162,8 +163,9 @@
     pen.clearRect(0, 0, width, height);
     pen.font = '11px system-ui, sans-serif';
     const texts = [...rows.map((row) => row.row), ...panes.flatMap((pane) => [...pane.labels, pane.unit])];
-    left = Math.ceil(Math.max(24, ...texts.map((text) => pen.measureText(text).width))) + 8;
+    left = Math.ceil(Math.max(24, ...texts.map((text) => pen.measureText(text).width))) + 10;
     wide = Math.max(1, width - left - 8);
+    [canvas.dataset.left, canvas.dataset.wide] = [left, wide];
     ruler(color, height);
     rows.forEach((row, i) => band(row, RULER + i * BAND, color));
     panes.forEach((pane, i) => plot(pane, RULER + rows.length * BAND + i * PANE, color));
@@ -187,10 +189,10 @@
       pen.fillStyle = color('muted');
       pen.fillText(k ? text : state.is_live ? 'now' : '0', clamp(place, left + 8, left + wide - 13), 11);
     }
-    pen.textAlign = 'left'; pen.fillText('s', 0, 11);
+    pen.textAlign = 'left'; pen.fillText('s', 2, 11);
   }
   function band({ row, stretches }, top, color) {
-    pen.textAlign = 'left'; pen.fillStyle = color('muted'); pen.fillText(row, 0, top + 11);
+    pen.textAlign = 'left'; pen.fillStyle = color('muted'); pen.fillText(row, 2, top + 11);
     for (const bad of [false, true]) for (const [a, b, text, meaning] of stretches) {
       if ((meaning === 'wrong') !== bad) continue; // what is wrong covers the rest
       const begin = clamp(x(a), left, left + wide), long = Math.max(2, clamp(x(b), left, left + wide) - begin);
