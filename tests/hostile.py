@@ -84,7 +84,7 @@ def gives_values_of_every_wrong_type(watcher: PageClient, driver: PageClient) ->
     wrong: Any
     wrong = ([], {}, [[1]], None, NAN, INF, 2**63, -(2**63), "x" * 5000, b"bytes", {"a": [1] * 100})
     for page in (watcher, driver):
-        for label in ("dark", "name", "joint", "Take control"):
+        for label in ("dark", "name", "show", "Take control"):
             for value in wrong:
                 page.set(page.elements[label], value=value)
 

@@ -108,8 +108,8 @@ def test_no_peak_is_lost_in_what_is_drawn_and_no_more_is_told_than_pixels_show(
 
 
 def test_one_sample_of_600000_that_is_wrong_is_seen_where_it_is() -> None:
-    times = np.arange(600_000) * 1e-3
-    values = np.sin(times)
+    times = np.arange(600_000.0) * 1e-3
+    values: Any = np.sin(times)
     values[432_101] = -50.0
     told = thinned((times, values), 0.0, 600.0, 1000)
     worst = int(np.nanargmin(numbers(told["low"])))
