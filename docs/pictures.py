@@ -119,7 +119,7 @@ def replay(folder: Path) -> None:
         tab.shows("Play", 120)
         toggle_dark(tab)
         seek(tab, 9.5)
-        for words in ("measured_cf fx", "setpoint_js theta1"):
+        for words in ("master/measured_cf fx", "setpoint_js theta1"):
             tab.value("document.querySelector('#t-strip [type=search]').focus()")
             tab.call("Input.insertText", text=words)
             tab.until("document.querySelectorAll('#t-found li').length === 1")
