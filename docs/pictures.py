@@ -112,17 +112,19 @@ def wide_and_narrow(url: str, folder: Path) -> None:
 def replay(folder: Path) -> None:
     """Take the page of a recording, dark, with curves and another recording laid over it."""
     for name, seed in (("session", 1), ("second", 2)):
-        settings = {"haptic_master.seed": seed, "path.approach_time": float(seed), "buttons.clutch": [4.0, 5.0]}
+        buttons = {"buttons.clutch": [4.0, 5.0], "buttons.mode": [6.0, 9.0], "buttons.fixture": [2.0, 11.0]}
+        settings = {"haptic_master.seed": seed, "path.approach_time": float(seed), **buttons}
         tc.run("mode_switching", duration=12.0, out=folder / "bags" / name, settings=settings)
     with served(folder, folder / "bags" / "session") as console, Tab(folder / "replay", 1100, 900) as tab:
         tab.visit(console.url)
         tab.shows("Play", 120)
         toggle_dark(tab)
         seek(tab, 9.5)
-        for words in ("master/measured_cf fx", "setpoint_js theta1"):
+        for words in ("master/measured_cf fx", "slave/setpoint_js theta1"):
             tab.value("document.querySelector('#t-strip [type=search]').focus()")
             tab.call("Input.insertText", text=words)
-            tab.until("document.querySelectorAll('#t-found li').length === 1")
+            found = "[...document.querySelectorAll('#t-found li')].map((e) => e.innerText).join()"
+            tab.until(f"{found}.includes({json.dumps(words)})")
             tab.key("Enter")
         tab.value("""(() => { const over = document.querySelector('.t-over');
             over.value = 'second'; over.dispatchEvent(new Event('change')); })()""")

@@ -95,7 +95,7 @@
     loop.parentElement.hidden = over.hidden = live;
     align.hidden = live || !state.over;
     one('[data-do=now]').hidden = !live || !state.is_past;
-    one('[data-do=play]').textContent = state.is_playing ? 'Pause' : 'Play';
+    one('[data-do=play]').textContent = state.is_playing && !live ? 'Pause' : 'Play';
     one('[data-do=fold]').textContent = folded ? 'Unfold' : 'Fold';
     one('[data-do=fold]').setAttribute('aria-expanded', !folded);
     strip.classList.toggle('t-folded', folded);
