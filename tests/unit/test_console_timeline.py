@@ -18,8 +18,9 @@ from patience import wait_until
 from teleop_console.curves import STRETCHES, TICKS, bands, thinned
 from teleop_console.drivers import Drivers
 from teleop_console.link import Arm, ArmView, View
-from teleop_console.past import DELAY, ERROR, ROWS, Past, Recorded, Rows, Seen
+from teleop_console.past import DELAY, ERROR, ROWS, Past, Rows, Seen
 from teleop_console.recorded import RecordedLink
+from teleop_console.recorded_past import Recorded
 from teleop_console.timeline import CURVES, FOUND, HELD, PIXELS, StripPage, Timeline
 from teleop_core.bags.memory import MemoryBag
 from teleop_core.bags.recording import MARKS

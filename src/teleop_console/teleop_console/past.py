@@ -1,27 +1,18 @@
 """Past: the numbers of a session over time, by name: those that were recorded, or that the page saw."""
 
 import threading
-import time
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from teleop_console.link import Arm, ArmView, View
-from teleop_console.recorded_arms import in_words, namespaces, reports_of
-from teleop_core.bags.arms import of_arm
-from teleop_core.bags.reader import Bag
-from teleop_core.bags.recording import MARKS
-from teleop_core.bags.series import kind_of
-from teleop_core.base.errors import TeleopError
-from teleop_core.evaluation.traces import Envelope
+from teleop_console.recorded_arms import in_words
 from teleop_core.graph.topics import (
     BY_NAME,
     OPERATION,
-    REPORTS,
     SLAVE_MEASURED_CP,
     SLAVE_OPERATION,
     SLAVE_SERVO_CP,
@@ -37,8 +28,6 @@ DELAY = "session command_delay"
 """Column of the median delay from master sample to slave command [s], of live sessions."""
 ROWS = 4000
 """Times that are kept of a live session: two minutes at 30 Hz."""
-_KEPT = 8  # topics that are read at once; twice as many are kept
-_GATHER = 0.02  # time in which one request asks for all that it needs [s]
 _UNITS = {
     Kind.POSE: ("m",) * 3 + ("",) * 4,
     Kind.TWIST: ("m/s",) * 3 + ("rad/s",) * 3,
@@ -81,7 +70,8 @@ class Column:
 
 Rows = tuple[Array, Array]
 """Times (N,) [s], ascending, and values (N, width) or (N,)."""
-_NONE: Rows = (np.empty(0), np.empty((0, 3)))
+NOTHING: Rows = (np.empty(0), np.empty((0, 3)))
+"""Rows of an unknown topic."""
 _NO_SAMPLES: Rows = (np.empty(0), np.empty(0))
 
 
@@ -134,9 +124,9 @@ class Past(ABC):
     def _add(self, arm: str, topic: str, names: Sequence[str], units: Sequence[str], *, is_held: bool = False) -> None:
         """Take note of a topic's columns."""
         for index, (name, unit) in enumerate(zip(names, units, strict=True)):
-            self.columns[f"{_below(arm, topic)} {name}"] = Column(_below(arm, topic), index, unit, is_held)
+            self.columns[f"{below(arm, topic)} {name}"] = Column(below(arm, topic), index, unit, is_held)
         if topic == SLAVE_MEASURED_CP.name:
-            self.columns[_below(arm, ERROR)] = Column(_below(arm, topic), 0, "m")
+            self.columns[below(arm, ERROR)] = Column(below(arm, topic), 0, "m")
 
     def _add_known(self, arm: str, topic: str, kind: Kind, joints: tuple[str, ...], robot: Robot | None) -> None:
         """Take note of the columns of a topic whose kind is known."""
@@ -161,7 +151,7 @@ class Seen(Past):
         self.joints = {arm.name: arm.robot.joint_names for arm in arms}
         self._lock = threading.Lock()
         self._times, self._rings, self._count = np.full(ROWS, np.nan), dict[tuple[str, str], Array](), 0
-        self.columns = {_below(arm.name, ERROR): Column("", 0, "m") for arm in arms} | {DELAY: Column(DELAY, 0, "s")}
+        self.columns = {below(arm.name, ERROR): Column("", 0, "m") for arm in arms} | {DELAY: Column(DELAY, 0, "s")}
 
     def add(self, view: View) -> None:
         """Note what is known; an earlier time begins anew, the same one and silence add nothing."""
@@ -205,8 +195,8 @@ class Seen(Past):
         """All rows of a topic."""
         with self._lock:
             order = self._order()
-            found = [ring for key, ring in self._rings.items() if _below(*key) == topic]
-            return (self._times[order], found[0][order]) if found else _NONE
+            found = [ring for key, ring in self._rings.items() if below(*key) == topic]
+            return (self._times[order], found[0][order]) if found else NOTHING
 
     def view(self, time: float) -> View:
         """What was known at a time [s]; at the first one that is kept, if that is later."""
@@ -229,123 +219,8 @@ class Seen(Past):
             return view
 
 
-class Recorded(Past):
-    """What was recorded: every column of every topic that has numbers.
-
-    A topic is read when it is first asked for, in a thread: reading ten minutes takes five seconds.
-    Of recordings beyond eleven minutes the smallest and largest value of short stretches are kept.
-
-    Args:
-        bag: The recording.
-        robots: Robots of its arms by namespace, where they are known.
-    """
-
-    def __init__(self, bag: Bag, robots: Mapping[str, Robot] | None = None) -> None:
-        super().__init__()
-        robots = robots or {}
-        self._start_ns, self._lock = bag.start_ns, threading.Lock()
-        self.duration = (bag.end_ns - bag.start_ns) * 1e-9
-        self._bags = {name: of_arm(bag, arm) for name, arm in namespaces(bag).items()}
-        self.joints = {name: robot.joint_names for name, robot in robots.items()}
-        self._end_ns = bag.end_ns
-        self._marks: tuple[tuple[float, str], ...] | None = None
-        self._read: dict[str, Rows] = {}
-        self._wanted, self._is_reading = set[str](), False
-        self._topics = {_below(arm, topic): (arm, topic) for arm, one in self._bags.items() for topic in one.topics}
-        for arm, topic in self._topics.values():
-            self._note(arm, topic, robots.get(arm))
-
-    def _note(self, arm: str, topic: str, robot: Robot | None) -> None:
-        """Take note of a topic's columns, where its messages are numbers."""
-        info = self._bags[arm].topics[topic]
-        kind, known = kind_of(topic, info.type), topic in BY_NAME
-        if not info.count or kind is None or (kind is Kind.REPORT and topic not in {one.name for one in REPORTS}):
-            return
-        joints = robot.joint_names if robot is not None and known else ()
-        if not joints and kind.has_joints:
-            joints = self._names(arm, topic)
-        self._add_known(arm, topic, kind, joints, robot if known else None)
-
-    def _names(self, arm: str, topic: str) -> tuple[str, ...]:
-        """Names of joints as the first messages of a topic have them."""
-        try:
-            blocks = (block[topic] for block in self._bags[arm].blocks([topic]) if topic in block)
-            return next((series.names for series in blocks), ())
-        except TeleopError:
-            return ()
-
-    def rows(self, topic: str) -> Rows | None:
-        """All rows of a topic; None until they are there. Topics asked for together are read together."""
-        with self._lock:
-            if topic in self._read:
-                return self._read[topic]
-            if topic not in self._topics:
-                return _NONE
-            if len(self._wanted) < _KEPT:
-                self._wanted.add(topic)
-            if not self._is_reading:
-                self._is_reading = True
-                threading.Thread(target=self._take, name="console past", daemon=True).start()
-            return None
-
-    def _take(self) -> None:
-        time.sleep(_GATHER)
-        with self._lock:
-            wanted, self._wanted = self._wanted, set()
-        found = dict.fromkeys(wanted, _NONE)
-        try:
-            for arm in self._bags:
-                own = [self._topics[topic][1] for topic in wanted if self._topics[topic][0] == arm]
-                found |= {_below(arm, topic): rows for topic, rows in self._rows_of(arm, own).items()}
-        except TeleopError:  # damaged there: nothing can be drawn
-            pass
-        finally:
-            with self._lock:
-                self._is_reading = False
-                kept = list(self._read.items())[-max(1, 2 * _KEPT - len(found)) :]
-                self._read = dict(kept) | found
-
-    def _rows_of(self, arm: str, own: list[str]) -> dict[str, Rows]:
-        """Rows of topics of an arm: of streams in one pass."""
-        bag, found = self._bags[arm], dict[str, Rows]()
-        reports = {one.name for one in REPORTS} & set(own)
-        for topic in reports:
-            if (series := reports_of(bag, BY_NAME[topic])) is not None:
-                found[topic] = self._sorted((series.log_ns - self._start_ns) * 1e-9, series.values)
-        known = [topic for topic in own if topic in BY_NAME and topic not in reports]
-        foreign = [topic for topic in own if topic not in BY_NAME]
-        for streams, joints in ((known, self.joints.get(arm)), (foreign, None)):
-            kept = dict[str, Envelope]()
-            for block in bag.blocks(streams, joints or None) if streams else ():
-                for topic, rows in block.items():
-                    if topic not in kept:
-                        kept[topic] = Envelope(self._start_ns, self._end_ns, rows.values.shape[1])
-                    kept[topic].add(rows.log_ns, rows.values)
-            found |= {topic: self._sorted(*one.line()) for topic, one in kept.items()}
-        return found
-
-    @staticmethod
-    def _sorted(times: Any, values: Any) -> Rows:
-        """Rows in the order of their times; those of several writers may stand otherwise."""
-        if len(times) and (np.diff(times) < 0.0).any():
-            order = np.argsort(times, kind="stable")
-            times, values = times[order], values[order]
-        return times, values
-
-    def marks(self) -> Sequence[tuple[float, str]]:
-        """Times [s] and texts of the marks that somebody set; the first call reads them."""
-        if self._marks is None:
-            self._marks = tuple(self._marks_of())
-        return self._marks
-
-    def _marks_of(self) -> Iterator[tuple[float, str]]:
-        for bag in self._bags.values():
-            with suppress(TeleopError):  # most have none
-                for mark in bag.reports(MARKS):
-                    yield (mark.stamp_ns - self._start_ns) * 1e-9, mark.message
-
-
-def _below(arm: str, topic: str) -> str:
+def below(arm: str, topic: str) -> str:
+    """Name of a topic, or a column, of an arm."""
     return f"{arm}/{topic}" if arm else topic
 
 

@@ -8,8 +8,8 @@ from types import MappingProxyType
 import numpy as np
 
 from teleop_console.link import ArmView, Parameters, Setting, View
-from teleop_console.past import Recorded
 from teleop_console.recorded_arms import configuration_of, parameters_of, recorded_arms
+from teleop_console.recorded_past import Recorded
 from teleop_core.bags.reader import Bag
 from teleop_core.base.errors import ParameterError, SessionError
 from teleop_core.graph.topics import Topic

@@ -14,8 +14,9 @@ from pathlib import Path
 from teleop_console.curves import bands, thinned
 from teleop_console.drivers import Drivers
 from teleop_console.link import Link, View
-from teleop_console.past import ERROR, Past, Recorded, Seen
+from teleop_console.past import ERROR, Past, Seen
 from teleop_console.recorded import RecordedLink
+from teleop_console.recorded_past import Recorded
 from teleop_console.recordings import Recordings
 from teleop_console.start import Query, Told
 from teleop_core.bags.reader import Bag
