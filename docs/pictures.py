@@ -106,23 +106,35 @@ def wide_and_narrow(url: str, folder: Path) -> None:
         tab.visit(url)
         tab.shows("ENABLED", 60)
         toggle_dark(tab)
-        tab.click("Plots")
         keep(tab, "console_800.png")
 
 
 def replay(folder: Path) -> None:
-    """Take the page of a recording of two arms, narrow and dark."""
-    settings = {"right/robot": "puma560", "right/haptic_master.seed": 2}
-    out = folder / "two_arms"
-    tc.run(SCENARIO, duration=12.0, out=out, arms=["left", "right"], settings=settings)
-    with served(folder, out) as console, Tab(folder / "replay", 800, 900) as tab:
+    """Take the page of a recording, dark, with curves and another recording laid over it."""
+    for name, seed in (("session", 1), ("second", 2)):
+        buttons = {"buttons.clutch": [4.0, 5.0], "buttons.mode": [6.0, 9.0], "buttons.fixture": [2.0, 11.0]}
+        settings = {"haptic_master.seed": seed, "path.approach_time": float(seed), **buttons}
+        tc.run("mode_switching", duration=12.0, out=folder / "bags" / name, settings=settings)
+    with served(folder, folder / "bags" / "session") as console, Tab(folder / "replay", 1100, 900) as tab:
         tab.visit(console.url)
         tab.shows("Play", 120)
         toggle_dark(tab)
-        tab.fill("time", "9.5")
-        tab.key("Enter")
-        tab.click("Plots")
-        keep(tab, "console_replay.png")
+        seek(tab, 9.5)
+        for words in ("master/measured_cf fx", "slave/setpoint_js theta1"):
+            tab.value("document.querySelector('#t-strip [type=search]').focus()")
+            tab.call("Input.insertText", text=words)
+            found = "[...document.querySelectorAll('#t-found li')].map((e) => e.innerText).join()"
+            tab.until(f"{found}.includes({json.dumps(words)})")
+            tab.key("Enter")
+        tab.value("""(() => { const over = document.querySelector('.t-over');
+            over.value = 'second'; over.dispatchEvent(new Event('change')); })()""")
+        keep(tab, "console_replay.png", "/theta1 .*, dashed /.test(document.querySelector('.t-key').innerText)")
+
+
+def seek(tab: Tab, moment: float) -> None:
+    """Go to a time of the recording [s]."""
+    tab.value(f"fetch('time?seek={moment}', {{headers: {{'Teleop-Page': window.teleopPage}}}})")
+    tab.shows(f"{moment:.2f} s of")
 
 
 def moving(folder: Path) -> None:
@@ -146,9 +158,7 @@ def moving(folder: Path) -> None:
 
 def frame(tab: Tab, moment: float) -> Image.Image:
     """Picture of a replay at a time of the recording [s]."""
-    tab.fill("time", f"{moment:.1f}")
-    tab.key("Enter")
-    tab.shows(f"{moment:.2f} s of")
+    seek(tab, moment)
     for _ in range(4):  # headless, the page is drawn only while it is pictured
         picture = shot(tab)
     return Image.open(io.BytesIO(picture)).convert("RGB")

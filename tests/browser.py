@@ -24,7 +24,10 @@ FLAGS = (
 )  # fmt: skip
 # What Chromium says about the speed of software rendering; nothing is wrong then.
 ADVICE = ("GL Driver Message", "Canvas2D: Multiple readback", "THREE.Clock")
-KEYS = {" ": ("Space", 32), "Escape": ("Escape", 27), "Enter": ("Enter", 13)}
+KEYS = {
+    " ": ("Space", 32), "Escape": ("Escape", 27), "Enter": ("Enter", 13), "ArrowLeft": ("ArrowLeft", 37),
+    "ArrowRight": ("ArrowRight", 39), "Home": ("Home", 36), "End": ("End", 35),
+}  # fmt: skip
 
 
 def chromium() -> str:

@@ -84,7 +84,7 @@ def gives_values_of_every_wrong_type(watcher: PageClient, driver: PageClient) ->
     wrong: Any
     wrong = ([], {}, [[1]], None, NAN, INF, 2**63, -(2**63), "x" * 5000, b"bytes", {"a": [1] * 100})
     for page in (watcher, driver):
-        for label in ("dark", "name", "joint", "Take control"):
+        for label in ("dark", "name", "show", "Take control"):
             for value in wrong:
                 page.set(page.elements[label], value=value)
 
@@ -246,6 +246,16 @@ def drives_to_where_no_stylus_is(watcher: PageClient, driver: PageClient) -> Non
     driver.drag(more=1)
 
 
+def moves_time_and_asks_the_strip_for_too_much(watcher: PageClient, driver: PageClient) -> None:
+    assert ask(watcher.port, "/strip?begin=0&end=1&pixels=100")[0] == 403  # of no page
+    for path in ("/time?seek=1", "/time?now=1", "/over?name=..%2F..", "/over?name="):
+        assert watcher.ask(path)[0] == 409, path
+    for words in ("begin=0&end=1&pixels=1e9", "begin=nan&end=1&pixels=9", "begin=0&end=1&pixels=9&name=/etc/passwd"):
+        assert driver.ask(f"/strip?{words}")[0] == 409, words
+    for path in ("/time?seek=inf", "/over?name=..", "/timeline?find=" + "x" * 5000, "/strip?" + "name=x&" * 90):
+        assert driver.ask(path)[0] == 409, path
+
+
 def occupies_the_server_with_presses(watcher: Any, driver: Any) -> None:
     for _ in range(60):
         driver.click("Initialize")
@@ -261,7 +271,7 @@ HOSTILE = (
     sends_one_message_that_is_too_large, floods_with_drags, floods_with_pings,
     begins_a_message_that_never_ends, opens_sockets_and_says_nothing,
     opens_pages_that_never_come_up, comes_and_goes, leaves_in_the_middle_of_a_message,
-    keeps_another_page_alive, reads_files, drives_to_where_no_stylus_is,
+    keeps_another_page_alive, reads_files, moves_time_and_asks_the_strip_for_too_much, drives_to_where_no_stylus_is,
 )  # fmt: skip
 """All that must not even be noticed by the arm."""
 

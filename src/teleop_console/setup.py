@@ -10,9 +10,7 @@ setup(
     description="Console and report of teleop_core: a session in the browser, and scores as a page",
     license="Apache-2.0",
     packages=find_packages(include=["teleop_console", "teleop_console.*"]),
-    package_data={
-        "teleop_console": ["py.typed", "*.pyi", "page.js", "start.css", "start.js", "report/*.js", "report/*.css"]
-    },
+    package_data={"teleop_console": ["py.typed", "*.pyi", "*.css", "*.js", "report/*.js", "report/*.css"]},
     python_requires=">=3.11",
     install_requires=[f"teleop_core=={VERSION}", "lazy_loader", "msgspec", "numpy", "plotly", "viser>=1.1,<1.2"],
     data_files=[

@@ -12,10 +12,8 @@ from hypothesis import strategies as st
 from rosbags.highlevel import AnyReader
 
 import teleop_core as tc
-from teleop_console.app import Console
 from teleop_console.recorded import FRAME, RecordedLink
 from teleop_console.recorded_arms import configuration_of, recorded_arms
-from teleop_console.server import ConsoleServer
 from teleop_core.bags.memory import MemoryBag
 from teleop_core.graph.topics import MASTER_MEASURED_CP, SLAVE_MEASURED_CP, Kind, Topic
 
@@ -237,19 +235,3 @@ def test_each_arm_of_two_is_seen_as_it_was(small: MemoryBag) -> None:
     joints = next(s for topic, s in small.streams.items() if topic.name == "slave/measured_js")
     np.testing.assert_array_equal(seen[""].streams["slave/measured_js"], joints.values[-1])
     np.testing.assert_array_equal(seen["right"].streams["slave/measured_js"], joints.values[0])
-
-
-def test_after_a_jump_in_time_plots_show_what_was_before(session: tc.Recording, link: RecordedLink) -> None:
-    with ConsoleServer(port=0) as server:
-        page = Console(server, link)
-        page.panel.remember(link.view)
-        page.draw()
-        link.seek(5.0)
-        page.draw()
-        at, place = page.panel.histories[""].read("place")
-    assert at[0] == pytest.approx(-5.0, abs=0.02)
-    tip = session["slave/measured_cp"]
-    begin = session.bag.start_ns
-    index = np.searchsorted(tip.log_ns, begin + ((5.0 + at) * 1e9).round().astype(int), "right") - 1
-    is_known = index >= 0
-    np.testing.assert_array_equal(place[is_known], np.column_stack([tip[axis] for axis in "xyz"])[index[is_known]])

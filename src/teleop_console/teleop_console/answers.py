@@ -23,12 +23,13 @@ from teleop_console.drivers import Drivers
 from teleop_console.guard import Request
 from teleop_console.look import style
 from teleop_console.start import StartPage
+from teleop_console.timeline import StripPage
 
 OWN_PAGE = "Teleop-Page"
 """Header of our page's requests; to a page of another origin browsers do not allow it."""
 PRESS = "Teleop-Press"
 """Header with the name of a press: one that is said again, unanswered, is the same."""
-_SCRIPTS = tuple(Path(__file__).with_name(name) for name in ("page.js", "start.js"))
+_SCRIPTS = tuple(Path(__file__).with_name(name) for name in ("page.js", "start.js", "strip.js"))
 _FIELDS = 100  # of an address
 _FURNITURE = b'<head><link rel="stylesheet" href="teleop.css"><script src="teleop.js"></script>'
 
@@ -64,6 +65,7 @@ class Answers:
         situation: What pages show; whoever knows it writes it.
         stop: Presses the emergency stop; it must not block.
         start: The form on which sessions are chosen.
+        strip: The strip of time.
     """
 
     def __init__(self, drivers: Drivers) -> None:
@@ -72,13 +74,13 @@ class Answers:
         self._drivers = drivers
         self._pages: dict[str, int] = {}  # by names that no other page can guess
         self._heard: deque[str | None] = deque(maxlen=100)  # presses, by their names
-        self.start = StartPage(drivers)
+        self.start, self.strip = StartPage(drivers), StripPage(drivers)
         self._paths: dict[str, Callable[[Request], Response]] = {
             "/alive": self._alive,
             "/stop": self._stop,
             "/teleop.js": _script,
             "/teleop.css": _style,
-            **dict.fromkeys(self.start.paths, self._start),
+            **dict.fromkeys(self.slow_paths, self._later),
         }
 
     def name(self, page: int) -> str:
@@ -99,7 +101,7 @@ class Answers:
     @property
     def slow_paths(self) -> frozenset[str]:
         """Those of :attr:`paths` whose answers may take a while."""
-        return self.start.paths
+        return self.start.paths | self.strip.paths
 
     def to(self, request: Request) -> Response:
         """Answer to a request for one of :attr:`paths`; from any thread."""
@@ -125,14 +127,18 @@ class Answers:
         told = {**asdict(self.situation), "drives": self._drivers.may_drive(page)}
         return answer_of(http.HTTPStatus.OK, json.dumps(told).encode(), "application/json")
 
-    def _start(self, request: Request) -> Response:
+    def _later(self, request: Request) -> Response:
         names = request.header(OWN_PAGE)
         if len(names) != 1:
             return answer_of(http.HTTPStatus.FORBIDDEN)
         address = urlsplit(request.path)
-        query = parse_qs(address.query, max_num_fields=_FIELDS)
+        is_strip = address.path in self.strip.paths
+        query = parse_qs(address.query, keep_blank_values=is_strip, max_num_fields=_FIELDS)
         page = self._pages.get(names[0], -1)
-        status, told = self.start.answer(address.path, query, page, request.body)
+        if is_strip:
+            status, told = self.strip.answer(address.path, query, page)
+        else:
+            status, told = self.start.answer(address.path, query, page, request.body)
         return answer_of(status, json.dumps(told).encode(), "application/json")
 
     def _stop(self, request: Request) -> Response:

@@ -19,6 +19,7 @@ from teleop_console.settings import Renew
 from teleop_console.start import Wish
 from teleop_console.status import situation
 from teleop_console.stylus import Steps, Stylus
+from teleop_console.timeline import Timeline
 from teleop_console.view_tab import Insets, ViewTab, Visitors, theme
 
 RATE = 30.0
@@ -59,6 +60,7 @@ class Console:
         self._failed = set[str]()
         self.panel = Panel(server.viser, link, drivers, renew, of_session)
         self.panel.settings.on_change(self.scene.retune)
+        self.timeline = server.answers.strip.shown = Timeline(link)
         self._visitors = Visitors(server.viser, drivers, self.scene, is_live=link.is_live)
         if link.is_live:
             server.answers.stop = self._stop
@@ -83,12 +85,14 @@ class Console:
 
     def draw(self) -> None:
         """Show what is known now."""
-        view = self._link.view()
+        view = seen = self._link.view()
         if self._link.is_live:
-            shown = replace(situation(view), can_end=self._can_end)
-            self._server.answers.situation = shown
-            self.stylus.show(is_shown=not shown.is_stopped and self.panel.is_led_here)
-        self.scene.draw(view)
+            told = replace(situation(view), can_end=self._can_end)
+            self._server.answers.situation = told
+            seen = self.timeline.shown(view, is_stopped=told.is_stopped)
+            is_now = seen is view and not told.is_stopped
+            self.stylus.show(is_shown=is_now and self.panel.is_led_here)
+        self.scene.draw(seen)
         self.stylus.draw(view)
         self.panel.draw(view)
         self.panel.settings.follow(self._link.changes())
@@ -99,15 +103,9 @@ class Console:
         while not is_over() and not self.panel.settings.refresh():
             time.sleep(_ASK_AGAIN)
 
-    def try_to_draw(self, *before: Callable[[], None]) -> None:
-        """Draw; what fails is said once, and costs this drawing and not the session.
-
-        Args:
-            before: What else is drawn, first.
-        """
+    def try_to_draw(self) -> None:
+        """Draw; what fails is said once, and costs this drawing and not the session."""
         try:
-            for draw in before:
-                draw()
             self.draw()
         except Exception as error:
             if (kind := repr(error)) not in self._failed:
@@ -130,6 +128,7 @@ class Console:
         """Leave the page to what comes next."""
         answers = self._server.answers
         answers.stop, answers.situation = None, Situation(doing="closing …")
+        answers.strip.shown = None
         self._server.drivers.is_for_all = False
         self._visitors.close()
 
@@ -181,21 +180,17 @@ def replay(server: ConsoleServer, path: Path) -> None:
     Raises:
         RecordingError: It cannot be read, or is one of another system.
     """
-    from teleop_console.replay_controls import ReplayControls
-
     link = RecordedLink(path)
     _empty(server)
     console = Console(server, link, can_end=True)
-    controls = ReplayControls(server.viser, link)
     console.panel.settings.refresh()
     console.scene.remember(link.path)
-    console.panel.remember(link.view)
     console.stylus.show(is_shown=False)
     before = time.monotonic()
     while not server.answers.start.is_ended:
         now = time.monotonic()
         link.advance(now - before)
         before = now
-        console.try_to_draw(controls.draw)
+        console.try_to_draw()
         time.sleep(max(0.0, now + 1.0 / RATE - time.monotonic()))
     console.close()

@@ -1,82 +1,12 @@
-"""History: what the page has seen in the last seconds, for plots, and what it sums up as scores."""
+"""History: figures that the page sums up of what it has seen."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from teleop_console.link import Arm, ArmView
+from teleop_console.link import ArmView
 from teleop_core.graph import topics
 from teleop_core.kernels.geometry import Array
-
-SPAN = 30.0
-"""How far plots reach back [s]."""
-_ROWS = 1200  # 30 s at 40 Hz
-_LEFT = topics.ENERGY.index("margin")
-
-
-class History:
-    """Last seconds of one arm: a row for each look.
-
-    Columns: joints wanted (n) and measured (n) [rad or m]; place wanted and measured (3 each) [m];
-    force (3) [N]; distance from the wanted place [m]; delay [s]; energy that the ports of hand and
-    slave may still give (2) [J]; NaN where nothing was known.
-
-    Args:
-        arm: The arm.
-    """
-
-    def __init__(self, arm: Arm) -> None:
-        self.arm, n = arm, arm.robot.n
-        ends = np.cumsum([n, n, 3, 3, 3, 1, 1, 2]).tolist()
-        starts = [0, *ends]
-        names = ("wanted", "joints", "reference", "place", "force", "error", "delay", "left")
-        self._columns = {name: slice(a, b) for name, a, b in zip(names, starts, ends, strict=False)}
-        self._rows = np.full((_ROWS, ends[-1]), np.nan)
-        self._times = np.full(_ROWS, np.nan)
-        self._next = self._count = 0
-
-    def add(self, time: float, view: ArmView, delay: float) -> None:
-        """Note what is known at a time [s]; an earlier one begins anew, the same adds nothing."""
-        if self._count:
-            last = self._times[self._next - 1]
-            if time == last:
-                return
-            if time < last:
-                self.clear()
-        row, n = self._rows[self._next], self.arm.robot.n
-        row[:] = np.nan
-        for name, topic, width in (
-            ("wanted", topics.SLAVE_SETPOINT_JS, n),
-            ("joints", topics.SLAVE_MEASURED_JS, n),
-            ("reference", topics.SLAVE_SERVO_CP, 3),
-            ("place", topics.SLAVE_MEASURED_CP, 3),
-            ("force", topics.MASTER_MEASURED_CF, 3),
-        ):
-            values = view.get(topic)
-            if values is not None:
-                row[self._columns[name]] = values[:width]
-        away = row[self._columns["reference"]] - row[self._columns["place"]]
-        row[self._columns["error"]] = np.sqrt(away @ away)
-        row[self._columns["delay"]] = delay
-        for i, topic in enumerate((topics.MASTER_ENERGY, topics.SLAVE_ENERGY)):
-            if (energies := view.get(topic)) is not None:
-                row[self._columns["left"].start + i] = energies[_LEFT]
-        self._times[self._next] = time
-        self._next, self._count = (self._next + 1) % _ROWS, min(self._count + 1, _ROWS)
-
-    def clear(self) -> None:
-        """Forget everything."""
-        self._next = self._count = 0
-        self._times[:] = np.nan
-
-    def read(self, name: str) -> tuple[Array, Array]:
-        """Times (N,) [s], 0 being now, and columns (N, k) of the last :data:`SPAN` seconds."""
-        order = (np.arange(self._next - self._count, self._next)) % _ROWS
-        times = self._times[order]
-        if len(times):
-            times = times - times[-1]
-        recent = times >= -SPAN
-        return times[recent], self._rows[order[recent]][:, self._columns[name]]
 
 
 @dataclass

@@ -59,11 +59,8 @@ DARK: Color = (20, 20, 20)
 GRID: Color = (196, 202, 208)
 GRID_DARK: Color = (52, 58, 64)
 """Lines of the floor."""
-AXIS = "#888888"
-AXIS_GRID = "rgba(128,128,128,0.2)"
-"""Of plots."""
 CURVES = ("#0072b2", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#8c6d46")
-"""Of plots, in the order of their series; told apart without seeing red or green (Okabe and Ito
+"""Of curves, in their order; told apart without seeing red or green (Okabe and Ito
 2008)."""
 
 _LIGHT = {"ground": "#ffffff", "text": "#1c2126", "muted": "#5c6670", "line": "#d9dee3", "field": "#7d8790"}
@@ -116,16 +113,17 @@ body { font: var(--t-text)/1.45 system-ui, -apple-system, "Segoe UI", Roboto, sa
 """
 
 
-_FORM = Path(__file__).with_name("start.css")
+_PARTS = tuple(Path(__file__).with_name(name) for name in ("start.css", "strip.css"))
 
 
 def style() -> str:
-    """Style sheet that is added to the page, with that of the form on it."""
-    light = _LIGHT | {name: one.light for name, one in MEANINGS.items()}
+    """Style sheet that is added to the page, with those of the form and of the strip of time."""
+    curves = {f"curve{i}": color for i, color in enumerate(CURVES)}
+    light = _LIGHT | curves | {name: one.light for name, one in MEANINGS.items()}
     dark = _DARK | {name: one.dark for name, one in MEANINGS.items()}
     stop = MEANINGS["wrong"].light  # on any ground, under white letters
     return (
-        (_STYLE + _FORM.read_text(encoding="utf-8"))
+        "".join((_STYLE, *(part.read_text(encoding="utf-8") for part in _PARTS)))
         .replace("STOP", stop)
         .replace("NEXT", MEANINGS["wanted"].light)
         .replace("DARK_VARIABLES", _variables(dark))

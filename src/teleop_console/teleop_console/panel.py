@@ -1,7 +1,6 @@
-"""Panel: what an operator's console has: state, commands, stop, save, settings, plots, scores."""
+"""Panel: what an operator's console has: state, commands, save, settings, scores."""
 
 import html
-import math
 import subprocess
 import sys
 import threading
@@ -10,22 +9,18 @@ from collections.abc import Callable
 from functools import partial
 from typing import Literal
 
-import numpy as np
 import viser
 
 from teleop_console.controls import CONTROLS, Control
 from teleop_console.drivers import Drivers
-from teleop_console.history import SPAN, History, LiveScores
+from teleop_console.history import LiveScores
 from teleop_console.hooks import Server
 from teleop_console.link import Link, Parameters, View
-from teleop_console.plots import Plots
 from teleop_console.settings import Renew, SettingsPanel
 from teleop_console.status import alive, leader, next_button, next_step, status_html
-from teleop_console.tails import is_jump
 from teleop_core.base.errors import TeleopError
 
 _PERIOD = 0.2  # between two drawings of the texts [s]
-_RECALLED = 300  # points of a plot
 
 
 class Panel:
@@ -51,11 +46,7 @@ class Panel:
         self._server, self._gui, self._link = server, server.gui, link
         self._make_public, self._may_drive = server.make_public, drivers.may_drive
         self._take, self._drivers, self._drawn = drivers.take, drivers, 0.0
-        self._recorded: Callable[[float], View] | None = None
-        self._time = 0.0
-        self.histories = {arm.name: History(arm) for arm in link.arms}
         self.scores = {arm.name: LiveScores() for arm in link.arms}
-        self._plots: list[Plots] = []
         self._gui.main_panel.dock_right()  # beside the scene, not over it
         self._buttons: dict[str, viser.GuiButtonHandle] = {}
         self._controls: list[Control] = []
@@ -64,8 +55,6 @@ class Panel:
         if link.is_live:
             with tabs.add_tab("Drive"):
                 self._add_drive()
-        with tabs.add_tab("Plots"):
-            self._add_plots()
         with tabs.add_tab("Settings"):
             self.settings = SettingsPanel(server, link, self._guard, renew, of_session)
         with tabs.add_tab("Scores"):
@@ -117,14 +106,6 @@ class Panel:
         if handle is not None:
             handle.add_notification("Not done", text, auto_close_seconds=5.0, color="yellow")
 
-    def _add_plots(self) -> None:
-        for name, history in self.histories.items():
-            if len(self.histories) > 1:
-                with self._gui.add_folder(name or "first arm"):
-                    self._plots.append(Plots(self._gui, history))
-            else:
-                self._plots.append(Plots(self._gui, history))
-
     def _add_scores(self) -> None:
         self._live = self._gui.add_markdown("")
         again = self._gui.add_button("begin anew", hint="the figures, not the recording")
@@ -174,32 +155,10 @@ class Panel:
 
     # -- drawing ---------------------------------------------------------------------------------
 
-    def remember(self, recorded: Callable[[float], View]) -> None:
-        """Take plots from a recording wherever time jumps; without that they begin anew there.
-
-        Args:
-            recorded: What was known at a time [s].
-        """
-        self._recorded = recorded
-
-    def _recall(self, recorded: Callable[[float], View], now: float) -> None:
-        """Fill the plots with what was before a time [s]."""
-        for history in self.histories.values():
-            history.clear()
-        for at in np.linspace(max(0.0, now - SPAN), now, _RECALLED, endpoint=False).tolist():
-            for name, arm in recorded(at).arms.items():
-                self.histories[name].add(at, arm, math.nan)
-
     def draw(self, view: View) -> None:
         """Take note of what is known now, and show it a few times a second."""
-        if self._recorded is not None and is_jump(self._time, view.time):
-            self._recall(self._recorded, view.time)
-        self._time = view.time
         for name, arm in view.arms.items():
-            self.histories[name].add(view.time, arm, view.delay[0])
             self.scores[name].add(view.time, arm)
-        for plots in self._plots:
-            plots.draw()
         now = time.monotonic()
         if now - self._drawn < _PERIOD:
             return
@@ -241,7 +200,7 @@ class Panel:
     @property
     def _kind(self) -> str:
         """Operator of the first arm; empty before it is known."""
-        name = next(iter(self.histories))
+        name = self._link.arms[0].name
         info = self.settings.known.get((f"{name}/operator" if name else "operator", "kind"))
         return "" if info is None else str(info.value)
 

@@ -9,13 +9,12 @@ import numpy as np
 
 from teleop_console.link import ArmView, Parameters, Setting, View
 from teleop_console.recorded_arms import configuration_of, parameters_of, recorded_arms
+from teleop_console.recorded_past import Recorded
 from teleop_core.bags.reader import Bag
 from teleop_core.base.errors import ParameterError, SessionError
 from teleop_core.graph.topics import Topic
 from teleop_core.kernels.geometry import Array
 
-SPEEDS = (0.1, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0)
-"""Speeds that the controls offer; any other from 0.01 to 100 is taken too."""
 FRAME = 1.0 / 30.0
 """Length of a step [s]."""
 _PATH = 200  # points of a path
@@ -35,6 +34,8 @@ class RecordedLink:
         duration: Time from the first to the last message [s].
         loop: Whether it begins again at its end.
         thinning: Of how many samples one is kept; 1 for all.
+        past: Its columns, of all samples.
+        recording: Its path.
 
     Raises:
         RecordingError: It cannot be read, or does not say which robot moved or how its joints did;
@@ -54,6 +55,8 @@ class RecordedLink:
         configuration = configuration_of(bag)
         self._recorded, self.thinning = recorded_arms(bag, configuration)
         self.arms = tuple(recorded.arm for recorded in self._recorded)
+        self.past = Recorded(bag, {arm.name: arm.robot for arm in self.arms})
+        self.recording = bag.path
         self._parameters = parameters_of(configuration)
 
     # -- seeing ----------------------------------------------------------------------------------

@@ -72,7 +72,7 @@ class RecordedArm:
                 view.state = dict(zip(TELEOP_STATE.columns, row.tolist(), strict=True))
             elif name == SLAVE_OPERATION.name:
                 view.operation = dict(zip(OPERATION, row.tolist(), strict=True))
-                view.operation_text = _in_words(view.operation, self.arm.robot.joint_names)
+                view.operation_text = in_words(view.operation, self.arm.robot.joint_names)
             else:
                 view.streams[name], view.stamp_ns[name] = row, int(track.stamp_ns[i])
 
@@ -90,17 +90,16 @@ def recorded_arms(
     Raises:
         RecordingError: It does not say which robot moved, or how its joints did.
     """
-    bags = {_namespace(bag, name): of_arm(bag, name) for name in arm_names(bag)}
+    bags = {name: of_arm(bag, arm) for name, arm in namespaces(bag).items()}
     arms = [Arm(name, _robot(one, configuration, name)) for name, one in bags.items()]
     thinning = max(1, -(-sum(_size(bags[arm.name], arm.robot.n) for arm in arms) // most))
     found = [RecordedArm(arm, _tracks(bags[arm.name], arm, thinning)) for arm in arms]
     return tuple(found), thinning
 
 
-def _namespace(bag: Bag, name: str) -> str:
-    """Namespace of an arm: empty for the default one, whose topics have plain names."""
-    prefix = topic_prefix(bag, name)
-    return "" if not prefix or not prefix.endswith(f"{name}/") else name
+def namespaces(bag: Bag) -> dict[str, str]:
+    """Arms by their namespaces: empty for the default one, whose topics have plain names."""
+    return {name if topic_prefix(bag, name).endswith(f"{name}/") else "": name for name in arm_names(bag)}
 
 
 def configuration_of(bag: Bag) -> Configuration | None:
@@ -163,7 +162,7 @@ def _tracks(bag: Bag, arm: Arm, thinning: int) -> dict[str, Series]:
             parts[name].append(Series(stamps, logs, rows))
     tracks = {name: in_order(found) for name, found in parts.items() if found}
     for topic in (TELEOP_STATE, SLAVE_OPERATION):
-        if (found := _reports(bag, topic)) is not None:
+        if (found := reports_of(bag, topic)) is not None:
             tracks[topic.name] = found
     return tracks
 
@@ -183,7 +182,7 @@ def _order(bag: Bag, names: tuple[str, ...], width: int, robot: Robot) -> list[i
     return [part * len(names) + joint for part in range(width // len(names)) for joint in chosen]
 
 
-def _reports(bag: Bag, topic: Topic) -> Series | None:
+def reports_of(bag: Bag, topic: Topic) -> Series | None:
     """Numbers of a report, whose own are those of its columns that it has; None without any."""
     info = bag.topics.get(topic.name)
     if info is None or not info.count or info.type != topic.kind.ros_type:
@@ -200,7 +199,7 @@ def _reports(bag: Bag, topic: Topic) -> Series | None:
     return Series(np.array(stamps, np.int64), np.array(logs, np.int64), np.array(rows))
 
 
-def _in_words(operation: Mapping[str, float], joints: tuple[str, ...]) -> str:
+def in_words(operation: Mapping[str, float], joints: tuple[str, ...]) -> str:
     """State of the arm in words; empty for numbers that are none of this version's."""
     with suppress(ValueError, KeyError):
         return operation_text(operation, joints)

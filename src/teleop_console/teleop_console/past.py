@@ -1,0 +1,243 @@
+"""Past: the numbers of a session over time, by name: those that were recorded, or that the page saw."""
+
+import threading
+from abc import ABC, abstractmethod
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from teleop_console.link import Arm, ArmView, View
+from teleop_console.recorded_arms import in_words
+from teleop_core.graph.topics import (
+    BY_NAME,
+    OPERATION,
+    SLAVE_MEASURED_CP,
+    SLAVE_OPERATION,
+    SLAVE_SERVO_CP,
+    TELEOP_STATE,
+    Kind,
+)
+from teleop_core.kernels.geometry import Array
+from teleop_core.robots.robot import Robot
+
+ERROR = "tracking error"
+"""Column of the distance between wanted and measured tip [m], which no topic has."""
+DELAY = "session command_delay"
+"""Column of the median delay from master sample to slave command [s], of live sessions."""
+ROWS = 4000
+"""Times that are kept of a live session: two minutes at 30 Hz."""
+_UNITS = {
+    Kind.POSE: ("m",) * 3 + ("",) * 4,
+    Kind.TWIST: ("m/s",) * 3 + ("rad/s",) * 3,
+    Kind.WRENCH: ("N",) * 3 + ("N·m",) * 3,
+    Kind.JAW: ("rad", "rad/s", "N·m"),
+}
+_UNIT_OF = {
+    name: unit
+    for unit, names in {
+        "m": "x y z position_residual cut_x cut_y cut_z goal_x goal_y goal_z width way off travel slid "
+        "drift_x drift_y drift_z fixture_center_x fixture_center_y fixture_center_z fixture_size_x "
+        "fixture_size_y fixture_size_z",
+        "J": "taken returned friction energy_in energy_out told heard margin withheld turn_in turn_out",
+        "N": "largest_force force pull",
+        "s": "time rest_time round clock_ahead",
+        "rad": "rotation_residual cut_rx cut_ry cut_rz jaw",
+        "N·s/m": "impedance",
+    }.items()
+    for name in names.split()
+}
+"""Units of numbers that have names of their own in ``topics.py``."""
+
+
+@dataclass(frozen=True)
+class Column:
+    """A number over time.
+
+    Attributes:
+        topic: Its topic, with the namespace of its arm before it.
+        index: Its place in a row of the topic.
+        unit: Its unit; empty for a number without one.
+        is_held: Whether each value holds until the next one, as of reports.
+    """
+
+    topic: str
+    index: int
+    unit: str
+    is_held: bool = False
+
+
+Rows = tuple[Array, Array]
+"""Times (N,) [s], ascending, and values (N, width) or (N,)."""
+NOTHING: Rows = (np.empty(0), np.empty((0, 3)))
+"""Rows of an unknown topic."""
+_NO_SAMPLES: Rows = (np.empty(0), np.empty(0))
+
+
+class Past(ABC):
+    """Columns of a session; methods may be called from any thread.
+
+    Attributes:
+        columns: By their names, such as ``left/slave/measured_cp x``.
+        joints: Names of the joints of each arm, by namespace.
+    """
+
+    columns: dict[str, Column]
+    joints: Mapping[str, tuple[str, ...]]
+
+    def __init__(self) -> None:
+        self.columns = {}
+        self._errors: dict[str, tuple[Rows, Rows, Rows]] = {}  # by arms, with what they are made of
+
+    @abstractmethod
+    def rows(self, topic: str) -> Rows | None:
+        """All rows of a topic, none of an unknown one; None while they are being read."""
+
+    def marks(self) -> Sequence[tuple[float, str]]:
+        """Times [s] and texts of the marks that somebody set."""
+        return ()
+
+    def samples(self, name: str) -> Rows | None:
+        """Times (N,) [s] and values (N,) of a column; None while they are being read."""
+        column = self.columns[name]
+        if not name.endswith(ERROR):
+            found = self.rows(column.topic)
+            if found is None or column.index >= found[1].shape[1]:  # an earlier version had fewer
+                return None if found is None else _NO_SAMPLES
+            return found[0], found[1][:, column.index]
+        arm = name.removesuffix(ERROR)
+        wanted, found = self.rows(arm + SLAVE_SERVO_CP.name), self.rows(arm + SLAVE_MEASURED_CP.name)
+        if wanted is None or found is None:
+            return None
+        known = self._errors.get(arm)
+        if known is not None and known[0] is wanted and known[1] is found:
+            return known[2]
+        at = np.searchsorted(wanted[0], found[0], side="right") - 1
+        if not len(wanted[0]):
+            return found[0], np.full(len(at), np.nan)
+        away = np.linalg.norm(found[1][:, :3] - wanted[1][np.maximum(at, 0), :3], axis=1)
+        errors = found[0], np.where(at < 0, np.nan, away)
+        self._errors[arm] = (wanted, found, errors)
+        return errors
+
+    def _add(self, arm: str, topic: str, names: Sequence[str], units: Sequence[str], *, is_held: bool = False) -> None:
+        """Take note of a topic's columns."""
+        for index, (name, unit) in enumerate(zip(names, units, strict=True)):
+            self.columns[f"{below(arm, topic)} {name}"] = Column(below(arm, topic), index, unit, is_held)
+        if topic == SLAVE_MEASURED_CP.name:
+            self.columns[below(arm, ERROR)] = Column(below(arm, topic), 0, "m")
+
+    def _add_known(self, arm: str, topic: str, kind: Kind, joints: tuple[str, ...], robot: Robot | None) -> None:
+        """Take note of the columns of a topic whose kind is known."""
+        known = BY_NAME.get(topic)
+        names = known.columns if known is not None and known.columns else kind.columns(joints)
+        units = _UNITS.get(kind) or [_UNIT_OF.get(name, "") for name in names]
+        if kind.has_joints:
+            units = _of_joints(kind, len(names), robot)
+        self._add(arm, topic, names, units, is_held=kind is Kind.REPORT)
+
+
+class Seen(Past):
+    """What the page has seen of a live session in the last minutes: a row for each look.
+
+    Args:
+        arms: The arms.
+    """
+
+    def __init__(self, arms: Sequence[Arm]) -> None:
+        super().__init__()
+        self._arms = {arm.name: arm for arm in arms}
+        self.joints = {arm.name: arm.robot.joint_names for arm in arms}
+        self._lock = threading.Lock()
+        self._times, self._rings, self._count = np.full(ROWS, np.nan), dict[tuple[str, str], Array](), 0
+        self.columns = {below(arm.name, ERROR): Column("", 0, "m") for arm in arms} | {DELAY: Column(DELAY, 0, "s")}
+
+    def add(self, view: View) -> None:
+        """Note what is known; an earlier time begins anew, the same one and silence add nothing."""
+        with self._lock:
+            last = self._times[(self._count - 1) % ROWS]
+            if self._count and view.time < last:
+                self._count = 0
+            if not view.is_fresh or (self._count and view.time == last):
+                return
+            row, self._count = self._count % ROWS, self._count + 1
+            self._times[row] = view.time
+            for ring in self._rings.values():
+                ring[row] = np.nan
+            self._ring("", DELAY, 1)[row] = view.delay[0]
+            for arm, seen in view.arms.items():
+                for topic, values in _values(seen):
+                    self._ring(arm, topic, len(values))[row] = values
+
+    def _ring(self, arm: str, topic: str, width: int) -> Array:
+        """Rows of a topic, with its columns noted when it is new."""
+        found = self._rings.get((arm, topic))
+        if found is None:
+            found = self._rings[arm, topic] = np.full((ROWS, width), np.nan)
+            if topic in BY_NAME:
+                robot = self._arms[arm].robot
+                columns = dict(self.columns)  # others read them
+                self._add_known(arm, topic, BY_NAME[topic].kind, robot.joint_names, robot)
+                self.columns = columns | self.columns
+        return found
+
+    def _order(self) -> Any:
+        return np.arange(max(0, self._count - ROWS), self._count) % ROWS
+
+    def span(self) -> tuple[float, float]:
+        """First and last time [s] that are kept."""
+        with self._lock:
+            times = self._times[self._order()]
+            return (float(times[0]), float(times[-1])) if len(times) else (0.0, 0.0)
+
+    def rows(self, topic: str) -> Rows | None:
+        """All rows of a topic."""
+        with self._lock:
+            order = self._order()
+            found = [ring for key, ring in self._rings.items() if below(*key) == topic]
+            return (self._times[order], found[0][order]) if found else NOTHING
+
+    def view(self, time: float) -> View:
+        """What was known at a time [s]; at the first one that is kept, if that is later."""
+        with self._lock:
+            order = self._order()
+            at = max(0, int(np.searchsorted(self._times[order], time, side="right")) - 1)
+            view = View(time=time, arms={name: ArmView() for name in self._arms}, is_fresh=True)
+            for (arm, topic), ring in self._rings.items():
+                row = ring[order[at]]
+                if topic == DELAY or np.isnan(row).all():
+                    continue
+                one = view.arms[arm]
+                if topic == TELEOP_STATE.name:
+                    one.state = dict(zip(TELEOP_STATE.columns, row.tolist(), strict=True))
+                elif topic == SLAVE_OPERATION.name:
+                    one.operation = dict(zip(OPERATION, row.tolist(), strict=True))
+                    one.operation_text = in_words(one.operation, self.joints[arm])
+                else:
+                    one.streams[topic] = row.copy()
+            return view
+
+
+def below(arm: str, topic: str) -> str:
+    """Name of a topic, or a column, of an arm."""
+    return f"{arm}/{topic}" if arm else topic
+
+
+def _values(view: ArmView) -> Iterator[tuple[str, Array]]:
+    """What is known of an arm, by topics."""
+    yield from view.streams.items()
+    if view.state:
+        yield TELEOP_STATE.name, np.array([view.state[name] for name in TELEOP_STATE.columns])
+    if view.operation:
+        yield SLAVE_OPERATION.name, np.array([view.operation[name] for name in OPERATION])
+
+
+def _of_joints(kind: Kind, count: int, robot: Robot | None) -> list[str]:
+    """Units of joints: of position, and where there are, of velocity and effort."""
+    joints = count // 3 if kind is Kind.STATE else count
+    slides = np.zeros(joints, bool)
+    if robot is not None:
+        slides = np.linalg.norm(robot.jacobian(robot.home)[3:], axis=0) < 1e-9
+    parts = (("m", "rad"), ("m/s", "rad/s"), ("N", "N·m")) if kind is Kind.STATE else (("m", "rad"),)
+    return [straight if is_so else turning for straight, turning in parts for is_so in slides.tolist()]
