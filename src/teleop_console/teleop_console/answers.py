@@ -22,13 +22,13 @@ from websockets.http11 import Response
 from teleop_console.drivers import Drivers
 from teleop_console.guard import Request
 from teleop_console.look import style
-from teleop_console.start import StartPage
+from teleop_console.start import Form, StartPage
 
 OWN_PAGE = "Teleop-Page"
 """Header of our page's requests; to a page of another origin browsers do not allow it."""
 PRESS = "Teleop-Press"
 """Header with the name of a press: one that is said again, unanswered, is the same."""
-_SCRIPTS = tuple(Path(__file__).with_name(name) for name in ("page.js", "start.js"))
+_SCRIPT = Path(__file__).with_name("page.js")
 _FIELDS = 100  # of an address
 _FURNITURE = b'<head><link rel="stylesheet" href="teleop.css"><script src="teleop.js"></script>'
 
@@ -44,6 +44,7 @@ class Situation:
         doing: What is going on before there is a session to see; empty once there is.
         chooses: Whether a session is being chosen: the form is shown.
         can_end: Whether what is shown can be ended, which leads back to the form.
+        can_press: Whether a person at the page leads a hand that closes: at a task, or a jaw.
     """
 
     can_stop: bool = True
@@ -52,6 +53,7 @@ class Situation:
     doing: str = ""
     chooses: bool = False
     can_end: bool = False
+    can_press: bool = False
 
 
 class Answers:
@@ -59,26 +61,33 @@ class Answers:
 
     Args:
         drivers: Hears that a page is alive.
+        form: What is shown while nothing runs; None for the form on which sessions are chosen.
 
     Attributes:
         situation: What pages show; whoever knows it writes it.
         stop: Presses the emergency stop; it must not block.
+        jaw: Closes the hand so far, 0 to 1; it must not block.
         start: The form on which sessions are chosen.
+        form: What is shown while nothing runs.
     """
 
-    def __init__(self, drivers: Drivers) -> None:
+    def __init__(self, drivers: Drivers, form: Form | None = None) -> None:
         self.situation = Situation()
         self.stop: Callable[[], None] | None = None
+        self.jaw: Callable[[float], None] | None = None
         self._drivers = drivers
         self._pages: dict[str, int] = {}  # by names that no other page can guess
         self._heard: deque[str | None] = deque(maxlen=100)  # presses, by their names
         self.start = StartPage(drivers)
+        self.form: Form = form or self.start
         self._paths: dict[str, Callable[[Request], Response]] = {
             "/alive": self._alive,
             "/stop": self._stop,
-            "/teleop.js": _script,
-            "/teleop.css": _style,
-            **dict.fromkeys(self.start.paths, self._start),
+            "/jaw": self._jaw,
+            "/teleop.js": self._script,
+            "/teleop.css": self._style,
+            **dict.fromkeys(self.form.documents, self._document),
+            **dict.fromkeys(self.form.paths, self._start),
         }
 
     def name(self, page: int) -> str:
@@ -99,7 +108,7 @@ class Answers:
     @property
     def slow_paths(self) -> frozenset[str]:
         """Those of :attr:`paths` whose answers may take a while."""
-        return self.start.paths
+        return self.form.paths
 
     def to(self, request: Request) -> Response:
         """Answer to a request for one of :attr:`paths`; from any thread."""
@@ -132,7 +141,7 @@ class Answers:
         address = urlsplit(request.path)
         query = parse_qs(address.query, max_num_fields=_FIELDS)
         page = self._pages.get(names[0], -1)
-        status, told = self.start.answer(address.path, query, page, request.body)
+        status, told = self.form.answer(address.path, query, page, request.body)
         return answer_of(status, json.dumps(told).encode(), "application/json")
 
     def _stop(self, request: Request) -> Response:
@@ -146,14 +155,26 @@ class Answers:
             self._heard.append(press)
         return answer_of(http.HTTPStatus.NO_CONTENT)
 
+    def _jaw(self, request: Request) -> Response:
+        names = request.header(OWN_PAGE)
+        closed = parse_qs(urlsplit(request.path).query, max_num_fields=_FIELDS).get("closed")
+        if len(names) != 1 or not self._drivers.may_drive(self._pages.get(names[0], -1)):
+            return answer_of(http.HTTPStatus.FORBIDDEN)
+        if self.jaw is None or closed not in (["0"], ["1"]):
+            return answer_of(http.HTTPStatus.CONFLICT)
+        self.jaw(float(closed[0]))
+        return answer_of(http.HTTPStatus.NO_CONTENT)
 
-def _script(_: Request) -> Response:
-    script = b"".join(file.read_bytes() for file in _SCRIPTS)
-    return answer_of(http.HTTPStatus.OK, script, "text/javascript; charset=utf-8")
+    def _script(self, _: Request) -> Response:
+        script = _SCRIPT.read_bytes() + self.form.script.read_bytes()
+        return answer_of(http.HTTPStatus.OK, script, "text/javascript; charset=utf-8")
 
+    def _style(self, _: Request) -> Response:
+        return answer_of(http.HTTPStatus.OK, style(self.form.style).encode(), "text/css; charset=utf-8")
 
-def _style(_: Request) -> Response:
-    return answer_of(http.HTTPStatus.OK, style().encode(), "text/css; charset=utf-8")
+    def _document(self, request: Request) -> Response:
+        page = self.form.documents[urlsplit(request.path).path]
+        return answer_of(http.HTTPStatus.OK, page, "text/html; charset=utf-8")
 
 
 def answer_of(status: http.HTTPStatus, body: bytes = b"", kind: str = "text/plain") -> Response:

@@ -17,7 +17,7 @@ from teleop_console.scene import Scene
 from teleop_console.server import ConsoleServer
 from teleop_console.settings import Renew
 from teleop_console.start import Wish
-from teleop_console.status import situation
+from teleop_console.status import closes, situation
 from teleop_console.stylus import Steps, Stylus
 from teleop_console.view_tab import Insets, ViewTab, Visitors, theme
 
@@ -37,6 +37,8 @@ class Console:
             does; None where the session is not ours.
         of_session: Parameters of the session as a whole, which no node has.
         can_end: Whether the page can end what it shows.
+        if_stopped: What pages say in an emergency stop, where their people see no panel; empty for what an
+            operator does next.
     """
 
     def __init__(
@@ -47,7 +49,9 @@ class Console:
         of_session: Parameters | None = None,
         *,
         can_end: bool = False,
+        if_stopped: str = "",
     ) -> None:
+        self._if_stopped = if_stopped
         self._server, self._link, drivers = server, link, server.drivers
         self._can_end = can_end
         theme(server.viser, is_dark=False)
@@ -58,10 +62,12 @@ class Console:
         drivers.is_for_all = not link.is_live
         self._failed = set[str]()
         self.panel = Panel(server.viser, link, drivers, renew, of_session)
+        if if_stopped:
+            server.viser.gui.main_panel.float()  # hidden by the page's style: the scene has all of the window
         self.panel.settings.on_change(self.scene.retune)
         self._visitors = Visitors(server.viser, drivers, self.scene, is_live=link.is_live)
         if link.is_live:
-            server.answers.stop = self._stop
+            server.answers.stop, server.answers.jaw = self._stop, link.close_jaw
         else:
             server.answers.situation = Situation(can_stop=False, can_end=can_end)
         if link.is_live:
@@ -85,8 +91,9 @@ class Console:
         """Show what is known now."""
         view = self._link.view()
         if self._link.is_live:
-            shown = replace(situation(view), can_end=self._can_end)
-            self._server.answers.situation = shown
+            can_press = self.panel.is_led_here and any(map(closes, view.arms.values()))
+            shown = replace(situation(view), can_end=self._can_end, can_press=can_press)
+            self._server.answers.situation = replace(shown, text=shown.text and (self._if_stopped or shown.text))
             self.stylus.show(is_shown=not shown.is_stopped and self.panel.is_led_here)
         self.scene.draw(view)
         self.stylus.draw(view)
@@ -129,7 +136,7 @@ class Console:
     def close(self) -> None:
         """Leave the page to what comes next."""
         answers = self._server.answers
-        answers.stop, answers.situation = None, Situation(doing="closing …")
+        answers.stop, answers.jaw, answers.situation = None, None, Situation(doing="closing …")
         self._server.drivers.is_for_all = False
         self._visitors.close()
 
