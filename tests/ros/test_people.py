@@ -111,7 +111,7 @@ def test_a_stop_fails_the_trial_and_a_person_presses_with_a_key(tmp_path: Path) 
         tab.key("j")
         tab.shows("1 of 4 done")
         tab.click("EMERGENCY STOP")
-        tab.shows("Please call the person who conducts the study")
+        tab.shows("Call the person who conducts the study")
         tab.click("End this trial")
         tab.shows("Please wait for the person who conducts the study.", STARTS)
     (event,) = journal(tmp_path)["events"]

@@ -12,7 +12,7 @@ from teleop_lab.people.journal import DONE, FAILED, Journal
 from teleop_lab.people.page import PeoplePage
 from teleop_lab.people.plan import Plan
 
-IF_STOPPED = "The arm is stopped. Please call the person who conducts the study."
+IF_STOPPED = "The arm is stopped. Call the person who conducts the study."
 
 
 def serve(plan: Plan, journal: Journal, port: int, host: str, token: str) -> tuple[ConsoleServer, PeoplePage]:
