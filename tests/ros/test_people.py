@@ -17,6 +17,7 @@ pytest.importorskip("viser")
 import teleop_core as tc
 from browser import Tab, until
 from console_process import ENDS, STARTS
+from present import present
 
 pytestmark = [pytest.mark.ros, pytest.mark.browser, pytest.mark.slow, pytest.mark.alone]
 
@@ -94,7 +95,7 @@ def test_trials_are_recorded_scored_and_go_on_where_they_were_after_a_kill(tmp_p
     assert (event["state"], event["bag"]) == ("done", "trial_01_2")
     recording = tc.open_recording(tmp_path / "store" / "p01" / "trial_01_2")
     assert recording.score().value("task.time_s") == event["scores"]["task.time_s"]
-    assert recording.score().value("task.attempts") >= 4
+    assert present(recording.score().value("task.attempts")) >= 4
     assert "participant p01, trial 1, repetition 1" in " ".join(recording.metadata["configuration"].split())
 
 

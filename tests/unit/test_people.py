@@ -126,7 +126,7 @@ def test_a_participant_goes_from_consent_by_trials_and_questions_to_thanks_and_o
     while (now := go(page, "", ""))["step"] != "thanks":
         steps.append(now["step"])
         assert Journal(journal.folder, plan).step("p01") == journal.step("p01")  # as after a crash here
-        words = ANSWERS if now["step"] == "questions" else {}
+        words: dict[str, Any] = ANSWERS if now["step"] == "questions" else {}
         told = go(page, now["step"], now.get("trial", ""), **words)
         if told["step"] == "runs":
             assert page.wait()[1].number == now["trial"]
