@@ -24,6 +24,7 @@ from teleop_core.graph.topics import (
     JAW_TOPICS,
     NETWORK_TOPICS,
     OPERATOR_BUTTONS,
+    OPERATOR_JAW,
     OPERATOR_SERVO_CP,
     PASSIVITY_TOPICS,
     PORTS_BETWEEN_ARMS,
@@ -80,7 +81,7 @@ def topics_page(graph: Graph) -> str:
         for topic in member.writes:
             rows.append(topic_row(topic, member.name, graph))
     rows.append(topic_row(DIAGNOSTICS, "every node", graph))
-    for topic in (OPERATOR_SERVO_CP, OPERATOR_BUTTONS):
+    for topic in (OPERATOR_SERVO_CP, OPERATOR_BUTTONS, OPERATOR_JAW):
         row = topic_row(topic, "[a person](hand.md)", graph)
         rows.append(row.replace("–", "operator, if it is `remote`", 1))
     with_network = build_graph(stages=["network"])

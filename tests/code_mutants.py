@@ -60,6 +60,8 @@ CODE_MUTANTS = (
             "        if True:\n            return -math.inf", "observer"),
     _mutant("no_eye", "an operator acts on what its eye has not seen yet", _SEEING,
             "                return at + self._p.eye", "                return at", "observer"),
+    _mutant("practice_counts", "practice counts among a participant's trials", "teleop_lab/people/compare.py",
+            "if trial.repetition and ", "if ", "people"),
     _mutant("worst_is_best", "a search takes the worst values for the best", "teleop_lab/studies/tuning.py",
             "sign = -1.0 if self.is_largest else 1.0", "sign = 1.0", "tuning"),
     _mutant("goal_chased", "a goal that jumps is run after as one that moves", _SEEING,

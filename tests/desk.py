@@ -67,6 +67,9 @@ class Desk:
     def press_button(self, arm: Any, name: Any) -> None:
         self.asked.append(name)
 
+    def close_jaw(self, share: float) -> None:
+        self.asked.append(f"jaw {share:g}")
+
     def parameters(self) -> dict[tuple[str, str], link.ParameterInfo]:
         return self.known
 

@@ -2,7 +2,7 @@
 
 from setuptools import find_packages, setup
 
-COMMANDS = ("calibrate", "experiment", "fit", "grade", "reach", "study", "tune")
+COMMANDS = ("calibrate", "experiment", "fit", "grade", "people", "reach", "study", "tune")
 VERSION = "0.6.0"  # released together with teleop_core
 
 setup(
@@ -11,7 +11,9 @@ setup(
     description="Experiments, calibration, fitting and planning for teleop_core",
     license="Apache-2.0",
     packages=find_packages(include=["teleop_lab", "teleop_lab.*"]),
-    package_data={"teleop_lab": ["py.typed", "*.pyi", "fitting/*.csv", "experiments/*.csv"]},
+    package_data={
+        "teleop_lab": ["py.typed", "*.pyi", "fitting/*.csv", "experiments/*.csv", "people/*.js", "people/*.css"]
+    },
     python_requires=">=3.11",
     install_requires=[
         f"teleop_core=={VERSION}",

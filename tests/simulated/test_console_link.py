@@ -8,6 +8,8 @@ import pytest
 from teleop_console.console_link import LiveLink
 from teleop_core.bags.reader import Bag
 from teleop_core.graph import topics
+from teleop_core.session.api import configuration
+from teleop_drill.simulation.session import parameters_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -42,3 +44,34 @@ def test_a_page_sees_the_arm_stops_it_changes_a_parameter_and_names_the_recordin
         assert link.parameters()["motion_scaling", "coarse_gain"].value == 0.25
         kept = link.save("a_name")
         assert Bag(kept).topics[topics.SLAVE_SETPOINT_JS.name].count > 1000
+
+
+@pytest.mark.slow
+def test_a_person_sees_the_slave_as_late_as_the_display_says_and_presses_at_the_goal(
+    peer: "Peer", tmp_path: Path
+) -> None:
+    late, out = 0.4, str(tmp_path / "bag")
+    made = configuration("point", settings={"operator.kind": "remote", "display.latency": late})
+    peer._session("", made.graph, parameters_of(made, out, ""))  # type: ignore[attr-defined]
+    with LiveLink(0, world=peer.world) as link:
+
+        def ages() -> Any:
+            arm, now_ns = link.view().arms[""], peer.world.time_ns()
+            names = topics.MASTER_MEASURED_CP.name, topics.SLAVE_MEASURED_CP.name
+            return [1e-9 * (now_ns - arm.stamp_ns[name]) for name in names if name in arm.stamp_ns]
+
+        def attempts() -> float:
+            told = link.view().arms[""].get(topics.TASK_STATE)
+            return 0.0 if told is None else float(told[topics.TASK_STATE.columns.index("attempts")])
+
+        peer.wait(lambda: len(ages()) == 2 and ages()[1] > late, "the first frame")
+        for _ in range(20):
+            peer.sleep(0.05)
+            master, slave = ages()
+            assert master < 0.1
+            assert late - 0.04 < slave < late + 0.1
+        for number in (1, 2):
+            link.close_jaw(1.0)
+            peer.wait(lambda number=number: attempts() == number, "an attempt")  # type: ignore[misc]
+            link.close_jaw(0.0)
+            peer.sleep(0.2)

@@ -49,17 +49,32 @@ def test_no_two_things_have_one_color() -> None:
         assert one == other or distance > 10, (one, other)
 
 
-@pytest.mark.parametrize("ground", GROUNDS)
-@pytest.mark.parametrize("name", MEANINGS)
-def test_texts_stand_out_from_their_ground(name: str, ground: str) -> None:
+def contrast(one: str, other: str) -> float:
+    """Contrast ratio of two colours (WCAG 2.2, relative luminance)."""
+
     def light(text: str) -> float:
         parts = [part / 255 for part in rgb(text)]
-        linear = [c / 12.92 if c < 0.0404 else ((c + 0.055) / 1.055) ** 2.4 for c in parts]
+        linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in parts]
         return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2] + 0.05
 
-    low, high = sorted(light(text) for text in (getattr(MEANINGS[name], ground), GROUNDS[ground]))
-    assert high / low >= 4.5
-    assert f"--t-color-{name}: {getattr(MEANINGS[name], ground)}" in style()
+    low, high = sorted((light(one), light(other)))
+    return high / low
+
+
+@pytest.mark.parametrize("ground", GROUNDS)
+@pytest.mark.parametrize("name", [*MEANINGS, "text", "muted", "field"])
+def test_texts_stand_out_from_their_ground_and_borders_of_inputs_too(name: str, ground: str) -> None:
+    """By WCAG AA: 4.5 for texts, 3 for what shows where an input is. As the style sheet has them."""
+    said = dict(
+        re.findall(r"--t-color-(\w+): (#[0-9a-f]{6})", re.findall(r"\{ --t-color-[^}]*", style())[ground == "dark"])
+    )
+    assert said["ground"] == GROUNDS[ground]
+    assert contrast(said[name], GROUNDS[ground]) >= (3.0 if name == "field" else 4.5)
+
+
+def test_letters_of_the_stop_and_of_the_next_step_stand_out() -> None:
+    for button in re.findall(r"--t-(?:stop|next): (#[0-9a-f]{6})", style()):
+        assert contrast(button, "#ffffff") >= 4.5
 
 
 def test_colors_of_the_page_stand_in_one_table() -> None:

@@ -22,14 +22,14 @@ from websockets.http11 import Response
 from teleop_console.drivers import Drivers
 from teleop_console.guard import Request
 from teleop_console.look import style
-from teleop_console.start import StartPage
+from teleop_console.start import Form, StartPage
 from teleop_console.timeline import StripPage
 
 OWN_PAGE = "Teleop-Page"
 """Header of our page's requests; to a page of another origin browsers do not allow it."""
 PRESS = "Teleop-Press"
 """Header with the name of a press: one that is said again, unanswered, is the same."""
-_SCRIPTS = tuple(Path(__file__).with_name(name) for name in ("page.js", "start.js", "strip.js"))
+_SCRIPTS = tuple(Path(__file__).with_name(name) for name in ("page.js", "strip.js"))
 _FIELDS = 100  # of an address
 _FURNITURE = b'<head><link rel="stylesheet" href="teleop.css"><script src="teleop.js"></script>'
 
@@ -45,6 +45,7 @@ class Situation:
         doing: What is going on before there is a session to see; empty once there is.
         chooses: Whether a session is being chosen: the form is shown.
         can_end: Whether what is shown can be ended, which leads back to the form.
+        can_press: Whether a person at the page leads a hand that closes: at a task, or a jaw.
     """
 
     can_stop: bool = True
@@ -53,6 +54,7 @@ class Situation:
     doing: str = ""
     chooses: bool = False
     can_end: bool = False
+    can_press: bool = False
 
 
 class Answers:
@@ -60,26 +62,33 @@ class Answers:
 
     Args:
         drivers: Hears that a page is alive.
+        form: What is shown while nothing runs; None for the form on which sessions are chosen.
 
     Attributes:
         situation: What pages show; whoever knows it writes it.
         stop: Presses the emergency stop; it must not block.
+        jaw: Closes the hand so far, 0 to 1; it must not block.
         start: The form on which sessions are chosen.
         strip: The strip of time.
+        form: What is shown while nothing runs.
     """
 
-    def __init__(self, drivers: Drivers) -> None:
+    def __init__(self, drivers: Drivers, form: Form | None = None) -> None:
         self.situation = Situation()
         self.stop: Callable[[], None] | None = None
+        self.jaw: Callable[[float], None] | None = None
         self._drivers = drivers
         self._pages: dict[str, int] = {}  # by names that no other page can guess
         self._heard: deque[str | None] = deque(maxlen=100)  # presses, by their names
         self.start, self.strip = StartPage(drivers), StripPage(drivers)
+        self.form: Form = form or self.start
         self._paths: dict[str, Callable[[Request], Response]] = {
             "/alive": self._alive,
             "/stop": self._stop,
-            "/teleop.js": _script,
-            "/teleop.css": _style,
+            "/jaw": self._jaw,
+            "/teleop.js": self._script,
+            "/teleop.css": self._style,
+            **dict.fromkeys(self.form.documents, self._document),
             **dict.fromkeys(self.slow_paths, self._later),
         }
 
@@ -101,7 +110,7 @@ class Answers:
     @property
     def slow_paths(self) -> frozenset[str]:
         """Those of :attr:`paths` whose answers may take a while."""
-        return self.start.paths | self.strip.paths
+        return self.form.paths | self.strip.paths
 
     def to(self, request: Request) -> Response:
         """Answer to a request for one of :attr:`paths`; from any thread."""
@@ -138,7 +147,7 @@ class Answers:
         if is_strip:
             status, told = self.strip.answer(address.path, query, page)
         else:
-            status, told = self.start.answer(address.path, query, page, request.body)
+            status, told = self.form.answer(address.path, query, page, request.body)
         return answer_of(status, json.dumps(told).encode(), "application/json")
 
     def _stop(self, request: Request) -> Response:
@@ -152,14 +161,26 @@ class Answers:
             self._heard.append(press)
         return answer_of(http.HTTPStatus.NO_CONTENT)
 
+    def _jaw(self, request: Request) -> Response:
+        names = request.header(OWN_PAGE)
+        closed = parse_qs(urlsplit(request.path).query, max_num_fields=_FIELDS).get("closed")
+        if len(names) != 1 or not self._drivers.may_drive(self._pages.get(names[0], -1)):
+            return answer_of(http.HTTPStatus.FORBIDDEN)
+        if self.jaw is None or closed not in (["0"], ["1"]):
+            return answer_of(http.HTTPStatus.CONFLICT)
+        self.jaw(float(closed[0]))
+        return answer_of(http.HTTPStatus.NO_CONTENT)
 
-def _script(_: Request) -> Response:
-    script = b"".join(file.read_bytes() for file in _SCRIPTS)
-    return answer_of(http.HTTPStatus.OK, script, "text/javascript; charset=utf-8")
+    def _script(self, _: Request) -> Response:
+        script = b"\n".join(file.read_bytes() for file in (*_SCRIPTS, self.form.script))
+        return answer_of(http.HTTPStatus.OK, script, "text/javascript; charset=utf-8")
 
+    def _style(self, _: Request) -> Response:
+        return answer_of(http.HTTPStatus.OK, style(self.form.style).encode(), "text/css; charset=utf-8")
 
-def _style(_: Request) -> Response:
-    return answer_of(http.HTTPStatus.OK, style().encode(), "text/css; charset=utf-8")
+    def _document(self, request: Request) -> Response:
+        page = self.form.documents[urlsplit(request.path).path]
+        return answer_of(http.HTTPStatus.OK, page, "text/html; charset=utf-8")
 
 
 def answer_of(status: http.HTTPStatus, body: bytes = b"", kind: str = "text/plain") -> Response:

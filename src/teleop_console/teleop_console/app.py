@@ -17,7 +17,7 @@ from teleop_console.scene import Scene
 from teleop_console.server import ConsoleServer
 from teleop_console.settings import Renew
 from teleop_console.start import Wish
-from teleop_console.status import situation
+from teleop_console.status import closes, situation
 from teleop_console.stylus import Steps, Stylus
 from teleop_console.timeline import Timeline
 from teleop_console.view_tab import Insets, ViewTab, Visitors, theme
@@ -38,6 +38,8 @@ class Console:
             does; None where the session is not ours.
         of_session: Parameters of the session as a whole, which no node has.
         can_end: Whether the page can end what it shows.
+        if_stopped: What pages say in an emergency stop, where their people see no panel; empty for what an
+            operator does next.
     """
 
     def __init__(
@@ -48,7 +50,9 @@ class Console:
         of_session: Parameters | None = None,
         *,
         can_end: bool = False,
+        if_stopped: str = "",
     ) -> None:
+        self._if_stopped = if_stopped
         self._server, self._link, drivers = server, link, server.drivers
         self._can_end = can_end
         theme(server.viser, is_dark=False)
@@ -59,11 +63,13 @@ class Console:
         drivers.is_for_all = not link.is_live
         self._failed = set[str]()
         self.panel = Panel(server.viser, link, drivers, renew, of_session)
+        if if_stopped:
+            server.viser.gui.main_panel.float()  # hidden by the page's style: the scene has all of the window
         self.panel.settings.on_change(self.scene.retune)
         self.timeline = server.answers.strip.shown = Timeline(link)
         self._visitors = Visitors(server.viser, drivers, self.scene, is_live=link.is_live)
         if link.is_live:
-            server.answers.stop = self._stop
+            server.answers.stop, server.answers.jaw = self._stop, link.close_jaw
         else:
             server.answers.situation = Situation(can_stop=False, can_end=can_end)
         if link.is_live:
@@ -87,7 +93,9 @@ class Console:
         """Show what is known now."""
         view = seen = self._link.view()
         if self._link.is_live:
-            told = replace(situation(view), can_end=self._can_end)
+            can_press = self.panel.is_led_here and any(map(closes, view.arms.values()))
+            told = replace(situation(view), can_end=self._can_end, can_press=can_press)
+            told = replace(told, text=told.text and (self._if_stopped or told.text))
             self._server.answers.situation = told
             seen = self.timeline.shown(view, is_stopped=told.is_stopped)
             is_now = seen is view and not told.is_stopped
@@ -127,7 +135,7 @@ class Console:
     def close(self) -> None:
         """Leave the page to what comes next."""
         answers = self._server.answers
-        answers.stop, answers.situation = None, Situation(doing="closing …")
+        answers.stop, answers.jaw, answers.situation = None, None, Situation(doing="closing …")
         answers.strip.shown = None
         self._server.drivers.is_for_all = False
         self._visitors.close()

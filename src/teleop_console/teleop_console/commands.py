@@ -3,7 +3,7 @@
 import argparse
 import time
 import webbrowser
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -124,13 +124,10 @@ def _attach(arguments: argparse.Namespace, server: "ConsoleServer") -> None:
 
 def _drive(arguments: argparse.Namespace, server: "ConsoleServer", settings: Sequence[str]) -> bool:
     """Start sessions one after the other, each with the page; whether the page ended the last."""
-    from teleop_console.app import Console, splash
     from teleop_console.choices import OWN
-    from teleop_console.recorded_arms import parameters_of
-    from teleop_core.graph.layers import SESSION
 
     ros_module("guest")
-    from teleop_console.console_session import ConsoleSession
+    from teleop_console.console_session import show_session
 
     first = arguments.out or BAGS / time.strftime("console_%Y%m%d_%H%M%S")
     texts, number, wanted = [*OWN, *settings], 0, list[str]()
@@ -146,21 +143,11 @@ def _drive(arguments: argparse.Namespace, server: "ConsoleServer", settings: Seq
 
     while True:
         out = first if not number else first.with_name(f"{first.name}_session{number + 1}")
-        with splash(server) as say:
-            configuration = _configured(arguments, texts)
-            session = ConsoleSession(configuration, out, _both(say), arguments.without)
-            server.answers.stop = partial(session.button.say, is_pressed=True)
-            try:
-                link = session.link()
-            except BaseException:
-                session.end()
-                raise
         wanted.clear()
-        with session, link:
-            of_session = parameters_of(configuration, (SESSION,))
-            console = Console(server, link, renew, of_session, can_end=True)
-            console.run(lambda session=session: bool(session.is_over or wanted or start.is_ended))  # type: ignore[misc]
-        session.check()
+        configuration = _configured(arguments, texts)
+        show_session(
+            server, configuration, out, lambda _: bool(wanted or start.is_ended), renew=renew, without=arguments.without
+        )
         print(f"{out}: recorded; next: teleop evaluate {out}", flush=True)
         if not wanted:
             return start.is_ended
@@ -171,14 +158,3 @@ def _configured(arguments: argparse.Namespace, texts: list[str]) -> Any:
     from teleop_core.session import api
 
     return api.configuration(arguments.scenario, files=arguments.config, texts=texts)
-
-
-def _both(say: Callable[[str], None]) -> Callable[[str], None]:
-    """Say on the page what matters while a session starts, and in the terminal."""
-
-    def tell(line: str) -> None:
-        if "s  " not in line:  # its line of every second is on the page
-            print(printable(line), flush=True)
-            say(line)
-
-    return tell

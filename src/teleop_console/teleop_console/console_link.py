@@ -1,11 +1,13 @@
 """Console link: a live session as the page sees it, over its topics and services alone.
 
 Of streams it reads the slow copies that the recorder gives (:mod:`teleop_core.nodes.display`);
-where nobody records, the streams themselves, best effort and one deep.
+where nobody records, the streams themselves, best effort and one deep. In a session with a display
+the slave is shown as late as the display says, as it is to a simulated operator.
 """
 
 import math
 import re
+from collections import deque
 from contextlib import suppress
 from pathlib import Path
 from types import MappingProxyType
@@ -20,8 +22,10 @@ from teleop_core.bags.messages import Layout, layout, read_any, read_numbers
 from teleop_core.base.errors import ParameterError, SessionError
 from teleop_core.graph.graph import RECORDER_NAME
 from teleop_core.graph.topics import (
+    DISPLAY_MEASURED_CP,
     OPERATION,
     OPERATOR_BUTTONS,
+    OPERATOR_JAW,
     OPERATOR_SERVO_CP,
     SLAVE_OPERATION,
     TELEOP_STATE,
@@ -43,6 +47,8 @@ PATIENCE = 5.0
 _LIST, _SPLIT = "/list_parameters", "/split"
 _SILENCE = 1.0  # after which nothing is fresh [s]
 _PRESS = 0.12  # of a button [s]
+_FRAMES = 512  # samples of a stream that may wait to be seen
+_SCREEN_NS = 33_000_000  # that the page itself takes, as a display does if it is told nothing else [ns]
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}")
 
 
@@ -60,9 +66,11 @@ class _Seen:
         self._owner, self._own = owner, topic.of_arm(arm.name)
         self._name, self._since = displayed(self._own).name, _now(owner)
         self._subscription = Subscription(owner, self._own, self._name, 1)
+        self._is_of_slave = topic.name.startswith("slave/")
+        self._waiting: deque[tuple[int, int, Array]] = deque(maxlen=_FRAMES)
 
-    def take(self, view: ArmView) -> bool:
-        """Write the newest sample into a view; whether there was one."""
+    def take(self) -> bool:
+        """Take the newest sample, for :meth:`show`; whether one came."""
         newest = None
         while (taken := self._subscription.take()) is not None:
             newest = taken.data
@@ -72,8 +80,14 @@ class _Seen:
         found: Any = self._layout.decode_one(newest) or read_any(self.topic.kind, newest, self._joints)
         if not isinstance(found, tuple) or not np.isfinite(found[1]).all():
             return False  # refused and counted by the nodes that need it
-        view.stamp_ns[self.topic.name], view.streams[self.topic.name] = found[0], found[1].copy()
+        self._waiting.append((self._owner.world.time_ns(), found[0], found[1].copy()))
         return True
+
+    def show(self, view: ArmView) -> None:
+        """Write what has come into a view, of the slave only what the display shows by now."""
+        seen_ns = view.stamp_ns.get(DISPLAY_MEASURED_CP.name) if self._is_of_slave else None
+        while self._waiting and (seen_ns is None or self._waiting[0][0] <= seen_ns + _SCREEN_NS):
+            _, view.stamp_ns[self.topic.name], view.streams[self.topic.name] = self._waiting.popleft()
 
     def _find_another(self) -> None:
         """Read the stream itself where nobody says it again."""
@@ -202,9 +216,11 @@ class LiveLink(Observer):
         with self._lock:
             view, now = self._view, _now(self)
             for arm in self.arms:
-                taken = [seen.take(view.arms[arm.name]) for seen in self._seen[arm.name]]
+                taken = [seen.take() for seen in self._seen[arm.name]]
                 if any(taken):
                     self._heard = now
+                for seen in reversed(self._seen[arm.name]):  # the display, which is last of them, first
+                    seen.show(view.arms[arm.name])
                 self._hear(arm, view.arms[arm.name])
             self._insist(view)
             self._hear_nodes(view)
@@ -302,6 +318,11 @@ class LiveLink(Observer):
         """Press and release the ``fixture`` or ``mode`` button of the stylus."""
         self._hands[arm].press(name)
 
+    def close_jaw(self, share: float) -> None:
+        """Close the jaw of all hands so far: 0 open, 1 closed."""
+        for hand in self._hands.values():
+            hand.close_jaw(share)
+
     def save(self, name: str) -> Path:
         """Close the recording under a name and go on recording; returns where it is.
 
@@ -340,8 +361,9 @@ class _Hand:
         self._lock, self._pressing = self._world.lock(), self._world.lock()
         self._publishers = [
             owner.ros.create_publisher(message_type(topic.kind.ros_type), f"/{topic.of_arm(arm).name}", Qos(depth=10))
-            for topic in (OPERATOR_SERVO_CP, OPERATOR_BUTTONS)
+            for topic in (OPERATOR_SERVO_CP, OPERATOR_BUTTONS, OPERATOR_JAW)
         ]
+        self._closed = layout(OPERATOR_JAW, ())
 
     def hold(self, pose: Array) -> None:
         """Want the stylus somewhere."""
@@ -359,6 +381,11 @@ class _Hand:
             self._world.sleep(_PRESS)
             self._say(np.zeros(3))
             self._world.sleep(_PRESS)  # released for as long, or two presses were one
+
+    def close_jaw(self, share: float) -> None:
+        """Close the jaw so far."""
+        with self._lock:
+            self._publishers[2].publish(self._closed.encode_one(self._world.time_ns(), np.array([share])))
 
     def _say(self, pressed: Array) -> None:
         with self._lock:

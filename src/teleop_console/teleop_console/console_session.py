@@ -2,12 +2,21 @@
 
 import threading
 from collections.abc import Callable, Collection
+from functools import partial
 from pathlib import Path
 
 from rich.console import Console
 
+from teleop_console.app import Console as AppPage
+from teleop_console.app import splash
 from teleop_console.console_link import LiveLink
+from teleop_console.link import View
+from teleop_console.recorded_arms import parameters_of
+from teleop_console.server import ConsoleServer
+from teleop_console.settings import Renew
 from teleop_core.base.errors import SessionError, TeleopError
+from teleop_core.base.texts import printable
+from teleop_core.graph.layers import SESSION
 from teleop_core.nodes.children import environment
 from teleop_core.nodes.crews import Processes
 from teleop_core.nodes.guest import Guest
@@ -123,3 +132,54 @@ class ConsoleSession:
         self._interrupt.ask()
         self._thread.join(_END_PATIENCE)
         self._guest.close()
+
+
+def show_session(
+    server: ConsoleServer,
+    configuration: Configuration,
+    out: Path,
+    is_over: Callable[[View], bool],
+    *,
+    renew: Renew | None = None,
+    without: Collection[str] = (),
+    if_stopped: str = "",
+) -> None:
+    """Run a session behind the page until it ends, or is over.
+
+    Args:
+        server: The page.
+        configuration: What runs.
+        out: Directory of the recording.
+        is_over: Whether it shall end, asked at every drawing with what is known of the session.
+        renew: As of :class:`~teleop_console.app.Console`.
+        without: As of :class:`ConsoleSession`.
+        if_stopped: As of the page. With it pages say no more than that the session starts, and cannot end it.
+
+    Raises:
+        SessionError: It could not begin, or ended with an error.
+    """
+    with splash(server) as say:
+        session = ConsoleSession(configuration, out, _both(say, is_on_page=not if_stopped), without)
+        server.answers.stop = partial(session.button.say, is_pressed=True)
+        try:
+            link = session.link()
+        except BaseException:
+            session.end()
+            raise
+    with session, link:
+        of_session = parameters_of(configuration, (SESSION,))
+        page = AppPage(server, link, renew, of_session, can_end=not if_stopped, if_stopped=if_stopped)
+        page.run(lambda: session.is_over or is_over(link.view()))
+    session.check()
+
+
+def _both(say: Callable[[str], None], *, is_on_page: bool) -> Callable[[str], None]:
+    """Say on the page what matters while a session starts, and in the terminal."""
+
+    def tell(line: str) -> None:
+        if "s  " not in line:  # its line of every second is on the page
+            print(printable(line), flush=True)
+            if is_on_page:
+                say(line)
+
+    return tell

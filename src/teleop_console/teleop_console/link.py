@@ -144,6 +144,9 @@ class Link(Protocol):
     def press_button(self, arm: str, name: str) -> None:
         """Press and release the ``fixture`` or ``mode`` button of the stylus."""
 
+    def close_jaw(self, share: float) -> None:
+        """Close the jaw of all hands so far: 0 open, 1 closed; to close it presses at a task's goal."""
+
     def save(self, name: str) -> Path:
         """Close the recording under a name and go on recording; returns where it is.
 

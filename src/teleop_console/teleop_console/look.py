@@ -84,7 +84,7 @@ body { font: var(--t-text)/1.45 system-ui, -apple-system, "Segoe UI", Roboto, sa
 .t-wrong { color: var(--t-color-wrong); } .t-idle { color: var(--t-color-idle); }
 #t-safety { position: fixed; left: 12px; bottom: 12px; z-index: 10000; width: 230px;
   display: flex; flex-direction: column; gap: 8px; font: inherit; }
-#t-stop[hidden], #t-end[hidden] { display: none; }
+#t-stop[hidden], #t-end[hidden], #t-press[hidden] { display: none; }
 #t-stop { height: 56px; border: 0; border-radius: 6px; background: var(--t-stop); color: #fff;
   font-family: inherit; font-size: 18px; font-weight: 700; letter-spacing: 0.02em; cursor: pointer;
   box-shadow: 0 1px 4px rgba(0,0,0,.3); touch-action: manipulation; user-select: none; }
@@ -101,6 +101,8 @@ body { font: var(--t-text)/1.45 system-ui, -apple-system, "Segoe UI", Roboto, sa
 .t-says #t-banner { display: block; }
 .t-stopped #t-stop { background: #fff; color: var(--t-stop); border: 3px solid var(--t-stop); }
 .t-stopped canvas { filter: grayscale(0.85) opacity(0.7); }
+@media (prefers-reduced-motion: reduce) { *, *::before, *::after {
+  animation-duration: 1ms !important; transition-duration: 1ms !important; scroll-behavior: auto !important; } }
 @media (max-width: 575px) {
   #t-safety { left: 0; right: 0; top: 0; bottom: auto; width: auto; }
   #t-stop { border-radius: 0; width: 100%; }
@@ -116,14 +118,15 @@ body { font: var(--t-text)/1.45 system-ui, -apple-system, "Segoe UI", Roboto, sa
 _PARTS = tuple(Path(__file__).with_name(name) for name in ("start.css", "strip.css"))
 
 
-def style() -> str:
-    """Style sheet that is added to the page, with those of the form and of the strip of time."""
+def style(form: Path | None = None) -> str:
+    """Style sheet that is added to the page, with those of the form and of the strip of time, and of another form."""
     curves = {f"curve{i}": color for i, color in enumerate(CURVES)}
     light = _LIGHT | curves | {name: one.light for name, one in MEANINGS.items()}
     dark = _DARK | {name: one.dark for name, one in MEANINGS.items()}
     stop = MEANINGS["wrong"].light  # on any ground, under white letters
+    files = (*_PARTS, *((form,) if form is not None else ()))
     return (
-        "".join((_STYLE, *(part.read_text(encoding="utf-8") for part in _PARTS)))
+        "".join((_STYLE, *(file.read_text(encoding="utf-8") for file in files)))
         .replace("STOP", stop)
         .replace("NEXT", MEANINGS["wanted"].light)
         .replace("DARK_VARIABLES", _variables(dark))

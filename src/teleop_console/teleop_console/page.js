@@ -22,7 +22,10 @@
   stop.id = 't-stop'; stop.textContent = 'EMERGENCY STOP';
   stop.title = 'stops all arms at once; the space key too';
   banner.id = 't-banner'; banner.setAttribute('role', 'alert');
-  safety.append(stop);
+  starting.setAttribute('role', 'status');
+  const hand = document.createElement('button');
+  hand.id = 't-press'; hand.type = 'button'; hand.textContent = 'Press or grip (hold J)'; hand.hidden = true;
+  safety.append(hand, stop);
 
   function show() {
     const [head, text] = pressed === 'unheard'
@@ -43,6 +46,7 @@
       banner.replaceChildren(strong, text);
     }
     stop.hidden = !shown.can_stop;
+    hand.hidden = !shown.can_press || !shown.drives;
     starting.textContent = shown.doing;
     starting.hidden = !shown.doing;
     const seen = document.querySelector('canvas')?.getBoundingClientRect();
@@ -75,12 +79,28 @@
     show();
   }
 
+  // The hand closes for as long as the button or the key is down, one request after the other.
+  let closed = false, said = Promise.resolve();
+  function close(now) {
+    if (now === closed || (now && hand.hidden)) return;
+    closed = now;
+    hand.setAttribute('aria-pressed', closed);
+    said = said.then(() => ask(`jaw?closed=${Number(now)}`)).catch(() => {});
+  }
+
   const types = (element) => element.closest && element.closest(
     'input:not([type=checkbox]):not([type=radio]):not([type=range]), textarea, [contenteditable=true]');
   document.documentElement.append(banner, safety, starting); // before the page has a body
   show();
   stop.addEventListener('pointerdown', press);
   stop.addEventListener('click', press);
+  hand.addEventListener('pointerdown', (event) => { hand.setPointerCapture(event.pointerId); close(true); });
+  for (const kind of ['pointerup', 'pointercancel']) hand.addEventListener(kind, () => close(false));
+  addEventListener('blur', () => close(false));
+  addEventListener('keydown', (event) => {
+    if ((event.code === 'KeyJ' && !types(event.target)) || (event.code === 'Enter' && event.target === hand)) close(true);
+  });
+  addEventListener('keyup', (event) => { if (['KeyJ', 'Enter'].includes(event.code)) close(false); });
   addEventListener('keydown', (event) => {
     if (event.code !== 'Space' || types(event.target) || !shown.can_stop) return;
     event.preventDefault();

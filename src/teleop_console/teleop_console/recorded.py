@@ -201,6 +201,9 @@ class RecordedLink:
     def press_button(self, arm: str, name: str) -> None:
         """Nothing."""
 
+    def close_jaw(self, share: float) -> None:
+        """Nothing."""
+
     def save(self, name: str) -> Path:
         """Refused.
 

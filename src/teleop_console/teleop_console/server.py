@@ -6,6 +6,7 @@ A taken port is told with who has it, never changed silently.
 import secrets
 import socket
 import threading
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
@@ -13,6 +14,7 @@ from teleop_console.answers import Answers
 from teleop_console.drivers import PATIENCE, Drivers
 from teleop_console.guard import Guard, is_loopback, is_wildcard
 from teleop_console.hooks import Server
+from teleop_console.start import Form
 from teleop_core.base.errors import ParameterError, SessionError
 
 _LISTENS = "0A"  # state in /proc/net/tcp
@@ -120,6 +122,7 @@ class ConsoleServer:
         host: Address of this machine to serve at; the loopback by default.
         token: Secret; made if the address is not the loopback and none is given.
         label: Heading of the panel.
+        form: What is shown while nothing runs, made of the drivers; None for the form on which sessions are chosen.
         patience: Time without a sign of life after which a page loses a held stylus [s].
 
     Raises:
@@ -128,14 +131,21 @@ class ConsoleServer:
     """
 
     def __init__(
-        self, port: int = PORT, host: str = "127.0.0.1", token: str = "", *, label: str = "", patience: float = PATIENCE
+        self,
+        port: int = PORT,
+        host: str = "127.0.0.1",
+        token: str = "",
+        *,
+        label: str = "",
+        form: Callable[[Drivers], Form] | None = None,
+        patience: float = PATIENCE,
     ) -> None:
         opened = listen(host, port)
         self.port = int(opened.getsockname()[1])
         self.host = host
         self.token = token or ("" if is_loopback(host) else secrets.token_urlsafe(24))
         self.drivers = Drivers(patience)
-        self.answers = Answers(self.drivers)
+        self.answers = Answers(self.drivers, form and form(self.drivers))
         guard = Guard(host, self.port, self.token)
         self.viser = Server(opened, guard, self.drivers, self.answers, label)
         self._ends = threading.Event()

@@ -12,6 +12,8 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
+from types import MappingProxyType
+from typing import Protocol
 
 from teleop_console.drivers import Drivers
 from teleop_console.recordings import Recordings
@@ -44,6 +46,29 @@ class Wish:
     recording: Path | None = None
 
 
+class Form(Protocol):
+    """What lies over the page while nothing runs, and what it may ask."""
+
+    @property
+    def script(self) -> Path:
+        """Its script."""
+
+    @property
+    def style(self) -> Path | None:
+        """Its style sheet, beside the one that forms share; None for none."""
+
+    @property
+    def documents(self) -> Mapping[str, bytes]:
+        """Pages of their own by path."""
+
+    @property
+    def paths(self) -> frozenset[str]:
+        """Paths of its requests."""
+
+    def answer(self, path: str, query: Query, page: int, body: Body = bytes) -> Told:
+        """Answer to a request of a page; -1 for one that is not open."""
+
+
 class StartPage:
     """What the form shows, and what was asked of it; methods may be called from any thread.
 
@@ -55,6 +80,9 @@ class StartPage:
         is_open: Whether the form is shown: nothing runs.
         told: What a person is told: why the last session ended, what a command said.
     """
+
+    script, style = Path(__file__).with_name("start.js"), None
+    documents: Mapping[str, bytes] = MappingProxyType({})
 
     def __init__(self, drivers: Drivers, folder: Path = BAGS) -> None:
         self.is_open, self.told = False, ""

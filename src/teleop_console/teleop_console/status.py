@@ -6,7 +6,7 @@ import math
 from teleop_console.answers import Situation
 from teleop_console.link import ArmView, View
 from teleop_core.chain.tasks import Act, Miss
-from teleop_core.graph.topics import TASK_STATE
+from teleop_core.graph.topics import SLAVE_JAW_MEASURED_JS, TASK_STATE
 from teleop_core.slave.operation import Fault, State
 
 _SIGNALS = {State.ENABLED: "good", State.PAUSED: "held", State.DISABLED: "idle", State.FAULT: "wrong"}
@@ -133,6 +133,11 @@ def task_text(arm: ArmView) -> str:
     last = Miss(int(task["miss"]))
     ended = f"last {task['time']:.1f} s" + (f", {_MISSED[last]}" if last in _MISSED else "")
     return f"{text} · {done} of {tried} attempts reached their goal · {ended}"
+
+
+def closes(arm: ArmView) -> bool:
+    """Whether it matters how far the hand closes: at a task, or with a jaw."""
+    return arm.get(TASK_STATE) is not None or arm.get(SLAVE_JAW_MEASURED_JS) is not None
 
 
 def status_html(view: View, title: str, doing: str, step: str = "") -> str:

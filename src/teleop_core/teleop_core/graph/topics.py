@@ -418,6 +418,8 @@ OPERATOR_SERVO_CP = Topic("operator/servo_cp", Kind.POSE, SAMPLED, "master_base"
 go. As ``operator/buttons`` it comes from outside: no stage writes it, and it is not recorded."""
 OPERATOR_BUTTONS = Topic("operator/buttons", Kind.BUTTONS, SAMPLED, "master_base", quality=Quality.REPORT)
 """Buttons that this person presses and releases: each message counts, so it is sent reliably."""
+OPERATOR_JAW = Topic("operator/jaw", Kind.NUMBERS, SAMPLED, "master_base", quality=Quality.REPORT, columns=("closing",))
+"""How far this person closes the jaw, 0 open to 1 closed; silence leaves it as it is."""
 DIAGNOSTICS = Topic("diagnostics", Kind.REPORT, Stamp("time of the report"), quality=Quality.REPORT)
 
 STREAMS = (

@@ -7,6 +7,7 @@ recorder has all of them already, and says again what people can see.
 from dataclasses import replace
 
 from teleop_core.graph.topics import (
+    DISPLAY_MEASURED_CP,
     MASTER_ENERGY,
     MASTER_MEASURED_CF,
     MASTER_MEASURED_CP,
@@ -28,7 +29,7 @@ from teleop_core.nodes.newest import Cadence, Newest
 SEEN = (
     MASTER_MEASURED_CP, MASTER_MEASURED_CF, SLAVE_SERVO_CP, SLAVE_SETPOINT_JS, SLAVE_MEASURED_JS,
     SLAVE_MEASURED_CP, SLAVE_MEASURED_CF, SLAVE_JAW_MEASURED_JS, SLAVE_JAW_OBJECT_CP,
-    SLAVE_JAW_BOARD, MASTER_ENERGY, SLAVE_ENERGY, TASK_STATE,
+    SLAVE_JAW_BOARD, MASTER_ENERGY, SLAVE_ENERGY, TASK_STATE, DISPLAY_MEASURED_CP,
 )  # fmt: skip
 """Streams that are said again."""
 PERIOD_NS = 25_000_000

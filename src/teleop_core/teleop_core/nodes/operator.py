@@ -14,6 +14,7 @@ from teleop_core.graph.topics import (
     MASTER_MEASURED_CF,
     MASTER_MEASURED_CP,
     OPERATOR_BUTTONS,
+    OPERATOR_JAW,
     OPERATOR_SERVO_CP,
     SLAVE_MEASURED_CP,
     Topic,
@@ -27,7 +28,7 @@ _SELDOM = 4
 
 
 class HandInput:
-    """``operator/servo_cp`` and ``operator/buttons``, looked at in every tick: 2 µs, no executor.
+    """``operator/servo_cp``, ``buttons`` and ``jaw``, looked at in every tick: 2 µs, no executor.
 
     They stand among the ports of the node, which reports, forgets and closes them.
 
@@ -39,9 +40,10 @@ class HandInput:
 
     def __init__(self, node: Any, hand: RemoteHand, *, has_poses: bool) -> None:
         self._node, self._hand, self._ticks = node, hand, 0
-        self._pose, self._pressed = np.zeros(7), np.zeros(len(BUTTONS))
+        self._pose, self._pressed, self._closing = np.zeros(7), np.zeros(len(BUTTONS)), np.zeros(1)
         self._poses = self._open(OPERATOR_SERVO_CP, self._pose) if has_poses else None
         self._buttons = self._open(OPERATOR_BUTTONS, self._pressed)
+        self._jaw = self._open(OPERATOR_JAW, self._closing)
 
     def _open(self, topic: Topic, target: Any) -> Input:
         name, delay = self._node.options.feeds(topic.name)[0]
@@ -51,7 +53,7 @@ class HandInput:
         return entry
 
     def read(self) -> None:
-        """Hand on what has come: the newest pose, and every press and release of a button."""
+        """Hand on what has come: the newest pose, every press and release of a button, and the jaw."""
         if self._poses is not None and self._poses.newest():
             self._hand.want(self._pose)
         self._ticks += 1
@@ -60,6 +62,8 @@ class HandInput:
         while self._buttons.take():
             for name, number in zip(BUTTONS, self._pressed.tolist(), strict=True):
                 self._hand.press(name, is_pressed=number > 0.0)
+        while self._jaw.take():
+            self._hand.close(float(self._closing[0]))
 
     def concerns(self) -> list[str]:
         """A stylus that nobody holds."""

@@ -1,14 +1,16 @@
 """Page: a study as one HTML file: lines with intervals, heat maps, and paired differences."""
 
+from collections.abc import Callable
 from html import escape
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from teleop_core.evaluation.figure import FIRST, FIXTURE, SECOND, THIRD
+from teleop_core.kernels.geometry import Array
 from teleop_lab.drawing import axis
 from teleop_lab.studies.study import SEED, is_number
-from teleop_lab.studies.summary import conditions, differences, mean_of
+from teleop_lab.studies.summary import Mean, conditions, differences, mean_of
 from teleop_lab.studies.tuning import Range
 
 if TYPE_CHECKING:
@@ -29,14 +31,15 @@ def study_page(study: "Study", found: "xarray.Dataset", title: str) -> str:
     parts = [_table(study, found)]
     for metric in study.metrics:
         parts.append(f"<h2>{escape(metric)}</h2>")
-        for figure in (_lines(study, found, metric), _heat(study, found, metric)):
-            if figure is not None:
-                parts.append(_drawn(*figure))
+        if study.swept:
+            parts.append(drawn(condition_lines(study, found, metric), label_of(study, found, metric)))
+        if (heat := _heat(study, found, metric)) is not None:
+            parts.append(drawn(*heat))
         parts.append(_changes(study, found, metric))
     errors = sorted({str(error) for error in found["error"].values.ravel() if error})
     parts += [f"<p>failed: {escape(error)}</p>" for error in errors]
     facts = ", ".join(f"{name} {value}" for name, value in found.attrs.items() if value)
-    return _page(title, f"{facts}. Means over the seeds, with 95 % intervals by the bootstrap.", parts)
+    return whole_page(title, f"{facts}. Means over the seeds, with 95 % intervals by the bootstrap.", parts)
 
 
 def tuning_page(tuning: "Tuning", tuned: "Tuned", title: str) -> str:
@@ -58,24 +61,26 @@ def tuning_page(tuning: "Tuning", tuned: "Tuned", title: str) -> str:
         where = tuning.searched.get(name)
         kind = {"type": "log"} if isinstance(where, Range) and where.is_log else {}
         layout = {"xaxis": axis(name, **kind), "yaxis": axis(tuning.metric), "height": 300}
-        parts += [f"<h2>{escape(name)}</h2>", _drawn([trace], layout)]
+        parts += [f"<h2>{escape(name)}</h2>", drawn([trace], layout)]
     best = ", ".join(
         f"{name}={value:.4g}" if isinstance(value, float) else f"{name}={value}"
         for name, value in tuned.best.values.items()
     )
-    return _page(title, f"Best: {best}, with {tuning.metric} {tuned.best.score:.4g}.", parts)
+    return whole_page(title, f"Best: {best}, with {tuning.metric} {tuned.best.score:.4g}.", parts)
 
 
-def _drawn(traces: Any, layout: Any) -> str:
+def drawn(traces: Any, layout: Any) -> str:
+    """HTML of a figure, for a :func:`whole_page`."""
     import plotly.graph_objects as go
 
-    drawn = go.Figure(traces, layout)
-    drawn.update_layout(margin={"t": 10, "b": 50, "l": 70, "r": 20})
-    text: str = drawn.to_html({"displayModeBar": False}, full_html=False, include_plotlyjs=False)
+    figure = go.Figure(traces, layout)
+    figure.update_layout(margin={"t": 10, "b": 50, "l": 70, "r": 20})
+    text: str = figure.to_html({"displayModeBar": False}, full_html=False, include_plotlyjs=False)
     return text
 
 
-def _page(title: str, sentence: str, parts: list[str]) -> str:
+def whole_page(title: str, sentence: str, parts: list[str]) -> str:
+    """HTML page of some parts, with plotly.js inside."""
     from plotly.offline import get_plotlyjs
 
     return (
@@ -90,14 +95,15 @@ def _label(found: "xarray.Dataset", metric: str) -> dict[str, Any]:
     return axis(metric, "" if unit == "1" else unit)
 
 
-def _lines(study: "Study", found: "xarray.Dataset", metric: str) -> tuple[Any, Any] | None:
-    if not study.swept:
-        return None
+def condition_lines(
+    study: "Study", found: "xarray.Dataset", metric: str, figure: Callable[[Array], Mean] = mean_of
+) -> list[dict[str, Any]]:
+    """A line over the first swept parameter for each combination of the others, with intervals."""
     name = next(iter(study.swept))
-    lines: dict[str, list[tuple[Any, Any]]] = {}
+    lines: dict[str, list[tuple[Any, Mean]]] = {}
     for values, part in conditions(study, found):
         others = ", ".join(f"{key}={value}" for key, value in values.items() if key != name)
-        lines.setdefault(others, []).append((values[name], mean_of(part[metric].values)))
+        lines.setdefault(others, []).append((values[name], figure(part[metric].values)))
     traces = []
     for number, (others, points) in enumerate(lines.items()):
         means = [mean for _, mean in points]
@@ -105,7 +111,7 @@ def _lines(study: "Study", found: "xarray.Dataset", metric: str) -> tuple[Any, A
             {
                 "type": "scatter",
                 "mode": "lines+markers",
-                "name": others or metric,
+                "name": others,
                 "x": [x if is_number(x) else str(x) for x, _ in points],
                 "y": [mean.value for mean in means],
                 "error_y": {
@@ -117,8 +123,12 @@ def _lines(study: "Study", found: "xarray.Dataset", metric: str) -> tuple[Any, A
                 "line": {"color": _COLORS[number % len(_COLORS)]},
             }
         )
-    layout = {"xaxis": axis(name), "yaxis": _label(found, metric), "height": 340}
-    return traces, layout
+    return traces
+
+
+def label_of(study: "Study", found: "xarray.Dataset", metric: str) -> dict[str, Any]:
+    """Layout of a figure of lines over the first swept parameter."""
+    return {"xaxis": axis(next(iter(study.swept))), "yaxis": _label(found, metric), "height": 340}
 
 
 def _heat(study: "Study", found: "xarray.Dataset", metric: str) -> tuple[Any, Any] | None:

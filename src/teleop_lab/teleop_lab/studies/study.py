@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from distributed import Client
 
 SEED = "seed"
-_KEYS = ("scenario", "seeds", "set", "sweep", "metrics", "parts", "duration")
+_KEYS = ("scenario", "seeds", "set", "sweep", "metrics", "parts", "duration", "people")
 _SPEED = 25.0
 """Simulated seconds that a process makes in a second, with scores; measured on a busy machine."""
 _RESULT = 600
@@ -251,12 +251,13 @@ def _study(
 def read_study(path: Path | str) -> Study:
     """Study of a YAML file: scenario, set, sweep, seeds, metrics, parts, duration.
 
-    ``seeds`` is how many there are, from 1 on, or a list. ``parts`` are files beside it.
+    ``seeds`` is how many there are, from 1 on, or a list. ``parts`` are files beside it. What
+    stands below ``people`` is for :mod:`teleop_lab.people`.
 
     Raises:
         TeleopError: The file cannot be read, or says something else.
     """
-    content = read_entries(path, _KEYS)
+    content = read_entries(path)
     swept = named(content, "sweep")
     for name, values in swept.items():
         if not isinstance(values, list):
@@ -268,7 +269,7 @@ def read_study(path: Path | str) -> Study:
     )
 
 
-def read_entries(path: Path | str, known: Sequence[str]) -> dict[str, Any]:
+def read_entries(path: Path | str, known: Sequence[str] = _KEYS) -> dict[str, Any]:
     """Entries of a YAML file of a study.
 
     Raises:

@@ -1,6 +1,6 @@
 """Summary: means over the seeds with intervals, and what each value changes, pair by pair."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from itertools import product
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -18,7 +18,7 @@ _SHARE = (2.5, 97.5)
 
 
 class Mean(NamedTuple):
-    """A mean, and its 95 % interval by the bootstrap; NaN where nothing is."""
+    """A mean or another figure, and its 95 % interval by the bootstrap; NaN where nothing is."""
 
     value: float
     low: float
@@ -33,20 +33,53 @@ class Mean(NamedTuple):
         return f"{self.value:.4g} ({self.low:.4g} … {self.high:.4g})"
 
 
+Statistic = Callable[..., Any]
+"""Figure of samples along an axis, such as ``np.mean``."""
+
+
 def mean_of(values: Array) -> Mean:
     """Mean of the numbers among some values (N,).
 
     Source:
         Efron 1979: percentiles of the means of samples drawn anew, always with the same numbers.
     """
-    known = np.asarray(values, np.float64)
-    known = known[np.isfinite(known)]
+    return _figure(values, np.mean)
+
+
+def median_of(values: Array) -> Mean:
+    """Median of the numbers among some values (N,), as :func:`mean_of`."""
+    return _figure(values, np.median)
+
+
+def apart(values: Array, others: Array) -> Mean:
+    """Median of some values (N,) minus that of others (M,), each drawn anew for itself."""
+    one, other = _known(values), _known(others)
+    count = min(len(one), len(other))
+    if not count:
+        return mean_of(np.empty(0))
+    value = float(np.median(one) - np.median(other))
+    low, high = np.percentile(_drawn(one, np.median, 0) - _drawn(other, np.median, 1), _SHARE)
+    return Mean(value, float(low), float(high), count)
+
+
+def _figure(values: Array, statistic: Statistic) -> Mean:
+    known = _known(values)
     if len(known) < 2:
         value = float(known[0]) if len(known) else float("nan")
         return Mean(value, value, value, len(known))
-    draws = np.random.default_rng(0).integers(0, len(known), (_DRAWS, len(known)))
-    low, high = np.percentile(known[draws].mean(axis=1), _SHARE)
-    return Mean(float(known.mean()), float(low), float(high), len(known))
+    low, high = np.percentile(_drawn(known, statistic, 0), _SHARE)
+    return Mean(float(statistic(known)), float(low), float(high), len(known))
+
+
+def _known(values: Array) -> Array:
+    found = np.asarray(values, np.float64)
+    return found[np.isfinite(found)]
+
+
+def _drawn(known: Array, statistic: Statistic, seed: int) -> Array:
+    """Figure of samples drawn anew from some values (N,)."""
+    draws = np.random.default_rng(seed).integers(0, len(known), (_DRAWS, len(known)))
+    return np.asarray(statistic(known[draws], axis=1))
 
 
 def conditions(study: "Study", found: "xarray.Dataset") -> "Iterator[tuple[dict[str, Any], Any]]":

@@ -1,0 +1,85 @@
+"""``teleop people``: a study with people in the console, and their scores beside the simulated operator's."""
+
+import argparse
+import webbrowser
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from teleop_core.base.errors import ParameterError
+from teleop_core.commands.arguments import command, ros_module
+
+_EPILOG = """\
+a study is a YAML file, as of `teleop study`, with an entry `people`; then:
+  teleop people late.yaml --store late             opens the participant's page; prints the conductor's
+  teleop people late.yaml --store late             ended and called again, it goes on where it was
+  teleop people late.yaml --store late --compare   scores beside those of the simulated operator
+  teleop people late.yaml --store late --compare --html late.html --csv late.csv
+"""
+
+
+def add(commands: Any) -> None:
+    """Add the command's parser."""
+    text = "conduct a study with people in the browser, and compare them with the simulated operator"
+    parser = command(commands, "people", _run, text, _EPILOG)
+    parser.add_argument("file", type=Path, metavar="FILE.yaml", help="what is done, and by how many")
+    parser.add_argument(
+        "--store", type=Path, metavar="DIR", required=True, help="where recordings and answers are kept"
+    )
+    parser.add_argument("--port", type=int, default=8080, help="port of the pages (default: 8080)")
+    parser.add_argument("--host", default="127.0.0.1", help="address to serve at (default: this machine alone)")
+    parser.add_argument("--token", default="", help="secret of the pages (default: made for --host)")
+    parser.add_argument("--no-browser", action="store_true", help="open no browser")
+    parser.add_argument(
+        "--compare", action="store_true", help="run the simulated operator, and compare; conduct nothing"
+    )
+    parser.add_argument("--jobs", type=int, metavar="N", help="processes of --compare (default: processors)")
+    parser.add_argument("--html", type=Path, metavar="FILE", help="write a page with plots, of --compare")
+    parser.add_argument("--csv", type=Path, metavar="FILE", help="write a line for each trial, of --compare")
+
+
+def _run(arguments: argparse.Namespace) -> int:
+    from teleop_lab.people.journal import Journal
+    from teleop_lab.people.plan import read_plan
+
+    plan = read_plan(arguments.file)
+    if arguments.jobs is not None and arguments.jobs < 1:
+        raise ParameterError("--jobs", arguments.jobs, "1 or more processes")
+    if not arguments.compare and (arguments.html or arguments.csv):
+        raise ParameterError("--html and --csv", True, "given with --compare")
+    journal = Journal(arguments.store, plan)
+    if arguments.compare:
+        return _compare(arguments, plan, journal)
+    ros_module("guest")
+    from teleop_lab.people.conduct import conduct, serve
+
+    server, page = serve(plan, journal, arguments.port, arguments.host, arguments.token)
+    with server:
+        print(f"participants: {server.url}; Ctrl-C ends it", flush=True)
+        print(f"who conducts: {page.link(server.url)}", flush=True)
+        if not arguments.no_browser and not webbrowser.open(server.url):
+            print("there is no browser here: open these addresses in one", flush=True)
+        with suppress(KeyboardInterrupt):
+            conduct(server, page, plan, journal)
+    return 0
+
+
+def _compare(arguments: argparse.Namespace, plan: Any, journal: Any) -> int:
+    import pandas
+
+    from teleop_core.commands.progress import shown_progress
+    from teleop_core.evaluation.command import check_places, write_whole
+    from teleop_lab.people.compare import comparison_page, comparison_table, people_dataset
+
+    check_places(arguments.html, arguments.csv)
+    people = people_dataset(plan, journal)
+    with shown_progress("simulated operator") as progress:
+        simulated = plan.study.run(arguments.store / "simulated", jobs=arguments.jobs, progress=progress)
+    print(comparison_table(plan, people, simulated))
+    if arguments.csv is not None:
+        write_whole(arguments.csv, pandas.DataFrame(journal.rows()).to_csv(index=False))
+        print(f"numbers: {arguments.csv}")
+    if arguments.html is not None:
+        write_whole(arguments.html, comparison_page(plan, people, simulated))
+        print(f"page: {arguments.html}")
+    return 0

@@ -1,0 +1,126 @@
+"""Compare: what people scored, as a data set like a study's, and beside the simulated operator."""
+
+from html import escape
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from teleop_core.evaluation.figure import FIRST, SECOND
+from teleop_core.evaluation.score import keys
+from teleop_lab.people.journal import DONE, Journal
+from teleop_lab.people.plan import Plan
+from teleop_lab.studies.page import condition_lines, drawn, label_of, whole_page
+from teleop_lab.studies.summary import Mean, apart, conditions, differences, median_of, table_text
+
+if TYPE_CHECKING:
+    import xarray
+
+PARTICIPANT = "participant"
+_HEADS = ("people", "simulated operator", "people − simulated")
+_ABOUT = (
+    "Medians over participants and over seeds, a participant's value being the mean of the trials that count. "
+    "Intervals of 95 % by the bootstrap (Efron 1979). Changes are within each participant, and within each seed."
+)
+
+
+def people_dataset(plan: Plan, journal: Journal) -> "xarray.Dataset":
+    """What people scored, as :meth:`Study.run` gives it, with a dimension ``participant`` in place of the seed.
+
+    A value is the mean over the trials that count, practice left out; NaN where there is none. Questions
+    are variables too, 0 to 100, and so is ``trials``: how many were done.
+    """
+    import xarray
+
+    study = plan.study
+    sizes = [*(len(values) for values in study.swept.values()), len(plan.codes)]
+    asked = [question.name for question in plan.questions]
+    places = dict[tuple[int, str], list[dict[str, Any]]]()
+    for code in plan.codes:
+        for trial in plan.trials(code):
+            event = journal.event(code, trial.number)
+            if trial.repetition and event.get("state") == DONE:
+                found = {**event.get("scores", {}), **journal.answers(code, trial.number)}
+                places.setdefault((trial.condition, code), []).append(found)
+    units = {name: key.unit for key in keys() for name in key.names()} | dict.fromkeys(asked, "1")
+    names, variables = (*study.swept, PARTICIPANT), dict[str, Any]()
+    every = [(index, code) for index in range(int(np.prod(sizes[:-1]))) for code in plan.codes]
+    for name in (*study.metrics, *asked):
+        values = [_mean([trial.get(name) for trial in places.get(place, [])]) for place in every]
+        variables[name] = (names, np.array(values).reshape(sizes), {"units": units.get(name, "1")})
+    variables["trials"] = (names, np.array([len(places.get(p, [])) for p in every]).reshape(sizes), {})
+    coordinates: dict[str, object] = {
+        name: [v if isinstance(v, int | float | str) else str(v) for v in values]
+        for name, values in study.swept.items()
+    }
+    coordinates[PARTICIPANT] = list(plan.codes)
+    return xarray.Dataset(variables, coordinates, {"scenario": study.scenario or "", "study": plan.title})
+
+
+def _mean(values: list[float | None]) -> float:
+    known = [value for value in values if value is not None]
+    return float(np.mean(known)) if known else float("nan")
+
+
+def compared(
+    plan: Plan, people: "xarray.Dataset", simulated: "xarray.Dataset", metric: str
+) -> list[tuple[str, Mean, Mean, Mean]]:
+    """For each condition: its name, medians of people and of the simulated operator, and their difference."""
+    found = []
+    pairs = zip(conditions(plan.study, people), conditions(plan.study, simulated), strict=True)
+    for (values, theirs), (_, its) in pairs:
+        name = ", ".join(f"{key}={value}" for key, value in values.items()) or "all"
+        one, other = theirs[metric].values, its[metric].values
+        found.append((name, median_of(one), median_of(other), apart(one, other)))
+    return found
+
+
+def comparison_table(plan: Plan, people: "xarray.Dataset", simulated: "xarray.Dataset") -> str:
+    """People beside the simulated operator, as text."""
+    rows = []
+    for metric in plan.study.metrics:
+        rows += [[metric, row[0], *map(str, row[1:])] for row in compared(plan, people, simulated, metric)]
+    taken = int((people["trials"].sum([d for d in people["trials"].dims if d != PARTICIPANT]) > 0).sum())
+    return f"{table_text(('score', 'condition', *_HEADS), rows)}\n{taken} of {len(plan.codes)} participants"
+
+
+def comparison_page(plan: Plan, people: "xarray.Dataset", simulated: "xarray.Dataset") -> str:
+    """HTML page of the same, with plots, changes pair by pair, and answers; it works offline."""
+    parts = []
+    both = {"people": (people, FIRST), "simulated operator": (simulated, SECOND)}
+    for metric in plan.study.metrics:
+        rows = [[row[0], *map(str, row[1:])] for row in compared(plan, people, simulated, metric)]
+        parts += [f"<h2>{escape(metric)}</h2>", _table((metric, *_HEADS), rows)]
+        if plan.study.swept:
+            traces = [
+                trace | {"name": " ".join(filter(None, (who, trace["name"]))), "line": {"color": color}}
+                for who, (found, color) in both.items()
+                for trace in condition_lines(plan.study, found, metric, median_of)
+            ]
+            parts.append(drawn(traces, label_of(plan.study, people, metric)))
+        parts.append(_table((f"change of {metric}", "against the first", *_HEADS[:2]), _changes(plan, both, metric)))
+    asked = [question.name for question in plan.questions]
+    if asked:
+        rows = [
+            [
+                ", ".join(f"{k}={v}" for k, v in values.items()) or "all",
+                *(str(median_of(part[n].values)) for n in asked),
+            ]
+            for values, part in conditions(plan.study, people)
+        ]
+        parts += ["<h2>Questions</h2>", _table(("medians of people, 0 to 100", *asked), rows)]
+    return whole_page(plan.title, _ABOUT, parts)
+
+
+def _changes(plan: Plan, both: dict[str, Any], metric: str) -> list[list[str]]:
+    found = [differences(plan.study, data, metric) for data, _ in both.values()]
+    return [
+        [name, str(value), *(str(changes[name][i]) for changes in found)]
+        for name, values in plan.study.swept.items()
+        for i, value in enumerate(values[1:])
+    ]
+
+
+def _table(heads: tuple[str, ...], rows: list[list[str]]) -> str:
+    head = "".join(f"<th>{escape(text)}</th>" for text in heads)
+    body = "".join(f"<tr>{''.join(f'<td>{escape(cell)}</td>' for cell in row)}</tr>" for row in rows)
+    return f"<table><tr>{head}</tr>{body}</table>" if rows else ""
