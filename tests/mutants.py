@@ -202,11 +202,11 @@ MUTANTS = (
     Mutant("commands_queued", "commands that waited during an outage run after it (as in "
            "stretch_web_teleop #3)",
            (("nodes/streams.py", "_WAITING = 20", "_WAITING = 20_000"),
-            ("nodes/streams.py", "if has_buttons and self._target.tobytes() !=", "if b'x' !=")),
+            ("nodes/streams.py", "(has_buttons and self._target.tobytes() != before)", "True")),
            (), schedule=Schedule("age", ((2.0, "standstill", "slave_side", 3.0, 0.5),))),
     Mutant("queue_kept", "a queue grows for as long as its reader stands still",
            (("nodes/streams.py", "_WAITING = 20", "_WAITING = 20_000"),
-            ("nodes/streams.py", "if has_buttons and self._target.tobytes() !=", "if b'x' !=")),
+            ("nodes/streams.py", "(has_buttons and self._target.tobytes() != before)", "True")),
            (), schedule=Schedule("queues", ((2.0, "standstill", "slave_side", 4.5, 0.5),))),
     _mutant("engage_jumps", "who engages leads on from where the hand was (as in moveit2 #3378 and "
             "IsaacTeleop #730)", "chain/mapping/motion_scaling.py",

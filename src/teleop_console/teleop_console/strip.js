@@ -355,7 +355,8 @@
   // -- again and again -----------------------------------------------------------------------------
 
   document.documentElement.append(strip);
-  addEventListener('DOMContentLoaded', () => document.body.append(strip));
+  addEventListener('DOMContentLoaded', () => { // not on a page of a form's own
+    if (document.getElementById('root')) document.body.append(strip); else strip.remove(); });
   addEventListener('resize', () => { place(); draw(); if (state) look(); });
   let choosing = true, seen = 0;
   addEventListener('teleop', ({ detail }) => {
