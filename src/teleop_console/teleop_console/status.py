@@ -136,8 +136,10 @@ def task_text(arm: ArmView) -> str:
 
 
 def closes(arm: ArmView) -> bool:
-    """Whether it matters how far the hand closes: at a task, or with a jaw."""
-    return arm.get(TASK_STATE) is not None or arm.get(SLAVE_JAW_MEASURED_JS) is not None
+    """Whether it matters how far the hand closes: at a task, or with a jaw, while the arm follows."""
+    told = arm.operation
+    follows = bool(told) and State(int(told["state"])) is State.ENABLED and bool(told["is_homed"])
+    return follows and (arm.get(TASK_STATE) is not None or arm.get(SLAVE_JAW_MEASURED_JS) is not None)
 
 
 def status_html(view: View, title: str, doing: str, step: str = "") -> str:
