@@ -1,7 +1,9 @@
 """Scheduler of the simulated machine: whose turn it is."""
 
 import pytest
+from std_msgs.msg import Bool, Empty
 
+from teleop_core.middleware.world import Qos
 from teleop_drill.simulation.bus import Bus
 from teleop_drill.simulation.machine import Machine, Process
 from teleop_drill.simulation.scheduler import Scheduler
@@ -19,6 +21,24 @@ def test_a_thread_that_ends_lets_its_maker_wait_on() -> None:
         return machine.scheduler.now_ns
 
     assert machine.run(work) - begun >= 1_000_000_000
+
+
+def test_ends_of_different_types_do_not_match() -> None:
+    machine = Machine(Scheduler(0))
+    bus = Bus(machine.scheduler)
+
+    def work(process: Process) -> tuple[bool, ...]:
+        bus.watch(process)
+        world = SimulatedWorld(bus, process)
+        node = world.node("both")
+        sent = node.create_publisher(Bool, "told", Qos())
+        takers = [node.create_taker(kind, "told", Qos()) for kind in (Bool, Empty)]
+        world.sleep(2.0)
+        sent.publish(Bool(data=True))
+        world.sleep(0.1)
+        return tuple(taker.take() is not None for taker in takers)
+
+    assert machine.run(work) == (True, False)
 
 
 @pytest.mark.parametrize(

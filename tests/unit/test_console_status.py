@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from teleop_console.link import ArmView, View
-from teleop_console.status import facts, leader, next_step, status_html, task_text
+from teleop_console.status import closes, facts, leader, next_step, status_html, task_text
 from teleop_core.chain.operators import OPERATORS
 from teleop_core.chain.tasks import Act, Miss
 from teleop_core.graph.topics import TASK_STATE
@@ -83,3 +83,21 @@ def test_every_act_and_every_error_has_words(act: Act, miss: Miss) -> None:
     text = task_text(arm_at_a_task(number=2, act=act, attempts=1, miss=miss))
     assert text.startswith("Task: ")
     assert text.endswith("s") == (miss is Miss.NONE)
+
+
+@pytest.mark.parametrize(
+    ("state", "is_homed", "has_task", "told"),
+    [
+        (State.ENABLED, True, True, True),
+        (State.ENABLED, False, True, False),
+        (State.PAUSED, True, True, False),
+        (State.ENABLED, True, False, False),
+    ],
+)
+def test_a_press_is_offered_at_a_task_while_the_arm_follows(
+    state: State, is_homed: bool, has_task: bool, told: bool
+) -> None:
+    streams = {TASK_STATE.name: np.zeros(len(TASK_STATE.columns))} if has_task else {}
+    arm = ArmView(streams, operation={"state": float(state), "is_homed": float(is_homed)})
+    assert closes(arm) is told
+    assert not closes(ArmView(streams))

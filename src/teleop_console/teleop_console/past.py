@@ -79,7 +79,8 @@ class Past(ABC):
     """Columns of a session; methods may be called from any thread.
 
     Attributes:
-        columns: By their names, such as ``left/slave/measured_cp x``.
+        columns: By their names, such as ``left/slave/measured_cp x``; it grows while others look, who go
+            through a copy.
         joints: Names of the joints of each arm, by namespace.
     """
 
@@ -177,9 +178,7 @@ class Seen(Past):
             found = self._rings[arm, topic] = np.full((ROWS, width), np.nan)
             if topic in BY_NAME:
                 robot = self._arms[arm].robot
-                columns = dict(self.columns)  # others read them
                 self._add_known(arm, topic, BY_NAME[topic].kind, robot.joint_names, robot)
-                self.columns = columns | self.columns
         return found
 
     def _order(self) -> Any:

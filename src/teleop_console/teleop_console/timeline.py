@@ -85,13 +85,13 @@ class Timeline:
             "speed": link.speed if link else 1.0,
             "loop": bool(link and link.loop),
             "title": self._link.title,
-            "first": [name for name in self._past.columns if name.endswith(ERROR)][:1],
+            "first": [name for name in tuple(self._past.columns) if name.endswith(ERROR)][:1],
             "over": self._over_name,
             "align": self._align,
         }
         if "find" in words:
             asked = words["find"].lower().split()
-            units = ((name, column.unit) for name, column in self._past.columns.items())
+            units = ((name, column.unit) for name, column in tuple(self._past.columns.items()))
             found = [[name, unit] for name, unit in units if all(word in f"{name} [{unit}]".lower() for word in asked)]
             told["found"], told["count"] = found[:FOUND], len(found)
             told["others"] = self._others()
@@ -185,13 +185,17 @@ class Timeline:
 
     @staticmethod
     def _states(past: Past) -> list[str]:
-        return [name for name in {column.topic for column in past.columns.values()} if name.endswith(TELEOP_STATE.name)]
+        return [
+            name
+            for name in {column.topic for column in tuple(past.columns.values())}
+            if name.endswith(TELEOP_STATE.name)
+        ]
 
 
 def _following(past: Past) -> float | None:
     """When an arm first followed the hand [s], 0 if none did; None while it is being read."""
     first = math.inf
-    for name in past.columns:
+    for name in tuple(past.columns):
         if not name.endswith(f"{TELEOP_STATE.name} is_following"):
             continue
         if (samples := past.samples(name)) is None:
