@@ -2,7 +2,7 @@
 
 It is YAML 1.1 as of PyYAML's safe loader, of which dates are texts, since no value here is one.
 Aliases are fine unless they lead back into themselves or multiply; so are numbers of a length that
-a number can have. Where PyYAML has libyaml, that reads and writes: the values are the same, six times
+a number can have. Where PyYAML has libyaml, that reads and writes: the values are the same, five times
 as fast.
 """
 
