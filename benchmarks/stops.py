@@ -23,6 +23,7 @@ from typing import Any
 import numpy as np
 from rclpy.context import Context
 from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import Bool
 
 from teleop_core.bags.layouts import layout
@@ -34,6 +35,7 @@ from teleop_core.nodes.remote_control import RemoteControl
 from teleop_core.nodes.streams import Subscription
 from teleop_core.robots import load_robot
 
+_LATCHED = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 _JOINTS = load_robot("rcrt1").joint_names
 _PATIENCE = 120.0
 _STILL = 60  # equal setpoints that are a standstill
@@ -51,7 +53,7 @@ class Tap:
         topic = SLAVE_SETPOINT_JS
         self._setpoints = Subscription(self._own, topic, f"/{topic.name}", 5000)
         self._layout = layout(topic, _JOINTS)
-        self.button = self._node.create_publisher(Bool, STOP_TOPIC, 10)
+        self.button = self._node.create_publisher(Bool, STOP_TOPIC, _LATCHED)
         self._heard = self._node.create_subscription(Bool, STOP_TOPIC, lambda _: None, 10)
         self.rows: list[tuple[int, Any]] = []
 

@@ -221,6 +221,43 @@ def test_a_button_that_was_pressed_before_the_slave_began_stops_it(peer: "Peer")
     go_on(peer)
 
 
+def test_a_button_that_has_said_nothing_counts_as_pressed_until_it_speaks_or_is_overridden(peer: "Peer") -> None:
+    """Nobody knows whether it was pressed before it was found."""
+    peer.start("slave")
+    peer.wait(lambda: state(peer) is State.ENABLED, "ENABLED")
+    first = peer.ros.create_publisher(Bool, STOP_TOPIC, Qos())
+    peer.wait(lambda: state(peer) is State.FAULT, "FAULT by a button that is there")
+    ok, text = command(peer, "reset")
+    assert not ok
+    assert "peer" in text
+    first.publish(Bool(data=False))
+    go_on(peer)
+    peer.ros.create_publisher(Bool, STOP_TOPIC, Qos())
+    peer.wait(lambda: state(peer) is State.FAULT, "FAULT by another one")
+    assert command(peer, "release")[0]
+    go_on(peer)
+    since = peer.now()
+    peer.wait(lambda: peer.now() > since + 2.0, "a while")
+    assert state(peer) is State.ENABLED
+
+
+@pytest.mark.parametrize("is_latched", [True, False])
+def test_a_button_that_tells_whoever_comes_what_it_is_stops_nothing(peer: "Peer", is_latched: bool) -> None:
+    peer.start("slave")
+    peer.wait(lambda: state(peer) is State.ENABLED, "ENABLED")
+    button = peer.ros.create_publisher(Bool, STOP_TOPIC, Qos(is_latched=is_latched))
+    since = peer.now()
+
+    def beat() -> bool:
+        if not is_latched and button.get_subscription_count() == 2:
+            button.publish(Bool(data=False))
+        peer.sleep(0.2)  # the rate of a slow button, not a wait
+        return peer.now() > since + 3.0
+
+    peer.wait(beat, "three seconds")
+    assert state(peer) is State.ENABLED
+
+
 def test_a_stop_is_released_by_the_button_that_pressed_it_alone(peer: "Peer", button: Publisher) -> None:
     other = peer.ros.create_publisher(Bool, STOP_TOPIC, Qos())
     peer.wait(lambda: other.get_subscription_count() == 2, "both readers of the other button")

@@ -41,6 +41,18 @@ def test_what_a_button_said_before_it_is_heard_is_nothing_to_an_idle_listener() 
     assert presses.lost == 0
 
 
+def test_a_button_that_says_nothing_holds_the_stop_until_it_is_released_or_overridden() -> None:
+    presses = Presses()
+    assert presses.doubt(b"a") == (True,)
+    assert presses.doubt(b"a") == ()
+    assert presses.holders == (b"a",)
+    assert told(presses, (1, False)) == [False]
+    assert presses.doubt(b"b") == (True,)
+    presses.release()
+    assert not presses.holders
+    assert presses.doubt(b"a") == presses.doubt(b"b") == ()
+
+
 def test_only_the_button_that_presses_releases() -> None:
     presses = Presses()
     assert told(presses, (1, True)) == [True]

@@ -18,6 +18,13 @@ RELEASE = "release"
 _EVERY = 4
 _BEAT_NS = 100_000_000
 """A button of this package that has spoken says its state again so often [ns]."""
+_LOOK = 0.1
+"""A slave looks for buttons that it has not heard so often [s]."""
+_GRACE_NS = 500_000_000
+"""A button that was found so long ago and has said nothing counts as pressed [ns].
+
+Who sends again and again is heard within it, for reader and sender find each other about a tenth of a second apart.
+"""
 _BYTES = 5
 """A Bool as CDR: four bytes of encapsulation, one of data."""
 READERS = (Qos(keeps_all=True), Qos(keeps_all=True, is_latched=True), Qos(keeps_all=True, is_reliable=False))
@@ -75,10 +82,11 @@ class StopInput:
     readers keep all messages, and what is missing counts as a press
     (:class:`~teleop_core.slave.operation.presses.Presses`), by the numbers of messages and by the
     account of the first reader, which hears all who send reliably. The second reader hears what was
-    said long ago, too.
+    said long ago, too. A button that is there and says nothing counts as pressed after half a second: nobody knows
+    whether it was pressed before it was found.
 
     Args:
-        owner: Node that owns it.
+        owner: Node that owns it; its executor looks for such buttons.
 
     Attributes:
         has_new: Whether a button was heard for the first time; set it back before :meth:`learn`.
@@ -86,6 +94,10 @@ class StopInput:
 
     def __init__(self, owner: Owner) -> None:
         self._ros, self.has_new = owner.ros, False
+        self._now_ns = owner.world.monotonic_ns
+        self._found_ns: dict[bytes, int] = {}  # of buttons that have said nothing yet
+        self._silent: tuple[bytes, ...] = ()
+        self._timer = self._ros.create_timer(_LOOK, self._look_for_silent)
         self._takers = [self._ros.create_taker(Bool, STOP_TOPIC, qos) for qos in READERS]
         self._presses, self._ticks = Presses(), 0
         self._names: dict[bytes, str] = {}
@@ -100,7 +112,8 @@ class StopInput:
         found: list[bool] = []
         self._ticks += 1
         presses, best_effort = self._presses, self._takers[-1]
-        for taker in self._takers if self._ticks % _EVERY == 0 else self._takers[:1]:
+        looks_at_all = self._ticks % _EVERY == 0
+        for taker in self._takers if looks_at_all else self._takers[:1]:
             while (taken := taker.take()) is not None:
                 if len(taken.data) < _BYTES:
                     continue
@@ -110,7 +123,14 @@ class StopInput:
                     found += presses.overhear(taken.sender, now_ns, is_pressed=is_pressed)
                 else:
                     found += presses.take(taken.sender, taken.number, now_ns, is_pressed=is_pressed, is_idle=is_idle)
+        if looks_at_all and self._silent:  # now that all they have said is read
+            found += [said for one in self._silent for said in presses.doubt(one)]
         return [*presses.lose(self._takers[0].lost), *found]
+
+    def _look_for_silent(self) -> None:
+        now_ns = self._now_ns()
+        self._found_ns = {one: self._found_ns.get(one, now_ns) for one in self._unheard()}
+        self._silent = tuple(one for one, since_ns in self._found_ns.items() if now_ns - since_ns >= _GRACE_NS)
 
     @property
     def heard_ns(self) -> int | None:
@@ -141,9 +161,14 @@ class StopInput:
 
         They are there, have said nothing yet, and do not repeat their state for late readers.
         """
-        return " and ".join(
-            name for one, (name, is_latched) in self._look_up().items() if not (is_latched or self._presses.knows(one))
-        )
+        return " and ".join(self._unheard().values())
+
+    def _unheard(self) -> dict[bytes, str]:
+        return {
+            one: name
+            for one, (name, is_latched) in self._look_up().items()
+            if not (is_latched or self._presses.knows(one))
+        }
 
     def release(self) -> None:
         """Override all buttons that hold the stop pressed, or are missed."""
@@ -151,6 +176,7 @@ class StopInput:
 
     def close(self) -> None:
         """Stop listening."""
+        self._ros.destroy(self._timer)
         for taker in self._takers:
             taker.close()
 

@@ -166,14 +166,14 @@ class SlaveNode(TickingNode):
         log.error(text) if is_bad else log.info(text)
 
     def concerns(self) -> list[str]:
-        """Reasons why it holds still; stop buttons that may be pressed without its knowing."""
+        """Reasons why it holds still; stop buttons that say nothing."""
         return [*self._standstills(), *self._unknown_buttons()]
 
     def _unknown_buttons(self) -> list[str]:
         unheard = self._stop.unheard()
         if not unheard:
             return []
-        return [f"{unheard} has not said yet whether the stop is pressed: press and release it"]
+        return [f"{unheard} has not said whether it is pressed, and counts as pressed: press and release it"]
 
     def _standstills(self) -> list[str]:
         if not self._is_told:

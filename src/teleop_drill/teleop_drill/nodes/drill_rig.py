@@ -64,7 +64,9 @@ class LiveRig:
         self._executor.add_node(self._node.ros)
         # As anybody's, which keep no state. Made long before they are pressed: a message sent while
         # a button and the slave discover each other arrives a tenth of a second later.
-        self._buttons = [self._node.ros.create_publisher(Bool, STOP_TOPIC, Qos(depth=100)) for _ in range(2)]
+        self._buttons = [
+            self._node.ros.create_publisher(Bool, STOP_TOPIC, Qos(depth=100, is_latched=True)) for _ in range(2)
+        ]
         self._speeds = self._node.ros.create_publisher(JointState, "/slave/servo_jv", Qos())
         self._services = {name: self._node.ros.create_client(Trigger, f"/slave/{name}") for name in COMMANDS}
         self._settings = {

@@ -34,6 +34,8 @@ _TELL = 0.3
 """Time within which the operator is told a new state [s], of the time in which the arm works."""
 _OBEY = 0.1
 """Time within which a pressed stop is in force [s], of the time in which the arm works."""
+_DOUBT = 0.7
+"""The same since the slave has found a button that was pressed before: half a second, and two looks [s]."""
 _FOUND_NS, _ON_THE_WAY_NS = 1_600_000_000, 300_000_000
 """Time in which a recorder hears of all topics, and in which what was sent is recorded [ns]."""
 _OLD = 1.0
@@ -105,7 +107,9 @@ class Laws:
         self._offset_ns = self._stepped_ns = self._old = 0
         self._resting_since: float | None = None
         self._moved_at = 0.0
-        self._press: tuple[int, float] | None = None
+        self._press: tuple[int, bool] | None = None
+        """Newest press that is not in force: its button, and whether it was sent to the slave."""
+        self._obey_by, self._was_idle = 0.0, False
         self._presses = 0
         self._sent_ns: dict[bytes, list[int]] = {}  # of each publisher
         """When setpoints were sent, by the system's clock [ns]."""
@@ -196,10 +200,12 @@ class Laws:
         if slave is not self._slave:
             self._slave, self._seen_state, self._press = slave, -1, None
             self._presses = len(stage.presses)
+            for button in stage.held:  # this slave has never heard of it
+                self._press, self._obey_by = (button, False), math.inf
         if works and slave is not None and slave.stage is not None and slave.is_at_work:
             self._worked += 1e-9 * _LOOK_NS
             self._judge_state(slave)
-            self._judge_stop(slave)
+            self._judge_stop(slave, process)
         self._judge_ends()
         self._judge_queues()
 
@@ -221,20 +227,33 @@ class Laws:
             was = "nothing" if told is None else State(int(told)).name
             self._break("told", f"is {State(state).name} for {in_force:.2f} s and has told {was}")
 
-    def _judge_stop(self, slave: Any) -> None:
-        """A pressed stop is in force soon, and never lost."""
-        presses = self._stage.presses
-        if len(presses) > self._presses:
-            self._presses = len(presses)
-            self._press = presses[-1], self._worked
+    def _judge_stop(self, slave: Any, process: Process) -> None:
+        """A pressed stop is in force soon, and never lost.
+
+        A press that was sent to nobody is in force soon after the slave has found its button. One that was released
+        before that is nothing to an arm that was disabled.
+        """
+        stage, now_ns, operation = self._stage, self._scheduler.now_ns, slave.stage.operation
+        if len(stage.presses) > self._presses:
+            self._presses, button = len(stage.presses), stage.presses[-1]
+            times = stage.found(button, process)
+            is_sent = times is not None and times[0] <= now_ns - _LOOK_NS
+            self._press, self._was_idle = (button, is_sent), False
+            self._obey_by = self._worked + _OBEY if is_sent else math.inf
         if self._press is None:
             return
         self._count("stop")
-        if slave.stage.operation["is_stopped"] or slave.stage.operation["is_pressed"]:
+        button, is_sent = self._press
+        self._was_idle |= operation["state"] == State.DISABLED
+        if math.isinf(self._obey_by) and (times := stage.found(button, process)) and times[1] <= now_ns:
+            self._obey_by = self._worked + _DOUBT
+        is_over = not is_sent and self._was_idle and button not in stage.held
+        if is_over or operation["is_stopped"] or operation["is_pressed"]:
             self._press = None
-        elif self._worked - self._press[1] > _OBEY + self._late():
+        elif self._worked > self._obey_by + self._late():
             self._press = None
-            self._break("stop", f"a stop was pressed, and {_OBEY:g} s later none is in force")
+            since = "it was pressed" if is_sent else "the slave found the button that was pressed before"
+            self._break("stop", f"no stop is in force, although {since} long enough ago")
 
     def _late(self) -> float:
         """What the machine itself may take [s]: bad lines, and processors that others keep busy."""

@@ -75,7 +75,9 @@ class Stage:
         self.stopped: list[tuple[Process, int]] = []
         """Processes that were stopped, each with the time [ns]."""
         self.presses: list[int] = []
-        """When a stop was pressed [ns]."""
+        """Which button each press was of."""
+        self.held: set[int] = set()
+        """Buttons that are pressed."""
         self._buttons = [self._node.create_publisher(Bool, STOP_TOPIC, Qos(depth=100)) for _ in range(2)]
         self._speeds = self._node.create_publisher(JointState, "/slave/servo_jv", Qos())
         self._clients = {name: self._node.create_client(Trigger, f"/slave/{name}") for name in (*COMMANDS, _RELEASE)}
@@ -136,10 +138,19 @@ class Stage:
             self.session.launch(name)
 
     def press(self, button: int, *, is_pressed: bool) -> None:
-        """Send a message of a stop button."""
+        """Send a message of a stop button, which only those hear whom it has found."""
         if is_pressed:
-            self.presses.append(self.machine.scheduler.now_ns)
+            self.presses.append(button)
+            self.held.add(button)
+        else:
+            self.held.discard(button)
         self._buttons[button].publish(Bool(data=is_pressed))
+
+    def found(self, button: int, slave: Process) -> tuple[int, int] | None:
+        """When a button finds a slave, and is found by it [ns]; None before the slave listens."""
+        links = self._buttons[button].links
+        times = [(link.writer_knows_ns, link.reader_knows_ns) for link in links if link.reader.process is slave]
+        return max(times, default=None)
 
     def command(self, name: str) -> None:
         """Ask the slave for something, without waiting for its answer."""
@@ -180,6 +191,8 @@ class Stage:
         if state == State.PAUSED:
             self.command("resume")
         elif state == State.FAULT:
+            for button in self._buttons if told["is_pressed"] else ():  # one that was not heard yet counts as pressed
+                button.publish(Bool(data=False))
             self.command("reset")
         elif state == State.DISABLED:
             self.command("enable")

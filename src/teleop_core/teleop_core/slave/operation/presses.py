@@ -12,6 +12,8 @@ class Presses:
     said before it is heard for the first time may have been sent to this listener too, so messages before the first one
     count as missing, unless the listener is idle. A message that arrives twice, through two readers, counts once.
 
+    Of a button that says nothing, nobody knows whether it is pressed. Who finds one has it hold the stop (:meth:`doubt`).
+
     Methods that take a message return what the stop is after it, oldest first: a press alone
     (True), followed by False where no button holds the stop any more.
     """
@@ -20,6 +22,7 @@ class Presses:
         self._last: dict[bytes, int] = {}
         self._heard_ns: dict[bytes, int] = {}
         self._holders: dict[bytes, None] = {}  # in the order of their presses
+        self._doubted: set[bytes] = set()
         self._missing = self._told = 0
 
     @property
@@ -90,6 +93,20 @@ class Presses:
             is_pressed: What the message says.
         """
         return () if sender in self._last else self._note(sender, now_ns, is_pressed=is_pressed)
+
+    def doubt(self, sender: bytes) -> tuple[bool, ...]:
+        """Have a button hold the stop that is there and has never been heard.
+
+        It counts as pressed until it says that it is released, or is overridden.
+
+        Args:
+            sender: As in :meth:`take`; one that is known, or was doubted before, is passed over.
+        """
+        if self.knows(sender) or sender in self._doubted:
+            return ()
+        self._doubted.add(sender)
+        self._holders[sender] = None
+        return (True,)
 
     def release(self) -> None:
         """Override all buttons: none holds the stop, and none is missed before it speaks again."""
