@@ -12,7 +12,7 @@ class Presses:
     said before it is heard for the first time may have been sent to this listener too, so messages before the first one
     count as missing, unless the listener is idle. A message that arrives twice, through two readers, counts once.
 
-    Of a button that says nothing, nobody knows whether it is pressed. Who finds one has it hold the stop (:meth:`doubt`).
+    Of a button that says nothing, nobody knows whether it is pressed: it holds the stop (:meth:`doubt`).
 
     Methods that take a message return what the stop is after it, oldest first: a press alone
     (True), followed by False where no button holds the stop any more.
