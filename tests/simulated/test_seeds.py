@@ -1,6 +1,7 @@
 """Random schedules: laws that hold in all of them, and what is told where one does not."""
 
 import json
+import os
 import subprocess
 import sys
 from collections import Counter
@@ -18,6 +19,12 @@ from teleop_drill.simulation.seeds import PROCESSES, run_seed, shrink
 
 pytestmark = pytest.mark.slow
 SIDES = PROCESSES[Processes.SIDES]
+PROCESSORS: tuple[dict[str, str], ...] = (
+    {},
+    {"OPENBLAS_CORETYPE": "Sandybridge"},
+    {"OPENBLAS_CORETYPE": "Haswell", "NPY_DISABLE_CPU_FEATURES": "X86_V3,X86_V4,AVX512_ICL,AVX512_SPR"},
+)
+"""What makes NumPy and OpenBLAS compute as on three processors."""
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -49,14 +56,21 @@ def test_a_schedule_that_breaks_a_law_is_cut_down_to_what_does_it(monkeypatch: p
     assert [fault.kind for fault in shrink(found, "stop").faults] == ["press"]
 
 
-def test_one_schedule_is_run_again_by_its_seed_and_faults(tmp_path: Path) -> None:
-    words = ["drill", "--seeds", "1", "--seed", "3", "--faults", "0", "--out", str(tmp_path / "bags")]
-    done = subprocess.run(
-        [sys.executable, "-m", "teleop_core.cli", *words], check=False, capture_output=True, text=True
-    )
-    assert done.returncode == 0, done.stdout + done.stderr
-    assert draw(3, SIDES)[0].text() in done.stdout
-    assert (tmp_path / "bags/recording_1/metadata.yaml").exists()
+def test_one_schedule_is_run_again_by_its_seed_and_faults_on_processors_that_round_otherwise(tmp_path: Path) -> None:
+    """Its recording has the same bytes wherever NumPy and OpenBLAS compute in other orders."""
+    recordings = set()
+    for k, processor in enumerate(PROCESSORS):
+        (folder := tmp_path / str(k)).mkdir()
+        words = ["drill", "--seeds", "1", "--seed", "3", "--faults", "0", "--out", "bags"]  # a recording tells its place
+        done = subprocess.run(
+            [sys.executable, "-m", "teleop_core.cli", *words],
+            check=False, capture_output=True, text=True, env=os.environ | processor, cwd=folder,
+        )  # fmt: skip
+        assert done.returncode == 0, done.stdout + done.stderr
+        assert draw(3, SIDES)[0].text() in done.stdout
+        assert (folder / "bags/recording_1/metadata.yaml").exists()
+        recordings.add((folder / "bags/recording_1/recording_1_0.mcap").read_bytes())
+    assert len(recordings) == 1
 
 
 def test_many_schedules_are_told_as_a_table_of_faults_and_states(tmp_path: Path) -> None:
