@@ -47,7 +47,7 @@ def findings_of(*faults: str, may_move: bool) -> dict[str, Finding]:
         return {found.row.name: found for found in examine(arm, may_move=may_move)}
 
 
-@pytest.mark.slow
+@pytest.mark.soak
 def test_a_foreign_arm_without_fault_passes() -> None:
     found = findings_of("honest", may_move=True)
     sound = ("operating_state", "state_command", "measured_js", "measured_cp", "setpoint_js", "move_jp", "servo_jp")

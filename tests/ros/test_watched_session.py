@@ -33,6 +33,7 @@ def test_parameters_of_a_composed_node_change_at_run_time(watched: Any) -> None:
     assert "fine_gain" in refused.reason
 
 
+@pytest.mark.soak
 def test_a_subscriber_that_never_reads_does_not_slow_the_session(watched: Any) -> None:
     deaf = [watched.listen(topic) for topic in STREAMS]
     spans = [_ticks_and_lost_time(watched)]
