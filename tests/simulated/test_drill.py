@@ -10,7 +10,7 @@ import pytest
 
 from drill_runs import run_drill
 from mutants import ROOT
-from teleop_drill.drill import SHORT, chosen
+from teleop_drill.drill import SHORT, chosen, inside
 from teleop_drill.nodes import drill
 from teleop_drill.simulation.drill import simulated_drill
 
@@ -66,6 +66,13 @@ def test_a_signal_ends_a_drill_where_it_waits_and_what_was_measured_is_kept(tmp_
     found = simulated_drill(rows, tmp_path, say)
     assert [one.exercise.name for one in found] == [rows[0].name], said
     assert said[3:] == ["goes on until it waits", "stopped: interrupted; what was measured until now:"]
+
+
+def test_a_drill_whose_environment_another_drill_has_left_breaks_its_stage(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("TELEOP_PARTS", inside.__file__)
+    assert_it_behaves(tmp_path, ["stage_raises"], "--composed")
 
 
 @pytest.mark.soak

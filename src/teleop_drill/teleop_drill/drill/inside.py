@@ -180,7 +180,8 @@ def register() -> None:
     register_stage(stage)
 
 
-def _install() -> None:
+def install() -> None:
+    """Register the stage in a process that a drill has started, and do there what it says."""
     register()
     file = os.environ.get(VARIABLE)
     if file is None:
@@ -193,4 +194,7 @@ def _install() -> None:
 
 
 if __name__.startswith("teleop_own_parts"):
-    _install()
+    # This file is read as parts of one's own: the stage is that of the package, which the drill steers.
+    from teleop_drill.drill import inside
+
+    inside.install()
