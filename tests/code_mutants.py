@@ -52,7 +52,7 @@ CODE_MUTANTS = (
             "            self.site.interrupt.check()\n", "", "tests/simulated/test_drill.py"),
     _mutant("conformance_deaf", "a test of an arm does not look for a signal where it waits",
             "teleop_drill/nodes/conformance_arm.py",
-            "            self.interrupt.check()\n", "", "tests/ros/test_crtk.py"),
+            "            self.interrupt.check()\n", "", "tests/simulated/test_conformance.py"),
     _mutant("cut_untold", "who was killed with what it held back is not told", "nodes/feed.py",
             "self.cut += sum(", "self.cut += 0 * sum(", "feed"),
     _mutant("old_clock", "stamps of a clock that was ahead shut out all later ones",

@@ -29,6 +29,13 @@ def test_an_arm_without_fault_passes_and_is_only_moved_by_what_it_takes() -> Non
     assert {verdict for name, verdict in verdicts.items() if name not in sound} == {Verdict.ABSENT}
 
 
+def test_a_signal_ends_a_test_where_it_waits() -> None:
+    with Arm("PSM", world=SimulatedPeer().world) as arm:
+        arm.interrupt.ask()
+        with pytest.raises(KeyboardInterrupt):
+            arm.is_there(60.0)
+
+
 @pytest.mark.parametrize(
     ("fault", "topic", "note"),
     [

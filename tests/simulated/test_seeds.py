@@ -61,7 +61,7 @@ def test_one_schedule_is_run_again_by_its_seed_and_faults_on_processors_that_rou
     recordings = set()
     for k, processor in enumerate(PROCESSORS):
         (folder := tmp_path / str(k)).mkdir()
-        words = ["drill", "--seeds", "1", "--seed", "3", "--faults", "0", "--out", "bags"]  # a recording tells its place
+        words = ["drill", "--seeds", "1", "--seed", "3", "--faults", "0", "--out", "bags"]  # which is recorded
         done = subprocess.run(
             [sys.executable, "-m", "teleop_core.cli", *words],
             check=False, capture_output=True, text=True, env=os.environ | processor, cwd=folder,

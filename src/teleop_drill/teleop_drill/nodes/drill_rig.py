@@ -62,8 +62,8 @@ class LiveRig:
         self._node, self._own = Guest("drill", domain, world), Guest("drill_hand", domain, world)
         self._executor = self._node.world.executor()
         self._executor.add_node(self._node.ros)
-        # Latched, as a good button is: who keeps no state counts as pressed until it speaks. Made long before they
-        # are pressed: a message sent while a button and the slave discover each other arrives a tenth of a second later.
+        # Latched, as a good button is: who keeps no state counts as pressed until it speaks. Made long before they are
+        # pressed: a message sent while a button and the slave discover each other comes a tenth of a second later.
         self._buttons = [
             self._node.ros.create_publisher(Bool, STOP_TOPIC, Qos(depth=100, is_latched=True)) for _ in range(2)
         ]
