@@ -188,15 +188,17 @@ class Robot:
         """Inverse kinematics as an argument for other kernels."""
         return cast("IkKernel", pointer(self.kernels.ik, IK))
 
+    @property
+    def speed_limit(self) -> Array:
+        """Largest joint speeds (n,) [rad/s or m/s], those of the drives; infinite without drives."""
+        return np.full(self.n, np.inf) if self.drives is None else self.drives.speed_limit
+
     def limits(self, dt: float = math.inf) -> Array:
         """Rows lower, upper, largest step within ``dt`` [s]: (3, n), as the ik kernel takes it.
 
         Without drives, or without ``dt``, steps are infinite. A new array each time, the caller's.
         """
-        step = np.full(self.n, np.inf)
-        if self.drives is not None and not math.isinf(dt):
-            step = self.drives.speed_limit * dt
-        return np.ascontiguousarray(np.stack((self.lower, self.upper, step)))
+        return np.stack((self.lower, self.upper, self.speed_limit * dt))
 
     def fk(self, q: object) -> Array:
         """Pose of the tip in the base, in which all loops close.

@@ -1,11 +1,11 @@
 """Velocity: the setpoint of a slave that is driven at a speed of its joints or of its tip."""
 
-import math
 from enum import IntEnum
 
 from teleop_core.graph import copy
 from teleop_core.kernels import Array, inner
 from teleop_core.robots.chains.damped import eliminate, gram, weigh
+from teleop_core.slave import commands
 from teleop_core.slave.arm import ArmModel
 from teleop_core.slave.commands import SlaveNumbers, SlaveState
 
@@ -57,12 +57,6 @@ def joint_speeds(arm: ArmModel, q: Array, twist: Array, speed: Array) -> None:
 
 
 @inner
-def _stoppable(room: float, most: float) -> float:
-    """Largest step from which a setpoint stops within ``room``, each step less by ``most``."""
-    return 0.5 * (math.sqrt(most * (most + 8.0 * max(room, 0.0))) - most)
-
-
-@inner
 def _share_of_limits(p: SlaveNumbers, s: SlaveState, dt: float) -> float:
     """Share of the wanted speeds that no joint is too fast for, or of the tip's, none too far."""
     share = 1.0
@@ -72,7 +66,7 @@ def _share_of_limits(p: SlaveNumbers, s: SlaveState, dt: float) -> float:
         if s.motion == _TIP:
             up = s.drive[i] > 0.0
             room = p.upper[i] - s.setpoint[i] if up else s.setpoint[i] - p.lower[i]
-            most = min(most, _stoppable(room, p.braking[i] * dt * dt) / dt)
+            most = min(most, commands.stoppable(room, p.braking[i] * dt * dt) / dt)
         if fast > most:
             share = min(share, most / fast)
     return share
@@ -112,13 +106,10 @@ def advance_velocity(p: SlaveNumbers, s: SlaveState, arm: ArmModel, now_ns: int,
     for i in range(n):
         most = p.braking[i] * dt * dt
         step = s.step[i] + change * (share * s.drive[i] * dt - s.step[i])
-        step = min(step, _stoppable(p.upper[i] - s.setpoint[i], most))
-        step = max(step, -_stoppable(s.setpoint[i] - p.lower[i], most))
-        before = s.setpoint[i]
-        s.setpoint[i] = min(max(before + step, p.lower[i]), p.upper[i])
-        s.step[i] = s.setpoint[i] - before
-        s.command[i] = s.target[i] = s.filtered[i] = s.setpoint[i]
+        step = min(step, commands.stoppable(p.upper[i] - s.setpoint[i], most))
+        step = max(step, -commands.stoppable(s.setpoint[i] - p.lower[i], most))
+        commands.move_joint(p, s, i, step, dt)
         is_still = is_still and s.step[i] == 0.0
-    s.span, s.ticks = 0, 1
+    commands.forget_way(s)
     if is_stale and is_still:
         s.motion = _FOLLOWING
