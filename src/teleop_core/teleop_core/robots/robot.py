@@ -11,7 +11,7 @@ import numpy as np
 
 from teleop_core.base import ParameterError, ShapeError, UnknownNameError
 from teleop_core.kernels import Array, checked_array, direct, is_rigid, pointer, product, raise_pending
-from teleop_core.robots import description, forward_kinematics, kinematics, room
+from teleop_core.robots import description, forward_kinematics, freedom, kinematics
 from teleop_core.robots.drives import Drives, Dynamics, independent_axes, read_only
 from teleop_core.robots.hardware import Hardware
 from teleop_core.robots.kinematics import (
@@ -48,7 +48,7 @@ class _Start:
         if robot is None:
             return None  # the field's default
         if robot.__dict__["start"] is None:
-            posture = read_only("start", room.start_of(robot), (robot.n,))
+            posture = read_only("start", freedom.start_of(robot), (robot.n,))
             robot.__dict__["start"] = posture
         return cast("Array", robot.__dict__["start"])
 
@@ -71,7 +71,7 @@ class Robot:
         home_is_assumed: Whether nobody says that home is a posture to work from: the zero of a
             URDF, at which many arms are stretched out. No session starts there.
         start: Joint vector (n,) at which a session starts, inside the limits; None for one with room in all directions
-            (:func:`teleop_core.robots.room.start_posture`), looked for when it is first asked for.
+            (:func:`teleop_core.robots.freedom.start_posture`), looked for when it is first asked for.
         geometry: Symbols and their values [m, rad], in the order the kernels expect if there is no row.
         kernels: Compiled functions.
         row: Numbers that the kernels take (k,); None for the values of the geometry.
