@@ -160,10 +160,18 @@ class SpreadMetric(Metric):
     Attributes:
         label: What is off.
         unit: Of the error.
+        meaning: From what to what it is, as its key says; empty for a class that has keys of its own.
     """
 
     label: ClassVar[str] = "position"
     unit: ClassVar[str] = "mm"
+    meaning: ClassVar[str] = ""
+
+    def __init_subclass__(cls) -> None:
+        """Make the key of a class that says its meaning."""
+        super().__init_subclass__()
+        if cls.meaning:
+            cls.keys = (Key(f"{cls.name}.rms|sd|max", cls.unit, f"{cls.meaning}: {SPREAD_MEANING}"),)
 
     def __init__(self, context: Context) -> None:
         super().__init__(context)
