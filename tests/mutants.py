@@ -156,12 +156,10 @@ MUTANTS = (
             "xArm-Python-SDK #88)", _COMMANDS, "if step > most:", "if step > 1e9:", "fast_hand",
             schedule=Schedule("tool speed", ((1.0, "drive", "", 2.0, 0.5),))),
     _mutant("limits_off", "driven joints go beyond their limits", "slave/velocity.py",
-            """        step = min(step, _stoppable(p.upper[i] - s.setpoint[i], most))
-        step = max(step, -_stoppable(s.setpoint[i] - p.lower[i], most))
-        before = s.setpoint[i]
-        s.setpoint[i] = min(max(before + step, p.lower[i]), p.upper[i])
-""", """        before = s.setpoint[i]
-        s.setpoint[i] = before + step
+            """        step = min(step, commands.stoppable(p.upper[i] - s.setpoint[i], most))
+        step = max(step, -commands.stoppable(s.setpoint[i] - p.lower[i], most))
+        commands.move_joint(p, s, i, step, dt)
+""", """        s.setpoint[i], s.step[i] = s.setpoint[i] + step, step
 """, "press_limit"),
     _mutant("tracking_off", "no joint is too far from its setpoint", _WATCH,
             "if not off <= p.lag[i]:", "if not off <= 1e9:", "stuck_tracking"),

@@ -13,8 +13,8 @@ import teleop_lab as lab
 from people import PEOPLE, moves, recorded
 from teleop_core.chain.mapping import inverse_kinematics, parameters
 from teleop_core.kernels import IS_COMPILED
+from teleop_core.robots.freedom import free_postures, freedom
 from teleop_core.robots.parameters import RobotParameters
-from teleop_core.robots.room import room, roomy_postures
 from teleop_lab.planning import turns, walk
 from teleop_lab.planning.aim import Aim
 from teleop_lab.planning.asked import STRETCHES, AskedPath, asked_path
@@ -180,10 +180,10 @@ def test_nothing_moves_over_a_gap_of_the_recording() -> None:
 
 
 @pytest.mark.skipif(not IS_COMPILED, reason="looks at 100 000 poses")
-def test_roomy_postures_begin_with_the_start_and_have_room() -> None:
+def test_free_postures_begin_with_the_start_and_have_room() -> None:
     robot = tc.load_robot("rcrt1")
-    postures = roomy_postures(robot, 8)
+    postures = free_postures(robot, 8)
     np.testing.assert_array_equal(postures[0], robot.start)
-    rooms = [min(room(robot, q)) for q in postures]
+    freedoms = [min(freedom(robot, q)) for q in postures]
     assert len(postures) == 8
-    assert min(rooms) > 0.05
+    assert min(freedoms) > 0.05

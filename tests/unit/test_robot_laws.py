@@ -185,7 +185,7 @@ def test_a_path_keeps_every_joint_within_its_speed_and_its_branch(name: str) -> 
     assert np.abs(result.q - way).max() < 1e-8
 
 
-@arms
+@pytest.mark.parametrize("name", [*BRANCHES, "mma"])
 def test_random_jumps_never_move_a_joint_faster_than_its_drive_or_out_of_its_limits(name: str) -> None:
     arm = ARMS[name]
     followed(arm, arm.fk(drawn(name, 500, seed=6)), arm.home, 1e-2)

@@ -15,7 +15,7 @@ from present import present
 from random_arms import random_urdf
 from teleop_core.base.errors import ParameterError, RecordingError, ShapeError, TeleopWarning, UnknownNameError
 from teleop_core.kernels.geometry import Array
-from teleop_core.robots import load_robot, load_robot_set, room
+from teleop_core.robots import freedom, load_robot, load_robot_set
 from teleop_core.robots.chains.chain_dynamics import inertia_matrix, inverse_dynamics, tip_efforts
 from teleop_core.robots.kinematics import DIRECTIONS, IkStatus
 from teleop_core.robots.rank import directions_of
@@ -550,7 +550,7 @@ def test_an_arm_controls_as_many_directions_as_its_tip_can_move_in_at_once(name:
     arm = load_robot(few(name, tmp_path))
     held = [direction for direction, is_held in zip(DIRECTIONS, arm.task_mask, strict=True) if is_held]
     assert " ".join(held) == task
-    assert directions_of(arm, room.lever(arm)).rank == rank
+    assert directions_of(arm, freedom.lever(arm)).rank == rank
     for q in np.random.default_rng(1).uniform(arm.lower, arm.upper, (20, arm.n)):
         assert arm.ik(arm.fk(q), q).status in {IkStatus.FOLLOWED, IkStatus.NEAR_SINGULAR}
 

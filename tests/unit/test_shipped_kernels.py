@@ -6,13 +6,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from llvmlite.binding import get_host_cpu_features
 
 from teleop_core.kernels import IS_COMPILED
-from teleop_core.kernels.shipped import FOLDER, TIERS
+from teleop_core.kernels.shipped import FOLDER, TIER, is_tier
 
 SOURCES = Path(__file__).parents[2] / "src"
-V3, V2 = TIERS
 SCRIPT = """
 import numpy as np
 from teleop_core.kernels.geometry import multiply_quaternions, turn_between
@@ -31,7 +29,7 @@ import sys
 read = []
 sys.addaudithook(lambda event, of: read.append(str(of[0])) if event == "open" else None)
 {SCRIPT}
-print(*(any(tier in name for name in read) for tier in {[*TIERS]}))
+print(any({TIER!r} in name for name in read))
 """
 PLACES = """
 from pathlib import Path
@@ -53,9 +51,7 @@ def _script() -> Any:
 wheels = _script()
 pytestmark = [
     pytest.mark.skipif(not IS_COMPILED, reason="nothing is compiled in pure Python"),
-    pytest.mark.skipif(
-        not all(get_host_cpu_features().get(name) for name in TIERS[V3]), reason="this processor is of no such tier"
-    ),
+    pytest.mark.skipif(not is_tier(), reason="this processor is of no such tier"),
 ]
 
 
@@ -67,8 +63,7 @@ def shipped(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
     assert int(compiled[0]) >= 3
     for file in _kept(tree):
         file.unlink()
-    for tier in TIERS:
-        wheels.compile_kernels(tree, tier, SCRIPT)
+    wheels.compile_kernels(tree, SCRIPT)
     return tree, compiled[1]
 
 
@@ -89,7 +84,7 @@ def _kept(tree: Path) -> list[Path]:
     return list(tree.rglob("__pycache__/*.nb?"))
 
 
-@pytest.mark.parametrize("tier", [None, V3, V2])
+@pytest.mark.parametrize("tier", [None, TIER])
 def test_shipped_kernels_are_loaded_and_give_the_bits_of_compiled_ones(
     shipped: tuple[Path, str], tree: Path, tier: str | None
 ) -> None:
@@ -98,20 +93,19 @@ def test_shipped_kernels_are_loaded_and_give_the_bits_of_compiled_ones(
     assert not _kept(tree)
 
 
-def test_best_tier_of_the_processor_comes_first_and_own_files_have_none(tree: Path) -> None:
-    assert wheels.run(tree, None, PLACES).split() == [V3, V2]
-    assert wheels.run(tree, V2, PLACES).split() == [V2]
+def test_processors_of_the_tier_have_shipped_kernels_and_others_and_own_files_have_none(tree: Path) -> None:
+    assert wheels.run(tree, None, PLACES).split() == [TIER]
     assert wheels.run(tree, "generic", PLACES).split() == []
 
 
 def test_kernels_that_were_compiled_here_come_before_shipped_ones(tree: Path) -> None:
     place = tree / "teleop_core/kernels" / FOLDER.name
-    assert wheels.run(tree, None, READ).split()[2:] == ["True", "False"]
+    assert wheels.run(tree, None, READ).split()[2:] == ["True"]
     place.rename(place.with_name("away"))
     assert wheels.run(tree, None, SCRIPT).split()[0] != "0"
     place.with_name("away").rename(place)
     count, _, *read = wheels.run(tree, None, READ).split()
-    assert (count, read) == ("0", ["False", "False"])
+    assert (count, read) == ("0", ["False"])
 
 
 def test_kernels_are_compiled_where_shipped_ones_are_broken(shipped: tuple[Path, str], tree: Path) -> None:

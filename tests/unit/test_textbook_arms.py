@@ -173,15 +173,24 @@ def out_and_back(pose: Array, far: Array) -> Array:
     return np.array([transform(pose[:3, :3], p) for p in points])
 
 
-@pytest.mark.parametrize("offset", [0.0, 0.05, D3 - 1e-3, D3, D3 + 1e-6, D3 + 1e-3, 0.2, 0.3])
-def test_a_path_over_axis_1_keeps_its_speeds_and_goes_on_behind(offset: float) -> None:
-    x = np.concatenate((np.linspace(0.4, -0.4, 3000), np.full(3000, -0.4)))
-    down = rotation("y", math.pi)
-    path = np.array([transform(down, np.array([value, offset, 0.5])) for value in x])
-    result = followed(PUMA, path, PUMA.ik(path[0]).q)
-    if offset > D3:
-        # No branch flips, and no limit is in the way on this side.
-        assert result.residual[-1, 0] < 1e-9
+LINES: dict[str, tuple[Any, Array, tuple[float, float], float, tuple[float, ...]]] = {
+    "puma560": (PUMA, rotation("y", math.pi), (0.4, -0.4), 0.5, (0.0, 0.05, D3 - 1e-3, D3, D3 + 1e-6, D3 + 1e-3, 0.3)),
+    "scara": (SCARA, np.eye(3), (0.5, -0.5), -0.1, (0.0, 1e-9, 1e-3, 0.1, 0.3)),
+    "planar_3r": (PLANAR, np.eye(3), (1.1, -0.1), 0.0, (0.0, 1e-9, 1e-3, 0.1, 0.19, 0.21)),
+    "five_axis": (FIVE, FIVE.fk(FIVE.home)[:3, :3], (0.2, -0.2), 0.3, (0.0, 1e-9, 1e-4, 1e-2)),
+}
+"""Lines along x past axis 1, or the hole in the middle: arm, attitude, ends, height, distances in y."""
+
+
+@pytest.mark.parametrize("name", LINES)
+def test_lines_over_and_beside_the_first_axis_keep_speeds_and_go_on(name: str) -> None:
+    arm, attitude, ends, height, distances = LINES[name]
+    x = np.concatenate((np.linspace(*ends, 4000), np.full(4000, ends[1])))
+    for y in distances:
+        poses = np.array([transform(attitude, np.array([value, y, height])) for value in x])
+        result = followed(arm, poses, arm.ik(poses[0]).q)
+        if arm is PUMA and y > D3:  # no branch flips, and no limit is in the way on this side
+            assert result.residual[-1, 0] < 1e-9
 
 
 # SCARA.
@@ -267,13 +276,6 @@ def test_the_tool_turns_on_over_a_whole_turn_without_unwinding() -> None:
     assert result.q[-1, 3] - result.q[0, 3] == pytest.approx(2.0 * math.pi, abs=1e-9)
 
 
-@pytest.mark.parametrize("y", [0.0, 1e-9, 1e-3, 0.1, 0.3])
-def test_lines_beside_the_column_keep_speeds_and_go_on(y: float) -> None:
-    x = np.concatenate((np.linspace(0.5, -0.5, 4000), np.full(2000, -0.5)))
-    poses = np.array([transform(np.eye(3), np.array([value, y, -0.1])) for value in x])
-    followed(SCARA, poses, SCARA.ik(poses[0]).q)
-
-
 # Planar 3R.
 
 
@@ -304,13 +306,6 @@ def test_stretching_out_and_back_keeps_speeds_and_ends_on_the_path(lateral: floa
     assert result.residual[-1].max() < 1e-9
     # Beyond reach the nearest point of the ring is held.
     assert result.residual[2999, 0] == pytest.approx(math.hypot(2.0, lateral) - 1.8, abs=1e-6)
-
-
-@pytest.mark.parametrize("lateral", [0.0, 1e-9, 1e-3, 0.1, 0.19, 0.21])
-def test_crossing_the_hole_in_the_middle_keeps_speeds_and_goes_on(lateral: float) -> None:
-    wrist_x = np.concatenate((np.linspace(0.6, -0.6, 4000), np.full(3000, -0.6)))
-    poses = np.array([transform(np.eye(3), np.array([x + 0.5, lateral, 0.0])) for x in wrist_x])
-    followed(PLANAR, poses, PLANAR.ik(poses[0], [0.0, 2.0, 0.0]).q)
 
 
 def test_equal_links_folded_onto_the_axis_keep_the_seed_of_joint_1() -> None:
@@ -362,14 +357,6 @@ def test_no_other_attitude_of_the_arm_is_nearer_than_the_one_it_takes() -> None:
         for a, b in rng.uniform(-1e-4, 1e-4, (20, 2)):
             assert best <= miss(a, b) + 1e-12
     assert count > 10
-
-
-@pytest.mark.parametrize("y", [0.0, 1e-9, 1e-4, 1e-2])
-def test_lines_over_the_base_axis_keep_speeds_and_go_on(y: float) -> None:
-    x = np.concatenate((np.linspace(0.2, -0.2, 3000), np.full(4000, -0.2)))
-    down = FIVE.fk(FIVE.home)[:3, :3]
-    poses = np.array([transform(down, np.array([value, y, 0.3])) for value in x])
-    followed(FIVE, poses, FIVE.ik(poses[0]).q)
 
 
 @pytest.mark.parametrize("reach", [1.001, 1.2])

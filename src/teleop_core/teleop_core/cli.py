@@ -187,15 +187,6 @@ def _add_play(commands: Any) -> None:
     play.add_argument("bag", type=Path, help="recording to publish")
     play.add_argument("--topics", nargs="+", metavar="TOPIC", help="only these (default: all)")
     play.add_argument("--rate", type=float, default=1.0, help="speed, as a multiple of real time (default: 1)")
-    play.add_argument(
-        "--clock",
-        type=float,
-        nargs="?",
-        const=100.0,
-        default=0.0,
-        metavar="HZ",
-        help="publish the recording's time on /clock as well (default: 100 times a second)",
-    )
 
 
 def _add_evaluate(commands: Any) -> None:
@@ -295,7 +286,7 @@ def _play(arguments: argparse.Namespace) -> int:
     from teleop_core.bags.reader import Bag
 
     bag, rate = Bag(arguments.bag), arguments.rate
-    ros_module("play").play(bag, arguments.topics, rate, Console(), clock=arguments.clock)
+    ros_module("play").play(bag, arguments.topics, rate, Console())
     return 0
 
 

@@ -29,7 +29,7 @@ from teleop_machines.bodies.mma_bodies import mma_bodies
 
 JOINTS = ("theta1", "theta2", "theta3", "theta3_prime", "theta6", "theta8", "theta10")
 HOME = np.radians([0.0, -90.0, 0.0, 90.0, 90.0, 0.0, 0.0])
-# Answer of :func:`teleop_core.robots.room.start_posture` for the published lengths, rounded.
+# Answer of :func:`teleop_core.robots.freedom.start_posture` for the published lengths, rounded.
 START = np.array([1.2611, -0.5588, -1.012, 1.6884, 0.3097, 0.0, 0.0])
 
 # All assumed. Inertia: 0.3 kg spread over the arm's 0.2 m, and small motors at the wrist.

@@ -36,7 +36,7 @@ FRAMES = {
 MODELS = tuple(FRAMES)
 
 
-class Loop(NamedTuple):
+class LoopEnds(NamedTuple):
     """Where the two branches of the parallelogram meet; equal points and angles close it."""
 
     along_link_3a: Array
@@ -176,7 +176,7 @@ def joints_of_model(q: object, model: str) -> Array:
     return np.concatenate((joints[:2], elbow, joints[4:] + np.array(turns)))
 
 
-def loop_closure(q: object, g: Mapping[str, float], short_side: float = SHORT_SIDE) -> Loop:
+def loop_closure(q: object, g: Mapping[str, float], short_side: float = SHORT_SIDE) -> LoopEnds:
     """Both ways round the parallelogram for joint readings q (7,) [rad].
 
     Source:
@@ -187,7 +187,7 @@ def loop_closure(q: object, g: Mapping[str, float], short_side: float = SHORT_SI
     upper, short, long = joints[1], joints[1] + joints[2], joints[1] + joints[3]
     start = ((g["a2"], upper),)
     over_3a = ((short_side, short), (g["a3"], short + knee), (short_side, short + knee + ankle))
-    return Loop(
+    return LoopEnds(
         along_link_3a=_in_plane(g["d1"], joints[0], start + over_3a),
         along_link_3=_in_plane(g["d1"], joints[0], (*start, (g["a3"], long))),
         frame_4=_in_plane(g["d1"], joints[0], start + over_3a[:2]),

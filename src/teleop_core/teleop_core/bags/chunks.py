@@ -108,7 +108,7 @@ class Stretch(NamedTuple):
 Messages = tuple[list[Stretch], list[Single]]
 
 
-class _Room:
+class _Scratch:
     """Memory that is used again: to get fresh memory takes longer than to fill it."""
 
     def __init__(self) -> None:
@@ -129,7 +129,7 @@ class Assembly:
     """
 
     def __init__(self, size: int) -> None:
-        self._size, self._table, self._data = size, _Room(), _Room()
+        self._size, self._table, self._data = size, _Scratch(), _Scratch()
 
     def chunks(self, stretches: Sequence[Stretch], singles: Sequence[Single]) -> Iterator[Chunk]:
         """All these messages as chunks that follow each other in time.
@@ -211,7 +211,7 @@ class _Table:
         loose: Records of the other streams.
     """
 
-    def __init__(self, stretches: Sequence[Stretch], room: _Room) -> None:
+    def __init__(self, stretches: Sequence[Stretch], room: _Scratch) -> None:
         longest = max((s.log_ns for s in stretches), key=len, default=np.empty(0, np.int64))
         self.times = longest if (longest[1:] > longest[:-1]).all() else longest[:0]
         is_in_step = [np.array_equal(stretch.log_ns, self.times) for stretch in stretches]

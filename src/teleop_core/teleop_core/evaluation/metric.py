@@ -2,7 +2,7 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import Field, field, fields
+from dataclasses import Field, field, fields, is_dataclass
 from itertools import product
 from typing import Any, ClassVar, NamedTuple
 
@@ -45,9 +45,12 @@ class Key(NamedTuple):
         return [part.split("|") for part in self.path.split(".")]
 
 
-def figure(unit: str, meaning: str, **default: object) -> Any:
-    """Field of a metric's values, with a ``default`` if wanted; :func:`keys_of` makes its key."""
-    return field(metadata={"unit": unit, "meaning": meaning}, **default)  # type: ignore[call-overload]
+def figure(unit: str, meaning: str, label: str = "", **default: object) -> Any:
+    """Field of a metric's values, with a ``default`` if wanted; :func:`keys_of` makes its key.
+
+    With a ``label`` it has a row in tables, in which a share is in per cent; see :meth:`Metric.rows`.
+    """
+    return field(metadata={"unit": unit, "meaning": meaning, "label": label}, **default)  # type: ignore[call-overload]
 
 
 def keys_of(path: str, values: type[Any] | Sequence[Field[Any]], said: str = "") -> tuple[Key, ...]:
@@ -81,6 +84,7 @@ class Metric(ABC):
 
     Attributes:
         name: What it is called, in JSON too.
+        group: Of its rows; empty for the name.
         keys: Its keys in JSON; each path begins with the name and a dot. Without keys a metric
             is not in JSON and only draws.
         topics: Streams it reads. Those that a recording lacks have no samples in its windows. For
@@ -89,6 +93,7 @@ class Metric(ABC):
     """
 
     name: ClassVar[str]
+    group: ClassVar[str] = ""
     keys: ClassVar[tuple[Key, ...]] = ()
     topics: ClassVar[tuple[Topic, ...]] = ()
 
@@ -108,11 +113,19 @@ class Metric(ABC):
         """
 
     def rows(self) -> list[Row]:
-        """What tables show: the same groups and labels for every recording.
+        """What tables show.
 
-        Unless a metric says otherwise, this is one row per key without ``<…>``.
+        Unless a metric says otherwise, this is one row per :func:`figure` with a label that has a value, and none where
+        all counts are 0. Without labels it is one row per key without ``<…>``.
         """
-        found = {".".join(path): value for path, value in leaves(plain(self.values())).items()}
+        values = self.values()
+        labels = [one for one in fields(values) if one.metadata.get("label")] if is_dataclass(values) else []
+        if labels:
+            known = [(one, value) for one in labels if (value := getattr(values, one.name)) is not None]
+            counts = [value for _, value in known if isinstance(value, int)]
+            group = self.group or self.name
+            return [_figure_row(group, *one) for one in known] if any(counts) or not counts else []
+        found = {".".join(path): value for path, value in leaves(plain(values)).items()}
         out = []
         for key in self.keys:
             for name in key.names():
@@ -124,6 +137,13 @@ class Metric(ABC):
     def figures(self) -> list[Figure]:
         """Plots for the page, in their order; none unless a metric says otherwise."""
         return []
+
+
+def _figure_row(group: str, one: Field[Any], value: float) -> Row:
+    label, unit = one.metadata["label"], one.metadata["unit"]
+    if isinstance(value, int):
+        return Row(group, label, "", str(value))
+    return row(group, label, "%", 100.0 * value) if unit == "1" else row(group, label, unit, value)
 
 
 def _row(name: str, label: str, unit: str, value: Leaf) -> Row:
@@ -138,14 +158,20 @@ class SpreadMetric(Metric):
     """Spread of an error that every sample has.
 
     Attributes:
-        group: Of its rows.
         label: What is off.
         unit: Of the error.
+        meaning: From what to what it is, as its key says; empty for a class that has keys of its own.
     """
 
-    group: ClassVar[str]
     label: ClassVar[str] = "position"
     unit: ClassVar[str] = "mm"
+    meaning: ClassVar[str] = ""
+
+    def __init_subclass__(cls) -> None:
+        """Make the key of a class that says its meaning."""
+        super().__init_subclass__()
+        if cls.meaning:
+            cls.keys = (Key(f"{cls.name}.rms|sd|max", cls.unit, f"{cls.meaning}: {SPREAD_MEANING}"),)
 
     def __init__(self, context: Context) -> None:
         super().__init__(context)

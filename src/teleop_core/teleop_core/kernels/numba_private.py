@@ -4,7 +4,6 @@ The public part of numba cannot stamp a cache, compile without a wrapper for Pyt
 as plain numbers, or say in one line what is wrong with a function.
 """
 
-import gc
 import os
 import sys
 import warnings
@@ -86,9 +85,6 @@ class Dispatcher(CPUDispatcher):
     @_roomy
     def compile(self, sig: Any) -> Any:
         """Compile for one signature, or load that from the disk."""
-        # Millions of objects are made and kept: looking through them for garbage is for nothing.
-        is_enabled = gc.isenabled()
-        gc.disable()
         try:
             if not self._has_cache:
                 self._cache, self._has_cache = _cache(self.py_func), True
@@ -97,9 +93,6 @@ class Dispatcher(CPUDispatcher):
             raise
         except _MISTAKES as error:
             raise kernel_error(error, self.py_func, normalize_signature(sig)[0]) from error
-        finally:
-            if is_enabled:
-                gc.enable()
 
     def get_call_template(self, args: Any, kws: Any) -> Any:
         """Type of a call from another kernel."""
@@ -263,7 +256,7 @@ class _Cache(FunctionCache):
         return found or self._shipped(sig, target_context)
 
     def _shipped(self, sig: Any, target_context: Any) -> Any:
-        """What the wheel holds for a signature, of the best tier that this processor can run."""
+        """What the wheel holds for a signature, if this processor can run it."""
         _, (triple, *_), code = self._index_key(sig, target_context.codegen())
         own, file = self._cache_file, self._py_func.__code__.co_filename
         source = Path(__file__ if self._py_func in _generated else file)

@@ -8,9 +8,9 @@ import numpy as np
 
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots.arm import Arm
+from teleop_core.robots.freedom import freedom, lever
 from teleop_core.robots.kinematics import DIRECTIONS
 from teleop_core.robots.rank import directions_of
-from teleop_core.robots.room import lever, room
 
 _OF_CHAINS = "fixed0_00"  # a symbol of chains from tables, whose geometry is a row of matrices
 
@@ -58,7 +58,7 @@ def postures(robot: Arm) -> dict[str, Array]:
 
 def room_text(robot: Arm, q: Array) -> str:
     """How far the tip can go from a posture in its worst direction, in millimetres and degrees."""
-    metres, radians = room(robot, q)
+    metres, radians = freedom(robot, q)
     ways = [f"{1e3 * metres:.0f} mm"] if math.isfinite(metres) else []
     ways += [f"{math.degrees(radians):.0f}°"] if math.isfinite(radians) else []
     return " and ".join(ways) + " in the worst direction"

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from teleop_core.kernels.geometry import Array
-from teleop_core.robots import arm, room
+from teleop_core.robots import arm, freedom
 from teleop_core.robots.kinematics import DIRECTIONS
 
 _POSTURES, _FEW = 128, 4
@@ -36,7 +36,7 @@ def directions_of(robot: arm.Arm, lever: float) -> Directions:
     Source:
         The least singular value as a measure of dexterity: Klein and Blaho 1987, IJRR 6(2).
     """
-    postures = room.samples(robot)[:_POSTURES]
+    postures = freedom.samples(robot)[:_POSTURES]
     if _rank(_jacobians(robot, postures[:_FEW], lever)) == len(DIRECTIONS):
         return Directions(len(DIRECTIONS), DIRECTIONS)
     jacobians = _jacobians(robot, postures, lever)

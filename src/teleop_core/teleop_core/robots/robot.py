@@ -11,7 +11,7 @@ import numpy as np
 
 from teleop_core.base import ParameterError, ShapeError, UnknownNameError
 from teleop_core.kernels import Array, checked_array, direct, is_rigid, pointer, product, raise_pending
-from teleop_core.robots import description, forward_kinematics, kinematics, room
+from teleop_core.robots import description, forward_kinematics, freedom, kinematics
 from teleop_core.robots.drives import Drives, Dynamics, independent_axes, read_only
 from teleop_core.robots.hardware import Hardware
 from teleop_core.robots.kinematics import (
@@ -48,7 +48,7 @@ class _Start:
         if robot is None:
             return None  # the field's default
         if robot.__dict__["start"] is None:
-            posture = read_only("start", room.start_of(robot), (robot.n,))
+            posture = read_only("start", freedom.start_of(robot), (robot.n,))
             robot.__dict__["start"] = posture
         return cast("Array", robot.__dict__["start"])
 
@@ -71,7 +71,7 @@ class Robot:
         home_is_assumed: Whether nobody says that home is a posture to work from: the zero of a
             URDF, at which many arms are stretched out. No session starts there.
         start: Joint vector (n,) at which a session starts, inside the limits; None for one with room in all directions
-            (:func:`teleop_core.robots.room.start_posture`), looked for when it is first asked for.
+            (:func:`teleop_core.robots.freedom.start_posture`), looked for when it is first asked for.
         geometry: Symbols and their values [m, rad], in the order the kernels expect if there is no row.
         kernels: Compiled functions.
         row: Numbers that the kernels take (k,); None for the values of the geometry.
@@ -188,15 +188,17 @@ class Robot:
         """Inverse kinematics as an argument for other kernels."""
         return cast("IkKernel", pointer(self.kernels.ik, IK))
 
+    @property
+    def speed_limit(self) -> Array:
+        """Largest joint speeds (n,) [rad/s or m/s], those of the drives; infinite without drives."""
+        return np.full(self.n, np.inf) if self.drives is None else self.drives.speed_limit
+
     def limits(self, dt: float = math.inf) -> Array:
         """Rows lower, upper, largest step within ``dt`` [s]: (3, n), as the ik kernel takes it.
 
         Without drives, or without ``dt``, steps are infinite. A new array each time, the caller's.
         """
-        step = np.full(self.n, np.inf)
-        if self.drives is not None and not math.isinf(dt):
-            step = self.drives.speed_limit * dt
-        return np.ascontiguousarray(np.stack((self.lower, self.upper, step)))
+        return np.stack((self.lower, self.upper, self.speed_limit * dt))
 
     def fk(self, q: object) -> Array:
         """Pose of the tip in the base, in which all loops close.

@@ -1,9 +1,9 @@
 """Notes on a robot of a URDF: what of it may not be meant, each in a line."""
 
+from teleop_core.robots.freedom import lever
 from teleop_core.robots.kinematics import DIRECTIONS
 from teleop_core.robots.rank import directions_of
 from teleop_core.robots.robot import Robot
-from teleop_core.robots.room import lever
 
 
 def notes_on_robot(robot: Robot, file: str, has_task: bool) -> list[str]:

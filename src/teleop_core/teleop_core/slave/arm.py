@@ -15,12 +15,8 @@ class ArmModel(NamedTuple):
     joints: Array
     effort: Array
     T: Array
-    speeds: Array  # rooms for what follows a twist: joint speeds (n,), and so on
-    is_free: Array
-    twist: Array
+    is_free: Array  # rooms for what follows a twist: (n,) and (6, n)
     J: Array
-    A: Array
-    b: Array
 
 
 class Arm(NamedTuple):

@@ -133,6 +133,23 @@ def advance_move(s: SlaveState) -> None:
 
 
 @inner
+def move_joint(p: SlaveNumbers, s: SlaveState, i: int, step: float, dt: float) -> None:
+    """Move a joint's setpoint by a step, no faster than its drive and no farther than its range."""
+    reach, before = p.speed_limit[i] * dt, s.setpoint[i]
+    step = min(max(step, -reach), reach)
+    s.setpoint[i] = min(max(before + step, p.lower[i]), p.upper[i])
+    s.step[i] = s.setpoint[i] - before
+
+
+@inner
+def forget_way(s: SlaveState) -> None:
+    """Let the setpoint be what is asked for, and no command be on its way."""
+    for i in range(s.setpoint.shape[0]):
+        s.command[i] = s.target[i] = s.filtered[i] = s.setpoint[i]
+    s.span, s.ticks = 0, 1
+
+
+@inner
 def come_to_rest(p: SlaveNumbers, s: SlaveState, how: int, dt: float) -> None:
     """Stop the setpoint: at once, at what the drives can brake, or where the brakes hold the arm.
 
@@ -146,18 +163,14 @@ def come_to_rest(p: SlaveNumbers, s: SlaveState, how: int, dt: float) -> None:
     for i in range(s.setpoint.shape[0]):
         step = s.step[i]
         if how == WITH_ARM:
-            reach = p.speed_limit[i] * dt
-            step = min(max(s.measured[i] - s.setpoint[i], -reach), reach)
+            step = s.measured[i] - s.setpoint[i]
         elif how == AT_ONCE:
             step = 0.0
         else:
             less = p.braking[i] * dt * dt
             step = max(0.0, step - less) if step > 0.0 else min(0.0, step + less)
-        before = s.setpoint[i]
-        s.setpoint[i] = min(max(before + step, p.lower[i]), p.upper[i])
-        s.step[i] = s.setpoint[i] - before
-        s.command[i] = s.target[i] = s.filtered[i] = s.setpoint[i]
-    s.span, s.ticks = 0, 1
+        move_joint(p, s, i, step, dt)
+    forget_way(s)
 
 
 @inner
@@ -256,22 +269,25 @@ def advance_setpoint(p: SlaveNumbers, s: SlaveState, before: Array, dt: float) -
         most = p.acceleration[i] * dt * dt
         if abs(step - s.step[i]) > most:
             step = _eased(s.filtered[i] - s.setpoint[i], s.filtered[i] - lagged, s.step[i], most)
-            step = min(max(step, -reach), reach)
-        began = s.setpoint[i]
-        s.setpoint[i] = min(max(began + step, p.lower[i]), p.upper[i])
-        s.step[i] = s.setpoint[i] - began
+        move_joint(p, s, i, step, dt)
+
+
+@inner
+def stoppable(room: float, most: float) -> float:
+    """Largest step from which a setpoint stops within ``room``, each step less by ``most``.
+
+    From r, in steps of ``most``, the way to rest is r (r + most) / (2 most).
+    """
+    return 0.5 * (math.sqrt(most * (most + 8.0 * max(room, 0.0))) - most)
 
 
 @inner
 def _eased(ahead: float, flow: float, step: float, most: float) -> float:
     """Step of a setpoint that may change its step by ``most``, towards a place that moves on.
 
-    Relative to that place, which is ``ahead`` and moves by ``flow`` a tick, it goes no faster than
-    it can brake: from r, in steps of ``most``, the way to rest is r (r + most) / (2 most).
+    Relative to that place, which is ``ahead`` and moves by ``flow`` a tick, it goes no faster than it can brake.
     """
-    room = abs(ahead)
-    relative = 0.5 * (math.sqrt(most * (most + 8.0 * room)) - most)
-    relative = min(relative, room)
+    relative = min(stoppable(abs(ahead), most), abs(ahead))
     wanted = flow + (relative if ahead > 0.0 else -relative)
     return min(max(wanted, step - most), step + most)
 

@@ -91,7 +91,6 @@ class ForceSensorParameters:
         doc="of what hangs behind the sensor, at the tip: its weight is measured, its inertia not",
         source="assumed: none, an ideal sensor",
     )
-
     estimate: bool = parameter(
         False, doc="whether slave/estimated_cf tells what drive efforts and joint motion say of the force"
     )

@@ -111,8 +111,7 @@ class Slave(RunningStage):
             jacobian=pointer(self.robot.kernels.jacobian, FK),
             geometry=self.robot.geometry_row.copy(),
             setpoint=np.zeros(n), joints=np.zeros(n), effort=np.zeros(n), T=np.zeros((4, 4)),
-            speeds=np.zeros(n), is_free=np.zeros(n), twist=np.zeros(6), J=np.zeros((6, n)),
-            A=np.zeros((6, 6)), b=np.zeros(6),
+            is_free=np.zeros(n), J=np.zeros((6, n)),
         )  # fmt: skip
         self.kernel, self.arguments = step.slave_step, (self.parameters, self.state, self.arm)
         self.motion = motion_commands.MotionCommands(self)

@@ -274,7 +274,7 @@ class SlaveSim(RunningStage):
         """Try the loop as it is set, where the arm is; see :mod:`teleop_core.slave.stability`."""
         assert self.robot.drives is not None
         stability.check_friction(self.parameters, self.robot.drives.inertia, self.dt)
-        loop = stability.Loop(self.parameters, self.state, self.arm, self.signals, self.dt)
+        loop = stability.ClosedLoop(self.parameters, self.state, self.arm, self.signals, self.dt)
         stability.check_stable(self._law, self.robot, loop, are_large_tried=parameters.trials == "all")
 
     def _hand_over(self) -> None:

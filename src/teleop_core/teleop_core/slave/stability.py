@@ -71,7 +71,7 @@ def check_friction(p: SimulationNumbers, inertia: Array, dt: float) -> None:
         raise ParameterError("slave_sim.coulomb", p["coulomb"].tolist(), needed)
 
 
-class Loop(NamedTuple):
+class ClosedLoop(NamedTuple):
     """A simulated arm with its control law: what one tick of it takes."""
 
     p: SimulationNumbers
@@ -80,7 +80,7 @@ class Loop(NamedTuple):
     row: Row
     dt: float
 
-    def copied(self) -> "Loop":
+    def copied(self) -> "ClosedLoop":
         """The same arm apart, in free air, for a loop is judged there."""
         p, s, row = (_copy(record) for record in (self.p, self.s, self.row))
         p["has_world"] = 0
@@ -88,7 +88,7 @@ class Loop(NamedTuple):
         parts = (np.array(part) if isinstance(part, np.ndarray) else part for part in self.arm)
         arm = Arm(*parts)
         arm.contacts["is_near"] = 0
-        return Loop(p, s, arm, row, self.dt)
+        return ClosedLoop(p, s, arm, row, self.dt)
 
     def step(self) -> Callable[[], None]:
         """What makes a tick of it."""
@@ -113,7 +113,7 @@ def loop_key(p: SimulationNumbers, arm: Arm) -> tuple[bytes, ...]:
     return tuple(field.tobytes() for field in fields)
 
 
-def check_stable(law: Controller, robot: Robot, loop: Loop, *, are_large_tried: bool = True) -> None:
+def check_stable(law: Controller, robot: Robot, loop: ClosedLoop, *, are_large_tried: bool = True) -> None:
     """Refuse a loop in which small errors grow, or that does not come back from large ones.
 
     Small errors: two copies of the arm are held at the present setpoint, one of them with a small
@@ -145,7 +145,7 @@ def check_stable(law: Controller, robot: Robot, loop: Loop, *, are_large_tried: 
     _passed.add(tried)
 
 
-def _check_small(name: str, loop: Loop) -> None:
+def _check_small(name: str, loop: ClosedLoop) -> None:
     error, dt = _ERROR * np.array(loop.p.encoder_step), loop.dt
     calm, shaken = (_held(loop, by) for by in (0.0 * error, error))
     with np.errstate(all="ignore"):
@@ -160,7 +160,7 @@ def _check_small(name: str, loop: Loop) -> None:
         raise ParameterError("slave_sim.controller.kind", name, needed)
 
 
-def _held(loop: Loop, by: Array) -> Array:
+def _held(loop: ClosedLoop, by: Array) -> Array:
     """Positions (N, n) in the last ticks of an arm that is held ``by`` (n,) off its setpoint."""
     loop = loop.copied()
     for field in ("encoder_step", "effort_step"):
@@ -174,7 +174,7 @@ def _held(loop: Loop, by: Array) -> Array:
     return found
 
 
-def _check_large(name: str, robot: Robot, loop: Loop) -> None:
+def _check_large(name: str, robot: Robot, loop: ClosedLoop) -> None:
     for joint in range(len(loop.arm.q)):
         left = _left(robot, loop, joint)
         if not left <= _LEFT:  # NaN is left as well
@@ -206,7 +206,7 @@ def dash(lower: float, upper: float, start: float, speed: float, dt: float) -> A
     return start + side * share * speed * dt * np.cumsum(pace)
 
 
-def _left(robot: Robot, loop: Loop, joint: int) -> float:
+def _left(robot: Robot, loop: ClosedLoop, joint: int) -> float:
     """Share of a joint's largest error that is left in rest after its setpoint has dashed."""
     loop = loop.copied()
     setpoint, arm, step = loop.row.slave_setpoint_js, loop.arm, loop.step()

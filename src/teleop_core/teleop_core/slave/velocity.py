@@ -1,11 +1,12 @@
 """Velocity: the setpoint of a slave that is driven at a speed of its joints or of its tip."""
 
-import math
 from enum import IntEnum
 
 from teleop_core.graph import copy
 from teleop_core.kernels import Array, inner
+from teleop_core.kernels.room import room
 from teleop_core.robots.chains.damped import eliminate, gram, weigh
+from teleop_core.slave import commands
 from teleop_core.slave.arm import ArmModel
 from teleop_core.slave.commands import SlaveNumbers, SlaveState
 
@@ -34,7 +35,7 @@ def joint_speeds(arm: ArmModel, q: Array, twist: Array, speed: Array) -> None:
     singularity the tip lags instead of the joints racing; what a robot cannot do is left out.
 
     Args:
-        arm: Its ``jacobian`` and ``geometry``; its rooms ``J``, ``A``, ``b`` and ``is_free`` are written.
+        arm: Its ``jacobian`` and ``geometry``; its rooms ``J`` and ``is_free`` are written.
         q: Joints (n,) [rad or m].
         twist: Of the tip (6,) in base axes [m/s, rad/s].
         speed: Joint speeds (n,) [rad/s or m/s]; written.
@@ -42,24 +43,19 @@ def joint_speeds(arm: ArmModel, q: Array, twist: Array, speed: Array) -> None:
     Source:
         Nakamura and Hanafusa 1986, eq. 15.
     """
+    A, b = room(6, 6), room(6)
     arm.jacobian(q, arm.geometry, arm.J)
     weigh(arm.J, _LENGTH)
     for r in range(6):
-        arm.b[r] = twist[r] / _LENGTH if r < 3 else twist[r]
+        b[r] = twist[r] / _LENGTH if r < 3 else twist[r]
     for i in range(q.shape[0]):
         arm.is_free[i] = 1.0
-    gram(arm.J, arm.is_free, _DAMPING, arm.A)
-    eliminate(arm.A, arm.b)
+    gram(arm.J, arm.is_free, _DAMPING, A)
+    eliminate(A, b)
     for i in range(q.shape[0]):
         speed[i] = 0.0
         for r in range(6):
-            speed[i] += arm.J[r, i] * arm.b[r]
-
-
-@inner
-def _stoppable(room: float, most: float) -> float:
-    """Largest step from which a setpoint stops within ``room``, each step less by ``most``."""
-    return 0.5 * (math.sqrt(most * (most + 8.0 * max(room, 0.0))) - most)
+            speed[i] += arm.J[r, i] * b[r]
 
 
 @inner
@@ -71,8 +67,8 @@ def _share_of_limits(p: SlaveNumbers, s: SlaveState, dt: float) -> float:
         most = p.speed_limit[i]
         if s.motion == _TIP:
             up = s.drive[i] > 0.0
-            room = p.upper[i] - s.setpoint[i] if up else s.setpoint[i] - p.lower[i]
-            most = min(most, _stoppable(room, p.braking[i] * dt * dt) / dt)
+            left = p.upper[i] - s.setpoint[i] if up else s.setpoint[i] - p.lower[i]
+            most = min(most, commands.stoppable(left, p.braking[i] * dt * dt) / dt)
         if fast > most:
             share = min(share, most / fast)
     return share
@@ -99,9 +95,7 @@ def advance_velocity(p: SlaveNumbers, s: SlaveState, arm: ArmModel, now_ns: int,
             s.drive[i] = 0.0
     elif s.motion == _TIP:
         copy(s.setpoint, arm.joints)
-        copy(s.twist, arm.twist)
-        joint_speeds(arm, arm.joints, arm.twist, arm.speeds)
-        copy(arm.speeds, s.drive)
+        joint_speeds(arm, arm.joints, s.twist, s.drive)
     share, change = _share_of_limits(p, s, dt), 1.0
     for i in range(n):
         most = p.braking[i] * dt * dt
@@ -112,13 +106,10 @@ def advance_velocity(p: SlaveNumbers, s: SlaveState, arm: ArmModel, now_ns: int,
     for i in range(n):
         most = p.braking[i] * dt * dt
         step = s.step[i] + change * (share * s.drive[i] * dt - s.step[i])
-        step = min(step, _stoppable(p.upper[i] - s.setpoint[i], most))
-        step = max(step, -_stoppable(s.setpoint[i] - p.lower[i], most))
-        before = s.setpoint[i]
-        s.setpoint[i] = min(max(before + step, p.lower[i]), p.upper[i])
-        s.step[i] = s.setpoint[i] - before
-        s.command[i] = s.target[i] = s.filtered[i] = s.setpoint[i]
+        step = min(step, commands.stoppable(p.upper[i] - s.setpoint[i], most))
+        step = max(step, -commands.stoppable(s.setpoint[i] - p.lower[i], most))
+        commands.move_joint(p, s, i, step, dt)
         is_still = is_still and s.step[i] == 0.0
-    s.span, s.ticks = 0, 1
+    commands.forget_way(s)
     if is_stale and is_still:
         s.motion = _FOLLOWING

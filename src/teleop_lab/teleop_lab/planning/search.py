@@ -11,8 +11,8 @@ from dataclasses import replace
 import numpy as np
 
 from teleop_core.kernels.geometry import Array, multiply_quaternions, transform_from_pose
+from teleop_core.robots.freedom import free_postures
 from teleop_core.robots.kinematics import IkStatus
-from teleop_core.robots.room import roomy_postures
 from teleop_lab.planning import turns, walk
 from teleop_lab.planning.aim import Aim
 from teleop_lab.planning.placement import Placement
@@ -54,7 +54,7 @@ class Search:
         self._walker, self._given, self._aim, self._tell = walker, given, aim, tell
         self._goal = 1.0
         self._known: dict[Placement, float] = {}
-        self._starts = [self._rounded(q) for q in roomy_postures(walker.robot, STARTS)]
+        self._starts = [self._rounded(q) for q in free_postures(walker.robot, STARTS)]
 
     def best(self, goal: float) -> Found:
         """The placement with the largest gains that reach the goal, or the one that comes nearest.

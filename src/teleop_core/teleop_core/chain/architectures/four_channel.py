@@ -4,7 +4,8 @@ from dataclasses import dataclass
 
 from teleop_core.base.parameters import parameter
 from teleop_core.chain.architectures import Architecture
-from teleop_core.chain.architectures.three_channel import ThreeChannelParameters, channels_push, force_gain
+from teleop_core.chain.architectures.position_force import force_scale
+from teleop_core.chain.architectures.three_channel import ThreeChannelParameters, channels_push
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -26,5 +27,5 @@ def _lead(parameters: FourChannelParameters) -> float:
 
 
 FOUR_CHANNEL = Architecture(
-    "four_channel", FourChannelParameters, channels_push, force_scale=force_gain, lead_gain=_lead, needs_impedance=True
+    "four_channel", FourChannelParameters, channels_push, force_scale=force_scale, lead_gain=_lead, needs_impedance=True
 )

@@ -27,8 +27,9 @@ def position_force_push(numbers: Array, memory: Array, felt: Array, away: Array,
         out[i] = numbers[0] * felt[i]
 
 
-def _scale(parameters: PositionForceParameters) -> float:
+def force_scale(parameters: PositionForceParameters) -> float:
+    """Force at the hand over the one on the tip, above 0."""
     return max(parameters.force_gain, 1e-3)
 
 
-POSITION_FORCE = Architecture("position_force", PositionForceParameters, position_force_push, force_scale=_scale)
+POSITION_FORCE = Architecture("position_force", PositionForceParameters, position_force_push, force_scale=force_scale)

@@ -58,6 +58,14 @@ def beyond(rates: Array, dead_zone: float) -> Array:
     return np.asarray(np.sign(rates) * size)
 
 
+def steer(pose: Array, rates: Array, time: float, parameters: RateParameters, low: Array, high: Array) -> None:
+    """Move a pose (7,) at rates (6,) from -1 to 1 for a time [s]; its place stays from ``low`` to ``high`` (3,) [m]."""
+    moved = beyond(rates, parameters.dead_zone)
+    pose[:3] = np.clip(pose[:3] + time * parameters.speed * moved[:3], low, high)
+    turn_by(time * parameters.turn_speed * moved[3:], pose[3:])
+    pose[3:] /= length(pose[3:])
+
+
 class Pilot:
     """Tells a hand where a person steers the stylus.
 
@@ -81,13 +89,8 @@ class Pilot:
         time = min(dt, _LONGEST)
         if self._pose is None:
             self._pose, time = self._hand.pose, 0.0  # the first pose of a grip is where it is
-        p, pose = self._parameters, self._pose
-        rates = beyond(reading.rates, p.dead_zone)
-        low, high = self._hand.room
-        pose[:3] = np.clip(pose[:3] + time * p.speed * rates[:3], low, high)
-        turn_by(time * p.turn_speed * rates[3:], pose[3:])
-        pose[3:] /= length(pose[3:])
-        self._hand.want(pose)
+        steer(self._pose, reading.rates, time, self._parameters, *self._hand.room)
+        self._hand.want(self._pose)
 
     def let_go(self) -> None:
         """Let go of the stylus, if it is held."""

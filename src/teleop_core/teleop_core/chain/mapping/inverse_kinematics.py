@@ -234,7 +234,7 @@ class InverseKinematics(RunningStage):
         super().__init__(INVERSE_KINEMATICS, n, dt)
         self.parameters, self.state = record(SolverNumbers, n), record(SolverState)
         self._solver = Solver(
-            self.robot.fk_pointer, self.robot.ik_pointer, self.robot.limits(dt).copy(),
+            self.robot.fk_pointer, self.robot.ik_pointer, self.robot.limits(),
             self.robot.geometry_row.copy(), np.zeros((4, 4)), np.zeros((4, 4)), np.zeros(n),
             np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(2),
         )  # fmt: skip
@@ -261,9 +261,7 @@ class InverseKinematics(RunningStage):
 
     def retune(self, parameters: InverseKinematicsParameters) -> None:
         """Take new parameters from the next pose on."""
-        drives = self.robot.drives
-        limit = np.full(self.robot.n, np.inf) if drives is None else drives.speed_limit
-        self.parameters["speed"] = limit * parameters.speed_share
+        self.parameters["speed"] = self.robot.speed_limit * parameters.speed_share
         p = parameters
         self.parameters["tolerance"] = p.position_tolerance, p.rotation_tolerance
         self.parameters["longest_ns"] = round(parameters.longest_pause * 1e9)

@@ -136,7 +136,7 @@ def _latch(s: ScalingState, stylus: Array) -> None:
 
 
 @inner
-def _move(p: ScalingNumbers, s: ScalingState, fixture: side.Walled, gain: float, position: Array, turn: Array) -> None:
+def _move(p: ScalingNumbers, s: ScalingState, fixture: Held, gain: float, position: Array, turn: Array) -> None:
     """Add the scaled step of the hand to the command; turn the tool as the stylus."""
     step = room(3)
     for i in range(3):
@@ -163,20 +163,20 @@ def _move(p: ScalingNumbers, s: ScalingState, fixture: side.Walled, gain: float,
 
 
 @inner
-def _wall(p: ScalingNumbers, s: ScalingState, fixture: side.Walled, period: float, stylus: Array, force: Array) -> None:
+def _wall(p: ScalingNumbers, s: ScalingState, fixture: Held, period: float, stylus: Array, force: Array) -> None:
     """Write the push (3,) [N] of the fixture's wall; after a pause it begins anew."""
-    length = 0.0
+    offset, out, length = room(3), room(3), 0.0
+    for i in range(3):
+        offset[i], out[i] = stylus[i] - s.center[i], 0.0
     if s.is_fixture_on and p.holds_hand:
-        for i in range(3):
-            fixture.offset[i] = stylus[i] - s.center[i]
-        length = fixture_depth(fixture.held, fixture.offset, fixture.out)
+        length = fixture_depth(fixture, offset, out)
     if p.is_damped == 0:
-        walls.wall_force(fixture.out, length, p.stiffness, p.max_force, force)
+        walls.wall_force(out, length, p.stiffness, p.max_force, force)
         return
     if period <= 0.0 or period > 1e-9 * p.pause_ns:
         walls.forget_wall(s, stylus)
         period = _LONG
-    walls.damped_wall(p, s, stylus, fixture.out, length, period, force)
+    walls.damped_wall(p, s, stylus, out, length, period, force)
 
 
 @inner
@@ -237,7 +237,7 @@ def _refuse(
 
 @kernel
 def motion_scaling_step(
-    p: ScalingNumbers, s: ScalingState, sent: Sequence[limits.Sent], fixture: side.Walled, law: Law, row: Row, dt: float
+    p: ScalingNumbers, s: ScalingState, sent: Sequence[limits.Sent], fixture: Held, law: Law, row: Row, dt: float
 ) -> None:
     """One master sample: write slave_servo_cp, master_servo_cf and teleop_state.
 
@@ -245,7 +245,7 @@ def motion_scaling_step(
         p: Parameter record.
         s: State record; written.
         sent: Records of :class:`~teleop_core.chain.mapping.limits.Sent`; written.
-        fixture: :class:`Walled`.
+        fixture: The fixture.
         law: :class:`~teleop_core.chain.mapping.reflection.Law`; written.
         row: Signals.
         dt: Tick [s].
@@ -315,8 +315,7 @@ class MotionScaling(RunningStage):
         self._sent = record_array(limits.Sent, limits.SENT)
         self._values = parameters
         self.kernel = motion_scaling_step
-        nothing = Held(None, np.empty(0), np.empty(4))
-        self._walled = side.Walled(nothing, np.zeros(3), np.zeros(3))
+        self._held = Held(None, np.empty(0), np.empty(4))
         self._law = make_law(ARCHITECTURES.find("unilateral"), np.empty(0), PASSIVITIES.find("none"), np.empty(0))
         self.reset()
         self.retune(parameters)
@@ -370,7 +369,7 @@ class MotionScaling(RunningStage):
         self.parameters["reach_depth"] = depth
 
     def _take_fixture(self, fixture: FixtureParameters) -> None:
-        held, last = fixture.made.held, self._walled.held
+        held, last = fixture.made.held, self._held
         p, s = self.parameters, self.state
         p["size"] = fixture.made.size()
         p["holds_hand"], p["holds_slave"] = fixture.side != "slave", fixture.side != "hand"
@@ -380,7 +379,7 @@ class MotionScaling(RunningStage):
         if held.distance is last.distance and len(held.numbers) == len(last.numbers):
             last.numbers[:], last.place[:] = held.numbers, held.place  # the composed tick goes on
             return
-        self._walled = self._walled._replace(held=held)
+        self._held = held
         self._compose_anew()
 
     def _take_reflection(self, reflection: ReflectionParameters) -> None:
@@ -393,7 +392,7 @@ class MotionScaling(RunningStage):
         p["force_scale"] = part.force_scale(chosen.parameters)
         p["lead_gain"] = part.lead_gain(chosen.parameters)
         numbers = part.numbers(chosen.parameters)
-        kept = passivity.numbers_of(reflection.passivity.parameters)
+        kept = passivity.numbers(reflection.passivity.parameters)
         law = self._law
         if (part.push_pointer, passivity.hand_pointer) == (law.push, law.hand) and (len(numbers), len(kept)) == (
             len(law.numbers),
@@ -408,7 +407,7 @@ class MotionScaling(RunningStage):
         self._compose_anew()
 
     def _compose_anew(self) -> None:
-        self.arguments = (self.parameters, self.state, self._sent, self._walled, self._law)
+        self.arguments = (self.parameters, self.state, self._sent, self._held, self._law)
         self._bound = None
 
     def fall_silent(self) -> None:

@@ -12,9 +12,9 @@ Source:
 """
 
 import math
-from typing import NamedTuple
 
 from teleop_core.chain.fixtures import Held, fixture_depth
+from teleop_core.graph import copy
 from teleop_core.kernels import Array, Fields, Vector3, inner
 from teleop_core.kernels.room import room
 
@@ -35,14 +35,6 @@ class SideState(Fields):
     center: Vector3  # middle of the fixture
     master: Vector3  # where the hand leads the slave from
     beyond: Vector3  # from the proxy to there; zero where nothing is held
-
-
-class Walled(NamedTuple):
-    """The fixture, and arrays to work in."""
-
-    held: Held
-    offset: Array
-    out: Array
 
 
 # Depth up to which a place is allowed [m]: a tenth of the nanometre that reports are rounded to,
@@ -73,25 +65,27 @@ def _distance(a: Array, b: Array) -> float:
 
 
 @inner
-def _draw_in(fixture: Walled, place: Array) -> bool:
+def _draw_in(fixture: Held, place: Array) -> bool:
     """Move a place (3,) to the nearest one that is allowed; whether it is allowed then."""
-    depth = fixture_depth(fixture.held, place, fixture.out)
+    out = room(3)
+    depth = fixture_depth(fixture, place, out)
     for _ in range(_ROUNDS):
         if depth <= _ALLOWED:
             return True
         for i in range(3):
-            place[i] -= fixture.out[i]
-        depth = fixture_depth(fixture.held, place, fixture.out)
+            place[i] -= out[i]
+        depth = fixture_depth(fixture, place, out)
     return bool(depth <= _ALLOWED)
 
 
 @inner
-def _approach(fixture: Walled, last: Array, aim: Array, most: float) -> None:
+def _approach(fixture: Held, last: Array, aim: Array, most: float) -> None:
     """Move an aim (3,) to where the proxy may be next on its way there, ``most`` [m] away.
 
     A proxy that is outside, as after a change of the shape, goes the shortest way in. One that has no way stays.
     """
-    target, share = aim.copy(), most / max(_distance(aim, last), most)
+    target, share = room(3), most / max(_distance(aim, last), most)
+    copy(aim, target)
     for _ in range(_SHARES):
         for i in range(3):
             aim[i] = last[i] + share * (target[i] - last[i])
@@ -106,7 +100,7 @@ def _approach(fixture: Walled, last: Array, aim: Array, most: float) -> None:
 
 
 @inner
-def hold_slave(s: SideState, fixture: Walled, step: Array) -> None:
+def hold_slave(s: SideState, fixture: Held, step: Array) -> None:
     """Turn the hand's step (3,) [m] into that of its proxy, which is no longer.
 
     Where the hand gets to a place that is allowed, but the proxy cannot follow, as through a
@@ -117,7 +111,7 @@ def hold_slave(s: SideState, fixture: Walled, step: Array) -> None:
         fixture: The fixture.
         step: From the hand's last place to its present one; written.
     """
-    last, aim, most = room(3), fixture.offset, 0.0
+    last, aim, hand, most = room(3), room(3), room(3), 0.0
     for i in range(3):
         last[i] = s.master[i] - s.center[i] - s.beyond[i]
         aim[i] = last[i] + s.beyond[i] + step[i]
@@ -125,12 +119,12 @@ def hold_slave(s: SideState, fixture: Walled, step: Array) -> None:
     if most == 0.0:
         return
     most = math.sqrt(most)
-    is_free = fixture_depth(fixture.held, aim, fixture.out) <= _ALLOWED
+    is_free = fixture_depth(fixture, aim, hand) <= _ALLOWED
     if is_free and _distance(aim, last) > most + _ROUNDING:
         let_go(s)
         for i in range(3):
             aim[i] = last[i] + step[i]
-    hand = aim.copy()
+    copy(aim, hand)
     if not _draw_in(fixture, aim) or _distance(aim, last) > most + _ROUNDING:
         _approach(fixture, last, aim, most)
     for i in range(3):

@@ -104,7 +104,7 @@ class DeviceParameters:
 
 
 class Handle(NamedTuple):
-    """A jointed handle: its kinematics, where it stands, and room to work in."""
+    """A jointed handle: its kinematics, where it stands, and its last joints."""
 
     ik: Any
     fk: Any
@@ -114,10 +114,7 @@ class Handle(NamedTuple):
     T_handle_base: Array
     encoder_step: Array
     joints: Array
-    T: Array
-    U: Array
     q: Array
-    residual: Array
 
 
 class ReadingNumbers(Fields):
@@ -156,14 +153,14 @@ def read_handle(handle: Handle, position: Array, attitude: Array, pose: Array) -
     The hand moves the tip; the joints that go with it come from the inverse kinematics, next to
     those of the last sample.
     """
-    T, U, q = handle.T, handle.U, handle.q
+    T, U, residual, q = room(4, 4), room(4, 4), room(2), handle.q
     for i in range(3):
         pose[i] = position[i]
     for i in range(4):
         pose[3 + i] = attitude[i]
     transform_from_pose(pose, T)
     compose(handle.T_handle_base, T, U)
-    handle.ik(U, handle.joints, handle.limits, handle.geometry, q, handle.residual)
+    handle.ik(U, handle.joints, handle.limits, handle.geometry, q, residual)
     for i in range(q.shape[0]):
         handle.joints[i] = q[i]
         q[i] = round(q[i] / handle.encoder_step[i]) * handle.encoder_step[i]
@@ -218,5 +215,5 @@ def make_handle(parameters: DeviceParameters, T_base_rest: Array) -> Handle | No
     return Handle(
         robot.ik_pointer, robot.fk_pointer, robot.limits(), robot.geometry_row.copy(),
         T_base_handle, inverse_motion(T_base_handle), step, robot.home.copy(),
-        np.eye(4), np.eye(4), np.zeros(robot.n), np.zeros(2),
+        np.zeros(robot.n),
     )  # fmt: skip

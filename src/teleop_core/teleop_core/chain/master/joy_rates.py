@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from teleop_core.base import parameter
-from teleop_core.chain.devices.pilot import RateParameters, beyond
-from teleop_core.kernels import Array, length, turn_by
+from teleop_core.chain.devices.pilot import RateParameters, steer
+from teleop_core.kernels import Array
 
 _LONGEST = 0.1  # a driver that was silent for longer has lost time, not made way [s]
 
@@ -62,8 +62,6 @@ class JoyRates:
         self._stamp_ns = max(stamp_ns, self._stamp_ns)
         if p.held_button >= 0 and not buttons[p.held_button]:
             return ""
-        rates = beyond(np.clip(said, -1.0, 1.0), p.dead_zone)
-        self.pose[:3] = np.clip(self.pose[:3] + time * p.speed * rates[:3], -p.reach, p.reach)
-        turn_by(time * p.turn_speed * rates[3:], self.pose[3:])
-        self.pose[3:] /= length(self.pose[3:])
+        ends = np.full(3, p.reach)
+        steer(self.pose, np.clip(said, -1.0, 1.0), time, p, -ends, ends)
         return ""

@@ -15,7 +15,7 @@ import numpy as np
 from numba import types
 
 from teleop_core.base import PartError, Registry, part_check
-from teleop_core.base.registry import tried
+from teleop_core.base.registry import places, tried
 from teleop_core.graph import topics
 from teleop_core.kernels import Array, fenced, is_whole, kernel, numbers_of, pointer
 
@@ -58,8 +58,8 @@ class Passivity:
             command that arrives, with a stage ``passivity`` alone. ``numbers`` are those of that stage; ``force`` (6,)
             is on the tip [N, N m], whose pose is ``tip`` (7,); ``last`` (7,) the command before it, as it was given;
             ``command`` (7,) the one that came, to be made the one that is given.
-        numbers: ``numbers(parameters)`` gives what ``hand`` takes; None for the numbers of the
-            parameters in their order.
+        numbers: ``numbers(parameters)`` gives what ``hand`` takes, if that is
+            something else than the numbers of the parameters in their order.
         needs_slave: Whether it works with a stage ``passivity`` alone.
     """
 
@@ -67,22 +67,12 @@ class Passivity:
     parameters: type
     hand: Callable[..., None]
     slave: Callable[..., None] = leave_command
-    numbers: Callable[[Any], Array] | None = None
+    numbers: Callable[[Any], Array] = numbers_of
     needs_slave: bool = False
 
-    @cached_property
-    def hand_pointer(self) -> Any:
-        """The hand's side as an argument for kernels."""
-        return pointer(self.hand, HAND)
-
-    @cached_property
-    def slave_pointer(self) -> Any:
-        """The slave's side as an argument for kernels."""
-        return pointer(self.slave, SLAVE)
-
-    def numbers_of(self, parameters: object) -> Array:
-        """Numbers of a parameter group, as the hand's side takes them."""
-        return numbers_of(parameters) if self.numbers is None else self.numbers(parameters)
+    hand_pointer = cached_property(lambda self: pointer(self.hand, HAND))
+    slave_pointer = cached_property(lambda self: pointer(self.slave, SLAVE))
+    """Both sides as arguments for kernels."""
 
 
 def _try(part: Passivity) -> None:
@@ -92,7 +82,7 @@ def _try(part: Passivity) -> None:
         "and parameters that all have defaults"
     )
     with tried("passivity", part.name, needs):
-        numbers, width = part.numbers_of(part.parameters()), len(topics.ENERGY)
+        numbers, width = part.numbers(part.parameters()), len(topics.ENERGY)
         memory, fence = fenced(np.zeros(MEMORY))
         push, behind = fenced(np.zeros(3))
         command, after = fenced(np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]))
@@ -111,18 +101,11 @@ def _try(part: Passivity) -> None:
 PASSIVITIES: Registry[Passivity] = Registry(
     "passivity",
     "passivities",
-    {
-        "none": "teleop_core.chain.passivity.none:NONE",
-        "tank": "teleop_core.chain.passivity.tank:TANK",
-        "tdpa": "teleop_core.chain.passivity.tdpa:TDPA",
-        "wave": "teleop_core.chain.passivity.wave:WAVES",
-    },
+    {**places("teleop_core.chain.passivity", "none tank tdpa"), "wave": "teleop_core.chain.passivity.wave:WAVES"},
     part_check("passivity", Passivity, "hand", "slave"),
     _try,
 )
 """All kinds by name."""
 
-
-def register_passivity(part: Passivity, *, replace: bool = False) -> Passivity:
-    """Add a kind under its own name for the rest of the program; see :meth:`Registry.add`."""
-    return PASSIVITIES.add(part.name, part, replace=replace)
+register_passivity = PASSIVITIES.register
+"""Adds one of yours under its own name; see :meth:`Registry.register`."""

@@ -15,6 +15,7 @@ from teleop_core.chain.passivity.port import IN, LAW, ROUND, TURN_IN, begin_roun
 from teleop_core.graph import DT, Row, RunningStage, Stage, assign, copy, topics
 from teleop_core.kernels import Array, Fields, PoseRow, Wrench, inner, kernel, record, records
 from teleop_core.kernels.geometry import turn_between
+from teleop_core.kernels.room import room
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -84,14 +85,12 @@ class PassivityParameters:
 
 
 class Laws(NamedTuple):
-    """The slave's side of all kinds, what they remember, and room to work in."""
+    """The slave's side of all kinds, and what they remember."""
 
     slaves: Any
     numbers: Array
     memory: Array
     flow: Array  # heard, in and out since the last command
-    step: Array
-    turn: Array
     last: Array  # the command that was given last (7,)
 
 
@@ -119,13 +118,14 @@ def _observe(s: PortState, laws: Laws, row: Row, port: Array) -> None:
         now = s.before[i] if is_late else row.slave_measured_cf[i]
         s.felt[i], s.force[i] = 0.5 * (s.force[i] + now), now
         s.before[i] = row.slave_measured_cf[i]
+    step, turn = room(3), room(3)
     if s.tip_ns != 0 and row.slave_measured_cp_ns > s.tip_ns:
         for i in range(3):
-            laws.step[i] = row.slave_measured_cp[i] - s.tip[i]
-        turn_between(s.tip[3:7], row.slave_measured_cp[3:7], laws.turn)
-        came = port_work(s.felt[0:3], laws.step)
+            step[i] = row.slave_measured_cp[i] - s.tip[i]
+        turn_between(s.tip[3:7], row.slave_measured_cp[3:7], turn)
+        came = port_work(s.felt[0:3], step)
         count(port, IN, came)
-        turned = port_work(s.felt[3:6], laws.turn)
+        turned = port_work(s.felt[3:6], turn)
         count(port, TURN_IN, turned)
         came += turned
         laws.flow[1] += max(came, 0.0)
@@ -187,7 +187,7 @@ class SlaveSide(RunningStage):
         self.parameters, self.state = records([("none", "i8")])[0], record(PortState)
         self.kernel = passivity_step
         slaves = tuple(PASSIVITIES.find(name).slave_pointer for name in PASSIVITIES)
-        self._laws = Laws(slaves, np.zeros(7), np.zeros(MEMORY), np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(7))
+        self._laws = Laws(slaves, np.zeros(7), np.zeros(MEMORY), np.zeros(3), np.zeros(7))
         self.arguments = (self.parameters, self.state, self._laws)
         self._start = self.signals.copy()
         self.retune(parameters)

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from teleop_core.evaluation import SPREAD_MEANING, Context, Integers, Key, Window, latest, same_stamp
+from teleop_core.evaluation import Context, Integers, Window, latest, same_stamp
 from teleop_core.evaluation.metric import SpreadMetric
 from teleop_core.evaluation.pairing import NONE
 from teleop_core.evaluation.tracking import angles_between
@@ -123,8 +123,7 @@ class AskedErrorMetric(_AskedMetric):
     interpolation is in it.
     """
 
-    name = "asked_error_mm"
-    keys = (Key("asked_error_mm.rms|sd|max", "mm", f"{_MEANING}: {SPREAD_MEANING}"),)
+    name, meaning = "asked_error_mm", _MEANING
 
     def errors(self, window: Window) -> Array:
         """Distances (N,) [mm]."""
@@ -140,7 +139,7 @@ class AskedTurnMetric(_AskedMetric):
     """
 
     name, label, unit = "asked_error_deg", "rotation", "deg"
-    keys = (Key("asked_error_deg.rms|sd|max", "deg", f"angle of {_MEANING}: {SPREAD_MEANING}"),)
+    meaning = f"angle of {_MEANING}"
 
     def errors(self, window: Window) -> Array:
         """Angles (N,) [deg]."""

@@ -4,12 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from teleop_core.evaluation import Context, Metric, Moments, Row, Window, keys_of, latest, row
+from teleop_core.evaluation import Context, Metric, Moments, Window, keys_of, latest
 from teleop_core.evaluation.metric import figure
 from teleop_core.graph.topics import SLAVE_ESTIMATED_CF, SLAVE_MEASURED_CF, SLAVE_TRUE_CF, Topic
 from teleop_core.kernels.geometry import Array
-
-GROUP = "force on the tip as it was told"
 
 
 @dataclass(frozen=True)
@@ -20,9 +18,12 @@ class ForceSensingScore:
         "N",
         "root mean square of the distance of slave/measured_cf from slave/true_cf, at all samples "
         "of both in touch; null without a touch, or if nobody tells the true force",
+        "measured, error, rms",
     )
     measured_max_n: float | None = figure("N", "largest such distance")
-    estimated_rms_n: float | None = figure("N", "the same of slave/estimated_cf; null too if nothing was estimated")
+    estimated_rms_n: float | None = figure(
+        "N", "the same of slave/estimated_cf; null too if nothing was estimated", "estimated, error, rms"
+    )
     estimated_max_n: float | None = figure("N", "largest such distance")
 
 
@@ -32,7 +33,7 @@ class ForceSensingMetric(Metric):
     All three are sent where they change, so each holds until its next sample.
     """
 
-    name = "force_sensing"
+    name, group = "force_sensing", "force on the tip as it was told"
     keys = keys_of("force_sensing", ForceSensingScore)
     topics = (SLAVE_TRUE_CF, SLAVE_MEASURED_CF, SLAVE_ESTIMATED_CF)
 
@@ -52,16 +53,6 @@ class ForceSensingMetric(Metric):
         measured = self._measured.spread()
         estimated = (self._estimated if self._is_estimated else Moments()).spread()
         return ForceSensingScore(measured.rms, measured.max, estimated.rms, estimated.max)
-
-    def rows(self) -> list[Row]:
-        """The root mean squares; nothing where nothing was touched."""
-        score = self.values()
-        if score.measured_rms_n is None:
-            return []
-        found = [row(GROUP, "measured, error, rms", "N", score.measured_rms_n)]
-        if score.estimated_rms_n is not None:
-            found.append(row(GROUP, "estimated, error, rms", "N", score.estimated_rms_n))
-        return found
 
 
 def force_errors(window: Window, told: Topic) -> Array:

@@ -4,14 +4,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from teleop_core.evaluation import Context, Metric, Row, Window, keys_of, row
+from teleop_core.evaluation import Context, Metric, Window, keys_of
 from teleop_core.evaluation.metric import figure
 from teleop_core.evaluation.metrics.touch import object_of
 from teleop_core.graph.topics import SLAVE_TRUE_CF, SLAVE_TRUE_CP
 from teleop_core.kernels import Array, length
 from teleop_core.shapes.hole import HoleParameters
-
-GROUP = "insertion"
 
 
 @dataclass(frozen=True)
@@ -19,12 +17,14 @@ class InsertionScore:
     """What a peg did in a hole; None where the world is no hole."""
 
     depth_mm: float | None = figure(
-        "mm", "largest depth of the slave's tip in the hole, from the mouth to the far end at most"
+        "mm",
+        "largest depth of the slave's tip in the hole, from the mouth to the far end at most",
+        "largest depth in the hole",
     )
     resistance_n: float | None = figure(
-        "N", "largest force on the tool along the hole's axis, against a tip that goes in"
+        "N", "largest force on the tool along the hole's axis, against a tip that goes in", "largest force against it"
     )
-    torque_nm: float | None = figure("N·m", "largest torque about the slave's tip")
+    torque_nm: float | None = figure("N·m", "largest torque about the slave's tip", "largest torque about the tip")
 
 
 def depth_in_hole(places: Array, center: Array, hole: HoleParameters) -> float:
@@ -74,14 +74,3 @@ class InsertionMetric(Metric):
         if self._object is None:
             return InsertionScore(None, None, None)
         return InsertionScore(1e3 * self._depth, self._resistance, self._torque)
-
-    def rows(self) -> list[Row]:
-        """All three; nothing where the world is no hole."""
-        score = self.values()
-        if score.depth_mm is None:
-            return []
-        return [
-            row(GROUP, "largest depth in the hole", "mm", score.depth_mm),
-            row(GROUP, "largest force against it", "N", score.resistance_n),
-            row(GROUP, "largest torque about the tip", "N·m", score.torque_nm),
-        ]

@@ -4,13 +4,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from teleop_core.evaluation import Context, Envelope, Metric, Row, Window, keys_of, number, row
+from teleop_core.evaluation import Context, Envelope, Metric, Window, keys_of, number
 from teleop_core.evaluation.figure import COMMAND, DARK, MEASURED, Figure, line, time_axis
 from teleop_core.evaluation.metric import figure
 from teleop_core.evaluation.pairing import mean_wait_s
 from teleop_core.graph.topics import SLAVE_JAW_GRIP, SLAVE_JAW_MEASURED_JS, SLAVE_JAW_SERVO_JP
 
-GROUP = "the jaw"
 _FORCE, _IS_GRIPPED, _GRIPS, _SLIPS, _DROPS = (
     SLAVE_JAW_GRIP.columns.index(name) for name in ("force", "is_gripped", "grips", "slips", "drops")
 )
@@ -20,17 +19,21 @@ _FORCE, _IS_GRIPPED, _GRIPS, _SLIPS, _DROPS = (
 class JawScore:
     """What the jaw did with the object; None without a jaw."""
 
-    grips: int | None = figure("1", "how often the jaw closed on the object")
-    slips: int | None = figure("1", "grips in which the object slid by more than 1 mm")
-    drops: int | None = figure("1", "how often it slid out of the jaw above the table")
-    peak_force_n: float | None = figure("N", "largest push of each finger on the object")
-    delay_s: float | None = figure("s", "mean time from the master's sample that begins to close the jaw to the grip")
+    grips: int | None = figure("1", "how often the jaw closed on the object", "grips")
+    slips: int | None = figure("1", "grips in which the object slid by more than 1 mm", "slips")
+    drops: int | None = figure("1", "how often it slid out of the jaw above the table", "drops")
+    peak_force_n: float | None = figure("N", "largest push of each finger on the object", "push of each finger, max")
+    delay_s: float | None = figure(
+        "s",
+        "mean time from the master's sample that begins to close the jaw to the grip",
+        "from the command to the grip",
+    )
 
 
 class JawMetric(Metric):
     """Grips of a simulated jaw, by what its simulator tells."""
 
-    name = "jaw"
+    name, group = "jaw", "the jaw"
     keys = keys_of("jaw", JawScore)
     topics = (SLAVE_JAW_GRIP, SLAVE_JAW_SERVO_JP, SLAVE_JAW_MEASURED_JS)
 
@@ -73,19 +76,6 @@ class JawMetric(Metric):
         counts = self._last - self._first
         grips, slips, drops = (int(counts[i]) for i in (_GRIPS, _SLIPS, _DROPS))
         return JawScore(grips, slips, drops, self._peak, mean_wait_s(self._closings, self._begins))
-
-    def rows(self) -> list[Row]:
-        """Counts, force and delay; nothing without a grip."""
-        score = self.values()
-        if not score.grips:
-            return []
-        return [
-            Row(GROUP, "grips", "", str(score.grips)),
-            Row(GROUP, "slips", "", str(score.slips)),
-            Row(GROUP, "drops", "", str(score.drops)),
-            row(GROUP, "push of each finger, max", "N", score.peak_force_n),
-            row(GROUP, "from the command to the grip", "s", score.delay_s),
-        ]
 
     def figures(self) -> list[Figure]:
         """Angle and force against time; none without a jaw."""

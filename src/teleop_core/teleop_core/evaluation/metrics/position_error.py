@@ -6,7 +6,7 @@ true tip is behind what the encoders see.
 
 import numpy as np
 
-from teleop_core.evaluation import SPREAD_MEANING, TRACKED, Context, Key, Window, same_stamp, tracked
+from teleop_core.evaluation import TRACKED, Context, Window, same_stamp, tracked
 from teleop_core.evaluation.figure import COMMAND, MEASURED, Figure, line, time_axis
 from teleop_core.evaluation.metric import SpreadMetric
 from teleop_core.evaluation.published import POSITION_SHARE, Gains, agrees
@@ -22,13 +22,7 @@ class CommandErrorMetric(SpreadMetric):
     """Spread of the distance between tip and command, [mm]."""
 
     name, group = "command_error_mm", COMMAND_GROUP
-    keys = (
-        Key(
-            "command_error_mm.rms|sd|max",
-            "mm",
-            f"slave/measured_cp to the latest slave/servo_cp at its stamp: {SPREAD_MEANING}",
-        ),
-    )
+    meaning = "slave/measured_cp to the latest slave/servo_cp at its stamp"
     topics = TRACKED
 
     def errors(self, window: Window) -> Array:
@@ -40,13 +34,7 @@ class TrueErrorMetric(SpreadMetric):
     """Spread of the distance between the true tip and the reference, [mm]."""
 
     name, group = "true_error_mm", "true tip, behind the encoders"
-    keys = (
-        Key(
-            "true_error_mm.rms|sd|max",
-            "mm",
-            f"slave/true_cp to slave/setpoint_cp of the same tick, null if nobody tells the true tip: {SPREAD_MEANING}",
-        ),
-    )
+    meaning = "slave/true_cp to slave/setpoint_cp of the same tick, null if nobody tells the true tip"
     topics = TRACKED
 
     def __init__(self, context: Context) -> None:
@@ -66,13 +54,7 @@ class PositionErrorMetric(SpreadMetric):
     """Spread of the distance between tip and reference, [mm]."""
 
     name, group = "position_error_mm", GROUP
-    keys = (
-        Key(
-            "position_error_mm.rms|sd|max",
-            "mm",
-            f"slave/measured_cp to slave/setpoint_cp of the same tick: {SPREAD_MEANING}",
-        ),
-    )
+    meaning = "slave/measured_cp to slave/setpoint_cp of the same tick"
     topics = TRACKED
 
     def __init__(self, context: Context) -> None:

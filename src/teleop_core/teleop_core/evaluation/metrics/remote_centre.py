@@ -4,13 +4,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from teleop_core.evaluation import Context, Metric, Moments, Row, Window, keys_of, row
+from teleop_core.evaluation import Context, Metric, Moments, Window, keys_of
 from teleop_core.evaluation.metric import figure
 from teleop_core.evaluation.metrics.motion import approach_end_ns
 from teleop_core.graph.topics import REMOTE_CENTRE, SLAVE_MEASURED_CP
 from teleop_core.kernels.geometry import Array, rotations_from_quaternions
-
-GROUP = "remote centre"
 
 
 @dataclass(frozen=True)
@@ -18,10 +16,12 @@ class RemoteCentreScore:
     """Distances after the approach; None without a remote centre."""
 
     off_rms_mm: float | None = figure(
-        "mm", "RMS distance from the centre to the line of the shaft, of slave/measured_cp"
+        "mm",
+        "RMS distance from the centre to the line of the shaft, of slave/measured_cp",
+        "shaft beside the centre, RMS",
     )
-    off_max_mm: float | None = figure("mm", "largest such distance")
-    least_depth_mm: float | None = figure("mm", "least distance from the centre to the tip")
+    off_max_mm: float | None = figure("mm", "largest such distance", "shaft beside the centre, max")
+    least_depth_mm: float | None = figure("mm", "least distance from the centre to the tip", "least depth of the tip")
 
 
 def distances(poses: Array, centre: Array, shaft: Array) -> tuple[Array, Array]:
@@ -41,7 +41,7 @@ def distances(poses: Array, centre: Array, shaft: Array) -> tuple[Array, Array]:
 class RemoteCentreMetric(Metric):
     """How well a tool keeps to its remote centre."""
 
-    name = "remote_centre"
+    name, group = "remote_centre", "remote centre"
     keys = keys_of("remote_centre", RemoteCentreScore)
     topics = (REMOTE_CENTRE, SLAVE_MEASURED_CP)
 
@@ -67,14 +67,3 @@ class RemoteCentreMetric(Metric):
         off = self._off.spread()
         least = 1e3 * self._least if self._off.count else None
         return RemoteCentreScore(off.rms, off.max, least)
-
-    def rows(self) -> list[Row]:
-        """All three; nothing without a remote centre."""
-        score = self.values()
-        if score.off_rms_mm is None:
-            return []
-        return [
-            row(GROUP, "shaft beside the centre, RMS", "mm", score.off_rms_mm),
-            row(GROUP, "shaft beside the centre, max", "mm", score.off_max_mm),
-            row(GROUP, "least depth of the tip", "mm", score.least_depth_mm),
-        ]

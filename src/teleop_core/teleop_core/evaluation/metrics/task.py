@@ -4,11 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from teleop_core.evaluation import Context, Metric, Row, Window, keys_of, row
+from teleop_core.evaluation import Context, Metric, Row, Window, keys_of
 from teleop_core.evaluation.metric import figure
 from teleop_core.graph.topics import DISPLAY_MEASURED_CP, NO_COMMAND_NS, TASK_STATE
 
-GROUP = "task"
 _ATTEMPTS, _SUCCESSES, _WAY, _OFF, _TIME, _MISS = (
     TASK_STATE.columns.index(name) for name in ("attempts", "successes", "way", "off", "time", "miss")
 )
@@ -21,23 +20,26 @@ EFFECTIVE = 4.133
 class TaskScore:
     """What came of a task; None without one, or where too little was tried."""
 
-    attempts: int | None = figure("1", "attempts at a goal")
-    successes: int | None = figure("1", "attempts that ended within the goal's width")
-    error_share: float | None = figure("1", "share of the attempts that ended outside of it")
+    attempts: int | None = figure("1", "attempts at a goal", "attempts")
+    successes: int | None = figure("1", "attempts that ended within the goal's width", "successes")
+    error_share: float | None = figure("1", "share of the attempts that ended outside of it", "errors")
     time_s: float | None = figure(
         "s",
         "mean time of an attempt, from when its goal was set; of four or more, without the first, "
         "which begins while the arm is led in",
+        "time of an attempt, mean",
     )
     throughput: float | None = figure(
-        "bit/s", "log2(mean way / effective width + 1) over the mean time, without the first attempt"
+        "bit/s", "log2(mean way / effective width + 1) over the mean time, without the first attempt", "throughput"
     )
-    effective_width_mm: float | None = figure("mm", "4.133 standard deviations of the end points along their ways")
-    beside: int | None = figure("1", "errors: it ended beside the goal")
-    late: int | None = figure("1", "errors: it took too long")
-    forced: int | None = figure("1", "errors: it pressed too hard")
-    dropped: int | None = figure("1", "errors: what was carried came to rest beside its goal")
-    wrong: int | None = figure("1", "errors: what was carried came to rest on another one's goal")
+    effective_width_mm: float | None = figure(
+        "mm", "4.133 standard deviations of the end points along their ways", "effective width"
+    )
+    beside: int | None = figure("1", "errors: it ended beside the goal", "errors: beside")
+    late: int | None = figure("1", "errors: it took too long", "errors: late")
+    forced: int | None = figure("1", "errors: it pressed too hard", "errors: forced")
+    dropped: int | None = figure("1", "errors: what was carried came to rest beside its goal", "errors: dropped")
+    wrong: int | None = figure("1", "errors: what was carried came to rest on another one's goal", "errors: wrong")
 
 
 class TaskMetric(Metric):
@@ -88,27 +90,18 @@ class TaskMetric(Metric):
         return TaskScore(count, successes, errors, time, rate, 1e3 * width, *kinds)
 
     def rows(self) -> list[Row]:
-        """Counts, times and rates, and the kinds of error that occurred; nothing without a task."""
-        score = self.values()
-        if score.attempts is None:
-            return []
-        return [
-            Row(GROUP, "attempts", "", str(score.attempts)),
-            Row(GROUP, "successes", "", str(score.successes)),
-            row(GROUP, "errors", "%", None if score.error_share is None else 1e2 * score.error_share),
-            row(GROUP, "time of an attempt, mean", "s", score.time_s),
-            row(GROUP, "throughput", "bit/s", score.throughput),
-            row(GROUP, "effective width", "mm", score.effective_width_mm),
-            *(Row(GROUP, f"errors: {kind}", "", str(n)) for kind in _KINDS if (n := getattr(score, kind))),
-        ]
+        """All but the kinds of error that did not occur."""
+        return [one for one in super().rows() if not one.label.startswith("errors: ") or one.value != "0"]
 
 
 @dataclass(frozen=True)
 class DisplayScore:
     """How late the operator saw the slave; None without a display."""
 
-    age_mean_ms: float | None = figure("ms", "mean age of the newest frame that was on the screen")
-    rate_hz: float | None = figure("Hz", "frames with another pose that were shown in a second")
+    age_mean_ms: float | None = figure(
+        "ms", "mean age of the newest frame that was on the screen", "age of what is seen, mean"
+    )
+    rate_hz: float | None = figure("Hz", "frames with another pose that were shown in a second", "frames")
 
 
 class DisplayMetric(Metric):
@@ -145,13 +138,3 @@ class DisplayMetric(Metric):
         if not self._span_s:
             return DisplayScore(None, None)
         return DisplayScore(1e3 * self._seen / self._span_s, (self._frames - 1) / self._span_s)
-
-    def rows(self) -> list[Row]:
-        """Both; nothing without a display."""
-        score = self.values()
-        if score.rate_hz is None:
-            return []
-        return [
-            row("display", "age of what is seen, mean", "ms", score.age_mean_ms),
-            row("display", "frames", "Hz", score.rate_hz),
-        ]

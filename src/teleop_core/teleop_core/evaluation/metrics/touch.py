@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from teleop_core.base import TeleopError, build
-from teleop_core.evaluation import Context, Envelope, Metric, Moments, Row, Window, keys_of, number, row
+from teleop_core.evaluation import Context, Envelope, Metric, Moments, Window, keys_of, number
 from teleop_core.evaluation.figure import DARK, FIRST, SECOND, THIRD, Figure, line, time_axis
 from teleop_core.evaluation.metric import figure
 from teleop_core.graph.topics import SLAVE_MEASURED_CF, SLAVE_TRUE_CF, SLAVE_TRUE_CP
@@ -14,7 +14,6 @@ from teleop_core.kernels.geometry import Array
 from teleop_core.slave.world.button import ButtonParameters, count_presses
 from teleop_core.slave.world.parameters import WorldParameters
 
-GROUP = "what the slave touched"
 _NEXT_NS = 5_000_000
 """Largest time between samples of which the later follows at once [ns]."""
 
@@ -23,13 +22,15 @@ _NEXT_NS = 5_000_000
 class TouchScore:
     """Forces on the slave's tip; None where none were recorded."""
 
-    count: int | None = figure("1", "touches: how often the force on the slave's tip set in")
-    peak_n: float | None = figure("N", "largest force on the tip; null without a touch")
+    count: int | None = figure("1", "touches: how often the force on the slave's tip set in", "touches")
+    peak_n: float | None = figure("N", "largest force on the tip; null without a touch", "force on the tip, max")
     rms_n: float | None = figure("N", "root mean square of the samples with a force")
-    share: float | None = figure("1", "share of the recorded time in touch")
-    drop_n: float | None = figure("N", "largest fall of the force from sample to sample within 5 ms, as of a puncture")
+    share: float | None = figure("1", "share of the recorded time in touch", "share of the time in touch")
+    drop_n: float | None = figure(
+        "N", "largest fall of the force from sample to sample within 5 ms, as of a puncture", "largest fall of it"
+    )
     presses: int | None = figure(
-        "1", "how often a button was pressed to its stop, from click to click; null without one"
+        "1", "how often a button was pressed to its stop, from click to click; null without one", "presses"
     )
 
 
@@ -80,7 +81,7 @@ class TouchMetric(Metric):
     Of the true force where it was recorded: noise and bias of a sensor are no touch.
     """
 
-    name = "touch"
+    name, group = "touch", "what the slave touched"
     keys = keys_of("touch", TouchScore)
     topics = (SLAVE_TRUE_CF, SLAVE_MEASURED_CF)
 
@@ -126,20 +127,6 @@ class TouchMetric(Metric):
         share = self._time_ns / whole if whole else 0.0
         drop = self._drop if self._count else None
         return TouchScore(self._count, spread.max, spread.rms, share, drop, self._presses.count)
-
-    def rows(self) -> list[Row]:
-        """Number of touches and the largest force; nothing where nothing was touched."""
-        score = self.values()
-        if not score.count:
-            return []
-        presses = [] if score.presses is None else [Row(GROUP, "presses", "", str(score.presses))]
-        return [
-            Row(GROUP, "touches", "", str(score.count)),
-            *presses,
-            row(GROUP, "force on the tip, max", "N", score.peak_n),
-            row(GROUP, "largest fall of it", "N", score.drop_n),
-            row(GROUP, "share of the time in touch", "%", 100.0 * (score.share or 0.0)),
-        ]
 
     def figures(self) -> list[Figure]:
         """Force on the tip against time; none where nothing was touched."""

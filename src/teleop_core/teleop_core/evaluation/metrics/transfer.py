@@ -4,12 +4,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from teleop_core.evaluation import Context, Metric, Row, Window, keys_of, row
+from teleop_core.evaluation import Context, Metric, Window, keys_of
 from teleop_core.evaluation.metric import figure
 from teleop_core.evaluation.pairing import mean_wait_s
 from teleop_core.graph.topics import SLAVE_JAW_BOARD, SLAVE_JAW_GRIP
 
-GROUP = "peg transfer"
 _TRANSFERRED, _DROPPED, _PULL = (SLAVE_JAW_BOARD.columns.index(name) for name in ("transferred", "dropped", "pull"))
 _GRIPS = SLAVE_JAW_GRIP.columns.index("grips")
 
@@ -18,16 +17,20 @@ _GRIPS = SLAVE_JAW_GRIP.columns.index("grips")
 class TransferScore:
     """What became of the objects of a board; None without a jaw."""
 
-    transferred: int | None = figure("1", "objects that were let go onto another peg")
-    dropped: int | None = figure("1", "objects that came to rest on no peg")
-    time_s: float | None = figure("s", "mean time of those transferred, from the last grip to rest")
-    peak_pull_n: float | None = figure("N", "largest pull of a peg on the gripped object, across the peg")
+    transferred: int | None = figure("1", "objects that were let go onto another peg", "transferred")
+    dropped: int | None = figure("1", "objects that came to rest on no peg", "dropped")
+    time_s: float | None = figure(
+        "s", "mean time of those transferred, from the last grip to rest", "time of a transfer, mean"
+    )
+    peak_pull_n: float | None = figure(
+        "N", "largest pull of a peg on the gripped object, across the peg", "pull of a peg, max"
+    )
 
 
 class TransferMetric(Metric):
     """Counts, times and pulls of a simulated board, by what its simulator tells."""
 
-    name = "transfer"
+    name, group = "transfer", "peg transfer"
     keys = keys_of("transfer", TransferScore)
     topics = (SLAVE_JAW_BOARD, SLAVE_JAW_GRIP)
 
@@ -62,15 +65,3 @@ class TransferMetric(Metric):
         counts = self._last - self._first
         transferred, dropped = int(counts[_TRANSFERRED]), int(counts[_DROPPED])
         return TransferScore(transferred, dropped, mean_wait_s(self._begins, self._ends), self._peak)
-
-    def rows(self) -> list[Row]:
-        """All four; nothing where no object came onto a peg or missed one."""
-        score = self.values()
-        if not score.transferred and not score.dropped:
-            return []
-        return [
-            Row(GROUP, "transferred", "", str(score.transferred)),
-            Row(GROUP, "dropped", "", str(score.dropped)),
-            row(GROUP, "time of a transfer, mean", "s", score.time_s),
-            row(GROUP, "pull of a peg, max", "N", score.peak_pull_n),
-        ]

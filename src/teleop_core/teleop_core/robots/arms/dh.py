@@ -14,7 +14,7 @@ A table is YAML, one row per link, written as in a textbook with ``q`` in the pl
 Entries that are left out are 0. A row without ``q`` is a fixed frame, such as a tool. Turning joints without limits
 have ±180 degrees; sliding ones must state theirs. ``home`` is the posture of the published or natural zero; ``start``
 the one at which sessions start, which joints without it start at home; if no row has it, one with room in all
-directions is looked for (:mod:`teleop_core.robots.room`).
+directions is looked for (:mod:`teleop_core.robots.freedom`).
 
 Every chain can be a slave. What its drives are stands, joint by joint, in a section of its own::
 

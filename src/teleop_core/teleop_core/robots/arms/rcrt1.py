@@ -28,7 +28,7 @@ LOWER = np.array([-80.0, 50.0, 0.0, -170.0, -80.0, -170.0]) * _DEGREES
 UPPER = np.array([80.0, 160.0, 0.0, 170.0, 80.0, 170.0]) * _DEGREES
 UPPER[2] = 0.421
 HOME = np.array([0.0, 113.4 * _DEGREES, 0.421, 0.0, 0.0, 0.0])
-# Answer of :func:`teleop_core.robots.room.start_posture` for the published lengths, rounded.
+# Answer of :func:`teleop_core.robots.freedom.start_posture` for the published lengths, rounded.
 START = np.array([-0.7622, 1.7058, 0.3445, 1.1233, 0.7795, -1.3396])
 
 # Below this sine the wrist axes 4 and 6 count as one line and joint 4 keeps its value: rounding

@@ -23,7 +23,7 @@ from teleop_core.robots.robot import Robot, geometry_of
 
 _MOST = 10.0  # [m], of a length
 _DEGREES = math.pi / 180.0
-# Answer of :func:`teleop_core.robots.room.start_posture` for the published lengths, rounded.
+# Answer of :func:`teleop_core.robots.freedom.start_posture` for the published lengths, rounded.
 _PUMA_START = (-0.4783, -1.6627, -0.035, 0.3949, 1.0084, -0.57)
 
 

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from teleop_core.base.registry import Registry, part_check
+from teleop_core.base.registry import Registry, part_check, places
 from teleop_core.kernels.geometry import Array
 
 __all__ = ["BRIDGES", "Bridge", "Command", "register_bridge", "write_time"]
@@ -64,12 +64,7 @@ def write_time(message: Any, time_ns: int) -> None:
 BRIDGES: Registry[Bridge] = Registry(
     "bridge",
     "bridges",
-    {
-        "joint_state": "teleop_core.slave.bridges.joint_state:JOINT_STATE",
-        "forward_command": "teleop_core.slave.bridges.forward_command:FORWARD_COMMAND",
-        "joint_trajectory": "teleop_core.slave.bridges.joint_trajectory:JOINT_TRAJECTORY",
-        "crtk": "teleop_core.slave.bridges.crtk:CRTK",
-    },
+    places("teleop_core.slave.bridges", "joint_state forward_command joint_trajectory crtk"),
     part_check("bridge", Bridge, "write"),
 )
 """All kinds by name."""

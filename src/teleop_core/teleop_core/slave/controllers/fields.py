@@ -5,15 +5,10 @@ from typing import Any
 from teleop_core.base.parameters import parameter
 
 
-def bandwidth(poles: str) -> Any:
+def bandwidth(poles: str, source: str = "assumed: the drive table's, as of pid") -> Any:
     """Closed-loop pole of each joint [rad/s]; ``poles``: "double" or "triple"."""
     return parameter(
-        (),
-        unit="rad/s",
-        lower=0.1,
-        upper=500.0,
-        doc=f"{poles} closed-loop pole of each joint",
-        source="assumed: the drive table's, as of pid",
+        (), unit="rad/s", lower=0.1, upper=500.0, doc=f"{poles} closed-loop pole of each joint", source=source
     )
 
 

@@ -4,19 +4,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from teleop_core.base import parameter
 from teleop_core.kernels import Array, kernel
 from teleop_core.robots.robot import Robot
-from teleop_core.slave.controllers import Controller, drives_and_poles
+from teleop_core.slave.controllers import Controller, drives_and_poles, fields
 
 
 @dataclass(frozen=True, kw_only=True)
 class PdParameters:
     """Double closed-loop pole; empty lists mean: from the robot's drive table."""
 
-    bandwidth: tuple[float, ...] = parameter(
-        (), unit="rad/s", lower=0.1, upper=500.0, doc="double closed-loop pole of each joint"
-    )
+    bandwidth: tuple[float, ...] = fields.bandwidth("double")
 
 
 # Columns of the table of gains, and of the memory.

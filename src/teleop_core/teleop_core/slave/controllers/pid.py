@@ -7,7 +7,7 @@ import numpy as np
 from teleop_core.base import parameter
 from teleop_core.kernels import Array, kernel
 from teleop_core.robots.robot import Robot
-from teleop_core.slave.controllers import Controller, drives_and_poles, motion_estimates, per_joint
+from teleop_core.slave.controllers import Controller, drives_and_poles, fields, motion_estimates, per_joint
 
 THIRD = 1.0 / 3.0
 """Setpoint weight whose zero cancels one of three equal poles."""
@@ -17,14 +17,7 @@ THIRD = 1.0 / 3.0
 class PidParameters:
     """Gains; empty lists mean: by the rule of three equal poles, from the robot's drive table."""
 
-    bandwidth: tuple[float, ...] = parameter(
-        (),
-        unit="rad/s",
-        lower=0.1,
-        upper=500.0,
-        doc="triple closed-loop pole of each joint",
-        source="assumed: the drive table's",
-    )
+    bandwidth: tuple[float, ...] = fields.bandwidth("triple", "assumed: the drive table's")
     kp: tuple[float, ...] = parameter((), lower=0.0, doc="N·m/rad or N/m of each joint")
     ki: tuple[float, ...] = parameter((), lower=0.0, doc="N·m/(rad·s) or N/(m·s) of each joint")
     kd: tuple[float, ...] = parameter((), lower=0.0, doc="N·m·s/rad or N·s/m of each joint")

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from teleop_core.base import parameter
 from teleop_core.kernels import Array, kernel
 from teleop_core.robots.robot import Robot
-from teleop_core.slave.controllers import Controller, drives_and_poles, per_joint
+from teleop_core.slave.controllers import Controller, drives_and_poles, fields, per_joint
 from teleop_core.slave.controllers.pid import critically_damped_gains
 
 
@@ -28,13 +28,9 @@ from teleop_core.slave.controllers.pid import critically_damped_gains
 class SourcePidParameters:
     """Gains; empty lists mean: by the rule, from the robot's drive table."""
 
-    bandwidth: tuple[float, ...] = parameter(
-        (),
-        unit="rad/s",
-        lower=0.1,
-        upper=500.0,
-        doc="closed-loop pole of each joint, double, triple where it has integral action",
-        source="assumed: the source prints no gains; critically damped, as it says they were",
+    bandwidth: tuple[float, ...] = fields.bandwidth(
+        "double, or with integral action triple,",
+        "assumed: the source prints no gains; critically damped, as it says they were",
     )
     kp: tuple[float, ...] = parameter((), lower=0.0, doc="N·m/rad or N/m of each joint")
     ki: tuple[float, ...] = parameter((), lower=0.0, doc="N·m/(rad·s) or N/(m·s) of each joint")

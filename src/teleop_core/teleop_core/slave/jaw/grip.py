@@ -9,12 +9,11 @@ second jaw; that of the second is told where they are.
 """
 
 import math
-from typing import Annotated, NamedTuple
-
-import numpy as np
+from typing import Annotated
 
 from teleop_core.graph import Row, copy, topics
 from teleop_core.kernels import Integers, Vector3, geometry, inner, kernel
+from teleop_core.kernels.room import room
 from teleop_core.slave.jaw import drive, sharing
 
 WEIGHT = 9.81
@@ -67,37 +66,24 @@ class GripState(drive.DriveState):
     drops: int
 
 
-class GripRoom(NamedTuple):
-    """Room to work in."""
-
-    back: geometry.Array  # (4,)
-    turn: geometry.Array  # (4,)
-    turned: geometry.Array  # (4,)
-    R: geometry.Array  # (3, 3)
-    motion: geometry.Array  # (3,)
-    second: geometry.Array  # (3,)
-    tips: geometry.Array  # (2, 7)
-
-
-def make_room() -> GripRoom:
-    """Room for :func:`move_objects`."""
-    rows = np.empty(4), np.empty(4), np.empty(4)
-    return GripRoom(*rows, np.empty((3, 3)), np.empty(3), np.empty(3), np.empty((2, 7)))
-
-
 @inner
 def _tip_motion(
-    s: GripState, room: GripRoom, hand: int, pose: geometry.Array, motion: geometry.Array, dt: float
+    before: geometry.Array,
+    now: geometry.Array,
+    pose: geometry.Array,
+    turn: geometry.Array,
+    motion: geometry.Array,
+    dt: float,
 ) -> None:
-    """Write a tip's turn since its last sample, and its speed (3,) at the object's middle."""
-    before, now = s.tips[7 * hand : 7 * hand + 7], room.tips[hand]
-    geometry.invert_quaternion(before[3:7], room.back)
-    geometry.multiply_quaternions(now[3:7], room.back, room.turn)
-    geometry.rotation_from_quaternion(room.turn, room.R)
+    """Write a tip's turn (4,) since its last sample, and its speed (3,) at the object's middle."""
+    back, R = room(4), room(3, 3)
+    geometry.invert_quaternion(before[3:7], back)
+    geometry.multiply_quaternions(now[3:7], back, turn)
+    geometry.rotation_from_quaternion(turn, R)
     for i in range(3):
         place = now[i]
         for k in range(3):
-            place += room.R[i, k] * (pose[k] - before[k])
+            place += R[i, k] * (pose[k] - before[k])
         motion[i] = (place - pose[i]) / dt
 
 
@@ -291,42 +277,43 @@ def put_objects(p: GripNumbers, s: GripState, places: geometry.Array) -> None:
 
 
 @inner
-def _hold(p: GripNumbers, s: GripState, room: GripRoom, number: int, hands: int, dt: float) -> None:
+def _hold(p: GripNumbers, s: GripState, tips: geometry.Array, number: int, hands: int, dt: float) -> None:
     """Give an object the speed that fingers make of its own; it turns with those it sticks to.
 
     Args:
         p: Parameters.
         s: State; written.
-        room: Room; written.
+        tips: Where both tips are now (2, 7).
         number: Of the object.
         hands: Who holds it: 1 the own jaw, 2 the second arm's, 3 both.
         dt: Tick [s].
     """
     pose, motion = s.objects[7 * number : 7 * number + 7], s.motions[3 * number : 3 * number + 3]
     first = 1 if hands == 2 else 0
+    tip, second, turn, turned = room(3), room(3), room(4), room(4)
     if hands == 3:
-        _tip_motion(s, room, 1, pose, room.second, dt)
-    _tip_motion(s, room, first, pose, room.motion, dt)
+        _tip_motion(s.tips[7:14], tips[1], pose, turn, second, dt)
+    _tip_motion(s.tips[7 * first : 7 * first + 7], tips[first], pose, turn, tip, dt)
     if hands == 3:
         most, against = _most(p, s.forces[0], dt), _most(p, s.forces[1], dt)
-        sharing.share_speed(motion, room.motion, most, room.second, against)
-        left = sharing.far_from(motion, room.motion)
+        sharing.share_speed(motion, tip, most, second, against)
+        left = sharing.far_from(motion, tip)
         is_stuck = left == 0.0
-        copy(motion, room.second)
-        _meet_peg(p, int(s.pegs[number]), pose, motion, room.second, dt)
+        copy(motion, second)
+        _meet_peg(p, int(s.pegs[number]), pose, motion, second, dt)
     else:
-        cut = _meet_peg(p, int(s.pegs[number]), pose, motion, room.motion, dt)
-        left = _rub(p, s, motion, room.motion, s.forces[first], cut, dt)
+        cut = _meet_peg(p, int(s.pegs[number]), pose, motion, tip, dt)
+        left = _rub(p, s, motion, tip, s.forces[first], cut, dt)
         is_stuck = left == 0.0
     if first == 0:
         _slide(s, left * dt)
     if is_stuck:
-        geometry.multiply_quaternions(room.turn, pose[3:7], room.turned)
-        copy(room.turned, pose[3:7])
+        geometry.multiply_quaternions(turn, pose[3:7], turned)
+        copy(turned, pose[3:7])
 
 
 @inner
-def _move(p: GripNumbers, s: GripState, room: GripRoom, number: int, dt: float) -> None:
+def _move(p: GripNumbers, s: GripState, tips: geometry.Array, number: int, dt: float) -> None:
     """Move an object on by a tick: fingers, weight, table and peg."""
     pose, motion = s.objects[7 * number : 7 * number + 7], s.motions[3 * number : 3 * number + 3]
     hands = 0
@@ -338,12 +325,13 @@ def _move(p: GripNumbers, s: GripState, room: GripRoom, number: int, dt: float) 
     if is_on_table:
         motion[2] = max(motion[2], 0.0)
     if hands:
-        _hold(p, s, room, number, hands, dt)
+        _hold(p, s, tips, number, hands, dt)
     elif is_on_table:
         motion[0] = motion[1] = 0.0
     else:
-        copy(motion, room.motion)
-        _meet_peg(p, int(s.pegs[number]), pose, motion, room.motion, dt)
+        wanted = room(3)
+        copy(motion, wanted)
+        _meet_peg(p, int(s.pegs[number]), pose, motion, wanted, dt)
     before = pose[2]
     for i in range(3):
         pose[i] += motion[i] * dt
@@ -353,54 +341,53 @@ def _move(p: GripNumbers, s: GripState, room: GripRoom, number: int, dt: float) 
 
 
 @inner
-def _take_hands(p: GripNumbers, s: GripState, room: GripRoom, row: Row) -> None:
-    """Take where both tips are, how hard their jaws press, and on what."""
-    copy(row.slave_true_cp, room.tips[0])
-    copy(row.second_slave_true_cp, room.tips[1])
+def _take_hands(p: GripNumbers, s: GripState, tips: geometry.Array, row: Row) -> None:
+    """Take where both tips are (2, 7), how hard their jaws press, and on what."""
+    copy(row.slave_true_cp, tips[0])
+    copy(row.second_slave_true_cp, tips[1])
     for i in range(3):
-        room.tips[1, i] += p.second_base[i]
+        tips[1, i] += p.second_base[i]
     at = 7 * s.numbers[0]
     rests = s.objects[at + 2] <= p.place[2] or row.second_slave_true_cp_ns > 0
     if not (s.is_between or s.is_gripped) and rests:
-        _choose(p, s, 0, room.tips[0])
+        _choose(p, s, 0, tips[0])
     if s.forces[1] == 0.0:
-        _choose(p, s, 1, room.tips[1])
+        _choose(p, s, 1, tips[1])
     s.forces[0] = s.force
-    is_there = _is_near(p, s, int(s.numbers[1]), room.tips[1])
+    is_there = _is_near(p, s, int(s.numbers[1]), tips[1])
     s.forces[1] = row.second_slave_jaw_grip[0] if is_there else 0.0
 
 
 @inner
-def move_objects(p: GripNumbers, s: GripState, room: GripRoom, row: Row) -> None:
+def move_objects(p: GripNumbers, s: GripState, row: Row) -> None:
     """Move the objects on to the stamp of the newest slave_true_cp.
 
     Args:
         p: Parameters.
         s: State, with the force of the fingers; written.
-        room: :class:`GripRoom`; written.
         row: Signals.
     """
     elapsed_ns = row.slave_true_cp_ns - s.tip_ns
     if elapsed_ns <= 0:  # no tip is known yet, or no newer one
         return
-    _take_hands(p, s, room, row)
+    tips = room(2, 7)
+    _take_hands(p, s, tips, row)
     s.tip_ns, dt = row.slave_true_cp_ns, 1e-9 * elapsed_ns
     s.pull = 0.0
     for i in range(p.objects):
-        _move(p, s, room, i, dt)
-    copy(room.tips[0], s.tips[0:7])
-    copy(room.tips[1], s.tips[7:14])
-    _count(p, s, p.place[2], _find(p, s, room.tips[0]))
+        _move(p, s, tips, i, dt)
+    copy(tips[0], s.tips[0:7])
+    copy(tips[1], s.tips[7:14])
+    _count(p, s, p.place[2], _find(p, s, tips[0]))
 
 
 @inner
-def see_objects(p: GripNumbers, s: GripState, room: GripRoom, row: Row) -> None:
+def see_objects(p: GripNumbers, s: GripState, row: Row) -> None:
     """Take where the first arm's simulator says that the objects are, and count own grips of them.
 
     Args:
         p: Parameters.
         s: State, with the force of the fingers; written.
-        room: :class:`GripRoom`; written.
         row: Signals.
     """
     board, n = row.first_slave_jaw_board, s.numbers[0]
@@ -409,16 +396,17 @@ def see_objects(p: GripNumbers, s: GripState, room: GripRoom, row: Row) -> None:
         for k in range(3):
             s.objects[7 * i + k] = board[3 + 3 * i + k] - p.second_base[k]
     # The board is a tick old, and tells what the tip did a tick before that.
-    geometry.rotation_from_quaternion(s.tips[10:14], room.R)
+    R, way = room(3, 3), room(3)
+    geometry.rotation_from_quaternion(s.tips[10:14], R)
     for i in range(3):
-        room.motion[i] = 0.0
+        way[i] = 0.0
         for k in range(3):
-            room.motion[i] += room.R[k, i] * (s.objects[7 * n + k] - s.tips[7 + k])
+            way[i] += R[k, i] * (s.objects[7 * n + k] - s.tips[7 + k])
     copy(s.tips[0:7], s.tips[7:14])
     copy(row.slave_true_cp, s.tips[0:7])
     if s.is_gripped:
-        _slide(s, max(sharing.far_from(room.motion, s.held) - s.slid, 0.0))
+        _slide(s, max(sharing.far_from(way, s.held) - s.slid, 0.0))
     else:
-        copy(room.motion, s.held)
+        copy(way, s.held)
         _choose(p, s, 0, s.tips[0:7])
     _count(p, s, p.place[2] - p.second_base[2], _find(p, s, s.tips[0:7]))

@@ -9,17 +9,7 @@ from teleop_core.base import ParameterError, parameter
 from teleop_core.graph import DT, Row, RunningStage, Stage, assign, copy, topics
 from teleop_core.kernels import kernel, record
 from teleop_core.slave.jaw.drive import drive
-from teleop_core.slave.jaw.grip import (
-    PEGS,
-    GripNumbers,
-    GripRoom,
-    GripState,
-    make_room,
-    move_objects,
-    put_objects,
-    see_objects,
-    tell_board,
-)
+from teleop_core.slave.jaw.grip import PEGS, GripNumbers, GripState, move_objects, put_objects, see_objects, tell_board
 
 _OTHERS = (topics.FIRST_JAW_BOARD, topics.SECOND_TRUE_CP, topics.SECOND_JAW_GRIP)
 
@@ -134,13 +124,12 @@ class JawSimParameters:
 
 
 @kernel
-def jaw_sim_step(p: GripNumbers, s: GripState, room: GripRoom, row: Row, dt: float) -> None:
+def jaw_sim_step(p: GripNumbers, s: GripState, row: Row, dt: float) -> None:
     """One tick: take the setpoint, say where the jaw is, and move jaw and object on.
 
     Args:
         p: Parameter record.
         s: State record; written.
-        room: :class:`~teleop_core.slave.jaw.grip.GripRoom`; written.
         row: Signals.
         dt: Tick [s].
     """
@@ -152,9 +141,9 @@ def jaw_sim_step(p: GripNumbers, s: GripState, room: GripRoom, row: Row, dt: flo
     row.slave_jaw_measured_js[2] = s.effort
     if p.objects:
         if row.first_slave_jaw_board_ns > 0:
-            see_objects(p, s, room, row)
+            see_objects(p, s, row)
         else:
-            move_objects(p, s, room, row)
+            move_objects(p, s, row)
         tell_board(p, s, row.slave_jaw_board)
     copy(s.objects[7 * s.numbers[0] : 7 * s.numbers[0] + 7], row.slave_jaw_object_cp)
     grip = row.slave_jaw_grip
@@ -169,7 +158,7 @@ class JawSim(RunningStage):
         super().__init__(JAW_SIM, 0, dt)
         self.parameters, self.state = record(GripNumbers), record(GripState)
         self.kernel = jaw_sim_step
-        self.arguments = (self.parameters, self.state, make_room())
+        self.arguments = (self.parameters, self.state)
         self._begin = self.signals.copy()
         self.retune(parameters)
         self.reset()

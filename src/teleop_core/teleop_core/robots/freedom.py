@@ -1,4 +1,4 @@
-"""Room: how far the tip can go in every direction, and the posture a slave starts from.
+"""Freedom: how far the tip can go in every direction, and the posture a slave starts from.
 
 The tip is walked away from a posture along 26 directions, and turned about as many axes, in small steps, as the hand
 will move it. A direction ends where a joint limit ends it, and where the arm comes beside a singularity: there a joint
@@ -33,7 +33,7 @@ _FOLLOWED = int(IkStatus.FOLLOWED)
 _KNOWN: dict[tuple[object, ...], Array] = {}
 
 
-class Room(NamedTuple):
+class Freedom(NamedTuple):
     """How far the tip can go from a posture in its worst direction, of those it controls."""
 
     metres: float
@@ -42,7 +42,7 @@ class Room(NamedTuple):
     """Turn about the tip in place; inf if no rotation is controlled."""
 
 
-def room(robot: arm.Arm, q: object) -> Room:
+def freedom(robot: arm.Arm, q: object) -> Freedom:
     """How far the tip can go from a posture in every direction.
 
     Args:
@@ -50,7 +50,7 @@ def room(robot: arm.Arm, q: object) -> Room:
         q: Joint vector (n,) [rad, m] inside the limits.
 
     Returns:
-        :class:`Room`, in whole steps of 2 degrees and reach/pi times that, up to 90 degrees.
+        :class:`Freedom`, in whole steps of 2 degrees and reach/pi times that, up to 90 degrees.
 
     Raises:
         ShapeError: Another shape.
@@ -58,7 +58,7 @@ def room(robot: arm.Arm, q: object) -> Room:
     """
     postures = np.array(q, dtype=np.float64, ndmin=2)
     moves, turns = _steps(robot, postures)
-    return Room(float(moves[0]) * STEP * lever(robot), float(turns[0]) * STEP)
+    return Freedom(float(moves[0]) * STEP * lever(robot), float(turns[0]) * STEP)
 
 
 def lever(robot: arm.Arm) -> float:
@@ -122,7 +122,7 @@ def start_posture(robot: arm.Arm) -> Array:
     return np.asarray(good[int(away.argmin())])
 
 
-def roomy_postures(robot: arm.Arm, count: int) -> Array:
+def free_postures(robot: arm.Arm, count: int) -> Array:
     """Postures with room all around, the start first, then those looked at with the most room.
 
     Args:

@@ -13,7 +13,7 @@ from present import present
 from teleop_core.base.errors import ParameterError, ShapeError
 from teleop_core.graph.layers import list_scenarios
 from teleop_core.kernels import IS_COMPILED
-from teleop_core.robots import IkStatus, room
+from teleop_core.robots import IkStatus, freedom
 from teleop_core.robots.arms.dh import robot_from_table
 
 ANY_ARM = str(Path(__file__).resolve().parents[2] / "examples/any_arm.urdf")
@@ -48,14 +48,14 @@ def with_starts(*starts: float) -> tc.Robot:
 @pytest.mark.parametrize("name", FROZEN)
 def test_the_start_in_the_file_is_what_the_rule_says(name: str) -> None:
     robot = tc.load_robot(name)
-    np.testing.assert_allclose(room.start_posture(robot), robot.start, rtol=0, atol=ROUNDED)
+    np.testing.assert_allclose(freedom.start_posture(robot), robot.start, rtol=0, atol=ROUNDED)
 
 
 @pytest.mark.parametrize("name", [*FROZEN, *ROOMY])
 def test_from_the_start_the_tool_goes_far_in_every_direction(name: str) -> None:
     robot = tc.load_robot(name)
-    metres, radians = room.room(robot, robot.start)
-    reach = np.linalg.norm(robot.solve_fk_batch(room.samples(robot), search=False).T[:, :3, 3], axis=1).max()
+    metres, radians = freedom.freedom(robot, robot.start)
+    reach = np.linalg.norm(robot.solve_fk_batch(freedom.samples(robot), search=False).T[:, :3, 3], axis=1).max()
     assert metres >= reach / 16
     assert radians >= math.radians(29.9)
 
@@ -76,7 +76,7 @@ def test_at_the_start_the_tool_points_as_at_home(name: str) -> None:
 @pytest.mark.parametrize("name", ["rcrt1", "puma560", "scara"])
 def test_the_room_is_walked_in_any_direction_without_a_limit(name: str) -> None:
     robot, rng = tc.load_robot(name), np.random.default_rng(4)
-    metres, begin = room.room(robot, robot.start).metres, robot.fk(robot.start)
+    metres, begin = freedom.freedom(robot, robot.start).metres, robot.fk(robot.start)
     for _ in range(20):
         way = rng.normal(size=3)
         shares = np.linspace(0.0, 0.75, 200)[:, None]  # between two directions that were walked
@@ -90,16 +90,16 @@ def test_a_joint_on_its_stop_leaves_no_room() -> None:
     robot = tc.load_robot("rcrt1")
     q = robot.start.copy()
     q[2] = robot.upper[2]
-    assert room.room(robot, q).metres == 0.0
+    assert freedom.freedom(robot, q).metres == 0.0
 
 
 @walks_far
 def test_a_stretched_arm_starts_bent() -> None:
     robot = robot_from_table(ARM)
-    assert room.room(robot, robot.home).metres == 0.0
+    assert freedom.freedom(robot, robot.home).metres == 0.0
     assert abs(robot.start[1]) > math.radians(30.0)
-    assert room.room(robot, robot.start).metres > 0.1
-    assert room.room(robot, robot.start).radians == math.inf  # it controls x and y alone
+    assert freedom.freedom(robot, robot.start).metres > 0.1
+    assert freedom.freedom(robot, robot.start).radians == math.inf  # it controls x and y alone
 
 
 @walks_far
@@ -146,7 +146,9 @@ def test_an_arm_from_a_urdf_starts_with_room_in_every_scenario(scenario: str) ->
     made = tc.configuration(scenario, robot=ANY_ARM, geometry=["tip=tool0"])
     robot = tc.load_robot(ANY_ARM, tip="tool0")
     start = made.group("slave").start_of(robot)
-    assert min(room.room(robot, start)[1], room.room(robot, start)[0] / room.lever(robot)) > math.radians(12.0)
+    assert min(
+        freedom.freedom(robot, start)[1], freedom.freedom(robot, start)[0] / freedom.lever(robot)
+    ) > math.radians(12.0)
     assert not np.allclose(start, robot.home, rtol=0, atol=0.1)
 
 
