@@ -1,5 +1,6 @@
 """The operator who sees: alone before a screen, without arm and device."""
 
+import math
 from collections import deque
 from collections.abc import Callable
 from typing import Any
@@ -139,7 +140,7 @@ class Bench:
         self.rows, self.tips = list[Array](), list[Array]()
         self.seen.state[STATE["gain"]] = 1.0
 
-    def ask(self, goal: Array, width: float = 0.004, act: Act = Act.GRIP, **more: float) -> None:
+    def ask(self, goal: Array, act: Act = Act.GRIP, width: float = 0.004, /, **more: float) -> None:
         """Set the next goal at a place (3,) [m] from the beginning."""
         task = self.seen.task
         task[COLUMN["number"]] += 1.0
@@ -160,7 +161,7 @@ class Bench:
         turned, vector = np.empty(4), row[3:6]
         if row[6] > 0.0:  # what turns now turns the stylus alone
             back = np.empty(4)
-            rotate_by_vector(np.array([1.0, 0.0, 0.0, 0.0]), *vector, back)
+            rotate_by_vector(np.array([1.0, 0.0, 0.0, 0.0]), vector[0], vector[1], vector[2], back)
             invert_quaternion(back, back)
             multiply_quaternions(self.tip[3:], back, self.aligned)
         else:
@@ -168,7 +169,7 @@ class Bench:
             self.tip[:3] = np.clip(wanted, self._begins - self._arm, self._begins + self._arm)
             is_out = (np.abs(self.tip[:3] - self._begins) >= self._arm).any()
             self.seen.state[STATE["limit"]] = float(is_out * Limit.WORKSPACE)
-            rotate_by_vector(self.aligned, *vector, turned)
+            rotate_by_vector(self.aligned, vector[0], vector[1], vector[2], turned)
             self.tip[3:] = turned
         self.hand = row[:6].copy()
         self._shown.append(self.tip.copy())
@@ -234,7 +235,7 @@ def test_a_hand_that_comes_to_its_end_clutches_and_goes_on_and_else_does_not(roo
     assert wide.presses == 0
     assert np.abs(np.array(narrow.rows)[:, :3]).max() <= 0.5 * room
     # Each clutch gives the length of the room, less its margins.
-    assert narrow.presses == np.ceil((0.1 - (0.5 * room - 0.002)) / (room - 0.004))
+    assert narrow.presses == math.ceil((0.1 - (0.5 * room - 0.002)) / (room - 0.004))
 
 
 def test_a_wrist_that_comes_to_its_end_clutches_and_turns_on() -> None:
@@ -291,7 +292,7 @@ def test_a_press_goes_by_the_force_that_is_felt_whatever_the_screen_shows(stiffn
 
     bench = Bench(ObserverParameters(noise=0.01, **PLAIN), late=1.0, push=push)
     bench.tip[2] = -0.06 / stiffness  # it touches already, and the goal is shown too deep
-    bench.ask(np.array([0.0, 0.0, -0.01]), act=Act.PASS, force=0.5)
+    bench.ask(np.array([0.0, 0.0, -0.01]), Act.PASS, force=0.5)
     bench.go_on(4.0)
     forces = [push(tip[:3])[2] for tip in bench.tips]
     assert forces[-1] == pytest.approx(0.5, abs=0.06)
