@@ -197,7 +197,7 @@ def turned_by(angle: float, axis: int = 2) -> dict[str, float]:
 def off_turn(bench: Bench) -> float:
     """How far the tool is off the goal's orientation [rad]."""
     goal = bench.seen.task[COLUMN["goal_qw"] : COLUMN["goal_qw"] + 4]
-    return float(2.0 * np.arccos(min(1.0, abs(bench.tip[3:] @ goal))))
+    return 2.0 * math.acos(min(1.0, abs(float(bench.tip[3:] @ goal))))
 
 
 @pytest.mark.parametrize("axis", [0, 1, 2])
