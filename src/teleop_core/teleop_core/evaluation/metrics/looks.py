@@ -17,14 +17,13 @@ class LooksMetric(Metric):
 
     name, topics = "looks", (MASTER_MEASURED_CP,)
     count = figure("1", "how often the hand moved on, at 5 mm/s, after 0.1 s of rest or more")
-    _place, _slot, _still = np.full(3, np.inf), -1, 0
+    _place, _slot, _still = np.full((1, 3), np.inf), -1, 0
 
     def add(self, window: Window) -> None:
         """Take one window, of which one sample in each fiftieth of a second is looked at."""
-        at = window.samples(MASTER_MEASURED_CP)
-        slots = at.stamp_ns // 20_000_000
-        for i in np.flatnonzero(np.diff(slots, prepend=self._slot) > 0).tolist():
-            has_moved = np.linalg.norm(at.values[i, :3] - self._place) >= 0.02 * IDLE_SPEED
+        slots = (at := window.samples(MASTER_MEASURED_CP)).stamp_ns // 20_000_000
+        places = np.concatenate((self._place, at.values[np.diff(slots, prepend=self._slot) > 0, :3]))
+        for has_moved in (np.linalg.norm(np.diff(places, axis=0), axis=1) >= 0.02 * IDLE_SPEED).tolist():
             self.count = (self.count or 0) + (has_moved and self._still >= 5)
             self._still = 0 if has_moved else self._still + 1
-            self._place, self._slot = at.values[i, :3], int(slots[i])
+        self._place, self._slot = places[-1:], int(slots.max(initial=self._slot))
