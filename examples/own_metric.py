@@ -3,19 +3,17 @@
 import numpy as np
 
 import teleop_core as tc
-from teleop_core.evaluation import Context, Moments, Spread, Window
+from teleop_core.evaluation import Window
+from teleop_core.evaluation.metric import figure
 from teleop_core.graph.topics import SLAVE_SETPOINT_CP
 
 
 class JerkMetric(tc.Metric):
-    """Third derivative of the setpoint's place, [m/s³]."""
+    """Third derivative of the setpoint's place."""
 
-    name = "jerk"
-    keys = (tc.Key("jerk.rms|sd|max", "m/s^3", "magnitude of the jerk of the slave's setpoint"),)
-    topics = (SLAVE_SETPOINT_CP,)
-
-    def __init__(self, context: Context) -> None:
-        self._jerk = Moments()
+    name, topics = "jerk", (SLAVE_SETPOINT_CP,)
+    rms = figure("m/s^3", "root mean square of the jerk of the slave's setpoint")
+    _squares, _count = 0.0, 0
 
     def add(self, window: Window) -> None:
         """Take one window; three samples before it are needed for its first one."""
@@ -24,11 +22,8 @@ class JerkMetric(tc.Metric):
         place, time = series.values[first : own.stop, :3], series.log_ns[first : own.stop] * 1e-9
         if len(place) > 3:
             jerk = np.diff(place, 3, axis=0) / np.diff(time).mean() ** 3
-            self._jerk.add(np.linalg.norm(jerk, axis=1))
-
-    def values(self) -> Spread:
-        """What ``keys`` name."""
-        return self._jerk.spread()
+            self._squares, self._count = self._squares + float((jerk**2).sum()), self._count + len(jerk)
+            self.rms = float(np.sqrt(self._squares / self._count))
 
 
 tc.register_metric(JerkMetric)

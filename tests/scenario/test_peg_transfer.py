@@ -8,7 +8,8 @@ import pytest
 import teleop_core as tc
 from teleop_core.base.errors import ParameterError
 from teleop_core.chain.tasks import MEMORY, SCENE, Act, Miss
-from teleop_core.chain.tasks.peg_transfer import PEG_TRANSFER, STEPS, PegTransferParameters
+from teleop_core.chain.tasks.peg_transfer import PEG_TRANSFER, PegTransferParameters
+from teleop_core.chain.tasks.transfer import STEPS
 from teleop_core.graph.topics import TASK_STATE
 from teleop_core.kernels.geometry import Array
 
@@ -118,7 +119,7 @@ class Board:
     ],
 )
 def test_a_block_counts_on_the_peg_of_its_colour_alone(place: list[float], on_peg: bool, miss: Miss) -> None:
-    state = Board().rest(place, on_peg=on_peg)
+    state = Board(tries=1).rest(place, on_peg=on_peg)
     assert state[COLUMN["miss"]] == miss
     assert state[COLUMN["successes"]] == (miss == Miss.NONE)
     assert state[COLUMN["attempts"]] == 1
@@ -137,6 +138,30 @@ def test_a_transfer_that_takes_too_long_is_late_and_the_last_one_ends_the_task()
     board.tick(100.0)
     board.tick()
     assert board.state[COLUMN["attempts"]] == 2
+
+
+def test_a_dropped_block_is_taken_up_again_where_it_lies_as_often_as_it_may() -> None:
+    board = Board(tries=2)
+    state = board.rest([0.22, -0.23, -0.1], on_peg=False)
+    assert (state[COLUMN["errors"]], STEPS[int(state[COLUMN["step"]])]) == (1, "reach")
+    assert state[COLUMN["goal_x"] : COLUMN["goal_x"] + 3].tolist() == [0.22, -0.23, -0.1]
+    state = board.rest([0.2, -0.24, -0.1], on_peg=True)
+    assert (state[COLUMN["attempts"]], state[COLUMN["successes"]], state[COLUMN["goal_x"]]) == (2, 1, 0.25)
+    board = Board(tries=2)
+    for _ in range(2):
+        state = board.rest([0.22, -0.23, -0.1], on_peg=False)
+    assert (state[COLUMN["errors"]], state[COLUMN["goal_x"]]) == (2, 0.25)
+
+
+def test_a_late_block_that_is_held_is_carried_on_in_the_same_step() -> None:
+    board = Board(longest=5.0)
+    board.go("carry")
+    goal = board.state[1:6].copy()
+    board.tick(5.1)
+    board.tick()
+    assert (board.state[COLUMN["errors"]], board.state[COLUMN["miss"]]) == (1, Miss.LATE)
+    assert STEPS[int(board.state[COLUMN["step"]])] == "carry"
+    assert np.array_equal(board.state[1:6], goal)
 
 
 def test_the_board_of_the_uva_study_leads_each_colour_to_its_peg() -> None:

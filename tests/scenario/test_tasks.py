@@ -151,3 +151,29 @@ def test_a_predictive_display_hides_the_network() -> None:
         for shows in ("slave", "command")
     )
     assert (predicted.value("task.time_s") or 9.0) < (plain.value("task.time_s") or 0.0) - 0.2
+
+
+def test_a_person_turns_the_tool_as_a_reach_asks_for_with_arm_and_device_between() -> None:
+    settings = {"task.reach.turn": 0.6, "task.reach.turn_width": 0.15}
+    recording = tc.run("point", duration=15.0, task="reach", settings=settings)
+    told, tip = recording["task/state"], recording["slave/true_cp"]
+    ends = np.flatnonzero(np.diff(told.values[:, COLUMN["successes"]]) > 0.0)
+    assert len(ends) >= 5
+    for end in ends:  # the goal of this attempt is that of the sample before
+        at = tip.values[tip.stamp_ns <= told.stamp_ns[end + 1]][-1]
+        goal = told.values[end, COLUMN["goal_qw"] : COLUMN["goal_qw"] + 4]
+        assert 2.0 * np.arccos(min(1.0, abs(goal @ at[3:]))) <= 0.075 + 0.01
+    turns = told.values[ends, COLUMN["goal_qw"] : COLUMN["goal_qw"] + 4]
+    assert np.abs(turns @ turns[0])[1:].min() < np.cos(0.5 * 0.3)  # they are turned apart
+
+
+def test_a_small_gain_makes_a_person_clutch_and_each_clutch_leaves_the_slave_where_it_is() -> None:
+    recording = tc.run("point", duration=25.0, coarse_gain=0.1)
+    pressed, tip = recording["hand/buttons"], recording["slave/setpoint_cp"]
+    edges = np.diff(pressed.values[:, 0], prepend=0.0)
+    downs, ups = pressed.stamp_ns[edges > 0.0], pressed.stamp_ns[edges < 0.0]
+    assert len(downs) >= 2
+    for down, up in zip(downs, ups, strict=False):
+        while_down = tip.values[(tip.stamp_ns > down + 100_000_000) & (tip.stamp_ns < up), :3]
+        assert np.ptp(while_down, axis=0).max() < 2e-4
+    assert (recording.score().value("task.successes") or 0) >= 1

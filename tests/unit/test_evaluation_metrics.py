@@ -1,5 +1,7 @@
 """Metrics: one of a user stands beside ours, and wrong ones are refused by name."""
 
+import ast
+import inspect
 import io
 import json
 from collections.abc import Callable, Iterator, Sequence
@@ -12,12 +14,15 @@ from rich.console import Console
 
 from present import present
 from teleop_core import evaluation
-from teleop_core.bags.reader import Bag
+from teleop_core.bags.reader import Bag, Series
 from teleop_core.bags.writer import BagWriter
 from teleop_core.base.errors import EvaluationError, PartError, UnknownNameError
 from teleop_core.evaluation import METRICS, Context, Key, Metric, Moments, Row, Spread, Window, evaluate
 from teleop_core.evaluation.command import evaluate_bags
 from teleop_core.evaluation.figure import Figure, line, time_axis
+from teleop_core.evaluation.metrics.clutches import ClutchesMetric
+from teleop_core.evaluation.metrics.economy import EconomyMetric
+from teleop_core.evaluation.metrics.looks import LooksMetric
 from teleop_core.evaluation.score_table import score_tables
 from teleop_core.graph.signals import TICK_NS
 from teleop_core.graph.topics import (
@@ -27,6 +32,7 @@ from teleop_core.graph.topics import (
     SLAVE_MEASURED_JS,
     SLAVE_SERVO_CP,
     SLAVE_SETPOINT_CP,
+    TASK_STATE,
     TELEOP_STATE,
     Topic,
 )
@@ -373,3 +379,57 @@ def test_part_that_two_metrics_share_gets_every_window_once(bag: Bag) -> None:
 
     score = evaluate(bag, further=[metric("one"), metric("two")])
     assert score.value("one.windows") == score.value("two.windows") == max(counts) > 1
+
+
+def scored(metric: type[Metric], **series: tuple[Array, Array]) -> dict[str, Any]:
+    """Values of a metric over times [s] and rows of topics, taken in windows of a second."""
+    one = metric(None)  # type: ignore[arg-type]
+    kept = {}
+    for name, (times, rows) in series.items():
+        stamps = np.round(1e9 * (1.0 + times)).astype(np.int64)
+        kept[name.replace("__", "/")] = Series(stamps, stamps, rows, (), "")
+    for second in range(60):
+        one.add(Window(second * 1_000_000_000, (second + 1) * 1_000_000_000, kept))
+    return dict(one.values())  # type: ignore[arg-type]
+
+
+def test_looks_are_counted_where_the_hand_moves_on_after_a_rest_of_the_eye() -> None:
+    times = np.arange(0.0, 20.0, 0.002)
+    rests = {0.5: True, 0.2: True, 0.06: False}
+    for rest, is_look in rests.items():
+        place = np.zeros((len(times), 7))
+        place[:, 0] = 0.01 * (times // (0.4 + rest) + np.minimum(times % (0.4 + rest) / 0.4, 1.0))
+        count = scored(LooksMetric, master__measured_cp=(times, place))["count"]
+        assert count == pytest.approx(20.0 / (0.4 + rest) if is_look else 0.0, abs=1.5)
+
+
+def test_a_clutch_is_counted_each_time_that_it_is_pressed_and_as_long_as_it_is_down() -> None:
+    times = np.arange(0.0, 10.0, 0.001)
+    down = np.column_stack([(times % 2.0 < 0.5).astype(float), *[np.zeros(len(times))] * 2])
+    found = scored(ClutchesMetric, master__buttons=(times, down))
+    assert found == {"count": 4, "share": pytest.approx(0.25, abs=1e-3)}  # it is down at the beginning already
+
+
+def test_economy_is_one_on_straight_ways_and_half_on_a_way_twice_as_long() -> None:
+    times = np.arange(0.0, 10.0, 0.002)
+    told = np.zeros((2, len(TASK_STATE.columns)))
+    told[1, [TASK_STATE.columns.index("attempts"), TASK_STATE.columns.index("way")]] = 1.0, 0.1
+    for detour, share in ((0.0, 1.0), (0.1, 0.5)):
+        tip = np.zeros((len(times), 7))
+        tip[:, 0] = 0.01 * times
+        tip[:, 1] = 0.5 * detour * (1.0 - np.abs(times / 5.0 - 1.0)) * np.sqrt(3.0)
+        found = scored(EconomyMetric, slave__true_cp=(times, tip), task__state=(np.array([0.0, 9.9]), told))
+        expected = share if detour == 0.0 else 0.1 / found["path_mm"] * 1e3
+        assert found["share"] == pytest.approx(expected, abs=0.02)
+        assert found["path_mm"] == pytest.approx(100.0 / share, rel=0.02)
+
+
+@pytest.mark.parametrize("name", ["looks", "clutches", "economy", "waits", "force_peaks"])
+def test_a_measure_takes_fifteen_lines_beside_its_docstrings(name: str) -> None:
+    source = inspect.getsource(METRICS.find(name))
+    module = ast.parse(source)
+    for node in ast.walk(module):
+        if isinstance(node, ast.ClassDef | ast.FunctionDef):
+            node.body = node.body[1:] if ast.get_docstring(node) else node.body
+    text = {line for node in ast.walk(module) if isinstance(node, ast.stmt | ast.expr) for line in (node.lineno,)}
+    assert len(text) <= 15

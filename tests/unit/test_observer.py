@@ -1,22 +1,29 @@
 """The operator who sees: alone before a screen, without arm and device."""
 
+import math
 from collections import deque
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 import teleop_core as tc
-from teleop_core.chain.operators.observer import AHEAD, Observer, ObserverParameters
-from teleop_core.chain.operators.parameters import OperatorParameters
+from teleop_core.chain.operators.observer import AHEAD, Observer
+from teleop_core.chain.operators.observer_parameters import ObserverParameters
+from teleop_core.chain.operators.parameters import OperatorParameters, RoomParameters
 from teleop_core.chain.tasks import Act
 from teleop_core.graph import STATE, topics
+from teleop_core.graph.topics import Limit
+from teleop_core.kernels.geometry import invert_quaternion, multiply_quaternions, rotate_by_vector
 
 Array = NDArray[np.float64]
 # MacKenzie and Ware 1993: lags of the screen [s], mean times of movement [s].
 PUBLISHED = {0.0083: 0.911, 0.025: 0.934, 0.075: 1.059, 0.225: 1.493}
 WAYS, WIDTHS = (0.096, 0.192, 0.384), (0.006, 0.012, 0.024, 0.048)
 TICK = 1e-3
+WIDE = OperatorParameters(device=RoomParameters(workspace=(1.0, 1.0, 1.0)))
 COLUMN = {name: i for i, name in enumerate(topics.TASK_STATE.columns)}
 
 
@@ -25,7 +32,7 @@ def pointing(lag: float, way: float, width: float, trials: int, seed: int = 1) -
     seen = tc.Seen(np.zeros(7), np.zeros(7), np.zeros(6), np.zeros(len(STATE)), np.zeros(len(COLUMN)))
     seen.slave[3] = seen.state[STATE["gain"]] = 1.0
     p = ObserverParameters(fastest=10.0, noise_across=0.0, axes=("+x", "+y", "+z"))
-    setting = tc.Setting(OperatorParameters(), np.zeros((6, 4)), seed, seen)
+    setting = tc.Setting(WIDE, np.zeros((6, 4)), seed, seen)
     person = Observer(p, setting)
     late = round(lag / TICK)
     begins = np.array([0.3, -0.2, 0.0])  # of the pointer: a tip at 0 is one that nobody told
@@ -75,7 +82,7 @@ def test_a_goal_that_is_suddenly_elsewhere_is_not_run_after_as_one_that_moves(la
     seen = tc.Seen(np.zeros(7), np.zeros(7), np.zeros(6), np.zeros(len(STATE)), np.zeros(len(COLUMN)))
     seen.slave[3] = seen.state[STATE["gain"]] = 1.0
     p = ObserverParameters(fastest=10.0, noise=0.0, axes=("+x", "+y", "+z"))
-    person = Observer(p, tc.Setting(OperatorParameters(), np.zeros((6, 4)), 1, seen))
+    person = Observer(p, tc.Setting(WIDE, np.zeros((6, 4)), 1, seen))
     begins, way, late = np.array([0.3, -0.2, 0.0]), 0.1, round(lag / TICK)
     pointer, went = deque([begins] * (late + 1), maxlen=late + 1), list[float]()
     seen.task[COLUMN["number"]], seen.task[COLUMN["act"]], seen.task[COLUMN["width"]] = 1.0, Act.PASS, 0.01
@@ -93,7 +100,7 @@ def test_a_goal_that_is_suddenly_elsewhere_is_not_run_after_as_one_that_moves(la
 
 def test_nobody_moves_without_a_goal() -> None:
     seen = tc.Seen(*(np.zeros(n) for n in (7, 7, 6, len(STATE), len(COLUMN))))
-    person = Observer(ObserverParameters(), tc.Setting(OperatorParameters(), np.zeros((6, 4)), 1, seen))
+    person = Observer(ObserverParameters(), tc.Setting(WIDE, np.zeros((6, 4)), 1, seen))
     rows = np.vstack([person(np.arange(16 * k, 16 * k + 16, dtype=np.float64) * TICK) for k in range(100)])
     assert not rows.any()
 
@@ -101,3 +108,193 @@ def test_nobody_moves_without_a_goal() -> None:
 def test_an_operator_who_needs_a_task_is_refused_without_one() -> None:
     with pytest.raises(tc.ParameterError, match=r"observer.*teleop.stages=\[task\]"):
         tc.configuration(operator="observer")
+
+
+class Bench:
+    """A slave that follows the hand at once, and a person who sees it late and feels what it touches at once.
+
+    Args:
+        p: Constants of the person.
+        late: How late it is seen [s].
+        room: Of the hand (3,) [m], with the start in its middle.
+        push: Force on the hand (3,) [N] by the place of the tip (3,) [m].
+        arm: Corners of where the tip can go [m].
+    """
+
+    def __init__(
+        self,
+        p: ObserverParameters,
+        late: float = 0.02,
+        room: tuple[float, ...] = (1.0, 1.0, 1.0),
+        push: Callable[[Array], Array] = np.zeros_like,
+        arm: float = 10.0,
+        seed: int = 1,
+    ) -> None:
+        self.seen = tc.Seen(np.zeros(7), np.zeros(7), np.zeros(6), np.zeros(len(STATE)), np.zeros(len(COLUMN)))
+        common = OperatorParameters(device=RoomParameters(workspace=room, start=(0.0, 0.0, 0.0)))
+        self.person = Observer(p, tc.Setting(common, np.zeros((6, 4)), seed, self.seen))
+        self.tip = np.array([0.3, -0.2, 0.0, 1.0, 0.0, 0.0, 0.0])
+        self.hand, self.aligned = np.zeros(6), self.tip[3:].copy()  # tool at a stylus that is not turned
+        self._shown = deque([self.tip.copy()], maxlen=1 + round(late / TICK))
+        self._push, self._arm, self._begins, self.tick = push, arm, self.tip[:3].copy(), 0
+        self.rows, self.tips = list[Array](), list[Array]()
+        self.seen.state[STATE["gain"]] = 1.0
+
+    def ask(self, goal: Array, act: Act = Act.GRIP, width: float = 0.004, /, **more: float) -> None:
+        """Set the next goal at a place (3,) [m] from the beginning."""
+        task = self.seen.task
+        task[COLUMN["number"]] += 1.0
+        task[COLUMN["act"]], task[COLUMN["width"]] = act, width
+        task[COLUMN["goal_x"] : COLUMN["goal_x"] + 3] = self._begins + goal
+        for name, value in more.items():
+            task[COLUMN[name]] = value
+
+    def go_on(self, time: float) -> None:
+        """Let the person act for a time [s]."""
+        for _ in range(round(time / TICK / AHEAD)):
+            self.seen.slave[:], self.seen.force[:3] = self._shown[0], self._push(self.tip[:3])
+            for row in self.person(np.arange(self.tick + 1, self.tick + 1 + AHEAD, dtype=np.float64) * TICK):
+                self._follow(row)
+            self.tick += AHEAD
+
+    def _follow(self, row: Array) -> None:
+        turned, vector = np.empty(4), row[3:6]
+        if row[6] > 0.0:  # what turns now turns the stylus alone
+            back = np.empty(4)
+            rotate_by_vector(np.array([1.0, 0.0, 0.0, 0.0]), vector[0], vector[1], vector[2], back)
+            invert_quaternion(back, back)
+            multiply_quaternions(self.tip[3:], back, self.aligned)
+        else:
+            wanted = self.tip[:3] + row[:3] - self.hand[:3]
+            self.tip[:3] = np.clip(wanted, self._begins - self._arm, self._begins + self._arm)
+            is_out = (np.abs(self.tip[:3] - self._begins) >= self._arm).any()
+            self.seen.state[STATE["limit"]] = float(is_out * Limit.WORKSPACE)
+            rotate_by_vector(self.aligned, vector[0], vector[1], vector[2], turned)
+            self.tip[3:] = turned
+        self.hand = row[:6].copy()
+        self._shown.append(self.tip.copy())
+        self.rows.append(row)
+        self.tips.append(self.tip.copy())
+
+    @property
+    def presses(self) -> int:
+        """How often the clutch was pressed."""
+        return int((np.diff(np.array(self.rows)[:, 6]) > 0.0).sum())
+
+
+PLAIN: dict[str, Any] = {
+    "axes": ("+x", "+y", "+z"), "tool_axes": ("+x", "+y", "+z"), "fastest": 1.0, "fastest_turn": 5.0,
+}  # fmt: skip
+
+
+def turned_by(angle: float, axis: int = 2) -> dict[str, float]:
+    """A goal's orientation: turned about an axis of the tool [rad], and 0.1 rad wide."""
+    q = dict.fromkeys(("goal_qx", "goal_qy", "goal_qz"), 0.0)
+    q[("goal_qx", "goal_qy", "goal_qz")[axis]] = np.sin(0.5 * angle)
+    return {**q, "goal_qw": float(np.cos(0.5 * angle)), "turn": 0.1}
+
+
+def off_turn(bench: Bench) -> float:
+    """How far the tool is off the goal's orientation [rad]."""
+    goal = bench.seen.task[COLUMN["goal_qw"] : COLUMN["goal_qw"] + 4]
+    return 2.0 * math.acos(min(1.0, abs(float(bench.tip[3:] @ goal))))
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_a_person_turns_the_tool_as_the_goal_is_turned_by_looks_and_submovements(axis: int) -> None:
+    bench = Bench(ObserverParameters(noise=0.06, **PLAIN), late=0.1)
+    bench.ask(np.array([0.0, 0.03, 0.0]), **turned_by(0.8, axis))
+    while not bench.rows or bench.rows[-1][12] == 0.0:
+        assert len(bench.rows) < 9000, "it never grips"
+        bench.go_on(0.016)
+    assert off_turn(bench) <= 0.05
+    speeds = np.linalg.norm(np.diff(np.array(bench.rows)[:, 3:6], axis=0), axis=1)
+    begins = np.flatnonzero((speeds[1:] > 1e-9) & (speeds[:-1] <= 1e-9))
+    assert len(begins) >= 2  # noise asks for corrections
+    assert np.diff(begins).min() * TICK > 0.13 + 0.08  # each waits until the last is seen
+
+
+def test_a_turn_that_is_seen_late_takes_longer() -> None:
+    times = []
+    for late in (0.02, 0.3):
+        bench = Bench(ObserverParameters(noise=0.05, **PLAIN), late=late)
+        bench.ask(np.zeros(3), **turned_by(0.5))
+        bench.go_on(6.0)
+        times.append(next(i for i, row in enumerate(bench.rows) if row[12] > 0.0) * TICK)
+    assert times[1] - times[0] >= 0.28
+
+
+@pytest.mark.parametrize("room", [0.03, 0.06])
+def test_a_hand_that_comes_to_its_end_clutches_and_goes_on_and_else_does_not(room: float) -> None:
+    narrow, wide = (Bench(ObserverParameters(noise=0.0, **PLAIN), room=(size,) * 3) for size in (room, 0.5))
+    for bench in (narrow, wide):
+        bench.ask(np.array([0.1, 0.0, 0.0]))
+        bench.go_on(8.0)
+        assert bench.tip[:3] == pytest.approx([0.4, -0.2, 0.0], abs=0.002)
+        assert np.abs(np.array(bench.rows)[:, :3]).max() <= 0.5 * 0.5
+    assert wide.presses == 0
+    assert np.abs(np.array(narrow.rows)[:, :3]).max() <= 0.5 * room
+    # Each clutch gives the length of the room, less its margins.
+    assert narrow.presses == math.ceil((0.1 - (0.5 * room - 0.002)) / (room - 0.004))
+
+
+def test_a_wrist_that_comes_to_its_end_clutches_and_turns_on() -> None:
+    bench = Bench(ObserverParameters(noise=0.0, largest_turn=0.4, **PLAIN))
+    bench.ask(np.zeros(3), **turned_by(1.4))
+    bench.go_on(10.0)
+    assert off_turn(bench) <= 0.05
+    assert np.linalg.norm(np.array(bench.rows)[:, 3:6], axis=1).max() <= 0.4 + 1e-9
+    assert bench.presses >= 2
+
+
+def test_where_the_arm_ends_the_hand_is_brought_back_and_tries_again() -> None:
+    bench = Bench(ObserverParameters(noise=0.0, **PLAIN), arm=0.02)
+    bench.ask(np.array([0.05, 0.0, 0.0]))
+    bench.go_on(12.0)
+    assert bench.presses >= 2
+    assert np.abs(np.array(bench.rows)[:, :3]).max() < 0.06  # it does not push on and on
+
+
+@pytest.mark.parametrize("gap", [0.006, 0.012])
+def test_beside_a_wall_a_person_goes_as_slowly_as_keeps_its_noise_off_the_wall(gap: float) -> None:
+    peaks, beyond = list[float](), list[bool]()
+    for seed in range(20):
+        bench = Bench(ObserverParameters(**PLAIN), seed=seed)
+        state = bench.seen.state
+        state[STATE["is_fixture_on"]] = 1.0
+        state[STATE["fixture_center_x"] : STATE["fixture_center_x"] + 3] = [0.3, -0.2, 0.0]
+        state[STATE["fixture_size_x"] : STATE["fixture_size_x"] + 3] = [2.0 * (0.08 + gap), 0.4, 0.4]
+        bench.ask(np.array([0.08, 0.0, 0.0]))
+        bench.go_on(0.3 + 0.0064 / gap)
+        way = np.array(bench.tips)[:, 0] - 0.3
+        peaks.append(float(np.diff(way).max() / TICK))
+        beyond.append(bool(way.max() > 0.08 + gap))
+    assert np.mean(beyond) <= 0.1  # two standard deviations
+    # Of minimum jerk the peak is 1.875 times the mean, and the spread is noise times the mean.
+    assert np.median(peaks) == pytest.approx(1.875 * gap / (2.0 * 0.04), rel=0.1)
+
+
+def test_in_a_narrow_hole_a_person_goes_as_slowly_as_keeps_its_noise_off_the_edge() -> None:
+    peaks = []
+    for clearance in (0.0, 0.001, 0.0005):
+        bench = Bench(ObserverParameters(noise_across=0.36, **PLAIN))
+        bench.ask(np.array([0.02, 0.0, 0.0]), clearance=clearance)
+        bench.go_on(3.0)
+        peaks.append(np.diff(np.array(bench.tips)[:, 0]).max())
+    assert peaks[0] > peaks[1]
+    assert peaks[1] == pytest.approx(2.0 * peaks[2], rel=0.2)
+
+
+@pytest.mark.parametrize("stiffness", [150.0, 1000.0])
+def test_a_press_goes_by_the_force_that_is_felt_whatever_the_screen_shows(stiffness: float) -> None:
+    def push(tip: Array) -> Array:
+        return np.array([0.0, 0.0, stiffness * max(-tip[2], 0.0)])
+
+    bench = Bench(ObserverParameters(noise=0.01, **PLAIN), late=1.0, push=push)
+    bench.tip[2] = -0.06 / stiffness  # it touches already, and the goal is shown too deep
+    bench.ask(np.array([0.0, 0.0, -0.01]), Act.PASS, force=0.5)
+    bench.go_on(4.0)
+    forces = [push(tip[:3])[2] for tip in bench.tips]
+    assert forces[-1] == pytest.approx(0.5, abs=0.06)
+    right = next(i for i in range(len(forces)) if max(abs(f - 0.5) for f in forces[i:]) < 0.1)
+    assert right * TICK < 1.5  # in which a screen that is 1 s late allows one look

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 import teleop_core as tc
+from teleop_core.graph.layers import config_folder
 from teleop_lab import Study, read_study, sweep
 from teleop_lab.studies import point, summary
 from teleop_lab.studies.store import Store
@@ -216,3 +217,8 @@ def test_dask_workers_give_the_same_bits(found: Found, tmp_path: Path) -> None:
         again = study().run(client=client)
     for metric in METRICS:
         assert np.array_equal(again[metric].values, data[metric].values, equal_nan=True)
+
+
+def test_the_uva_study_is_1080_transfers_whose_sessions_and_scores_can_be() -> None:
+    study = read_study(config_folder() / "studies" / "uva.yaml")
+    assert 6 * study.explain().sessions == 1080

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 import teleop_core as tc
 from present import present
 from teleop_core.base.errors import ParameterError
+from teleop_core.graph.topics import SLAVE_TRUE_CF
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot
 from teleop_core.session import configuration, virtual
@@ -252,3 +253,17 @@ def test_force_that_falls_silent_fades_within_a_tenth_of_a_second() -> None:
     steps = np.abs(np.diff(pushes))
     assert pushes[-1] == 0.0
     assert steps.max() < 0.02 * pushes[0]
+
+
+def test_an_object_that_is_seen_from_another_base_is_the_same_object() -> None:
+    base, place = [0.03, -0.02, 0.01], [0.03 + BLOCK[0], -0.02 + BLOCK[1], 0.01 + BLOCK[2]]
+    own = pressed(ticks=13_000)
+    moved = pressed(f"world.place={place}", f"world.base={base}", ticks=13_000)
+    assert own["slave_true_cf"][:, 2].max() > 0.3
+    np.testing.assert_allclose(moved["slave_true_cf"], own["slave_true_cf"], atol=1e-6)
+
+
+def test_two_arms_touch_one_object_each_from_its_own_base() -> None:
+    rows = pressed("teleop.arms=[right, left]", f"left/world.base={[0.0, 0.0, 0.004]}", ticks=13_000)
+    low, high = (rows[SLAVE_TRUE_CF.of_arm(arm).field][:, 2].max() for arm in ("", "left"))
+    assert 0.0 < high < low  # the base of the left one is 4 mm higher, so its tip is less deep

@@ -33,7 +33,7 @@ def object_outline(values: Mapping[str, Setting], robot: Robot) -> Array:
         world = build(WorldParameters, own)
         if world.kind.kind == "empty":
             return nothing
-        center = np.array(world.place or world.below(robot.fk(robot.start)))
+        center = world.center(robot.fk(robot.start))
         part = WORLD_OBJECTS.find(world.kind.kind)
         return segments_of(np.asarray(part.outline(world.kind.parameters), np.float64) + center)
     return nothing

@@ -82,11 +82,22 @@ class Metric(ABC):
     :meth:`~teleop_core.evaluation.context.Context.shared` (over the recording) and
     :meth:`~teleop_core.evaluation.windows.Window.once` (of a window).
 
+    The shortest one declares each value as a :func:`figure`, which is None before it is set. It needs neither ``keys``
+    nor :meth:`values`::
+
+        class PeakMetric(tc.Metric):
+            name, topics = "peak", (SLAVE_TRUE_CF,)
+            force_n = figure("N", "largest force along z")
+
+            def add(self, window: Window) -> None:
+                force = window.samples(SLAVE_TRUE_CF).values[:, 2]
+                self.force_n = max(force.max(initial=0.0), self.force_n or 0.0)
+
     Attributes:
         name: What it is called, in JSON too.
         group: Of its rows; empty for the name.
         keys: Its keys in JSON; each path begins with the name and a dot. Without keys a metric
-            is not in JSON and only draws.
+            is not in JSON and only draws. Those of its figures come of themselves.
         topics: Streams it reads. Those that a recording lacks have no samples in its windows. For
             streams that depend on the recording see
             :meth:`~teleop_core.evaluation.context.Context.read`.
@@ -97,6 +108,15 @@ class Metric(ABC):
     keys: ClassVar[tuple[Key, ...]] = ()
     topics: ClassVar[tuple[Topic, ...]] = ()
 
+    def __init_subclass__(cls) -> None:
+        """Make keys of the figures of the class, each of which is None at first."""
+        super().__init_subclass__()
+        found = {name: one for name, one in vars(cls).items() if isinstance(one, Field)}
+        if found:
+            cls.keys = tuple(Key(f"{cls.name}.{name}", *one.metadata.values()) for name, one in found.items())
+        for name in found:
+            setattr(cls, name, None)
+
     def __init__(self, context: Context) -> None:
         """Make it for one arm of a recording."""
         super().__init__()
@@ -105,12 +125,14 @@ class Metric(ABC):
     def add(self, window: Window) -> None:
         """Take one window; ``window.samples(topic)`` are its samples."""
 
-    @abstractmethod
     def values(self) -> Values:
         """What was found: names and values below the metric's name, as its keys say.
 
-        None stands for what does not apply, such as a mean without samples.
+        None stands for what does not apply, such as a mean without samples. Without a method of its own a metric has
+        its attributes of these names.
         """
+        names = [key.path.removeprefix(f"{self.name}.") for key in self.keys]
+        return {name: getattr(self, name, None) for name in names}
 
     def rows(self) -> list[Row]:
         """What tables show.

@@ -26,6 +26,9 @@ def check_metric(name: str, part: object) -> type[Metric]:
         raise _refusal(name, f"a class below teleop_core.evaluation.Metric, is {part!r}")
     if missing := sorted(getattr(part, "__abstractmethods__", ())):
         raise _refusal(name, f"a class with the methods add and values, lacks {missing[0]}")
+    told = (key.path.partition(".")[2] for key in part.keys if isinstance(key, Key))
+    if part.values is Metric.values and not all(hasattr(part, one) for one in told):
+        raise _refusal(name, "a class with figures or with the methods add and values, lacks values")
     own = getattr(part, "name", None)
     if own != name or name == SESSION or not name or "." in name:
         raise _refusal(name, f"registered under its own name without dots, which is {own!r}")
@@ -104,6 +107,9 @@ METRICS: Registry[type[Metric]] = Registry(
         "jaw": f"{_FOLDER}.jaw:JawMetric",
         "transfer": f"{_FOLDER}.transfer:TransferMetric",
         "waits": f"{_FOLDER}.waits:WaitsMetric",
+        "looks": f"{_FOLDER}.looks:LooksMetric",
+        "clutches": f"{_FOLDER}.clutches:ClutchesMetric",
+        "economy": f"{_FOLDER}.economy:EconomyMetric",
         "force_peaks": f"{_FOLDER}.force_peaks:ForcePeaksMetric",
         "step_s": f"{_FOLDER}.steps:StepsMetric",
         "task": f"{_FOLDER}.task:TaskMetric",

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from teleop_core.bags.arms import PLAYED_KEY
-from teleop_core.base import PartError, ShapeError
+from teleop_core.base import PartError, ShapeError, TeleopError
 from teleop_core.chain.operators.parameters import insist_on_virtual
 from teleop_core.graph import BUILT_IN, TICK_NS, Runner, assign, topics
 from teleop_core.graph.stage import joints_of
@@ -161,18 +161,22 @@ class VirtualTime:
     def _run(self, block: NDArray[np.void], samples: NDArray[np.void] | None) -> NDArray[np.void]:
         if self._is_stale():
             self._tick = self._composed()
-        for begin in range(0, len(block), self._ahead):
-            part = block[begin : begin + self._ahead]
-            for stage in self.stages.values():
-                stage.prepare(len(part))
-            taken = None if samples is None else samples[begin : begin + self._ahead]
-            self._tick.run(self.now_ns + self._tick_ns, self._tick_ns, taken, part)
-            self._check(part)
-            self.now_ns += len(part) * self._tick_ns
+        try:
+            for begin in range(0, len(block), self._ahead):
+                part = block[begin : begin + self._ahead]
+                for stage in self.stages.values():
+                    stage.prepare(len(part))
+                taken = None if samples is None else samples[begin : begin + self._ahead]
+                self._tick.run(self.now_ns + self._tick_ns, self._tick_ns, taken, part)
+                self.now_ns += len(part) * self._tick_ns
+        except TeleopError:
+            self._check(block[:begin])  # what was written before may be the cause
+            raise
+        self._check(block)
         return block
 
     def _check(self, part: Any) -> None:
-        """Make sure that further stages wrote numbers.
+        """Make sure that further stages wrote numbers; looked at seldom, for it takes as long for few rows as for many.
 
         Raises:
             PartError: One wrote NaN or infinity; the text says where and when.

@@ -236,7 +236,7 @@ class SlaveSim(RunningStage):
         p, made_of = self.parameters, world.made_of
         p["has_world"] = world.kind.kind != "empty"
         if p["has_world"]:
-            p["world_center"] = world.place or world.below(self._tip_at_start())
+            p["world_center"] = world.center(self._tip_at_start())
         p["tool_length"], p["tool_radius"] = world.tool_length, world.tool_radius
         p["world_stiffness"], p["world_damping"] = made_of.stiffness, made_of.damping
         p["world_friction"] = made_of.friction

@@ -8,6 +8,7 @@ from typing import Any
 
 from teleop_core.base.errors import ParameterError
 from teleop_core.commands.arguments import command, ros_module
+from teleop_lab.commands.outputs import add_outputs, check_outputs, write_outputs
 
 _EPILOG = """\
 a study is a YAML file, as of `teleop study`, with an entry `people`; then:
@@ -33,9 +34,7 @@ def add(commands: Any) -> None:
     parser.add_argument(
         "--compare", action="store_true", help="run the simulated operator, and compare; conduct nothing"
     )
-    parser.add_argument("--jobs", type=int, metavar="N", help="processes of --compare (default: processors)")
-    parser.add_argument("--html", type=Path, metavar="FILE", help="write a page with plots, of --compare")
-    parser.add_argument("--csv", type=Path, metavar="FILE", help="write a line for each trial, of --compare")
+    add_outputs(parser, "trial", ", of --compare")
 
 
 def _run(arguments: argparse.Namespace) -> int:
@@ -43,8 +42,7 @@ def _run(arguments: argparse.Namespace) -> int:
     from teleop_lab.people.plan import read_plan
 
     plan = read_plan(arguments.file)
-    if arguments.jobs is not None and arguments.jobs < 1:
-        raise ParameterError("--jobs", arguments.jobs, "1 or more processes")
+    check_outputs(arguments)
     if not arguments.compare and (arguments.html or arguments.csv):
         raise ParameterError("--html and --csv", True, "given with --compare")
     journal = Journal(arguments.store, plan)
@@ -68,18 +66,12 @@ def _compare(arguments: argparse.Namespace, plan: Any, journal: Any) -> int:
     import pandas
 
     from teleop_core.commands.progress import shown_progress
-    from teleop_core.evaluation.command import check_places, write_whole
     from teleop_lab.people.compare import comparison_page, comparison_table, people_dataset
 
-    check_places(arguments.html, arguments.csv)
     people = people_dataset(plan, journal)
     with shown_progress("simulated operator") as progress:
         simulated = plan.study.run(arguments.store / "simulated", jobs=arguments.jobs, progress=progress)
     print(comparison_table(plan, people, simulated))
-    if arguments.csv is not None:
-        write_whole(arguments.csv, pandas.DataFrame(journal.rows()).to_csv(index=False))
-        print(f"numbers: {arguments.csv}")
-    if arguments.html is not None:
-        write_whole(arguments.html, comparison_page(plan, people, simulated))
-        print(f"page: {arguments.html}")
+    rows = pandas.DataFrame(journal.rows())
+    write_outputs(arguments, lambda: rows.to_csv(index=False), lambda: comparison_page(plan, people, simulated))
     return 0

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from teleop_core.base.errors import SessionError
 from teleop_core.commands.arguments import command
+from teleop_lab.commands.outputs import add_outputs, check_outputs, write_outputs
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -32,29 +33,24 @@ def add(commands: Any) -> None:
     parser = command(commands, "study", _run, text, _EPILOG)
     parser.add_argument("file", type=Path, metavar="FILE.yaml", help="what is compared")
     parser.add_argument("--store", type=Path, metavar="DIR", help="keep results there, and run only what is not")
-    parser.add_argument("--jobs", type=int, metavar="N", help="processes (default: processors)")
     parser.add_argument("--scheduler", metavar="ADDRESS", help="run on the workers of this Dask scheduler")
     parser.add_argument("--recordings", type=Path, metavar="DIR", help="record each session there")
     parser.add_argument("--explain", action="store_true", help="say what it costs, and run nothing")
-    parser.add_argument("--html", type=Path, metavar="FILE", help="write a page with plots")
-    parser.add_argument("--csv", type=Path, metavar="FILE", help="write a line for each session")
+    add_outputs(parser, "session")
 
 
 def _run(arguments: argparse.Namespace) -> int:
-    from teleop_core.base.errors import ParameterError
     from teleop_core.commands.progress import shown_progress
-    from teleop_core.evaluation.command import check_places, write_whole
     from teleop_lab.studies import read_study
+    from teleop_lab.studies.page import study_page
     from teleop_lab.studies.summary import study_table
 
     study = read_study(arguments.file)
-    if arguments.jobs is not None and arguments.jobs < 1:
-        raise ParameterError("--jobs", arguments.jobs, "1 or more processes")
+    check_outputs(arguments)
     explained = study.explain(arguments.store, arguments.jobs)
     print(explained)
     if arguments.explain:
         return 0
-    check_places(arguments.html, arguments.csv)
     client = _client(arguments.scheduler) if arguments.scheduler else None
     with shown_progress(arguments.file.stem) as progress:
         found = study.run(
@@ -64,14 +60,7 @@ def _run(arguments: argparse.Namespace) -> int:
     failed = [str(error) for error in found["error"].values.ravel() if error]
     if failed:
         print(f"{len(failed)} of {explained.sessions} failed; first: {failed[0]}")
-    if arguments.csv is not None:
-        write_whole(arguments.csv, found.to_dataframe().to_csv())
-        print(f"numbers: {arguments.csv}")
-    if arguments.html is not None:
-        from teleop_lab.studies.page import study_page
-
-        write_whole(arguments.html, study_page(study, found, arguments.file.stem))
-        print(f"page: {arguments.html}")
+    write_outputs(arguments, found.to_dataframe().to_csv, lambda: study_page(study, found, arguments.file.stem))
     return 1 if failed else 0
 
 

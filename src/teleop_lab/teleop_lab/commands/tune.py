@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from teleop_core.commands.arguments import command
+from teleop_lab.commands.outputs import add_outputs, check_outputs, write_outputs
 
 if TYPE_CHECKING:
     from teleop_lab.studies.tuning import Tuned, Tuning
@@ -32,18 +33,16 @@ def add(commands: Any) -> None:
     parser.add_argument("file", type=Path, metavar="FILE.yaml", help="what is searched")
     parser.add_argument("--store", type=Path, metavar="DIR", help="keep results there, and run only what is not")
     parser.add_argument("--trials", type=int, default=30, metavar="N", help="values (default: 30)")
-    parser.add_argument("--jobs", type=int, metavar="N", help="processes (default: processors)")
-    parser.add_argument("--html", type=Path, metavar="FILE", help="write a page with plots")
-    parser.add_argument("--csv", type=Path, metavar="FILE", help="write a line for each trial")
+    add_outputs(parser, "trial")
 
 
 def _run(arguments: argparse.Namespace) -> int:
     from teleop_core.commands.progress import shown_progress
-    from teleop_core.evaluation.command import check_places, write_whole
+    from teleop_lab.studies.page import tuning_page
     from teleop_lab.studies.tuning import read_tuning
 
     tuning = read_tuning(arguments.file)
-    check_places(arguments.html, arguments.csv)
+    check_outputs(arguments)
     with shown_progress(arguments.file.stem) as progress:
         tuned = tuning.run(arguments.store, trials=arguments.trials, jobs=arguments.jobs, progress=progress)
     print(_table(tuning, tuned))
@@ -51,14 +50,7 @@ def _run(arguments: argparse.Namespace) -> int:
     if failed:
         print(f"{len(failed)} of {len(tuned.trials)} trials failed; first: {failed[0]}")
     print("best: --set " + " ".join(f"{n}={_text(v)}" for n, v in tuned.best.values.items()))
-    if arguments.csv is not None:
-        write_whole(arguments.csv, _csv(tuning, tuned))
-        print(f"numbers: {arguments.csv}")
-    if arguments.html is not None:
-        from teleop_lab.studies.page import tuning_page
-
-        write_whole(arguments.html, tuning_page(tuning, tuned, arguments.file.stem))
-        print(f"page: {arguments.html}")
+    write_outputs(arguments, lambda: _csv(tuning, tuned), lambda: tuning_page(tuning, tuned, arguments.file.stem))
     return 0
 
 

@@ -46,10 +46,23 @@ TLX = (
     Question("mental", "Mental demand: how mentally demanding was the task?", "very low", "very high"),
     Question("physical", "Physical demand: how physically demanding was the task?", "very low", "very high"),
     Question("temporal", "Temporal demand: how hurried or rushed was the pace of the task?", "very low", "very high"),
-    Question("performance", "Performance: how successful were you in what you were asked to do?", "perfect", "failure"),
-    Question("effort", "Effort: how hard did you have to work for what you accomplished?", "very low", "very high"),
     Question(
-        "frustration", "Frustration: how insecure, irritated, stressed or annoyed were you?", "very low", "very high"
+        "performance",
+        "Performance: how successful were you in accomplishing what you were asked to do?",
+        "perfect",
+        "failure",
+    ),
+    Question(
+        "effort",
+        "Effort: how hard did you have to work to accomplish your level of performance?",
+        "very low",
+        "very high",
+    ),
+    Question(
+        "frustration",
+        "Frustration: how insecure, discouraged, irritated, stressed and annoyed were you?",
+        "very low",
+        "very high",
     ),
 )
 """NASA-TLX (Hart and Staveland 1988). Its raw score is the mean of the six (Hart 2006)."""

@@ -214,7 +214,9 @@ class RunningOperator(RunningStage):
         if not np.isfinite(moves).all():
             bad = times[int(np.flatnonzero(~np.isfinite(moves).all(axis=1))[0])]
             raise PartError("operator", name, f"one who answers finite numbers; at {bad:g} s not")
-        return np.pad(moves, ((0, 0), (0, 13 - moves.shape[1])))
+        whole = np.zeros((len(times), 13))
+        whole[:, : moves.shape[1]] = moves
+        return whole
 
     def _asked(self, question: Callable[..., Any], *arguments: Any) -> Any:
         """What the operator answers.

@@ -3,8 +3,11 @@
 from dataclasses import dataclass, field
 from itertools import pairwise
 
+import numpy as np
+
 from teleop_core.base import Choice, ParameterError, choice, parameter
 from teleop_core.chain.operators import OPERATORS
+from teleop_core.kernels import Array
 
 PRESS_TIME = 0.1
 """How long the operator presses the fixture or the mode button [s]."""
@@ -57,6 +60,12 @@ class RoomParameters:
         fixed=True,
         doc="place of the inkwell relative to the middle of it; as haptic_master's",
     )
+
+    @property
+    def corners(self) -> tuple[Array, Array]:
+        """Low and high corner (3,) [m] of where the stylus can go from the inkwell, which is within them."""
+        middle, half = -np.array(self.start), 0.5 * np.array(self.workspace)
+        return np.minimum(middle - half, 0.0), np.maximum(middle + half, 0.0)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -344,10 +344,8 @@ def _row(name: str, pose: object) -> geometry.Array:
 def hand_of(setting: Setting) -> RemoteHand:
     """Hand for a session, within the room of its device; its parameters are ``operator.remote``."""
     p = cast(RemoteParameters, setting.common.kind.groups["remote"])
-    start, device = rest.rest_pose(), setting.common.device
-    middle, half = start[:3] - np.array(device.start), 0.5 * np.array(device.workspace)
-    low, high = np.minimum(middle - half, start[:3]), np.maximum(middle + half, start[:3])
-    return RemoteHand(p, start, (low, high))
+    start, (low, high) = rest.rest_pose(), setting.common.device.corners
+    return RemoteHand(p, start, (start[:3] + low, start[:3] + high))
 
 
 def make_remote(_: object, setting: Setting) -> Motion:

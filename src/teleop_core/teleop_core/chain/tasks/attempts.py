@@ -16,9 +16,8 @@ KEPT = 59
 _PASS = int(Act.PASS)
 _SINCE, _CLOSED = KEPT + 3, KEPT + 4
 _OPENS, _CLOSES = 0.4, 0.6  # closing at which a hand counts as open and closed again
-(_NUMBER, _ACT, _GOAL, _, _, _WIDTH, _ATTEMPTS, _SUCCESSES, _ERRORS, _WAY, _OFF, _TIME, _MISS, _) = range(
-    len(topics.TASK_STATE.columns)
-)
+(_NUMBER, _ACT, _GOAL, _, _, _WIDTH, _ATTEMPTS, _SUCCESSES, _ERRORS, _WAY, _OFF, _TIME, _MISS) = range(13)
+_ATTITUDE, _TURN = (topics.TASK_STATE.columns.index(name) for name in ("goal_qw", "turn"))
 _NONE, _BESIDE, _LATE, _FORCE = (int(m) for m in (Miss.NONE, Miss.BESIDE, Miss.LATE, Miss.FORCE))
 _PUSH = SCENE.index("fx")
 
@@ -53,11 +52,14 @@ def begin_goal(memory: Array, scene: Array, state: Array, act: int, x: float, y:
 
 @inner
 def is_at_goal(scene: Array, state: Array) -> bool:
-    """Whether the tip is within the goal, a ball as wide as the goal is."""
-    off = 0.0
+    """Whether the tip is within the goal, a ball as wide as the goal is, and turned as it asks for."""
+    off, same = 0.0, 0.0
     for i in range(3):
         off += (scene[1 + i] - state[_GOAL + i]) * (scene[1 + i] - state[_GOAL + i])
-    return math.sqrt(off) <= 0.5 * state[_WIDTH]
+    for i in range(4):
+        same += scene[4 + i] * state[_ATTITUDE + i]
+    is_turned = state[_TURN] == 0.0 or 2.0 * math.acos(min(abs(same), 1.0)) <= 0.5 * state[_TURN]
+    return is_turned and math.sqrt(off) <= 0.5 * state[_WIDTH]
 
 
 @inner

@@ -5,9 +5,11 @@ from dataclasses import dataclass
 
 from teleop_core.base import ParameterError, parameter
 from teleop_core.chain.tasks import Act, Miss, Task, attempts
+from teleop_core.graph import topics
 from teleop_core.kernels import Array, kernel
 
 _PASS, _NONE = int(Act.PASS), int(Miss.NONE)
+_CLEARANCE = topics.TASK_STATE.columns.index("clearance")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -27,6 +29,13 @@ class InsertParameters(attempts.PressedParameters):
     )
     depth: float = parameter(0.01, unit="m", lower=1e-3, upper=0.5, doc="of the goal inside")
     outside: float = parameter(0.008, unit="m", lower=0.0, upper=0.5, doc="goal before the mouth")
+    clearance: float = parameter(
+        0.0,
+        unit="m",
+        lower=0.0,
+        upper=0.1,
+        doc="from the tool to the hole's edge, which the hand heeds; 0: it does not",
+    )
 
     def __post_init__(self) -> None:
         if not any(self.axis):
@@ -51,6 +60,7 @@ def insert_judge(numbers: Array, memory: Array, scene: Array, state: Array) -> N
     out = (-numbers[9] if memory[0] > 0.0 else numbers[10]) / math.sqrt(x * x + y * y + z * z)
     goal_x, goal_y, goal_z = numbers[3] + out * x, numbers[4] + out * y, numbers[5] + out * z
     attempts.begin_goal(memory, scene, state, _PASS, goal_x, goal_y, goal_z, numbers[0])
+    state[_CLEARANCE] = memory[0] * numbers[11]
 
 
 INSERT = Task("insert", InsertParameters, insert_judge)

@@ -5,9 +5,11 @@ from dataclasses import dataclass
 
 from teleop_core.base import parameter
 from teleop_core.chain.tasks import Act, Miss, Task, attempts
+from teleop_core.graph import topics
 from teleop_core.kernels import Array, kernel
 
 _PASS, _NONE = int(Act.PASS), int(Miss.NONE)
+_FORCE = topics.TASK_STATE.columns.index("force")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,7 +41,7 @@ def palpate_judge(numbers: Array, memory: Array, scene: Array, state: Array) -> 
             memory[i] = scene[1 + i]
     elif memory[3] == 0.0:
         if attempts.is_at_goal(scene, state):
-            memory[3], memory[4] = 1.0, scene[0]
+            memory[3], memory[4], state[_FORCE] = 1.0, scene[0], numbers[5]
         return
     else:
         missing = numbers[5] - scene[11]
@@ -51,7 +53,7 @@ def palpate_judge(numbers: Array, memory: Array, scene: Array, state: Array) -> 
         if miss == _NONE and scene[0] - memory[4] < numbers[7]:
             return
         attempts.end_attempt(memory, scene, state, miss)
-    memory[3], place = 0.0, state[0] % numbers[3] - 0.5 * (numbers[3] - 1.0)
+    memory[3], state[_FORCE], place = 0.0, 0.0, state[0] % numbers[3] - 0.5 * (numbers[3] - 1.0)
     y = memory[1] + place * numbers[4]
     attempts.begin_goal(memory, scene, state, _PASS, memory[0], y, memory[2], numbers[0])
 

@@ -1,43 +1,25 @@
 """Peg transfer: bring each block to the peg of its colour, by one arm, two, or from jaw to jaw."""
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
 
 from teleop_core.base import ParameterError, parameter
-from teleop_core.chain.tasks import SCENE, Act, Miss, Task, attempts
-from teleop_core.graph import topics
-from teleop_core.kernels import Array, inner, kernel
+from teleop_core.chain.tasks import Task, transfer
+from teleop_core.graph.topics import JAW_OBJECTS
+from teleop_core.kernels import Array, kernel
 
-KINDS = ("one", "two", "hand_over")
-"""Who transfers: one arm all blocks; each arm every other one; the second takes from the first."""
-STEPS = ("wait", "reach", "grasp", "lift", "meet", "take", "release", "retreat", "carry", "place")
-"""What an arm is doing: of these the nine after the first make a transfer with a hand-over."""
-(_WAIT, _REACH, _GRASP, _LIFT, _MEET, _TAKE, _RELEASE, _RETREAT, _CARRY, _PLACE) = range(len(STEPS))
-_TWO, _HAND_OVER = KINDS.index("two"), KINDS.index("hand_over")
-_GRIP, _LET_GO = int(Act.GRIP), int(Act.LET_GO)
-_NONE, _LATE, _DROP, _WRONG = (int(m) for m in (Miss.NONE, Miss.LATE, Miss.DROP, Miss.WRONG))
-_STEP = topics.TASK_STATE.columns.index("step")
-_SECOND, _X0 = SCENE.index("is_second"), SCENE.index("x0")
-_STARTS = 4  # places of the blocks at the beginning, in the memory
-_MEETS = 0.01  # a block that is no farther from where both meet is there [m]
-_RESTS = 5e-4  # a block that is no higher above its start stands on the table or a peg [m]
+_ONE_WAY, _WAYS = 2, 2 * JAW_OBJECTS
 
 
 @dataclass(frozen=True, kw_only=True)
 class PegTransferParameters:
-    """What is to be done with the blocks of ``jaw_sim``.
-
-    Source:
-        The three kinds: Hwang et al. 2020, arXiv 2012.12844.
-    """
+    """What is to be done with the blocks of ``jaw_sim``; the kinds are those of Hwang et al. 2020, arXiv 2012.12844."""
 
     arms: str = parameter(
         "one",
-        choices=KINDS,
-        doc="who transfers: one arm all blocks; each of two every other one; or the first one "
-        "hands each over to the second",
+        choices=transfer.KINDS,
+        doc="who transfers: one arm all blocks; each of two every other one; the first hands each over to the second",
     )
     ways: tuple[float, ...] = parameter(
         (0.0, -0.04),
@@ -52,140 +34,23 @@ class PegTransferParameters:
     )
     width: float = parameter(0.002, unit="m", lower=1e-4, upper=0.1, doc="of a goal, a ball")
     longest: float = parameter(60.0, unit="s", lower=1.0, upper=600.0, doc="a transfer that takes longer is an error")
+    tries: int = parameter(2, lower=1, upper=99, doc="how often a block is taken up, if it is dropped")
 
     def __post_init__(self) -> None:
-        if len(self.ways) not in {2, 2 * topics.JAW_OBJECTS}:
-            needed = f"x, y of one way, or of {topics.JAW_OBJECTS}"
-            raise ParameterError("task.peg_transfer.ways", self.ways, needed)
+        if len(self.ways) not in {_ONE_WAY, _WAYS}:
+            raise ParameterError("task.peg_transfer.ways", self.ways, f"x, y of one way, or of {JAW_OBJECTS}")
 
 
 def numbers(p: PegTransferParameters) -> Array:
-    """Numbers that the judge takes: lift, width, longest, kind, six ways, clearance."""
-    ways, kind = np.resize(p.ways, 2 * topics.JAW_OBJECTS), KINDS.index(p.arms)
-    return np.array([p.lift, p.width, p.longest, kind, *ways, p.clearance], dtype=np.float64)
-
-
-@inner
-def _verdict(numbers: Array, memory: Array, scene: Array, block: int) -> int:
-    """:class:`Miss` of a block that came to rest where it is; -1 where none came to rest."""
-    now, brought = _X0 + 3 * block, scene[_SECOND + 3] - memory[2]
-    is_high = scene[now + 2] - memory[_STARTS + 3 * block + 2] > _RESTS
-    if is_high or brought + scene[_SECOND + 4] - memory[3] == 0.0:
-        return -1
-    best, nearest = _DROP, numbers[4 + 2 * topics.JAW_OBJECTS] + 1e-9
-    for i in range(topics.JAW_OBJECTS):
-        x = memory[_STARTS + 3 * i] + numbers[4 + 2 * i] - scene[now]
-        y = memory[_STARTS + 3 * i + 1] + numbers[5 + 2 * i] - scene[now + 1]
-        if brought > 0.0 and math.hypot(x, y) <= nearest:
-            best = _NONE if i == block else _WRONG
-    return best
-
-
-@inner
-def _begin_step(numbers: Array, memory: Array, scene: Array, state: Array, step: int) -> None:
-    block, lift, width = max(int(memory[0]), 0), numbers[0], numbers[1]
-    start, now = _STARTS + 3 * block, _X0 + 3 * block
-    way_x, way_y = numbers[4 + 2 * block], numbers[5 + 2 * block]
-    x, y, z = state[2], state[3], state[4]  # stay, if nothing else is said
-    state[_STEP] = float(step)
-    if step in (_REACH, _GRASP) or (step == _TAKE and scene[_SECOND] > 0.0):
-        x, y, z = scene[now], scene[now + 1], scene[now + 2]
-    elif step in (_LIFT, _RETREAT):
-        x, y, z = memory[start], memory[start + 1], memory[start + 2] + lift
-    elif step == _MEET:  # the second one waits beyond, where it is not in the way
-        share = 1.0 if scene[_SECOND] > 0.0 else 0.5
-        x, y = memory[start] + share * way_x, memory[start + 1] + share * way_y
-        z = memory[start + 2] + lift
-    elif step == _CARRY:  # so that the block comes over the peg, wherever in the jaw it is
-        x = scene[1] + memory[start] + way_x - scene[now]
-        y = scene[2] + memory[start + 1] + way_y - scene[now + 1]
-        z = scene[3] + memory[start + 2] + memory[1] - scene[now + 2]
-    is_closed = step in (_GRASP, _LIFT, _CARRY) or (step == _MEET and scene[_SECOND] == 0.0)
-    is_closed = is_closed or step == _TAKE or (step == _RELEASE and scene[_SECOND] > 0.0)
-    act = _GRIP if is_closed else _LET_GO
-    if step == _REACH or (step == _MEET and scene[_SECOND] > 0.0):
-        attempts.begin_goal(memory, scene, state, act, x, y, z, width)
-    else:
-        attempts.move_goal(state, act, x, y, z, width)
-
-
-@inner
-def _is_done(numbers: Array, memory: Array, scene: Array, state: Array) -> bool:
-    """Whether the present step is done: by what jaws hold, or by where the tip is."""
-    step, is_second, block = int(state[_STEP]), scene[_SECOND] > 0.0, int(memory[0])
-    grips, other = scene[_SECOND + 1] > 0.0, scene[_SECOND + 2] > 0.0
-    if step == _MEET and is_second:  # the block has come to where both meet
-        away = 0.0
-        for i in range(3):
-            half = 0.5 * numbers[4 + 2 * block + i] if i < 2 else numbers[0]
-            away += (scene[_X0 + 3 * block + i] - memory[_STARTS + 3 * block + i] - half) ** 2
-        return other and math.sqrt(away) <= _MEETS
-    if step == _RELEASE:
-        return not (other if is_second else grips)
-    if step in (_GRASP, _TAKE):
-        return grips if step == _GRASP or is_second else other
-    return step not in (_WAIT, _PLACE) and attempts.is_at_goal(scene, state)
-
-
-@inner
-def _next_step(numbers: Array, memory: Array, scene: Array, step: int) -> int:
-    if step == _RETREAT:
-        return _WAIT
-    if step == _CARRY:  # first above the peg, then down
-        is_above, memory[1] = memory[1] > 0.0, 0.0
-        return _CARRY if is_above else _PLACE
-    is_carried = step == _LIFT and int(numbers[3]) != _HAND_OVER
-    if is_carried or (step == _RELEASE and scene[_SECOND] > 0.0):
-        memory[1] = numbers[0]
-        return _CARRY
-    return step + 1
-
-
-@inner
-def _next_block(numbers: Array, memory: Array, scene: Array, state: Array) -> None:
-    """Begin with the block after the present one; wait where none is left."""
-    stride = 2.0 if int(numbers[3]) == _TWO else 1.0
-    is_first, is_second = state[0] == 0.0, scene[_SECOND] > 0.0
-    if is_first:
-        memory[0] = 1.0 if stride == 2.0 and is_second else 0.0
-    else:
-        memory[0] += stride
-    memory[2], memory[3] = scene[_SECOND + 3], scene[_SECOND + 4]
-    begin = _MEET if int(numbers[3]) == _HAND_OVER and is_second else _REACH
-    if memory[0] >= topics.JAW_OBJECTS or memory[_STARTS + 3 * int(memory[0])] == 0.0:
-        memory[0], begin = -1.0, _WAIT
-    _begin_step(numbers, memory, scene, state, begin)
+    """Numbers that the judge takes: lift, width, longest, kind, six ways, clearance, tries."""
+    kind = transfer.KINDS.index(p.arms)
+    return np.array([p.lift, p.width, p.longest, kind, *np.resize(p.ways, _WAYS), p.clearance, p.tries], np.float64)
 
 
 @kernel
 def peg_transfer_judge(numbers: Array, memory: Array, scene: Array, state: Array) -> None:
-    """Lead each hand from step to step, and judge each block where it comes to rest.
-
-    ``memory`` holds the number of the block, -1 once all are done; the height above where it stood
-    to bring it to; and from the beginning of the attempt, how many were on another peg and on none.
-    From the fifth on it holds the first places of all.
-    """
-    if state[0] == 0.0:
-        for i in range(3 * topics.JAW_OBJECTS):
-            memory[_STARTS + i] = scene[_X0 + i]
-        _next_block(numbers, memory, scene, state)
-    if memory[0] < 0.0:
-        return
-    step, block, miss = int(state[_STEP]), int(memory[0]), -1
-    is_others = int(numbers[3]) == _HAND_OVER and scene[_SECOND + 2] > 0.0
-    if scene[_SECOND + 1] == 0.0 and not is_others and (step > _LIFT or step == _WAIT):
-        miss = _verdict(numbers, memory, scene, block)
-    if miss < 0 and attempts.waited(memory, scene) > numbers[2]:
-        miss = _LATE
-    if miss >= 0:
-        attempts.end_attempt(memory, scene, state, miss)
-        _next_block(numbers, memory, scene, state)
-        return
-    if step == _TAKE and scene[_SECOND] > 0.0:  # from a hand that is never quite still
-        for i in range(3):
-            state[2 + i] = scene[_X0 + 3 * block + i]
-    if _is_done(numbers, memory, scene, state):
-        _begin_step(numbers, memory, scene, state, _next_step(numbers, memory, scene, step))
+    """Lead each hand from step to step, and judge each block where it comes to rest: :mod:`.transfer`."""
+    transfer.lead(numbers, memory, scene, state)
 
 
 PEG_TRANSFER = Task("peg_transfer", PegTransferParameters, peg_transfer_judge, numbers)

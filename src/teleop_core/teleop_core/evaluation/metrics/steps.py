@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from teleop_core.chain.tasks.peg_transfer import STEPS
+from teleop_core.chain.tasks.transfer import STEPS
 from teleop_core.evaluation import Context, Key, Metric, Window
 from teleop_core.graph.topics import TASK_STATE
 

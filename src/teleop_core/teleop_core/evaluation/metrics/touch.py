@@ -47,7 +47,7 @@ def object_of(context: Context, kind: type) -> tuple[WorldParameters, Array] | N
     with suppress(TeleopError):
         world = build(WorldParameters, dict(context.origin.world))
         if isinstance(world.kind.parameters, kind) and (robot := context.load_robot()) is not None:
-            return world, np.array(world.place or world.below(robot.fk(robot.start)))
+            return world, world.center(robot.fk(robot.start))
     return None
 
 

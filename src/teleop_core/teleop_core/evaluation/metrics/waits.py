@@ -2,23 +2,18 @@
 
 import numpy as np
 
-from teleop_core.evaluation import Context, Key, Metric, Window
+from teleop_core.evaluation import Metric, Window
+from teleop_core.evaluation.metric import figure
 from teleop_core.graph.topics import MASTER_MEASURED_CP
 
 
 class WaitsMetric(Metric):
     """Rests of the hand: 0.3 s and longer, with less than 0.5 mm in each tenth of a second."""
 
-    name = "waits"
-    keys = (
-        Key("waits.count", "1", "rests of the hand: 0.3 s or more, with < 0.5 mm in each 0.1 s"),
-        Key("waits.share", "1", "share of the time in such rests, without the first 0.3 s of each"),
-    )
-    topics = (MASTER_MEASURED_CP,)
-
-    def __init__(self, _: Context) -> None:
-        self._place, self._slot, self._still = np.full(3, np.inf), -1, 0
-        self._count = self._rests = self._slots = 0
+    name, topics = "waits", (MASTER_MEASURED_CP,)
+    count = figure("1", "rests of the hand: 0.3 s or more, with < 0.5 mm in each 0.1 s")
+    share = figure("1", "share of the time in such rests, without the first 0.3 s of each")
+    _place, _slot, _slots, _still, _rests = np.full(3, np.inf), -1, 0, 0, 0
 
     def add(self, window: Window) -> None:
         """Take one window, of which one sample in each tenth of a second is looked at."""
@@ -27,10 +22,6 @@ class WaitsMetric(Metric):
         for i in np.flatnonzero(np.diff(slots, prepend=self._slot) > 0).tolist():
             has_moved = np.linalg.norm(at.values[i, :3] - self._place) >= 5e-4
             self._still = 0 if has_moved else self._still + 1
-            self._count, self._rests = (self._count + (self._still == 3), self._rests + (self._still > 3))
             self._place, self._slot, self._slots = at.values[i, :3], int(slots[i]), self._slots + 1
-
-    def values(self) -> dict[str, float | None]:
-        """What ``keys`` name; None without a master."""
-        share = self._rests / self._slots if self._slots else None
-        return {"count": self._count if self._slots else None, "share": share}
+            self._rests += self._still > 3
+            self.count, self.share = (self.count or 0) + (self._still == 3), self._rests / self._slots

@@ -55,6 +55,16 @@ class WorldParameters:
         fixed=True,
         doc="middle of the object in the slave's base; empty: straight below the tip of the robot's start, gap apart",
     )
+    base: tuple[float, ...] = parameter(
+        (0.0, 0.0, 0.0),
+        unit="m",
+        lower=-10.0,
+        upper=10.0,
+        length=3,
+        fixed=True,
+        doc="where the base of this arm is, with parallel axes, from where place is given: that of a second arm in the "
+        "base of the first, so that both touch the same object",
+    )
     gap: float = parameter(
         0.01, unit="m", lower=0.0, upper=1.0, fixed=True, doc="between that tip and the object, if no place is given"
     )
@@ -168,6 +178,14 @@ class WorldParameters:
             name = "tool_points" if self.tool_points > 1 else "tool_radius"
             text = "that of a needle (1 point, radius 0) for a button, or with a puncture_force"
             raise ParameterError(f"world.{name}", getattr(self, name), text)
+
+    def center(self, T_base_tip: Array) -> Array:
+        """Middle of the object (3,) [m] in the arm's base, where its tip begins at a pose (4, 4).
+
+        Raises:
+            ParameterError: As :meth:`below`.
+        """
+        return np.array(self.place) - np.array(self.base) if self.place else self.below(T_base_tip)
 
     def below(self, T_base_tip: Array) -> Array:
         """Middle of the object (3,) [m] that lies straight below a tip's pose (4, 4), a gap apart.

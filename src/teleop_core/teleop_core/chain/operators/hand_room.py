@@ -1,0 +1,42 @@
+"""Hand room: how far a hand can go and turn from where it is, and where to bring it back to."""
+
+import numpy as np
+
+from teleop_core.kernels import Array, length
+from teleop_core.kernels.geometry import rotate_by_vector, turn_within
+
+_MARGIN = 2e-3  # from the ends of the room [m]
+_REST = np.array([1.0, 0.0, 0.0, 0.0])
+
+
+def turned(attitude: Array, turn: Array) -> tuple[Array, Array]:
+    """An attitude (4,) turned by a rotation vector (3,) in its own frame, and its rotation vector (3,) [rad]."""
+    found, vector = np.empty(4), np.empty(3)
+    rotate_by_vector(attitude, turn[0], turn[1], turn[2], found)
+    turn_within(_REST, found, vector)
+    return found, vector
+
+
+class HandRoom:
+    """Where a hand can be.
+
+    Args:
+        corners: Low and high one (3,) [m], from where the hand rests.
+        largest_turn: How far it can turn from there [rad].
+    """
+
+    def __init__(self, corners: tuple[Array, Array], largest_turn: float) -> None:
+        self._low, self._high, self._turn = corners[0] + _MARGIN, corners[1] - _MARGIN, largest_turn
+
+    def share(self, hand: Array, step: Array, turn: Array) -> float:
+        """Share, at most 1, of a step (3,) [m] and a turn (3,) [rad] for which a hand at a pose (7,) has room."""
+        room = np.maximum(np.where(step > 0.0, self._high - hand[:3], hand[:3] - self._low), 0.0)
+        shares = np.linspace(min(1.0, float((room / np.maximum(np.abs(step), 1e-12)).min())), 0.0, 21).tolist()
+        return next((s for s in shares if length(turned(hand[3:], s * turn)[1]) <= self._turn), 0.0)
+
+    def back(self, hand: Array, step: Array, turn: Array) -> tuple[Array, Array]:
+        """Step (3,) [m] and turn (3,) [rad] of a hand to where it has the most room for what is to come."""
+        middle, angle = 0.5 * (self._low + self._high), np.zeros(3)
+        begin = -min(0.5, self._turn / max(float(length(turn)), 1e-12)) * turn
+        turn_within(hand[3:], turned(_REST, begin)[0], angle)
+        return np.clip(middle - 0.5 * step, self._low, self._high) - hand[:3], angle

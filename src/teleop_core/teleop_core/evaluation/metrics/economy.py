@@ -1,0 +1,30 @@
+"""Economy: how direct the tip's ways to its goals were."""
+
+import numpy as np
+
+from teleop_core.evaluation import Metric, Window
+from teleop_core.evaluation.metric import figure
+from teleop_core.graph.topics import SLAVE_TRUE_CP, TASK_STATE
+
+_ATTEMPTS, _WAY = TASK_STATE.columns.index("attempts"), TASK_STATE.columns.index("way")
+
+
+class EconomyMetric(Metric):
+    """Sum of the straight ways to the goals of a task over the path of the tip; 1 is straight."""
+
+    name, topics = "economy", (SLAVE_TRUE_CP, TASK_STATE)
+    path_mm = figure("mm", "path of the tip, of places 0.1 s apart")
+    share = figure("1", "straight ways of the attempts over that path; 1: all were straight")
+    _path, _slot, _straight, _tried = np.empty((0, 3)), -1, 0.0, 0.0
+
+    def add(self, window: Window) -> None:
+        """Take one window."""
+        for row in window.samples(TASK_STATE).values:
+            self._straight += row[_WAY] * (row[_ATTEMPTS] > self._tried)
+            self._tried = row[_ATTEMPTS]
+        slots = (tip := window.samples(SLAVE_TRUE_CP)).stamp_ns // 100_000_000
+        path = np.concatenate((self._path, tip.values[np.diff(slots, prepend=self._slot) > 0, :3]))
+        if len(path):
+            self.path_mm = (self.path_mm or 0.0) + 1e3 * float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum())
+        self._path, self._slot = path[-1:], int(slots.max(initial=self._slot))
+        self.share = 1e3 * self._straight / self.path_mm if self._tried and self.path_mm else None
