@@ -141,13 +141,9 @@ class Answers:
         if len(names) != 1:
             return answer_of(http.HTTPStatus.FORBIDDEN)
         address = urlsplit(request.path)
-        is_strip = address.path in self.strip.paths
-        query = parse_qs(address.query, keep_blank_values=is_strip, max_num_fields=_FIELDS)
-        page = self._pages.get(names[0], -1)
-        if is_strip:
-            status, told = self.strip.answer(address.path, query, page)
-        else:
-            status, told = self.form.answer(address.path, query, page, request.body)
+        asked = self.strip if address.path in self.strip.paths else self.form
+        query = parse_qs(address.query, keep_blank_values=True, max_num_fields=_FIELDS)
+        status, told = asked.answer(address.path, query, self._pages.get(names[0], -1), request.body)
         return answer_of(status, json.dumps(told).encode(), "application/json")
 
     def _stop(self, request: Request) -> Response:
