@@ -104,8 +104,15 @@ def facts(view: View) -> str:
         (view.rate, f"{view.rate:.0f} ticks/s"),
         (view.delay[0], f"command {1e3 * view.delay[0]:.1f} ms old"),
         (view.age, f"picture {1e3 * view.age:.0f} ms old"),
+        (view.display[1], f"display {display_text(view)}"),
     )
     return " · ".join(text for value, text in told if math.isfinite(value))
+
+
+def display_text(view: View) -> str:
+    """Rate and delay of the operator's display; empty without one."""
+    rate, late = view.display
+    return f"{rate:.0f} Hz, {1e3 * late:.0f} ms late" if math.isfinite(late) else ""
 
 
 def mode_text(arm: ArmView) -> str:
