@@ -73,7 +73,7 @@ _STYLE = """\
 @media (prefers-color-scheme: dark) { :root.t-choosing { DARK_VARIABLES; color-scheme: dark; } }
 body { font: var(--t-text)/1.45 system-ui, -apple-system, "Segoe UI", Roboto, sans-serif; }
 .t-status { padding: 4px 14px; color: var(--t-color-text); font-size: var(--t-small);
-  box-sizing: border-box; height: 140px; overflow-y: auto; overflow-wrap: anywhere;
+  box-sizing: border-box; height: 166px; overflow-y: auto; overflow-wrap: anywhere;
   line-height: 18px;
   border-bottom: 1px solid var(--t-color-line); margin-bottom: 6px; }
 .t-role { margin: 8px 14px 0; font-weight: 600; }
@@ -104,13 +104,14 @@ body { font: var(--t-text)/1.45 system-ui, -apple-system, "Segoe UI", Roboto, sa
 @media (prefers-reduced-motion: reduce) { *, *::before, *::after {
   animation-duration: 1ms !important; transition-duration: 1ms !important; scroll-behavior: auto !important; } }
 @media (max-width: 575px) {
-  #t-safety { left: 0; right: 0; top: 0; bottom: auto; width: auto; }
-  #t-stop { border-radius: 0; width: 100%; }
+  #t-safety { left: 0; right: 0; top: 0; bottom: auto; width: auto; pointer-events: none; }
+  #t-safety > * { order: 1; pointer-events: auto; } #t-press { margin: 0 8px; }
+  #t-stop { border-radius: 0; width: 100%; order: 0; }
   #t-banner { top: 56px; font-size: var(--t-text); }
   #root .mantine-Paper-root[style*="position: fixed"] { max-height: 46% !important; }
   #root .mantine-Paper-root[style*="position: fixed"], #root [style*="width: 20em"] {
     width: 100% !important; }
-  .t-status { height: auto; max-height: 140px; }
+  .t-status { height: auto; max-height: 166px; }
 }
 """
 
