@@ -12,7 +12,7 @@ from teleop_console.server import ConsoleServer
 
 pytest.importorskip("viser")
 
-from browser import Tab, until
+from browser import both, opened, until
 from desk import Desk, shown
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
@@ -30,10 +30,10 @@ DEAD = """[...document.querySelectorAll('button')].filter((b) =>
     ['Start', 'Pause', 'Home'].includes(b.innerText)).every((b) => b.disabled)"""
 
 
-@pytest.fixture(scope="module")
-def tab(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Headless]:
-    with Tab(tmp_path_factory.mktemp("stop"), 390, 780) as opened:
-        yield opened
+@pytest.fixture(scope="module", params=both())
+def tab(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Headless]:
+    with opened(request.param, tmp_path_factory.mktemp("stop"), 390, 780) as browser:
+        yield browser
 
 
 @pytest.fixture(autouse=True)

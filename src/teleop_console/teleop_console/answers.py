@@ -45,6 +45,7 @@ class Situation:
         doing: What is going on before there is a session to see; empty once there is.
         chooses: Whether a session is being chosen: the form is shown.
         can_end: Whether what is shown can be ended, which leads back to the form.
+        state: State of all arms in words, for screen readers.
         can_press: Whether a person at the page leads a hand that closes: at a task, or a jaw.
     """
 
@@ -55,6 +56,7 @@ class Situation:
     chooses: bool = False
     can_end: bool = False
     can_press: bool = False
+    state: str = ""
 
 
 class Answers:

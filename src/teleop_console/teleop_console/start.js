@@ -38,7 +38,7 @@
 
   function field({ name, label, options }) {
     const row = made('label', label, { className: 't-field' });
-    const select = made('select');
+    const select = made('select', '', { name });
     const why = made('span', '', { className: 't-why' });
     select.addEventListener('change', () => choose(name, select.value));
     row.append(select, why);
@@ -106,6 +106,7 @@
       shownList = said;
       one('.t-list').replaceChildren(...recordings.map(({ name, made: at, about, verdict, is_good }) => {
         const item = made('li'), row = made('label'), box = made('input', '', { type: 'checkbox', checked: picked.has(name) });
+        box.addEventListener('keydown', ({ key }) => { if (key === 'Enter') box.click(); }); // space is the stop
         box.addEventListener('change', () => { picked[box.checked ? 'add' : 'delete'](name); acts(); });
         const mark = is_good === null ? ['idle', '…', 'being scored'] : is_good ? ['good', '✓', verdict] : ['held', '!', verdict];
         const text = made('span');
@@ -123,7 +124,7 @@
     one('[data-act=replay]').disabled = one('[data-act=export]').disabled = count !== 1 || !drives || busy;
     one('[data-act=score]').disabled = !count || !drives || busy;
     one('[data-act=score]').textContent = count > 1 ? 'Compare' : 'Score';
-    one('.t-hint').textContent = count ? '' : 'Tick one, or several to compare.';
+    one('.t-hint').textContent = count ? '' : 'Tick one (by keys: Enter), or several to compare.';
   }
 
   async function look() {

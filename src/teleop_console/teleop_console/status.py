@@ -42,7 +42,9 @@ def situation(view: View) -> Situation:
         if arm.operation
     )
     text = _PRESSED if is_pressed else _RELEASED if is_latched else ""
-    return Situation(can_stop=True, is_stopped=is_pressed or is_latched, text=text)
+    arms = ((name, arm.operation_text) for name, arm in view.arms.items() if arm.operation_text)
+    state = "; ".join(f"{name} {words}".strip() for name, words in arms)
+    return Situation(can_stop=True, is_stopped=is_pressed or is_latched, text=text, state=state)
 
 
 def alive(view: View) -> dict[str, bool]:
