@@ -25,7 +25,8 @@ FLAGS = (
 # What Chromium says about the speed of software rendering; nothing is wrong then.
 ADVICE = ("GL Driver Message", "Canvas2D: Multiple readback", "THREE.Clock")
 KEYS = {
-    " ": ("Space", 32), "Escape": ("Escape", 27), "Enter": ("Enter", 13), "Tab": ("Tab", 9), "Home": ("Home", 36), "End": ("End", 35),
+    " ": ("Space", 32), "Escape": ("Escape", 27), "Enter": ("Enter", 13), "Tab": ("Tab", 9),
+    "Home": ("Home", 36), "End": ("End", 35),
     "ArrowLeft": ("ArrowLeft", 37), "ArrowRight": ("ArrowRight", 39), "ArrowDown": ("ArrowDown", 40),
 }  # fmt: skip
 
