@@ -4,7 +4,7 @@ import ast
 import math
 from collections.abc import Callable, Mapping, Sequence
 from functools import cache
-from typing import Any
+from typing import Any, cast
 
 import viser
 
@@ -83,7 +83,7 @@ class Input:
             return parsed(self._own.value, self._info)
         assert isinstance(self._info.value, tuple)
         like = type(self._info.value[0])
-        return tuple(like(part.value) for part in self.parts)
+        return cast("Setting", tuple(like(part.value) for part in self.parts))
 
     @property
     def said(self) -> object:

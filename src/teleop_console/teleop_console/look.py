@@ -99,6 +99,9 @@ body { font: var(--t-text)/1.45 system-ui, -apple-system, "Segoe UI", Roboto, sa
   background: var(--t-stop); color: #fff; }
 #t-banner b { font-weight: 700; margin-right: 0.6em; }
 .t-says #t-banner { display: block; }
+#root button[style*="color-gray-filled"] { background: var(--t-color-ground); color: var(--t-color-text);
+  border: 1px solid var(--t-color-field); }
+#root button[style*="color-gray-filled"]:disabled { color: var(--t-color-muted); border-color: var(--t-color-line); }
 .t-spoken { position: absolute; width: 1px; height: 1px; margin: 0; overflow: hidden; clip-path: inset(50%); }
 .t-stopped #t-stop { background: #fff; color: var(--t-stop); border: 3px solid var(--t-stop); }
 .t-stopped canvas { filter: grayscale(0.85) opacity(0.7); }

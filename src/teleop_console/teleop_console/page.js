@@ -28,7 +28,7 @@
   spoken.className = 't-spoken'; spoken.setAttribute('role', 'status');
   const hand = document.createElement('button');
   hand.id = 't-press'; hand.type = 'button'; hand.textContent = 'Press or grip (hold J)'; hand.hidden = true;
-  safety.append(hand, stop, spoken);
+  safety.append(hand, stop);
 
   function show() {
     const [head, text] = pressed === 'unheard'
@@ -94,7 +94,7 @@
 
   const types = (element) => element.closest && element.closest(
     'input:not([type=checkbox]):not([type=radio]):not([type=range]), textarea, [contenteditable=true]');
-  document.documentElement.append(banner, safety, starting); // before the page has a body
+  document.documentElement.append(banner, safety, starting, spoken); // before the page has a body
   show();
   stop.addEventListener('pointerdown', press);
   stop.addEventListener('click', press);
