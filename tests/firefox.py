@@ -44,14 +44,15 @@ class Firefox(Tab):
         lines = (f'user_pref("{name}", {json.dumps(value)});\n' for name, value in PREFERENCES.items())
         (profile / "user.js").write_text("".join(lines))
         words = [SCREEN, "-a", "-s", f"-screen 0 {max(width, 1400)}x{max(height, 1000)}x24", browser, "--no-remote"]
-        self._process: Any = subprocess.Popen(
+        process: Any = subprocess.Popen(
             [*words, "--profile", str(profile), "--remote-debugging-port", "0"],
             stdout=subprocess.DEVNULL,
             stderr=subprocess.PIPE,
             text=True,
             env=os.environ | {"MOZ_CRASHREPORTER_DISABLE": "1"},
         )
-        found = (re.search(r"ws://\S+", line) for line in self._process.stderr)
+        self._process, self._said = process, process.stderr
+        found = (re.search(r"ws://\S+", line) for line in process.stderr)
         self._socket = connect(next(filter(None, found))[0] + "/session", max_size=None, ping_interval=None)
         self._numbers, self._touches = count(1), list[Any]()
         self.said, self.errors, self.asked, self.answers = [], [], [], {}
@@ -64,7 +65,7 @@ class Firefox(Tab):
         self._say("browser.close")
         self._socket.close()
         self._process.wait(30)
-        self._process.stderr.close()
+        self._said.close()
 
     def _say(self, method: str, **parameters: Any) -> Any:
         """Answer to a command of BiDi."""

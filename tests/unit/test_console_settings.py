@@ -14,7 +14,7 @@ from teleop_core.base.plain_yaml import parse
 from teleop_core.graph.layers import declared_groups
 
 MODE, GAIN = ("motion_scaling", "mode"), ("motion_scaling", "fine_gain")
-EVERY = [
+EVERY: list[tuple[str, str, Any]] = [
     (name, spec.name, values_of(group())[spec.name])
     for name, group in declared_groups().items()
     for spec in specs(group)
@@ -116,11 +116,13 @@ def test_numbers_of_a_vector_have_the_names_of_axes_or_joints_and_are_set_one_by
     with ConsoleServer(0) as server:
         settings = SettingsPanel(server.viser, desk, lambda _: True)
         settings.refresh()
-        settings._search.value = "slave_sim"
+        search: Any = settings._search
+        search.value = "slave_sim"
         settings._show()
         assert [part.label for part in settings._by_key[place].parts] == ["x", "y", "z"]
         assert [part.label for part in settings._by_key[gains].parts] == list(joints)
-        settings._by_key[place].parts[1].value = 0.5
+        y: Any = settings._by_key[place].parts[1]
+        y.value = 0.5
         settings._changed(0, settings._by_key[place], settings._failed, desk.known[place])
         assert settings.known[place].value == (0.1, 0.5, 0.3)
         settings.follow({place: (1.0, 2.0, 3.0)})
