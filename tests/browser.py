@@ -25,8 +25,9 @@ FLAGS = (
 # What Chromium says about the speed of software rendering; nothing is wrong then.
 ADVICE = ("GL Driver Message", "Canvas2D: Multiple readback", "THREE.Clock")
 KEYS = {
-    " ": ("Space", 32), "Escape": ("Escape", 27), "Enter": ("Enter", 13), "ArrowLeft": ("ArrowLeft", 37),
-    "ArrowRight": ("ArrowRight", 39), "Home": ("Home", 36), "End": ("End", 35),
+    " ": ("Space", 32), "Escape": ("Escape", 27), "Enter": ("Enter", 13), "Tab": ("Tab", 9),
+    "Home": ("Home", 36), "End": ("End", 35),
+    "ArrowLeft": ("ArrowLeft", 37), "ArrowRight": ("ArrowRight", 39), "ArrowDown": ("ArrowDown", 40),
 }  # fmt: skip
 
 
@@ -51,12 +52,26 @@ VIEWER = """(() => {
 """What viser's page holds: its camera, and its nodes by name."""
 
 
+def both() -> list[Any]:
+    """Both browsers, for a fixture that takes them as its parameter; CI has time for one."""
+    return ["Tab", pytest.param("Firefox", marks=pytest.mark.soak)]
+
+
+def opened(name: Any, folder: Path, width: int = 1400, height: int = 900) -> "Tab":
+    """A tab of a browser of :func:`both`."""
+    from firefox import Firefox
+
+    return {"Tab": Tab, "Firefox": Firefox}[name](folder, width, height)
+
+
 class Tab(Headless):
     """One tab of a browser of its own.
 
-    ``errors`` are the errors on its console, ``asked`` the addresses it asked for anything,
-    ``answers`` the status of each answer.
+    ``errors`` are the errors on its console, ``asked`` the addresses it asked for anything, ``answers`` the status of
+    each answer, ``has_focus`` whether its window is the active one, to which keys go as a person's do.
     """
+
+    has_focus = True
 
     def __enter__(self) -> "Tab":
         return self
@@ -135,10 +150,21 @@ class Tab(Headless):
     def key(self, name: Any) -> None:
         """Press and release a key."""
         code, number = KEYS.get(name, (f"Key{name.upper()}", ord(name.upper()[0])))
-        text = {"text": name} if len(name) == 1 else {}
+        text = {"text": "\r" if name == "Enter" else name} if len(name) == 1 or name == "Enter" else {}
         for kind in ("keyDown", "keyUp"):
             self.call("Input.dispatchKeyEvent", type=kind, key=name, code=code, windowsVirtualKeyCode=number, **text)
             text = {}
+
+    def tab_to(self, wanted: str) -> None:
+        """Press Tab until what a selector names has the focus, which can be seen wherever it is."""
+        for _ in range(60):
+            self.key("Tab")
+            unseen = self.value("""(({ activeElement: e, body }) => (e === body || e.matches('html')
+                || getComputedStyle(e).outlineStyle !== 'none' ? '' : e.outerHTML.slice(0, 200)))(document)""")
+            assert not unseen, f"its focus cannot be seen: {unseen}"
+            if self.value(f"document.activeElement.matches({json.dumps(wanted)})"):
+                return
+        raise AssertionError(f"the Tab key does not lead to {wanted}")
 
     def pull(self, begin: Any, end: Any, steps: int = 20) -> None:
         """Drag slowly, as a hand does, from one point to another [px]; the button stays down."""

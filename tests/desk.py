@@ -80,6 +80,10 @@ class Desk:
         self.asked.append(name)
         return ""
 
+    def mark(self) -> tuple[bool, str]:
+        self.asked.append("mark")
+        return True, "marked"
+
     def save(self, name: Any) -> None:
         self.asked.append("save")
 

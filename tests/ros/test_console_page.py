@@ -195,11 +195,11 @@ def test_fixed_setting_begins_a_new_session_and_an_impossible_one_is_refused(
 ) -> None:
     ready(page)
     page.click("Settings")
-    page.fill("delays", "[nowhere=0.02]")
+    page.fill("delays ↻", "[nowhere=0.02]")
     page.shows("nowhere")  # the list above the button: it moves the button
     page.click("New session with these")
     page.shows("⚠")
-    page.fill("delays", "[slave/servo_jp=0.02]")
+    page.fill("delays ↻", "[slave/servo_jp=0.02]")
     page.shows("slave/servo_jp=0.02")
     page.click("New session with these")
     until((console.folder / "session_session2").exists, "a new session")

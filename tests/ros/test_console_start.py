@@ -56,7 +56,7 @@ def test_session_is_begun_stopped_ended_scored_repeated_and_replayed_from_the_pa
         tab.shows("robot=robots/any_arm.urdf")
         tab.shows("must be one of camera, tool0")
         tab.fill("Tip", "tool0")
-        tab.value("document.activeElement.blur()")
+        tab.key("Tab")
         pick(tab, "Network", "delay_100")
         tab.shows("network.preset=delay_100")
         tab.until(READY)

@@ -15,7 +15,7 @@ from headless import Headless
 
 pytest.importorskip("viser")
 
-from browser import Tab, until
+from browser import both, opened, until
 from page_client import PageClient, ask
 from teleop_console.app import choose
 from teleop_console.server import ConsoleServer
@@ -36,10 +36,10 @@ UNNAMED = """[...document.querySelectorAll('#t-start :is(select, input, button)'
 browser = pytest.mark.browser
 
 
-@pytest.fixture(scope="module")
-def tab(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Headless]:
-    with Tab(tmp_path_factory.mktemp("start")) as opened:
-        yield opened
+@pytest.fixture(scope="module", params=both())
+def tab(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Headless]:
+    with opened(request.param, tmp_path_factory.mktemp("start")) as browser:
+        yield browser
 
 
 @pytest.fixture(autouse=True)
@@ -119,6 +119,40 @@ def test_session_is_chosen_begun_and_repeated(
 
 @browser
 @pytest.mark.slow
+@pytest.mark.parametrize("size", [(1400, 900), (390, 844)])
+def test_form_is_filled_and_a_recording_is_replayed_by_keys_alone(
+    tab: Any, size: tuple[int, int], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if not tab.has_focus:
+        pytest.skip("its window is not the active one")
+    shutil.copytree(EXAMPLE, tmp_path / "bags" / "run_1")
+    monkeypatch.chdir(tmp_path)
+    wishes = list[Wish]()
+    tab.resize(*size)
+    with chosen(wishes, 2) as server:
+        tab.visit(server.url)
+        tab.until(f"{READY} && document.querySelector('.t-list input')")
+        tab.tab_to("[name=network]")
+        tab.key("ArrowDown")
+        tab.until("document.querySelector('[name=network]').value !== ''")
+        word = tab.value("document.querySelector('[name=network]').value")
+        tab.until(f"{READY} && document.querySelector('.t-command').innerText.includes('network.preset={word}')")
+        tab.tab_to("#t-begin")
+        tab.key("Enter")
+        until(lambda: wishes, "it is begun")
+        assert wishes[0].chosen == {"operator": "remote", "network": word}
+        tab.until(f"{READY} && document.querySelector('.t-list input')")
+        tab.tab_to(".t-list input")
+        tab.key("Enter")
+        tab.tab_to("[data-act=replay]")
+        tab.key("Enter")
+        until(lambda: len(wishes) == 2, "it is shown")
+        assert wishes[1].recording == Path("bags/run_1")
+        assert not tab.faults()
+
+
+@browser
+@pytest.mark.slow
 def test_urdf_that_is_dropped_on_the_form_is_the_robot(
     tab: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -136,7 +170,10 @@ def test_urdf_that_is_dropped_on_the_form_is_the_robot(
         }})()""")
         tab.shows("robot=robots/any_arm.urdf")
         tab.fill("Tip", "tool0")
-        tab.value("document.activeElement.blur()")
+        assert tab.value("[...document.querySelector('#t-tips').options].map((o) => o.value)") == ["camera", "tool0"]
+        tab.key("Tab")
+        if not tab.has_focus:
+            tab.value("document.querySelector('[list]').dispatchEvent(new Event('change'))")
         tab.shows("'geometry=[tip=tool0]'")
         tab.until(READY)
         tab.click("Start")

@@ -7,12 +7,13 @@ from typing import Any
 import pytest
 
 from headless import Headless
+from teleop_console.answers import Situation
 from teleop_console.app import splash
 from teleop_console.server import ConsoleServer
 
 pytest.importorskip("viser")
 
-from browser import Tab, until
+from browser import both, opened, until
 from desk import Desk, shown
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
@@ -30,10 +31,10 @@ DEAD = """[...document.querySelectorAll('button')].filter((b) =>
     ['Start', 'Pause', 'Home'].includes(b.innerText)).every((b) => b.disabled)"""
 
 
-@pytest.fixture(scope="module")
-def tab(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Headless]:
-    with Tab(tmp_path_factory.mktemp("stop"), 390, 780) as opened:
-        yield opened
+@pytest.fixture(scope="module", params=both())
+def tab(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Headless]:
+    with opened(request.param, tmp_path_factory.mktemp("stop"), 390, 780) as browser:
+        yield browser
 
 
 @pytest.fixture(autouse=True)
@@ -73,6 +74,18 @@ def test_stop_is_in_view_at_any_scroll_and_the_page_looks_stopped_when_it_was_pr
 def gizmos(server: ConsoleServer) -> list[Any]:
     """All styli's handles that the server shows."""
     return list(server.viser.scene._handle_from_transform_controls_name.values())
+
+
+@pytest.mark.parametrize("size", [(390, 780), (780, 390), (1400, 900)])
+def test_nothing_that_a_session_offers_lies_over_the_stop(tab: Any, size: tuple[int, int]) -> None:
+    tab.resize(*size)
+    with ConsoleServer(0) as server:
+        server.answers.situation = Situation(can_end=True, can_press=True, state="ENABLED, homed")
+        tab.visit(server.url)
+        for name in ("#t-end", "#t-press"):
+            tab.until(f"document.querySelector('{name}').getClientRects().length")
+        tab.until(STOP)
+        assert tab.value("document.querySelector('[role=status].t-spoken').textContent") == "ENABLED, homed"
 
 
 def test_space_stops_from_anywhere_but_a_field_in_which_it_is_typed(tab: Any) -> None:

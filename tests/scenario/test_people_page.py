@@ -28,7 +28,6 @@ SOUND = """[...document.querySelectorAll('#t-start :is(select, input, button)')]
     return box.left >= 0 && box.right <= innerWidth && box.height >= 24
         && (e.labels?.[0]?.innerText || e.innerText || e.ariaLabel);
 }) && document.documentElement.scrollWidth <= innerWidth"""
-FOCUS = "getComputedStyle(document.activeElement).outlineStyle !== 'none'"
 READY = "!document.querySelector('#t-begin').disabled"
 browser = pytest.mark.browser
 
@@ -78,28 +77,6 @@ def clean(tab: Any, size: tuple[int, int]) -> None:
     tab.errors.clear()
 
 
-def tab_to(tab: Any, condition: str) -> None:
-    """Press Tab until what is wanted has the focus."""
-    for _ in range(30):
-        tab.call("Input.dispatchKeyEvent", type="keyDown", key="Tab", code="Tab", windowsVirtualKeyCode=9)
-        if tab.value(f"document.activeElement.matches({condition!r})"):
-            assert tab.value(FOCUS)
-            return
-    raise AssertionError(condition)
-
-
-def arrow(tab: Any) -> None:
-    """Press the right arrow."""
-    for kind in ("keyDown", "keyUp"):
-        tab.call("Input.dispatchKeyEvent", type=kind, key="ArrowRight", code="ArrowRight", windowsVirtualKeyCode=39)
-
-
-def press(tab: Any) -> None:
-    """Press Enter on what has the focus."""
-    for kind, text in (("keyDown", {"text": "\r"}), ("keyUp", {})):
-        tab.call("Input.dispatchKeyEvent", type=kind, key="Enter", code="Enter", windowsVirtualKeyCode=13, **text)
-
-
 @browser
 @pytest.mark.slow
 @pytest.mark.parametrize("size", SIZES)
@@ -114,19 +91,19 @@ def test_participant_gets_to_the_questions_and_answers_by_keys_alone(
         tab.until(SOUND)
         assert tab.value("document.activeElement.matches('.t-text')")  # a screen reader says what is new
         tab.until(READY)
-        tab_to(tab, "#t-begin")
-        press(tab)
+        tab.tab_to("#t-begin")
+        tab.key("Enter")
     tab.until("document.querySelectorAll('.t-scale').length === 6")
     assert tab.value("document.querySelector('#t-begin').disabled")
     assert tab.value(SOUND)
     tab.reload()  # which loses nothing that was done
     tab.until("document.querySelectorAll('.t-scale').length === 6")
     for question in TLX:
-        tab_to(tab, f"[name={question.name}]")
-        arrow(tab)
+        tab.tab_to(f"[name={question.name}]")
+        tab.key("ArrowRight")
     tab.until(READY)
-    tab_to(tab, "#t-begin")
-    press(tab)
+    tab.tab_to("#t-begin")
+    tab.key("Enter")
     tab.shows("Trial 4 of 6 · practice")
     assert journal.answers("p01", 3) == {question.name: 55.0 for question in TLX}
     assert not tab.faults()
@@ -149,8 +126,8 @@ def test_conductor_sees_scores_repeats_with_a_reason_pauses_and_chooses_who_is_n
         tab.shows(text)
     assert tab.value("document.querySelector('main').scrollWidth <= innerWidth")
     tab.value("window.prompt = () => 'the mouse was lost'")
-    tab_to(tab, "[aria-label='Repeat trial 1']")
-    press(tab)
+    tab.tab_to("[aria-label='Repeat trial 1']")
+    tab.key("Enter")
     tab.shows("the mouse was lost")
     assert journal.event("p01", 1)["state"] == "again"
     tab.click("Pause")

@@ -17,6 +17,9 @@ if TYPE_CHECKING:
     from peers import AnyPeer as Peer
 
 
+RATE = 10.0  # frames of a display in a second
+
+
 @pytest.mark.slow
 def test_a_page_sees_the_arm_stops_it_changes_a_parameter_and_names_the_recording(
     peer: "Peer", compose: "Callable[..., Any]", tmp_path: Path
@@ -42,6 +45,11 @@ def test_a_page_sees_the_arm_stops_it_changes_a_parameter_and_names_the_recordin
         assert "coarse_gain" in wrong
         assert link.change("motion_scaling", "coarse_gain", 0.25) == ""
         assert link.parameters()["motion_scaling", "coarse_gain"].value == 0.25
+        before = link.view().time
+        assert link.mark()[0]
+        peer.wait(lambda: link.view().marks, "the mark")
+        assert [text for _, text in link.view().marks] == ["1"]
+        assert before <= link.view().marks[0][0] <= link.view().time
         kept = link.save("a_name")
         assert Bag(kept).topics[topics.SLAVE_SETPOINT_JS.name].count > 1000
 
@@ -51,7 +59,7 @@ def test_a_person_sees_the_slave_as_late_as_the_display_says_and_presses_at_the_
     peer: "Peer", tmp_path: Path
 ) -> None:
     late, out = 0.4, str(tmp_path / "bag")
-    made = configuration("point", settings={"operator.kind": "remote", "display.latency": late})
+    made = configuration("point", settings={"operator.kind": "remote", "display.latency": late, "display.rate": RATE})
     peer._session("", made.graph, parameters_of(made, out, ""))  # type: ignore[attr-defined]
     with LiveLink(0, world=peer.world) as link:
 
@@ -65,11 +73,14 @@ def test_a_person_sees_the_slave_as_late_as_the_display_says_and_presses_at_the_
             return 0.0 if told is None else float(told[topics.TASK_STATE.columns.index("attempts")])
 
         peer.wait(lambda: len(ages()) == 2 and ages()[1] > late, "the first frame")
-        for _ in range(20):
+        for _ in range(40):
             peer.sleep(0.05)
             master, slave = ages()
             assert master < 0.1
-            assert late - 0.04 < slave < late + 0.1
+            assert late - 0.04 < slave < late + 0.1 + 1.0 / RATE
+        frames, seen = link.view().display
+        assert frames == pytest.approx(RATE, rel=0.1)
+        assert late - 0.04 < seen < late + 0.1
         for number in (1, 2):
             link.close_jaw(1.0)
             peer.wait(lambda number=number: attempts() == number, "an attempt")  # type: ignore[misc]

@@ -1,7 +1,9 @@
 """Scene of the console: what is drawn is where it is, and only what changed is sent."""
 
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any, cast
 
 import numpy as np
@@ -12,6 +14,7 @@ from viser._scene_handles import BoxHandle, FrameHandle
 
 import teleop_core as tc
 from present import present
+from teleop_console.drivers import Drivers
 from teleop_console.fixture_outlines import Look, scale_of, unit_outline
 from teleop_console.hooks import Server
 from teleop_console.jaw_nodes import finger_poses
@@ -20,6 +23,7 @@ from teleop_console.look import GOOD, HELD, ROLES, WRONG
 from teleop_console.recorded import RecordedLink
 from teleop_console.scene import Scene
 from teleop_console.server import ConsoleServer
+from teleop_console.view_tab import Visitors
 from teleop_console.world_nodes import object_outline
 from teleop_core.chain.fixtures import Fixture
 from teleop_core.graph.topics import Limit
@@ -463,3 +467,61 @@ def test_the_goal_of_a_task_is_a_ball_where_it_is_and_as_wide(server: Server) ->
     view.arms[""].streams["task/state"][0] = 0.0
     scene.draw(view)
     assert not goal.visible
+
+
+def test_the_view_of_the_work_grows_to_hold_what_the_tip_meets_goals_far_away_too(server: Server) -> None:
+    recording = tc.run("point", duration=3.0)
+    scene, view = drawn(server, RecordedLink(recording.bag), recording.duration - 0.1)
+    nodes, before = scene.arms[""], scene.work()
+
+    def is_held(point: Array) -> bool:
+        points = nodes.work()
+        return bool((points.min(axis=0) <= point).all() and (point <= points.max(axis=0)).all())
+
+    arm = view.arms[""]
+    far = arm.streams["task/state"][2:5] + np.array([0.3, -0.2, 0.1])
+    assert is_held(nodes.tip()[:3])
+    assert not is_held(far)
+    arm.streams["task/state"][2:5] = far
+    arm.state |= {"is_fixture_on": 1.0, "gain": 1.0}
+    corner = np.array([-0.2, -0.2, 0.0])
+    for axis, place, size in zip("xyz", corner, (0.1, 0.1, 0.1), strict=True):
+        arm.state |= {f"fixture_center_{axis}": place, f"fixture_size_{axis}": size}
+    scene.draw(view)
+    assert is_held(far)
+    assert is_held(corner - 0.05)
+    assert scene.work().is_elsewhere(before, 0.08)
+
+
+def test_a_camera_on_the_tool_goes_with_it_until_another_is_chosen_and_one_that_was_turned_stays(
+    server: Server,
+) -> None:
+    scene, client = Scene(server, [Arm("", tc.load_robot("rcrt1"))]), Viewer()
+    visitors: Any = Visitors(server, Drivers(), scene, is_live=True)
+    visitors._fit(0, client)
+    work = scene.work(client.camera.aspect)
+    np.testing.assert_allclose(client.camera.position, work.position)
+    visitors.give(client, scene.tool, is_riding=True)
+    for step in (0.1, 0.2):
+        scene.arms[""]._poses[-1, :3] += step
+        visitors._fit(0, client)
+        np.testing.assert_allclose(client.camera.position, scene.tool().position)
+    visitors.give(client, None)
+    visitors._fit(0, client)
+    np.testing.assert_allclose(client.camera.position, scene.work(client.camera.aspect).position)
+    client.camera.position = turned = np.array([9.0, 0.0, 0.0])  # by its person
+    scene.arms[""]._works = np.array(([-1.0] * 3, [1.0] * 3))
+    visitors._fitted[0] = replace(visitors._fitted[0], looked=0.0)
+    visitors._fit(0, client)
+    np.testing.assert_allclose(client.camera.position, turned)
+
+
+class Viewer:
+    """A browser that keeps the camera that it is given."""
+
+    client_id = 0
+
+    def __init__(self) -> None:
+        nowhere = np.zeros(3)
+        self.camera = SimpleNamespace(aspect=1.2, position=nowhere, look_at=nowhere, up_direction=nowhere)
+        self.atomic = nullcontext

@@ -5,15 +5,16 @@ from typing import Any
 import pytest
 
 from desk import Desk
+from teleop_console.inputs import KINDS, LATER, Input, kind_of, parsed, shown, text
 from teleop_console.link import ParameterInfo
 from teleop_console.server import ConsoleServer
-from teleop_console.settings import SettingsPanel, _control, _parsed, _shown, _text
+from teleop_console.settings import SettingsPanel
 from teleop_core.base.parameters import specs, values_of
 from teleop_core.base.plain_yaml import parse
 from teleop_core.graph.layers import declared_groups
 
 MODE, GAIN = ("motion_scaling", "mode"), ("motion_scaling", "fine_gain")
-EVERY = [
+EVERY: list[tuple[str, str, Any]] = [
     (name, spec.name, values_of(group())[spec.name])
     for name, group in declared_groups().items()
     for spec in specs(group)
@@ -24,12 +25,12 @@ EVERY = [
 @pytest.mark.parametrize(("node", "name", "value"), EVERY, ids=[f"{n}.{p}" for n, p, _ in EVERY])
 def test_a_value_that_is_shown_is_read_as_itself(node: str, name: str, value: Any) -> None:
     info = ParameterInfo(node, name, value)
-    read = _parsed(_shown(value), info)
+    read = parsed(shown(value), info)
     assert read == value or read == pytest.approx(value)
 
 
 @pytest.mark.parametrize(
-    ("shown", "present", "wanted"),
+    ("said", "present", "wanted"),
     [
         ("[0.1, 2]", (1.0,), (0.1, 2.0)), ("0.1, 2", (1.0,), (0.1, 2.0)), ("3", (1.0,), (3.0,)),
         ("[a, b]", (), ("a", "b")), ("['a=0.1']", ("b",), ("a=0.1",)), ("[]", (1.0,), ()),
@@ -37,14 +38,14 @@ def test_a_value_that_is_shown_is_read_as_itself(node: str, name: str, value: An
     ],
 )  # fmt: skip
 def test_lists_are_read_as_people_write_them(
-    shown: str | int | bool, present: Any, wanted: float | bool | tuple[str | float, ...] | None
+    said: str | int | bool, present: Any, wanted: float | bool | tuple[str | float, ...] | None
 ) -> None:
-    assert _parsed(shown, ParameterInfo("node", "name", present)) == wanted
+    assert parsed(said, ParameterInfo("node", "name", present)) == wanted
 
 
 @pytest.mark.parametrize("value", [(0.1, 2.0), ("a=0.1", "b"), ("ball at=[0, 1]", "box"), (), True, 3, 0.25, "hold"])
 def test_a_setting_text_is_read_by_the_session_as_the_value(value: Any) -> None:
-    found = parse(_text(value)) if not isinstance(value, bool) else {"True": True}[_text(value)]
+    found = parse(text(value)) if not isinstance(value, bool) else {"True": True}[text(value)]
     assert (tuple(found) if isinstance(found, list) else found) == value
 
 
@@ -60,8 +61,74 @@ def test_a_setting_text_is_read_by_the_session_as_the_value(value: Any) -> None:
 )
 def test_a_label_has_the_unit_that_ends_the_meaning(doc: str, unit: str) -> None:
     with ConsoleServer(0) as server:
-        control = _control(server.viser.gui, "x", ParameterInfo("slave", "x", 1.0, doc))
-        assert control.label == f"x{unit}"
+        control = Input(server.viser.gui, "x", ParameterInfo("slave", "x", 1.0, doc))
+        assert control.parts[0].label == f"x{unit}"
+
+
+def test_every_parameter_has_an_input_of_its_kind_which_shows_its_value_and_all_seven_kinds_are_used() -> None:
+    bounds = {(n, s.name): s for n, group in declared_groups().items() for s in specs(group)}
+    used = set()
+    with ConsoleServer(0) as server:
+        for node, name, value in EVERY:
+            spec = bounds[node, name]
+            info = ParameterInfo(node, name, value, spec.doc, spec.lowest, spec.upper, spec.choices, spec.fixed)
+            control = Input(server.viser.gui, name, info)
+            assert control.value == value or control.value == pytest.approx(value), name
+            assert control.show(value)
+            assert control.kind == "vector" or (LATER in control.parts[0].label) == spec.fixed
+            used.add(control.kind)
+            control.remove()
+    assert used == set(KINDS)
+
+
+@pytest.mark.parametrize(
+    ("value", "more", "kind", "element"),
+    [
+        (True, {}, "switch", "GuiCheckboxHandle"),
+        ("coarse", {"choices": ("coarse", "fine")}, "choice", "GuiDropdownHandle"),
+        (3, {"lower": 1.0, "upper": 9.0}, "whole number", "GuiNumberHandle"),
+        (0.5, {"lower": 0.0, "upper": 2.0}, "slider", "GuiSliderHandle"),
+        (0.5, {"lower": 0.0}, "number", "GuiNumberHandle"),
+        (0.5, {"lower": 0.0, "upper": 1e6}, "number", "GuiNumberHandle"),  # no hand finds 0.5 there
+        ((0.1, 0.2, 0.3), {}, "vector", "GuiNumberHandle"),
+        (tuple([0.1] * 8), {}, "text", "GuiTextHandle"),
+        (("a", "b"), {}, "text", "GuiTextHandle"),
+        ("bags/run_1", {}, "text", "GuiTextHandle"),
+    ],
+)
+def test_seven_kinds_of_values_have_seven_kinds_of_inputs(value: Any, more: Any, kind: str, element: str) -> None:
+    info = ParameterInfo("elsewhere", "x", value, **more)
+    with ConsoleServer(0) as server:
+        control = Input(server.viser.gui, "x", info)
+        assert kind_of(info) == control.kind == kind
+        assert {type(part).__name__ for part in control.parts} == {element}
+        assert control.value == value
+
+
+def test_numbers_of_a_vector_have_the_names_of_axes_or_joints_and_are_set_one_by_one() -> None:
+    desk: Any = Desk()
+    joints = desk.arms[0].robot.joint_names
+    place, gains = ("slave_sim", "world.place"), ("slave_sim", "own.gains")
+    desk.known = {
+        place: ParameterInfo(*place, (0.1, 0.2, 0.3), "place [m]"),
+        gains: ParameterInfo(*gains, (1.0,) * len(joints)),
+    }
+    with ConsoleServer(0) as server:
+        settings = SettingsPanel(server.viser, desk, lambda _: True)
+        settings.refresh()
+        search: Any = settings._search
+        search.value = "slave_sim"
+        settings._show()
+        assert [part.label for part in settings._by_key[place].parts] == ["x", "y", "z"]
+        assert [part.label for part in settings._by_key[gains].parts] == list(joints)
+        y: Any = settings._by_key[place].parts[1]
+        y.value = 0.5
+        settings._changed(0, settings._by_key[place], settings._failed, desk.known[place])
+        assert settings.known[place].value == (0.1, 0.5, 0.3)
+        settings.follow({place: (1.0, 2.0, 3.0)})
+        assert [part.value for part in settings._by_key[place].parts] == [1.0, 2.0, 3.0]
+        settings.follow({place: ()})  # which has no fields
+        assert settings._by_key[place].kind == "text"
 
 
 def test_value_that_a_button_of_the_stylus_changed_is_shown_as_it_is_and_can_be_set_back() -> None:

@@ -156,5 +156,6 @@ def test_verdict_of_a_recording_is_the_one_that_evaluate_gives(tmp_path: Path) -
     score = tc.open_recording(EXAMPLE).score()
     assert by_name["run_1"].verdict == score.verdict.text
     assert by_name["run_1"].is_good == score.verdict.is_good
+    assert "operator random" in by_name["run_1"].about
     assert by_name["broken"].is_good is False
     assert "could not be scored" in by_name["broken"].verdict

@@ -222,6 +222,27 @@ def test_marks_that_were_set_are_ticks_with_their_texts(session: tc.Recording) -
     assert [(tick["time"], tick["text"]) for tick in ticks] == [(pytest.approx(1.5), "here")]
 
 
+def test_marks_of_a_live_session_are_ticks_and_two_arms_have_bands_of_their_own() -> None:
+    arms = tuple(Arm(name, ARM.robot) for name in ("left", "right"))
+    seen = Seen(arms)
+    for tick in range(30):
+        told = {}
+        for arm, state in zip(arms, (State.ENABLED, State.PAUSED), strict=True):
+            numbers = dict.fromkeys(topics.OPERATION, 0.0) | {"state": float(state)}
+            hand = dict.fromkeys(topics.TELEOP_STATE.columns, 0.0) | {"is_following": float(arm.name == "left")}
+            told[arm.name] = ArmView(state=hand, operation=numbers)
+        marks = ((0.5, "needle in"),) if tick > 15 else ()
+        seen.add(View(time=tick / 30.0, arms=told, is_fresh=True, marks=marks))
+    rows, ticks = bands(seen, 0.0, 1.0)
+    assert [(tick["time"], tick["text"]) for tick in ticks] == [(0.5, "needle in")]
+    said = {str(row["row"]): [stretch[2] for stretch in row["stretches"]] for row in rows}  # type: ignore[attr-defined]
+    assert said["left state"] == ["ENABLED"]
+    assert said["right state"] == ["PAUSED"]
+    assert said["left hand"] == ["follows"]
+    assert said["right hand"] == ["rests"]
+    assert {"left/tracking error", "right/tracking error"} <= set(seen.columns)
+
+
 def test_numbers_of_topics_that_no_stage_of_ours_has_are_columns_too(session: tc.Recording) -> None:
     bag: Any = session.bag
     tip = bag.read(topics.SLAVE_MEASURED_CP)

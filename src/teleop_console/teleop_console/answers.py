@@ -45,6 +45,7 @@ class Situation:
         doing: What is going on before there is a session to see; empty once there is.
         chooses: Whether a session is being chosen: the form is shown.
         can_end: Whether what is shown can be ended, which leads back to the form.
+        state: State of all arms in words, for screen readers.
         can_press: Whether a person at the page leads a hand that closes: at a task, or a jaw.
     """
 
@@ -55,6 +56,7 @@ class Situation:
     chooses: bool = False
     can_end: bool = False
     can_press: bool = False
+    state: str = ""
 
 
 class Answers:
@@ -141,13 +143,9 @@ class Answers:
         if len(names) != 1:
             return answer_of(http.HTTPStatus.FORBIDDEN)
         address = urlsplit(request.path)
-        is_strip = address.path in self.strip.paths
-        query = parse_qs(address.query, keep_blank_values=is_strip, max_num_fields=_FIELDS)
-        page = self._pages.get(names[0], -1)
-        if is_strip:
-            status, told = self.strip.answer(address.path, query, page)
-        else:
-            status, told = self.form.answer(address.path, query, page, request.body)
+        asked = self.strip if address.path in self.strip.paths else self.form
+        query = parse_qs(address.query, keep_blank_values=True, max_num_fields=_FIELDS)
+        status, told = asked.answer(address.path, query, self._pages.get(names[0], -1), request.body)
         return answer_of(status, json.dumps(told).encode(), "application/json")
 
     def _stop(self, request: Request) -> Response:

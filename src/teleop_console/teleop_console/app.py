@@ -17,7 +17,7 @@ from teleop_console.scene import Scene
 from teleop_console.server import ConsoleServer
 from teleop_console.settings import Renew
 from teleop_console.start import Wish
-from teleop_console.status import closes, situation
+from teleop_console.status import closes, display_text, situation
 from teleop_console.stylus import Steps, Stylus
 from teleop_console.timeline import Timeline
 from teleop_console.view_tab import Insets, ViewTab, Visitors, theme
@@ -77,8 +77,8 @@ class Console:
                 arms = tuple(arm.name for arm in link.arms)
                 Steps(server.viser, self.stylus, arms, drivers.may_drive)
         with self.panel.view_tab:
-            ViewTab(server.viser, self.scene)
-            Insets(server.viser, self.scene)
+            ViewTab(server.viser, self.scene, self._visitors)
+            self._insets = Insets(server.viser, self.scene)
 
     def _stop(self) -> None:
         self._link.press(is_pressed=True)
@@ -104,6 +104,7 @@ class Console:
         self.stylus.draw(view)
         self.panel.draw(view)
         self.panel.settings.follow(self._link.changes())
+        self._insets.say(display_text(view))
         self._visitors.look()
 
     def _ask(self, is_over: Callable[[], bool]) -> None:
@@ -171,14 +172,17 @@ def splash(server: ConsoleServer) -> Iterator[Callable[[str], None]]:
     _empty(server)
     answers = server.answers
 
+    is_over = threading.Event()
+
     def say(line: str) -> None:
-        if answers.situation.doing:  # else the page is showing something else by now
+        if not is_over.is_set():
             answers.situation = Situation(doing=line)
 
     answers.situation = Situation(doing="starting …")
     try:
         yield say
     finally:
+        is_over.set()
         answers.situation = Situation()
 
 

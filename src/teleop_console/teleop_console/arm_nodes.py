@@ -43,6 +43,7 @@ _AT = 1e-3
 _WORK, _GRIP = 0.05, 0.1  # room on all sides of a tip and of a stylus with its handles [m]
 _GOAL = TASK_STATE.columns.index("goal_x")
 _LEAST_GOAL = 1e-3  # width of a goal as it is drawn [m]
+_NEAR = 0.4  # part of the robot's length about the start of the tip in which an object is framed
 _TOUCH = 0.05  # force of a wall that somebody touches [N]
 
 
@@ -92,6 +93,7 @@ class ArmNodes:
         self.recorded_path: Path | None = None
         self._side, self._count = 0.0, 0
         self.low, self.high = self._room()
+        self._works: Array | None = None
 
     # -- places ----------------------------------------------------------------------------------
 
@@ -112,11 +114,33 @@ class ArmNodes:
         return points.min(axis=0), points.max(axis=0)
 
     def work(self) -> Array:
-        """Corners (16, 3) [m] of where tip and stylus work, in the axes of the page."""
-        hand = self._stand.axes @ REST[:3] + self._stand.origin + np.array([0.0, self._side, 0.0])
-        tip, room = self.begin(), max(_WORK, 0.08 * self.bodies.size)
-        grip = corners(hand - _GRIP, hand + _GRIP)
-        return np.concatenate((grip, corners(tip - room, tip + room)))
+        """Corners (16, 3) [m] of where stylus and tip work, in the axes of the page.
+
+        Those of the tip hold all that it met so far: where it was, fixture, object and goals.
+        """
+        hand = self._stand.axes @ REST[:3] + self._stand.origin
+        tip, room = self._start(), max(_WORK, 0.08 * self.bodies.size)
+        low, high = (tip - room, tip + room) if self._works is None else self._works
+        shift = np.array([0.0, self._side, 0.0])
+        return np.concatenate((corners(hand - _GRIP, hand + _GRIP), corners(low, high))) + shift
+
+    def _meet(self, view: ArmView) -> None:
+        """Let :meth:`work` hold what is known now."""
+        tip, room, reach = self._start(), max(_WORK, 0.08 * self.bodies.size), _NEAR * self.bodies.size
+        points = [self._poses[-1, :3]]
+        if (box := box_of(view.state)) is not None:
+            points += [box[0] - 0.5 * box[1], box[0] + 0.5 * box[1]]
+        if self._goal is not None and self._goal.visible:
+            points.append(np.asarray(self._goal.position))
+        objects = [*self.world.points(), *(np.asarray(block.position) for block in self.jaw.blocks)]
+        points += [np.clip(one, tip - reach, tip + reach) for one in objects]
+        met = np.array(points)
+        before = (tip - room, tip + room) if self._works is None else self._works
+        self._works = np.array((np.minimum(before[0], met.min(axis=0)), np.maximum(before[1], met.max(axis=0))))
+
+    def _start(self) -> Array:
+        """Place (3,) [m] of the tip where it was first measured, in the axes of its base."""
+        return self._poses[-1, :3].copy() if self._begin is None else self._begin
 
     def tip(self) -> Array:
         """Pose (7,) of the tip as it is drawn, in the axes of the page."""
@@ -126,9 +150,7 @@ class ArmNodes:
 
     def begin(self) -> Array:
         """Place (3,) [m] of the tip where it was first measured, in the axes of the page."""
-        place = self.tip()[:3] if self._begin is None else self._begin.copy()
-        place[1] += 0.0 if self._begin is None else self._side
-        return place
+        return self._start() + np.array([0.0, self._side, 0.0])
 
     def turn_master(self, axes: Array) -> None:
         """Let the master stand so that a motion of the stylus and the tip's have one direction.
@@ -161,6 +183,8 @@ class ArmNodes:
         self.world.draw(self._poses[-1][:3], None if push is None else push[:3])
         self.jaw.draw(self._poses[-1], view)
         self._draw_goal(view)
+        if self._begin is not None:
+            self._meet(view)
 
     def _draw_ghost(self, view: ArmView) -> None:
         """Draw the reference posture, every third time: it tells no more than where to."""
@@ -197,6 +221,7 @@ class ArmNodes:
             self._goal = self._server.scene.add_icosphere(
                 f"{self.path}/goal", 0.5, TARGET, subdivisions=2, opacity=0.5, cast_shadow=False
             )
+            self._server.scene.add_label(f"{self.path}/goal/name", "goal")  # it may be within the tool, or small
         if self._goal is None:
             return
         self._goal.visible = is_there

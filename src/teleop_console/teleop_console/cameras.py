@@ -44,6 +44,12 @@ class Camera:
         quaternion_from_rotation(np.stack((x, np.cross(z, x), z), axis=1), out)
         return out
 
+    def is_elsewhere(self, other: "Camera", part: float) -> bool:
+        """Whether it stands, or looks, away from another by more than a part of their distance from what they see."""
+        far = part * float(np.linalg.norm(other.position - other.look_at))
+        away = max(np.linalg.norm(self.position - other.position), np.linalg.norm(self.look_at - other.look_at))
+        return bool(away > far)
+
     def give(self, client: viser.ClientHandle) -> None:
         """Let the browser of one person see from here."""
         with client.atomic():

@@ -9,8 +9,10 @@ import math
 import shlex
 import time
 from collections.abc import Callable, Iterable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import lru_cache
+from pathlib import Path
 
 from teleop_core.base.errors import ParameterError, TeleopError
 from teleop_core.base.parameters import specs
@@ -26,6 +28,7 @@ from teleop_core.graph.layers import (
     parse_setting,
 )
 from teleop_core.robots import ROBOTS, load_robot_set
+from teleop_core.robots.files.urdf_tree import elements_of, root_of
 from teleop_core.session.configuration import Configuration
 from teleop_core.session.length import as_long_as_followed
 from teleop_core.slave.controllers import CONTROLLERS
@@ -106,6 +109,7 @@ _PATHS = {"bag": "operator.bag", "file": "operator.file.path"}  # by operator, w
 START: Chosen = {"operator": PERSON}
 """What is chosen at first."""
 _LONGEST = 500  # characters of a word
+_TASK_TIME = 60.0  # for which a simulated operator works at a task, at least [s]
 _NOTHING = "none"  # word of a field with a stage that does not need the stage
 
 
@@ -138,7 +142,10 @@ def texts(chosen: Chosen) -> tuple[str, ...]:
     except TeleopError:
         return said
     known = () if chosen.get("operator") else (f"operator={made.groups['operator'].kind.kind}",)
-    return (*said, *known, f"{SESSION}.duration={made.groups[SESSION].duration!r}")
+    duration = made.groups[SESSION].duration
+    if chosen.get("task", _NOTHING) != _NOTHING:
+        duration = max(duration, _TASK_TIME)
+    return (*said, *known, f"{SESSION}.duration={duration!r}")
 
 
 def _said(chosen: Chosen) -> tuple[str, ...]:
@@ -179,6 +186,17 @@ def refusal(chosen: Chosen) -> str:
             _REFUSALS.clear()
         _REFUSALS[key] = reason
     return _REFUSALS[key]
+
+
+def tips(chosen: Chosen) -> tuple[str, ...]:
+    """Links of a URDF that carry no other: one of them is the tip; none of another robot, or a file that is none."""
+    file = Path(chosen.get("robot", ""))
+    with suppress(TeleopError, OSError):
+        if file.suffix == ".urdf":
+            root = root_of(file, file.read_bytes())
+            parents = {one.get("link") for one in root.findall("joint/parent")}
+            return tuple(link for link in elements_of(root, "link") if link not in parents)
+    return ()
 
 
 @lru_cache(64)

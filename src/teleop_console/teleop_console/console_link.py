@@ -18,7 +18,8 @@ from std_srvs.srv import Trigger
 
 from teleop_console.link import Arm, ArmView, ParameterInfo, Parameters, Setting, View
 from teleop_console.parameter_client import ParameterClient, ParameterEvents, call
-from teleop_core.bags.messages import Layout, layout, read_any, read_numbers
+from teleop_core.bags.messages import Layout, layout, read_any, read_numbers, read_reports
+from teleop_core.bags.recording import MARKS
 from teleop_core.base.errors import ParameterError, SessionError
 from teleop_core.graph.graph import RECORDER_NAME
 from teleop_core.graph.topics import (
@@ -49,6 +50,8 @@ _SILENCE = 1.0  # after which nothing is fresh [s]
 _PRESS = 0.12  # of a button [s]
 _FRAMES = 512  # samples of a stream that may wait to be seen
 _SCREEN_NS = 33_000_000  # that the page itself takes, as a display does if it is told nothing else [ns]
+_MARKS = 100  # marks that are kept
+_RHYTHM_NS = 3_000_000_000  # over which the frames of a display are counted [ns]
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}")
 
 
@@ -68,6 +71,7 @@ class _Seen:
         self._subscription = Subscription(owner, self._own, self._name, 1)
         self._is_of_slave = topic.name.startswith("slave/")
         self._waiting: deque[tuple[int, int, Array]] = deque(maxlen=_FRAMES)
+        self._frames: deque[tuple[int, int]] = deque(maxlen=_FRAMES)  # when new ones came, and their stamps
 
     def take(self) -> bool:
         """Take the newest sample, for :meth:`show`; whether one came."""
@@ -80,8 +84,19 @@ class _Seen:
         found: Any = self._layout.decode_one(newest) or read_any(self.topic.kind, newest, self._joints)
         if not isinstance(found, tuple) or not np.isfinite(found[1]).all():
             return False  # refused and counted by the nodes that need it
-        self._waiting.append((self._owner.world.time_ns(), found[0], found[1].copy()))
+        now_ns = self._owner.world.time_ns()
+        self._waiting.append((now_ns, found[0], found[1].copy()))
+        if not self._frames or self._frames[-1][1] != found[0]:
+            self._frames.append((now_ns, found[0]))
         return True
+
+    def rhythm(self) -> tuple[float, float]:
+        """New samples in a second, and how late the newest one came [s]; NaN without any of late."""
+        since_ns = self._owner.world.time_ns() - _RHYTHM_NS
+        seen = [frame for frame in self._frames if frame[0] >= since_ns]
+        if len(seen) < 2:
+            return math.nan, math.nan
+        return 1e9 * (len(seen) - 1) / (seen[-1][0] - seen[0][0]), 1e-9 * (seen[-1][0] - seen[-1][1])
 
     def show(self, view: ArmView) -> None:
         """Write what has come into a view, of the slave only what the display shows by now."""
@@ -184,6 +199,7 @@ class LiveLink(Observer):
             ]
             for arm in self.arms
         }
+        self._marks = Subscription(self, MARKS, f"/{self._recorder()}/marks", _MARKS)
         self._hands = {arm.name: _Hand(self, arm.name) for arm in self.arms}
         self._view = View(arms={arm.name: ArmView() for arm in self.arms})
         self._begun = self._heard = _now(self)
@@ -224,7 +240,9 @@ class LiveLink(Observer):
                 self._hear(arm, view.arms[arm.name])
             self._insist(view)
             self._hear_nodes(view)
+            self._hear_marks(view)
             view.time, view.age = now - self._begun, now - self._heard
+            view.display = self._seen[self.arms[0].name][-1].rhythm()  # of the display, which is last
             view.is_fresh = view.age < _SILENCE
             return view
 
@@ -239,6 +257,13 @@ class LiveLink(Observer):
             found = read_numbers(taken.data, TELEOP_STATE.columns)
             if isinstance(found, tuple):
                 view.state = dict(zip(TELEOP_STATE.columns, map(float, found[1]), strict=True))
+
+    def _hear_marks(self, view: View) -> None:
+        while (taken := self._marks.take()) is not None:
+            with suppress(ValueError):  # bytes that are no report
+                for mark in read_reports(taken.data):
+                    ago = 1e-9 * (self.world.time_ns() - mark.stamp_ns)
+                    view.marks = (*view.marks, (_now(self) - self._begun - ago, mark.message))[-_MARKS:]
 
     def _hear_nodes(self, view: View) -> None:
         if not self.take():
@@ -322,6 +347,10 @@ class LiveLink(Observer):
         """Close the jaw of all hands so far: 0 open, 1 closed."""
         for hand in self._hands.values():
             hand.close_jaw(share)
+
+    def mark(self) -> tuple[bool, str]:
+        """Mark that something happens now; whether it was noted in the recording, and as what."""
+        return self._trigger(f"/{self._recorder()}/mark")
 
     def save(self, name: str) -> Path:
         """Close the recording under a name and go on recording; returns where it is.

@@ -60,6 +60,8 @@ class View:
         delay: Median and 99th percentile from master sample to slave command [s]; NaN if unknown.
         rate: Ticks of the slave in a second; NaN if unknown.
         age: Time since the newest sample that is shown came [s]; NaN if unknown.
+        marks: Times [s] and texts of the marks that somebody set while this page looked.
+        display: Frames a second of the operator's display, and how late they are [s]; NaN without one.
         recording: Where it is being recorded; None if it is not.
         run: Number of recordings that were saved in this session.
     """
@@ -71,6 +73,8 @@ class View:
     delay: tuple[float, float] = (float("nan"), float("nan"))
     rate: float = float("nan")
     age: float = float("nan")
+    marks: tuple[tuple[float, str], ...] = ()
+    display: tuple[float, float] = (float("nan"), float("nan"))
     recording: Path | None = None
     run: int = 0
 
@@ -146,6 +150,9 @@ class Link(Protocol):
 
     def close_jaw(self, share: float) -> None:
         """Close the jaw of all hands so far: 0 open, 1 closed; to close it presses at a task's goal."""
+
+    def mark(self) -> tuple[bool, str]:
+        """Mark that something happens now; whether it was noted in the recording, and as what."""
 
     def save(self, name: str) -> Path:
         """Close the recording under a name and go on recording; returns where it is.

@@ -73,7 +73,7 @@ _STYLE = """\
 @media (prefers-color-scheme: dark) { :root.t-choosing { DARK_VARIABLES; color-scheme: dark; } }
 body { font: var(--t-text)/1.45 system-ui, -apple-system, "Segoe UI", Roboto, sans-serif; }
 .t-status { padding: 4px 14px; color: var(--t-color-text); font-size: var(--t-small);
-  box-sizing: border-box; height: 140px; overflow-y: auto; overflow-wrap: anywhere;
+  box-sizing: border-box; height: 166px; overflow-y: auto; overflow-wrap: anywhere;
   line-height: 18px;
   border-bottom: 1px solid var(--t-color-line); margin-bottom: 6px; }
 .t-role { margin: 8px 14px 0; font-weight: 600; }
@@ -99,18 +99,23 @@ body { font: var(--t-text)/1.45 system-ui, -apple-system, "Segoe UI", Roboto, sa
   background: var(--t-stop); color: #fff; }
 #t-banner b { font-weight: 700; margin-right: 0.6em; }
 .t-says #t-banner { display: block; }
+#root button[style*="color-gray-filled"] { background: var(--t-color-ground); color: var(--t-color-text);
+  border: 1px solid var(--t-color-field); }
+#root button[style*="color-gray-filled"]:disabled { color: var(--t-color-muted); border-color: var(--t-color-line); }
+.t-spoken { position: absolute; width: 1px; height: 1px; margin: 0; overflow: hidden; clip-path: inset(50%); }
 .t-stopped #t-stop { background: #fff; color: var(--t-stop); border: 3px solid var(--t-stop); }
 .t-stopped canvas { filter: grayscale(0.85) opacity(0.7); }
 @media (prefers-reduced-motion: reduce) { *, *::before, *::after {
   animation-duration: 1ms !important; transition-duration: 1ms !important; scroll-behavior: auto !important; } }
 @media (max-width: 575px) {
-  #t-safety { left: 0; right: 0; top: 0; bottom: auto; width: auto; }
-  #t-stop { border-radius: 0; width: 100%; }
+  #t-safety { left: 0; right: 0; top: 0; bottom: auto; width: auto; pointer-events: none; }
+  #t-safety > * { order: 1; pointer-events: auto; } #t-press { margin: 0 8px; }
+  #t-stop { border-radius: 0; width: 100%; order: 0; }
   #t-banner { top: 56px; font-size: var(--t-text); }
   #root .mantine-Paper-root[style*="position: fixed"] { max-height: 46% !important; }
   #root .mantine-Paper-root[style*="position: fixed"], #root [style*="width: 20em"] {
     width: 100% !important; }
-  .t-status { height: auto; max-height: 140px; }
+  .t-status { height: auto; max-height: 166px; }
 }
 """
 

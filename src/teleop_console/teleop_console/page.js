@@ -23,6 +23,9 @@
   stop.title = 'stops all arms at once; the space key too';
   banner.id = 't-banner'; banner.setAttribute('role', 'alert');
   starting.setAttribute('role', 'status');
+  stop.setAttribute('aria-keyshortcuts', 'Space');
+  const spoken = document.createElement('p'); // what a screen reader says of the arms
+  spoken.className = 't-spoken'; spoken.setAttribute('role', 'status');
   const hand = document.createElement('button');
   hand.id = 't-press'; hand.type = 'button'; hand.textContent = 'Press or grip (hold J)'; hand.hidden = true;
   safety.append(hand, stop);
@@ -45,6 +48,7 @@
       strong.textContent = head;
       banner.replaceChildren(strong, text);
     }
+    if (spoken.textContent !== (shown.state || '')) spoken.textContent = shown.state || '';
     stop.hidden = !shown.can_stop;
     hand.hidden = !shown.can_press || !shown.drives;
     starting.textContent = shown.doing;
@@ -90,7 +94,7 @@
 
   const types = (element) => element.closest && element.closest(
     'input:not([type=checkbox]):not([type=radio]):not([type=range]), textarea, [contenteditable=true]');
-  document.documentElement.append(banner, safety, starting); // before the page has a body
+  document.documentElement.append(banner, safety, starting, spoken); // before the page has a body
   show();
   stop.addEventListener('pointerdown', press);
   stop.addEventListener('click', press);

@@ -74,6 +74,7 @@ class Panel:
             self._name = self._gui.add_text("name", "run_1", hint="letters, digits, . _ -")
             self._button("Save as", "closes the recording under this name", self._save)
             self._saved = self._gui.add_markdown("")
+            self._button("Mark", "notes in the recording, and on the timeline, that something happens now", self._mark)
         self._told = self._gui.add_markdown("")
 
     def _add_controls(self, folder: str) -> None:
@@ -141,6 +142,10 @@ class Panel:
             self._name.value = _next_name(self._name.value)  # type: ignore[misc]
         except TeleopError as error:
             self._saved.content = f"⚠ {html.escape(str(error))}"
+
+    def _mark(self, client: int) -> None:
+        is_noted, text = self._link.mark()
+        self._saved.content = f"{'' if is_noted else '⚠ '}{html.escape(text)}"
 
     def _begin_scores(self) -> None:
         for name in self.scores:

@@ -151,6 +151,7 @@ class Seen(Past):
         self._arms = {arm.name: arm for arm in arms}
         self.joints = {arm.name: arm.robot.joint_names for arm in arms}
         self._lock = threading.Lock()
+        self._marks: tuple[tuple[float, str], ...] = ()
         self._times, self._rings, self._count = np.full(ROWS, np.nan), dict[tuple[str, str], Array](), 0
         self.columns = {below(arm.name, ERROR): Column("", 0, "m") for arm in arms} | {DELAY: Column(DELAY, 0, "s")}
 
@@ -162,6 +163,7 @@ class Seen(Past):
                 self._count = 0
             if not view.is_fresh or (self._count and view.time == last):
                 return
+            self._marks = view.marks
             row, self._count = self._count % ROWS, self._count + 1
             self._times[row] = view.time
             for ring in self._rings.values():
@@ -170,6 +172,10 @@ class Seen(Past):
             for arm, seen in view.arms.items():
                 for topic, values in _values(seen):
                     self._ring(arm, topic, len(values))[row] = values
+
+    def marks(self) -> Sequence[tuple[float, str]]:
+        """Times [s] and texts of the marks that somebody set."""
+        return self._marks
 
     def _ring(self, arm: str, topic: str, width: int) -> Array:
         """Rows of a topic, with its columns noted when it is new."""

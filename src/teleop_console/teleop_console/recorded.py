@@ -204,6 +204,10 @@ class RecordedLink:
     def close_jaw(self, share: float) -> None:
         """Nothing."""
 
+    def mark(self) -> tuple[bool, str]:
+        """Refused."""
+        return False, _REFUSED
+
     def save(self, name: str) -> Path:
         """Refused.
 

@@ -6,10 +6,11 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from teleop_core.base.errors import ParameterError
+from teleop_core.base.errors import ParameterError, TeleopError
 
 _MOST = 50
 """Recordings that are listed."""
@@ -115,7 +116,7 @@ class Recordings:
         if process.poll() is None:
             return
         self._judging = None
-        self._known[entry.name, entry.made] = _judged(entry, out)
+        self._known[entry.name, entry.made] = _judged(self._folder, entry, out)
         shutil.rmtree(out.parent)
 
 
@@ -123,11 +124,26 @@ def _program() -> list[str]:
     return ["nice", "-n", "15", sys.executable, "-m", "teleop_core.cli"]
 
 
-def _judged(entry: Entry, out: Path) -> Entry:
+def _operator(path: Path) -> list[str]:
+    """Kind of the first arm's operator; none where that is not told."""
+    from teleop_console.recorded_arms import configuration_of  # costly for a command that only lists itself
+    from teleop_core.bags.reader import Bag
+
+    with suppress(TeleopError):
+        configuration = configuration_of(Bag(path))
+        return [] if configuration is None else [str(configuration.groups["operator"].kind.kind)]
+    return []
+
+
+def _judged(folder: Path, entry: Entry, out: Path) -> Entry:
     """Entry with what a score says; one that could not be scored says so."""
     if not out.is_file():
         return Entry(entry.name, entry.made, "", "could not be scored: teleop evaluate", False)
     score = json.loads(out.read_text(encoding="utf-8"))[0]
     session, verdict = score["session"], score["verdict"]
-    told = [str(session[key]) for key in ("scenario", "robot", "operator") if session.get(key)]
+    told = [str(session[key]) for key in ("scenario", "robot") if session.get(key)]
+    told += [f"operator {kind}" for kind in _operator(folder / entry.name)]
+    if (task := score["task"])["attempts"]:
+        took = f", {task['time_s']:.1f} s each" if task["successes"] and task["time_s"] is not None else ""
+        told.append(f"{task['successes']:g} of {task['attempts']:g} attempts reached their goal{took}")
     return Entry(entry.name, entry.made, " · ".join(told), verdict["text"], verdict["worst"] is None)

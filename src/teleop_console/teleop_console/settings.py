@@ -1,17 +1,14 @@
 """Settings: every parameter of the session as a control, with its unit, bounds and meaning."""
 
-import ast
+import threading
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from functools import cache
-from typing import Any
 
 import viser
 
+from teleop_console.inputs import LATER, Input, default_of, form, text
 from teleop_console.link import Link, ParameterInfo, Parameters, Setting
 from teleop_core.base.errors import TeleopError
-from teleop_core.base.parameters import specs
-from teleop_core.graph.layers import declared_groups
 
 QUICK = (
     ("motion_scaling", "mode"), ("motion_scaling", "coarse_gain"), ("motion_scaling", "fine_gain"),
@@ -66,8 +63,9 @@ class SettingsPanel:
         self._folder = self._gui.add_folder("values")
         reset = self._gui.add_button("Reset these", hint="to the defaults", color="gray")
         self._failed = self._gui.add_markdown("", visible=False)
-        self._by_key: dict[tuple[str, str], Any] = {}
-        self._controls: list[viser.GuiInputHandle | viser.GuiMarkdownHandle] = []  # type: ignore[type-arg]
+        self._by_key: dict[tuple[str, str], Input] = {}
+        self._controls: list[Input | viser.GuiMarkdownHandle] = []
+        self._changing = threading.Lock()
         with self._gui.add_folder("fixed while it runs", visible=False) as self._pending:
             self._list = self._gui.add_markdown("")
             begin = self._gui.add_button("New session with these", color="blue")
@@ -96,7 +94,8 @@ class SettingsPanel:
             return len(before) > len(self._of_session)
         groups = sorted({_group(*key) for key in self.known})
         self._choice.options = (_USED, *groups)
-        self._told.content = f"{len(self.known)} parameters; hover over one for its meaning, bounds and default"
+        about = "hover over one for its meaning, bounds and default"
+        self._told.content = f"{len(self.known)} parameters; {about}. {LATER} takes a new session"
         self._show()
         return False
 
@@ -108,8 +107,8 @@ class SettingsPanel:
         new = {key: replace(self.known[key], value=value) for key, value in known.items()}
         self._know({**self.known, **new})
         for key, value in known.items():
-            if (control := self._by_key.get(key)) is not None and control.value != _shown(value):
-                control.value = _shown(value)
+            if (control := self._by_key.get(key)) is not None and not control.show(value):
+                self._show()
 
     def _know(self, known: Parameters) -> None:
         self.known = known
@@ -131,7 +130,7 @@ class SettingsPanel:
         return [key for key in keys if self._is_changed(key)] if self._only.value else keys
 
     def _is_changed(self, key: tuple[str, str]) -> bool:
-        default = _default(*key)
+        default = default_of(*key)
         return default is not None and default != self._wanted.get(key, self.known[key].value)
 
     def _show(self) -> None:
@@ -150,7 +149,7 @@ class SettingsPanel:
         """Set what is shown to the defaults, as far as the nodes take them."""
         failed = [] if self._may(client) else ["you watch; take control first"]
         for key in () if failed else [key for key in self._by_key if self._is_changed(key)]:
-            if refusal := self._set(self.known[key], _default(*key)):  # type: ignore[arg-type]
+            if refusal := self._set(self.known[key], default_of(*key)):  # type: ignore[arg-type]
                 failed.append(f"{'.'.join(key)}: {refusal}")
         self._failed.content, self._failed.visible = "⚠ " + "; ".join(failed), bool(failed)
         self._show()
@@ -160,26 +159,34 @@ class SettingsPanel:
         label = info.name.rpartition(".")[2] if not with_node else info.name
         arm = info.node.rpartition("/")[0]
         wanted = self._wanted.get((info.node, info.name), info.value)
-        control = _control(self._gui, f"{arm} {label}".strip(), replace(info, value=wanted))
+        control = Input(self._gui, f"{arm} {label}".strip(), replace(info, value=wanted), self._joints(info))
         why = self._gui.add_markdown("", visible=False)
         key = info.node, info.name
         self._controls += [control, why]
         self._by_key[key] = control
 
-        @control.on_update
-        def _(event: viser.GuiEvent) -> None:  # type: ignore[type-arg]
-            shown = self._wanted.get(key, self.known[key].value)
-            if event.client_id is None or control.value == _shown(shown):
+        control.on_change(lambda client: self._changed(client, control, why, info))
+
+    def _changed(self, client: int | None, control: Input, why: viser.GuiMarkdownHandle, info: ParameterInfo) -> None:
+        """Set what an input shows now: of a slider that is pulled, the last value is set last."""
+        key = info.node, info.name
+        with self._changing:
+            before, value = self._wanted.get(key, self.known[key].value), control.value
+            if client is None or value == before:
                 return
-            value = _parsed(control.value, info)
-            refusal = "" if value is not None else f"{control.value!r} is no {_form(info)}"
-            if not refusal and not self._may(event.client_id):
+            refusal = "" if value is not None else f"{control.said!r} is no {form(info)}"
+            if not refusal and not self._may(client):
                 refusal = "you watch; take control first"
             if not refusal and value is not None:
                 refusal = self._set(info, value)
             why.content, why.visible = f"⚠ {refusal}", bool(refusal)
             if refusal:
-                control.value = _shown(shown)
+                control.show(before)
+
+    def _joints(self, info: ParameterInfo) -> tuple[str, ...]:
+        """Names of the joints of the arm that a parameter is of."""
+        namespace = info.node.rpartition("/")[0]
+        return next((arm.robot.joint_names for arm in self._link.arms if arm.name == namespace), ())
 
     def _set(self, info: ParameterInfo, value: Setting) -> str:
         key = info.node, info.name
@@ -189,121 +196,24 @@ class SettingsPanel:
                 self._know({**self.known, key: replace(self.known[key], value=value)})
             return refusal
         if self._renew is None:
-            return f"fixed while it runs: start it with --set {info.name}={_text(value)}"
+            return f"fixed while it runs: start it with --set {info.name}={text(value)}"
         self._wanted[key] = value
         self._tell_pending()
         return ""
 
     def _tell_pending(self, refusal: str = "") -> None:
-        lines = [f"- `{n}.{p}` = {_text(v)}" for (n, p), v in self._wanted.items()]
+        lines = [f"- `{n}.{p}` = {text(v)}" for (n, p), v in self._wanted.items()]
         lines += [f"\n⚠ {refusal}"] if refusal else []
         self._list.content, self._pending.visible = "\n".join(lines), True
 
     def _begin(self, client: int | None) -> None:
         if self._renew is None:
             return
-        texts = tuple(f"{n}.{p}={_text(v)}" for (n, p), v in self._wanted.items())
+        texts = tuple(f"{n}.{p}={text(v)}" for (n, p), v in self._wanted.items())
         is_allowed = self._may(client)
         self._tell_pending(self._renew(texts) if is_allowed else "you watch; take control first")
-
-
-@cache
-def _defaults() -> Mapping[tuple[str, str], Any]:
-    return {(stage, spec.name): spec.default for stage, group in declared_groups().items() for spec in specs(group)}
-
-
-def _default(node: str, name: str) -> Setting | None:
-    """Default of a parameter of a known stage; None of others, and where there is none."""
-    return _defaults().get((node.rpartition("/")[2], name))
 
 
 def _group(node: str, name: str) -> str:
     """Stage and group of a parameter, as the choice shows it."""
     return " · ".join(filter(None, (node, name.rpartition(".")[0])))
-
-
-def _shown(value: Setting) -> bool | int | float | str:
-    """Value as a control shows it: lists as text."""
-    if not isinstance(value, tuple):
-        return value
-    words = [f"{one:g}" if isinstance(one, float) else str(one) for one in _words(value)]
-    return f"[{', '.join(words)}]"
-
-
-def _text(value: Setting) -> str:
-    """Value as ``--set`` takes it."""
-    if not isinstance(value, tuple):
-        return str(value)
-    return f"[{','.join(map(str, _words(value)))}]"
-
-
-def _words(values: tuple[float | str, ...]) -> list[float | str]:
-    """Numbers as they are; texts in quotes if one of them would fall apart in a list without."""
-    is_quoted = any(isinstance(one, str) and set(one) & set(",[]()'\"") for one in values)
-    return [repr(one) if is_quoted and isinstance(one, str) else one for one in values]
-
-
-def _form(info: ParameterInfo) -> str:
-    if isinstance(info.value, tuple):
-        return "list such as [0.1, 0.2]"
-    return {bool: "yes or no", int: "whole number", float: "number"}.get(type(info.value), "text")
-
-
-def _parsed(shown: object, info: ParameterInfo) -> Setting | None:
-    """Value that a control shows, of the parameter's type; None if it is none."""
-    if isinstance(info.value, bool):
-        return bool(shown)
-    if isinstance(info.value, tuple):
-        return _list(str(shown), info.value)
-    if isinstance(info.value, int | float):
-        assert isinstance(shown, int | float)
-        return int(shown) if isinstance(info.value, int) else float(shown)
-    return str(shown)
-
-
-def _list(text: str, like: tuple[object, ...]) -> Setting | None:
-    """Tuple of a text ``[1, 2]`` or ``[a, b]``; of numbers where the present one has numbers."""
-    try:
-        found = ast.literal_eval(text)
-    except (ValueError, SyntaxError):
-        words = text.strip().strip("[]()").split(",")
-        found = tuple(word.strip() for word in words if word.strip())
-    if not isinstance(found, list | tuple):
-        found = (found,)
-    if like and isinstance(like[0], float):
-        numbers = [float(one) for one in found if isinstance(one, int | float)]
-        return tuple(numbers) if len(numbers) == len(found) else None
-    return tuple(found)
-
-
-def _control(gui: viser.GuiApi, label: str, info: ParameterInfo) -> Any:
-    bounds = ""
-    if info.lower is not None or info.upper is not None:
-        low = "−∞" if info.lower is None else f"{info.lower:g}"
-        bounds = f" ({low} to {'∞' if info.upper is None else f'{info.upper:g}'})"
-    default = _default(info.node, info.name)
-    bounds += "" if default is None else f"; default {_shown(default)}"
-    hint = f"{info.doc}{bounds}" + (" — takes effect in a new session" if info.is_fixed else "")
-    value, label = _shown(info.value), f"{label}{_unit(info.doc)}"
-    if isinstance(value, bool):
-        return gui.add_checkbox(label, value, hint=hint)
-    if info.choices and not isinstance(info.value, tuple):
-        options = info.choices if value in info.choices else (str(value), *info.choices)
-        return gui.add_dropdown(label, options, initial_value=str(value), hint=hint)
-    if isinstance(value, int | float):
-        step = 1 if isinstance(value, int) else _step(value)
-        return gui.add_number(label, value, step=step, hint=hint)
-    return gui.add_text(label, str(value), hint=hint)
-
-
-def _unit(doc: str) -> str:
-    """Unit in brackets as it ends a meaning, with a space before it; empty without one."""
-    _, bracket, unit = doc.rpartition(" [")
-    return f"{bracket}{unit}" if unit.endswith("]") else ""
-
-
-def _step(value: float) -> float:
-    """A twentieth of a value, in a round number."""
-    if value == 0.0:
-        return 0.001
-    return float(f"{abs(value) / 20.0:.0e}")

@@ -26,7 +26,7 @@
   const one = (selector) => page.querySelector(selector);
   const made = (kind, text = '', more = {}) => Object.assign(document.createElement(kind), { textContent: text }, more);
   const fields = {}, picked = new Set();
-  let chosen = null, drives = false, open = false, busy = false, shownList = '';
+  let followed, tip, chosen = null, drives = false, open = false, busy = false, shownList = '';
 
   async function ask(path, words = [], body) {
     const answer = await fetch(`${path}?${new URLSearchParams(words)}`, {
@@ -38,17 +38,21 @@
 
   function field({ name, label, options }) {
     const row = made('label', label, { className: 't-field' });
-    const select = made('select');
+    const select = made('select', '', { name });
     const why = made('span', '', { className: 't-why' });
-    select.addEventListener('change', () => { chosen = { ...chosen, [name]: select.value }; look(); });
+    select.addEventListener('change', () => choose(name, select.value));
     row.append(select, why);
     one('.t-fields').append(row);
-    if (name === 'robot') {
+    if (name === 'robot') { // with a file of one's own, and the link at its tip
       const own = made('label', 'Its URDF', { className: 't-field' });
       const file = made('input', '', { type: 'file', accept: '.urdf' });
       file.addEventListener('change', () => keep(file.files[0]));
       own.append(file); one('.t-fields').append(own);
+      tip = text('tip', 'Tip', 'link of the URDF at its tip');
+      tip.links = made('datalist', '', { id: 't-tips' }); tip.row.append(tip.links);
+      tip.input.setAttribute('list', 't-tips');
     }
+    if (name === 'operator') followed = text('followed', 'Follows', 'recording or CSV file on this machine');
     return fields[name] = { select, why, known: '' };
   }
 
@@ -56,12 +60,18 @@
   function text(name, label, hint) {
     const row = made('label', label, { className: 't-field' });
     const input = made('input', '', { placeholder: hint, type: 'text', maxLength: 500 });
-    input.addEventListener('change', () => { chosen = { ...chosen, [name]: input.value.trim() }; look(); });
+    input.addEventListener('change', () => choose(name, input.value.trim()));
     row.append(input);
     one('.t-fields').append(row);
     return { row, input };
   }
-  let followed, tip;
+
+  function choose(name, word) {
+    chosen = { ...chosen, [name]: word };
+    one('#t-begin').disabled = true; // until the answer says that these words go together
+    one('footer .t-why').textContent = 'checking …';
+    look();
+  }
 
   function show(told) {
     chosen = chosen || told.chosen;
@@ -76,10 +86,9 @@
       known.select.value = chosen[name] || '';
       known.select.disabled = !drives;
     }
-    followed ||= text('followed', 'Follows', 'recording or CSV file on this machine');
-    tip ||= text('tip', 'Tip', 'link of the URDF at its tip');
     followed.row.hidden = !['bag', 'file'].includes(chosen.operator);
     tip.row.hidden = !/[./]/.test(chosen.robot || '');
+    tip.links.replaceChildren(...told.tips.map((value) => made('option', '', { value })));
     one('.t-command').textContent = told.command;
     one('footer .t-why').textContent = told.refusal && `Cannot start: ${told.refusal}`;
     one('#t-begin').disabled = Boolean(told.refusal) || !drives;
@@ -97,6 +106,7 @@
       shownList = said;
       one('.t-list').replaceChildren(...recordings.map(({ name, made: at, about, verdict, is_good }) => {
         const item = made('li'), row = made('label'), box = made('input', '', { type: 'checkbox', checked: picked.has(name) });
+        box.addEventListener('keydown', ({ key }) => { if (key === 'Enter') box.click(); }); // space is the stop
         box.addEventListener('change', () => { picked[box.checked ? 'add' : 'delete'](name); acts(); });
         const mark = is_good === null ? ['idle', '…', 'being scored'] : is_good ? ['good', '✓', verdict] : ['held', '!', verdict];
         const text = made('span');
@@ -114,7 +124,7 @@
     one('[data-act=replay]').disabled = one('[data-act=export]').disabled = count !== 1 || !drives || busy;
     one('[data-act=score]').disabled = !count || !drives || busy;
     one('[data-act=score]').textContent = count > 1 ? 'Compare' : 'Score';
-    one('.t-hint').textContent = count ? '' : 'Tick one, or several to compare.';
+    one('.t-hint').textContent = count ? '' : 'Tick one (by keys: Enter), or several to compare.';
   }
 
   async function look() {
@@ -128,6 +138,10 @@
   async function act(path, words) {
     const [ok, told] = await ask(path, words);
     if (!ok) one('footer .t-why').textContent = told;
+    else if (path === 'begin' || path === 'show') {
+      one('#t-begin').disabled = true; // the page follows in a moment
+      one('footer .t-why').textContent = 'starting …';
+    }
     else if (path === 'run') await look();
   }
 

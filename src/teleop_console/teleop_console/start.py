@@ -166,6 +166,7 @@ class StartPage:
         return {
             "chosen": chosen,
             "fields": fields,
+            "tips": choices.tips(chosen),
             "refusal": choices.refusal(chosen),
             "command": choices.command_line(chosen),
             "is_repeat": chosen == self._last,

@@ -42,7 +42,9 @@ def situation(view: View) -> Situation:
         if arm.operation
     )
     text = _PRESSED if is_pressed else _RELEASED if is_latched else ""
-    return Situation(can_stop=True, is_stopped=is_pressed or is_latched, text=text)
+    arms = ((name, arm.operation_text) for name, arm in view.arms.items() if arm.operation_text)
+    state = "; ".join(f"{name} {words}".strip() for name, words in arms)
+    return Situation(can_stop=True, is_stopped=is_pressed or is_latched, text=text, state=state)
 
 
 def alive(view: View) -> dict[str, bool]:
@@ -104,8 +106,15 @@ def facts(view: View) -> str:
         (view.rate, f"{view.rate:.0f} ticks/s"),
         (view.delay[0], f"command {1e3 * view.delay[0]:.1f} ms old"),
         (view.age, f"picture {1e3 * view.age:.0f} ms old"),
+        (view.display[1], f"display {display_text(view)}"),
     )
     return " · ".join(text for value, text in told if math.isfinite(value))
+
+
+def display_text(view: View) -> str:
+    """Rate and delay of the operator's display; empty without one."""
+    rate, late = view.display
+    return f"{rate:.0f} Hz, {1e3 * late:.0f} ms late" if math.isfinite(late) else ""
 
 
 def mode_text(arm: ArmView) -> str:

@@ -18,7 +18,7 @@ from teleop_console.past import ERROR, Past, Seen
 from teleop_console.recorded import RecordedLink
 from teleop_console.recorded_past import Recorded
 from teleop_console.recordings import Recordings
-from teleop_console.start import Query, Told
+from teleop_console.start import Body, Query, Told
 from teleop_core.bags.reader import Bag
 from teleop_core.base.errors import ParameterError, TeleopError
 from teleop_core.graph.topics import TELEOP_STATE
@@ -45,9 +45,12 @@ class Timeline:
 
     def __init__(self, link: Link, clock: Callable[[], float] = time.monotonic) -> None:
         self._link, self._clock = link, clock
-        self._replay = link if isinstance(link, RecordedLink) else None
-        self._seen = None if self._replay else Seen(link.arms)
-        self._past: Past = self._replay.past if self._replay else self._seen  # type: ignore[assignment]
+        self._past: Past
+        self._replay, self._seen = None, None
+        if isinstance(link, RecordedLink):
+            self._replay, self._past = link, link.past
+        else:
+            self._seen = self._past = Seen(link.arms)
         self._over: Recorded | None = None
         self._over_name, self._align = "", _ALIGNMENTS[0]
         self._wanted = (0.0, -math.inf)  # time, and until when
@@ -237,14 +240,16 @@ class StripPage:
         self.shown: Timeline | None = None
         self._drivers = drivers
 
-    def answer(self, path: str, query: Query, page: int) -> Told:
+    def answer(self, path: str, query: Query, page: int, body: Body = bytes) -> Told:
         """Answer to a request.
 
         Args:
             path: One of :attr:`paths`.
             query: Its words; of all but ``name`` the first counts.
             page: Page that asks.
+            body: Not asked for.
         """
+        del body
         shown, names = self.shown, query.get("name", ())
         if shown is None:
             return http.HTTPStatus.OK, {}

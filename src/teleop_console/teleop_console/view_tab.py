@@ -8,6 +8,7 @@ further picture each, so they are off at first and rare.
 import threading
 import time
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 import viser
@@ -25,15 +26,16 @@ class ViewTab:
     Args:
         server: The page.
         scene: What they control.
+        visitors: Whose cameras are moved.
     """
 
-    def __init__(self, server: Server, scene: Scene) -> None:
-        self._server, self._scene = server, scene
+    def __init__(self, server: Server, scene: Scene, visitors: "Visitors") -> None:
+        self._server, self._scene, self._visitors = server, scene, visitors
         gui = server.gui
         with gui.add_folder("camera"):
-            self._camera("Work", "tips and styli, as near as they fit", scene.work)
+            self._camera("Work", "styli, and all that the tips have met: fixtures, objects, goals", None)
             self._camera("Whole", "all arms and their masters", scene.whole)
-            self._camera("From the tool", "as the tool of the first arm sees it now", scene.tool)
+            self._camera("From the tool", "goes with the first arm's tool until another is chosen", scene.tool, True)
             self._camera("Microscope", "fixed, over where the tip starts", scene.microscope)
         with gui.add_folder("show"):
             self._box("frames", False, scene.show_frames, "axes of all bodies")
@@ -41,14 +43,14 @@ class ViewTab:
             self._box("paths", True, scene.show_tails, "of the tip, wanted and measured, 10 s")
             self._box("dark", False, self._darken, "dark page")
 
-    def _camera(self, label: str, hint: str, find: Callable[[], Camera]) -> None:
+    def _camera(self, label: str, hint: str, find: Callable[[], Camera] | None, is_riding: bool = False) -> None:
         button = self._server.gui.add_button(label, hint=hint, color="gray")
         self._server.make_public(button)
 
         @button.on_click
         def _(event: viser.GuiEvent[viser.GuiButtonHandle]) -> None:
             if event.client is not None:
-                find().give(event.client)
+                self._visitors.give(event.client, find, is_riding=is_riding)
 
     def _box(self, label: str, is_on: bool, show: Callable[[bool], None], hint: str) -> None:
         box = self._server.gui.add_checkbox(label, is_on, hint=hint)
@@ -92,6 +94,14 @@ class Insets:
             self._is_on = gui.add_checkbox("show", False, hint="twice a second, rendered by one of the browsers")
             self._images = {name: gui.add_image(blank, label=name, visible=False) for name in self._cameras}
         self._is_on.on_update(lambda event: self.show(event.target.value))
+        self._told = ""
+
+    def say(self, display: str) -> None:
+        """Say with the pictures how often and how late the operator's display shows the slave; empty without one."""
+        if display != self._told:
+            self._told = display
+            for name, image in self._images.items():
+                image.label = " · ".join(filter(None, (name, display and f"display {display}")))
 
     def show(self, is_shown: bool) -> None:
         """Begin with pictures, or end with them."""
@@ -128,6 +138,34 @@ class Insets:
 
 
 _SETTLING = 4.0  # until a window has its panel beside it [s]
+_LOOK = 1.0  # between looks whether the work has grown out of the picture [s]
+_GROWN, _STILL = 0.08, 1e-4  # parts of its distance by which a camera is elsewhere: for a new view, for a ride
+
+
+@dataclass(frozen=True)
+class _Fit:
+    """What the camera of a browser shows.
+
+    Attributes:
+        since: When it came [s].
+        aspect: Width over height of its picture.
+        looked: When its picture was last compared with the work [s].
+        camera: What it was given.
+        is_own: Whether its person has chosen another view than the work.
+    """
+
+    since: float
+    aspect: float = 0.0
+    looked: float = 0.0
+    camera: Camera | None = None
+    is_own: bool = False
+
+
+def _is_moved(client: viser.ClientHandle, given: Camera) -> bool:
+    """Whether a person has turned the camera since it was given."""
+    camera = client.camera
+    now = Camera(np.asarray(camera.position), np.asarray(camera.look_at), given.up)
+    return now.is_elsewhere(given, _GROWN)
 
 
 class Visitors:
@@ -143,7 +181,8 @@ class Visitors:
     def __init__(self, server: viser.ViserServer, drivers: Drivers, scene: Scene, *, is_live: bool) -> None:
         self._server, self._drivers, self._scene, self._is_live = server, drivers, scene, is_live
         self._lines: dict[int, viser.GuiHtmlHandle] = {}
-        self._fitted: dict[int, tuple[float, float]] = {}  # since when, for which picture
+        self._fitted: dict[int, _Fit] = {}
+        self._riding: dict[int, Callable[[], Camera]] = {}
 
     def look(self) -> None:
         """Welcome who has come, and tell everybody whether he drives or watches."""
@@ -157,6 +196,24 @@ class Visitors:
                 self._lines[number].content = text
         for number in self._lines.keys() - clients.keys():
             del self._lines[number], self._fitted[number]
+            self._riding.pop(number, None)
+
+    def give(self, client: viser.ClientHandle, find: Callable[[], Camera] | None, *, is_riding: bool = False) -> None:
+        """Let a browser see from somewhere.
+
+        Args:
+            client: The browser.
+            find: The camera; None for one that sees the work.
+            is_riding: Whether it goes on with what it is on.
+        """
+        number, now = client.client_id, time.monotonic()
+        camera = None if find is None else find()
+        self._riding.pop(number, None)
+        if find is not None and is_riding:
+            self._riding[number] = find
+        if camera is not None:
+            camera.give(client)
+        self._fitted[number] = _Fit(now - _SETTLING, camera=camera, is_own=camera is not None)
 
     def _role(self, number: int) -> str:
         if self._is_live:
@@ -164,12 +221,24 @@ class Visitors:
         return f"replay: {'you play it' if self._drivers.may_drive(number) else 'another page plays it'}"
 
     def _fit(self, number: int, client: viser.ClientHandle) -> None:
-        """Show the whole to who has come, again where the window finds its size a moment later."""
+        """Show the work to who has come, again where the window finds its size or the work grows."""
         now, aspect = time.monotonic(), client.camera.aspect
-        since, known = self._fitted.get(number, (now, 0.0))
-        if abs(aspect - known) > 0.02 * aspect and now - since < _SETTLING:
-            self._scene.work(aspect).give(client)
-            self._fitted[number] = (since, aspect)
+        fit = self._fitted.setdefault(number, _Fit(now))
+        if (find := self._riding.get(number)) is not None:
+            camera = find()
+            if fit.camera is None or camera.is_elsewhere(fit.camera, _STILL):
+                camera.give(client)
+                self._fitted[number] = replace(fit, camera=camera)
+            return
+        is_settling = now - fit.since < _SETTLING and abs(aspect - fit.aspect) > 0.02 * aspect
+        if not is_settling and (now - fit.looked < _LOOK or fit.is_own):
+            return
+        camera, given = self._scene.work(aspect), fit.camera
+        is_moved = given is not None and not is_settling and _is_moved(client, given)
+        if given is None or is_settling or (not is_moved and camera.is_elsewhere(given, _GROWN)):
+            camera.give(client)
+            given = camera
+        self._fitted[number] = replace(fit, aspect=aspect, looked=now, camera=given)
 
     def close(self) -> None:
         """Take the lines back."""

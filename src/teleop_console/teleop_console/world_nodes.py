@@ -52,6 +52,7 @@ class WorldNodes:
         self._server, self._path, self._robot = server, path, robot
         self._values: Mapping[str, Setting] = {}
         self.line: viser.LineSegmentsHandle | None = None
+        self._corners = np.empty((0, 3))
         self.push = ForceArrow(server, f"{path}/push")
 
     def retune(self, values: Mapping[str, Setting]) -> None:
@@ -63,10 +64,16 @@ class WorldNodes:
             self.line.remove()
             self.line = None
         outline = object_outline(values, self._robot)
+        points = outline.reshape(-1, 3)
+        self._corners = np.array((points.min(axis=0), points.max(axis=0))) if len(points) else points
         if len(outline):
             self.line = self._server.scene.add_line_segments(
                 f"{self._path}/world", outline.astype(np.float32), TARGET, thickness=2.0, thickness_units="screen"
             )
+
+    def points(self) -> Array:
+        """Lowest and highest corner (2, 3) [m] of the object in slave_base; none (0, 3) without one."""
+        return self._corners
 
     def draw(self, tip: Array, force: Array | None) -> None:
         """Draw the push (3,) [N] at a tip (3,) [m]; None where it is unknown."""

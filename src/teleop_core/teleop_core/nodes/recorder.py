@@ -3,7 +3,7 @@
 import sys
 import time
 from collections import deque
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -178,6 +178,7 @@ class RecorderNode(CoreNode):
         every = parameters.every_nth((*topics, *self._model.topics))
         self._recorded = [topic for topic in topics if every[topic.name]]
         self._mark_topic, self._part, self._marks = MARKS.of_arm(self.arm), 0, 0
+        self._mark_publisher = self.open_publisher(replace(self._mark_topic, name=f"/{self._mark_topic.name}"))
         self._last.clear()
         self._open = partial(
             BagWriter,
@@ -336,6 +337,7 @@ class RecorderNode(CoreNode):
             text = self.parameters.mark or str(self._marks)
             data = report(now_ns, self.member_name, 0, text, {"number": str(self._marks)})
             self._writer.write(self._mark_topic, now_ns, data, now_ns)
+            self._mark_publisher.publish(data)
         return f"marked {text!r} in {self._writer.path}"
 
     def _insist(self, *, is_recording: bool) -> None:
