@@ -29,11 +29,13 @@
   let followed, tip, chosen = null, drives = false, open = false, busy = false, shownList = '';
 
   async function ask(path, words = [], body) {
-    const answer = await fetch(`${path}?${new URLSearchParams(words)}`, {
-      ...(body && { method: 'POST', body }),
-      headers: { 'Teleop-Page': window.teleopPage || 'new' }, cache: 'no-store',
-      signal: AbortSignal.timeout(10000) });
-    return [answer.ok, await answer.json()];
+    try {
+      const answer = await fetch(`${path}?${new URLSearchParams(words)}`, {
+        ...(body && { method: 'POST', body }),
+        headers: { 'Teleop-Page': window.teleopPage || 'new' }, cache: 'no-store',
+        signal: AbortSignal.timeout(10000) });
+      return [answer.ok, await answer.json()];
+    } catch { return [false, 'The console does not answer. Try again.']; }
   }
 
   function field({ name, label, options }) {

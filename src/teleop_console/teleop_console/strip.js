@@ -36,13 +36,15 @@
   let left = 0, wide = 0, folded = innerWidth < 576 || innerHeight < 700, found = [], picked = 0, looks = false, past = null, again = 0;
 
   async function ask(path, words = []) {
-    const answer = await fetch(`${path}?${new URLSearchParams(words)}`, { cache: 'no-store',
-      headers: { 'Teleop-Page': window.teleopPage || 'new' }, signal: AbortSignal.timeout(10000) });
-    return [answer.ok, await answer.json()];
+    try {
+      const answer = await fetch(`${path}?${new URLSearchParams(words)}`, { cache: 'no-store',
+        headers: { 'Teleop-Page': window.teleopPage || 'new' }, signal: AbortSignal.timeout(10000) });
+      return [answer.ok, await answer.json()];
+    } catch { return [false, '']; }
   }
   async function act(path, words) {
     const [ok, said] = await ask(path, words);
-    if (ok) take(said); else one('output').textContent = said;
+    if (ok) take(said); else one('output').textContent = said || 'The console does not answer. Try again.';
   }
   const go = (words) => act('time', Object.entries(words));
 
@@ -60,7 +62,7 @@
     past = next = clamp(to, state.begin, state.end); draw();
     if (seeking) return;
     seeking = true;
-    while (next !== null) { const wanted = next; next = null; await go({ seek: wanted.toFixed(4) }).catch(() => 0); }
+    while (next !== null) { const wanted = next; next = null; await go({ seek: wanted.toFixed(4) }); }
     seeking = false;
     if (!state.is_live || !state.is_past) past = null;
     draw();
@@ -122,7 +124,7 @@
       again = 0;
       const [a, b] = range();
       const words = [['begin', a], ['end', b], ['pixels', Math.max(1, Math.round(wide || 300))]];
-      const [ok, said] = await ask('strip', [...words, ...(folded ? [] : names).map((name) => ['name', name])]).catch(() => [false, '']);
+      const [ok, said] = await ask('strip', [...words, ...(folded ? [] : names).map((name) => ['name', name])]);
       if (ok && said.bands && state) { told = said; draw(); place(); }
       else if (!ok && said) { names = names.slice(0, -1); one('output').textContent = said; }
     } while (again);

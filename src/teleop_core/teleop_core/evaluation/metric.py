@@ -1,7 +1,7 @@
 """Metric: one thing that is measured on a recording; each is one file, ours or a user's."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import Field, field, fields, is_dataclass
 from itertools import product
 from typing import Any, ClassVar, NamedTuple
@@ -101,21 +101,25 @@ class Metric(ABC):
         topics: Streams it reads. Those that a recording lacks have no samples in its windows. For
             streams that depend on the recording see
             :meth:`~teleop_core.evaluation.context.Context.read`.
+        declared: Its figures; not to be set.
     """
 
     name: ClassVar[str]
     group: ClassVar[str] = ""
     keys: ClassVar[tuple[Key, ...]] = ()
     topics: ClassVar[tuple[Topic, ...]] = ()
+    declared: ClassVar[tuple[Field[Any], ...]] = ()
 
     def __init_subclass__(cls) -> None:
         """Make keys of the figures of the class, each of which is None at first."""
         super().__init_subclass__()
         found = {name: one for name, one in vars(cls).items() if isinstance(one, Field)}
-        if found:
-            cls.keys = tuple(Key(f"{cls.name}.{name}", *one.metadata.values()) for name, one in found.items())
-        for name in found:
+        for name, one in found.items():
+            one.name = name
             setattr(cls, name, None)
+        if found:
+            cls.declared = tuple(found.values())
+            cls.keys = keys_of(cls.name, cls.declared)
 
     def __init__(self, context: Context) -> None:
         """Make it for one arm of a recording."""
@@ -141,9 +145,12 @@ class Metric(ABC):
         all counts are 0. Without labels it is one row per key without ``<…>``.
         """
         values = self.values()
-        labels = [one for one in fields(values) if one.metadata.get("label")] if is_dataclass(values) else []
+        labels = [
+            one for one in (fields(values) if is_dataclass(values) else self.declared) if one.metadata.get("label")
+        ]
         if labels:
-            known = [(one, value) for one in labels if (value := getattr(values, one.name)) is not None]
+            of: Mapping[str, Any] = vars(values) if is_dataclass(values) else values
+            known = [(one, value) for one in labels if (value := of[one.name]) is not None]
             counts = [value for _, value in known if isinstance(value, int)]
             group = self.group or self.name
             return [_figure_row(group, *one) for one in known] if any(counts) or not counts else []

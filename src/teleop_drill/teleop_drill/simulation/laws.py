@@ -196,13 +196,13 @@ class Laws:
         slave, process = stage.session.node("slave"), stage.session.process_of("slave")
         if process is not self._process:  # what the one before has told says nothing of this one
             self._process, stage.operation = process, {}
-        works = slave is not None and process is not None and not process.is_stopped
         if slave is not self._slave:
             self._slave, self._seen_state, self._press = slave, -1, None
             self._presses = len(stage.presses)
             for button in stage.held:  # this slave has never heard of it
                 self._press, self._obey_by = (button, False), math.inf
-        if works and slave is not None and slave.stage is not None and slave.is_at_work:
+        works = slave is not None and slave.stage is not None and slave.is_at_work
+        if works and process is not None and not process.is_stopped:
             self._worked += 1e-9 * _LOOK_NS
             self._judge_state(slave)
             self._judge_stop(slave, process)
