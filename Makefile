@@ -74,7 +74,6 @@ format: $(VENV)/.tested
 # one process. All parts run, whatever fails: one run tells all that is wrong.
 CORE := $(BIN)/pytest -n 2 --dist worksteal
 LIVE := $(BIN)/pytest -n 2 --dist worksteal tests/ros
-ALONE := $(BIN)/pytest -n 1 tests/ros
 test: $(VENV)/.tested crtk_msgs
 	@code=0; set -x; \
 	$(CORE) -m "not ros and not slow" || code=1; \
@@ -85,7 +84,7 @@ test: $(VENV)/.tested crtk_msgs
 test-slow: $(VENV)/.tested crtk_msgs
 	@code=0; set -x; \
 	$(CORE) -m "slow and not ros and not soak" || code=1; \
-	$(ALONE) -m "ros and (slow or alone) and not soak" || code=1; \
+	$(LIVE) -m "ros and slow and not soak" || code=1; \
 	exit $$code
 
 # Long tests whose law a shorter one tests in CI with another case, and whole sessions of all commands

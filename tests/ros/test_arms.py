@@ -36,7 +36,6 @@ def test_a_refused_parameter_of_a_node_in_a_namespace_is_named_with_it(peer: "Pe
 
 
 @pytest.mark.slow
-@pytest.mark.alone
 @pytest.mark.parametrize(
     "processes",
     # Fourteen processes need more than two processors.

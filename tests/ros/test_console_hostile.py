@@ -15,7 +15,7 @@ from console_process import STARTS, ConsoleProcess
 from page_client import PageClient
 from teleop_core.slave.operation import State
 
-pytestmark = [pytest.mark.ros, pytest.mark.soak, pytest.mark.alone]
+pytestmark = [pytest.mark.ros, pytest.mark.soak]
 
 
 SETTLES = 1e-6  # filters come to rest within nanometres; a drag moves millimetres [m]

@@ -20,7 +20,7 @@ from teleop_core.bags.reader import Bag
 from teleop_core.evaluation.origin import read_origin
 from teleop_core.slave.operation import State
 
-pytestmark = [pytest.mark.ros, pytest.mark.browser, pytest.mark.slow, pytest.mark.alone]
+pytestmark = [pytest.mark.ros, pytest.mark.browser, pytest.mark.slow]
 
 ROOT = Path(__file__).parents[2]
 TIP = "/arm/robot/tip"

@@ -13,7 +13,7 @@ import teleop_core as tc
 from browser import Tab, until
 from console_process import STARTS, ConsoleProcess
 
-pytestmark = [pytest.mark.ros, pytest.mark.browser, pytest.mark.slow, pytest.mark.alone]
+pytestmark = [pytest.mark.ros, pytest.mark.browser, pytest.mark.slow]
 
 URDF = Path(__file__).parents[2] / "examples" / "any_arm.urdf"
 FORM = "!document.querySelector('#t-start').hidden"

@@ -10,7 +10,7 @@ import pytest
 from drill_runs import run_drill
 from teleop_drill.drill import SHORT
 
-pytestmark = [pytest.mark.ros, pytest.mark.slow, pytest.mark.alone]
+pytestmark = [pytest.mark.ros, pytest.mark.slow]
 LIMITS = 1.0 + 1e-9
 
 

@@ -43,7 +43,6 @@ def test_a_plain_node_on_time_leads_the_slave_no_farther_than_it_goes(tmp_path: 
     assert led_by_a_plain_node(tmp_path) < 20.5
 
 
-@pytest.mark.alone
 def test_a_session_is_broken_in_a_way_of_ones_own(tmp_path: Path) -> None:
     text = run("own_exercise", tmp_path)
     assert "\u2713 shaken: ENABLED" in text

@@ -19,7 +19,7 @@ from browser import Tab, until
 from console_process import ENDS, STARTS
 from present import present
 
-pytestmark = [pytest.mark.ros, pytest.mark.browser, pytest.mark.slow, pytest.mark.alone]
+pytestmark = [pytest.mark.ros, pytest.mark.browser, pytest.mark.slow]
 
 STUDY = """\
 scenario: point

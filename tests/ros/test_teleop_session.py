@@ -12,7 +12,7 @@ from teleop_core.graph import topics
 if TYPE_CHECKING:
     from ros.conftest import Listener, Peer
 
-pytestmark = [pytest.mark.ros, pytest.mark.slow, pytest.mark.alone]
+pytestmark = [pytest.mark.ros, pytest.mark.slow]
 
 
 def rest_of(measured: "Listener") -> Any:

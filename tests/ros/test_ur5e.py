@@ -26,7 +26,7 @@ from teleop_core.graph.topics import MASTER_MEASURED_CP, SLAVE_MEASURED_CP
 from teleop_core.nodes.children import environment, free_domain
 from teleop_core.session import api
 
-pytestmark = [pytest.mark.ros, pytest.mark.slow, pytest.mark.alone]
+pytestmark = [pytest.mark.ros, pytest.mark.slow]
 
 CONTROLLER = [sys.executable, str(ROOT / "tests/plain_controller.py"), "forward_command", "ur5e"]
 URDF = ROOT / "examples/ur5e.urdf"

@@ -212,7 +212,6 @@ def chain(peer: "Peer", master: dict[str, Any] = STEADY) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.alone
 def test_the_hand_rests_until_the_slave_follows(peer: "Peer") -> None:
     poses = peer.listen(topics.MASTER_MEASURED_CP)
     peer.start("haptic_master", patience=3600.0, **STEADY)
@@ -256,7 +255,6 @@ def follows(peer: "Peer", setpoints: "Listener") -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.alone
 @pytest.mark.parametrize("name", ["motion_scaling", "inverse_kinematics", "haptic_master"])
 def test_restarting_a_node_does_not_move_the_slave(peer: "Peer", name: str) -> None:
     measured, setpoints = (peer.listen(topics.SLAVE_MEASURED_JS), peer.listen(topics.SLAVE_SETPOINT_JS))
@@ -283,7 +281,6 @@ def test_restarting_a_node_does_not_move_the_slave(peer: "Peer", name: str) -> N
 
 
 @pytest.mark.slow
-@pytest.mark.alone
 def test_slave_holds_when_the_master_dies(peer: "Peer") -> None:
     measured = peer.listen(topics.SLAVE_MEASURED_JS)
     circle = {"operator__kind": "circle", "operator__approach_time": 0.5, "operator__period": 4.0}
