@@ -56,9 +56,9 @@ def test_never_does_more_than_one_page_drive_nor_one_that_is_closed(steps: list[
 
 def test_first_page_drives_and_the_second_watches_until_it_takes_control() -> None:
     drivers, changes = pages(2)
-    assert [drivers.role(page) for page in (0, 1)] == ["you drive", "you watch"]
+    assert [drivers.role(page) for page in (0, 1)] == ["you have control", "you watch"]
     drivers.take(1)
-    assert [drivers.role(page) for page in (0, 1)] == ["you watch", "you drive"]
+    assert [drivers.role(page) for page in (0, 1)] == ["you watch", "you have control"]
     assert changes == [1]
 
 
@@ -66,7 +66,7 @@ def test_nobody_gets_control_unasked_when_the_driver_leaves_but_a_page_that_is_l
     drivers, changes = pages(2)
     drivers.leave(0)
     assert drivers.driver is None
-    assert drivers.role(1) == "you watch, nobody drives"
+    assert drivers.role(1) == "you watch, nobody has control"
     drivers.join(2)
     assert drivers.driver == 2
     assert changes == [None, 2]

@@ -53,8 +53,8 @@ class Drivers:
     def role(self, page: int) -> str:
         """What to tell the people at a page about it."""
         if self.may_drive(page):
-            return "you drive"
-        return "you watch" if self._driver is not None else "you watch, nobody drives"
+            return "you have control"
+        return "you watch" if self._driver is not None else "you watch, nobody has control"
 
     def on_change(self, listener: Callable[[int | None], None]) -> None:
         """Call a function with the new driver, or None, at every change; it must not block.

@@ -199,7 +199,7 @@ class Panel:
         """Run, recording, and who drives."""
         where = view.recording.name if view.recording else "not recording"
         driver = self._drivers.driver
-        who = "nobody drives" if driver is None else f"browser {driver + 1} drives"
+        who = "nobody has control" if driver is None else f"browser {driver + 1} has control"
         return " · ".join(filter(None, (f"run {view.run + 1}", where, who, leader(self._kind))))
 
     @property
