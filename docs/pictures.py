@@ -2,6 +2,7 @@
 
 python docs/pictures.py            all of them, some minutes; look at them before they are committed
 python docs/pictures.py --moving   the moving one alone
+python docs/pictures.py --states   twenty states at a desk, on a phone and on a wall, to look at, in out/states
 """
 
 import base64
@@ -164,8 +165,95 @@ def frame(tab: Tab, moment: float) -> Image.Image:
     return Image.open(io.BytesIO(picture)).convert("RGB")
 
 
+SIZES = {"desk": (1400, 900), "phone": (390, 844), "wall": (3840, 2160)}
+STATES = ROOT / "out" / "states"
+LISTED = "document.querySelectorAll('.t-list :is(.t-good, .t-held)').length === 2"
+STARTS = 240.0  # patience with a session, whose kernels may have to be compiled [s]
+
+
+def states(folder: Path) -> None:
+    """Take the page's states as small pictures, which only are looked at."""
+    STATES.mkdir(parents=True, exist_ok=True)
+    for name, scenario in (("fine", "fine_box"), ("push", "wall")):
+        tc.run(scenario, duration=8.0, out=folder / "bags" / name)
+    with served(folder) as console, Tab(folder / "states", *SIZES["desk"]) as tab:
+        tab.visit(console.url)
+        tab.until(LISTED, 120)
+        state(tab, "form", "desk", "phone", "wall")
+        choose(tab, "operator", "bag")
+        tab.shows("Cannot start")
+        state(tab, "form_refuses", "desk", "phone")
+        choose(tab, "operator", "")
+        choose(tab, "task", "reach")
+        tab.until("document.querySelector('#t-begin').disabled === false")
+        tab.click("Start")
+        state(tab, "starting", "desk")
+        tab.shows("ENABLED", STARTS)
+        state(tab, "task", "desk", "phone", "wall")
+        tab.click("Pause")
+        tab.shows("PAUSED")
+        state(tab, "paused", "desk")
+        tab.click("Settings")
+        state(tab, "settings", "desk", "phone")
+        tab.click("View")
+        state(tab, "view", "desk")
+        with Tab(folder / "second", *SIZES["desk"]) as second:
+            second.visit(console.url)
+            second.shows("you watch", 60)
+            state(second, "watches", "desk")
+        tab.click("EMERGENCY STOP")
+        tab.shows("All arms are stopped")
+        state(tab, "stopped", "desk", "phone")
+        tab.click("End session")
+        tab.shows("Repeat", STARTS)
+        state(tab, "form_repeats", "desk")
+        tab.value("document.querySelector('.t-list input').click()")
+        tab.click("Replay")
+        tab.shows("Play", 60)
+        state(tab, "replay", "desk", "phone")
+    with Tab(folder / "lost", *SIZES["desk"]) as tab:
+        with served(folder, folder / "bags" / "fine") as console:
+            tab.visit(console.url)
+            tab.shows("Play", 120)
+        tab.shows("NO CONNECTION")
+        state(tab, "no_connection", "desk")
+
+
+def choose(tab: Tab, name: str, word: str) -> None:
+    """Choose a word in a list of the form."""
+    tab.value(f"""(() => {{
+        const list = document.querySelector('#t-start select[name={name}]');
+        list.value = '{word}'; list.dispatchEvent(new Event('change'));
+    }})()""")
+
+
+def state(tab: Tab, name: str, *sizes: str) -> None:
+    """Keep what is seen now, at some sizes."""
+    tab.value(NOTICE)
+    for size in sizes:
+        width, height = SIZES[size]
+        tab.call(
+            "Emulation.setDeviceMetricsOverride",
+            width=width,
+            height=height,
+            deviceScaleFactor=1,
+            mobile=size == "phone",
+        )
+        end = time.monotonic() + SETTLE
+        while time.monotonic() < end:
+            picture = shot(tab)
+        file = STATES / f"{name}_{size}.webp"
+        Image.open(io.BytesIO(picture)).convert("RGB").save(file, quality=60, method=6)
+        print(file)
+    width, height = SIZES["desk"]
+    tab.call("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=False)
+
+
 if __name__ == "__main__":
     with tempfile.TemporaryDirectory() as place:
+        if "--states" in sys.argv:
+            states(Path(place))
+            sys.exit()
         moving(Path(place))
         if "--moving" not in sys.argv:
             start(Path(place))

@@ -52,7 +52,7 @@ def page(console: Any, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Hea
     with Tab(tmp_path_factory.mktemp("browser"), *SIZE) as tab:
         tab.visit(console.url)
         tab.shows("ENABLED", STARTS)
-        tab.shows("drives")
+        tab.shows("has control")
         yield tab
 
 
