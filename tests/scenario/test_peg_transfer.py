@@ -53,6 +53,20 @@ def test_every_kind_of_transfer_is_done_and_told_as_the_board_tells_it(
         assert steps < time if waits else steps == pytest.approx(time, abs=0.05)
 
 
+def test_a_session_may_end_with_its_task_and_is_the_same_until_then() -> None:
+    settings = {**SEEING, "task.peg_transfer.arms": "one"}
+    whole, short = (
+        tc.run("peg_transfer", duration=60.0, settings=settings | {"teleop.ends_with_task": ends})
+        for ends in (False, True)
+    )
+    states = [one["task/state"].values for one in (whole, short)]
+    count = len(states[1])
+    assert states[1][-1, COLUMN["is_over"]] == 1.0
+    assert states[1][-1001, COLUMN["is_over"]] == 0.0
+    assert count < 40_000
+    assert np.array_equal(states[0][:count], states[1])
+
+
 def test_in_a_hand_over_the_first_lets_go_once_the_second_holds() -> None:
     recording = transferred("hand_over", 14.0)
     first, second = (recording[f"{arm}slave/jaw/grip"] for arm in ("", "right/"))

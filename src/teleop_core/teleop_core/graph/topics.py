@@ -407,6 +407,7 @@ TASK_STATE = Topic(
     columns=(
         "number", "act", "goal_x", "goal_y", "goal_z", "width", "attempts", "successes", "errors",
         "way", "off", "time", "miss", "step", "goal_qw", "goal_qx", "goal_qy", "goal_qz", "turn", "force", "clearance",
+        "is_over",
     ),
 )  # fmt: skip
 """What a task asks for now, and what came of it: how many goals there were, what to do at this one
@@ -414,7 +415,7 @@ TASK_STATE = Topic(
 last attempt: the way to its goal [m], how far the tip was beyond the goal along it [m], the time it took [s], and what
 was wrong with it (:class:`~teleop_core.chain.tasks.Miss`); the step of the present one, where a task has several. Then
 how the tool shall be turned there, and how wide that is [rad]; with how much force to press [N]; and how far beside its
-way the tip would meet something [m]. Zero stands for what a task does not ask for."""
+way the tip would meet something [m]. Zero stands for what a task does not ask for. Last, whether no goal is left."""
 OPERATOR_SERVO_CP = Topic("operator/servo_cp", Kind.POSE, SAMPLED, "master_base")
 """Where a person who is elsewhere wants the stylus, at any rate: ``operator=remote`` leads the hand there. Silence lets
 go. As ``operator/buttons`` it comes from outside: no stage writes it, and it is not recorded."""

@@ -25,6 +25,7 @@ from teleop_core.session.reports import report_of
 from teleop_core.shapes import files_of, moved
 
 Progress = Callable[[int, int], None]
+_OVER = topics.TASK_STATE.columns.index("is_over")
 
 
 def silent(*_: object) -> None:
@@ -56,11 +57,19 @@ def session_ticks(configuration: Configuration, session: virtual.VirtualTime) ->
 
 
 def run_blocks(session: virtual.VirtualTime, ticks: int) -> Iterator[Any]:
-    """Rows of the next ticks, a block at a time; each block takes the place of the one before."""
+    """Rows of the next ticks, a block at a time; each block takes the place of the one before.
+
+    With ``teleop.ends_with_task`` the last block is the first one at whose end no task has a goal left.
+    """
     rows = session.rows(min(virtual.BLOCK, ticks))
+    tasks = [t.field for t in session.graph.streams if t == topics.TASK_STATE.of_arm(t.arm)]
+    may_end = session.configuration.groups[SESSION].ends_with_task and bool(tasks)
     for done in range(0, ticks, virtual.BLOCK):
         count = min(virtual.BLOCK, ticks - done)
-        yield session.run(count, rows[:count])
+        block = session.run(count, rows[:count])
+        yield block
+        if may_end and all(block[field][-1, _OVER] > 0.0 for field in tasks):
+            return
 
 
 def replay(bag: Bag, configuration: Configuration, out: Path, progress: Progress = silent, begin: str = DEVICE) -> int:

@@ -17,7 +17,7 @@ STEPS = ("wait", "reach", "grasp", "lift", "meet", "take", "release", "retreat",
 """What an arm is doing: of these the nine after the first make a transfer with a hand-over."""
 (_WAIT, _REACH, _GRASP, _LIFT, _MEET, _TAKE, _RELEASE, _RETREAT, _CARRY, _PLACE) = range(len(STEPS))
 _TWO, _HAND_OVER = KINDS.index("two"), KINDS.index("hand_over")
-_STEP = topics.TASK_STATE.columns.index("step")
+_STEP, _OVER = (topics.TASK_STATE.columns.index(name) for name in ("step", "is_over"))
 _SECOND, _X0 = SCENE.index("is_second"), SCENE.index("x0")
 _STARTS = 4
 _GRIP, _LET_GO = int(Act.GRIP), int(Act.LET_GO)
@@ -111,7 +111,7 @@ def _take_up(numbers: Array, memory: Array, scene: Array, state: Array) -> None:
     memory[2], memory[3] = scene[_SECOND + 3], scene[_SECOND + 4]
     begin = _MEET if int(numbers[3]) == _HAND_OVER and scene[_SECOND] > 0.0 else _REACH
     if memory[0] >= topics.JAW_OBJECTS or memory[_STARTS + 3 * int(memory[0])] == 0.0:
-        memory[0], begin = -1.0, _WAIT
+        memory[0], state[_OVER], begin = -1.0, 1.0, _WAIT
     _begin_step(numbers, memory, scene, state, begin)
 
 
