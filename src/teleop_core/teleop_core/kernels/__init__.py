@@ -216,8 +216,14 @@ def bound(compiled: Callable[P, R], *arguments: P.args, **_: P.kwargs) -> Callab
     """
     if isinstance(compiled, FunctionType) or not is_kernel(compiled):
         return partial(compiled, *arguments)
-    own = [_Memory(a) if isinstance(a, np.void) else a for a in arguments]
-    return partial(_compiler.entry(compiled, _types(arguments)), *own)
+    return partial(_compiler.entry(compiled, _types(arguments)), *map(_memory, arguments))
+
+
+def _memory(value: Any) -> Any:
+    """Memory of a record, also of one in a tuple: its attributes are looked up at every call, at 1 µs each."""
+    if isinstance(value, np.void):
+        return _Memory(value)
+    return tuple(map(_memory, value)) if isinstance(value, tuple) else value
 
 
 def direct(compiled: Callable[P, R], signature: Any) -> Callable[P, R]:

@@ -19,9 +19,10 @@ Array = NDArray[np.float64]
 
 def dot(a: ArrayLike, b: ArrayLike) -> Array:
     """Sum of a times b along the last axis, (..., n) and (..., n) to (...), from the first on."""
-    products = np.moveaxis(np.asarray(a) * b, -1, 0)
-    total = np.zeros(products.shape[1:])
-    for term in products:
+    products = np.asarray(a) * b
+    terms = products.T if products.ndim < 3 else np.moveaxis(products, -1, 0)
+    total = np.zeros(terms.shape[1:])
+    for term in terms:
         total = total + term
     return total
 

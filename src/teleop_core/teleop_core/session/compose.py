@@ -11,6 +11,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from teleop_core import kernels
 from teleop_core.base.errors import PartError, TeleopError
 from teleop_core.graph.graph import Graph, Link, Member
@@ -111,15 +113,15 @@ class Tick:
         Raises:
             TeleopError: A part in plain Python raised; its own exception is the cause.
         """
-        clock = self._clock
+        clock, rows, found = self._clock, _bytes(self._rows), _bytes(block)
         clock["tick_ns"] = tick_ns
         for begin in range(0, len(block), self._size):
-            part = block[begin : begin + self._size]
-            clock["first_ns"], clock["count"] = first_ns + begin * tick_ns, len(part)
+            count = min(self._size, len(block) - begin)
+            clock["first_ns"], clock["count"] = first_ns + begin * tick_ns, count
             if samples is not None:
-                self._samples[: len(part)] = samples[begin : begin + len(part)]
+                self._samples[:count] = samples[begin : begin + count]
             self._step()
-            part[:] = self._rows[: len(part)]
+            found[begin : begin + count] = rows[:count]
 
     def _step(self) -> None:
         try:
@@ -130,6 +132,11 @@ class Tick:
             raise
         except Exception as error:
             raise raised_by(error) from error
+
+
+def _bytes(rows: Any) -> Any:
+    """The same rows without their fields: NumPy copies field by field otherwise, which takes five times as long."""
+    return np.ndarray.view(rows, np.dtype((np.void, rows.itemsize)))
 
 
 def raised_by(error: Exception) -> PartError:
