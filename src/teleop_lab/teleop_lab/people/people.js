@@ -14,12 +14,14 @@
   const write = (element, text) => { if (element.textContent !== text) element.textContent = text; };
 
   async function ask(path, words = {}) {
-    const answer = await fetch(`${path}?${new URLSearchParams(words)}`, {
-      headers: { 'Teleop-Page': window.teleopPage || 'new' }, cache: 'no-store', signal: AbortSignal.timeout(10000) });
-    const told = await answer.json();
-    if (!answer.ok) { write(one('.t-why'), told); return null; }
-    write(one('.t-why'), '');
-    return told;
+    let isOk = false, told = 'The console does not answer. Try again.';
+    try {
+      const answer = await fetch(`${path}?${new URLSearchParams(words)}`, {
+        headers: { 'Teleop-Page': window.teleopPage || 'new' }, cache: 'no-store', signal: AbortSignal.timeout(10000) });
+      [isOk, told] = [answer.ok, await answer.json()];
+    } catch { /* it is told below */ }
+    write(one('.t-why'), isOk ? '' : told);
+    return isOk ? told : null;
   }
 
   // -- the participant ------------------------------------------------------------------------
@@ -62,7 +64,7 @@
     const go = button(BUTTONS[step], async () => {
       go.disabled = true;
       const words = questions ? Object.fromEntries([...page.querySelectorAll('input')].map((e) => [e.name, e.value])) : {};
-      const next = await ask('go', { step, at, ...words }).catch(() => null);
+      const next = await ask('go', { step, at, ...words });
       changed();
       if (next) participant(next);
     }, { id: 't-begin' });
@@ -135,7 +137,7 @@
   }
 
   async function look() {
-    const now = await ask(conducts ? 'conducting' : 'people', conducts ? { key } : {}).catch(() => null);
+    const now = await ask(conducts ? 'conducting' : 'people', conducts ? { key } : {});
     if (now) (conducts ? conductor : participant)(now);
   }
 
