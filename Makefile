@@ -84,7 +84,7 @@ test: $(VENV)/.tested crtk_msgs
 test-slow: $(VENV)/.tested crtk_msgs
 	@code=0; set -x; \
 	$(CORE) -m "slow and not ros and not soak" || code=1; \
-	$(LIVE) -m "ros and slow and not soak" || code=1; \
+	$(BIN)/pytest -n 1 tests/ros -m "ros and slow and not soak" || code=1; \
 	exit $$code
 
 # Long tests whose law a shorter one tests in CI with another case, and whole sessions of all commands
