@@ -25,7 +25,7 @@ pytestmark = [pytest.mark.ros, pytest.mark.browser, pytest.mark.slow]
 ROOT = Path(__file__).parents[2]
 TIP = "/arm/robot/tip"
 GRIP, ARROW = "/arm/master/grip", 0.07  # the stylus' gizmo, and the heads of its arrows [m]
-DRIVER = "/browser [0-9]+ drives/.exec(document.body.innerText)?.[0]"
+DRIVER = "/browser [0-9]+ has control/.exec(document.body.innerText)?.[0]"
 PULLED = 0.012  # m
 # Software draws the page with the processors that the session needs: a small one.
 SIZE = (1000, 560)  # px
