@@ -73,6 +73,8 @@ CODE_MUTANTS = (
             'self._seen.state[STATE["limit"]] in _ENDS', "False", "observer"),
     _mutant("hasty_at_walls", "an operator is as fast beside a wall as without one", _SEEING,
             "return _SURE * p.noise * slowest", "return 0.0", "observer"),
+    _mutant("hasty_begin", "an operator begins while the arm is on its way to its start", _SEEING,
+            "move is not None or self._is_at_rest(until)", "True", "observer"),
     _mutant("numb", "an operator presses by what it sees alone", _SEEING,
             'if task[_FORCE] > 0.0 and felt >= _FELT:', "if False:", "observer"),
     _mutant("practice_counts", "practice counts among a participant's trials", "teleop_lab/people/compare.py",

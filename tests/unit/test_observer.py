@@ -77,6 +77,22 @@ def test_a_smaller_target_takes_longer_and_so_does_a_farther_one() -> None:
     assert small > near
 
 
+def test_nobody_begins_while_the_arm_is_seen_to_go_to_its_start() -> None:
+    seen = tc.Seen(np.zeros(7), np.zeros(7), np.zeros(6), np.zeros(len(STATE)), np.zeros(len(COLUMN)))
+    seen.slave[3] = seen.state[STATE["gain"]] = 1.0
+    p = ObserverParameters(fastest=10.0, axes=("+x", "+y", "+z"))
+    person = Observer(p, tc.Setting(WIDE, np.zeros((6, 4)), 1, seen))
+    seen.task[COLUMN["number"]], seen.task[COLUMN["width"]], seen.task[COLUMN["goal_x"]] = 1.0, 0.01, 0.2
+    rests, began = 1.0, None
+    for tick in range(0, 2000, AHEAD):
+        seen.slave[0] = 0.1 * min(tick * TICK, rests) + 0.01
+        rows = person(np.arange(tick + 1, tick + AHEAD + 1) * TICK)
+        if began is None and rows[-1, 0] != 0.0:
+            began = tick * TICK
+    assert began is not None
+    assert rests < began < rests + 0.3
+
+
 @pytest.mark.parametrize("lag", [0.02, 0.2])
 def test_a_goal_that_is_suddenly_elsewhere_is_not_run_after_as_one_that_moves(lag: float) -> None:
     seen = tc.Seen(np.zeros(7), np.zeros(7), np.zeros(6), np.zeros(len(STATE)), np.zeros(len(COLUMN)))

@@ -153,8 +153,8 @@ class Observer:
         slower arm is seen to move on.
         """
         move = self._move
-        if move is None or move.is_clutched:
-            return -math.inf
+        if move is None or move.is_clutched:  # nobody begins while the arm is seen to go to its start
+            return -math.inf if move is not None or self._is_at_rest(until) else math.inf
         end = move.begin + move.duration
         is_pressed = self._seen.task[_FORCE] > 0.0 and length(move.seen.force) >= _FELT
         self._was_felt = bool(is_pressed and self._is_felt(move, end + self._p.eye, until))
@@ -174,6 +174,11 @@ class Observer:
             self._half_seen += until - when + 1e-3
             return math.inf
         return when
+
+    def _is_at_rest(self, until: float) -> bool:
+        """Whether the tip was seen to stand still lately."""
+        gone = self._gone(self._glances.at(until - STILL_TIME), self._glances.at(until))
+        return bool(length(gone) <= _STILL * self._seen.task[_WIDTH])
 
     def _is_felt(self, move: Move, when: float, until: float) -> bool:
         """Whether the force tells, at rest, what a submovement did; not as long as it is the one of before."""
