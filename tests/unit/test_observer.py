@@ -86,7 +86,7 @@ def test_nobody_begins_while_the_arm_is_seen_to_go_to_its_start() -> None:
     rests, began = 1.0, None
     for tick in range(0, 2000, AHEAD):
         seen.slave[0] = 0.1 * min(tick * TICK, rests) + 0.01
-        rows = person(np.arange(tick + 1, tick + AHEAD + 1) * TICK)
+        rows = person(np.arange(tick + 1, tick + AHEAD + 1, dtype=np.float64) * TICK)
         if began is None and rows[-1, 0] != 0.0:
             began = tick * TICK
     assert began is not None
