@@ -207,7 +207,7 @@ def states(folder: Path) -> None:
         tab.click("End session")
         tab.shows("Repeat", STARTS)
         state(tab, "form_repeats", "desk")
-        tab.value("document.querySelector('.t-list input').click()")
+        tab.value("[...document.querySelectorAll('.t-list input')].at(-1).click()")
         tab.click("Replay")
         tab.shows("Play", 60)
         state(tab, "replay", "desk", "phone")
