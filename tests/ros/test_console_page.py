@@ -122,6 +122,7 @@ def test_button_of_ones_own_acts_on_the_session_and_says_what_it_did(page: Any) 
         page.shows(told)
 
 
+@pytest.mark.soak
 @pytest.mark.parametrize(("axis", "by"), [(0, "mouse"), (1, "finger")])
 def test_stylus_that_is_pulled_moves_the_slave_by_gain_and_axes(
     page: Any, console: ConsoleProcess, axis: int, by: str
@@ -143,6 +144,7 @@ def test_stylus_that_is_pulled_moves_the_slave_by_gain_and_axes(
     assert np.linalg.norm(slave - expected) < SHARE * np.linalg.norm(expected)
 
 
+@pytest.mark.soak
 def test_emergency_stop_stops_until_it_is_released(page: Any, console: ConsoleProcess) -> None:
     ready(page)
     page.click("EMERGENCY STOP")
@@ -154,6 +156,7 @@ def test_emergency_stop_stops_until_it_is_released(page: Any, console: ConsolePr
     page.shows("ENABLED", 60)
 
 
+@pytest.mark.soak
 def test_browser_that_is_closed_in_motion_leaves_the_slave_still(page: Any, console: Any, tmp_path: Path) -> None:
     ready(page)
     begin = page.value(page.place_of(TIP))
@@ -180,6 +183,7 @@ def test_browser_that_is_closed_in_motion_leaves_the_slave_still(page: Any, cons
     assert after["teleop/state"]["is_clutched"][-1] == 1.0
 
 
+@pytest.mark.soak
 def test_recording_that_was_saved_is_scored_by_a_button(page: Any, console: ConsoleProcess) -> None:
     ready(page)
     page.mouse("mouseReleased", *pull(page, 0))
@@ -190,6 +194,7 @@ def test_recording_that_was_saved_is_scored_by_a_button(page: Any, console: Cons
     page.click("Drive")
 
 
+@pytest.mark.soak
 def test_fixed_setting_begins_a_new_session_and_an_impossible_one_is_refused(
     page: Any, console: ConsoleProcess
 ) -> None:

@@ -41,6 +41,7 @@ def pick(tab: Any, label: str, word: str) -> None:
     }})()""")
 
 
+@pytest.mark.soak
 def test_session_is_begun_stopped_ended_scored_repeated_and_replayed_from_the_page(
     console: ConsoleProcess, tmp_path: Path
 ) -> None:
