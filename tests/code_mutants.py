@@ -50,6 +50,8 @@ CODE_MUTANTS = (
             "        raise KeyboardInterrupt\n        if number == signal.SIGHUP:", "interrupt"),
     _mutant("drill_deaf", "a drill does not look for a signal where it waits", "teleop_drill/nodes/drill_rig.py",
             "            self.site.interrupt.check()\n", "", "tests/simulated/test_drill.py"),
+    _mutant("play_deaf", "who plays a recording does not look for a signal where it waits", "nodes/play.py",
+            "        interrupt.check()\n", "", "tests/simulated/test_played_recording.py"),
     _mutant("conformance_deaf", "a test of an arm does not look for a signal where it waits",
             "teleop_drill/nodes/conformance_arm.py",
             "            self.interrupt.check()\n", "", "tests/simulated/test_conformance.py"),

@@ -113,33 +113,3 @@ def test_a_node_that_cannot_start_is_named_with_its_reason(tmp_path: Path) -> No
     with pytest.raises(SessionError, match=r"(?s)hand_side ended with exit code 2.*no/such"):
         live(wrong, tmp_path / "bag", console())
     assert children() == []
-
-
-def test_play_publishes_a_recording_as_it_was(peer: "Peer", monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("ROS_DOMAIN_ID", peer.domain)
-    bag = Bag(EXAMPLE)
-    pose, state = peer.listen(topics.MASTER_MEASURED_CP), peer.listen(topics.MASTER_BUTTONS)
-    began = time.monotonic()
-    names = ["master/measured_cp", "/master/buttons"]
-    with ThreadPoolExecutor() as pool:
-        playing = pool.submit(play, bag, names, RATE, console())
-        peer.wait(lambda: (pose.take(), state.take(), playing.done())[-1], "end of the recording")
-    sent = playing.result()
-    assert time.monotonic() - began >= 1e-9 * (bag.end_ns - bag.start_ns) / RATE
-    series = bag.read(topics.MASTER_MEASURED_CP)
-    assert sent == 2 * len(series)
-    # Best effort loses some on a busy machine, as their numbers tell; what came is the same.
-    for listener in (pose, state):
-        assert listener.take() > 0
-        assert listener.take() + listener.lost > 0.9 * len(series)
-    where = np.searchsorted(series.stamp_ns, pose.stamps)
-    np.testing.assert_array_equal(series.stamp_ns[where], pose.stamps)
-    np.testing.assert_array_equal(series.values[where], np.array(pose.values))
-
-
-def test_play_refuses_what_is_not_there() -> None:
-    with pytest.raises(RecordingError, match="lacks no/topic"):
-        play(Bag(EXAMPLE), ["no/topic"], 1.0, console())
-    with pytest.raises(ParameterError) as caught:
-        play(Bag(EXAMPLE), None, 0.0, console())
-    assert caught.value.name == "--rate"

@@ -3,7 +3,6 @@
 import math
 import os
 import sys
-import time
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -15,7 +14,8 @@ from teleop_core.bags.reader import Bag
 from teleop_core.bags.transforms import ROBOT_DESCRIPTION, TF
 from teleop_core.base.errors import ParameterError, RecordingError
 from teleop_core.graph.topics import BY_NAME, Quality
-from teleop_core.middleware.world import Qos
+from teleop_core.middleware.ros import ROS
+from teleop_core.middleware.world import Qos, World
 from teleop_core.nodes.discovery import choose_transport
 from teleop_core.nodes.guest import Guest
 from teleop_core.nodes.interrupt import Interrupt
@@ -23,18 +23,29 @@ from teleop_core.nodes.quality import profile
 from teleop_core.nodes.streams import message_type
 
 _KNOWN = BY_NAME | {topic.name: topic for topic in (TF, ROBOT_DESCRIPTION)}
-DISCOVERY_TIME = 1.0
-"""Time for subscribers to be found before the first message [s]."""
+_DISCOVERY_NS = 1_000_000_000
+"""Time for subscribers to be found before the first message."""
+_EARLY_NS = 100_000
+"""By how much a message may come too early."""
 
 
-def play(bag: Bag, topics: Iterable[str] | None, rate: float, console: Console) -> int:
-    """Publish a recording with its own bytes and spacing, until its end or Ctrl-C.
+def play(
+    bag: Bag,
+    topics: Iterable[str] | None,
+    rate: float,
+    console: Console,
+    world: World = ROS,
+    interrupt: Interrupt | None = None,
+) -> int:
+    """Publish a recording with its own bytes and spacing, until its end or a signal that ends it.
 
     Args:
         bag: The recording.
         topics: Topics to publish; None for all, without ``/tf`` where its type is not installed.
         rate: Times real time, > 0.
         console: Where the progress is shown, if it is a terminal.
+        world: Where it is published.
+        interrupt: What ends it beside signals of this process.
 
     Returns:
         Number of messages published.
@@ -49,11 +60,12 @@ def play(bag: Bag, topics: Iterable[str] | None, rate: float, console: Console) 
     bag.require(names)
     if topics is None:
         names = [name for name in bag.topics if name != TF.name or _is_installed(bag, name)]
-    sent, interrupt = 0, Interrupt()
-    with interrupt.caught(), _publishers(bag, names) as publishers, _progress(bag, console) as show:
+    sent, interrupt = 0, interrupt or Interrupt()
+    with interrupt.caught(), _publishers(bag, names, world) as publishers, _progress(bag, console) as show:
+        begin_ns = world.monotonic_ns() + _DISCOVERY_NS
         try:
-            _sleep_until(time.monotonic() + DISCOVERY_TIME, interrupt)
-            for name, log_ns, data in _paced(bag, names, rate, interrupt):
+            for name, _, log_ns, data in bag.raw(names):
+                _sleep_until(begin_ns + round((log_ns - bag.start_ns) / rate), world, interrupt)
                 publishers[name].publish(data)
                 sent += 1
                 show(log_ns)
@@ -62,28 +74,22 @@ def play(bag: Bag, topics: Iterable[str] | None, rate: float, console: Console) 
     return sent
 
 
-def _sleep_until(deadline: float, interrupt: Interrupt) -> None:
-    """Sleep until a time of the monotonic clock [s], unless a signal comes."""
-    interrupt.check()
-    while (ahead := deadline - time.monotonic()) > 1e-4:
-        time.sleep(min(ahead, 0.1))
+def _sleep_until(time_ns: int, world: World, interrupt: Interrupt) -> None:
+    """Sleep until a time of the monotonic clock, unless a signal comes."""
+    while True:
         interrupt.check()
-
-
-def _paced(bag: Bag, names: list[str], rate: float, interrupt: Interrupt) -> Iterator[tuple[str, int, bytes]]:
-    """Messages in the order of their log times, each when its time has come, and the time."""
-    begin = time.monotonic()
-    for name, _, log_ns, data in bag.raw(names):
-        _sleep_until(begin + (log_ns - bag.start_ns) * 1e-9 / rate, interrupt)
-        yield name, log_ns, data
+        ahead_ns = time_ns - world.monotonic_ns()
+        if ahead_ns <= _EARLY_NS:
+            return
+        world.sleep(min(1e-9 * ahead_ns, 0.1))
 
 
 @contextmanager
-def _publishers(bag: Bag, names: list[str]) -> Iterator[dict[str, Any]]:
+def _publishers(bag: Bag, names: list[str], world: World) -> Iterator[dict[str, Any]]:
     os.environ.setdefault("AMENT_PREFIX_PATH", sys.prefix)
     choose_transport()
     types = {name: _type_in(bag, name) for name in names}
-    with Guest("teleop_play") as guest:
+    with Guest("teleop_play", world=world) as guest:
         ros, publishers = guest.ros, {}
         for name, kind in types.items():
             topic = _KNOWN.get(name)
