@@ -3,9 +3,7 @@
 import io
 import re
 import threading
-import time
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,10 +15,9 @@ from rosbags.highlevel import AnyReader
 
 from live_process import wait_until, words
 from teleop_core.bags.reader import Bag
-from teleop_core.base import ParameterError, RecordingError, SessionError
+from teleop_core.base import RecordingError, SessionError
 from teleop_core.graph import BUILT_IN, RECORDER_NAME, topics
 from teleop_core.nodes.live import live
-from teleop_core.nodes.play import play
 from teleop_core.session.configuration import Configuration, configure
 
 if TYPE_CHECKING:

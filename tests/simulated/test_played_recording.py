@@ -37,9 +37,7 @@ def test_a_recording_is_published_as_it_was(peer: SimulatedPeer) -> None:
 @pytest.mark.parametrize("after", [0.5, 1.5])
 def test_a_signal_ends_it_where_it_waits(peer: SimulatedPeer, after: float) -> None:
     interrupt = Interrupt()
-    player = peer.foreign(
-        "player", lambda world: play(Bag(EXAMPLE), NAMES, 0.1, Console(quiet=True), world, interrupt)
-    )
+    player = peer.foreign("player", lambda world: play(Bag(EXAMPLE), NAMES, 0.1, Console(quiet=True), world, interrupt))
     peer.world.sleep(after)
     assert not player.is_dead
     interrupt.ask()

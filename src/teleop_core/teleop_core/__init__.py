@@ -3,7 +3,7 @@
 Folders follow the data: ``chain`` is the way from the operator's hand to the command of the slave, ``slave`` the arm's
 server with its control laws and plants, ``bags`` what is recorded, ``evaluation`` what it is worth. ``graph`` says
 which stages there are and how they are linked, ``session`` runs them in virtual time, ``nodes`` puts them on ROS 2
-topics, ``console`` shows them, ``commands`` is the ``teleop`` of a terminal. All stand on ``robots``, ``shapes``,
+topics, ``commands`` is the ``teleop`` of a terminal. All stand on ``robots``, ``shapes``,
 ``kernels`` and ``base``.
 
 Everything a user needs is here:

@@ -92,7 +92,7 @@ def _prefixes(bag: Bag) -> dict[str, str]:
 
 
 def _base(bag: Bag) -> str:
-    """What stands before all topics of the arms that the metadata name."""
+    """Common prefix of all topics of the arms that the metadata name."""
     namespace = bag.metadata.get(NAMESPACE_KEY, "").strip("/")
     return f"{namespace}/" if namespace else ""
 

@@ -61,7 +61,7 @@ def _finished(path: Path, file: McapFile, start_ns: int) -> Path | None:
 
 
 def _made_again(path: Path, file: McapFile) -> Path:
-    """Copy of a file that was removed, which is still there for who writes it.
+    """Copy of a file that was removed while it is still open for writing.
 
     Raises:
         OSError: It cannot be written, neither where it was nor beside it.

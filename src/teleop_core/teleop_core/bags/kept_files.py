@@ -75,7 +75,7 @@ class KeptFiles:
             self._texts[f"{prefix}{_ROBOT}{_MESHES}"] = "\n".join(lines)
 
     def texts(self) -> dict[str, str]:
-        """Names and texts for the recording; what it has no room for is told by a warning."""
+        """Names and texts for the recording; files that exceed its room give a warning."""
         if self._left_out:
             names = ", ".join(path.name for path in self._left_out.values())
             limit = f"keeps {_MOST / 2**20:g} MiB of files"
@@ -106,7 +106,7 @@ class KeptFiles:
 def recorded_files(metadata: Mapping[str, str], arm: str = "") -> dict[str, str]:
     """Path of each recorded file of an arm, by the path under which it was recorded.
 
-    A file of which only the digest was kept, and that is gone or another by now, is told by a warning.
+    A file of which only the digest was kept gives a warning if it is gone or has changed.
 
     Args:
         metadata: Names and texts of a recording.
@@ -207,7 +207,7 @@ def _digest_now(path: Path | None) -> str:
 
 
 def _unpacked(metadata: Mapping[str, str], digest: str, most: int) -> bytes | None:
-    """Bytes that a recording keeps under a digest; None for none, others, or more than most."""
+    """Bytes that a recording keeps under a digest; None if missing, damaged or larger than ``most``."""
     try:
         packed = base64.b64decode(metadata.get(digest, "").removeprefix(_PACKED))
         data = zlib.decompressobj().decompress(packed, max(1, most))

@@ -93,7 +93,7 @@ def read_values(
 def read_any(
     kind: Kind, data: bytes, joint_names: tuple[str, ...] = (), buttons: tuple[int, ...] = BUTTONS
 ) -> tuple[int, Values] | Refusal:
-    """Stamp [ns] and values of the bytes of any message of a kind; or why it cannot be used.
+    """Stamp [ns] and values of any message of a kind, from its bytes; or the reason to refuse it.
 
     Args:
         kind: What the values are.
@@ -109,7 +109,7 @@ def read_any(
 
 
 def read_numbers(data: bytes, columns: tuple[str, ...]) -> tuple[int, Values] | Refusal:
-    """Stamp [ns] and the named numbers, shape (columns,), of a report; or why it has none."""
+    """Stamp [ns] and the named numbers, shape (columns,), of a report; or the reason to refuse it."""
     try:
         reports = read_reports(data)
     except ValueError:

@@ -65,7 +65,7 @@ class UnreadableError(ValueError):
 
 
 class Column:
-    """Reader of one topic's messages; what is no message of the topic is left out and counted.
+    """Reader of one topic's messages; malformed ones are left out and counted.
 
     Args:
         name: Topic.

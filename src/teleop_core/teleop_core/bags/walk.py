@@ -1,4 +1,4 @@
-"""Walking through MCAP records: compiled, since every message of a recording passes here."""
+"""Walking through MCAP records: compiled, since every message of a recording passes through it."""
 
 import numpy as np
 from mcap.opcode import Opcode

@@ -26,12 +26,12 @@ class TeleopError(Exception):
         super().__init__(one_line(text))
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Parts from which another process makes the same error."""
+        """What pickle needs to make the same error in another process."""
         return _same, (type(self), str(self), self.__dict__)
 
 
 class TeleopWarning(UserWarning):
-    """What runs but may not be meant: the kind of all warnings of this package."""
+    """Category of all warnings of this package: it runs, but may not be what was meant."""
 
 
 def _same(kind: type[TeleopError], text: str, attributes: dict[str, object]) -> TeleopError:
@@ -51,7 +51,7 @@ class ParameterError(TeleopError, ValueError):
 class UnknownNameError(ParameterError):
     """A name is not in its list: carries the ``alternatives``, each once.
 
-    The text has those first that are nearest to the name, and of many these alone.
+    The text lists the nearest alternatives first; of a long list it names only those.
     """
 
     def __init__(self, kind: str, value: object, alternatives: Iterable[str]) -> None:

@@ -117,7 +117,7 @@ def _make_choice(registry: "Registry[Any]", kind: str, values: Mapping[str, obje
 
 
 def _below(name: str, values: Mapping[str, object]) -> dict[str, object]:
-    """Values of a nested group, without its name."""
+    """Values of a nested group, with its name cut from their keys."""
     start = name + "."
     return {key[len(start) :]: value for key, value in values.items() if key.startswith(start)}
 
@@ -146,7 +146,7 @@ class Spec:
 
     @property
     def lowest(self) -> float | None:
-        """Smallest allowed number, that which turns it off included; None without a bound."""
+        """Smallest allowed number, including the one that means "off"; None without a bound."""
         if self.lower is None or self.off is None:
             return self.lower
         return min(self.lower, self.off)
@@ -199,7 +199,7 @@ class Spec:
 
 @cache
 def _hints(group: type) -> dict[str, Any]:
-    """Types of a group's fields; finding them out is most of the work of building one."""
+    """Types of a group's fields. They are cached: to resolve them is most of the cost of a group."""
     return get_type_hints(group)
 
 

@@ -1,9 +1,8 @@
 """Plain YAML: what files and settings say, with bounds on what reading it can cost, and writing it.
 
-It is YAML 1.1 as of PyYAML's safe loader, of which dates are texts, since no value here is one.
-Aliases are fine unless they lead back into themselves or multiply; so are numbers of a length that
-a number can have. Where PyYAML has libyaml, that reads and writes: the values are the same, five times
-as fast.
+It is YAML 1.1 as PyYAML's safe loader reads it, except that dates stay texts. Recursive aliases, aliases that expand to
+too many values, and overlong numbers are refused. Where PyYAML has libyaml, that reads and writes: the values are the
+same, five times as fast.
 """
 
 import stat
@@ -51,7 +50,7 @@ class _Dumper(getattr(yaml, "CSafeDumper", yaml.SafeDumper)):  # type: ignore[mi
 
 
 def written(value: Any, **options: Any) -> str:
-    """Text of a value: mappings in their own order, equal parts in full.
+    """YAML text of a value: mappings keep their order, and repeated parts are written out instead of aliased.
 
     Args:
         value: Mappings, lists, texts, numbers, truth values or None.
@@ -101,7 +100,7 @@ def _told(error: yaml.MarkedYAMLError) -> str:
 
 
 def _count(node: yaml.Node, known: dict[int, int], within: set[int]) -> int:
-    """Values that a node stands for.
+    """Number of values that a node expands to, with its aliases.
 
     Raises:
         UnreadableError: It is part of itself, or there are too many, or a number is too long.

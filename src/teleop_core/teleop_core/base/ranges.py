@@ -1,7 +1,7 @@
 """Ranges: what a number from outside may be at all, by its unit, declared once for all readers.
 
-Parameters, arms of files and traces of networks are checked against them. A number beyond ``most``
-is physical for no arm and is refused. One beyond ``usual`` is told: it looks like another unit.
+Parameters, arms of files and traces of networks are checked against them. A number beyond ``most`` is impossible for
+any arm and is refused. One beyond ``usual`` gives a warning: it looks like another unit.
 """
 
 import math
@@ -46,7 +46,7 @@ LATEST_S = 4e9
 
 
 def range_of(unit: str) -> Range:
-    """Range of a unit, or of ``rad or m`` the wider one; of other units any number."""
+    """Range of a unit; for ``rad or m`` the wider of both, for an unknown unit any number."""
     parts = [RANGES.get(part, Range(math.inf)) for part in unit.split(" or ")]
     return max(parts, key=lambda part: part.most)
 

@@ -166,7 +166,7 @@ class Registry(Generic[Part]):
 
 
 def places(package: str, names: str) -> dict[str, str]:
-    """Places of parts called like their files: ``NOTCH`` of ``notch.py`` for the name "notch"."""
+    """Import paths of parts that are named like their files: ``NOTCH`` of ``notch.py`` for the name "notch"."""
     return {name: f"{package}.{name}:{name.upper()}" for name in names.split()}
 
 
@@ -203,7 +203,7 @@ def part_check(kind: str, form: type[Part], *calls: str) -> Callable[[str, objec
 
 @contextmanager
 def tried(kind: str, name: str, needs: str) -> Iterator[None]:
-    """Tell what a part raises that is tried inside of this ``with``.
+    """Report what a part raises inside this ``with`` as a :class:`PartError`.
 
     Args:
         kind: As the registry's.

@@ -52,7 +52,7 @@ def _run(arguments: argparse.Namespace) -> int:
 
 
 def phases_of(*, is_all: bool) -> Iterator[Sequence[Job]]:
-    """Jobs to be done side by side, one group after the other: later ones find what is there."""
+    """Groups of jobs. Those of a group run in parallel; later groups reuse the kernels of earlier ones."""
     from importlib.util import find_spec
 
     from teleop_core.graph.graph import BUILT_IN

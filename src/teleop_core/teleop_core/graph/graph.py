@@ -353,7 +353,7 @@ def build_graph(arms: Iterable[str] = (), stages: Iterable[str] = (), delays: It
 
 
 def _demanded(stages: tuple[Stage, ...]) -> tuple[Stage, ...]:
-    """The stages without those of their outputs on demand for which there is none."""
+    """The stages, without those of their on-demand outputs that nobody reads."""
     needed = {topic.name for stage in stages for topic in stage.reads if topic not in stage.optional}
     written = {
         topic.name for stage in stages for topic in stage.writes if topic not in stage.on_demand or topic.name in needed

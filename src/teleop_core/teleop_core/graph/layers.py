@@ -205,7 +205,7 @@ def _current(full: str) -> str:
 
 
 def _share_robot(layer: Layer) -> None:
-    """Let a slave have the robot of its simulator, where a file knows no slave beside that."""
+    """Give ``slave`` the robot of ``slave_sim`` where a file of a former version has no ``slave``."""
     for name in [name for name in layer if name.rpartition("/")[2] == "slave_sim"]:
         slave = layer.setdefault(name.removesuffix("_sim"), {})
         if not slave.keys() & set(_OF_ROBOT):
@@ -287,7 +287,7 @@ def _hits(key: str) -> list[tuple[str, Spec]]:
 
 
 def _as_declared(spec: Spec, value: object) -> object:
-    """Whole numbers as real ones where a real one is declared; text for a name that YAML read.
+    """Value as the declared type: a whole number as a real one; what YAML took for a number as text.
 
     A single value stands for a list of one.
     """

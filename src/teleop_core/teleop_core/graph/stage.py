@@ -268,7 +268,7 @@ class RunningStage:
         return []
 
     def described(self) -> dict[str, str]:
-        """Names and texts that its report tells beside its numbers: none."""
+        """Names and texts that its report carries beside its numbers; none by default."""
         return {}
 
     def step(self) -> None:

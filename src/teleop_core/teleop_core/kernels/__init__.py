@@ -204,8 +204,8 @@ def bound(compiled: Callable[P, R], *arguments: P.args, **_: P.kwargs) -> Callab
     """Kernel on arguments that stay the same objects, without the cost of looking at their types.
 
     Numbers keep the value they have now; what changes from call to call travels in arrays and
-    records. With function pointers among the arguments this saves two thirds of a call. Where the
-    compiler has a say, so that a mistake in the kernel is found, that is here.
+    records. With function pointers among the arguments this saves two thirds of a call. The kernel is compiled here,
+    so that a mistake in it is reported here.
 
     Args:
         compiled: A kernel; a plain Python function is bound as it is.
@@ -227,10 +227,10 @@ def _memory(value: Any) -> Any:
 
 
 def direct(compiled: Callable[P, R], signature: Any) -> Callable[P, R]:
-    """Kernel for arguments of one signature, which it takes without a look at their types.
+    """Kernel for arguments of one signature, called without a check of their types.
 
-    It saves 0.15 µs of a call. Whoever calls it has looked: arguments of other types are read as if
-    they were of these. A plain Python function stays as it is.
+    It saves 0.15 µs of a call. The caller must pass the right types: arguments of other types are misread. A plain
+    Python function stays as it is.
 
     Args:
         compiled: A kernel.
@@ -246,7 +246,7 @@ def direct(compiled: Callable[P, R], signature: Any) -> Callable[P, R]:
 
 
 def apart(compiled: Callable[..., R], *arguments: object) -> Callable[..., R]:
-    """Kernel as a value that other kernels call where it is, without its code in theirs.
+    """Kernel that other kernels call by its address, instead of compiling a copy of its code.
 
     A kernel that names another is compiled with a copy of it, which takes seconds where that is
     large. This one is compiled once for its arguments, and its callers without it.
@@ -282,7 +282,7 @@ class _Memory:
 
 
 def bare(value: Any) -> Any:
-    """Record over the same memory without attributes, whose look-up costs 1 µs; others as is."""
+    """The same memory as a record without attributes, whose look-up costs 1 µs; other values unchanged."""
     if isinstance(value, np.record):
         return value.view(np.dtype((np.void, value.dtype)))
     return value
@@ -317,7 +317,7 @@ class Record(_NUMPY_RECORD):
 
 
 def _missing(name: str, fields: Iterable[str]) -> str:
-    """What is wrong with a name, as the compiler's messages have it."""
+    """Message for a field that does not exist, in the compiler's own words."""
     known = list(fields)
     near = get_close_matches(name, known, n=1)
     hint = f"; did you mean {near[0]!r}?" if near else ""

@@ -147,7 +147,7 @@ _unboxers.functions[types.FunctionType] = _unbox_function
 
 
 class InnerDispatcher(Dispatcher):
-    """Has no way in from Python; numba would crash where this raises."""
+    """Kernel that Python cannot call: this raises, where numba would crash."""
 
     def __call__(self, *_: Any, **__: Any) -> Any:
         """Refuse."""
@@ -237,7 +237,7 @@ _BROKEN = (OSError, EOFError, UnpicklingError, AttributeError, ImportError)
 
 
 class _Cache(FunctionCache):
-    """Cache on disk that is as good as none where its files are broken or cannot be written."""
+    """Cache on disk; files that are broken or cannot be written count as absent."""
 
     shipped_name = ""
     """Name of its files beside a source, which a wheel gives them."""

@@ -25,7 +25,7 @@ _SIM_TIME = "use_sim_time"
 
 
 def _sim_time(node: str) -> ParameterError:
-    """Refusal of a clock that others set: a step is a millisecond, of drives too."""
+    """Refusal of ``use_sim_time``: a step is a millisecond of real time, for drives too."""
     requirement = (
         "false: nodes step in real time; teleop sim and replay go as fast as the machine can, "
         "teleop play --clock publishes /clock"
@@ -111,7 +111,7 @@ class _Own(LifecycleNode):  # type: ignore[misc]
 
     @property
     def subscriptions(self) -> Iterator[Any]:
-        """Those that the executor serves: others are opened and closed by any thread."""
+        """Subscriptions that the executor serves; those taken by hand are opened and closed by any thread."""
         for entry in tuple(super().subscriptions):
             if not isinstance(entry.callback_group, Unattended):
                 yield entry
@@ -138,7 +138,7 @@ class _Own(LifecycleNode):  # type: ignore[misc]
         return _CODES[self._hooks.on_error()]
 
     def _change_state(self, change: Callable[..., Any], request: Any, response: Any) -> Any:
-        """Answer a service that asks for a transition; one that there is not is refused."""
+        """Answer a service that asks for a transition; refuse one that the present state does not have."""
         try:
             return change(request, response)
         except rclpy_implementation.RCLError:  # it would end the process

@@ -6,7 +6,7 @@ from rclpy.serialization import deserialize_message, serialize_message
 
 
 def read_message(data: bytes, kind: Any) -> Any:
-    """Message of a class, from its bytes; raises what rclpy raises where they are none."""
+    """Message of a class, from its bytes; raises what rclpy raises for malformed bytes."""
     return deserialize_message(data, kind)
 
 

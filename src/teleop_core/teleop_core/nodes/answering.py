@@ -25,7 +25,7 @@ class AnsweringNode(CoreNode):
         self._stamp_fields = (f"{self._trigger.field}_ns", "now_ns")
 
     def start(self) -> None:
-        """Start from where the slave is, whatever was before."""
+        """Start from where the slave is now; forget everything before."""
         self.stage.reset()
         self._was_silent, self._told_ns = True, 0
         for port in self.description.reads:
@@ -68,7 +68,7 @@ class AnsweringNode(CoreNode):
             self._find_silence(report)
 
     def _find_silence(self, report: Callable[[int], None] | None) -> None:
-        """Report once that nothing is answered any more, where a stage has something to say."""
+        """Report once that the inputs fell silent, if the stage has a safe output for that."""
         is_silent = self._question.age() > self._timeout
         if is_silent and not self._was_silent:
             with self.lock:

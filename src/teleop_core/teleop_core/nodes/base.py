@@ -115,7 +115,7 @@ class CoreNode(TunedNode):
         return {}
 
     def news(self, word: str) -> str:
-        """Line for the log when the node has come to another state, said in a word."""
+        """Log line for a new state of the node, whose name is ``word``."""
         if word != _NEWS["active"]:
             return word
         inputs, robot = self.ports.all_inputs(), getattr(self.parameters, "robot", "")
@@ -141,7 +141,7 @@ class CoreNode(TunedNode):
         return [(loop, loop.turns + sent)]
 
     def halt(self) -> None:
-        """Stop what works for several nodes: nothing here."""
+        """Stop what several nodes share; a single node shares nothing."""
 
     # -- topics ----------------------------------------------------------------------------------
 
@@ -171,7 +171,7 @@ class CoreNode(TunedNode):
             read_reports(report_of(self._report, 0, self._state))  # loads the message types, 60 ms
 
     def send_report(self, stamp_ns: int) -> None:
-        """Report the state if it, or a parameter that may be told beside it, has changed."""
+        """Send the state report if the state, or a parameter that goes with it, has changed."""
         if self._report is None or self.runner is None:
             return
         bits, parameters = self._state.tobytes(), self.parameters
@@ -183,7 +183,7 @@ class CoreNode(TunedNode):
         self.show_present()
 
     def input(self, port: Topic) -> Input:
-        """What the node reads at a port, of several the one that others are added to."""
+        """Input of a port; where several topics are added up, the one that the others are added to."""
         return self.ports.input(port)
 
     def read_ports(self, trigger: Topic | None = None) -> None:
@@ -334,7 +334,7 @@ class CoreNode(TunedNode):
             self.ros.trigger("shutdown")
 
     def on_no_transition(self, wanted: str) -> None:
-        """Say that a transition was asked for that there is not now."""
+        """Log that a transition was requested which the present state does not have."""
         self.ros.get_logger().error(f"no transition {wanted} while {self._word}")
 
     # -- diagnostics -----------------------------------------------------------------------------
@@ -355,7 +355,7 @@ class CoreNode(TunedNode):
         self._report_in_time()
 
     def _report_in_time(self) -> None:
-        """Report, once a second; what a part of others raises must not end the node."""
+        """Report once a second. An exception from a user's part is logged, and does not end the node."""
         try:
             self.report()
         except Exception:

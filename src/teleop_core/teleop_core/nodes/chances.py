@@ -1,4 +1,4 @@
-"""Chances: how long a process could have worked, by the system's accounts of its threads.
+"""Chances: how long a process could have worked, by the kernel's accounting of its threads.
 
 On a busy machine a healthy thread may get no processor for a second. Who judges by the clock takes
 it for one that hangs; so the time for which it waited for a processor does not count here.

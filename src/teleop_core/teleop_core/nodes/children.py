@@ -29,10 +29,10 @@ _STILL_STARTING = 60.0  # the interpreter loads, perhaps from a cold disk
 
 
 def environment(domain: int | None = None) -> dict[str, str]:
-    """Environment of the nodes: this machine only, and a domain of their own, if nothing is said.
+    """Environment of the nodes; by default this machine only, and a free domain.
 
-    What concerns this process as well is set here too, but for the domain: one process may lead
-    several sessions.
+    Variables that this process needs too are set here as well, except the domain: one process may lead several
+    sessions.
 
     Args:
         domain: ROS domain; None for that of ``ROS_DOMAIN_ID``, or else a free one.
@@ -151,7 +151,7 @@ class Child:
             raise SessionError(text + self.last_words())
 
     def _silence(self) -> float:
-        """Time for which it could have spoken [s]; 0 while that is no reason to worry."""
+        """Processor time in which it could have reported and did not [s]; 0 while that is normal."""
         with suppress(OSError):
             while came := self._line.recv(4096):
                 self._text += came
@@ -163,7 +163,7 @@ class Child:
         return self._silent if self._silent > patience else 0.0
 
     def last_words(self) -> str:
-        """What it wrote of its trouble, else its last lines, each indented on a line of its own."""
+        """Its error lines, or else its last lines of output, each indented."""
         size = os.fstat(self._log.fileno()).st_size
         tail = os.pread(self._log.fileno(), 20_000, max(0, size - 20_000))
         lines = tail.decode(errors="replace").splitlines()

@@ -44,8 +44,7 @@ _LATCHED = Qos(depth=10, is_latched=True)
 class OperatingState:
     """Topics of the operating state of one arm, served by the executor.
 
-    The loop of the node says :meth:`note`; it never publishes here itself, so that no reader can
-    hold it up.
+    The node's loop calls :meth:`note` and never publishes here itself, so that no slow reader blocks it.
 
     Args:
         node: Node that owns them; its ``lock`` is held while a command is taken.

@@ -20,11 +20,11 @@ _OPENING = 20.0  # a device that takes longer to open hangs [s]
 class DeviceHand:
     """Reader of a device, in a thread of its own that alone uses the device.
 
-    A device that goes is let go of, and taken again when it comes back.
+    A device that is unplugged is closed, and opened again when it comes back.
 
     Args:
-        node: Node whose log is told.
-        hand: Who follows.
+        node: Node in whose log it reports.
+    hand: Hand that it moves.
         opens: Opens the device.
         parameters: Of the operator.
         force: Force that the person shall feel, as a share of the largest.
@@ -124,6 +124,6 @@ class DeviceHand:
         self._log.info(f"{self._device.name} is back")
 
     def _fail(self, reason: str, _: bool) -> None:
-        """Tell what nobody expected; the silence that follows lets go of the stylus."""
+        """Log an unexpected error. The silence that follows releases the stylus."""
         self._lost = "the reader of the device has crashed; see the log"
         self._log.error(f"{self._lost}:\n{reason}")

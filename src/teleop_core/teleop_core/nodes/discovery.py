@@ -28,8 +28,8 @@ LOOPBACK, NETWORK = str(_FOLDER / "loopback.xml"), str(_FOLDER / "network.xml")
 def choose_transport(environment: MutableMapping[str, str] = os.environ) -> None:
     """Choose the transport of this process and its children; a profile of the user's own wins.
 
-    To be called before the middleware is started. Without a word of the user, and with LOCALHOST,
-    nothing outside of this machine is heard or told. Other middlewares get the range alone.
+    To be called before the middleware is started. By default, and with LOCALHOST, nothing is sent to or heard from
+    other machines. Middlewares other than Fast DDS get the range alone.
 
     Args:
         environment: Variables, which are changed in place.

@@ -42,7 +42,7 @@ def displayed(topic: Topic) -> Topic:
 
 
 class LiveDisplay:
-    """Slow copies of the streams of one arm, while somebody looks.
+    """Slow copies of the streams of one arm, published while somebody subscribes.
 
     Args:
         node: Node that publishes them.
@@ -55,7 +55,7 @@ class LiveDisplay:
         self._cadence, self._said = (Cadence(node.world.monotonic_ns, PERIOD_NS), dict.fromkeys(topics, b""))
 
     def show(self, newest: Newest) -> None:
-        """Say again what is due and new."""
+        """Publish the samples that are due and new."""
         if not self._cadence.is_due():
             return
         for topic, publisher in self._publishers.items():

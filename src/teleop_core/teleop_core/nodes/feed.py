@@ -41,7 +41,7 @@ class Channel:
             self._feed.put(self._index, _MESSAGE, data, self._number, sent_ns)
 
     def join(self, is_inside: bool) -> None:
-        """Say whether this process sends the topic, or whoever else does."""
+        """Tell the recorder whether this process sends the topic, or another one does."""
         if is_inside is not self._is_inside:
             self._is_inside = is_inside
             self.tell()
@@ -124,7 +124,7 @@ class Fed(Protocol):
         """Take a message, before which so many were lost."""
 
     def join(self, is_inside: bool, since_ns: int) -> None:
-        """Take messages of the feed, or those of the middleware, that were sent since then [ns]."""
+        """Take messages from the feed or from the middleware, from those sent at ``since_ns`` on [ns]."""
 
 
 class FeedReader:
@@ -197,7 +197,7 @@ class _Loop:
                 channel.join(False, self._world.time_ns())
 
     def _hand_on(self) -> None:
-        """Hand on whole frames; who sends others is no loop of ours, and is heard no more."""
+        """Hand on whole frames. A sender of malformed frames is no loop of ours and is cut off."""
         try:
             self._take_frames()
         except (IndexError, ValueError, TypeError):

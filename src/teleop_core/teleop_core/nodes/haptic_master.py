@@ -13,8 +13,8 @@ from teleop_core.slave.operation.states import TABLE, Answer, Event, State, answ
 class CrtkMaster:
     """Operating state of the device in the hand.
 
-    It is enabled from the start and needs no homing: its encoders know where it is. Outside of
-    ENABLED its motors give no force, and the hand moves it freely. An emergency stop of the
+    It is enabled from the start and needs no homing: its encoders know where it is. In all other states than ENABLED
+    its motors give no force, and the hand moves it freely. An emergency stop of the
     session makes it FAULT until it is released.
 
     Args:

@@ -11,11 +11,10 @@ from teleop_core.nodes.watch import ENDS
 
 
 class Interrupt:
-    """Whether Ctrl-C or another such signal came; what runs goes on until it looks.
+    """Whether Ctrl-C or another ending signal came. Work goes on until it calls :meth:`check`.
 
-    SIGTERM ends a session like Ctrl-C does, and so do SIGHUP, of a terminal that is closed, and
-    SIGQUIT. An exception that came out of nowhere could leave a lock of the middleware taken, for
-    which the end of the session would then wait.
+    SIGTERM, SIGQUIT, and SIGHUP of a closed terminal act like Ctrl-C. An exception raised by the handler itself could
+    leave a lock of the middleware taken, and the end of the session would wait for it.
 
     Attributes:
         has_come: Whether one did.

@@ -22,7 +22,7 @@ _YOUNG = 60.0  # seconds
 
 
 def remove_leftovers(folder: Path = FOLDER) -> int:
-    """Remove what nobody alive owns, and leave alone what cannot be opened.
+    """Remove files without a living owner; leave files that cannot be opened.
 
     Args:
         folder: Where the middleware keeps its shared memory.

@@ -119,7 +119,7 @@ _UNGRANTED = (
 def _priority(configuration: Configuration, processes: Processes) -> int | None:
     """Priority of the loops; None: as configured.
 
-    Processes for each node need more than two processors together, so that theirs stays 0.
+    With a process for each node it stays 0: together they need more than two processors.
     """
     if configuration.groups[SESSION].real_time.priority >= 0 or processes is Processes.NODES:
         return None
@@ -233,7 +233,7 @@ class _Session:
                 )
 
     def _await_operator(self) -> None:
-        """Wait until the hand moves; it does after a while even if nothing follows it."""
+        """Wait until the hand moves, which it does after a while even if no arm follows."""
         hands = [m.name for m in self._graph.members if m.stage.name == HAND]
         operators = [name for name in hands if name in self._observer.statuses]
         while not all(self._observer.statuses[m].number("has_begun") for m in operators):
@@ -256,7 +256,7 @@ class _Session:
             child.check()
 
     def _obey(self) -> None:
-        """Do what keys ask for, beside the stop, which does not wait for us."""
+        """Do what pressed keys ask for. The stop key does not come here: it is sent at once."""
         while self._keys.waiting:
             if self._keys.waiting.popleft() != "e":
                 continue
@@ -269,7 +269,7 @@ class _Session:
                 self.say(str(error))
 
     def _check(self) -> None:
-        """Make sure that nobody stops it, all processes run and all nodes report."""
+        """Check that no signal came, all processes run and all nodes report."""
         self._interrupt.check()
         self._obey()
         if time.monotonic() - self._ready < _ALONE:

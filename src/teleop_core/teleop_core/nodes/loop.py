@@ -53,7 +53,7 @@ class Loop:
         self._thread.start()
 
     def stop(self) -> bool:
-        """End after the present turn; whether it did, or is left behind because it hangs."""
+        """End after the present turn; returns whether it did. A loop that hangs is left behind."""
         self.is_running = False
         if self._world.thread_ident() == self._thread.ident:
             return True

@@ -21,7 +21,7 @@ _THERE = (NETWORK_SERVO_CP, NETWORK_MASTER_ENERGY, NETWORK_JAW_SERVO_JP)
 class NetworkNode(TickingNode):
     """Passes on what arrives in a tick; where nothing does, nothing is sent.
 
-    The slave's setpoint counts every time, for it may move under one stamp; the rest once.
+    A stamp is passed on once, except of the slave's setpoint, which may move under one stamp.
     """
 
     def setup(self, parameters: NetworkParameters) -> None:

@@ -58,7 +58,7 @@ class Commanders:
 
 
 class Trouble:
-    """Log of why a bridge holds: each reason once, without regard to its numbers, and its end.
+    """Log of why a bridge holds: each reason once, whatever numbers it contains, and when it is over.
 
     Args:
         owner: The node.

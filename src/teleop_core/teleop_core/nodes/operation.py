@@ -57,9 +57,9 @@ class StopButton:
         self._say(is_pressed)
 
     def beat(self) -> None:
-        """Say its state again, if it has one and the last time is a while ago.
+        """Repeat its state, if it has one and was silent for a while.
 
-        A slave with a heartbeat misses every button that it has heard.
+        A slave with ``operation.heartbeat`` counts the silence of a known button as a press.
         """
         silence_ns = self._world.monotonic_ns() - self._said_ns
         if self._is_pressed is not None and silence_ns > _BEAT_NS:
@@ -143,7 +143,7 @@ class StopInput:
         return self._presses.lost
 
     def holders(self, silent_since_ns: int = 0) -> tuple[bytes, ...]:
-        """Buttons that hold the stop pressed, or have been silent since then [ns]."""
+        """Buttons that hold the stop pressed, or have been silent since ``silent_since_ns``."""
         presses = self._presses
         return tuple(dict.fromkeys((*presses.holders, *presses.silent(silent_since_ns))))
 
@@ -188,7 +188,7 @@ class StopInput:
 
 
 class Commanded(Protocol):
-    """What takes commands by name, of which the answer comes with a text, and the stop."""
+    """Taker of the stop and of named commands, each of which is answered with a text."""
 
     def request(self, event: str) -> tuple[Answer, str]:
         """Take a command."""

@@ -1,4 +1,4 @@
-"""Node ``operator``: who holds the stylus, a simulated person or one at a device or elsewhere."""
+"""Node ``operator``: the hand on the stylus, of a simulated person or of one at a device."""
 
 from dataclasses import replace
 from typing import Any
@@ -87,7 +87,7 @@ _LOOK = 10
 
 
 class OperatorNode(TickingNode):
-    """Where the hand is wanted, once per millisecond."""
+    """Publishes the wanted place of the hand, once per millisecond."""
 
     _hand: HandInput | None = None
     _device: DeviceHand | None = None
@@ -131,7 +131,7 @@ class OperatorNode(TickingNode):
         super().teardown()
 
     def read_ports(self, trigger: Topic | None = None) -> None:
-        """Bring the signals up to date, and hear who says where the stylus shall be."""
+        """Bring the signals up to date, and read the pose that a person or program commands."""
         self._ticks += 1
         if self._sees or not self.has_own_loop or self._ticks % _LOOK == 0:
             super().read_ports(trigger)

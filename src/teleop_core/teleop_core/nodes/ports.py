@@ -93,7 +93,7 @@ class Ports:
         return f"{ports[0].field}_ns" if ports else ""
 
     def input(self, port: Topic) -> Input:
-        """What is read at a port, of several the one that others are added to."""
+        """Input of a port; where several topics are added up, the one that the others are added to."""
         return self.inputs[port.name][0]
 
     def output(self, topic: Topic) -> Output:
@@ -120,8 +120,8 @@ class Ports:
     def send(self, now_ns: int, silent: Collection[str] = ()) -> None:
         """Send what the stage wrote, each under the stamp that its topic says, but for some topics.
 
-        What passes on a stamp that went out already is no new answer, and is not sent. A stage
-        that is not of this package may write anything: what is not finite is not sent.
+        An output whose stamp was sent already is no new answer and is not sent. Nor is a value of a user's stage that
+        is not finite.
         """
         row = self.row
         if self._must_check and not all(output.is_sound() for output, _ in self._stamped):

@@ -106,7 +106,7 @@ def _begin_end(crew: Crew, watch: Watching) -> None:
 
 
 def _autostart(nodes: tuple[CoreNode, ...], world: World) -> int:
-    """Configure all, which takes long, before any is at work; returns the exit code so far."""
+    """Configure all nodes, which takes long, before activating any; returns the exit code so far."""
     willing = [node for node in nodes if node.options.autostart]
     for node in willing:
         if node.ended.done():

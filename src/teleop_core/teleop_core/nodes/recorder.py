@@ -75,7 +75,7 @@ class _Channel:
     def join(self, is_inside: bool, since_ns: int | None = None) -> None:
         """Take messages from :meth:`give`, or from the topic, that were sent since then [ns].
 
-        Those that the topic has brought already do not come again.
+        Messages that already came by the topic are not recorded twice.
         """
         if is_inside is not (self._inside_ns is None):
             return
@@ -130,8 +130,8 @@ class _Channel:
     def count(self, sender: bytes, number: int) -> None:
         """Note a message by its publisher and its number in that one's sequence.
 
-        A node that starts again sends before the middleware has told the recorder of it: for 0.1 s,
-        seldom for 1 s. So of a publisher that comes later, what it sent until then was lost.
+        A restarted node sends for 0.1 s, seldom 1 s, before the recorder discovers it. Messages that a late publisher
+        sent before its first recorded one therefore count as lost.
         """
         self.received += 1
         if (last := self._numbers.get(sender)) is None:
@@ -140,7 +140,7 @@ class _Channel:
         self.lost += max(0, number - last - 1)
 
     def _is_new_there(self) -> bool:
-        """Whether a publisher that was not heard yet cannot have sent before the recorder came."""
+        """Whether an unknown publisher is new, and so cannot have sent before the recorder started."""
         listens_ns = self._world.monotonic_ns() - self._since_ns
         return self.topic.quality is Quality.STREAM and listens_ns > DISCOVERY_NS
 
@@ -213,7 +213,7 @@ class RecorderNode(CoreNode):
         return Configuration.from_layers([layer], parameters.scenario)
 
     def _model_of(self, configuration: Configuration, parameters: RecorderParameters) -> LiveModel:
-        """Frames to record beside the topics; none of a robot that is not known here."""
+        """Frames to record beside the topics; none for a robot that is not installed."""
         try:
             return LiveModel(Model(configuration, parameters.tf_rate, self.arm))
         except TeleopError as error:

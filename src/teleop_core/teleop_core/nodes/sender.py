@@ -54,7 +54,7 @@ class Sender:
         self.clear_ages()
 
     def clear_ages(self) -> None:
-        """Begin anew with times that two clocks make up, as after one of them was stepped."""
+        """Forget ages, which compare two clocks, because one of the clocks was stepped."""
         self.ages.clear()
         self.newest_age_ns = 0
 
@@ -85,7 +85,7 @@ class Sender:
         return None
 
     def release(self) -> None:
-        """Let another sender have the topic: the owner's publisher is gone."""
+        """Free the topic for another sender: the owner's publisher is gone."""
         self._owner = b""
 
     def note_stamp(self, stamp_ns: int, now_ns: int) -> None:

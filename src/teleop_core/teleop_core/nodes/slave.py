@@ -47,7 +47,7 @@ class SlaveNode(TickingNode):
         super().teardown()
 
     def start(self) -> None:
-        """Relate the clocks; what they do later is seen against this."""
+        """Note the offset of the clocks, against which later steps are detected."""
         super().start()
         self._is_told = False
         self._offset_ns, self._turns, self._floods = self.epoch_ns, 0, 0
@@ -91,7 +91,7 @@ class SlaveNode(TickingNode):
             row[name] = waiting[-1][0]
 
     def advance(self, now_ns: int) -> None:
-        """Take the emergency stop, then make one step, also of many that are to be made up for."""
+        """Read the emergency stop, then make one step; also before each of several late steps."""
         with self.lock:  # over both: a reset between them would find a silent button released
             is_idle = self._state[0] == State.DISABLED
             for is_pressed in self._stop.take(now_ns, is_idle=is_idle):
@@ -131,7 +131,9 @@ class SlaveNode(TickingNode):
             self._fail(Fault.FLOOD)
 
     def _relate_anew(self, offset_ns: int) -> None:
-        """Take the present clock if that of the start was behind: else no command is followed."""
+        """Take the present offset if the clock was behind at the start; otherwise every command would seem to be of
+        the future.
+        """
         stamp_ns, now_ns = int(self.row["slave_servo_jp_ns"]), int(self.row["now_ns"])
         behind_ns = offset_ns - self.epoch_ns
         if stamp_ns - now_ns > SECOND_NS > abs(stamp_ns - now_ns - behind_ns):

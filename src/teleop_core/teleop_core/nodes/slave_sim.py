@@ -16,7 +16,7 @@ class SlaveSimNode(TickingNode):
         return [f"no slave/setpoint_js for {setpoint.age():.1f} s: stands"] if is_silent else []
 
     def values(self) -> dict[str, str]:
-        """Presses of a button; punctures, and how deep the needle is, where there can be any."""
+        """Presses of a button; punctures and depth of the needle, if the world can be punctured."""
         stage = self.stage
         if stage.parameters["click_force"] > 0.0:
             return {"presses": str(stage.presses)}

@@ -24,7 +24,7 @@ _RULES = {"__ns": "__ns", "__node": "__node", "__name": "__node"}
 
 
 def main() -> int:
-    """Entry point of every executable: the stage is what it is called, or what is said first.
+    """Entry point of every executable: its name, or its first argument, names the stage.
 
     Returns:
         Exit code: 0; 1 after a failure at work; 2 if a name, parameter or file is wrong.
@@ -59,7 +59,7 @@ def _start() -> int:
 
 
 def taken_names(arguments: list[str]) -> tuple[list[str], dict[str, str]]:
-    """Take the rules out that would name all nodes of a process alike.
+    """Remove remapping rules that would give all nodes of a process the same name.
 
     The middleware applies ``__node:=arm``, as launch files give it, to every node of a process,
     and ``__ns:=/lab`` in place of the namespaces of arms. A process of several nodes takes them

@@ -312,7 +312,7 @@ def _become(request: dict[str, Any], files: dict[str, int]) -> None:
 
 
 def _load(configuration: str) -> None:
-    """Load what the nodes of a session use; what cannot be loaded, its node tells of."""
+    """Load what the nodes of a session use. What fails to load is reported later, by its own node."""
     from teleop_core.bags.ros_types import typestore
     from teleop_core.base.own_parts import load_own_parts
     from teleop_core.graph.layers import parse_text
@@ -341,7 +341,7 @@ def _load(configuration: str) -> None:
 
 
 def _loaded(configuration: str, line: socket.socket) -> None:
-    """Load, and tell meanwhile that it does; no other thread is left afterwards."""
+    """Load, and report that it is busy meanwhile; leaves no other thread running."""
     from teleop_core.kernels.progress import in_work
 
     is_done = threading.Event()

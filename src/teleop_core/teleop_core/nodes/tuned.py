@@ -139,7 +139,7 @@ class TunedNode(Hooks):
         return f"{self.arm}/{self.ros.get_name()}".strip("/")
 
     def show_present(self) -> None:
-        """Let the executor show what the stage has changed by itself: setting it takes long."""
+        """Have the executor publish parameters that the stage changed by itself; that is too slow for the loop."""
         if self._changes_itself():
             self._present.trigger()
 

@@ -62,7 +62,7 @@ def signal_pipe() -> int:
 
 @dataclass
 class _Stillness:
-    """How long nothing came of a loop: since the number that it had, of its chances to work [s]."""
+    """How long a loop has made no progress: its last count, and the processor time it could have used since [s]."""
 
     chances: Chances
     number: int
@@ -125,7 +125,7 @@ class Watch:
                 self._leave()
 
     def _await_leave(self) -> None:
-        """End the process well if the middleware holds it up: all that matters is done."""
+        """Exit with success if the middleware blocks the end: everything that matters is done."""
         self._leaving += 1
         if self._leaving * _PERIOD > _LEAVE_PATIENCE:
             os._exit(0)
@@ -134,7 +134,7 @@ class Watch:
         return in_work() or self.word
 
     def _find_hung(self) -> None:
-        """Find loops of which nothing came for longer than they could have worked."""
+        """Find loops that made no progress although they had processor time."""
         still: dict[Loop, _Stillness] = {}
         own = threading.get_native_id()  # runs now, whatever its account says
         threads = {t.native_id or own for t in threading.enumerate()} - {own}

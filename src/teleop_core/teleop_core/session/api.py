@@ -256,7 +256,7 @@ def _kept(
 
 
 class _Memory:
-    """Takes blocks as a writer does."""
+    """A recording in memory, which takes blocks as a writer of bags does."""
 
     def __init__(self, session: virtual.VirtualTime) -> None:
         self._session, self._reports = session, runner.StateReports(session)
@@ -289,7 +289,7 @@ class _Memory:
 
 
 def _known(registry: object, part: object) -> str:
-    """Name of an own part, which is registered under it from now on."""
+    """Register a part that was given as an object, and return its name."""
     from teleop_core.base.registry import Registry
 
     assert isinstance(registry, Registry)

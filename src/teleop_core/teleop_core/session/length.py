@@ -16,8 +16,8 @@ from teleop_core.session.configuration import Configuration
 def as_long_as_followed(made: Configuration, given: Iterable[Layer]) -> Configuration:
     """The same session, as long as the recordings that its operators follow.
 
-    A scenario that names such an operator itself lasts at least as long as it says: it leaves the
-    slave time to come to where the hand ends.
+    If the scenario itself names such an operator, its own duration is the least: that leaves the slave time to arrive
+    where the hand ends.
 
     Args:
         made: The session.

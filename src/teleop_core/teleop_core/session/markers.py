@@ -52,8 +52,8 @@ class ArmMarkers:
     def fixture(self, state: Mapping[str, float], told: Mapping[str, str], force: float = 0.0) -> Marker:
         """Virtual fixture around the slave, red while it is touched; taken away when it is off.
 
-        A box and a sphere are bodies, other shapes are lines along their edges. What is not known
-        here is the box around it.
+        A box and a sphere are bodies, other shapes are lines along their edges. A shape that is not known here is
+        drawn as the box around it.
 
         Args:
             state: Numbers of ``teleop/state`` by name; empty before the first.

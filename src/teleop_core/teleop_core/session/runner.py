@@ -261,7 +261,7 @@ def describe(configuration: Configuration) -> dict[str, str]:
 
 
 class NewSamples:
-    """Finder of the rows of a session that hold a message which those before did not hold.
+    """Finder of the rows of a session that hold a new message.
 
     A stage that answers a slow master writes one message per sample, not one per tick. What tells
     the stamp in force is a message every tick.
@@ -303,7 +303,7 @@ class NewSamples:
 
 
 class ReportWriter(Protocol):
-    """What takes single messages."""
+    """Writer of single messages."""
 
     def write(self, topic: topics.Topic, log_ns: int, data: bytes) -> None:
         """Take one message."""

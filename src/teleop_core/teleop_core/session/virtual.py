@@ -176,7 +176,7 @@ class VirtualTime:
         return block
 
     def _check(self, part: Any) -> None:
-        """Make sure that further stages wrote numbers; looked at seldom, for it takes as long for few rows as for many.
+        """Make sure that a user's stages wrote finite numbers; called once a block, whose length hardly counts.
 
         Raises:
             PartError: One wrote NaN or infinity; the text says where and when.
