@@ -46,7 +46,7 @@ class Context:
         self._has_begun = False
 
     def load_robot(self) -> Robot | None:
-        """What moved, as it was recorded; None if that is not told, or is not installed."""
+        """The robot as it was recorded; None if the recording does not name it, or it is not installed."""
         if self.robot is not None:
             with suppress(TeleopError, OSError):
                 files = recorded_files(self.bag.metadata)
@@ -55,7 +55,7 @@ class Context:
         return None
 
     def missing(self) -> tuple[str, ...]:
-        """Parts that the recording names and that are not known here, each as a text."""
+        """Parts that the recording names and that are not installed here, each as a text."""
         is_lost = self.robot is not None and self.load_robot() is None
         return (*self.origin.missing, *[f"robot {shown(self.robot)}"] * is_lost)
 

@@ -70,7 +70,7 @@ def along(
     colored: bool = False,
     whole: bool = False,
 ) -> dict[str, Any]:
-    """A trace of a path of which a page shows the part within its visible time.
+    """A trace of a path; the page shows the part of it that lies in the visible time.
 
     Args:
         trace: Line in a plane or in space.

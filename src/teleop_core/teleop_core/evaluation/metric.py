@@ -78,7 +78,7 @@ class Metric(ABC):
     """One thing that is measured on one arm of a recording, made anew for each.
 
     A metric takes the recording window by window and must keep little of each, so that a recording
-    of any length can be scored. What other metrics compute too comes from
+    of any length can be scored. What several metrics need comes from
     :meth:`~teleop_core.evaluation.context.Context.shared` (over the recording) and
     :meth:`~teleop_core.evaluation.windows.Window.once` (of a window).
 

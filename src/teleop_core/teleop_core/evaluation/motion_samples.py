@@ -75,9 +75,9 @@ class MotionSamples:
 
 
 def _numbers(at: Array, first: int, stop: int) -> NDArray[np.int64]:
-    """Numbers from ``first`` on and below ``stop`` of samples that stand in no gap.
+    """Indices from ``first`` to below ``stop`` of the samples that lie in no gap.
 
-    A time that lies years behind the others costs nothing: there is nothing in between.
+    A single time that lies years later costs nothing, for gaps hold no samples.
 
     Args:
         at: Times since the sample number 0 (N,) [s].

@@ -100,8 +100,8 @@ class Origin:
 def read_origin(bag: reader.Bag, arm: str = "") -> Origin:
     """Origin of a recording.
 
-    What is missing, or cannot be built any more, is that of the built-in stages with their
-    published values: scores of what was recorded do not depend on it.
+    What is missing, or cannot be built any more, is taken from the built-in stages and their published values; scores
+    of recorded streams do not depend on it.
 
     Args:
         bag: The recording, or the view of one arm.
@@ -167,7 +167,7 @@ def _graph(layer: Layer) -> Graph:
 
 
 def _said(layer: Layer, stage: str, arm: str) -> dict[str, object]:
-    """What is said of a stage of all arms, and above it of that of one arm."""
+    """Values stored for a stage: those for all arms, overridden by those of one arm."""
     return layer.get(stage, {}) | layer.get(f"{arm}/{stage}", {})
 
 

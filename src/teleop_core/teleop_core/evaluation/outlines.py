@@ -41,7 +41,7 @@ class Outline:
 
     @property
     def size(self) -> list[float]:
-        """From end to end along the three axes, [mm]; empty for what is open on a side."""
+        """Size along the three axes, [mm], as text; empty for a shape that is open on a side."""
         if not np.isfinite(self.walls).all():
             return []
         extent: list[float] = (np.nanmax(self.points, axis=0) - np.nanmin(self.points, axis=0)).tolist()
@@ -49,7 +49,7 @@ class Outline:
 
     @property
     def place(self) -> tuple[str, bytes]:
-        """The same for fixtures of one kind and size at one place."""
+        """Key that is equal for fixtures of one kind and size at one place."""
         return self.kind, np.round(self.points, 6).tobytes()
 
     def wall_lines(self, axis: int, suffix: str) -> list[dict[str, Any]]:

@@ -89,5 +89,5 @@ class Gains:
 
     @property
     def is_source(self) -> bool:
-        """Whether the machine itself may have run, or what is to predict it, control law too."""
+        """Whether this may be the real machine or our prediction of it, with the source's control law."""
         return self._origin.plant is None or self._origin.controller == SOURCE_PID.name

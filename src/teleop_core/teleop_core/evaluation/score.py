@@ -194,7 +194,7 @@ class Score:
         raise UnknownNameError("metric", metric, [result.name for result in self.results])
 
     def __getattr__(self, name: str) -> NoReturn:
-        """Say where the values of further metrics are."""
+        """Raise an error that says where values of a user's metrics are."""
         hint = f"{name!r} is none; values of any metric: score.value({name + '.rms'!r})"
         raise AttributeError(f"attribute of a Score: {hint}")
 

@@ -79,7 +79,7 @@ def scores(bag: Bag, further: Sequence[type[Metric]] = (), span: Seconds | None 
 
 
 def measure(bag: Bag, keys: Iterable[str], arm: str = "") -> dict[str, float | None]:
-    """Numbers under some keys of a score, by the metrics that have them alone: faster.
+    """Numbers under some keys of a score; runs only the metrics that have these keys.
 
     Args:
         bag: The recording.
@@ -169,7 +169,7 @@ def _feed(context: Context, makers: Sequence[type[Metric]], cut: Cut) -> list[Me
 
 @contextmanager
 def _named(place: str, part: Accumulator | type[Metric]) -> Iterator[None]:
-    """Whatever a metric raises becomes one line that names it; damage of a recording stays."""
+    """Turn an exception of a metric into one line that names the metric; errors of the recording pass."""
     try:
         yield
     except (RecordingError, PartError):
@@ -189,9 +189,9 @@ def _result(context: Context, metric: Metric) -> Result:
 
 
 def _compared(results: tuple[Result, ...]) -> tuple[Result, ...]:
-    """Results whose published figures have marks only if the slave followed nearly all the time.
+    """Results that are compared with published figures only if the slave followed nearly all the time.
 
-    Otherwise the rows say so in words: what it tracked well is not what it was asked for.
+    Otherwise the rows say so: what it tracked well was not what the hand asked for.
     """
     reach = next((result.values for result in results if isinstance(result.values, ReachScore)), None)
     share = reach.followed_share if reach is not None else None
@@ -225,7 +225,7 @@ def _insist(metric: Metric, found: object, kind: type[object]) -> None:
 
 
 def _checked(metric: Metric, tree: dict[str, Plain]) -> dict[str, Plain]:
-    """The values, if they are just under the metric's keys."""
+    """The values, after a check that they have exactly the metric's keys."""
     paths = [(metric.name, *path) for path in leaves(tree)]
     given = {".".join(path) for path in paths if any(key.covers(path) for key in metric.keys)}
     names = {name for key in metric.keys for name in key.names() if "<" not in name}

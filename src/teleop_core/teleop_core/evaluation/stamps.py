@@ -37,7 +37,7 @@ class StampTally:
             self._holes.add(steps[(steps > 0) & is_own])
 
     def _is_own(self, window: Window, stamps: Integers) -> NDArray[np.bool_]:
-        """Whether what lies between two stamps is missing here, and not in what is passed on."""
+        """Whether samples between two stamps were lost here, and not already in the topic that is passed on."""
         if self._source is None or not len(source := window.around(self._source)):
             return np.full(len(stamps) - 1, not self._is_played)
         known = np.sort(source.stamp_ns)

@@ -110,7 +110,7 @@ def _missing(values: Values) -> Iterator[Concern]:
 
 
 def _drift(values: Values) -> Iterator[Concern]:
-    """Off where the hand led: more than the lag of filters, which is in the command error too."""
+    """Concern about the error to where the hand led, beyond the lag of filters, which the command error has too."""
     key = "asked_error_mm.max"
     off, lag = _number(values, key), _number(values, "command_error_mm.max") or 0.0
     if off is not None:
@@ -181,7 +181,7 @@ def _ticks(values: Values) -> Iterator[Concern]:
 
 
 def _created(values: Values) -> Iterator[Concern]:
-    """Energy that came out of hand and slave beyond what went in, where both were recorded."""
+    """Energy that came out beyond what hand and slave put in, where both were recorded."""
     into, out = ([_number(values, f"passivity.{side}.{way}_mj") for side in ("hand", "slave")] for way in ("in", "out"))
     if None not in (*into, *out):
         taken, given = (sum(part or 0.0 for part in parts) for parts in (into, out))

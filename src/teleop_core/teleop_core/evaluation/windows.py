@@ -57,7 +57,7 @@ class Window:
         return self._once(("states", topic.name), lambda: self.history.at(self.samples(topic).stamp_ns))
 
     def once(self, compute: Callable[["Window"], Found]) -> Found:
-        """What a function finds in this window; computed for the first metric that asks."""
+        """Result of a function of this window; computed once, when the first metric asks."""
         return self._once(compute, lambda: compute(self))
 
     def _once(self, name: object, compute: Callable[[], Found]) -> Found:

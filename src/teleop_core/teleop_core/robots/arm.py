@@ -1,4 +1,4 @@
-"""Arm: what the questions behind a robot's methods ask of it, so that its file imports theirs."""
+"""Arm: the part of :class:`Robot` that its helper modules use, so that they need not import ``robot.py``."""
 
 import math
 from collections.abc import Mapping
@@ -10,7 +10,7 @@ from teleop_core.robots.kinematics import AssembleKernel, FkBatch, FkOne, IkBatc
 
 
 class Arm(Protocol):
-    """A robot as :class:`teleop_core.robots.robot.Robot` is one, whose words say what all mean."""
+    """What a :class:`teleop_core.robots.robot.Robot` offers its helpers; meanings are documented there."""
 
     # ruff: noqa: D102
     @property

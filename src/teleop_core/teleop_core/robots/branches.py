@@ -64,7 +64,7 @@ def slowed(wanted: Array, seed: Array, limits: Array, q: Array) -> bool:
 
 @inner
 def turned(angle: float, seed: float, lower: float, upper: float, is_path: bool) -> float:
-    """Same angle by whole turns [rad]: next to the seed, inside the limits where one is.
+    """The angle plus whole turns [rad]: nearest to the seed, and inside the limits if possible.
 
     In a path only the neighbour of the seed counts: a joint at its end stop stays there instead of unwinding by a turn.
     """

@@ -140,7 +140,7 @@ class Kernels:
 
 @inner
 def is_askable(T: Array, seed: Array) -> bool:
-    """Whether T is a rigid transform and the seed finite: the question every ik kernel checks."""
+    """Whether T is a rigid transform and the seed finite; every ik kernel checks that first."""
     for i in range(seed.shape[0]):
         if not math.isfinite(seed[i]):
             return False

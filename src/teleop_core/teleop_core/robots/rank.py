@@ -51,7 +51,7 @@ def directions_of(robot: arm.Arm, lever: float) -> Directions:
 
 
 def _rank(jacobians: Array) -> int:
-    """Largest rank of several Jacobians (k, 6, n); that of any arm if a number is beyond all."""
+    """Largest rank of several Jacobians (k, 6, n); the full rank if a number is not finite."""
     if not np.isfinite(jacobians).all():
         return len(DIRECTIONS)
     return int((np.linalg.svd(jacobians, compute_uv=False) > _NONE).sum(axis=1).max())

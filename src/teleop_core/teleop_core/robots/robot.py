@@ -204,8 +204,8 @@ class Robot:
         """Pose of the tip in the base, in which all loops close.
 
         Where a robot with loops has several, it is the one next to home if that closes, else the
-        nearest to home of those that a search finds. Joints that say more than the pose, as those
-        of a hand on an object, may contradict each other by 0.1 mm.
+        nearest to home of those that a search finds. Redundant joints, as those of a hand on an object, may contradict
+        each other by 0.1 mm.
 
         Args:
             q: Joint vector (n,) or batch (N, n) [rad, m]; limits are not applied.

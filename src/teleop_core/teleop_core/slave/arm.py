@@ -1,4 +1,4 @@
-"""Arm: what kernels know of an arm, its server's and its simulator's, and rooms to work in."""
+"""Arm: what the kernels of server and simulator know of an arm, with scratch arrays."""
 
 from typing import Any, NamedTuple
 
@@ -6,7 +6,7 @@ from teleop_core.kernels.geometry import Array
 
 
 class ArmModel(NamedTuple):
-    """What the server knows of its arm, pointers and plain arrays, and rooms for kernels."""
+    """What the server knows of its arm: pointers, plain arrays, and scratch arrays for kernels."""
 
     fk: Any
     jacobian: Any

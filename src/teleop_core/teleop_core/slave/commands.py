@@ -143,7 +143,7 @@ def move_joint(p: SlaveNumbers, s: SlaveState, i: int, step: float, dt: float) -
 
 @inner
 def forget_way(s: SlaveState) -> None:
-    """Let the setpoint be what is asked for, and no command be on its way."""
+    """Make the setpoint the wanted value, and drop the command that was on its way."""
     for i in range(s.setpoint.shape[0]):
         s.command[i] = s.target[i] = s.filtered[i] = s.setpoint[i]
     s.span, s.ticks = 0, 1
@@ -151,7 +151,7 @@ def forget_way(s: SlaveState) -> None:
 
 @inner
 def come_to_rest(p: SlaveNumbers, s: SlaveState, how: int, dt: float) -> None:
-    """Stop the setpoint: at once, at what the drives can brake, or where the brakes hold the arm.
+    """Stop the setpoint: at once, as fast as the drives can brake, or where the brakes hold the arm.
 
     Args:
         p: Parameters.
@@ -175,7 +175,7 @@ def come_to_rest(p: SlaveNumbers, s: SlaveState, how: int, dt: float) -> None:
 
 @inner
 def _not_followed(s: SlaveState, row: SlaveRow) -> int:
-    """Status of an arm that follows nothing; what comes meanwhile is seen, and old later."""
+    """Status of an arm that follows nothing. Commands that come meanwhile count as old later."""
     s.seen_ns = max(s.seen_ns, row.slave_servo_jp_ns)
     s.arrival_ns, s.in_row, s.is_stream = 0, 0, 0
     return _MOVING if s.is_busy or s.motion != 0 else _CLOSED
@@ -231,7 +231,7 @@ def take_command(p: SlaveNumbers, s: SlaveState, row: SlaveRow, dt: float) -> in
 
 @inner
 def _longest_gap(p: SlaveNumbers, s: SlaveState) -> int:
-    """Time [ns] after which a stream is broken: of slow ones twice their period."""
+    """Time [ns] of silence after which a stream is broken; for a slow stream twice its period."""
     return max(p.timeout_ns, 2 * s.gap_ns)
 
 

@@ -1,7 +1,7 @@
 """Force observer: the force on the tip without a sensor, from drive efforts and joint motion.
 
-The generalised momentum of the arm changes by what drives, weight and friction do, which is known,
-and by what pushes it. The push is what is left, and known as well as friction is.
+The generalised momentum of the arm changes by drives, weight and friction, which are known, and by outside forces.
+These are the remainder, as accurate as the model of friction.
 """
 
 import math
@@ -45,7 +45,7 @@ class ObserverState(Fields):
 
 @inner
 def _lag(s: ObserverState, effort: Array, model: Array, share: float) -> None:
-    """Let efforts less the arm's own lag as much as the measured speeds do, by a share per tick.
+    """Low-pass the efforts, less the arm's own, so that they lag as much as the measured speeds.
 
     Speeds are those of differences: from the middle of one tick to that of the next an arm moves
     under the mean of both efforts, and weighs what it weighs in between.
@@ -98,8 +98,8 @@ def _observe(p: ObserverNumbers, s: ObserverState, model: Array, dt: float) -> N
 def force_of_efforts(J: Array, efforts: Array, scale: Array, force: Array) -> None:
     """Write the force (3,) [N] on a tip that explains efforts (n,) of the joints best.
 
-    Minimises Σ ((Jᵀ f - efforts)ᵢ / scaleᵢ)² + damping |f|². The way in which a singular arm feels
-    nothing gets no force; where the Jacobian is not finite there is none at all.
+    Minimises Σ ((Jᵀ f - efforts)ᵢ / scaleᵢ)² + damping |f|². The direction in which a singular arm feels nothing gets
+    no force; where the Jacobian is not finite there is none at all.
 
     Args:
         J: Jacobian (6, n) of the tip; its linear rows count, for a push makes no torque there.

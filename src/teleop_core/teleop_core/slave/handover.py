@@ -1,4 +1,4 @@
-"""Handover: what a control law gives less with new gains than with the former ones.
+"""Handover: the effort that a control law loses when its gains change.
 
 An integrator holds more than a load: of a joint that moves it also holds what the derivative takes
 off. Gains that change at once would leave that alone, and the arm, nothing to hold it back, would
@@ -20,7 +20,7 @@ _TICKS = 20  # after which a derivative's filter has forgotten the noise of one 
 
 
 def missing_effort(arm: Arm, speed: Array, before: Array, dt: float, ticks: int = _TICKS) -> Array:
-    """Effort (n,) that the present gains of an arm give less than those ``before`` [N·m or N].
+    """Effort (n,) of the gains ``before``, less that of the present gains [N·m or N].
 
     Both are asked for an arm that goes on evenly as it moves; nothing of the arm is changed.
 

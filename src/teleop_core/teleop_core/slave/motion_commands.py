@@ -115,7 +115,7 @@ class MotionCommands:
         return Answer.REFUSED, f"refused: out of reach, {short}"
 
     def load(self) -> None:
-        """Compile what :meth:`solve` calls: beside running ticks a compiler is a bad neighbour."""
+        """Compile what :meth:`solve` calls, since compiling beside running ticks would make them late."""
         robot = self._slave.robot
         self.solve(robot.fk(robot.home))
 
@@ -205,7 +205,7 @@ class MotionCommands:
         return None if s["is_homed"] else (Answer.REFUSED, "refused: home first")
 
     def _unfit(self, joints: Array) -> Told | None:
-        """Why nobody can go to these joints; None if they are sound."""
+        """Why these joints cannot be a goal; None if they can."""
         robot = self._slave.robot
         wanted = self._joints(joints)
         if not np.isfinite(wanted).all():

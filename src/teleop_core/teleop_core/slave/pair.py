@@ -14,7 +14,7 @@ class ArmParameters(slave.SlaveParameters, slave_sim.SlaveSimParameters):
 
     @staticmethod
     def of(server: slave.SlaveParameters, simulated: slave_sim.SlaveSimParameters) -> "ArmParameters":
-        """Those of two groups, which must name the same robot."""
+        """Parameters from two groups, which must name the same robot."""
         groups = (simulated, server)
         return ArmParameters(**{f.name: getattr(g, f.name) for g in groups for f in fields(g)})
 

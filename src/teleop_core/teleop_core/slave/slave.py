@@ -89,9 +89,9 @@ class SlaveParameters(RobotParameters):
 
 
 class Slave(RunningStage):
-    """Stage that leads an arm: from references and commands to setpoints, through all that it may.
+    """Stage that leads an arm: from references and commands to setpoints, within states and limits.
 
-    It takes the arm to be at home at first; one that says that it is elsewhere begins there. Once
+    It assumes that the arm is at home, until the arm says where it is. Once
     enabled it moves the arm smoothly to where it starts, and follows then.
 
     Raises:
@@ -176,7 +176,7 @@ class Slave(RunningStage):
     # -- operation -------------------------------------------------------------------------------
 
     def _load_commands(self) -> None:
-        """Compile what commands and faults call: no stop waits for a compiler."""
+        """Compile what commands and faults call, so that no stop waits for the compiler."""
         spare = records(self.state.dtype)[0]
         _request(self.parameters, spare, int(Event.STOP))
         _fail(self.parameters, spare, int(Fault.STALL), 0.0, 0.0)

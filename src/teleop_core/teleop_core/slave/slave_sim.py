@@ -278,7 +278,7 @@ class SlaveSim(RunningStage):
         stability.check_stable(self._law, self.robot, loop, are_large_tried=parameters.trials == "all")
 
     def _hand_over(self) -> None:
-        """Let the integrators take over what new gains give less, once these are in force."""
+        """Move the effort that new gains no longer give into the integrators, once the gains are in force."""
         if np.array_equal(self.arm.gains, self._gains_in_force):
             return
         if self.signals["now_ns"] > 0:  # before the first tick nothing moves, or is compensated

@@ -1,7 +1,7 @@
 """Stability: whether a slave's loop, as it is set, follows, comes to rest, and lets errors die.
 
-A loop is tried before it is used: copies of the arm run under it. What a trial shows does not
-depend on when it is made, so a loop that has passed is not tried twice in one process.
+A loop is tried before it is used: copies of the arm run under it. The result of a trial depends on nothing else, so a
+loop that has passed is not tried again in this process.
 """
 
 from collections.abc import Callable

@@ -54,7 +54,7 @@ def _begin_where_it_is(p: commands.SlaveNumbers, s: commands.SlaveState, arm: Ar
 
 @inner
 def _take_measured(p: commands.SlaveNumbers, s: commands.SlaveState, arm: ArmModel, row: commands.SlaveRow) -> None:
-    """Take what the arm says of itself, if it is new, and look for what is wrong with it.
+    """Take a new sample of the arm, and look for faults in it.
 
     It was sampled together with the setpoint that is still in force.
     """

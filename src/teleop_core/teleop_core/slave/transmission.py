@@ -32,8 +32,8 @@ class DriveState(Fields):
 def follow_encoders(p: DriveNumbers, s: DriveState, q: Array, coupling: Array, tip: Array) -> None:
     """Write the true joint positions (n,) of motors at ``q`` (n,) [rad or m].
 
-    A joint stays where it is until its motor has crossed the play, and is dragged then. By how
-    much an earlier joint lags behind its motor moves those that its tendons pass by.
+    A joint stays where it is until its motor has crossed the play, and is dragged then. The lag of a joint behind its
+    motor moves the later joints whose tendons pass it.
 
     Args:
         p: Parameters.
@@ -53,7 +53,7 @@ def follow_encoders(p: DriveNumbers, s: DriveState, q: Array, coupling: Array, t
 
 @inner
 def drive(p: DriveNumbers, s: DriveState, arm: Arm) -> None:
-    """Make of the effort asked for the one that the motors give.
+    """Turn the effort asked for into the one that the motors give.
 
     Args:
         p: Parameters.

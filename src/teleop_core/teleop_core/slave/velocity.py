@@ -12,7 +12,7 @@ from teleop_core.slave.commands import SlaveNumbers, SlaveState
 
 
 class Motion(IntEnum):
-    """What moves the setpoint of an enabled slave that is on no way to a goal."""
+    """What moves the setpoint of an enabled slave that is not moving to a goal."""
 
     FOLLOWING = 0  # references of its joints
     JOINTS = 1  # a speed of its joints
@@ -60,7 +60,7 @@ def joint_speeds(arm: ArmModel, q: Array, twist: Array, speed: Array) -> None:
 
 @inner
 def _share_of_limits(p: SlaveNumbers, s: SlaveState, dt: float) -> float:
-    """Share of the wanted speeds that no joint is too fast for, or of the tip's, none too far."""
+    """Share of the wanted speeds at which no joint is too fast, or, of a driven tip, leaves its range."""
     share = 1.0
     for i in range(s.drive.shape[0]):
         fast = abs(s.drive[i])

@@ -31,7 +31,7 @@ def unscaled(parameters: object) -> float:
 
 
 def unled(parameters: object) -> float:
-    """Zero: the hand's force does not lead the slave."""
+    """Zero: the hand's force does not move the slave."""
     return 0.0
 
 

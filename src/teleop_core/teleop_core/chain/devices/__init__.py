@@ -1,6 +1,6 @@
 """Devices: what a person holds at this machine, a gamepad or a 3-D mouse, as rates and buttons.
 
-None of them is needed to import this package; what they need is the extra ``console``.
+None of them is needed to import this package; their libraries are the extra ``devices``.
 """
 
 from typing import NamedTuple, Protocol

@@ -89,7 +89,7 @@ def _is_finite(values: Array) -> bool:
 
 @inner
 def _fade(s: FilterState, period: float, filtered: Array) -> None:
-    """Go on from where the old parameters left, and towards what the new ones say."""
+    """Fade from the output of the old parameters to that of the new ones."""
     for i in range(3):
         if s.is_retuned > 0:
             s.shift[i] = s.told[i] - filtered[i]

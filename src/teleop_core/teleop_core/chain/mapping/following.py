@@ -76,7 +76,7 @@ def follows(p: FollowingNumbers, s: FollowingState, row: Row) -> bool:
 
 @inner
 def is_in_doubt(p: FollowingNumbers, s: FollowingState, is_following: bool, row: Row) -> bool:
-    """Whether nobody knows where a slave is that does not follow: far away, or not heard of."""
+    """Whether the place of a slave that does not follow is unknown: it is far away, or silent."""
     now_ns = row.master_measured_cp_ns
     if is_following:
         s.lost_ns = 0

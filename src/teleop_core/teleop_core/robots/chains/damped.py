@@ -1,4 +1,4 @@
-"""Damped least squares: the joint vector of a box that comes next to a pose, for any arm.
+"""Damped least squares: the joint vector within a box whose pose is nearest to a wanted one, for any arm.
 
 The box is the joint limits, or one speed-limited step around the last joint vector; inside it the error is driven to
 zero where that is possible and to its least where it is not, through singularities too. Damping that shrinks with the

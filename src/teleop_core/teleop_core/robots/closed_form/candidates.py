@@ -1,4 +1,4 @@
-"""Closed forms of chains: what all of them share, from the pose that is asked to the status.
+"""Closed forms of chains: what all of them share, from the wanted pose to the status.
 
 A closed form sees the arm as G = Rz(q1) F1 Rz(q2) F2 ... Rz(qn), with constant transforms between the joints and every
 joint about its own z axis; for arms that decompose from the tip it is the arm from tip to base. Its constants stand

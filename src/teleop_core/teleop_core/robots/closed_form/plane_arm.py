@@ -248,7 +248,7 @@ def _settle(G: Array, seed: Array, limits: Array, K: Array, q: Array) -> None:
 
 @inner
 def _is_met(G: Array, reached: Array, K: Array, q: Array) -> bool:
-    """Whether the tip is where it is wanted, as far as the arm has a say, and the attitude too."""
+    """Whether place and attitude of the tip are as wanted, in the directions that the arm controls."""
     now, M, H = room(3, 4), room(3, 4), room(3, 4)
     _wanted(reached, K, now)
     off = 0.0

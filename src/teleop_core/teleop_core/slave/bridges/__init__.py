@@ -1,4 +1,4 @@
-"""Bridges: in which message a real arm's controller takes its commands, one file per kind.
+"""Bridges: the message by which a real arm's controller takes commands, one file per kind.
 
 A kind fills one ROS message from the joints that the arm is to hold, in the arm's own names, order and signs. Names,
 checks, the start and every hold are the same for all (:mod:`teleop_core.slave.bridges.arm_bridge`).

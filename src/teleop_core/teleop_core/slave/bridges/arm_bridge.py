@@ -1,7 +1,7 @@
 """Arm bridge: the stage that stands between the arm's server and the controller of a real arm.
 
-It reads what ``slave_sim`` reads, and writes where the arm is, in its place. What it does not
-believe it does not pass on; the server holds then, and reports ``feedback``.
+It reads what ``slave_sim`` reads, and writes where the arm is, in its place. It does not pass on samples that cannot
+be true; the server holds then, and reports ``feedback``.
 """
 
 from dataclasses import dataclass

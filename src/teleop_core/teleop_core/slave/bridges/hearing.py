@@ -1,4 +1,4 @@
-"""Hearing: what an arm says of its joints, and whether it can be believed."""
+"""Hearing: samples of an arm's joints, and whether they can be true."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -144,7 +144,7 @@ class Hearing:
 
 
 def _numbers(values: Sequence[float], names: Sequence[str], places: list[int]) -> Array | None:
-    """Those of our joints, in our order; None if there is not one for each name."""
+    """Values of our joints, in our order; None unless there is one for each name."""
     if len(values) != len(names):
         return None
     return np.array([values[place] for place in places], dtype=np.float64)

@@ -48,7 +48,7 @@ class Lead:
         return False
 
     def has_lost(self, measured: Array) -> bool:
-        """Whether an arm that is led is not where it was commanded, as after it was not led."""
+        """Whether an arm that is led is not where it was commanded."""
         off = np.abs(measured - self.position)
         return self.is_leading and not self._presses and not bool((off <= self.tolerance).all())
 

@@ -73,7 +73,7 @@ class JointMap:
         return self._known[1]
 
     def is_strange(self, names: Sequence[str]) -> bool:
-        """Whether a message speaks of other joints alone, as a gripper's on the same topic."""
+        """Whether a message names only other joints, as that of a gripper on the same topic."""
         return not set(self.theirs) & set(names)
 
     def position(self, theirs: Array) -> Array:

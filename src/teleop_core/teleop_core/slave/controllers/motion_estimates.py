@@ -110,7 +110,7 @@ def approach(error: float, linear: float) -> float:
 def closeness(error: float, linear: float) -> float:
     """Share of the setpoint's motion to feed forward: 1 where :func:`approach` acts on the error.
 
-    It falls to 0 at twice that distance: who is far behind follows no motion, but catches up.
+    It falls to 0 at twice that distance: a joint that is far behind catches up, and follows no motion.
     """
     return min(max(2.0 - abs(error) / linear, 0.0), 1.0)
 

@@ -94,7 +94,7 @@ def _may_move(p: JawNumbers, s: JawState, row: Row) -> bool:
 
 @inner
 def _is_led(s: JawState, wanted: float) -> bool:
-    """Whether a command leads the jaw, which after a hold it does by the operator's doing alone.
+    """Whether a command leads the jaw; after a hold the operator must take it up again.
 
     It opens the jaw once one has asked for the angle held, or less: nothing falls because the hand was opened during a
     stop. It closes the jaw once one has asked for the angle held, or more, or while it closes.

@@ -45,7 +45,7 @@ class Presses:
         return tuple(one for one, heard_ns in self._heard_ns.items() if heard_ns < since_ns)
 
     def lose(self, count: int) -> tuple[bool, ...]:
-        """Take the middleware's own account of lost messages; nobody knows whose they were.
+        """Take the middleware's count of lost messages, whose senders are unknown.
 
         Args:
             count: Messages that it has lost so far, of all buttons.
@@ -95,7 +95,7 @@ class Presses:
         return () if sender in self._last else self._note(sender, now_ns, is_pressed=is_pressed)
 
     def doubt(self, sender: bytes) -> tuple[bool, ...]:
-        """Have a button hold the stop that is there and has never been heard.
+        """Have a button that was found and has never been heard hold the stop.
 
         It counts as pressed until it says that it is released, or is overridden.
 

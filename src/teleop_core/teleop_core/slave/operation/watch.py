@@ -131,7 +131,7 @@ def is_braked(p: ServerParameters, s: ServerState) -> bool:
 
 @inner
 def watch_joints(p: ServerParameters, s: ServerState, effort: Array, passed_ns: int) -> None:
-    """Find joints that are too far off, too fast, or at the end of what their drives can give.
+    """Find joints that are too far from their setpoint, too fast, or at the effort limit of their drives.
 
     Args:
         p: Parameters.
@@ -212,7 +212,7 @@ def find_rest(s: ServerState, moves: bool, now_ns: int) -> None:
 
 @inner
 def watch_feedback(p: ServerParameters, s: ServerState, now_ns: int) -> None:
-    """Find an arm that has not said for too long where it is."""
+    """Find an arm whose position has been unknown for too long."""
     silence_ns = now_ns - s.heard_of_ns
     if silence_ns > p.silence_ns:
         fail(p, s, _FEEDBACK, -1, 1e-9 * silence_ns, 1e-9 * p.silence_ns)

@@ -133,8 +133,8 @@ def faults_of(robot: Robot) -> Hardware:
 def _steps(drives: Drives, bits: int) -> Array:
     """Steps of the converters over their range [N·m or N].
 
-    It ends at the drive's effort, or where that brings the axis to full speed within a tick: files
-    give links of some grams drives of 100 N·m and no motor, and one step would throw them.
+    The range ends at the drive's effort, or at the effort that brings the axis to full speed within a tick: some files
+    give links of a few grams drives of 100 N·m, and one step would throw them.
     """
     quick = drives.inertia * drives.speed_limit / DT
     return 2.0 * np.minimum(drives.effort_limit, quick) / 2.0**bits
