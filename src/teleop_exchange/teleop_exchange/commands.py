@@ -230,7 +230,7 @@ def _import(arguments: argparse.Namespace) -> int:
 
 
 class _OfArm(argparse.ArgumentParser):
-    """Parser of what is said of one hand."""
+    """Parser of the options of one hand."""
 
     def error(self, message: str) -> NoReturn:
         raise ParameterError("--arm", self.prog, f"options of the import; {message}")

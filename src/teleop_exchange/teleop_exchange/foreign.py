@@ -91,7 +91,7 @@ def _read(path: Path, arm: str, options: ImportOptions) -> dict[topics.Topic, Se
 
 @contextmanager
 def _options_told(path: Path) -> Iterator[None]:
-    """Say whose options those are that an error advises: who plays a recording takes none."""
+    """Say that the options which an error advises are those of ``teleop import``: a replay has none."""
     try:
         yield
     except TeleopError as error:

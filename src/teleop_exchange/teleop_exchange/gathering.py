@@ -199,5 +199,5 @@ def _without_stamps(source: Source, parts: _Parts, value: float, told: list[str]
 
 
 def _few(parts: list[NDArray[np.float64] | Stamps]) -> NDArray[np.float64]:
-    """Some of the times, in order."""
+    """A few of the times in order, for a message."""
     return np.concatenate([part[:SAMPLE] for part in parts[:SAMPLE]], dtype=np.float64)

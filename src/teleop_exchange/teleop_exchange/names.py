@@ -28,7 +28,7 @@ _VECTORS = re.compile(r"(^|_)(rotvec|rot_vec\w*|rotation_vec\w*|rvec|axis_angle|
 
 
 def plain(name: str) -> str:
-    """Name in small letters with ``_`` for all that parts words, without its unit."""
+    """Name in small letters, without its unit, with ``_`` for all word separators."""
     text, _ = without_unit(name)
     text = re.sub(r"([a-z])([XYZW])(?![a-z])", r"\1_\2", text.strip())
     return re.sub(r"[^0-9a-z]+", "_", text.lower()).strip("_")
@@ -63,7 +63,7 @@ def find_time(names: Sequence[str]) -> tuple[int, ...]:
 
 
 def find_positions(names: Sequence[str]) -> list[tuple[int, ...]]:
-    """Columns of x, y and z of all positions that the names say equally well, the first first."""
+    """Columns of x, y and z of all positions that the names suggest equally well, in their order."""
     found = _series(names, "xyz", without="w") or _series(names, "xyz")
     good = [(stem, columns) for stem, columns in found.items() if not _NOT_PLACES.search(stem)]
     named = [columns for stem, columns in found.items() if _PLACES.search(stem)]

@@ -1,4 +1,4 @@
-"""``teleop drill``: break a running session in all ways that are known, measure what it does."""
+"""``teleop drill``: break a running session in every known way, and measure what it does."""
 
 import argparse
 import json

@@ -1,7 +1,7 @@
 """Agreement: whether an arm measures what it was told to do, in time and in place.
 
-Trails of the same motion are compared by what changes: a constant difference, such as that of a
-load that the law does not take up, counts for nothing.
+Trails of the same motion are compared by what changes: a constant difference, such as that of an uncompensated load,
+is ignored.
 """
 
 from collections.abc import Callable
@@ -118,7 +118,7 @@ def obeys(joints: Trail, tip: Trail, fk: Callable[[Vectors], Vectors], least: fl
 
 
 def _differences(first: Vectors, second: Vectors) -> Vectors:
-    """Differences (M, k) where both are known, less what they differ by most of the time."""
+    """Differences (M, k) where both are known, less their median."""
     found = first - second
     found = found[np.isfinite(found).all(axis=1)]
     return found - np.median(found, axis=0) if len(found) else found
@@ -127,8 +127,8 @@ def _differences(first: Vectors, second: Vectors) -> Vectors:
 def _smooth(times: Vectors, trail: Trail) -> Vectors:
     """Change (M, k) since the first message, mean of a time around each of some times (M,).
 
-    So an overshoot of a few hundredths of a second is none of a place. NaN where messages are
-    missing; before the first one nothing has changed.
+    The mean hides an overshoot of a few hundredths of a second. NaN where messages are missing; zero before the first
+    one.
     """
     at = np.searchsorted(trail.sent, times, side="right") - 1
     changed = trail.place[np.maximum(at, 0)] - trail.place[0]

@@ -1,4 +1,4 @@
-"""Drill: breaks a running session in all ways that are known, and measures what the arm does."""
+"""Drill: breaks a running session in every known way, and measures what the arm does."""
 
 from teleop_core.base.errors import PartError, UnknownNameError
 from teleop_core.base.registry import Registry

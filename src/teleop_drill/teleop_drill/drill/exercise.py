@@ -50,7 +50,7 @@ class Rig(Protocol):
         """The fault begins now; without a word it is when :attr:`Exercise.inject` is called."""
 
     def note(self, text: str) -> None:
-        """Say something that belongs beside the state."""
+        """Add a note, which the table shows beside the state."""
 
     def wait(self, seconds: float) -> None:
         """Let time pass [s]."""
@@ -125,27 +125,27 @@ Time = Callable[[Numbers], float]
 
 
 def command_timeout(numbers: Numbers) -> float:
-    """Of commands that fail: the last one is in force for so long."""
+    """Bound for commands that stop coming: the last one stays in force for the command timeout."""
     return numbers.command_timeout
 
 
 def at_once(numbers: Numbers) -> float:
-    """Of what the slave itself is told: it looks in every tick."""
+    """Bound for what the slave is told directly: it looks in every tick."""
     return numbers.tick
 
 
 def outage(numbers: Numbers) -> float:
-    """Of a stream that fell silent: until the arm is PAUSED."""
+    """Bound for a stream that fell silent: the time until the arm is PAUSED."""
     return numbers.longest_outage
 
 
 def silence(numbers: Numbers) -> float:
-    """Of an arm that says no more where it is: until that is a fault."""
+    """Bound for an arm that no longer reports its position: the time until that is a fault."""
     return numbers.longest_silence
 
 
 def unheard(numbers: Numbers) -> float:
-    """Of an arm that says no more where it is: the command timeout, then it brakes."""
+    """Bound for an arm that no longer reports its position: it brakes after the command timeout."""
     braking = max(numbers.speed_limit / numbers.braking)
     return numbers.command_timeout + float(braking)
 
@@ -156,7 +156,7 @@ def never(_: Numbers) -> float:
 
 
 def after(seconds: float) -> Time:
-    """A time that the exercise itself makes up [s]."""
+    """Bound that follows from the exercise itself [s]."""
     return lambda _: seconds
 
 

@@ -1,4 +1,4 @@
-"""Hand of a drill: a circle at constant speed, and what may become of its samples on the way.
+"""Hand of a drill: a circle at constant speed, and distortions of its samples on the way.
 
 The speed is constant, so that what may move legally in a time is known exactly.
 """

@@ -1,4 +1,4 @@
-"""Judging: what was measured of a fault beside what a session's own numbers allow."""
+"""Judging: measurements of a fault, and bounds that follow from the session's own numbers."""
 
 import math
 from collections.abc import Iterator
@@ -107,7 +107,7 @@ def judge(exercise: Exercise, seen: Seen, numbers: Numbers) -> Iterator[Measured
 
 
 def late(seen: Seen, numbers: Numbers) -> float:
-    """What the way of a message and the machine may add to any time [s].
+    """What transport and machine may add to any time [s].
 
     A tick for each topic on the way, and twice what the drill's own thread was woken too late: once
     where a message is sent, once where it is taken.
@@ -152,7 +152,7 @@ def _tool(exercise: Exercise, seen: Seen, numbers: Numbers) -> Measured:
 
 
 def _told(exercise: Exercise, seen: Seen, numbers: Numbers) -> Iterator[Measured]:
-    """Who said so, and when."""
+    """When the slave's report told the fault, and when ``diagnostics`` warned of it."""
     if exercise.told is not None:
         most = seen.deaf + exercise.told(numbers) + late(seen, numbers)
         text = "slave/operation told after {0:.0f} ms, at most {1:.0f}"

@@ -103,7 +103,7 @@ def travel(places: Trace, since_ns: int, until_ns: int) -> float:
 
 
 def follows(setpoints: Array, measured: Array, speed_limit: Array) -> bool:
-    """Whether an arm goes where its setpoints go; both stand for some time before now.
+    """Whether an arm goes where its setpoints go, by both traces of a recent time.
 
     Setpoints alone prove nothing: drives that do not listen leave the arm where it is.
 

@@ -28,7 +28,7 @@ WARNED = 2.0
 
 @dataclass(frozen=True)
 class Scheduling:
-    """How late this machine wakes a thread that is due: the drill's own, which waits for nothing.
+    """How late this machine wakes a thread that is due, measured on the drill's own.
 
     Attributes:
         usual: Median [s].

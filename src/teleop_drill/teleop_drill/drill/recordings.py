@@ -83,7 +83,7 @@ def _saved(path: Path, killed_ns: int) -> Verdict:
 
 
 def missing(bag: Bag, name: str, heard: tuple[Stamps, Stamps]) -> Stamps:
-    """When those messages were sent that were heard beside the recorder, and are not recorded [ns].
+    """Times [ns] of messages that the drill's tap heard and that are not in the recording.
 
     Args:
         bag: The recording.

@@ -100,7 +100,7 @@ def _press_two(rig: Rig) -> None:
 
 
 def _resume_early(rig: Rig) -> None:
-    """Pause and resume in one breath: the second comes while the arm brakes."""
+    """Pause and resume at once: the resume comes while the arm still brakes."""
     rig.mark()
     _note_answer(rig, is_taken=rig.commands("pause", "resume")[1])
 
@@ -132,7 +132,7 @@ _STUCK = (Fault.TRACKING, Fault.TIP, Fault.EFFORT, Fault.OVERSPEED)
 
 
 def _stuck(fault: Fault, told: Time) -> Exercise:
-    """Joints that do not move: one of the faults that find it, the others told only.
+    """Exercise with joints that do not move, for one fault; the other faults that would find it only report.
 
     The drives are off then; the setpoint goes back to the arm, across the circle at worst.
     """

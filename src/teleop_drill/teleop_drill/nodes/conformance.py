@@ -1,7 +1,7 @@
 """Conformance: looks at a CRTK arm from outside, its topics first, then what it does when told.
 
-It is a stock client: reliable, keep last, stamped with the time of the machine. Nothing of ours is
-needed at the other end.
+It is a stock client: reliable, keep last, stamped with the time of the machine. The arm needs no software of this
+project.
 """
 
 from collections.abc import Callable, Iterable
@@ -56,7 +56,7 @@ def left_behind(arm: Arm, *, may_move: bool) -> str:
 
 
 def _insist_on_one(findings: dict[str, Finding]) -> None:
-    """An arm without any measured position is none."""
+    """Refuse an arm without any measured position."""
     pair = [findings[name] for name in ("measured_js", "measured_cp")]
     if all(found.verdict is Verdict.ABSENT for found in pair):
         row = pair[0].row
@@ -66,7 +66,7 @@ def _insist_on_one(findings: dict[str, Finding]) -> None:
 
 
 def _commands(findings: dict[str, Finding]) -> Iterable[tuple[str, Row]]:
-    """Commands that are there, soundly."""
+    """Commands whose topics passed."""
     for name, found in list(findings.items()):
         if found.row.group is not Group.QUERY and found.verdict is Verdict.OK:
             yield name, found.row
@@ -101,8 +101,8 @@ def _try(arm: Arm, findings: dict[str, Finding], report: Report, robot: Robot | 
 def _watched(trials: Trials, name: str, findings: dict[str, Finding], robot: Robot | None) -> Outcome:
     """Try a command; what the arm measures meanwhile must be what it was told.
 
-    A command that moved the setpoint alone moved nothing. Which of the two lies is not known from
-    outside, so both rows fail.
+    A command that moved the setpoint alone moved nothing. From outside nobody knows which of the two is wrong, so both
+    rows fail.
     """
     watch = Watch(trials.arm, None if robot is None else robot.fk)
     verdict, note = TRIALS[name](trials)

@@ -71,7 +71,7 @@ class Arm(Guest):
     Args:
         namespace: Where its topics are, such as ``/PSM1`` or ``slave``.
         domain: ROS domain; None for that of the environment.
-        world: Where we are.
+    world: Middleware and time of the client.
 
     Attributes:
         interrupt: What ends a wait with KeyboardInterrupt.
@@ -120,7 +120,7 @@ class Arm(Guest):
         return [end for end in self.ros.readers(self.path(name)) if end.node != self._own]
 
     def others(self, name: str) -> int:
-        """How many others command the arm on a topic: those who do not sit in its own nodes."""
+        """Number of other publishers of a command, without those of the arm's own nodes."""
         own = {end.node for query in ("setpoint_js", "measured_js", "measured_cp") for end in self.publishers(query)}
         own |= {end.node for end in self.readers("servo_cp")}
         return sum(end.node not in own for end in self.publishers(name))

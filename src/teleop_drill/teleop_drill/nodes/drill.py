@@ -230,7 +230,7 @@ class _Drill:
     # -- one exercise ----------------------------------------------------------------------------
 
     def _judged(self, exercise: Exercise, rig: LiveRig) -> Outcome:
-        """An exercise; once more where it failed while the machine itself stood still."""
+        """Outcome of an exercise, which is repeated once if it failed while the machine itself stood still."""
         outcome = self._repeated(exercise, rig)
         for _ in range(_MORE):
             late = outcome.extra["late_s"]

@@ -70,7 +70,7 @@ def _differs(report: dict[str, float], before: dict[str, float]) -> bool:
 
 
 def _is_expected(report: dict[str, float], exercise: Exercise) -> bool:
-    """Whether a report tells what an exercise is to end in."""
+    """Whether a report tells the state that an exercise expects."""
     is_fault = not exercise.faults or Fault(int(report["fault"])) in exercise.faults
     return is_fault and State(int(report["state"])) in exercise.states
 

@@ -1,7 +1,7 @@
 """Bus: topics and services between simulated processes, as ROS 2 on Fast DDS carries them.
 
-What matters of it: both sides of a topic discover each other at different times; what is sent
-before is not heard, but by who asks for the last messages of a latched topic; a queue that is full
+What it models: both sides of a topic discover each other at different times; what is sent before is heard only by
+readers that ask for the last messages of a latched topic; a queue that is full
 loses its oldest; a socket that nobody reads loses what comes, and reliable writers send it again as
 far as they still have it; each writer numbers its messages.
 """
@@ -28,7 +28,7 @@ _CALL_NS, _SPREAD_NS = 150_000, 300_000
 
 @dataclass
 class Line:
-    """What becomes of messages between two processes.
+    """Quality of the line between two processes.
 
     Attributes:
         loss: Share that is lost on the way.

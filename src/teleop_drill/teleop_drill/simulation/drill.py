@@ -54,7 +54,7 @@ class SimulatedSite:
         self.control: Steering = self._steering
 
     def load(self) -> float:
-        """Load of the machine: none that is not simulated."""
+        """Load of the machine: none beside the simulated one."""
         return 0.0
 
     def session(self, observer: Observer) -> SimulatedSession:

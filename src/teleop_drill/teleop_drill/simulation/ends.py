@@ -142,7 +142,7 @@ class Reader:
             self.told()
 
     def waits(self, least: int) -> int:
-        """Messages that have come and are kept; 0 where not more than so many may be."""
+        """Number of messages that wait; 0 if there cannot be more than ``least``, which is quicker to find out."""
         if len(self._ready) + len(self.coming) <= least:
             return 0
         now_ns = self._bus.scheduler.now_ns

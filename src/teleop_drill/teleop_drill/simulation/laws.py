@@ -256,7 +256,7 @@ class Laws:
             self._break("stop", f"no stop is in force, although {since} long enough ago")
 
     def _late(self) -> float:
-        """What the machine itself may take [s]: bad lines, and processors that others keep busy."""
+        """What the machine itself may add [s]: bad lines, and processors that are busy with other work."""
         lines = self._stage.bus.lines.values()
         on_the_way = max((line.delay + 20.0 * line.jitter for line in lines), default=0.0)
         lost = 0.2 * any(line.loss for line in lines)

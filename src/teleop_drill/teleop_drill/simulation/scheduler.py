@@ -250,7 +250,7 @@ class Scheduler:
             raise strand.error
 
     def _pump(self) -> bool:
-        """Let everything happen until whoever stands outside goes on; whether somebody woke it."""
+        """Run the simulation until the thread outside of it goes on; returns whether somebody woke that."""
         queue, pop = self._queue, heapq.heappop
         while queue:
             time_ns, _, what, token, value = pop(queue)

@@ -53,8 +53,8 @@ Act = Callable[[Stage, Fault], Callable[[], None] | None]
 def draw(seed: int, processes: tuple[str, ...]) -> tuple[Fault, ...]:
     """One to five faults of a seed, and commands before them, in the order of their times.
 
-    Before more than half of them somebody brings the arm out of ENABLED, in which nearly all would
-    meet it otherwise.
+    Before more than half of the faults a command brings the arm out of ENABLED, the state in which nearly all faults
+    would meet it otherwise.
 
     Args:
         seed: What they are drawn from.

@@ -170,8 +170,8 @@ def _goes_far(p: SolverNumbers, solver: Solver) -> bool:
 def _solve(p: SolverNumbers, solver: Solver, time: float, is_alone: bool) -> int:
     """Write the answer within ``time`` [s] of full speed, or all the way to a command alone.
 
-    Next to a singularity a tremor of the first command would turn joints far for nothing: such
-    ways are gone only for what is not within the tolerances anyway.
+    Next to a singularity a tremor of the first command would turn joints far for nothing, so joints move far only if
+    the pose is otherwise outside the tolerances.
     """
     longest = _ALONE if is_alone else time
     status = -1

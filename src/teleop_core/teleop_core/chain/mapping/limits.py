@@ -1,4 +1,4 @@
-"""Limits: what becomes of a command that the arm cannot follow, without wind-up.
+"""Limits: how a command that the arm cannot follow is drawn back, without wind-up.
 
 The command is drawn back to where the arm can be, so that it moves at once when the hand turns
 back. How far the hand stands against the limit is measured from where it met it, up to a bound
@@ -96,7 +96,7 @@ def _found(s: LimitState, sent: Sequence[Sent], stamp_ns: int) -> int:
 
 @inner
 def draw_back(s: LimitState, sent: Sequence[Sent], gain: float, row: Row) -> None:
-    """Take the answer to an earlier command: move the present one as far as that one was cut.
+    """Take the answer to an earlier command: draw the present command back as far as that one was cut.
 
     What was cut off since that command was sent is not cut twice.
 

@@ -411,7 +411,7 @@ class MotionScaling(RunningStage):
         self._bound = None
 
     def fall_silent(self) -> None:
-        """Tell that nothing is followed, for no sample came for long."""
+        """Report that nothing is followed, because no sample came for long."""
         self.signals["teleop_state"][_FOLLOWING] = 0.0
 
     def concerns(self) -> list[str]:

@@ -114,7 +114,7 @@ class ReachForceParameters:
 
 @dataclass(frozen=True, kw_only=True)
 class ReflectionParameters:
-    """What the hand feels of the slave, and of what that touches."""
+    """What the hand feels of the slave, and of what the slave touches."""
 
     architecture: Choice = choice(ARCHITECTURES, "unilateral", doc="what the hand feels of the slave")
     max_force: float = parameter(

@@ -156,7 +156,7 @@ def _turn(before: Array, after: Array) -> float:
 
 @inner
 def has_lost_buttons(p: PlausibilityNumbers, s: PlausibilityState, row: Row) -> bool:
-    """Whether the buttons came as a stream and are silent now: nobody can tell a pressed clutch.
+    """Whether the buttons came as a stream and are silent now, so that the state of the clutch is unknown.
 
     Masters that send them where they change only have no stream of them.
     """

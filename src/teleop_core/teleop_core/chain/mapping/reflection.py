@@ -103,7 +103,7 @@ def make_law(part: Architecture, numbers: Array, passivity: Passivity, kept: Arr
 def reflect(
     p: ReflectionNumbers, s: ReflectionState, law: Law, is_following: bool, period: float, stylus: Array, row: Row
 ) -> None:
-    """Add to the hand's force (3,) [N] what it feels of the slave; what falls silent fades.
+    """Add to the hand's force (3,) [N] what it feels of the slave. The force of a silent slave fades.
 
     Args:
         p: Parameters.
@@ -139,10 +139,10 @@ def reflect(
 
 @inner
 def _hold_wall(law: Law, force: Array) -> None:
-    """Make the force (3,) of fixture and limits no larger than what they took pays for.
+    """Limit the force (3,) of fixture and limits to what the energy that they absorbed pays for.
 
-    It is of the hand's port too: with passivity a wall gives back no more than it took, however
-    stiff. Its energy is its own, so that neither side can spend it.
+    With passivity a wall gives back no more energy than it took, however stiff it is. Its energy is counted apart, so
+    that reflection cannot spend it.
     """
     square = way = 0.0
     for i in range(3):
@@ -180,7 +180,7 @@ def _bound(push: Array, most: float, rounding: float) -> None:
 
 @inner
 def _count(p: ReflectionNumbers, s: ReflectionState, law: Law, is_following: bool, stylus: Array, row: Row) -> None:
-    """Count what the last push did on the way of the hand; what begins anew has no energy.
+    """Add the work of the last push on the hand; a law that begins anew has no energy.
 
     Energies begin anew with another law or scale, and while the hand does not lead the slave.
     """
@@ -208,7 +208,7 @@ def _count(p: ReflectionNumbers, s: ReflectionState, law: Law, is_following: boo
 
 @inner
 def _make_passive(p: ReflectionNumbers, s: ReflectionState, law: Law, period: float, row: Row) -> None:
-    """Make of the push that is asked for the one that is given, and tell the energies."""
+    """Limit the wanted push to a passive one, and report the energies."""
     for i in range(3):
         law.last[i], s.push[i] = s.push[i], law.asked[i]
     law.hand(law.kept, law.left, law.last, law.moved, law.led, law.flow, law.heard, law.port, s.push, s.scale, period)

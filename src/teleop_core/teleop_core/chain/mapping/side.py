@@ -50,7 +50,7 @@ _ROUNDING = 1e-13
 
 @inner
 def let_go(s: SideState) -> None:
-    """Put the hand where its proxy is; the fixture goes with it. The slave does not move."""
+    """Move the hand's place to its proxy, and the fixture with it. The slave does not move."""
     for i in range(3):
         s.center[i] += s.beyond[i]
         s.beyond[i] = 0.0

@@ -1,4 +1,4 @@
-"""Display: a stage that shows the operator the slave as a screen does, in frames and late."""
+"""Display: a stage that shows the operator the slave as a screen does, frame by frame and with latency."""
 
 from dataclasses import dataclass
 from typing import Annotated

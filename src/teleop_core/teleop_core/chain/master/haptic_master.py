@@ -100,7 +100,7 @@ def _is_sound(p: MasterNumbers, s: MasterState, force: Array, now_ns: int) -> bo
 
 @inner
 def _holds(p: MasterNumbers, s: MasterState, row: Row) -> bool:
-    """Whether a hand holds the stylus; takes where it is wanted from who does.
+    """Whether a hand holds the stylus; if so, take its wanted place.
 
     A hand that is suddenly elsewhere, or after a silence, is another grip: it brings the stylus
     there before the clutch is released.

@@ -1,7 +1,7 @@
 """Master bridge: the stage that brings a real device in, in the place of ``haptic_master``.
 
 It says where the device's stylus is, in ``master_base``, and hands the device the force that it
-shall give. What it does not believe it does not pass on: the slave holds then.
+shall give. It does not pass on samples that cannot be true: the slave holds then.
 """
 
 import math
@@ -241,7 +241,7 @@ class MasterBridge(RunningStage):
     def force(self, age: float, now_ns: int) -> geometry.Array:
         """Force (3,) that the device shall give, along its own axes [N].
 
-        Zero where nobody has asked for one lately, or the device has not said where it is.
+        Zero if no force was commanded lately, or the place of the device is unknown.
 
         Args:
             age: Time since ``master/servo_cf`` came [s]; infinite before the first.
@@ -257,7 +257,7 @@ class MasterBridge(RunningStage):
         return share * dot(self._rows.T, asked)
 
     def concerns(self) -> list[str]:
-        """Why nothing is said of the stylus."""
+        """Why the place of the stylus is not published."""
         if self.wrong:
             return [f"the device is not believed: {self.wrong}"]
         if not self.heard_ns:

@@ -1,4 +1,4 @@
-"""Operator: who holds the stylus, moves it and presses its buttons, and sees what a person gets."""
+"""Operator: a simulated person who moves the stylus and presses its buttons, and sees what a real one would."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -103,7 +103,7 @@ def operator_step(
 class RunningOperator(RunningStage):
     """Stage of the operator.
 
-    The same parameters give the same motion, bit for bit, of whoever does not answer to what is seen.
+    The same parameters give the same motion, bit for bit, unless the operator reacts to what it sees.
 
     Args:
         parameters: Who it is.

@@ -79,7 +79,7 @@ def take_deadband(p: DeadbandNumbers, parameters: DeadbandParameters, dt: float)
 
 @inner
 def is_worth_telling(p: DeadbandNumbers, s: DeadbandState, k: int, pose: Array, force: Array) -> bool:
-    """Whether a packet of direction ``k`` shall go with this pose (7,) and force (3,).
+    """Whether a packet of direction ``k`` with this pose (7,) and force (3,) is to be sent.
 
     Args:
         p: Parameters.

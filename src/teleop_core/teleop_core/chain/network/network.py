@@ -147,7 +147,7 @@ def _send_back(p: NetworkNumbers, s: NetworkState, back: link.Way, row: Row, dt:
 
 @inner
 def _take_there(p: NetworkNumbers, s: NetworkState, there: link.Way, row: Row) -> None:
-    """Take the command that arrived; increments count from where the slave is led, or was last."""
+    """Take the command that arrived; increments are added to where the slave is led, or was led last."""
     link.take_packet(s, there, THERE)
     if s.arrived[THERE]:
         _unpack(there.came, 0, row.network_servo_cp)

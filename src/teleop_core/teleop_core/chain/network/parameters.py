@@ -29,7 +29,7 @@ def _delays(least: float, mean: float, slow_mean: float, slow_share: float) -> d
 
 
 def _outages(pause: float, longest: float, packet_rate: float = 0.0) -> dict[str, Any]:
-    """Times in seconds, or in packets of which so many are sent in a second."""
+    """Parameters of outages, in seconds, or in packets if a ``packet_rate`` is given."""
     gone = {"kind": "outages", "outages.pause": pause, "outages.longest": longest}
     if packet_rate > 0.0:
         gone |= {"outages.in_packets": True, "packet_rate": packet_rate}
