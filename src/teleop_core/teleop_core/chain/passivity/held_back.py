@@ -1,4 +1,4 @@
-"""Held back: a command that goes against the force on the tip no further than it may.
+"""Held back: a command that goes against the force on the tip only as far as the energy allows.
 
 What it loses is *drift*, from what is given to what was commanded. It is made up for where that is
 allowed, and met by a hand that comes back.
@@ -14,7 +14,7 @@ from teleop_core.kernels.room import room
 
 @inner
 def hold_back(force: Array, size: float, last: Array, left: float, least: float, port: Array, command: Array) -> float:
-    """Let the command (7,) go against the force as far as work is left for it; the rest is drift.
+    """Let the command (7,) go against the force as far as the remaining work allows; the rest is drift.
 
     Args:
         force: On the tip (6,), with a size [N]; none if that is no more than ``least``.
@@ -51,7 +51,7 @@ def norm(force: Array) -> float:
 def met_way(command: Array, last: Array, drift: Array) -> float:
     """Way [m] on which the command (7,), as it came, went back towards the one given before.
 
-    Drift that goes away by it moves nothing: the command that is given waits until it is met.
+    Drift that shrinks by this way moves nothing: the given command waits for the hand.
     """
     size, way = norm(drift), 0.0
     if size == 0.0:
@@ -79,7 +79,7 @@ def make_up(numbers: Array, drift: Array, met: float, period: float) -> None:
 def hold_lead(
     numbers: Array, memory: Array, left: float, stop: float, force: Array, tip: Array, port: Array, command: Array
 ) -> None:
-    """Let the command (7,) be ahead of the tip only as far as what is left pays for on the way.
+    """Let the command (7,) be ahead of the tip only as far as the remaining energy pays for the way.
 
     The arm goes on to its command whatever it meets. So the way from the tip to the command is paid
     for before it is begun, as against a spring that has the present force already: friction may be

@@ -1,7 +1,7 @@
 """Passivity as a stage: the slave's port, between what arrives of the hand and inverse kinematics.
 
-It counts what goes through the slave's tip and lets the kind of passivity that the hand tells of
-have its say about the command. Without it nobody limits what the slave gives.
+It counts what goes through the slave's tip and lets the passivity that the hand's side names change the command.
+Without it nobody limits what the slave gives.
 """
 
 from dataclasses import dataclass

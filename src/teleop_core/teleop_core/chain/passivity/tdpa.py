@@ -26,7 +26,7 @@ _SPEED = 1
 
 @dataclass(frozen=True, kw_only=True)
 class StoreParameters:
-    """How much the hand's side keeps for itself, and what it sees to that the slave has."""
+    """Energy that the hand's side keeps for itself, and the least that it leaves to the slave."""
 
     kept_way: float = parameter(
         3e-4,
@@ -58,7 +58,7 @@ class StoreParameters:
 
 @inner
 def tell(port: Array, kept: float) -> None:
-    """Let the other side give what came in here, but for ``kept`` [J] and what is owed."""
+    """Credit the other side with the energy that came in here, less ``kept`` [J] and what is owed."""
     told = min(port[IN] - port[TOLD], port[MARGIN] - kept)
     if told > 0.0:
         port[TOLD] += told
@@ -128,7 +128,7 @@ def lead_slave(
     numbers: Array, memory: Array, flow: Array, force: Array, tip: Array, last: Array, port: Array,
     command: Array, stop: float, period: float,
 ) -> None:  # fmt: skip
-    """Make of the command (7,) that came the one that is given; see :func:`tdpa_slave`."""
+    """Turn the command (7,) that came into the one that is given to the slave; see :func:`tdpa_slave`."""
     left, drift = keep_account(numbers, flow, force, port), port[DRIFT : DRIFT + 3]
     met = held_back.met_way(command, last, drift) if held_back.norm(force) <= numbers[2] else 0.0
     held_back.make_up(numbers, drift, met, period)
@@ -142,7 +142,7 @@ def tdpa_slave(
     numbers: Array, memory: Array, flow: Array, force: Array, tip: Array, last: Array,
     heard: Array, port: Array, command: Array, period: float,
 ) -> None:  # fmt: skip
-    """Let the command (7,) be ahead of the tip as far as what is left pays for.
+    """Let the command (7,) be ahead of the tip as far as the remaining energy pays for.
 
     What is left is counted at the tip, by its force and its way on all six axes: what was heard and
     what came in, less what was told and what went out, and the credit, once for all. The last

@@ -45,7 +45,7 @@ The first place is the round at the hand, and what is left by the command at the
 
 @kernel
 def draw(owed: Array, energy: float, period: float, haste: float, wave: Array) -> float:
-    """Take from the integral of a wave as much as goes at once; returns the energy of that [J].
+    """Take the part of a wave's integral that is due now; returns its energy [J].
 
     What a wave of constant size brought in some time is given in the same time. Whatever the wave
     was, its energy suffices for all of it: no wave gets as far with less than one of constant size.
@@ -92,7 +92,7 @@ def _take(memory: Array, gained: float, heard: Array, port: Array, period: float
 
 @inner
 def _tell(memory: Array, port: Array, kept: float, period: float) -> None:
-    """Send of the own wave what the margin but for ``kept`` [J] pays for."""
+    """Send as much of the own wave as the margin, less ``kept`` [J], pays for."""
     wave = np.zeros(3)
     spent = draw(memory[OWED : OWED + 3], port[MARGIN] - kept, period, HASTE, wave)
     port[TOLD] += spent
@@ -140,7 +140,7 @@ def wave_hand(
 def pay_command(
     numbers: Array, memory: Array, force: Array, last: Array, port: Array, command: Array, period: float
 ) -> None:
-    """Let the command (7,) go against the force as far as what is left pays for; the rest is drift.
+    """Let the command (7,) go against the force as far as the remaining energy pays for; the rest is drift.
 
     Arguments are those of :func:`wave_slave`.
     """
