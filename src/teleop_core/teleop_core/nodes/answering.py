@@ -68,7 +68,7 @@ class AnsweringNode(CoreNode):
             self._find_silence(report)
 
     def _find_silence(self, report: Callable[[int], None] | None) -> None:
-        """Report once that the inputs fell silent, if the stage has a safe output for that."""
+        """Have the stage make its outputs safe when its trigger falls silent, and report that once."""
         is_silent = self._question.age() > self._timeout
         if is_silent and not self._was_silent:
             with self.lock:

@@ -60,7 +60,7 @@ def joint_speeds(arm: ArmModel, q: Array, twist: Array, speed: Array) -> None:
 
 @inner
 def _share_of_limits(p: SlaveNumbers, s: SlaveState, dt: float) -> float:
-    """Share of the wanted speeds at which no joint is too fast, or, of a driven tip, leaves its range."""
+    """Share, at most 1, of the wanted speeds that keeps all speed limits and, of a driven tip, all ranges."""
     share = 1.0
     for i in range(s.drive.shape[0]):
         fast = abs(s.drive[i])
