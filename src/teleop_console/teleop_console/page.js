@@ -4,7 +4,7 @@
 // scrolled or folded, and they speak to the server by requests of their own.
 (() => {
   'use strict';
-  const PERIOD = 1000, AGAIN = 200, TRIES = 50; // ms, ms, number
+  const PERIOD = 500, AGAIN = 200, TRIES = 50; // ms, ms, number
   let connected = true, pressed = false, shown = { can_stop: true, doing: 'starting …' };
 
   const ask = (path, more = {}) => fetch(path, {
@@ -75,11 +75,15 @@
     show();
   }
 
+  let asked = 0, heard = 0; // an answer that comes after a later one is old
   async function look() {
-    try {
-      shown = await (await ask('alive')).json();
-      connected = true;
-    } catch { connected = false; }
+    const number = asked += 1;
+    let said = null;
+    try { said = await (await ask('alive')).json(); } catch { /* nobody answers */ }
+    if (number < heard) return;
+    heard = number;
+    connected = said !== null;
+    shown = said || shown;
     show();
   }
 
@@ -115,5 +119,6 @@
     if (event.code === 'Space' && !types(event.target) && shown.can_stop) event.preventDefault();
   }, true);
   addEventListener('DOMContentLoaded', () => document.body.append(banner, safety, starting));
-  (async () => { for (;;) { await look(); await wait(PERIOD); } })();
+  look();
+  setInterval(look, PERIOD); // whether or not the last one was answered: it is the sign of life
 })();
