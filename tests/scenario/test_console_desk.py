@@ -10,7 +10,7 @@ import pytest
 pytest.importorskip("viser")
 
 import teleop_core as tc
-from browser import VIEWER, Tab, until
+from browser import PULLED, VIEWER, Tab, arrow, until
 from desk import POSE, Desk, shown
 from teleop_console.answers import Situation
 from teleop_console.app import Console
@@ -22,7 +22,6 @@ from teleop_core.session import api
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
 EXAMPLE = Path(__file__).parents[2] / "bags" / "example"
-GRIP, ARROW, PULLED = "/arm/master/grip", 0.07, 0.012  # the stylus' gizmo; heads of its arrows, and a pull [m]
 PANEL = "document.querySelector('[data-testid=floating-panel]')?.getBoundingClientRect()"
 
 
@@ -50,13 +49,6 @@ def ready(tab: Any, url: str) -> None:
         }};
         look();
     }})""")
-
-
-def arrow(tab: Any, axis: int, way: float = PULLED) -> Any:
-    """Where an arrow of the stylus is seen, and where it would be a way farther [px]."""
-    begin, end = np.zeros(3), np.zeros(3)
-    begin[axis], end[axis] = ARROW, ARROW + way
-    return tab.seen_at(GRIP, begin), tab.seen_at(GRIP, end)
 
 
 @pytest.mark.parametrize(("axis", "by", "sign"), [(0, "mouse", 1), (1, "finger", -1)])
