@@ -138,3 +138,15 @@ def test_panel_has_its_width_where_the_form_was_seen_on_a_phone_and_the_session_
         console.draw()
         tab.shows("ENABLED")
         tab.until(f"{PANEL}?.width > 300 && {PANEL}.right <= innerWidth")
+
+
+def test_scene_that_software_draws_has_few_pixels_and_other_ones_where_the_address_asks_for_them(tab: Any) -> None:
+    canvas = f"{VIEWER}.canvas"
+    with shown(Desk()) as (server, _):
+        ready(tab, server.url)
+        for width, height in ((390, 844), (1400, 900)):
+            tab.resize(width, height)
+            tab.until(f"innerWidth === {width} && {canvas}.width * {canvas}.height <= 320000")
+        assert not tab.value(f"{canvas}.getContext('webgl2').getContextAttributes().antialias")
+        ready(tab, f"{server.url}?fixedDpr=1")
+        tab.until(f"{canvas}.width === {canvas}.clientWidth")

@@ -4,8 +4,25 @@
 // scrolled or folded, and they speak to the server by requests of their own.
 (() => {
   'use strict';
-  const PERIOD = 500, AGAIN = 200, TRIES = 50; // ms, ms, number
+  const PERIOD = 500, AGAIN = 200, TRIES = 50, PIXELS = 320000; // ms, ms, number, of a scene that software draws
   let connected = true, pressed = false, shown = { can_stop: true, doing: 'starting …' };
+
+  // Where software draws, each sample of each pixel costs time that a session may need: edges are not smoothed, flat
+  // drawings are left to the processor, and a large scene has fewer pixels.
+  const canvas = HTMLCanvasElement.prototype, context = canvas.getContext;
+  const trial = context.call(document.createElement('canvas'), 'webgl2');
+  const named = trial?.getExtension('WEBGL_debug_renderer_info');
+  const soft = /swiftshader|llvmpipe|softpipe|software|basic render/i.test(named && trial.getParameter(named.UNMASKED_RENDERER_WEBGL));
+  trial?.getExtension('WEBGL_lose_context')?.loseContext();
+  if (soft) {
+    canvas.getContext = function (kind, wanted) {
+      return context.call(this, kind, { ...wanted, ...(kind === '2d' ? { willReadFrequently: true } : { antialias: false }) });
+    };
+  }
+  function thin() { // viser takes another ratio at any time; ?fixedDpr=1 in the address keeps one
+    const settings = soft && !location.search.includes('fixedDpr') && window.__viserTestpoints?.devSettings;
+    if (settings) settings.set({ fixedDpr: Math.min(1, Math.max(0.35, Math.sqrt(PIXELS / (innerWidth * innerHeight)))) });
+  }
 
   const ask = (path, more = {}) => fetch(path, {
     headers: { 'Teleop-Page': window.teleopPage || 'new', ...more }, cache: 'no-store',
@@ -38,6 +55,7 @@
       : shown.is_stopped || pressed ? ['EMERGENCY STOP', shown.text || 'All arms are being stopped.']
       : ['', ''];
     const root = document.documentElement.classList;
+    thin();
     dispatchEvent(new CustomEvent('teleop', { detail: shown })); // the form hears of it
     root.toggle('t-stopped', Boolean(shown.is_stopped || pressed));
     root.toggle('t-says', head !== '');
