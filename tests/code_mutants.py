@@ -614,6 +614,8 @@ CODE_MUTANTS = (
             "teleop_console/timeline.py", "self._clock() + HELD)", "math.inf)", "console_timeline"),
     _mutant("watcher_scrubs", "a page that watches moves time", "teleop_console/timeline.py",
             "if not is_look and not", "if False and not", "console_timeline"),
+    _mutant("stop_gives_way", "the stop gives way to the session, as what is drawn does", "teleop_console/app.py",
+            ' - stop:\n', ':\n', "tests/scenario/test_console_hostile.py"),
     _mutant("form_delays_stop", "the stop waits for what the form asks", "teleop_console/hooks.py",
             "answers.paths, answer, answers.slow_paths)", "answers.paths, answer)",
             "tests/scenario/test_console_start.py"),
