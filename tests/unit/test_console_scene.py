@@ -22,7 +22,8 @@ from teleop_console.link import Arm, ArmView, View
 from teleop_console.look import GOOD, HELD, ROLES, WRONG
 from teleop_console.master_nodes import METRES_PER_NEWTON
 from teleop_console.recorded import RecordedLink
-from teleop_console.scene import Scene
+from teleop_console.recorded_arms import parameters_of
+from teleop_console.scene import Scene, targets_of
 from teleop_console.server import ConsoleServer
 from teleop_console.view_tab import Visitors
 from teleop_console.world_nodes import object_outline
@@ -263,6 +264,17 @@ def test_the_reach_holds_the_places_of_the_tip_and_no_others(server: Any, name: 
     assert np.median(near) < room
     scene.show("reach", is_shown=False)
     assert not cloud.visible
+
+
+def test_the_hand_of_a_task_passes_every_target_and_no_other_operator_has_any() -> None:
+    configuration = tc.configuration("points24", duration=40.0)
+    targets = targets_of(parameters_of(configuration), "")
+    assert targets.shape == (24, 3)
+    path = tc.run(configuration)[MASTER][["x", "y", "z"]]
+    away = [np.linalg.norm(path - target, axis=1).min() for target in targets]
+    assert max(away) < 1.5e-3  # tremor, and what friction of the device holds back
+    assert len(targets_of(parameters_of(tc.configuration("free_motion")), "")) == 0
+    assert len(targets_of(parameters_of(configuration), "left")) == 0
 
 
 def test_a_joint_at_its_limit_has_a_halo_and_its_body_keeps_its_colour(server: Server) -> None:
