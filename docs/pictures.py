@@ -169,6 +169,7 @@ def frame(tab: Tab, moment: float) -> Image.Image:
 SIZES = {"desk": (1400, 900), "phone": (390, 844), "wall": (3840, 2160)}
 STATES = ROOT / "out" / "states"
 LISTED = "document.querySelectorAll('.t-list :is(.t-good, .t-held)').length === 2"
+SLIDES = "document.getAnimations().some((one) => one instanceof CSSTransition)"
 STARTS = 240.0  # patience with a session, whose kernels may have to be compiled [s]
 
 
@@ -241,7 +242,7 @@ def state(tab: Tab, name: str, *sizes: str) -> None:
             mobile=size == "phone",
         )
         end = time.monotonic() + SETTLE
-        while time.monotonic() < end:
+        while time.monotonic() < end or tab.value(SLIDES):
             picture = shot(tab)
         file = STATES / f"{name}_{size}.webp"
         Image.open(io.BytesIO(picture)).convert("RGB").save(file, quality=60, method=6)

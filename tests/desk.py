@@ -95,11 +95,11 @@ class Desk:
 
 
 @contextmanager
-def shown(desk: Any, renew: Any = None) -> Iterator[tuple[ConsoleServer, Desk]]:
-    """Server of the page of a desk, drawn as the command draws it, and the desk; ``renew`` as of the page."""
+def shown(desk: Any, renew: Any = None, *, can_end: bool = False) -> Iterator[tuple[ConsoleServer, Desk]]:
+    """Server of the page of a desk, drawn as the command draws it, and the desk; further arguments as of the page."""
     ends = threading.Event()
     with ConsoleServer(0) as server:
-        console = app.Console(server, desk, renew)
+        console = app.Console(server, desk, renew, can_end=can_end)
         drawing = threading.Thread(target=console.run, args=(ends.is_set,))
         drawing.start()
         try:

@@ -150,3 +150,29 @@ def test_scene_that_software_draws_has_few_pixels_and_other_ones_where_the_addre
         assert not tab.value(f"{canvas}.getContext('webgl2').getContextAttributes().antialias")
         ready(tab, f"{server.url}?fixedDpr=1")
         tab.until(f"{canvas}.width === {canvas}.clientWidth")
+
+
+def test_strip_of_time_stays_where_its_requests_are_not_answered(tab: Any) -> None:
+    shows = "document.querySelector('#t-strip')?.hidden === false"
+    with shown(Desk()) as (server, _):
+        ready(tab, server.url)
+        tab.until(shows)
+        tab.value("window.lost = 0; window.fetch = () => { lost += 1; return Promise.reject(new Error('lost')); }; 0")
+        tab.shows("NO CONNECTION")
+        tab.until("lost > 12")
+        assert tab.value(shows)
+
+
+def test_end_of_a_session_lies_beside_the_panel_of_a_phone_while_the_page_has_a_banner(tab: Any) -> None:
+    over = """(() => {
+        const end = document.querySelector('#t-end').getBoundingClientRect();
+        const panel = [...document.querySelectorAll('#root .mantine-Paper-root')].find(
+            (one) => getComputedStyle(one).position === 'fixed').getBoundingClientRect();
+        return end.height > 0 && end.bottom <= panel.top + 1;
+    })()"""
+    with shown(Desk(is_stoppable=True), can_end=True) as (server, desk):
+        ready(tab, server.url)
+        tab.resize(390, 844)
+        desk.press(is_pressed=True)
+        tab.until("document.documentElement.classList.contains('t-says')")
+        tab.until(over)

@@ -374,7 +374,7 @@
       try {
         if (!choosing) {
           if (state?.is_live && past !== null && !seeking) await go({ seek: past.toFixed(4) });
-          else take((await ask('timeline'))[1]);
+          else { const [ok, said] = await ask('timeline'); if (ok) take(said); } // unanswered, it stays as it is
           const due = performance.now() - seen > LIVE;
           if (state && (!told || waits() || (state.is_live && !window_ && due))) { seen = performance.now(); look(); }
         }
