@@ -59,7 +59,6 @@
     dispatchEvent(new CustomEvent('teleop', { detail: shown })); // the form hears of it
     root.toggle('t-stopped', Boolean(shown.is_stopped || pressed));
     root.toggle('t-says', head !== '');
-    root.toggle('t-watches', shown.drives === false);
     if (banner.dataset.said !== head + text) {
       banner.dataset.said = head + text;
       const strong = document.createElement('b');
