@@ -48,7 +48,7 @@ _NEAR = 0.4  # part of the robot's length about the start of the tip in which an
 _TOUCH = 0.05  # force of a wall that somebody touches [N]
 SHOWN = ("axes", "ghost", "reach", "paths")
 """What may be shown or hidden: axes of bodies, the commanded posture, where the tip can be, the last seconds' paths."""
-_REACHED, _POINT = 4000, 0.006  # points of the reach, and how wide each is, as a part of the robot's length
+_REACHED, _POINT = 4000, 0.003  # points of the reach, and how wide each is, as a part of the robot's length
 
 
 class ArmNodes:

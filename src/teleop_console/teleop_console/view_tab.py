@@ -22,7 +22,7 @@ from teleop_console.scene import Scene
 
 _SHOWN = (
     ("frames", "axes", "axes of all bodies"),
-    ("reference posture", "ghost", "where the setpoints are"),
+    ("ghost", "ghost", "the commanded posture: where the setpoints are"),
     ("reach", "reach", "where the tip can be: some thousand postures within the limits"),
     ("paths", "paths", "of the tip, wanted and measured, 10 s"),
 )
