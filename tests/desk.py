@@ -30,7 +30,7 @@ class Desk:
 
     def __init__(self, *, is_stoppable: bool = False) -> None:
         self.is_stoppable = is_stoppable
-        self.arms = (link.Arm("", load_robot_set("rcrt1", ())),)
+        self.arms: tuple[link.Arm, ...] = (link.Arm("", load_robot_set("rcrt1", ())),)
         self.asked: list[Any]
         self.known: dict[Any, Any]
         self.asked, self.stops, self.known = [], 0, {}
@@ -78,7 +78,7 @@ class Desk:
     def parameters(self) -> dict[tuple[str, str], link.ParameterInfo]:
         return self.known
 
-    def changes(self) -> dict[str, object]:
+    def changes(self) -> dict[tuple[str, str], link.Setting]:
         return {}
 
     def change(self, node: Any, name: Any, value: Any) -> str:
