@@ -233,6 +233,17 @@ class Tab(Headless):
             self.answers[told["response"]["url"]] = told["response"]["status"]
 
 
+GRIP, ARROW, PULLED = "/arm/master/grip", 0.07, 0.012
+"""The stylus' gizmo, how far its arrows reach, and a pull of a test [m]."""
+
+
+def arrow(tab: Any, axis: int, way: float = PULLED) -> Any:
+    """Where an arrow of the stylus is seen, and where it would be a way farther [px]."""
+    begin, end = np.zeros(3), np.zeros(3)
+    begin[axis], end[axis] = ARROW, ARROW + way
+    return tab.seen_at(GRIP, begin), tab.seen_at(GRIP, end)
+
+
 def until(condition: Callable[..., object], what: str, seconds: float = 60.0) -> bool:
     """Result of a condition as soon as it is true; for what happens outside of the browser."""
     return wait_until(condition, what, seconds)

@@ -4,6 +4,7 @@ import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -21,17 +22,19 @@ POSE = np.array([0.0, -0.0655, -0.0881, 1.0, 0.0, 0.0, 0.0])
 class Desk:
     """Link to an arm that stands still and writes down what the page asks of it.
 
-    Its state changes with the stop alone, and only if it ``is_stoppable``.
+    Its state changes with the stop alone, and only if it ``is_stoppable``. It tells ``poses`` at which the stylus was
+    wanted, how often it was ``let_gos`` and it had ``looks``; what it saves is the recording ``saved``.
     """
 
     title, is_live = "desk", True
 
     def __init__(self, *, is_stoppable: bool = False) -> None:
         self.is_stoppable = is_stoppable
-        self.arms = (link.Arm("", load_robot_set("rcrt1", ())),)
+        self.arms: tuple[link.Arm, ...] = (link.Arm("", load_robot_set("rcrt1", ())),)
         self.asked: list[Any]
         self.known: dict[Any, Any]
         self.asked, self.stops, self.known = [], 0, {}
+        self.poses, self.looks, self.let_gos, self.saved = list[Array](), 0, 0, Path()
         self.obeys = threading.Event()
         self.obeys.set()
         arm = link.ArmView({MASTER_MEASURED_CP.name: POSE}, {}, {}, dict.fromkeys(OPERATION, 0.0), "-")
@@ -39,6 +42,7 @@ class Desk:
         self._view = link.View(arms={"": arm}, is_fresh=True)
 
     def view(self) -> link.View:
+        self.looks += 1
         self._view.time, arm = time.monotonic(), self._view.arms[""]
         arm.operation_text = operation_text(arm.operation)
         return self._view
@@ -60,9 +64,10 @@ class Desk:
     def hold(self, arm: str, pose: Array) -> None:
         assert np.shape(pose) == (7,)
         self.asked.append("hold")
+        self.poses.append(np.array(pose))
 
     def let_go(self, arm: str) -> None:
-        pass
+        self.let_gos += 1
 
     def press_button(self, arm: Any, name: Any) -> None:
         self.asked.append(name)
@@ -73,7 +78,7 @@ class Desk:
     def parameters(self) -> dict[tuple[str, str], link.ParameterInfo]:
         return self.known
 
-    def changes(self) -> dict[str, object]:
+    def changes(self) -> dict[tuple[str, str], link.Setting]:
         return {}
 
     def change(self, node: Any, name: Any, value: Any) -> str:
@@ -84,16 +89,17 @@ class Desk:
         self.asked.append("mark")
         return True, "marked"
 
-    def save(self, name: Any) -> None:
+    def save(self, name: Any) -> Path:
         self.asked.append("save")
+        return self.saved
 
 
 @contextmanager
-def shown(desk: Any) -> Iterator[tuple[ConsoleServer, Desk]]:
-    """Server of the page of a desk, drawn as the command draws it, and the desk."""
+def shown(desk: Any, renew: Any = None, *, can_end: bool = False) -> Iterator[tuple[ConsoleServer, Desk]]:
+    """Server of the page of a desk, drawn as the command draws it, and the desk; further arguments as of the page."""
     ends = threading.Event()
     with ConsoleServer(0) as server:
-        console = app.Console(server, desk)
+        console = app.Console(server, desk, renew, can_end=can_end)
         drawing = threading.Thread(target=console.run, args=(ends.is_set,))
         drawing.start()
         try:

@@ -2,6 +2,8 @@
 
 import logging
 import socket
+import subprocess
+import sys
 import threading
 from collections.abc import Callable
 from contextlib import ExitStack
@@ -205,3 +207,21 @@ class Talker:
     def cut(self) -> None:
         self.is_cut = True
         self._crowd.pages.discard(self)
+
+
+PRIORITIES = """
+import os, threading
+from teleop_console import app
+from teleop_console.server import ConsoleServer
+app._NICE = 19
+with ConsoleServer(0):
+    before = os.getpriority(os.PRIO_PROCESS, 0)
+    app.give_way()
+    found = {thread.name: os.getpriority(os.PRIO_PROCESS, thread.native_id) for thread in threading.enumerate()}
+print(found.pop("console front") == before, set(found.values()))
+"""
+
+
+def test_thread_that_answers_the_stop_keeps_its_priority_where_the_page_gives_way_to_the_session() -> None:
+    done = subprocess.run([sys.executable, "-c", PRIORITIES], capture_output=True, text=True, check=False)
+    assert done.stdout == "True {19}\n", done.stderr

@@ -120,7 +120,7 @@ def test_session_is_chosen_begun_and_repeated(
 @browser
 @pytest.mark.slow
 @pytest.mark.parametrize("size", [(1400, 900), (390, 844)])
-def test_form_is_filled_and_a_recording_is_replayed_by_keys_alone(
+def test_form_is_filled_and_a_recording_is_scored_and_replayed_by_keys_alone(
     tab: Any, size: tuple[int, int], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     if not tab.has_focus:
@@ -144,6 +144,10 @@ def test_form_is_filled_and_a_recording_is_replayed_by_keys_alone(
         tab.until(f"{READY} && document.querySelector('.t-list input')")
         tab.tab_to(".t-list input")
         tab.key("Enter")
+        tab.tab_to("[data-act=score]")
+        tab.key("Enter")
+        tab.until("document.querySelector('.t-told').innerText.includes('tracking error')", 120)
+        tab.until("!document.querySelector('[data-act=replay]').disabled")
         tab.tab_to("[data-act=replay]")
         tab.key("Enter")
         until(lambda: len(wishes) == 2, "it is shown")

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from rosbags.highlevel import AnyReader
 
 import teleop_core as tc
-from teleop_console.recorded import FRAME, RecordedLink
+from teleop_console.recorded import RecordedLink
 from teleop_console.recorded_arms import configuration_of, recorded_arms
 from teleop_core.bags.memory import MemoryBag
 from teleop_core.graph.topics import MASTER_MEASURED_CP, SLAVE_MEASURED_CP, Kind, Topic
@@ -69,8 +69,7 @@ def test_a_view_has_what_others_read_as_the_last_sample_by_that_time(
 @settings(max_examples=100, deadline=None)
 @given(
     steps=st.lists(
-        st.tuples(st.sampled_from(("advance", "seek", "step", "play", "pause", "loop")), st.floats(-2.0, 9.0)),
-        max_size=30,
+        st.tuples(st.sampled_from(("advance", "seek", "play", "pause", "loop")), st.floats(-2.0, 9.0)), max_size=30
     )
 )
 def test_time_stays_within_the_recording_whatever_is_done(
@@ -83,7 +82,7 @@ def test_time_stays_within_the_recording_whatever_is_done(
         elif name in {"play", "pause"}:
             getattr(link, name)()
         else:
-            getattr(link, name)(int(value) if name == "step" else value)
+            getattr(link, name)(value)
         assert 0.0 <= link.time <= link.duration
 
 
@@ -118,16 +117,6 @@ def test_a_loop_begins_again_at_its_end(link: RecordedLink) -> None:
     link.advance(link.duration + 0.1)
     assert link.is_playing
     assert link.time < 1.0
-
-
-def test_a_step_holds_time_and_a_step_back_undoes_it(link: RecordedLink) -> None:
-    link.seek(2.0)
-    link.play()
-    link.step(1)
-    assert not link.is_playing
-    assert link.time == pytest.approx(2.0 + FRAME)
-    link.step(-1)
-    assert link.time == pytest.approx(2.0)
 
 
 @pytest.mark.parametrize("speed", [0.0, -1.0, 101.0, float("nan")])

@@ -20,8 +20,10 @@ from teleop_console.hooks import Server
 from teleop_console.jaw_nodes import finger_poses
 from teleop_console.link import Arm, ArmView, View
 from teleop_console.look import GOOD, HELD, ROLES, WRONG
+from teleop_console.master_nodes import METRES_PER_NEWTON
 from teleop_console.recorded import RecordedLink
-from teleop_console.scene import Scene
+from teleop_console.recorded_arms import parameters_of
+from teleop_console.scene import Scene, targets_of
 from teleop_console.server import ConsoleServer
 from teleop_console.view_tab import Visitors
 from teleop_console.world_nodes import object_outline
@@ -192,9 +194,9 @@ def test_every_robot_is_drawn(server: Server, name: str) -> None:
     for joints in (robot.home, rng.uniform(robot.lower, robot.upper), np.full(robot.n, np.nan)):
         state = np.concatenate((joints, np.zeros(2 * robot.n)))
         streams = {"slave/measured_js": state, "slave/setpoint_js": joints}
-        scene.show_ghost(True)
+        scene.show("ghost", is_shown=True)
         scene.draw(View(arms={"": ArmView(streams)}))
-    scene.show_frames(True)
+    scene.show("axes", is_shown=True)
     for camera in (scene.whole(), scene.tool(), scene.microscope()):
         assert np.isfinite(camera.quaternion).all()
     assert all(np.isfinite(frame.position).all() for frame in scene.arms[""].drawn.frames.values())
@@ -207,12 +209,72 @@ def test_a_link_with_a_visual_is_drawn_as_it_looks_and_the_others_plainly(server
     file = tmp_path / "arm.urdf"
     file.write_text(text.replace('<link name="forearm">', f'<link name="forearm">{box}'))
     scene = Scene(server, [Arm("", tc.load_robot(str(file), tip="tool0"))])
-    scene.show_ghost(is_shown=True)
+    scene.show("ghost", is_shown=True)
     for place in ("/arm/robot", "/arm/ghost"):
         forearm = present(server.scene.get_handle_by_name(f"{place}/link3/link"))
         assert np.ptp(forearm.vertices, axis=0).max() == pytest.approx(0.3)
         assert server.scene.get_handle_by_name(f"{place}/link3/joint") is None
         assert server.scene.get_handle_by_name(f"{place}/link2/joint") is not None
+
+
+def test_the_ghost_stands_where_the_setpoints_are_while_it_is_shown(server: Any, link: RecordedLink) -> None:
+    scene, view = drawn(server, link, 9.0)
+    scene.show("ghost", is_shown=True)
+    robot, root = link.arms[0].robot, present(server.scene.get_handle_by_name("/arm/ghost"))
+    tip = present(server.scene.get_handle_by_name("/arm/ghost/tip"))
+    for away, is_shown in ((0.1, True), (0.2, False)):
+        wanted = 0.5 * (robot.lower + robot.upper) + away * (robot.upper - robot.lower)
+        view.arms[""].streams["slave/setpoint_js"] = wanted
+        scene.show("ghost", is_shown=is_shown)
+        for _ in range(3):  # it is drawn every third time
+            scene.draw(view)
+        assert root.visible == is_shown
+        assert np.allclose(tip.position, robot.fk(wanted)[:3, 3], atol=STILL) == is_shown
+
+
+def test_the_force_on_the_stylus_is_an_arrow_at_it_as_long_as_it_is_large(
+    server: Server, link: RecordedLink, session: tc.Recording
+) -> None:
+    force = session[FORCE]
+    size = np.linalg.norm(force[["fx", "fy", "fz"]], axis=1)
+    scene, view = drawn(server, link, force.time[np.argmax(size)])
+    arrow, seen = scene.arms[""].master._force, view.arms[""].streams
+    assert arrow._frame.visible
+    np.testing.assert_allclose(arrow._frame.position, seen[MASTER][:3], atol=STILL)
+    shaft = np.array([np.zeros(3), METRES_PER_NEWTON * seen[FORCE][:3]])
+    np.testing.assert_allclose(np.asarray(arrow._arrow.points[0], np.float64), shaft, atol=1e-6)
+    assert arrow._label.text == f"{size.max():.1f} N"
+    scene, _ = drawn(server, link, force.time[size == 0.0][-1])
+    assert not scene.arms[""].master._force._frame.visible
+
+
+@pytest.mark.parametrize("name", ["rcrt1", "planar_3r"])
+def test_the_reach_holds_the_places_of_the_tip_and_no_others(server: Any, name: str) -> None:
+    server.scene.reset()
+    robot, rng = tc.load_robot(name), np.random.default_rng(1)
+    scene = Scene(server, [Arm("", robot)])
+    scene.show("reach", is_shown=True)
+    cloud = present(server.scene.get_handle_by_name("/arm/reach"))
+    points = np.asarray(cloud.points, np.float64)
+    tips = np.array([robot.fk(rng.uniform(robot.lower, robot.upper))[:3, 3] for _ in range(500)])
+    room = 0.1 * np.ptp(tips, axis=0).max()
+    for one, other in ((points, tips), (tips, points)):
+        assert (one.min(axis=0) > other.min(axis=0) - room).all()
+    near = np.linalg.norm(points[:, None] - tips[None], axis=2).min(axis=0)
+    assert np.median(near) < room
+    scene.show("reach", is_shown=False)
+    assert not cloud.visible
+
+
+def test_the_hand_of_a_task_passes_every_target_and_no_other_operator_has_any() -> None:
+    configuration = tc.configuration("points24", duration=40.0)
+    targets = targets_of(parameters_of(configuration), "")
+    assert targets.shape == (24, 3)
+    path = tc.run(configuration)[MASTER][["x", "y", "z"]]
+    away = [np.linalg.norm(path - target, axis=1).min() for target in targets]
+    assert max(away) < 1.5e-3  # tremor, and what friction of the device holds back
+    assert len(targets_of(parameters_of(tc.configuration("free_motion")), "")) == 0
+    assert len(targets_of(parameters_of(configuration), "left")) == 0
 
 
 def test_a_joint_at_its_limit_has_a_halo_and_its_body_keeps_its_colour(server: Server) -> None:

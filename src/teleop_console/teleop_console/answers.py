@@ -88,10 +88,12 @@ class Answers:
             "/alive": self._alive,
             "/stop": self._stop,
             "/jaw": self._jaw,
+            **dict.fromkeys(self.slow_paths, self._later),
+        }
+        self._files: dict[str, Callable[[Request], Response]] = {
             "/teleop.js": self._script,
             "/teleop.css": self._style,
             **dict.fromkeys(self.form.documents, self._document),
-            **dict.fromkeys(self.slow_paths, self._later),
         }
 
     def name(self, page: int) -> str:
@@ -107,7 +109,7 @@ class Answers:
     @property
     def paths(self) -> frozenset[str]:
         """Paths of the requests that are ours to answer."""
-        return frozenset(self._paths)
+        return frozenset({*self._paths, *self._files})
 
     @property
     def slow_paths(self) -> frozenset[str]:
@@ -115,8 +117,11 @@ class Answers:
         return self.form.paths | self.strip.paths
 
     def to(self, request: Request) -> Response:
-        """Answer to a request for one of :attr:`paths`; from any thread."""
-        return self._paths[urlsplit(request.path).path](request)
+        """Answer to a request for one of :attr:`paths`, from any thread; all but files ask for a page of ours."""
+        path = urlsplit(request.path).path
+        if len(request.header(OWN_PAGE)) != 1 and path not in self._files:
+            return answer_of(http.HTTPStatus.FORBIDDEN)
+        return (self._files.get(path) or self._paths[path])(request)
 
     def furnish(self, request: Request, response: Response) -> None:
         """Add our style and script to viser's page."""
@@ -129,28 +134,24 @@ class Answers:
         del response.headers["Content-Length"]
         response.headers["Content-Length"] = str(len(response.body))
 
+    def _page(self, request: Request) -> int:
+        """Page that asks; -1 for one that is not open."""
+        return self._pages.get(request.header(OWN_PAGE)[0], -1)
+
     def _alive(self, request: Request) -> Response:
-        names = request.header(OWN_PAGE)
-        if len(names) != 1:
-            return answer_of(http.HTTPStatus.FORBIDDEN)
-        page = self._pages.get(names[0], -1)
+        page = self._page(request)
         self._drivers.heard(page)
         told = {**asdict(self.situation), "drives": self._drivers.may_drive(page)}
         return answer_of(http.HTTPStatus.OK, json.dumps(told).encode(), "application/json")
 
     def _later(self, request: Request) -> Response:
-        names = request.header(OWN_PAGE)
-        if len(names) != 1:
-            return answer_of(http.HTTPStatus.FORBIDDEN)
         address = urlsplit(request.path)
         asked = self.strip if address.path in self.strip.paths else self.form
         query = parse_qs(address.query, keep_blank_values=True, max_num_fields=_FIELDS)
-        status, told = asked.answer(address.path, query, self._pages.get(names[0], -1), request.body)
+        status, told = asked.answer(address.path, query, self._page(request), request.body)
         return answer_of(status, json.dumps(told).encode(), "application/json")
 
     def _stop(self, request: Request) -> Response:
-        if len(request.header(OWN_PAGE)) != 1:
-            return answer_of(http.HTTPStatus.FORBIDDEN)
         if self.stop is None:
             return answer_of(http.HTTPStatus.CONFLICT)
         press = next(iter(request.header(PRESS)), None)
@@ -160,9 +161,8 @@ class Answers:
         return answer_of(http.HTTPStatus.NO_CONTENT)
 
     def _jaw(self, request: Request) -> Response:
-        names = request.header(OWN_PAGE)
         closed = parse_qs(urlsplit(request.path).query, max_num_fields=_FIELDS).get("closed")
-        if len(names) != 1 or not self._drivers.may_drive(self._pages.get(names[0], -1)):
+        if not self._drivers.may_drive(self._page(request)):
             return answer_of(http.HTTPStatus.FORBIDDEN)
         if self.jaw is None or closed not in (["0"], ["1"]):
             return answer_of(http.HTTPStatus.CONFLICT)

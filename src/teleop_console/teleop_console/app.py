@@ -10,6 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from teleop_console.answers import Situation
+from teleop_console.front import STOPPER
 from teleop_console.link import Link, Parameters
 from teleop_console.panel import Panel
 from teleop_console.recorded import RecordedLink
@@ -143,10 +144,11 @@ class Console:
 
 
 def give_way() -> None:
-    """Let the session go first where processors are short: the page can be late, the arm not."""
+    """Let the session go first where processors are short: the page can be late, arm and stop not."""
+    stop = {thread.native_id for thread in threading.enumerate() if thread.name == STOPPER}
     with suppress(OSError):  # elsewhere than on Linux threads have no priorities of their own
-        for thread in os.listdir("/proc/self/task"):
-            os.setpriority(os.PRIO_PROCESS, int(thread), _NICE)
+        for thread in {int(name) for name in os.listdir("/proc/self/task")} - stop:
+            os.setpriority(os.PRIO_PROCESS, thread, _NICE)
 
 
 def choose(server: ConsoleServer) -> Wish:

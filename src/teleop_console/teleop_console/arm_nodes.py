@@ -11,7 +11,7 @@ from teleop_console.cameras import corners
 from teleop_console.fixture_outlines import Look, OutlineNode, scale_of, unit_outline
 from teleop_console.jaw_nodes import JawNodes
 from teleop_console.link import Arm, ArmView, box_of
-from teleop_console.look import MEASURED, TARGET, WANTED, Color
+from teleop_console.look import MEASURED, ROLES, TARGET, WANTED, Color
 from teleop_console.master_nodes import MasterNodes
 from teleop_console.stand import DEVICE, PUBLISHED_AXES, REST, stand_beside
 from teleop_console.tails import LENGTH, Tail, is_jump
@@ -34,6 +34,7 @@ from teleop_core.kernels.geometry import Array
 from teleop_core.robots.bodies import bodies_of
 from teleop_core.robots.bodies.looks import looks_of
 from teleop_core.robots.bodies.meshes import mesh_of
+from teleop_core.robots.dexterity import sample_workspace
 from teleop_core.robots.robot import Robot
 
 Path = Callable[[Topic, str, float], tuple[Array, Array]]
@@ -45,6 +46,9 @@ _GOAL = TASK_STATE.columns.index("goal_x")
 _LEAST_GOAL = 1e-3  # width of a goal as it is drawn [m]
 _NEAR = 0.4  # part of the robot's length about the start of the tip in which an object is framed
 _TOUCH = 0.05  # force of a wall that somebody touches [N]
+SHOWN = ("axes", "ghost", "reach", "paths")
+"""What may be shown or hidden: axes of bodies, the commanded posture, where the tip can be, the last seconds' paths."""
+_REACHED, _POINT = 4000, 0.003  # points of the reach, and how wide each is, as a part of the robot's length
 
 
 class ArmNodes:
@@ -82,6 +86,7 @@ class ArmNodes:
         self._axes = PUBLISHED_AXES
         self._stand = stand_beside(self._own_low, self._own_high, self._axes)
         self.master = MasterNodes(server, f"{self.path}/master", self._stand)
+        self._tails = self.measured, self.reference, self.master.tail
         self.world = WorldNodes(server, self.path, robot)
         self.jaw = JawNodes(server, self.path)
         self.fixture = Look()
@@ -190,17 +195,13 @@ class ArmNodes:
         """Draw the reference posture, every third time: it tells no more than where to."""
         reference = view.get(SLAVE_SETPOINT_JS)
         self._count = (self._count + 1) % 3
-        if self._ghost is None or reference is None or not self._is_ghost_shown or self._count:
-            return
-        self._ghost.move(reference)
+        if self._ghost is not None and reference is not None and self._is_ghost_shown and not self._count:
+            self._ghost.move(reference)
 
     def _draw_paths(self, time: float, view: ArmView) -> None:
         if self.recorded_path is not None and is_jump(self._last, time):
-            for tail, topic in (
-                (self.measured, SLAVE_MEASURED_CP),
-                (self.reference, SLAVE_SETPOINT_CP),
-                (self.master.tail, MASTER_MEASURED_CP),
-            ):
+            topics = (SLAVE_MEASURED_CP, SLAVE_SETPOINT_CP, MASTER_MEASURED_CP)
+            for tail, topic in zip(self._tails, topics, strict=True):
                 times, rows = self.recorded_path(topic, self._name, LENGTH)
                 tail.fill(times, rows[:, :3])
         self._last = time
@@ -263,30 +264,31 @@ class ArmNodes:
 
     # -- what is shown ---------------------------------------------------------------------------
 
-    def show_axes(self, *, is_shown: bool) -> None:
-        """Show the axes of its bodies and of its master, or hide them."""
-        self.drawn.show_axes(is_shown=is_shown)
-        self.master.show_axes(is_shown=is_shown)
-
-    def show_ghost(self, *, is_shown: bool) -> None:
-        """Show its reference posture, or hide it; its meshes are sent when it is first shown."""
-        self._is_ghost_shown = is_shown
-        if self._ghost is None and is_shown:
-            self._ghost_root = self._server.scene.add_frame(f"{self.path}/ghost", show_axes=False)
-            place = f"{self.path}/ghost"
-            self._ghost = BodyNodes(self._server, place, self.bodies, self._looks, is_ghost=True)
-            self._ghost.move(posture(self._robot))
-        if self._ghost is not None:
-            self._ghost_root.visible = is_shown
-
-    def show_tails(self, *, is_shown: bool) -> None:
-        """Show its paths, or hide them."""
-        for tail in (self.measured, self.reference, self.master.tail):
-            tail.show(is_shown=is_shown)
+    def show(self, what: str, *, is_shown: bool) -> None:
+        """Show one of :data:`SHOWN`, or hide it; ghost and reach are sent when they are first shown."""
+        scene, place = self._server.scene, f"{self.path}/{what}"
+        if what == "axes":
+            self.drawn.show_axes(is_shown=is_shown)
+            self.master.show_axes(is_shown=is_shown)
+        elif what == "paths":
+            for tail in self._tails:
+                tail.show(is_shown=is_shown)
+        elif is_shown and scene.get_handle_by_name(place) is None:
+            if what == "ghost":
+                scene.add_frame(place, show_axes=False)
+                self._ghost = BodyNodes(self._server, place, self.bodies, self._looks, is_ghost=True)
+                self._ghost.move(posture(self._robot))
+            else:
+                points, _ = sample_workspace(self._robot, _REACHED, np.random.default_rng(0))
+                size = _POINT * self.bodies.size
+                scene.add_point_cloud(place, points, colors=ROLES["leg"], point_size=size, point_shape="circle")
+        self._is_ghost_shown = is_shown if what == "ghost" else self._is_ghost_shown
+        if (node := scene.get_handle_by_name(place)) is not None:
+            node.visible = is_shown
 
     def set_background(self, color: Color) -> None:
         """Colour into which its paths fade."""
-        for tail in (self.measured, self.reference, self.master.tail):
+        for tail in self._tails:
             tail.set_background(color)
 
 

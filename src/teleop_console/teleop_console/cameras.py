@@ -15,7 +15,7 @@ _FROM = np.array([-0.80, -0.42, 0.48])
 _WIDE, _HIGH = 0.875, 0.8  # parts of a picture that may be filled across and upwards
 ASPECT = 1.2
 """Width over height of a wide window with the panel beside it."""
-_PHONE = 0.75  # width over height below which a panel may cover the lower part, as on phones
+_PHONE = 0.85  # width over height below which a panel may cover the lower part, as on phones
 _CLEAR = (0.4, 0.55)  # middle and half height of what is free then, of half the picture, upwards
 
 

@@ -7,38 +7,28 @@ the slave is shown as late as the display says, as it is to a simulated operator
 
 import math
 import re
-from collections import deque
 from contextlib import suppress
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-import numpy as np
 from std_srvs.srv import Trigger
 
+from teleop_console.console_streams import SILENCE, Hand, Seen, now_of
 from teleop_console.link import Arm, ArmView, ParameterInfo, Parameters, Setting, View
 from teleop_console.parameter_client import ParameterClient, ParameterEvents, call
-from teleop_core.bags.messages import Layout, layout, read_any, read_numbers, read_reports
+from teleop_core.bags.messages import read_numbers, read_reports
 from teleop_core.bags.recording import MARKS
 from teleop_core.base.errors import ParameterError, SessionError
 from teleop_core.graph.graph import RECORDER_NAME
-from teleop_core.graph.topics import (
-    DISPLAY_MEASURED_CP,
-    OPERATION,
-    OPERATOR_BUTTONS,
-    OPERATOR_JAW,
-    OPERATOR_SERVO_CP,
-    SLAVE_OPERATION,
-    TELEOP_STATE,
-    Topic,
-)
+from teleop_core.graph.topics import OPERATION, SLAVE_OPERATION, TELEOP_STATE
 from teleop_core.kernels.geometry import Array
 from teleop_core.middleware.ros import ROS
-from teleop_core.middleware.world import Owner, Qos, World, WorldEndedError
-from teleop_core.nodes.display import SEEN, displayed
+from teleop_core.middleware.world import World, WorldEndedError
+from teleop_core.nodes.display import SEEN
 from teleop_core.nodes.observer import WARNING, Observer
 from teleop_core.nodes.operation import StopButton
-from teleop_core.nodes.streams import Subscription, message_type
+from teleop_core.nodes.streams import Subscription
 from teleop_core.robots import load_robot_set
 from teleop_core.robots.robot import Robot
 from teleop_core.slave.operation import operation_text
@@ -46,75 +36,8 @@ from teleop_core.slave.operation import operation_text
 PATIENCE = 5.0
 """Time in which an arm must be found, and answer [s]."""
 _LIST, _SPLIT = "/list_parameters", "/split"
-_SILENCE = 1.0  # after which nothing is fresh [s]
-_PRESS = 0.12  # of a button [s]
-_FRAMES = 512  # samples of a stream that may wait to be seen
-_SCREEN_NS = 33_000_000  # that the page itself takes, as a display does if it is told nothing else [ns]
 _MARKS = 100  # marks that are kept
-_RHYTHM_NS = 3_000_000_000  # over which the frames of a display are counted [ns]
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}")
-
-
-def _now(owner: Owner) -> float:
-    """Time of a clock that never goes back [s]."""
-    return 1e-9 * owner.world.monotonic_ns()
-
-
-class _Seen:
-    """Newest sample of one stream of one arm."""
-
-    def __init__(self, owner: Owner, topic: Topic, arm: Arm) -> None:
-        self.topic, self._joints = topic, arm.robot.joint_names
-        self._layout: Layout = layout(topic, self._joints)
-        self._owner, self._own = owner, topic.of_arm(arm.name)
-        self._name, self._since = displayed(self._own).name, _now(owner)
-        self._subscription = Subscription(owner, self._own, self._name, 1)
-        self._is_of_slave = topic.name.startswith("slave/")
-        self._waiting: deque[tuple[int, int, Array]] = deque(maxlen=_FRAMES)
-        self._frames: deque[tuple[int, int]] = deque(maxlen=_FRAMES)  # when new ones came, and their stamps
-
-    def take(self) -> bool:
-        """Take the newest sample, for :meth:`show`; whether one came."""
-        newest = None
-        while (taken := self._subscription.take()) is not None:
-            newest = taken.data
-        if newest is None:
-            self._find_another()
-            return False
-        found: Any = self._layout.decode_one(newest) or read_any(self.topic.kind, newest, self._joints)
-        if not isinstance(found, tuple) or not np.isfinite(found[1]).all():
-            return False  # refused and counted by the nodes that need it
-        now_ns = self._owner.world.time_ns()
-        self._waiting.append((now_ns, found[0], found[1].copy()))
-        if not self._frames or self._frames[-1][1] != found[0]:
-            self._frames.append((now_ns, found[0]))
-        return True
-
-    def rhythm(self) -> tuple[float, float]:
-        """New samples in a second, and how late the newest one came [s]; NaN without any of late."""
-        since_ns = self._owner.world.time_ns() - _RHYTHM_NS
-        seen = [frame for frame in self._frames if frame[0] >= since_ns]
-        if len(seen) < 2:
-            return math.nan, math.nan
-        return 1e9 * (len(seen) - 1) / (seen[-1][0] - seen[0][0]), 1e-9 * (seen[-1][0] - seen[-1][1])
-
-    def show(self, view: ArmView) -> None:
-        """Write what has come into a view, of the slave only what the display shows by now."""
-        seen_ns = view.stamp_ns.get(DISPLAY_MEASURED_CP.name) if self._is_of_slave else None
-        while self._waiting and (seen_ns is None or self._waiting[0][0] <= seen_ns + _SCREEN_NS):
-            _, view.stamp_ns[self.topic.name], view.streams[self.topic.name] = self._waiting.popleft()
-
-    def _find_another(self) -> None:
-        """Read the stream itself where nobody says it again."""
-        is_slow = self._name.startswith("/display/")
-        if is_slow and _now(self._owner) - self._since > _SILENCE:
-            self._since = _now(self._owner)
-            if not self._owner.ros.count_publishers(self._name):
-                self._subscription.close()
-                self._name = f"/{self._own.name}"
-                self._subscription = Subscription(self._owner, self._own, self._name, 1)
-
-
 _HEARTBEAT = "operation.heartbeat"
 
 
@@ -180,29 +103,24 @@ class LiveLink(Observer):
 
     def _find(self, patience: float) -> None:
         """Find arms and their robots."""
-        end, suffix, names = _now(self) + patience, f"/{SLAVE_OPERATION.name}", set[str]()
+        end, suffix, names = now_of(self) + patience, f"/{SLAVE_OPERATION.name}", set[str]()
         while not names:
             topics = self.ros.get_topic_names_and_types()
             names = {name.removesuffix(suffix).strip("/") for name, _ in topics if name.endswith(suffix)}
-            if not names and _now(self) > end:
+            if not names and now_of(self) > end:
                 raise SessionError(
                     f"no arm answers on ROS domain {self.domain}; `teleop live` says which is its "
                     "own, --domain N names another"
                 )
             self.world.sleep(0.02)
         self.arms = tuple(Arm(name, self._robot(name)) for name in sorted(names))
-        self._seen = {arm.name: [_Seen(self, t, arm) for t in SEEN] for arm in self.arms}
-        self._told = {
-            arm.name: [
-                Subscription(self, topic.of_arm(arm.name), f"/{topic.of_arm(arm.name).name}")
-                for topic in (SLAVE_OPERATION, TELEOP_STATE)
-            ]
-            for arm in self.arms
-        }
+        self._seen = {arm.name: [Seen(self, t, arm) for t in SEEN] for arm in self.arms}
+        told = {arm.name: [t.of_arm(arm.name) for t in (SLAVE_OPERATION, TELEOP_STATE)] for arm in self.arms}
+        self._told = {arm: [Subscription(self, t, f"/{t.name}") for t in topics] for arm, topics in told.items()}
         self._marks = Subscription(self, MARKS, f"/{self._recorder()}/marks", _MARKS)
-        self._hands = {arm.name: _Hand(self, arm.name) for arm in self.arms}
+        self._hands = {arm.name: Hand(self, arm.name) for arm in self.arms}
         self._view = View(arms={arm.name: ArmView() for arm in self.arms})
-        self._begun = self._heard = _now(self)
+        self._begun = self._heard = now_of(self)
 
     def _robot(self, arm: str) -> Robot:
         slave = "/".join(filter(None, (arm, "slave")))
@@ -230,7 +148,7 @@ class LiveLink(Observer):
     def view(self) -> View:
         """What is known now."""
         with self._lock:
-            view, now = self._view, _now(self)
+            view, now = self._view, now_of(self)
             for arm in self.arms:
                 taken = [seen.take() for seen in self._seen[arm.name]]
                 if any(taken):
@@ -243,7 +161,7 @@ class LiveLink(Observer):
             self._hear_marks(view)
             view.time, view.age = now - self._begun, now - self._heard
             view.display = self._seen[self.arms[0].name][-1].rhythm()  # of the display, which is last
-            view.is_fresh = view.age < _SILENCE
+            view.is_fresh = view.age < SILENCE
             return view
 
     def _hear(self, arm: Arm, view: ArmView) -> None:
@@ -263,7 +181,7 @@ class LiveLink(Observer):
             with suppress(ValueError):  # bytes that are no report
                 for mark in read_reports(taken.data):
                     ago = 1e-9 * (self.world.time_ns() - mark.stamp_ns)
-                    view.marks = (*view.marks, (_now(self) - self._begun - ago, mark.message))[-_MARKS:]
+                    view.marks = (*view.marks, (now_of(self) - self._begun - ago, mark.message))[-_MARKS:]
 
     def _hear_nodes(self, view: View) -> None:
         if not self.take():
@@ -379,43 +297,3 @@ class LiveLink(Observer):
         with self._lock:
             self._view.run = self._runs
         return wanted
-
-
-class _Hand:
-    """Publishers of a person's hand on one arm."""
-
-    def __init__(self, owner: Owner, arm: str) -> None:
-        self._layout, self._pressed = layout(OPERATOR_SERVO_CP, ()), layout(OPERATOR_BUTTONS, ())
-        self._world = owner.world
-        self._lock, self._pressing = self._world.lock(), self._world.lock()
-        self._publishers = [
-            owner.ros.create_publisher(message_type(topic.kind.ros_type), f"/{topic.of_arm(arm).name}", Qos(depth=10))
-            for topic in (OPERATOR_SERVO_CP, OPERATOR_BUTTONS, OPERATOR_JAW)
-        ]
-        self._closed = layout(OPERATOR_JAW, ())
-
-    def hold(self, pose: Array) -> None:
-        """Want the stylus somewhere."""
-        with self._lock:
-            data = self._layout.encode_one(self._world.time_ns(), np.asarray(pose, np.float64))
-            self._publishers[0].publish(data)
-
-    def press(self, name: str) -> None:
-        """Press a button and release it a moment later; presses follow one another."""
-        self._world.thread("press", lambda: self._press(name)).start()
-
-    def _press(self, name: str) -> None:
-        with self._pressing, suppress(RuntimeError):  # rclpy, once the link is closed
-            self._say(np.array([0.0, name == "fixture", name == "mode"]))
-            self._world.sleep(_PRESS)
-            self._say(np.zeros(3))
-            self._world.sleep(_PRESS)  # released for as long, or two presses were one
-
-    def close_jaw(self, share: float) -> None:
-        """Close the jaw so far."""
-        with self._lock:
-            self._publishers[2].publish(self._closed.encode_one(self._world.time_ns(), np.array([share])))
-
-    def _say(self, pressed: Array) -> None:
-        with self._lock:
-            self._publishers[1].publish(self._pressed.encode_one(self._world.time_ns(), pressed))

@@ -33,7 +33,6 @@ class Drivers:
         self._heard: dict[int, float] = {}
         self._driver: int | None = None
         self._holds, self.is_for_all = False, False
-        self._listeners: list[Callable[[int | None], None]] = []
 
     @property
     def driver(self) -> int | None:
@@ -55,13 +54,6 @@ class Drivers:
         if self.may_drive(page):
             return "you have control"
         return "you watch" if self._driver is not None else "you watch, nobody has control"
-
-    def on_change(self, listener: Callable[[int | None], None]) -> None:
-        """Call a function with the new driver, or None, at every change; it must not block.
-
-        Whoever drove before holds nothing any more: the listener lets go of the stylus.
-        """
-        self._listeners.append(listener)
 
     def join(self, page: int) -> None:
         """A page has opened; it drives if nobody does."""
@@ -108,9 +100,6 @@ class Drivers:
                 self._give(None)
 
     def _give(self, page: int | None) -> None:
-        """Change the driver; the listeners hear of it in the order of the changes."""
-        if page == self._driver:
-            return
-        self._driver, self._holds = page, False
-        for listener in tuple(self._listeners):
-            listener(page)
+        """Change the driver; whoever drove before holds nothing any more."""
+        if page != self._driver:
+            self._driver, self._holds = page, False

@@ -29,6 +29,8 @@ WAITING = 64
 """Connections that may be open without having said what they want; the oldest gives way."""
 PATIENCE = 10.0
 """Time in which a connection must have said what it wants [s]."""
+STOPPER = "console front"
+"""Name of the thread that answers the stop."""
 _LARGEST = 16 * 1024  # bytes of a request's head
 _LOOK = 0.5  # s, between looks at those that say nothing
 _SOON = 0.02  # s, between looks at a request that has begun
@@ -69,7 +71,7 @@ class Front:
         self._selector = selectors.DefaultSelector()
         self._selector.register(opened, selectors.EVENT_READ)
         self._is_closed = False
-        self._thread = threading.Thread(target=self._run, name="console front", daemon=True)
+        self._thread = threading.Thread(target=self._run, name=STOPPER, daemon=True)
         self._thread.start()
 
     def close(self) -> None:

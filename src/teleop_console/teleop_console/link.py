@@ -7,12 +7,17 @@ from typing import Protocol
 
 import numpy as np
 
+from teleop_core.base.errors import SessionError
 from teleop_core.graph.topics import Topic
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots.robot import Robot
 
 Setting = bool | int | float | str | tuple[bool, ...] | tuple[int, ...] | tuple[float, ...] | tuple[str, ...]
 """Value of a parameter."""
+
+
+REFUSED = "a recording cannot be commanded"
+"""What a link says to commands that it does not know."""
 
 
 @dataclass(frozen=True)
@@ -111,6 +116,8 @@ Parameters = Mapping[tuple[str, str], ParameterInfo]
 class Link(Protocol):
     """A session as the page sees it. All methods may be called from any thread.
 
+    A class below it that has only ``view`` and ``parameters`` of its own refuses all commands.
+
     Attributes:
         arms: The arms, the default one first.
         title: What the session is called: scenario or recording.
@@ -126,33 +133,42 @@ class Link(Protocol):
 
     def command(self, word: str, arm: str = "") -> tuple[bool, str]:
         """Send one of ``topics.STATE_COMMANDS``; whether it was taken, and why."""
+        return False, REFUSED
 
     def press(self, *, is_pressed: bool) -> None:
         """Press or release the emergency stop of all arms."""
+        return
 
     def parameters(self) -> Parameters:
         """All parameters of all nodes by node and name, as they were when last asked for."""
 
     def changes(self) -> Mapping[tuple[str, str], Setting]:
         """Parameters that anybody has changed since the last call, by node and name."""
+        return {}
 
     def change(self, node: str, name: str, value: Setting) -> str:
         """Set a parameter; returns why it was refused, empty if it was taken."""
+        return REFUSED
 
     def hold(self, arm: str, pose: Array) -> None:
         """Want the stylus at a pose (7,) in the master's base; silence after it lets go."""
+        return
 
     def let_go(self, arm: str) -> None:
         """Let go of the stylus: the slave holds until it is taken again."""
+        return
 
     def press_button(self, arm: str, name: str) -> None:
         """Press and release the ``fixture`` or ``mode`` button of the stylus."""
+        return
 
     def close_jaw(self, share: float) -> None:
         """Close the jaw of all hands so far: 0 open, 1 closed; to close it presses at a task's goal."""
+        return
 
     def mark(self) -> tuple[bool, str]:
         """Mark that something happens now; whether it was noted in the recording, and as what."""
+        return False, REFUSED
 
     def save(self, name: str) -> Path:
         """Close the recording under a name and go on recording; returns where it is.
@@ -160,6 +176,7 @@ class Link(Protocol):
         Raises:
             TeleopError: The name cannot be used, or the recorder refuses.
         """
+        raise SessionError(f"{name} is not saved: {REFUSED}")
 
 
 def box_of(state: Mapping[str, float]) -> tuple[Array, Array] | None:

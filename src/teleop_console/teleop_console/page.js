@@ -4,8 +4,25 @@
 // scrolled or folded, and they speak to the server by requests of their own.
 (() => {
   'use strict';
-  const PERIOD = 1000, AGAIN = 200, TRIES = 50; // ms, ms, number
+  const PERIOD = 500, AGAIN = 200, TRIES = 50, PIXELS = 320000; // ms, ms, number, of a scene that software draws
   let connected = true, pressed = false, shown = { can_stop: true, doing: 'starting …' };
+
+  // Where software draws, each sample of each pixel costs time that a session may need: edges are not smoothed, flat
+  // drawings are left to the processor, and a large scene has fewer pixels.
+  const canvas = HTMLCanvasElement.prototype, context = canvas.getContext;
+  const trial = context.call(document.createElement('canvas'), 'webgl2');
+  const named = trial?.getExtension('WEBGL_debug_renderer_info');
+  const soft = /swiftshader|llvmpipe|softpipe|software|basic render/i.test(named && trial.getParameter(named.UNMASKED_RENDERER_WEBGL));
+  trial?.getExtension('WEBGL_lose_context')?.loseContext();
+  if (soft) {
+    canvas.getContext = function (kind, wanted) {
+      return context.call(this, kind, { ...wanted, ...(kind === '2d' ? { willReadFrequently: true } : { antialias: false }) });
+    };
+  }
+  function thin() { // viser takes another ratio at any time; ?fixedDpr=1 in the address keeps one
+    const settings = soft && !location.search.includes('fixedDpr') && window.__viserTestpoints?.devSettings;
+    if (settings) settings.set({ fixedDpr: Math.min(1, Math.max(0.35, Math.sqrt(PIXELS / (innerWidth * innerHeight)))) });
+  }
 
   const ask = (path, more = {}) => fetch(path, {
     headers: { 'Teleop-Page': window.teleopPage || 'new', ...more }, cache: 'no-store',
@@ -38,10 +55,10 @@
       : shown.is_stopped || pressed ? ['EMERGENCY STOP', shown.text || 'All arms are being stopped.']
       : ['', ''];
     const root = document.documentElement.classList;
+    thin();
     dispatchEvent(new CustomEvent('teleop', { detail: shown })); // the form hears of it
     root.toggle('t-stopped', Boolean(shown.is_stopped || pressed));
     root.toggle('t-says', head !== '');
-    root.toggle('t-watches', shown.drives === false);
     if (banner.dataset.said !== head + text) {
       banner.dataset.said = head + text;
       const strong = document.createElement('b');
@@ -75,11 +92,15 @@
     show();
   }
 
+  let asked = 0, heard = 0; // an answer that comes after a later one is old
   async function look() {
-    try {
-      shown = await (await ask('alive')).json();
-      connected = true;
-    } catch { connected = false; }
+    const number = asked += 1;
+    let said = null;
+    try { said = await (await ask('alive')).json(); } catch { /* nobody answers */ }
+    if (number < heard) return;
+    heard = number;
+    connected = said !== null;
+    shown = said || shown;
     show();
   }
 
@@ -115,5 +136,6 @@
     if (event.code === 'Space' && !types(event.target) && shown.can_stop) event.preventDefault();
   }, true);
   addEventListener('DOMContentLoaded', () => document.body.append(banner, safety, starting));
-  (async () => { for (;;) { await look(); await wait(PERIOD); } })();
+  look();
+  setInterval(look, PERIOD); // whether or not the last one was answered: it is the sign of life
 })();

@@ -20,6 +20,8 @@ from teleop_console.settings import Renew, SettingsPanel
 from teleop_console.status import alive, leader, next_button, next_step, status_html
 from teleop_core.base.errors import TeleopError
 
+WIDTH = 320.0
+"""Of the panel on a desk [px]; on a phone it is as wide as the screen."""
 _PERIOD = 0.2  # between two drawings of the texts [s]
 
 
@@ -48,6 +50,7 @@ class Panel:
         self._take, self._drivers, self._drawn = drivers.take, drivers, 0.0
         self.scores = {arm.name: LiveScores() for arm in link.arms}
         self._gui.main_panel.dock_right()  # beside the scene, not over it
+        self._gui.main_panel.set_width(WIDTH)  # without it, what a phone had room for is kept on a desk
         self._buttons: dict[str, viser.GuiButtonHandle] = {}
         self._controls: list[Control] = []
         self._status = self._gui.add_html("")

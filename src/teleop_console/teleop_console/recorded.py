@@ -7,22 +7,19 @@ from types import MappingProxyType
 
 import numpy as np
 
-from teleop_console.link import ArmView, Parameters, Setting, View
+from teleop_console.link import ArmView, Link, Parameters, View
 from teleop_console.recorded_arms import configuration_of, parameters_of, recorded_arms
 from teleop_console.recorded_past import Recorded
 from teleop_core.bags.reader import Bag
-from teleop_core.base.errors import ParameterError, SessionError
+from teleop_core.base.errors import ParameterError
 from teleop_core.graph.topics import Topic
 from teleop_core.kernels.geometry import Array
 
-FRAME = 1.0 / 30.0
-"""Length of a step [s]."""
 _PATH = 200  # points of a path
-_REFUSED = "a recording cannot be commanded"
 
 
-class RecordedLink:
-    """A :class:`~teleop_console.link.Link` to a recording.
+class RecordedLink(Link):
+    """A link to a recording, which refuses what a session takes.
 
     A view is what was known at the present time of the replay: of each stream the last sample that
     was recorded by then. Time goes on by :meth:`advance`, whose caller has the clock.
@@ -156,11 +153,6 @@ class RecordedLink:
         """Hold time."""
         self._is_playing = False
 
-    def step(self, count: int) -> None:
-        """Hold time and go some frames on, or back."""
-        self.pause()
-        self.seek(self._time + count * FRAME)
-
     def advance(self, dt: float) -> None:
         """Let time go on by what passed [s]; nothing happens while it is held."""
         with self._lock:
@@ -172,46 +164,3 @@ class RecordedLink:
                     self._time = 0.0
                 else:
                     self.pause()
-
-    # -- what a recording does not take ----------------------------------------------------------
-
-    def command(self, word: str, arm: str = "") -> tuple[bool, str]:
-        """Refused."""
-        del word, arm
-        return False, _REFUSED
-
-    def press(self, *, is_pressed: bool) -> None:
-        """Nothing: there is nothing to stop."""
-
-    def changes(self) -> dict[tuple[str, str], Setting]:
-        """None: what is recorded stays."""
-        return {}
-
-    def change(self, node: str, name: str, value: Setting) -> str:
-        """Refused."""
-        del node, name, value
-        return _REFUSED
-
-    def hold(self, arm: str, pose: Array) -> None:
-        """Nothing: the hand has moved already."""
-
-    def let_go(self, arm: str) -> None:
-        """Nothing."""
-
-    def press_button(self, arm: str, name: str) -> None:
-        """Nothing."""
-
-    def close_jaw(self, share: float) -> None:
-        """Nothing."""
-
-    def mark(self) -> tuple[bool, str]:
-        """Refused."""
-        return False, _REFUSED
-
-    def save(self, name: str) -> Path:
-        """Refused.
-
-        Raises:
-            SessionError: Always.
-        """
-        raise SessionError(f"{name} is not saved: {_REFUSED}; it is {self._bag.path} already")

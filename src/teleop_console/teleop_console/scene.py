@@ -108,21 +108,11 @@ class Scene:
 
     # -- what is shown ---------------------------------------------------------------------------
 
-    def show_frames(self, is_shown: bool) -> None:
-        """Show the axes of all bodies and devices, or hide them."""
+    def show(self, what: str, *, is_shown: bool) -> None:
+        """Show one of :data:`~teleop_console.arm_nodes.SHOWN` of all arms, or hide it."""
         with self._server.atomic():
             for nodes in self.arms.values():
-                nodes.show_axes(is_shown=is_shown)
-
-    def show_ghost(self, is_shown: bool) -> None:
-        """Show the reference posture as a ghost, or hide it."""
-        for nodes in self.arms.values():
-            nodes.show_ghost(is_shown=is_shown)
-
-    def show_tails(self, is_shown: bool) -> None:
-        """Show the paths of the last seconds, or hide them."""
-        for nodes in self.arms.values():
-            nodes.show_tails(is_shown=is_shown)
+                nodes.show(what, is_shown=is_shown)
 
     def set_dark(self, *, is_dark: bool) -> None:
         """Take the colours for a dark page, or a light one."""

@@ -31,9 +31,10 @@
     const size = Math.abs(number), text = size && (size < 1e-3 || size >= 1e6) ? number.toExponential(1) : +number.toPrecision(digits);
     return String(text).replaceAll('-', '−'); };
   const sign = (text) => text.replace('-', '−');
+  const narrow = () => innerWidth < 576 || innerHeight < 700;
   const clamp = (value, low, high) => Math.min(high, Math.max(low, value));
   let state = null, at = 0, asked = 0, window_ = null, names = null, told = null, session = '';
-  let left = 0, wide = 0, folded = innerWidth < 576 || innerHeight < 700, found = [], picked = 0, looks = false, past = null, again = 0;
+  let left = 0, wide = 0, folded = narrow(), found = [], picked = 0, looks = false, past = null, again = 0;
 
   async function ask(path, words = []) {
     try {
@@ -84,7 +85,7 @@
     if (!said.title) { state = null; strip.hidden = true; place(); return; }
     if (session !== said.title + said.is_live) {
       session = said.title + said.is_live;
-      window_ = told = past = null; names = said.first; search.value = ''; folded = innerWidth < 576 || innerHeight < 700;
+      window_ = told = past = null; names = said.first; search.value = ''; folded = narrow();
       list.hidden = true; fill();
     }
     [state, at, asked] = [said, said.time, performance.now()];
@@ -359,7 +360,11 @@
   document.documentElement.append(strip);
   addEventListener('DOMContentLoaded', () => { // not on a page of a form's own
     if (document.getElementById('root')) document.body.append(strip); else strip.remove(); });
-  addEventListener('resize', () => { place(); draw(); if (state) look(); });
+  let small = narrow();
+  addEventListener('resize', () => {
+    if (small !== narrow()) folded = small = narrow(); // a phone that is turned, a window made wide
+    if (state) { take({ ...state, time: now() }); look(); }
+  });
   let choosing = true, seen = 0;
   addEventListener('teleop', ({ detail }) => {
     choosing = detail.chooses;
@@ -374,7 +379,7 @@
       try {
         if (!choosing) {
           if (state?.is_live && past !== null && !seeking) await go({ seek: past.toFixed(4) });
-          else take((await ask('timeline'))[1]);
+          else { const [ok, said] = await ask('timeline'); if (ok) take(said); } // unanswered, it stays as it is
           const due = performance.now() - seen > LIVE;
           if (state && (!told || waits() || (state.is_live && !window_ && due))) { seen = performance.now(); look(); }
         }

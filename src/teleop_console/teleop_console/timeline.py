@@ -133,10 +133,10 @@ class Timeline:
         return told
 
     def go(self, words: Mapping[str, str]) -> object:
-        """Move time: ``seek`` [s], ``now``, ``play`` or ``loop`` as 1 or 0, ``speed``, ``step`` in frames."""
+        """Move time: ``seek`` [s], ``now``, ``play`` or ``loop`` as 1 or 0, ``speed``."""
         link, asked = self._replay, {name: _number(words, name) for name in words}
-        if unknown := asked.keys() - {"seek", "now", "play", "loop", "speed", "step"}:
-            raise ParameterError("word", min(unknown), "one of seek, now, play, loop, speed, step")
+        if unknown := asked.keys() - {"seek", "now", "play", "loop", "speed"}:
+            raise ParameterError("word", min(unknown), "one of seek, now, play, loop, speed")
         if link is None:
             if "seek" in asked:
                 self._wanted = (asked["seek"], self._clock() + HELD)
@@ -147,8 +147,6 @@ class Timeline:
             link.speed = asked["speed"]
         if "loop" in asked:
             link.loop = bool(asked["loop"])
-        if "step" in asked:
-            link.step(max(-1000, min(1000, round(asked["step"]))))
         if "seek" in asked:
             link.seek(asked["seek"])
         if "play" in asked:

@@ -9,6 +9,7 @@ import threading
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 import viser
@@ -18,6 +19,13 @@ from teleop_console.drivers import Drivers
 from teleop_console.filter import PICTURE
 from teleop_console.hooks import Server
 from teleop_console.scene import Scene
+
+_SHOWN = (
+    ("frames", "axes", "axes of all bodies"),
+    ("ghost", "ghost", "the commanded posture: where the setpoints are"),
+    ("reach", "reach", "where the tip can be: some thousand postures within the limits"),
+    ("paths", "paths", "of the tip, wanted and measured, 10 s"),
+)
 
 
 class ViewTab:
@@ -38,9 +46,8 @@ class ViewTab:
             self._camera("From the tool", "goes with the first arm's tool until another is chosen", scene.tool, True)
             self._camera("Microscope", "fixed, over where the tip starts", scene.microscope)
         with gui.add_folder("show"):
-            self._box("frames", False, scene.show_frames, "axes of all bodies")
-            self._box("reference posture", False, scene.show_ghost, "where the setpoints are")
-            self._box("paths", True, scene.show_tails, "of the tip, wanted and measured, 10 s")
+            for label, what, hint in _SHOWN:
+                self._box(label, what == "paths", partial(scene.show, what), hint)
             self._box("dark", False, self._darken, "dark page")
 
     def _camera(self, label: str, hint: str, find: Callable[[], Camera] | None, is_riding: bool = False) -> None:
@@ -52,13 +59,13 @@ class ViewTab:
             if event.client is not None:
                 self._visitors.give(event.client, find, is_riding=is_riding)
 
-    def _box(self, label: str, is_on: bool, show: Callable[[bool], None], hint: str) -> None:
+    def _box(self, label: str, is_on: bool, show: Callable[..., None], hint: str) -> None:
         box = self._server.gui.add_checkbox(label, is_on, hint=hint)
-        box.on_update(lambda _: show(box.value))
+        box.on_update(lambda _: show(is_shown=box.value))
 
-    def _darken(self, is_dark: bool) -> None:
-        theme(self._server, is_dark=is_dark)
-        self._scene.set_dark(is_dark=is_dark)
+    def _darken(self, *, is_shown: bool) -> None:
+        theme(self._server, is_dark=is_shown)
+        self._scene.set_dark(is_dark=is_shown)
 
 
 def theme(server: viser.ViserServer, *, is_dark: bool) -> None:

@@ -1,0 +1,123 @@
+"""Console streams: what a page reads of one stream of an arm, and what it says as a person's hand."""
+
+import math
+from collections import deque
+from contextlib import suppress
+from typing import Any
+
+import numpy as np
+
+from teleop_console.link import Arm, ArmView
+from teleop_core.bags.messages import Layout, layout, read_any
+from teleop_core.graph.topics import DISPLAY_MEASURED_CP, OPERATOR_BUTTONS, OPERATOR_JAW, OPERATOR_SERVO_CP, Topic
+from teleop_core.kernels.geometry import Array
+from teleop_core.middleware.world import Owner, Qos
+from teleop_core.nodes.display import displayed
+from teleop_core.nodes.streams import Subscription, message_type
+
+SILENCE = 1.0
+"""Time after which nothing is fresh, and another source of a stream is looked for [s]."""
+_PRESS = 0.12  # of a button [s]
+_FRAMES = 512  # samples of a stream that may wait to be seen
+_SCREEN_NS = 33_000_000  # that the page itself takes, as a display does if it is told nothing else [ns]
+_RHYTHM_NS = 3_000_000_000  # over which the frames of a display are counted [ns]
+
+
+def now_of(owner: Owner) -> float:
+    """Time of a clock that never goes back [s]."""
+    return 1e-9 * owner.world.monotonic_ns()
+
+
+class Seen:
+    """Newest sample of one stream of one arm."""
+
+    def __init__(self, owner: Owner, topic: Topic, arm: Arm) -> None:
+        self.topic, self._joints = topic, arm.robot.joint_names
+        self._layout: Layout = layout(topic, self._joints)
+        self._owner, self._own = owner, topic.of_arm(arm.name)
+        self._name, self._since = displayed(self._own).name, now_of(owner)
+        self._subscription = Subscription(owner, self._own, self._name, 1)
+        self._is_of_slave = topic.name.startswith("slave/")
+        self._waiting: deque[tuple[int, int, Array]] = deque(maxlen=_FRAMES)
+        self._frames: deque[tuple[int, int]] = deque(maxlen=_FRAMES)  # when new ones came, and their stamps
+
+    def take(self) -> bool:
+        """Take the newest sample, for :meth:`show`; whether one came."""
+        newest = None
+        while (taken := self._subscription.take()) is not None:
+            newest = taken.data
+        if newest is None:
+            self._find_another()
+            return False
+        found: Any = self._layout.decode_one(newest) or read_any(self.topic.kind, newest, self._joints)
+        if not isinstance(found, tuple) or not np.isfinite(found[1]).all():
+            return False  # refused and counted by the nodes that need it
+        now_ns = self._owner.world.time_ns()
+        self._waiting.append((now_ns, found[0], found[1].copy()))
+        if not self._frames or self._frames[-1][1] != found[0]:
+            self._frames.append((now_ns, found[0]))
+        return True
+
+    def rhythm(self) -> tuple[float, float]:
+        """New samples in a second, and how late the newest one came [s]; NaN without any of late."""
+        since_ns = self._owner.world.time_ns() - _RHYTHM_NS
+        seen = [frame for frame in self._frames if frame[0] >= since_ns]
+        if len(seen) < 2:
+            return math.nan, math.nan
+        return 1e9 * (len(seen) - 1) / (seen[-1][0] - seen[0][0]), 1e-9 * (seen[-1][0] - seen[-1][1])
+
+    def show(self, view: ArmView) -> None:
+        """Write what has come into a view, of the slave only what the display shows by now."""
+        seen_ns = view.stamp_ns.get(DISPLAY_MEASURED_CP.name) if self._is_of_slave else None
+        while self._waiting and (seen_ns is None or self._waiting[0][0] <= seen_ns + _SCREEN_NS):
+            _, view.stamp_ns[self.topic.name], view.streams[self.topic.name] = self._waiting.popleft()
+
+    def _find_another(self) -> None:
+        """Read the stream itself where nobody says it again."""
+        is_slow = self._name.startswith("/display/")
+        if is_slow and now_of(self._owner) - self._since > SILENCE:
+            self._since = now_of(self._owner)
+            if not self._owner.ros.count_publishers(self._name):
+                self._subscription.close()
+                self._name = f"/{self._own.name}"
+                self._subscription = Subscription(self._owner, self._own, self._name, 1)
+
+
+class Hand:
+    """Publishers of a person's hand on one arm."""
+
+    def __init__(self, owner: Owner, arm: str) -> None:
+        self._layout, self._pressed = layout(OPERATOR_SERVO_CP, ()), layout(OPERATOR_BUTTONS, ())
+        self._world = owner.world
+        self._lock, self._pressing = self._world.lock(), self._world.lock()
+        self._publishers = [
+            owner.ros.create_publisher(message_type(topic.kind.ros_type), f"/{topic.of_arm(arm).name}", Qos(depth=10))
+            for topic in (OPERATOR_SERVO_CP, OPERATOR_BUTTONS, OPERATOR_JAW)
+        ]
+        self._closed = layout(OPERATOR_JAW, ())
+
+    def hold(self, pose: Array) -> None:
+        """Want the stylus somewhere."""
+        with self._lock:
+            data = self._layout.encode_one(self._world.time_ns(), np.asarray(pose, np.float64))
+            self._publishers[0].publish(data)
+
+    def press(self, name: str) -> None:
+        """Press a button and release it a moment later; presses follow one another."""
+        self._world.thread("press", lambda: self._press(name)).start()
+
+    def _press(self, name: str) -> None:
+        with self._pressing, suppress(RuntimeError):  # rclpy, once the link is closed
+            self._say(np.array([0.0, name == "fixture", name == "mode"]))
+            self._world.sleep(_PRESS)
+            self._say(np.zeros(3))
+            self._world.sleep(_PRESS)  # released for as long, or two presses were one
+
+    def close_jaw(self, share: float) -> None:
+        """Close the jaw so far."""
+        with self._lock:
+            self._publishers[2].publish(self._closed.encode_one(self._world.time_ns(), np.array([share])))
+
+    def _say(self, pressed: Array) -> None:
+        with self._lock:
+            self._publishers[1].publish(self._pressed.encode_one(self._world.time_ns(), pressed))
