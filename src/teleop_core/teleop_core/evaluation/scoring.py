@@ -96,10 +96,11 @@ def measure(bag: Bag, keys: Iterable[str], arm: str = "") -> dict[str, float | N
         PartError: A metric does not keep to its keys.
     """
     wanted = list(keys)
-    makers = [METRICS.find(name) for name in dict.fromkeys(k.partition(".")[0] for k in wanted)]
+    places = {key.partition(".")[0] for key in wanted}
+    makers = [found for found in map(METRICS.find, METRICS) if found.place() in places]
     context, metrics = _run(of_arm(bag, arm), arm or arm_names(bag)[0], makers, None)
     known = {
-        ".".join((metric.name, *path)): value
+        ".".join((metric.place(), *path)): value
         for metric in metrics
         for path, value in leaves(_result(context, metric).json or {}).items()
     }
@@ -185,7 +186,7 @@ def _result(context: Context, metric: Metric) -> Result:
         values, rows = metric.values(), metric.rows()
         _insist(metric, rows, Row)
         tree = _checked(metric, plain(values))
-        return Result(metric.name, values, tree if metric.keys else None, tuple(rows))
+        return Result(metric.name, metric.place(), values, tree if metric.keys else None, tuple(rows))
 
 
 def _compared(results: tuple[Result, ...]) -> tuple[Result, ...]:
@@ -226,7 +227,7 @@ def _insist(metric: Metric, found: object, kind: type[object]) -> None:
 
 def _checked(metric: Metric, tree: dict[str, Plain]) -> dict[str, Plain]:
     """The values, if they are just under the metric's keys."""
-    paths = [(metric.name, *path) for path in leaves(tree)]
+    paths = [(metric.place(), *path) for path in leaves(tree)]
     given = {".".join(path) for path in paths if any(key.covers(path) for key in metric.keys)}
     names = {name for key in metric.keys for name in key.names() if "<" not in name}
     foreign = {".".join(path) for path in paths} - given
