@@ -13,7 +13,7 @@ PUBLIC = {
     "teleop_lab", "teleop_lab.calibration", "teleop_core.slave.operation",
     "teleop_console.app", "teleop_console.controls", "teleop_console.link",
     "teleop_console.recorded", "teleop_console.server",
-    "teleop_core", "teleop_core.evaluation", "teleop_core.evaluation.metric", "teleop_core.chain.operators",
+    "teleop_core", "teleop_core.evaluation", "teleop_core.evaluation.metric", "teleop_core.chain.operators", "teleop_core.chain.tasks",
     "teleop_core.shapes",
     "teleop_core.slave.controllers", "teleop_core.robots", "teleop_core.graph.topics",
     "teleop_drill", "teleop_console", "teleop_exchange", "teleop_lab.experiments", "numpy",

@@ -21,8 +21,7 @@ class Attempts:
         successes: How many of them reached their goal; None without a task.
     """
 
-    def __init__(self, context: Context) -> None:
-        context.read((TASK_STATE,))
+    def __init__(self, _: Context) -> None:
         self.successes: int | None = None
         self._tried: list[Array] = []
         self._attempts, self._before = np.nan, 0.0  # of the last sample; successes before the first one
@@ -52,6 +51,8 @@ class Attempts:
 
 class AttemptsMetric(Metric):
     """Measure of the attempts at a task's goals."""
+
+    topics = (TASK_STATE,)
 
     def __init__(self, context: Context) -> None:
         super().__init__(context)
