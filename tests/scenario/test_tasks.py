@@ -177,11 +177,3 @@ def test_a_small_gain_makes_a_person_clutch_and_each_clutch_leaves_the_slave_whe
         while_down = tip.values[(tip.stamp_ns > down + 100_000_000) & (tip.stamp_ns < up), :3]
         assert np.ptp(while_down, axis=0).max() < 2e-4
     assert (recording.score().value("task.successes") or 0) >= 1
-
-
-def test_a_task_that_counts_no_attempt_at_its_goals_is_refused() -> None:
-    def endless(numbers: np.ndarray, memory: np.ndarray, scene: np.ndarray, state: np.ndarray) -> None:
-        state[COLUMN["number"]], state[COLUMN["width"]] = 1.0, 0.01
-
-    with pytest.raises(tc.TeleopError, match="counts none in ten minutes at its goals"):
-        tc.register_task(tc.Task("endless", FollowParameters, endless))

@@ -52,6 +52,13 @@ def test_a_point_has_the_numbers_of_the_same_session_alone(found: Found) -> None
     assert float(here["position_error_mm.rms"]) == score.value("position_error_mm.rms")
 
 
+def test_a_score_of_more_streams_than_it_declares_is_that_of_the_whole_session() -> None:
+    metrics = ["ticks.executed", "latency_ms.total.median", "position_error_mm.rms"]
+    found = study(metrics=metrics, swept={}, seeds=(1,)).run(jobs=1)
+    score = tc.run("point", duration=1.0, seed=1).score()
+    assert [float(found[metric].values[0]) for metric in metrics] == [score.value(metric) for metric in metrics]
+
+
 def test_nothing_is_run_twice(found: Found) -> None:
     store, data = found
     explained = study().explain(store)

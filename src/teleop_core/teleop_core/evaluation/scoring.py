@@ -25,7 +25,7 @@ from teleop_core.evaluation.rows import Row
 from teleop_core.evaluation.score import Result, Score, Session
 from teleop_core.evaluation.state_history import StateHistory, read_history
 from teleop_core.evaluation.windows import DisorderError, Seconds, Span, Window, span_of, whole, windows
-from teleop_core.graph.topics import SLAVE_MEASURED_CP, SLAVE_SERVO_CP, SLAVE_SETPOINT_CP, Topic
+from teleop_core.graph.topics import SLAVE_MEASURED_CP, SLAVE_SERVO_CP, SLAVE_SETPOINT_CP, TELEOP_STATE, Topic
 
 REQUIRED = (SLAVE_MEASURED_CP, SLAVE_SETPOINT_CP, SLAVE_SERVO_CP)
 """Topics without which there is no score; what needs others is None without them."""
@@ -96,9 +96,7 @@ def measure(bag: Bag, keys: Iterable[str], arm: str = "") -> dict[str, float | N
         PartError: A metric does not keep to its keys.
     """
     wanted = list(keys)
-    places = {key.partition(".")[0] for key in wanted}
-    makers = [found for found in map(METRICS.find, METRICS) if found.place() in places]
-    context, metrics = _run(of_arm(bag, arm), arm or arm_names(bag)[0], makers, None)
+    context, metrics = _run(of_arm(bag, arm), arm or arm_names(bag)[0], _makers(wanted), None)
     known = {
         ".".join((metric.place(), *path)): value
         for metric in metrics
@@ -112,6 +110,17 @@ def measure(bag: Bag, keys: Iterable[str], arm: str = "") -> dict[str, float | N
             raise EvaluationError(f"{key} of {bag.path} is {value!r}, must be a number")
         found[key] = value
     return found
+
+
+def streams_of(keys: Iterable[str]) -> frozenset[str]:
+    """Names of the streams that :func:`measure` reads for some keys, as their metrics declare; some read more."""
+    read = {topic.name for maker in _makers(keys) for topic in maker.topics}
+    return frozenset(read | {SLAVE_MEASURED_CP.name, TELEOP_STATE.name})
+
+
+def _makers(keys: Iterable[str]) -> list[type[Metric]]:
+    places = {key.partition(".")[0] for key in keys}
+    return [found for found in map(METRICS.find, METRICS) if found.place() in places]
 
 
 def study(bag: Bag, arm: str = "", further: Sequence[type[Metric]] = (), span: Seconds | None = None) -> Study:
