@@ -1,16 +1,15 @@
 """Set a task of your own, and see how a simulated person does it: one corner after another."""
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 import teleop_core as tc
+from teleop_core.chain.tasks import Act, Miss, attempts
 
 Array = NDArray[np.float64]
-NUMBER, ACT, GOAL, WIDTH = 0, 1, 2, 5  # places in task/state
-PASS = 1.0
+PASS, LATE = int(Act.PASS), int(Miss.LATE)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -19,30 +18,25 @@ class CornersParameters:
 
     side: float = tc.parameter(0.02, unit="m", lower=1e-3, upper=0.2, doc="of the square")
     width: float = tc.parameter(0.003, unit="m", lower=1e-4, upper=0.1, doc="of a corner")
+    longest: float = tc.parameter(10.0, unit="s", lower=0.1, upper=60.0, doc="after which an attempt is an error")
 
 
 @tc.kernel
 def corners(numbers: Array, memory: Array, scene: Array, state: Array) -> None:
     """Count a corner as soon as the tip is there, and ask for the next one."""
-    if state[NUMBER] == 0.0:
+    if state[0] == 0.0:  # no goal yet: remember where the tip begins
         for i in range(3):
             memory[i] = scene[1 + i]
+    elif attempts.is_at_goal(scene, state):
+        attempts.tell_attempt(memory, scene, state)
+    elif attempts.waited(memory, scene) > numbers[2]:
+        attempts.end_attempt(memory, scene, state, LATE)
     else:
-        off = 0.0
-        for i in range(3):
-            off += (scene[1 + i] - state[GOAL + i]) ** 2
-        if math.sqrt(off) > 0.5 * state[WIDTH]:
-            return
-        state[6] += 1.0  # attempts
-        state[7] += 1.0  # successes
-        state[11] = scene[0] - memory[3]  # time of the attempt
-    corner = int(state[NUMBER]) % 4
-    state[NUMBER] += 1.0
-    state[ACT], state[WIDTH] = PASS, numbers[1]
-    state[GOAL] = memory[0]
-    state[GOAL + 1] = memory[1] + numbers[0] * (corner in (0, 1))
-    state[GOAL + 2] = memory[2] + numbers[0] * (corner in (1, 2))
-    memory[3] = scene[0]
+        return
+    corner = int(state[0]) % 4
+    y = memory[1] + numbers[0] * (corner in (0, 1))
+    z = memory[2] + numbers[0] * (corner in (1, 2))
+    attempts.begin_goal(memory, scene, state, PASS, memory[0], y, z, numbers[1])
 
 
 tc.register_task(tc.Task("corners", CornersParameters, corners))

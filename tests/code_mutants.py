@@ -32,8 +32,7 @@ _SIDE = "chain/mapping/side.py"
 _TDPA, _CENTRE = "chain/passivity/tdpa.py", "chain/fixtures/remote_centre.py"
 _HELD = "chain/passivity/held_back.py"
 _CENTRE_SCORE, _TOUCH = "evaluation/metrics/remote_centre.py", "evaluation/metrics/touch.py"
-_JAW, _JAW_SCORE = "slave/jaw/jaw.py", "evaluation/metrics/jaw.py"
-_GRIP, _TRANSFER = "slave/jaw/grip.py", "evaluation/metrics/transfer.py"
+_JAW, _GRIP, _CHANGES = "slave/jaw/jaw.py", "slave/jaw/grip.py", "evaluation/changes.py"
 _GRIPPER = "slave/bridges/jaw_bridge.py"
 _SHARING = "slave/jaw/sharing.py"
 _YIELD = "chain/architectures/impedance.py"
@@ -92,9 +91,9 @@ CODE_MUTANTS = (
             "self._still >= 5", "self._still >= 1", "evaluation_metrics"),
     _mutant("lost_ways", "economy leaves out the ways of attempts", "evaluation/metrics/economy.py",
             "self._straight += row[_WAY]", "self._straight += 0.0", "evaluation_metrics"),
-    _mutant("narrow_ends", "effective width is too small", "evaluation/metrics/task.py",
+    _mutant("narrow_ends", "effective width is too small", "evaluation/metrics/throughput.py",
             "EFFECTIVE = 4.133", "EFFECTIVE = 3.133", "tests/scenario/test_tasks.py"),
-    _mutant("frame_age", "a frame does not age on the screen", "evaluation/metrics/task.py",
+    _mutant("frame_age", "a frame does not age on the screen", "evaluation/metrics/display.py",
             "[first:] + 0.5 * until", "[first:]", "tests/scenario/test_tasks.py"),
     _mutant("lone_jaw", "of two jaws that hold a block the second has no hold", _GRIP,
             "s.forces[1] = row.second_slave_jaw_grip[0] if is_there else 0.0", "s.forces[1] = 0.0",
@@ -114,6 +113,19 @@ CODE_MUTANTS = (
     _mutant("long_steps", "a step lasts from the first sample on", "evaluation/metrics/steps.py",
             "log_ns, step, self._tried = ns, int", "log_ns, step, self._tried = log_ns or ns, int",
             "tests/scenario/test_peg_transfer.py"),
+    _mutant("one_task_over", "a session ends once one of two arms has no goal left", "session/runner.py",
+            "all(block[field][-1, _OVER] > 0.0", "any(block[field][-1, _OVER] > 0.0",
+            "tests/scenario/test_peg_transfer.py"),
+    _mutant("endless_task", "a session goes on after its task", "session/runner.py",
+            "if may_end and all", "if False and all", "tests/scenario/test_peg_transfer.py"),
+    _mutant("one_live_over", "a live session ends once one of two arms has no goal left", "nodes/task_end.py",
+            "_OVER] > 0.0).all()", "_OVER] > 0.0).any()", "tests/simulated/test_task_end.py"),
+    _mutant("task_uncounted", "a task that counts nothing is taken", "chain/tasks/__init__.py",
+            "if not (needs_jaw or", "if False and (needs_jaw or", "part_mistakes"),
+    _mutant("scores_unwritten", "a study may ask for scores of what no session writes",
+            "teleop_lab/studies/checks.py", "if reads and not written.intersection(reads):", "if False:", "studies"),
+    _mutant("place_unreached", "a study may have an object that the slave cannot touch",
+            "teleop_lab/studies/checks.py", ") > _NEAR:", ") > np.inf:", "studies"),
     _mutant("short_waits", "a tenth of a second at rest is a wait", "evaluation/metrics/waits.py",
             "self._still == 3", "self._still == 1", "evaluation_scores"),
     _mutant("any_bump", "every bump of a force is a peak", "evaluation/metrics/force_peaks.py",
@@ -503,18 +515,16 @@ CODE_MUTANTS = (
     # scores
     _mutant("transfer_first", "every transfer begins at the first grip", "evaluation/pairing.py",
             "begins_ns[i - 1]", "begins_ns[0]", "evaluation_scores"),
-    _mutant("transfer_all", "the score counts transfers from before it begins", _TRANSFER,
-            "counts = self._last - self._first", "counts = self._last", "evaluation_scores"),
-    _mutant("jaw_delay", "a grip's delay begins at the end of the hand's closing", _JAW_SCORE,
-            "closes[1:] & ~closes[:-1]", "~closes[1:] & closes[:-1]",
+    _mutant("counts_all", "the score counts grips and transfers from before it begins", _CHANGES,
+            " - self._first[self._at(name)])", ")", "evaluation_scores"),
+    _mutant("jaw_delay", "a grip's delay begins at the end of the hand's closing", _CHANGES,
+            "(now < 0.0) & (before >= 0.0)", "(now >= 0.0) & (before < 0.0)",
             "evaluation_scores"),
     _mutant("delay_asked", "a delay beyond what was asked for is no concern",
             "evaluation/verdict.py", "(whole - asked) / _LATENCY_MS", "(asked - asked)", "verdict"),
     _mutant("holes_lost", "holes of a user's file count as messages lost in every topic",
             "evaluation/stamps.py", ", side=\"left\") > before", ", side=\"left\") >= before",
             "import_tables"),
-    _mutant("jaw_grips_all", "the score counts grips from before it begins", _JAW_SCORE,
-            "counts = self._last - self._first", "counts = self._last", "evaluation_scores"),
     _mutant("touch_drop", "a fall of the force over a pause counts as a puncture", _TOUCH,
             "falls = -np.diff(forces)[times <= _NEXT_NS]", "falls = -np.diff(forces)",
             "evaluation_scores"),

@@ -31,7 +31,7 @@ NOT_RUN = {
     r"import user\.bag": "needs a bag of ROS 1: tests/unit/test_import_bags.py",
     r".*--format lerobot": "needs its library: tests/unit/test_lerobot.py",
     r"study .* --scheduler": "needs a Dask scheduler: tests/unit/test_studies.py",
-    r"study config/studies/uva": "takes ten minutes and more of all processors; its configuration is checked by tests",
+    r"study config/studies/(uva|ten_thousand)": "takes ten minutes and more of all processors; tests check its points",
     r"experiment": "each is run by a test of its own, below its name",
 }
 """Commands that are not run as they stand, by their beginnings, and why."""

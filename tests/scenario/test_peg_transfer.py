@@ -27,11 +27,10 @@ SEEING: dict[str, Any] = {
 TWO: dict[str, Any] = {"jaw_sim.second_base": (0.0, -0.03, 0.0), "right/seed": 2}
 
 
-def transferred(arms: str, duration: float) -> tc.Recording:
+def transferred(arms: str, duration: float, more: dict[str, Any] | None = None) -> tc.Recording:
     """Session of a kind of transfer by one or two people who see."""
-    more = {} if arms == "one" else TWO
     names = [] if arms == "one" else ["left", "right"]
-    settings = {**SEEING, **more, "task.peg_transfer.arms": arms}
+    settings = {**SEEING, **(TWO if names else {}), "task.peg_transfer.arms": arms, **(more or {})}
     return tc.run("peg_transfer", duration=duration, arms=names, settings=settings)
 
 
@@ -53,18 +52,17 @@ def test_every_kind_of_transfer_is_done_and_told_as_the_board_tells_it(
         assert steps < time if waits else steps == pytest.approx(time, abs=0.05)
 
 
-def test_a_session_may_end_with_its_task_and_is_the_same_until_then() -> None:
-    settings = {**SEEING, "task.peg_transfer.arms": "one"}
-    whole, short = (
-        tc.run("peg_transfer", duration=60.0, settings=settings | {"teleop.ends_with_task": ends})
-        for ends in (False, True)
-    )
-    states = [one["task/state"].values for one in (whole, short)]
-    count = len(states[1])
-    assert states[1][-1, COLUMN["is_over"]] == 1.0
-    assert states[1][-1001, COLUMN["is_over"]] == 0.0
-    assert count < 40_000
-    assert np.array_equal(states[0][:count], states[1])
+@pytest.mark.parametrize("arms", ["one", "two"])
+def test_a_session_may_end_with_its_tasks_and_is_the_same_until_then(arms: str) -> None:
+    whole, short = (transferred(arms, 40.0, {"teleop.ends_with_task": ends}) for ends in (False, True))
+    tasks = [name for name in short.topics if name.endswith("task/state")]
+    for name in tasks:
+        states = [one[name].values for one in (whole, short)]
+        count = len(states[1])
+        assert states[1][-1, COLUMN["is_over"]] == 1.0
+        assert count < 30_000
+        assert np.array_equal(states[0][:count], states[1])
+    assert min(short[name].values[-1001, COLUMN["is_over"]] for name in tasks) == 0.0
 
 
 def test_in_a_hand_over_the_first_lets_go_once_the_second_holds() -> None:

@@ -424,7 +424,13 @@ def test_economy_is_one_on_straight_ways_and_half_on_a_way_twice_as_long() -> No
         assert found["path_mm"] == pytest.approx(100.0 / share, rel=0.02)
 
 
-@pytest.mark.parametrize("name", ["looks", "clutches", "economy", "waits", "force_peaks"])
+_SHORT = (
+    "looks", "clutches", "economy", "waits", "force_peaks", "task", "throughput", "misses", "step_s",
+    "jaw", "jaw_delay", "transfer", "insertion",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("name", _SHORT)
 def test_a_measure_takes_fifteen_lines_beside_its_docstrings(name: str) -> None:
     source = inspect.getsource(METRICS.find(name))
     module = ast.parse(source)

@@ -14,7 +14,7 @@ PUBLIC = {
     "teleop_console.app", "teleop_console.controls", "teleop_console.link",
     "teleop_console.recorded", "teleop_console.server",
     "teleop_core", "teleop_core.evaluation", "teleop_core.evaluation.metric", "teleop_core.chain.operators",
-    "teleop_core.shapes",
+    "teleop_core.chain.tasks", "teleop_core.shapes",
     "teleop_core.slave.controllers", "teleop_core.robots", "teleop_core.graph.topics",
     "teleop_drill", "teleop_console", "teleop_exchange", "teleop_lab.experiments", "numpy",
     "numpy.typing", "pandas", "plotly.graph_objects", "gymnasium", "mlflow", "stable_baselines3",

@@ -11,7 +11,6 @@ import teleop_core as tc
 from free_tool import drag, fly
 from present import present
 from teleop_console.world_nodes import object_outline
-from teleop_core.evaluation.metrics.insertion import depth_in_hole
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot
 from teleop_core.shapes.hole import HoleParameters
@@ -57,11 +56,11 @@ def test_the_chamfer_leads_a_peg_into_the_hole_and_without_it_the_peg_rests_on_t
 
 
 def test_depth_counts_in_the_hole_alone() -> None:
-    hole, center = HoleParameters(axis=TILTED), np.array([0.1, 0.2, 0.3])
+    hole = HoleParameters(axis=TILTED)
     axis, beside = np.array(TILTED), np.array([0.8, 0.0, -0.6])
 
     def depth(*ways: Array) -> float:
-        return depth_in_hole(center + np.array(ways), center, hole)
+        return hole.depth(np.array(ways))
 
     assert depth(0.01 * axis) == 0.0
     assert depth(-0.01 * axis + 0.004 * beside, -0.004 * axis) == pytest.approx(0.01)

@@ -14,9 +14,10 @@ import pytest
 from teleop_core import evaluation
 from teleop_core.base import NoParameters, ParameterError, PartError, build, parameter, specs
 from teleop_core.chain.operators import Operator, register_operator
+from teleop_core.chain.tasks import Task, register_task
 from teleop_core.evaluation import Metric
 from teleop_core.graph import Stage, register_stage
-from teleop_core.graph.topics import SLAVE_MEASURED_CP, SLAVE_SERVO_CP, Kind, Topic, passed_on
+from teleop_core.graph.topics import SLAVE_MEASURED_CP, SLAVE_SERVO_CP, TASK_STATE, Kind, Topic, passed_on
 from teleop_core.kernels import IS_COMPILED, kernel, records
 from teleop_core.session.configuration import configure
 from teleop_core.shapes import register_shape, sphere
@@ -242,3 +243,14 @@ class Nameless(Metric):
 def test_metric_class_without_a_name_or_no_class_is_refused(part: Any) -> None:
     with pytest.raises(PartError, match=r"^metric '\w+' must be .*(own name|a class below)"):
         evaluation.register_metric(part)
+
+
+# Tasks.
+
+
+def test_a_task_that_counts_no_attempt_at_its_goals_is_refused() -> None:
+    def endless(numbers: Any, memory: Any, scene: Any, state: Any) -> None:
+        state[0], state[TASK_STATE.columns.index("width")] = 1.0, 0.01
+
+    with pytest.raises(PartError, match="counts none in ten minutes at its goals"):
+        register_task(Task("endless", NoParameters, endless))

@@ -95,7 +95,7 @@ def test_practice_comes_before_the_trials_that_count_and_the_recording_names_wha
         ("practice: yes", "people.practice is True"),
         ("order: random", "one of: fixed, shuffled, latin"),
         ("ask: often", "one of: trial, condition, end"),
-        ("titel: x", "entry of people is 'titel'"),
+        ("titel: x", "parameter of people is 'titel'"),
         ("title: ''", "people.title is ''"),
         ("duration: .nan", "people.duration"),
         ("repetitions: 150", "people.repetitions"),
@@ -184,7 +184,7 @@ def test_a_store_of_another_study_is_refused_and_so_is_a_folder_with_something_e
     plan: Plan, journal: Journal, tmp_path: Path
 ) -> None:
     with pytest.raises(SessionError, match="another study"):
-        Journal(journal.folder, replace(plan, repetitions=5))
+        Journal(journal.folder, replace(plan, people=replace(plan.people, repetitions=5)))
     with pytest.raises(SessionError, match="something else"):
         Journal(Path(__file__).parent, plan)
     (journal.folder / "people.json").write_text("[")
@@ -300,7 +300,7 @@ def test_people_who_do_as_the_simulated_operator_score_as_it_does(plan: Plan, jo
     import teleop_core as tc
 
     study = replace(plan.study, seeds=(1, 2), settings={"teleop.duration": 5.0})
-    same = replace(plan, study=study, participants=2, practice=0, repetitions=1)
+    same = replace(plan, study=study, people=replace(plan.people, participants=2, practice=0, repetitions=1))
     store = Journal(journal.folder.with_name("same"), same)
     for seed, code in enumerate(same.codes, 1):
         for trial in same.trials(code):

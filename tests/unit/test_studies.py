@@ -52,6 +52,13 @@ def test_a_point_has_the_numbers_of_the_same_session_alone(found: Found) -> None
     assert float(here["position_error_mm.rms"]) == score.value("position_error_mm.rms")
 
 
+def test_a_score_of_more_streams_than_it_declares_is_that_of_the_whole_session() -> None:
+    metrics = ["ticks.executed", "latency_ms.total.median", "position_error_mm.rms"]
+    found = study(metrics=metrics, swept={}, seeds=(1,)).run(jobs=1)
+    score = tc.run("point", duration=1.0, seed=1).score()
+    assert [float(found[metric].values[0]) for metric in metrics] == [score.value(metric) for metric in metrics]
+
+
 def test_nothing_is_run_twice(found: Found) -> None:
     store, data = found
     explained = study().explain(store)
@@ -124,6 +131,10 @@ def test_a_session_that_fails_is_a_point_with_its_error(own_parts: None, tmp_pat
         ({"metrics": ["task.tme_s"]}, "task.time_s"),
         ({"metrics": []}, "key of a score"),
         ({"seeds": (-1,)}, "whole numbers >= 0"),
+        ({"metrics": ["session.scenario"]}, "key of a score"),
+        ({"metrics": ["jaw.grips"]}, "no stage writes slave/jaw/grip"),
+        ({"metrics": ["insertion.depth_mm"]}, "which has no insertion"),
+        ({"settings": {"world": "sphere", "world.place": (9.0, 0.0, 0.0)}}, "within reach .* no nearer than 8"),
     ],
 )
 def test_a_wrong_study_is_refused_before_its_first_session(changes: dict[str, Any], said: str) -> None:
@@ -219,6 +230,6 @@ def test_dask_workers_give_the_same_bits(found: Found, tmp_path: Path) -> None:
         assert np.array_equal(again[metric].values, data[metric].values, equal_nan=True)
 
 
-def test_the_uva_study_is_1080_transfers_whose_sessions_and_scores_can_be() -> None:
-    study = read_study(config_folder() / "studies" / "uva.yaml")
-    assert 6 * study.explain().sessions == 1080
+@pytest.mark.parametrize(("name", "sessions"), [("uva", 1080 // 6), ("ten_thousand", 10_000)])
+def test_sessions_and_scores_of_a_long_study_can_be(name: str, sessions: int) -> None:
+    assert read_study(config_folder() / "studies" / f"{name}.yaml").explain().sessions == sessions

@@ -57,8 +57,8 @@ def test_a_search_that_was_broken_off_goes_on_to_the_same_values(tmp_path: Path)
 
 
 def test_a_score_that_no_session_has_is_told_and_not_taken_for_a_bad_one() -> None:
-    with pytest.raises(tc.SessionError, match=r"no trial has transfer\.time_s"):
-        tuning(metric="transfer.time_s").run(trials=1, jobs=1)
+    with pytest.raises(tc.SessionError, match=r"no trial has touch\.peak_n"):
+        tuning(metric="touch.peak_n").run(trials=1, jobs=1)
 
 
 def test_choices_and_whole_numbers_are_kept_as_they_are() -> None:

@@ -15,6 +15,10 @@ Message = tuple[int, bytes]
 """Log time [ns] and CDR bytes."""
 
 
+class LeftOutError(RecordingError):
+    """A stream is asked for that was not kept."""
+
+
 class MemoryBag(reader.Bag):
     """Recording held in arrays.
 
@@ -23,6 +27,7 @@ class MemoryBag(reader.Bag):
         series: Streams with their samples, by topic.
         reports: Messages of reports in the order of their log times, by topic.
         metadata: Names and texts, as a writer would store them.
+        left_out: Streams that were there and were not kept.
 
     Raises:
         RecordingError: There is no sample at all.
@@ -34,6 +39,7 @@ class MemoryBag(reader.Bag):
         series: Mapping[Topic, Series],
         reports: Mapping[Topic, list[Message]],
         metadata: Mapping[str, str],
+        left_out: Iterable[Topic] = (),
     ) -> None:
         self.path, self.metadata = Path(name), dict(metadata)
         self.streams = dict(series)
@@ -41,6 +47,8 @@ class MemoryBag(reader.Bag):
         self._reports = {topic.name: found for topic, found in reports.items()}
         counts = {topic: len(found) for topic, found in series.items()}
         counts |= {topic: len(found) for topic, found in reports.items()}
+        self._left_out = {topic.name for topic in left_out}
+        counts |= dict.fromkeys(left_out, 1)
         self.topics = {t.name: reader.TopicInfo(t.kind.ros_type, n) for t, n in counts.items()}
         logs = [found.log_ns for found in series.values() if len(found)]
         if not logs:
@@ -53,6 +61,8 @@ class MemoryBag(reader.Bag):
         wanted = [topic.name if isinstance(topic, Topic) else topic.strip("/") for topic in topics]
         self.require(wanted)
         for name in wanted:
+            if name in self._left_out:
+                raise LeftOutError(self.path, f"{name} was not kept")
             if name not in self._series:
                 raise RecordingError(self.path, f"{name} is a report, which is not read as numbers")
         kinds = {topic.name: topic.kind for topic in self.streams}

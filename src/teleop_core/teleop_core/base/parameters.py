@@ -210,21 +210,27 @@ def specs(group: type, prefix: str = "") -> Iterator[Spec]:
         hint = hints[entry.name]
         if hint is Choice:
             yield from _choice_specs(entry, prefix)
-            continue
-        if dataclasses.is_dataclass(hint):
+        elif dataclasses.is_dataclass(hint):
             yield from specs(hint, f"{prefix}{entry.name}.")  # type: ignore[arg-type]
-            continue
-        kind = get_origin(hint) or hint
-        if kind is UnionType or kind not in {bool, int, float, str, tuple}:
-            raise TypeError(f"{group.__name__}.{entry.name}: a parameter cannot be a {hint}")
-        if "doc" not in entry.metadata:
-            text = f"one whose fields are made by parameter(...); {entry.name} is not"
-            raise PartError("parameter group", group.__name__, text)
-        element = get_args(hint)[0] if kind is tuple else kind
-        default: Any = entry.default
-        spec = Spec(prefix + entry.name, kind, element, default, **entry.metadata)
-        spec.check(default)
-        yield spec
+        else:
+            yield _spec(group, entry.name, prefix)
+
+
+@cache
+def _spec(group: type, name: str, prefix: str) -> Spec:
+    """Declaration of one field; made once, for it is most of what a configuration costs."""
+    hint, entry = _hints(group)[name], next(one for one in dataclasses.fields(group) if one.name == name)
+    kind = get_origin(hint) or hint
+    if kind is UnionType or kind not in {bool, int, float, str, tuple}:
+        raise TypeError(f"{group.__name__}.{name}: a parameter cannot be a {hint}")
+    if "doc" not in entry.metadata:
+        text = f"one whose fields are made by parameter(...); {name} is not"
+        raise PartError("parameter group", group.__name__, text)
+    element = get_args(hint)[0] if kind is tuple else kind
+    default: Any = entry.default
+    spec = Spec(prefix + name, kind, element, default, **entry.metadata)
+    spec.check(default)
+    return spec
 
 
 def _choice_specs(entry: Any, prefix: str) -> Iterator[Spec]:
@@ -234,8 +240,8 @@ def _choice_specs(entry: Any, prefix: str) -> Iterator[Spec]:
     yield Spec(kind, str, str, meta["default"], **text, choices=names, length=None, fixed=meta["fixed"], is_part=True)
     for name in names:
         for spec in specs(meta["registry"].find(name).parameters, f"{prefix}{name}."):
-            usual = meta["usual"].get(spec.name.removeprefix(prefix), spec.default)
-            yield dataclasses.replace(spec, default=usual)
+            own = spec.name.removeprefix(prefix)
+            yield dataclasses.replace(spec, default=meta["usual"][own]) if own in meta["usual"] else spec
 
 
 def build(group: type[Group], values: Mapping[str, object], prefix: str = "") -> Group:

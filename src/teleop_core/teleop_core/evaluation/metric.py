@@ -95,7 +95,8 @@ class Metric(ABC):
 
     Attributes:
         name: What it is called, in JSON too.
-        group: Of its rows; empty for the name.
+        below: Name of another metric below which its keys stand in JSON; empty for its own name.
+        group: Of its rows; empty for the name below which its keys stand.
         keys: Its keys in JSON; each path begins with the name and a dot. Without keys a metric
             is not in JSON and only draws. Those of its figures come of themselves.
         topics: Streams it reads. Those that a recording lacks have no samples in its windows. For
@@ -105,6 +106,7 @@ class Metric(ABC):
     """
 
     name: ClassVar[str]
+    below: ClassVar[str] = ""
     group: ClassVar[str] = ""
     keys: ClassVar[tuple[Key, ...]] = ()
     topics: ClassVar[tuple[Topic, ...]] = ()
@@ -119,11 +121,16 @@ class Metric(ABC):
             setattr(cls, name, None)
         if found:
             cls.declared = tuple(found.values())
-            cls.keys = keys_of(cls.name, cls.declared)
+            cls.keys = keys_of(cls.place(), cls.declared)
 
     def __init__(self, context: Context) -> None:
         """Make it for one arm of a recording."""
         super().__init__()
+
+    @classmethod
+    def place(cls) -> str:
+        """Name below which its keys stand in JSON."""
+        return cls.below or cls.name
 
     @abstractmethod
     def add(self, window: Window) -> None:
@@ -135,7 +142,7 @@ class Metric(ABC):
         None stands for what does not apply, such as a mean without samples. Without a method of its own a metric has
         its attributes of these names.
         """
-        names = [key.path.removeprefix(f"{self.name}.") for key in self.keys]
+        names = [key.path.removeprefix(f"{self.place()}.") for key in self.keys]
         return {name: getattr(self, name, None) for name in names}
 
     def rows(self) -> list[Row]:
@@ -152,15 +159,15 @@ class Metric(ABC):
             of: Mapping[str, Any] = vars(values) if is_dataclass(values) else values
             known = [(one, value) for one in labels if (value := of[one.name]) is not None]
             counts = [value for _, value in known if isinstance(value, int)]
-            group = self.group or self.name
+            group = self.group or self.place()
             return [_figure_row(group, *one) for one in known] if any(counts) or not counts else []
         found = {".".join(path): value for path, value in leaves(plain(values)).items()}
         out = []
         for key in self.keys:
             for name in key.names():
-                label = name.removeprefix(f"{self.name}.")
+                label = name.removeprefix(f"{self.place()}.")
                 if "<" not in label:
-                    out.append(_row(self.name, label, key.unit, found.get(label)))
+                    out.append(_row(self.place(), label, key.unit, found.get(label)))
         return out
 
     def figures(self) -> list[Figure]:

@@ -41,7 +41,7 @@ def check_metric(name: str, part: object) -> type[Metric]:
     ):
         if not _takes(getattr(part, method, None), names.count(",") + 1):
             raise _refusal(name, f"a class with {method}({names})")
-    _check_keys(name, part.keys)
+    _check_keys(name, part.place(), part.keys)
     if not isinstance(part.topics, tuple) or not all(map(_is_stream, part.topics)):
         raise _refusal(name, f"a class with a tuple of streams as topics, not {part.topics!r}")
     return part
@@ -62,7 +62,7 @@ def _takes(method: Callable[..., object] | None, count: int) -> bool:
     return True
 
 
-def _check_keys(name: str, keys: object) -> None:
+def _check_keys(name: str, place: str, keys: object) -> None:
     if not isinstance(keys, tuple):
         raise _refusal(name, f"a class with a tuple of Key as keys, not {keys!r}")
     known: set[str] = set()
@@ -70,8 +70,8 @@ def _check_keys(name: str, keys: object) -> None:
         is_key = isinstance(key, Key) and all(isinstance(text, str) and text for text in key)
         if not is_key:
             raise _refusal(name, f"a class whose keys are Key(path, unit, meaning), not {key!r}")
-        if not key.path.startswith(f"{name}."):
-            raise _refusal(name, f"a class whose keys begin with '{name}.', not {key.path!r}")
+        if not key.path.startswith(f"{place}."):
+            raise _refusal(name, f"a class whose keys begin with '{place}.', not {key.path!r}")
         for single in key.names():
             if single in known:
                 raise _refusal(name, f"a class with each key once, has {single!r} twice")
@@ -105,6 +105,8 @@ METRICS: Registry[type[Metric]] = Registry(
         "passivity": f"{_FOLDER}.passivity:PassivityMetric",
         "remote_centre": f"{_FOLDER}.remote_centre:RemoteCentreMetric",
         "jaw": f"{_FOLDER}.jaw:JawMetric",
+        "jaw_delay": f"{_FOLDER}.jaw_delay:JawDelayMetric",
+        "jaw_curves": f"{_FOLDER}.jaw_curves:JawCurvesMetric",
         "transfer": f"{_FOLDER}.transfer:TransferMetric",
         "waits": f"{_FOLDER}.waits:WaitsMetric",
         "looks": f"{_FOLDER}.looks:LooksMetric",
@@ -113,7 +115,9 @@ METRICS: Registry[type[Metric]] = Registry(
         "force_peaks": f"{_FOLDER}.force_peaks:ForcePeaksMetric",
         "step_s": f"{_FOLDER}.steps:StepsMetric",
         "task": f"{_FOLDER}.task:TaskMetric",
-        "display": f"{_FOLDER}.task:DisplayMetric",
+        "throughput": f"{_FOLDER}.throughput:ThroughputMetric",
+        "misses": f"{_FOLDER}.misses:MissesMetric",
+        "display": f"{_FOLDER}.display:DisplayMetric",
         "force_sensing": f"{_FOLDER}.force_sensing:ForceSensingMetric",
         "tremor_filter": f"{_FOLDER}.tremor_filter:TremorFilterMetric",
         "motion": f"{_FOLDER}.motion:MotionMetric",

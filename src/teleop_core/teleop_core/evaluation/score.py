@@ -117,12 +117,14 @@ class Result:
 
     Attributes:
         name: The metric.
+        place: Name below which its keys stand.
         values: What its ``values()`` returned.
         json: The same as plain dictionaries; None for a metric without keys.
         rows: What tables show.
     """
 
     name: str
+    place: str
     values: Values
     json: dict[str, Plain] | None
     rows: tuple[Row, ...]
@@ -210,8 +212,11 @@ class Score:
 
     def _found(self) -> dict[str, Plain]:
         """What is known without the verdict: the session, then each metric that has keys."""
-        found = {result.name: result.json for result in self.results if result.json is not None}
-        return {SESSION: plain(self.session), **found}
+        found: dict[str, dict[str, Plain]] = {SESSION: plain(self.session)}
+        for result in self.results:
+            if result.json is not None:
+                found.setdefault(result.place, {}).update(result.json)
+        return dict(found)
 
     def to_dict(self) -> dict[str, Leaf]:
         """Every value by its key, in one dictionary: a row of a data frame."""

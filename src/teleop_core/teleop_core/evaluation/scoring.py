@@ -25,7 +25,7 @@ from teleop_core.evaluation.rows import Row
 from teleop_core.evaluation.score import Result, Score, Session
 from teleop_core.evaluation.state_history import StateHistory, read_history
 from teleop_core.evaluation.windows import DisorderError, Seconds, Span, Window, span_of, whole, windows
-from teleop_core.graph.topics import SLAVE_MEASURED_CP, SLAVE_SERVO_CP, SLAVE_SETPOINT_CP, Topic
+from teleop_core.graph.topics import SLAVE_MEASURED_CP, SLAVE_SERVO_CP, SLAVE_SETPOINT_CP, TELEOP_STATE, Topic
 
 REQUIRED = (SLAVE_MEASURED_CP, SLAVE_SETPOINT_CP, SLAVE_SERVO_CP)
 """Topics without which there is no score; what needs others is None without them."""
@@ -96,10 +96,9 @@ def measure(bag: Bag, keys: Iterable[str], arm: str = "") -> dict[str, float | N
         PartError: A metric does not keep to its keys.
     """
     wanted = list(keys)
-    makers = [METRICS.find(name) for name in dict.fromkeys(k.partition(".")[0] for k in wanted)]
-    context, metrics = _run(of_arm(bag, arm), arm or arm_names(bag)[0], makers, None)
+    context, metrics = _run(of_arm(bag, arm), arm or arm_names(bag)[0], _makers(wanted), None)
     known = {
-        ".".join((metric.name, *path)): value
+        ".".join((metric.place(), *path)): value
         for metric in metrics
         for path, value in leaves(_result(context, metric).json or {}).items()
     }
@@ -111,6 +110,17 @@ def measure(bag: Bag, keys: Iterable[str], arm: str = "") -> dict[str, float | N
             raise EvaluationError(f"{key} of {bag.path} is {value!r}, must be a number")
         found[key] = value
     return found
+
+
+def streams_of(keys: Iterable[str]) -> frozenset[str]:
+    """Names of the streams that :func:`measure` reads for some keys, as their metrics declare; some read more."""
+    read = {topic.name for maker in _makers(keys) for topic in maker.topics}
+    return frozenset(read | {SLAVE_MEASURED_CP.name, TELEOP_STATE.name})
+
+
+def _makers(keys: Iterable[str]) -> list[type[Metric]]:
+    places = {key.partition(".")[0] for key in keys}
+    return [found for found in map(METRICS.find, METRICS) if found.place() in places]
 
 
 def study(bag: Bag, arm: str = "", further: Sequence[type[Metric]] = (), span: Seconds | None = None) -> Study:
@@ -185,7 +195,7 @@ def _result(context: Context, metric: Metric) -> Result:
         values, rows = metric.values(), metric.rows()
         _insist(metric, rows, Row)
         tree = _checked(metric, plain(values))
-        return Result(metric.name, values, tree if metric.keys else None, tuple(rows))
+        return Result(metric.name, metric.place(), values, tree if metric.keys else None, tuple(rows))
 
 
 def _compared(results: tuple[Result, ...]) -> tuple[Result, ...]:
@@ -226,7 +236,7 @@ def _insist(metric: Metric, found: object, kind: type[object]) -> None:
 
 def _checked(metric: Metric, tree: dict[str, Plain]) -> dict[str, Plain]:
     """The values, after a check that they have exactly the metric's keys."""
-    paths = [(metric.name, *path) for path in leaves(tree)]
+    paths = [(metric.place(), *path) for path in leaves(tree)]
     given = {".".join(path) for path in paths if any(key.covers(path) for key in metric.keys)}
     names = {name for key in metric.keys for name in key.names() if "<" not in name}
     foreign = {".".join(path) for path in paths} - given

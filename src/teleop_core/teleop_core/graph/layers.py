@@ -47,7 +47,7 @@ class SessionParameters:
     description: str = parameter("", doc="what happens in it, in one sentence")
     duration: float = parameter(10.0, unit="s", lower=0.001, upper=86400.0, doc="simulated or live time")
     ends_with_task: bool = parameter(
-        False, fixed=True, doc="in virtual time, end it within a second after no arm's task has a goal left"
+        False, fixed=True, doc="end it within a second after no arm's task has a goal left"
     )
     arms: tuple[str, ...] = parameter(
         (), fixed=True, doc="names of the arms, the first of which keeps the plain topics; empty: one without name"

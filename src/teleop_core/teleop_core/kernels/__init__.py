@@ -20,7 +20,7 @@ through them, coverage counts their lines, and everything is some hundred times 
 import linecache
 from collections.abc import Callable, Iterable, Mapping
 from difflib import get_close_matches
-from functools import partial
+from functools import cache, partial
 from types import FunctionType
 from typing import TYPE_CHECKING, Any, ParamSpec, Protocol, TypeVar, cast
 
@@ -266,7 +266,21 @@ def apart(compiled: Callable[..., R], *arguments: object) -> Callable[..., R]:
 
 
 def _types(arguments: tuple[object, ...]) -> tuple[Any, ...]:
-    return tuple(numba.typeof(bare(argument)) for argument in arguments)
+    return tuple(_type_of(bare(argument)) for argument in arguments)
+
+
+def _type_of(value: Any) -> Any:
+    """Type for the compiler; that of records is looked up once, for it takes a millisecond for a hundred fields."""
+    if isinstance(value, np.void):
+        return _record_type(value.dtype)
+    if type(value) is tuple:
+        return numba.types.BaseTuple.from_types([_type_of(one) for one in value])
+    return numba.typeof(value)
+
+
+@cache
+def _record_type(dtype: np.dtype[Any]) -> Any:
+    return numba.typeof(np.zeros(1, dtype)[0])
 
 
 class _Memory:

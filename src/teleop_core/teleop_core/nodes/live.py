@@ -25,6 +25,7 @@ from teleop_core.nodes.observer import WARNING, Observer, Status
 from teleop_core.nodes.remote_control import RemoteControl
 from teleop_core.nodes.sessions import announced
 from teleop_core.nodes.starter import START_TIMEOUT, Starter
+from teleop_core.nodes.task_end import TaskEnd
 from teleop_core.session.configuration import Configuration
 from teleop_core.session.links import link_texts
 from teleop_core.session.notes import notes_of
@@ -60,6 +61,8 @@ def live(
     domain: int | None = None,
 ) -> None:
     """Run and record a session as ROS 2 nodes, for the configured duration or until Ctrl-C.
+
+    With ``teleop.ends_with_task`` it ends once no task has a goal left.
 
     Args:
         configuration: What runs, and for how long.
@@ -141,6 +144,8 @@ class _Session:
     ) -> None:
         self._duration = float(configuration.groups[SESSION].duration)
         self._graph = configuration.graph
+        ends = configuration.groups[SESSION].ends_with_task
+        self._task_end = TaskEnd(observer, self._graph) if ends else None
         self._console, self._observer = console, observer
         self._parameters, self._env, self._interrupt = parameters, env, interrupt
         self._starter = starter
@@ -246,6 +251,9 @@ class _Session:
         while (elapsed := time.monotonic() - begin) < self._duration:
             self._observer.listen(min(0.1, self._duration - elapsed))
             self._check()
+            if self._task_end is not None and self._task_end.is_there():
+                self.say("the task has no goal left")
+                return
             if int(elapsed) > shown:
                 shown = int(elapsed)
                 self.say(f"{shown:3d}/{self._duration:g} s  {self._line()}")

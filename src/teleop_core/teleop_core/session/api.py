@@ -9,7 +9,7 @@ The command line is a thin layer on this module.
 """
 
 import warnings
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias, Union
 
@@ -138,6 +138,7 @@ def run(
     stages: str | Stage | Sequence[str | Stage] = (),
     arms: Sequence[str] = (),
     delays: Mapping[str, float] | None = None,
+    keep: Collection[str] | None = None,
     **parameters: Setting,
 ) -> Recording:
     """Run a session in virtual time.
@@ -158,6 +159,8 @@ def run(
         stages: As there.
         arms: As there.
         delays: As there.
+        keep: Streams that are kept in memory, of all arms, such as ``task/state``: faster; None: all.
+            Whoever reads another one is told that it was not kept.
         **parameters: As there.
 
     Returns:
@@ -185,7 +188,7 @@ def run(
         warnings.warn(note, TeleopWarning, stacklevel=2)
     session = virtual.VirtualTime(made)
     ticks = runner.session_ticks(made, session)
-    return _kept(session, made, runner.run_blocks(session, ticks), ticks, out, progress)
+    return _kept(session, made, runner.run_blocks(session, ticks), ticks, out, progress, keep)
 
 
 _BEGINS = {"device": DEVICE, "hand": HAND}
@@ -244,11 +247,12 @@ def _kept(
     ticks: int,
     out: Path | str | None,
     progress: Progress,
+    keep: Collection[str] | None = None,
 ) -> Recording:
     if out is not None:
         runner.record_blocks(session, made, Path(out), blocks, ticks, progress)
         return open_recording(out)
-    memory = _Memory(session)
+    memory = _Memory(session, keep)
     for block in blocks:
         memory.take(block)
         progress(memory.ticks, ticks)
@@ -258,12 +262,16 @@ def _kept(
 class _Memory:
     """A recording in memory, which takes blocks as a writer of bags does."""
 
-    def __init__(self, session: virtual.VirtualTime) -> None:
+    def __init__(self, session: virtual.VirtualTime, keep: Collection[str] | None) -> None:
         self._session, self._reports = session, runner.StateReports(session)
         self._is_new = runner.NewSamples()
-        self._parts: dict[topics.Topic, list[Sequence[NDArray[Any]]]] = {topic: [] for topic in session.graph.streams}
+        streams = session.graph.streams
+        self._left_out = [t for t in streams if keep is not None and t.name.removeprefix(f"{t.arm}/") not in keep]
+        self._parts: dict[topics.Topic, list[Sequence[NDArray[Any]]]] = {
+            topic: [] for topic in streams if topic not in self._left_out
+        }
         self._messages: dict[topics.Topic, list[Message]] = {
-            topic: [] for topic in session.graph.topics if topic not in self._parts
+            topic: [] for topic in session.graph.topics if topic not in streams
         }
         self.ticks = 0
 
@@ -285,7 +293,7 @@ class _Memory:
             names = topic.names(self._session.joint_names[topic.arm])
             series[topic] = Series(stamps, logs, values, names, topic.frame_id)
         about = runner.describe(made) | self._session.about
-        return MemoryBag(about["scenario"] or "session", series, self._messages, about)
+        return MemoryBag(about["scenario"] or "session", series, self._messages, about, self._left_out)
 
 
 def _known(registry: object, part: object) -> str:

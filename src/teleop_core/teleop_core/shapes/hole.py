@@ -3,8 +3,10 @@
 import math
 from dataclasses import dataclass
 
+import numpy as np
+
 from teleop_core.base import ParameterError, parameter
-from teleop_core.kernels import Array, inner, kernel
+from teleop_core.kernels import Array, inner, kernel, length
 from teleop_core.shapes import Shape
 from teleop_core.shapes.basis import directions, drawing
 
@@ -31,6 +33,18 @@ class HoleParameters:
         if not self.radius + self.chamfer < self.plate_radius:
             text = f"more than radius and chamfer ({self.radius + self.chamfer:g} m)"
             raise ParameterError("hole.plate_radius", self.plate_radius, text)
+
+    @property
+    def out(self) -> Array:
+        """Unit vector (3,) along the axis, out of the mouth."""
+        return np.array(self.axis) / length(self.axis)
+
+    def depth(self, ways: Array) -> float:
+        """Largest depth [m] in the hole of places (N, 3) [m] from the middle of its mouth; 0 where none is in it."""
+        deep = -(ways * self.out).sum(axis=1)
+        beside = length(ways + deep[:, None] * self.out)
+        is_inside = (beside < self.radius + self.chamfer) & (deep <= self.thickness)
+        return float(deep[is_inside].max(initial=0.0))
 
 
 @inner

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from teleop_core.commands.arguments import command
+from teleop_lab.commands.outputs import add_files, write_outputs
 
 _EPILOG = """\
   teleop grade hands.csv                              a table with a column of episodes
@@ -24,8 +25,7 @@ def add(commands: Any) -> None:
     parser.add_argument("data", type=Path, metavar="DATASET", help="folder or table")
     parser.add_argument("--position", nargs=3, metavar=("X", "Y", "Z"), help="columns of the place, if not x, y, z")
     parser.add_argument("--unit", default="auto", help="of the place: m, cm, mm, in, or auto")
-    parser.add_argument("--csv", type=Path, metavar="FILE", help="write all figures")
-    parser.add_argument("--html", type=Path, metavar="FILE", help="write a page")
+    add_files(parser, "episode")
     parser.add_argument("--usual", type=Path, metavar="FILE", help="write which are not too odd")
     parser.add_argument("--most", type=float, default=3.5, help="how odd those are (default: 3.5)")
     parser.add_argument("--recordings", type=Path, metavar="DIR", help="keep a recording of each")
@@ -51,14 +51,10 @@ def _run(arguments: argparse.Namespace) -> int:
     print(f"{len(kept)} of {len(table)} episodes are no odder than {arguments.most:g}")
     for number in refused:
         print(f"episode {number}: {table.loc[number, REASON]}")
-    for place, text in (
-        (arguments.csv, table.to_csv),
-        (arguments.usual, lambda: "".join(f"{number}\n" for number in kept)),
-        (arguments.html, lambda: _page(table, arguments.data.name)),
-    ):
-        if place is not None:
-            write_whole(place, text())
-            print(f"written: {place}")
+    if arguments.usual is not None:
+        write_whole(arguments.usual, "".join(f"{number}\n" for number in kept))
+        print(f"usual episodes: {arguments.usual}")
+    write_outputs(arguments, table.to_csv, lambda: _page(table, arguments.data.name))
     return 0
 
 

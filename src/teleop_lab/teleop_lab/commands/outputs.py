@@ -1,4 +1,4 @@
-"""Outputs: arguments of commands that run many sessions, and the files that they write."""
+"""Outputs: arguments of commands that run or score many sessions, and the files that they write."""
 
 import argparse
 from collections.abc import Callable
@@ -7,10 +7,28 @@ from pathlib import Path
 from teleop_core.base.errors import ParameterError
 
 
-def add_outputs(parser: argparse.ArgumentParser, line: str, only: str = "") -> None:
-    """Add ``--jobs``, ``--html`` and ``--csv``, which has a line for each ``line``; ``only`` is when they count."""
+def add_study(
+    parser: argparse.ArgumentParser, what: str, line: str, only: str = "", *, must_keep: bool = False
+) -> None:
+    """Add the file of a study, its store, ``--jobs``, and the arguments of :func:`add_files`.
+
+    Args:
+        parser: Of the command.
+        what: What the file says.
+        line: What has a line of its own in the table.
+        only: When the outputs count, such as ``, of --compare``.
+        must_keep: Whether a store has to be given.
+    """
+    keeps = "where recordings and answers are kept" if must_keep else "keep results there, and run only what is not"
+    parser.add_argument("file", type=Path, metavar="FILE.yaml", help=what)
+    parser.add_argument("--store", type=Path, metavar="DIR", required=must_keep, help=keeps)
     parser.add_argument("--jobs", type=int, metavar="N", help=f"processes{only} (default: processors)")
-    parser.add_argument("--html", type=Path, metavar="FILE", help=f"write a page with plots{only}")
+    add_files(parser, line, only)
+
+
+def add_files(parser: argparse.ArgumentParser, line: str, only: str = "") -> None:
+    """Add ``--html`` and ``--csv``, which has a line for each ``line``; ``only`` is when they count."""
+    parser.add_argument("--html", type=Path, metavar="FILE", help=f"write a page{only}")
     parser.add_argument("--csv", type=Path, metavar="FILE", help=f"write a line for each {line}{only}")
 
 

@@ -3,12 +3,11 @@
 import argparse
 import webbrowser
 from contextlib import suppress
-from pathlib import Path
 from typing import Any
 
 from teleop_core.base.errors import ParameterError
 from teleop_core.commands.arguments import command, ros_module
-from teleop_lab.commands.outputs import add_outputs, check_outputs, write_outputs
+from teleop_lab.commands.outputs import add_study, check_outputs, write_outputs
 
 _EPILOG = """\
 a study is a YAML file, as of `teleop study`, with an entry `people`; then:
@@ -23,10 +22,7 @@ def add(commands: Any) -> None:
     """Add the command's parser."""
     text = "conduct a study with people in the browser, and compare them with the simulated operator"
     parser = command(commands, "people", _run, text, _EPILOG)
-    parser.add_argument("file", type=Path, metavar="FILE.yaml", help="what is done, and by how many")
-    parser.add_argument(
-        "--store", type=Path, metavar="DIR", required=True, help="where recordings and answers are kept"
-    )
+    add_study(parser, "what is done, and by how many", "trial", ", of --compare", must_keep=True)
     parser.add_argument("--port", type=int, default=8080, help="port of the pages (default: 8080)")
     parser.add_argument("--host", default="127.0.0.1", help="address to serve at (default: this machine alone)")
     parser.add_argument("--token", default="", help="secret of the pages (default: made for --host)")
@@ -34,7 +30,6 @@ def add(commands: Any) -> None:
     parser.add_argument(
         "--compare", action="store_true", help="run the simulated operator, and compare; conduct nothing"
     )
-    add_outputs(parser, "trial", ", of --compare")
 
 
 def _run(arguments: argparse.Namespace) -> int:

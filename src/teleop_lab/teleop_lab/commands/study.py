@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from teleop_core.base.errors import SessionError
 from teleop_core.commands.arguments import command
-from teleop_lab.commands.outputs import add_outputs, check_outputs, write_outputs
+from teleop_lab.commands.outputs import add_study, check_outputs, write_outputs
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -31,12 +31,10 @@ def add(commands: Any) -> None:
     """Add the command's parser."""
     text = "run sessions over named values of parameters and seeds, and compare their scores"
     parser = command(commands, "study", _run, text, _EPILOG)
-    parser.add_argument("file", type=Path, metavar="FILE.yaml", help="what is compared")
-    parser.add_argument("--store", type=Path, metavar="DIR", help="keep results there, and run only what is not")
+    add_study(parser, "what is compared", "session")
     parser.add_argument("--scheduler", metavar="ADDRESS", help="run on the workers of this Dask scheduler")
     parser.add_argument("--recordings", type=Path, metavar="DIR", help="record each session there")
     parser.add_argument("--explain", action="store_true", help="say what it costs, and run nothing")
-    add_outputs(parser, "session")
 
 
 def _run(arguments: argparse.Namespace) -> int:

@@ -1,11 +1,10 @@
 """``teleop tune``: the values of some parameters with which a score is best."""
 
 import argparse
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from teleop_core.commands.arguments import command
-from teleop_lab.commands.outputs import add_outputs, check_outputs, write_outputs
+from teleop_lab.commands.outputs import add_study, check_outputs, write_outputs
 
 if TYPE_CHECKING:
     from teleop_lab.studies.tuning import Tuned, Tuning
@@ -30,10 +29,8 @@ def add(commands: Any) -> None:
     """Add the command's parser."""
     text = "search the values of parameters with which a score is best"
     parser = command(commands, "tune", _run, text, _EPILOG)
-    parser.add_argument("file", type=Path, metavar="FILE.yaml", help="what is searched")
-    parser.add_argument("--store", type=Path, metavar="DIR", help="keep results there, and run only what is not")
+    add_study(parser, "what is searched", "trial")
     parser.add_argument("--trials", type=int, default=30, metavar="N", help="values (default: 30)")
-    add_outputs(parser, "trial")
 
 
 def _run(arguments: argparse.Namespace) -> int:

@@ -10,8 +10,6 @@ LAGS = (0.0083, 0.025, 0.075, 0.225)
 """By which the screen was late [s]."""
 TIMES = (0.911, 0.934, 1.059, 1.493)
 """Mean times of movement at these lags [s], printed."""
-ERRORS = (3.6, 3.6, 4.9, 11.3)
-"""Misses at these lags [%], printed."""
 WAYS, WIDTHS = (96.0, 192.0, 384.0), (6.0, 12.0, 24.0, 48.0)
 """Of the targets; in picture elements, for only their ratio counts."""
 LATENCIES = (0.033, 0.133, 0.333)

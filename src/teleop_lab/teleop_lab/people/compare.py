@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from teleop_core.evaluation.figure import FIRST, SECOND
-from teleop_core.evaluation.score import keys
 from teleop_lab.people.journal import DONE, Journal
 from teleop_lab.people.plan import Plan
-from teleop_lab.studies.page import condition_lines, drawn, label_of, whole_page
+from teleop_lab.studies.dataset import swept_coordinates, units_of_scores
+from teleop_lab.studies.page import condition_lines, drawn, label_of, table_html, whole_page
 from teleop_lab.studies.summary import Mean, apart, conditions, differences, median_of, table_text
 
 if TYPE_CHECKING:
@@ -41,19 +41,16 @@ def people_dataset(plan: Plan, journal: Journal) -> "xarray.Dataset":
             if trial.repetition and event.get("state") == DONE:
                 found = {**event.get("scores", {}), **journal.answers(code, trial.number)}
                 places.setdefault((trial.condition, code), []).append(found)
-    units = {name: key.unit for key in keys() for name in key.names()} | dict.fromkeys(asked, "1")
+    units = units_of_scores()
     names, variables = (*study.swept, PARTICIPANT), dict[str, Any]()
     every = [(index, code) for index in range(int(np.prod(sizes[:-1]))) for code in plan.codes]
     for name in (*study.metrics, *asked):
         values = [_mean([trial.get(name) for trial in places.get(place, [])]) for place in every]
         variables[name] = (names, np.array(values).reshape(sizes), {"units": units.get(name, "1")})
     variables["trials"] = (names, np.array([len(places.get(p, [])) for p in every]).reshape(sizes), {})
-    coordinates: dict[str, object] = {
-        name: [v if isinstance(v, int | float | str) else str(v) for v in values]
-        for name, values in study.swept.items()
-    }
+    coordinates = swept_coordinates(study)
     coordinates[PARTICIPANT] = list(plan.codes)
-    return xarray.Dataset(variables, coordinates, {"scenario": study.scenario or "", "study": plan.title})
+    return xarray.Dataset(variables, coordinates, {"scenario": study.scenario or "", "study": plan.people.title})
 
 
 def _mean(values: list[float | None]) -> float:
@@ -89,7 +86,7 @@ def comparison_page(plan: Plan, people: "xarray.Dataset", simulated: "xarray.Dat
     both = {"people": (people, FIRST), "simulated operator": (simulated, SECOND)}
     for metric in plan.study.metrics:
         rows = [[row[0], *map(str, row[1:])] for row in compared(plan, people, simulated, metric)]
-        parts += [f"<h2>{escape(metric)}</h2>", _table((metric, *_HEADS), rows)]
+        parts += [f"<h2>{escape(metric)}</h2>", table_html((metric, *_HEADS), rows)]
         if plan.study.swept:
             traces = [
                 trace | {"name": " ".join(filter(None, (who, trace["name"]))), "line": {"color": color}}
@@ -97,7 +94,9 @@ def comparison_page(plan: Plan, people: "xarray.Dataset", simulated: "xarray.Dat
                 for trace in condition_lines(plan.study, found, metric, median_of)
             ]
             parts.append(drawn(traces, label_of(plan.study, people, metric)))
-        parts.append(_table((f"change of {metric}", "against the first", *_HEADS[:2]), _changes(plan, both, metric)))
+        parts.append(
+            table_html((f"change of {metric}", "against the first", *_HEADS[:2]), _changes(plan, both, metric))
+        )
     asked = [question.name for question in plan.questions]
     if asked:
         rows = [
@@ -107,8 +106,8 @@ def comparison_page(plan: Plan, people: "xarray.Dataset", simulated: "xarray.Dat
             ]
             for values, part in conditions(plan.study, people)
         ]
-        parts += ["<h2>Questions</h2>", _table(("medians of people, 0 to 100", *asked), rows)]
-    return whole_page(plan.title, _ABOUT, parts)
+        parts += ["<h2>Questions</h2>", table_html(("medians of people, 0 to 100", *asked), rows)]
+    return whole_page(plan.people.title, _ABOUT, parts)
 
 
 def _changes(plan: Plan, both: dict[str, Any], metric: str) -> list[list[str]]:
@@ -118,9 +117,3 @@ def _changes(plan: Plan, both: dict[str, Any], metric: str) -> list[list[str]]:
         for name, values in plan.study.swept.items()
         for i, value in enumerate(values[1:])
     ]
-
-
-def _table(heads: tuple[str, ...], rows: list[list[str]]) -> str:
-    head = "".join(f"<th>{escape(text)}</th>" for text in heads)
-    body = "".join(f"<tr>{''.join(f'<td>{escape(cell)}</td>' for cell in row)}</tr>" for row in rows)
-    return f"<table><tr>{head}</tr>{body}</table>" if rows else ""

@@ -35,7 +35,14 @@ class Journal:
     def __init__(self, folder: Path, plan: Plan) -> None:
         self.folder, self._plan, self._lock = Path(folder), plan, threading.Lock()
         study = plan.study
-        what = [study.scenario, dict(study.swept), dict(study.settings), plan.order, plan.practice, plan.repetitions]
+        what = [
+            study.scenario,
+            dict(study.swept),
+            dict(study.settings),
+            plan.people.order,
+            plan.people.practice,
+            plan.people.repetitions,
+        ]
         digest = hashlib.sha256(json.dumps(what, default=str).encode()).hexdigest()[:20]
         self._about = {"format": FORMAT, "plan": digest, "now": plan.codes[0]}
         try:
@@ -138,7 +145,7 @@ class Journal:
     def _was_done(self, code: str, trial: Trial, trials: Sequence[Trial]) -> bool:
         """Whether something was done of what the questions after a trial are about."""
         about = [one.number for one in trials[: trial.number] if one.condition == trial.condition]
-        about = [trial.number] if self._plan.ask == "trial" else about
+        about = [trial.number] if self._plan.people.ask == "trial" else about
         return any(self.event(code, number).get("state") == DONE for number in about)
 
     def rows(self) -> list[dict[str, object]]:

@@ -108,7 +108,7 @@ class PeoplePage:
         told = [arm.get(TASK_STATE) for arm in view.arms.values()]
         self._tried = sum(int(one[_TRIED]) for one in told if one is not None)
         self.is_stopped = situation(view).is_stopped
-        return self._ends.is_set() or 0 < self._plan.attempts <= self._tried
+        return self._ends.is_set() or 0 < self._plan.people.attempts <= self._tried
 
     def close(self, state: str, reason: str, bag: str) -> None:
         """Note what became of the trial that ran, why, and the name of its recording."""
@@ -128,13 +128,17 @@ class PeoplePage:
 
     def _shown(self) -> Mapping[str, object]:
         step, trial = self._step()
-        shown: dict[str, object] = {"step": step, "title": self._plan.title, "participant": self._journal.now}
+        shown: dict[str, object] = {"step": step, "title": self._plan.people.title, "participant": self._journal.now}
         if step == "consent":
-            shown["text"] = self._plan.consent
+            shown["text"] = self._plan.people.consent
         if trial is not None:
             count = len(self._plan.trials(self._journal.now))
             shown |= {"trial": trial.number, "trials": count, "is_practice": trial.repetition == 0}
-            shown |= {"text": self._plan.instructions, "tried": self._tried, "attempts": self._plan.attempts}
+            shown |= {
+                "text": self._plan.people.instructions,
+                "tried": self._tried,
+                "attempts": self._plan.people.attempts,
+            }
         if step == "questions":
             shown["questions"] = [asdict(question) for question in self._plan.questions]
         return shown
@@ -209,8 +213,8 @@ class PeoplePage:
             done = [self._journal.event(one, t.number).get("state") in {DONE, SKIPPED} for t in self._plan.trials(one)]
             everybody.append({"code": one, "done": sum(done), "trials": len(done)})
         return {
-            "title": self._plan.title, "participant": code, "step": step, "trial": trial and trial.number,
-            "tried": self._tried, "attempts": self._plan.attempts, "is_paused": self._is_paused,
+            "title": self._plan.people.title, "participant": code, "step": step, "trial": trial and trial.number,
+            "tried": self._tried, "attempts": self._plan.people.attempts, "is_paused": self._is_paused,
             "everybody": everybody, "own": own, "metrics": list(self._plan.study.metrics),
         }  # fmt: skip
 

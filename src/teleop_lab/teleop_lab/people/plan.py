@@ -5,9 +5,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
-from typing import Any
 
-from teleop_core.base.errors import ParameterError, UnknownNameError
+from teleop_core.base.errors import ParameterError
+from teleop_core.base.parameters import build, parameter, specs
 from teleop_core.base.texts import LONGEST_LINE
 from teleop_core.evaluation.score import keys
 from teleop_core.graph.layers import SESSION
@@ -16,13 +16,10 @@ from teleop_core.session.configuration import Configuration
 from teleop_lab.studies.study import Study, named, read_entries, read_study
 
 PEOPLE = "people"
-ORDERS = ("fixed", "shuffled", "latin")
-ASKS = ("trial", "condition", "end")
 MOST = 200
 """Participants, and trials of one."""
-_TEXTS = {"title": 200, "consent": 10_000, "instructions": 2_000}
-_COUNTS = {"participants": (12, 1), "practice": (1, 0), "repetitions": (3, 1), "attempts": (0, 0)}
-_KEYS = (*_TEXTS, *_COUNTS, "order", "operator", "duration", "ask", "questions")
+_TEXTS = {"title": 200, "consent": 10_000, "instructions": 2_000, "operator": 100}
+"""Texts that a plan cannot do without, with their longest lengths."""
 
 
 @dataclass(frozen=True)
@@ -87,56 +84,61 @@ class Trial:
     asks: bool
 
 
+@dataclass(frozen=True, kw_only=True)
+class PeopleParameters:
+    """What a study's file says below ``people``, but for its questions."""
+
+    title: str = parameter("", doc="heading of the participants' page")
+    consent: str = parameter("", doc="what a participant agrees to, before anything else")
+    instructions: str = parameter("", doc="what is to be done, before each trial")
+    participants: int = parameter(12, lower=1, upper=MOST, doc="how many there are, at most")
+    practice: int = parameter(1, lower=0, upper=MOST, doc="trials of each condition before those that count")
+    repetitions: int = parameter(3, lower=1, upper=MOST, doc="trials of each condition that count")
+    attempts: int = parameter(0, lower=0, upper=MOST, doc="after so many a trial ends; 0: after its time")
+    order: str = parameter("latin", choices=("fixed", "shuffled", "latin"), doc="of the conditions")
+    operator: str = parameter("remote", doc="kind of the operator that a person is")
+    duration: float = parameter(
+        0.0, unit="s", lower=0.1, upper=3600.0, off=0.0, doc="longest time of a trial; 0: as the study's sessions"
+    )
+    ask: str = parameter("condition", choices=("trial", "condition", "end"), doc="after what the questions come")
+
+    def __post_init__(self) -> None:
+        for name, longest in _TEXTS.items():
+            text = getattr(self, name)
+            if not 0 < len(text.strip()) <= longest:
+                raise ParameterError(f"{PEOPLE}.{name}", text, f"a text of at most {longest} characters")
+
+
 @dataclass(frozen=True)
 class Plan:
     """What people do in a study.
 
     Attributes:
         study: Conditions, and the scores that are compared.
-        title: Heading of the participants' page.
-        consent: What a participant agrees to, before anything else.
-        instructions: What is to be done, before each trial.
-        participants: How many there are, at most.
-        practice: Trials of each condition before those that count.
-        repetitions: Trials of each condition that count.
-        attempts: After so many a trial ends; 0: it lasts as long as the session.
-        order: Of the conditions: fixed, shuffled or latin.
-        operator: Kind of the operator that a person is.
-        duration: Longest time of a trial [s].
-        ask: After what the questions come.
+        people: What its file says of them.
         questions: Asked then.
     """
 
     study: Study
-    title: str
-    consent: str
-    instructions: str
-    participants: int
-    practice: int
-    repetitions: int
-    attempts: int
-    order: str
-    operator: str
-    duration: float
-    ask: str
+    people: PeopleParameters
     questions: Sequence[Question]
 
     @property
     def codes(self) -> tuple[str, ...]:
         """Codes of the participants, p01 and so on."""
-        return tuple(f"p{number:02d}" for number in range(1, self.participants + 1))
+        return tuple(f"p{number:02d}" for number in range(1, self.people.participants + 1))
 
     def trials(self, code: str) -> list[Trial]:
         """Trials of a participant, in order."""
         swept = self.study.swept
         every = [dict(zip(swept, values, strict=True)) for values in product(*swept.values())]
-        order = conditions_of(self.codes.index(code), len(every), self.order)
-        repetitions = [*[0] * self.practice, *range(1, self.repetitions + 1)]
+        order = conditions_of(self.codes.index(code), len(every), self.people.order)
+        repetitions = [*[0] * self.people.practice, *range(1, self.people.repetitions + 1)]
         count, found = len(order) * len(repetitions), list[Trial]()
         for condition in order:
             for repetition in repetitions:
-                number, last = len(found) + 1, repetition == self.repetitions
-                asks = {"trial": repetition > 0, "condition": last, "end": number == count}[self.ask]
+                number, last = len(found) + 1, repetition == self.people.repetitions
+                asks = {"trial": repetition > 0, "condition": last, "end": number == count}[self.people.ask]
                 asks = asks and bool(self.questions)
                 found.append(Trial(number, condition, every[condition], repetition, asks))
         return found
@@ -147,10 +149,11 @@ class Plan:
         Raises:
             TeleopError: It cannot run.
         """
-        about = f"study {self.title!r}, participant {code}, trial {trial.number}, repetition {trial.repetition}"
-        own: dict[str, Setting] = {"operator.kind": self.operator, f"{SESSION}.description": about}
-        length: dict[str, Setting] = {f"{SESSION}.duration": self.duration}
-        return configuration(self.study.scenario, settings={**self.study.settings, **trial.values, **own, **length})
+        about = f"study {self.people.title!r}, participant {code}, trial {trial.number}, repetition {trial.repetition}"
+        own: dict[str, Setting] = {"operator.kind": self.people.operator, f"{SESSION}.description": about}
+        if self.people.duration:
+            own[f"{SESSION}.duration"] = self.people.duration
+        return configuration(self.study.scenario, settings={**self.study.settings, **trial.values, **own})
 
 
 def conditions_of(participant: int, count: int, order: str) -> list[int]:
@@ -159,7 +162,7 @@ def conditions_of(participant: int, count: int, order: str) -> list[int]:
     Args:
         participant: Number from 0 on.
         count: How many conditions there are.
-        order: One of :data:`ORDERS`; ``shuffled`` is the same for the same participant always.
+        order: One of fixed, shuffled and latin; ``shuffled`` is the same for the same participant always.
 
     Source:
         Williams 1949: a square in which each condition follows each other one equally often; with
@@ -185,58 +188,28 @@ def read_plan(path: Path | str) -> Plan:
     study = read_study(path)
     content = named(read_entries(path), PEOPLE)
     if not content:
-        raise ParameterError(PEOPLE, content, f"an entry of {Path(path).name} with {', '.join(_KEYS)}")
-    for key in content:
-        if key not in _KEYS:
-            raise UnknownNameError(f"entry of {PEOPLE}", key, _KEYS)
-    said: dict[str, Any] = {key: _text(content, key, longest) for key, longest in _TEXTS.items()}
-    said |= {key: _count(content, key, *bounds) for key, bounds in _COUNTS.items()}
-    duration = content.get("duration", study.settings.get(f"{SESSION}.duration"))
-    if isinstance(duration, bool) or not isinstance(duration, int | float) or not 0.0 < duration <= 3600.0:
-        raise ParameterError("people.duration", duration, "0 to 3600 s, here or as the study's duration")
-    plan = Plan(
-        study=study,
-        **said,
-        order=_choice(content, "order", ORDERS),
-        ask=_choice(content, "ask", ASKS, "condition"),
-        operator=_text(content, "operator", 100, "remote"),
-        duration=float(duration),
-        questions=_questions(content.get("questions", [])),
-    )
+        known = ", ".join((*(spec.name for spec in specs(PeopleParameters)), "questions"))
+        raise ParameterError(PEOPLE, content, f"an entry of {Path(path).name} with {known}")
+    questions = _questions(content.pop("questions", []))
+    texts = {name: one.strip() if isinstance(one, str) else one for name, one in content.items()}
+    plan = Plan(study, build(PeopleParameters, texts, f"{PEOPLE}."), questions)
     trials = plan.trials(plan.codes[0])
     if len(trials) > MOST:
-        raise ParameterError("people.repetitions", plan.repetitions, f"so few that there are {MOST} trials at most")
+        raise ParameterError(
+            "people.repetitions", plan.people.repetitions, f"so few that there are {MOST} trials at most"
+        )
     study.points()  # whatever cannot run is told here
     for trial in {trial.condition: trial for trial in trials}.values():
         stages = plan.configuration(plan.codes[0], trial).groups
-        if plan.attempts and "task" not in stages:
-            raise ParameterError("people.attempts", plan.attempts, "0 where no stage `task` counts them")
+        if plan.people.attempts and "task" not in stages:
+            raise ParameterError("people.attempts", plan.people.attempts, "0 where no stage `task` counts them")
     return plan
 
 
-def _text(content: Mapping[str, Any], key: str, longest: int, default: str | None = None) -> str:
-    found = content.get(key, default)
-    if not isinstance(found, str) or not 0 < len(found.strip()) <= longest:
-        raise ParameterError(f"people.{key}", found, f"a text of at most {longest} characters")
-    return found.strip()
-
-
-def _count(content: Mapping[str, Any], key: str, default: int, least: int) -> int:
-    found = content.get(key, default)
-    if isinstance(found, bool) or not isinstance(found, int) or not least <= found <= MOST:
-        raise ParameterError(f"people.{key}", found, f"a whole number, {least} to {MOST}")
-    return found
-
-
-def _choice(content: Mapping[str, Any], key: str, known: Sequence[str], default: str = "latin") -> str:
-    found = content.get(key, default)
-    if found not in known:
-        raise UnknownNameError(f"people.{key}", found, known)
-    return str(found)
-
-
 def _questions(given: object) -> tuple[Question, ...]:
-    needs = "a list of `tlx`, and of questions with name, text, low and high"
+    needs = (
+        f"a list of `tlx`, and of questions with texts name, text, low and high of {LONGEST_LINE} characters at most"
+    )
     if not isinstance(given, list) or len(given) > MOST:
         raise ParameterError("people.questions", given, needs)
     found = list[Question]()
@@ -244,9 +217,10 @@ def _questions(given: object) -> tuple[Question, ...]:
         if one == "tlx":
             found += TLX
             continue
-        if not isinstance(one, dict) or set(one) != {"name", "text", "low", "high"}:
+        texts = list(one.values()) if isinstance(one, dict) and set(one) == {"name", "text", "low", "high"} else [""]
+        if not all(isinstance(text, str) and 0 < len(text.strip()) <= LONGEST_LINE for text in texts):
             raise ParameterError("people.questions", one, needs)
-        found.append(Question(**{key: _text(one, key, LONGEST_LINE) for key in ("name", "text", "low", "high")}))
+        found.append(Question(**one))
     names = [question.name for question in found]
     taken = {name for key in keys() for name in key.names()} | {"participant", "trial", "condition", "repetition"}
     for name in names:

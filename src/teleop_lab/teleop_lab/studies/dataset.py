@@ -15,6 +15,19 @@ if TYPE_CHECKING:
     from teleop_lab.studies.study import Study
 
 
+def swept_coordinates(study: "Study") -> dict[str, object]:
+    """Values of each swept parameter; those that are no plain value as texts."""
+    return {
+        name: [v if isinstance(v, int | float | str) else str(v) for v in values]
+        for name, values in study.swept.items()
+    }
+
+
+def units_of_scores() -> dict[str, str]:
+    """Unit of each key of a score."""
+    return {name: key.unit for key in keys() for name in key.names()}
+
+
 def dataset_of(study: "Study", points: Sequence[Point], store: Store) -> "xarray.Dataset":
     """Results as an xarray data set.
 
@@ -25,12 +38,9 @@ def dataset_of(study: "Study", points: Sequence[Point], store: Store) -> "xarray
 
     sizes = [*(len(values) for values in study.swept.values()), len(study.seeds)]
     results = [store.result(point) for point in points]
-    coordinates: dict[str, object] = {
-        name: [v if isinstance(v, int | float | str) else str(v) for v in values]
-        for name, values in study.swept.items()
-    }
+    coordinates = swept_coordinates(study)
     coordinates["seed"] = list(study.seeds)
-    units = {name: key.unit for key in keys() for name in key.names()}
+    units = units_of_scores()
     variables = {}
     for metric in study.metrics:
         numbers = [

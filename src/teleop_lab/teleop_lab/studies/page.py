@@ -1,6 +1,6 @@
 """Page: a study as one HTML file: lines with intervals, heat maps, and paired differences."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from html import escape
 from typing import TYPE_CHECKING, Any
 
@@ -151,22 +151,27 @@ def _heat(study: "Study", found: "xarray.Dataset", metric: str) -> tuple[Any, An
 
 
 def _table(study: "Study", found: "xarray.Dataset") -> str:
-    heads = "".join(f"<th>{escape(name)}</th>" for name in (*study.swept, *study.metrics))
-    rows = []
-    for values, part in conditions(study, found):
-        cells = [str(value) for value in values.values()]
-        cells += [str(mean_of(part[metric].values)) for metric in study.metrics]
-        rows.append("".join(f"<td>{escape(cell)}</td>" for cell in cells))
-    return f"<table><tr>{heads}</tr>{''.join(f'<tr>{row}</tr>' for row in rows)}</table>"
+    rows = [
+        [*map(str, values.values()), *(str(mean_of(part[metric].values)) for metric in study.metrics)]
+        for values, part in conditions(study, found)
+    ]
+    return table_html((*study.swept, *study.metrics), rows)
 
 
 def _changes(study: "Study", found: "xarray.Dataset", metric: str) -> str:
     rows = [
-        f"<tr><td>{escape(name)}</td><td>{escape(str(value))}</td><td>{escape(str(mean))}</td></tr>"
+        [name, str(value), str(mean)]
         for name, means in differences(study, found, metric).items()
         for value, mean in zip(study.swept[name][1:], means, strict=True)
     ]
-    if not rows:
-        return ""
-    head = f"<tr><th>{escape(metric)}</th><th>against the first value</th><th>difference</th></tr>"
-    return f"<table>{head}{''.join(rows)}</table>"
+    return table_html((metric, "against the first value", "difference"), rows)
+
+
+def table_html(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """A table for a :func:`whole_page`; empty without rows."""
+    lines = [
+        [f"<th>{escape(text)}</th>" for text in heads],
+        *([f"<td>{escape(cell)}</td>" for cell in r] for r in rows),
+    ]
+    body = "".join(f"<tr>{''.join(line)}</tr>" for line in lines)
+    return f"<table>{body}</table>" if rows else ""

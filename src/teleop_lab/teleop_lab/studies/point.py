@@ -5,13 +5,14 @@ import json
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
-from functools import cache
+from functools import cache, partial
 from importlib.resources import files
 from pathlib import Path
 
 import teleop_core
+from teleop_core.bags.memory import LeftOutError
 from teleop_core.base.errors import TeleopError
-from teleop_core.evaluation import measure
+from teleop_core.evaluation.scoring import measure, streams_of
 from teleop_core.session import api, configuration
 
 
@@ -109,6 +110,15 @@ def code_digest() -> str:
     return f"{teleop_core.__version__}-{found.hexdigest()[:16]}"
 
 
+_READ_MORE: set[tuple[str, ...]] = set()
+"""Scores for which everything has to be kept."""
+
+
+def _kept(metrics: tuple[str, ...]) -> frozenset[str] | None:
+    """Streams to be kept for some scores; None: all."""
+    return None if metrics in _READ_MORE else streams_of(metrics)
+
+
 def compute(point: Point, metrics: Sequence[str], recordings: Path | None) -> Result:
     """Run a point's session and score it; an error is a result too."""
     begin = time.monotonic()
@@ -116,8 +126,12 @@ def compute(point: Point, metrics: Sequence[str], recordings: Path | None) -> Re
     error = ""
     try:
         out = recordings / point.name if recordings is not None else None
-        session = api.run(point.scenario, seed=point.seed, settings=point.settings, out=out)
-        scores = measure(session.bag, metrics)
+        run = partial(api.run, point.scenario, seed=point.seed, settings=point.settings, out=out)
+        try:
+            scores = measure(run(keep=_kept(tuple(metrics))).bag, metrics)
+        except LeftOutError:  # a metric reads more than it declares
+            _READ_MORE.add(tuple(metrics))
+            scores = measure(run().bag, metrics)
     except TeleopError as raised:
         error = " ".join(str(raised).split())
     except Exception as raised:  # a part of a user's: the study goes on, the point says why

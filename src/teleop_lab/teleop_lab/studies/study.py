@@ -11,9 +11,10 @@ from typing import TYPE_CHECKING, Any
 from teleop_core.base.errors import ParameterError, UnknownNameError
 from teleop_core.base.own_parts import load_own_parts
 from teleop_core.base.plain_yaml import load
-from teleop_core.evaluation.score import keys
+from teleop_core.evaluation.score import SESSION_KEYS, keys
 from teleop_core.graph.layers import SESSION
 from teleop_core.session import api, runner
+from teleop_lab.studies.checks import insist_on_reach, insist_on_scores
 from teleop_lab.studies.point import Point, code_digest, point_key, recipe_of
 from teleop_lab.studies.store import Store
 
@@ -25,6 +26,8 @@ SEED = "seed"
 _KEYS = ("scenario", "seeds", "set", "sweep", "metrics", "parts", "duration", "people")
 _SPEED = 25.0
 """Simulated seconds that a process makes in a second, with scores; measured on a busy machine."""
+_BEGIN, _START = 0.1, 4.0
+"""Time that a session costs beside that, and the processes before the first one [s]."""
 _RESULT = 600
 """Bytes of a stored result."""
 _SECOND = 200_000
@@ -97,11 +100,10 @@ class Study:
             raise ParameterError("seed", tuple(self.seeds), "whole numbers >= 0 that differ")
         if not len(self.metrics):
             raise ParameterError("metrics", (), "at least one key of a score, as task.time_s")
-        known = [name for key in keys() for name in key.names()]
+        measured = [key for key in keys() if key not in SESSION_KEYS]
         for metric in self.metrics:
-            path = tuple(metric.split("."))
-            if not any(key.covers(path) for key in keys()):
-                raise UnknownNameError("key of a score", metric, known)
+            if not any(key.covers(tuple(metric.split("."))) for key in measured):
+                raise UnknownNameError("key of a score", metric, [name for key in measured for name in key.names()])
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -128,6 +130,8 @@ class Study:
         found, code = [], code_digest()
         given = {**self.settings, **chosen}
         made = api.configuration(self.scenario, settings=given)
+        insist_on_scores(made, self.metrics)
+        insist_on_reach(made)
         recipe, length = recipe_of(made), float(made.groups[SESSION].duration)
         for seed in self.seeds:
             place = {**chosen, SEED: int(seed)}
@@ -154,9 +158,10 @@ class Study:
             if reason:
                 why[reason] = why.get(reason, 0) + 1
                 left += point.length
-        wall = left / _SPEED / (jobs or len(sched_getaffinity(0)))
+        count = sum(why.values())
+        wall = (left / _SPEED + _BEGIN * count) / (jobs or len(sched_getaffinity(0))) + _START * bool(count)
         total = sum(point.length for point in points)
-        return Explained(len(points), sum(why.values()), why, left, wall, _RESULT * len(points), round(_SECOND * total))
+        return Explained(len(points), count, why, left, wall, _RESULT * len(points), round(_SECOND * total))
 
     def run(
         self,

@@ -136,7 +136,7 @@ class RunningOperator(RunningStage):
         self._motion = self._asked(self._operator.make, fixed.kind.parameters, setting)
         buttons = fixed.buttons
         has_presses = bool(buttons.clutch or buttons.fixture or buttons.mode or buttons.jaw)
-        self._person = None if has_presses else self.hand
+        self._has_presses, self._person = has_presses, None if has_presses else self.hand
         self._noise.begin(rng)
         self._tick, self._end = 0, 1
         assign(self.state, 0)
@@ -174,7 +174,8 @@ class RunningOperator(RunningStage):
         left = self._end - now  # with the record of the present tick
         if left > ticks:
             return
-        self._wanted[:left] = self._wanted[now : self._end]
+        as_bytes = self._wanted.view(np.dtype((np.void, self._wanted.itemsize)))  # not field by field, which is slow
+        as_bytes[:left] = as_bytes[now : self._end]
         self._end = max(ticks, min(left - 1 + self._operator.ahead, BLOCK)) + 1
         self.state["next"] = 0
         self._draw(self._wanted[left : self._end])
@@ -192,10 +193,10 @@ class RunningOperator(RunningStage):
         attitudes = np.empty((count, 4))
         _turn_all(self._rest, np.ascontiguousarray(moves[:, 3:6]), attitudes)
         drawn["attitude"] = attitudes
-        drawn["buttons"] = np.maximum(self._pressed(times), moves[:, 6:9])
+        drawn["buttons"] = np.maximum(self._pressed(times) if self._has_presses else 0.0, moves[:, 6:9])
         drawn["tremor"] = moves[:, 9:12]
-        closed = _held(self._fixed.buttons.jaw, times)
-        drawn["jaw"] = np.maximum(closed, np.clip(moves[:, 12], 0.0, 1.0))
+        closed = _held(self._fixed.buttons.jaw, times) if self._has_presses else 0.0
+        drawn["jaw"] = np.maximum(closed, np.minimum(moves[:, 12], 1.0))
 
     def _moves(self, times: Array) -> Array:
         """Motion, buttons, tremor and jaw (N, 13) of the operator.
@@ -207,7 +208,7 @@ class RunningOperator(RunningStage):
         moves = np.asarray(self._asked(self._motion, times))
         if moves.dtype.kind not in "fiub":
             raise PartError("operator", name, f"one who answers numbers, not {moves.dtype}")
-        moves = moves.astype(np.float64)
+        moves = moves.astype(np.float64, copy=False)
         if moves.shape not in {(len(times), columns) for columns in (3, 6, 9, 12, 13)}:
             text = f"one who answers (N, 3), (N, 6) or (N, 9) for N times, not {moves.shape}"
             raise PartError("operator", name, text)

@@ -55,6 +55,7 @@ class Observer:
         self._hand = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])  # where the last submovement ends
         self._softness = p.softness  # way for a newton, as it was felt last [m/N]
         self._move: Move | None = None
+        self._turns = False  # whether the stylus is turned in it
         self._number = 0.0
         self._next = 0.0  # when it may move again, whatever it sees [s]
         self._half_seen = math.inf  # when half of the last way was seen [s]
@@ -71,18 +72,25 @@ class Observer:
         self._draw(times, rows)
         if self._seen.task[_NUMBER] > 0.0 and self._glances and self._decide(now, until):
             self._draw(times, rows)
-        is_pressing = (times >= self._close) & (times < self._close + _PRESS_TIME)
-        rows[:, 12] = is_pressing | np.where(times >= self._since, self._holds, not self._holds)
+        if now < self._since <= until:
+            rows[:, 12] = (times >= self._since) == self._holds
+        else:
+            rows[:, 12] = (now >= self._since) == self._holds
+        if self._close <= until and now < self._close + _PRESS_TIME:
+            rows[(times >= self._close) & (times < self._close + _PRESS_TIME), 12] = 1.0
         return rows
 
     def _draw(self, times: Array, rows: Array) -> None:
         """Write the present submovement, from its begin on."""
         if (move := self._move) is None:
             return
+        if not move.is_clutched and not self._turns and move.begin + move.duration < times[0]:
+            rows[:, :3] = move.start[:3] + move.step  # it is over
+            return
         share, has_begun = minimum_jerk((times - move.begin) / move.duration), times >= move.begin
         moved = move.start[:3] + share[:, None] * move.step
         rows[:, :3] = np.where(has_begun[:, None], moved, rows[:, :3])
-        if move.turn.any() or move.start[4:].any():
+        if self._turns:
             turns = np.array([turned(move.start[3:], s * move.turn)[1] for s in share])
             rows[:, 3:6] = np.where(has_begun[:, None], turns, rows[:, 3:6])
         if move.is_clutched:
@@ -284,7 +292,7 @@ class Observer:
 
     def _go(self, move: Move) -> None:
         """Make a submovement the present one."""
-        self._move = move
+        self._move, self._turns = move, bool(move.turn.any() or move.start[4:].any())
         self._hand = np.concatenate((move.start[:3] + move.step, turned(move.start[3:], move.turn)[0]))
         self._next, self._half_seen = move.begin + move.duration, math.inf
         self._is_still = self._was_felt = False

@@ -92,12 +92,30 @@ def _try(part: Task) -> None:
         for i in range(64):
             scene[0], scene[SCENE.index("closing")] = 1e-3 * i, float(i % 8 == 7)
             part.judge(numbers, memory, scene, state)
+        _lead(part, numbers, memory, scene, state)
     if not (np.isfinite(state).all() and is_whole(fence) and is_whole(beyond)):
         text = f"one that writes {len(state)} finite numbers and remembers {MEMORY}"
         raise PartError("task", part.name, f"{text}; it writes {state.tolist()}")
     if not (state[0] >= 1.0 and state[topics.TASK_STATE.columns.index("width")] > 0.0):
         text = "one that sets a first goal at once, with a width > 0"
         raise PartError("task", part.name, f"{text}; it writes {state.tolist()}")
+    needs_jaw = state[topics.TASK_STATE.columns.index("act")] in (Act.GRIP, Act.LET_GO)
+    if not (needs_jaw or state[topics.TASK_STATE.columns.index("attempts")] > 0.0):
+        text = "one that counts an attempt: `end_attempt` of tasks.attempts, at its goal or after a time"
+        raise PartError("task", part.name, f"{text}; it counts none in ten minutes at its goals")
+
+
+def _lead(part: Task, numbers: Array, memory: Array, scene: Array, state: Array) -> None:
+    """Be at each goal for ten minutes, press, and be pressed as asked, until an attempt is counted."""
+    at = {name: i for i, name in enumerate(topics.TASK_STATE.columns)}
+    for i in range(12_000):
+        if state[at["attempts"]] > 0.0:
+            return
+        scene[0], scene[SCENE.index("closing")] = 0.064 + 0.05 * i, float(i % 8 == 7)
+        scene[1:4], scene[SCENE.index("fz")] = state[at["goal_x"] : at["goal_x"] + 3], state[at["force"]]
+        if state[at["turn"]] > 0.0:
+            scene[4:8] = state[at["goal_qw"] : at["goal_qw"] + 4]
+        part.judge(numbers, memory, scene, state)
 
 
 TASKS: Registry[Task] = Registry(

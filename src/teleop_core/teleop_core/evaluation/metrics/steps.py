@@ -12,9 +12,8 @@ _ATTEMPTS, _STEP = (TASK_STATE.columns.index(name) for name in ("attempts", "ste
 class StepsMetric(Metric):
     """Mean time of each step over the attempts at a task that has steps, [s]."""
 
-    name = "step_s"
+    name, topics = "step_s", (TASK_STATE,)
     keys = (Key(f"step_s.{'|'.join(STEPS[1:])}", "s", "mean time of this step of a transfer"),)
-    topics = (TASK_STATE,)
 
     def __init__(self, _: Context) -> None:
         self._times, self._last, self._tried = np.zeros(len(STEPS)), (0, 0), 0.0

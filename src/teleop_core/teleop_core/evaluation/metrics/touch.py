@@ -1,18 +1,16 @@
 """Touch: what the slave's tip felt of the world."""
 
-from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
 
-from teleop_core.base import TeleopError, build
 from teleop_core.evaluation import Context, Envelope, Metric, Moments, Window, keys_of, number
 from teleop_core.evaluation.figure import DARK, FIRST, SECOND, THIRD, Figure, line, time_axis
 from teleop_core.evaluation.metric import figure
+from teleop_core.evaluation.objects import object_of
 from teleop_core.graph.topics import SLAVE_MEASURED_CF, SLAVE_TRUE_CF, SLAVE_TRUE_CP
 from teleop_core.kernels.geometry import Array
 from teleop_core.slave.world.button import ButtonParameters, count_presses
-from teleop_core.slave.world.parameters import WorldParameters
 
 _NEXT_NS = 5_000_000
 """Largest time between samples of which the later follows at once [ns]."""
@@ -32,23 +30,6 @@ class TouchScore:
     presses: int | None = figure(
         "1", "how often a button was pressed to its stop, from click to click; null without one", "presses"
     )
-
-
-def object_of(context: Context, kind: type) -> tuple[WorldParameters, Array] | None:
-    """The world of a recording, and the middle (3,) [m] of the object in it.
-
-    Args:
-        context: Of the recording.
-        kind: Parameter group of the object.
-
-    Returns:
-        None where the object is another, or a part of it or its robot are not there any more.
-    """
-    with suppress(TeleopError):
-        world = build(WorldParameters, dict(context.origin.world))
-        if isinstance(world.kind.parameters, kind) and (robot := context.load_robot()) is not None:
-            return world, world.center(robot.fk(robot.start))
-    return None
 
 
 class _Presses:

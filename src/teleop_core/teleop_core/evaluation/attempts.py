@@ -1,0 +1,72 @@
+"""Attempts: what ``task/state`` tells of the attempts at a task's goals, and the base of measures of them."""
+
+from abc import abstractmethod
+
+import numpy as np
+
+from teleop_core.evaluation.context import Context
+from teleop_core.evaluation.metric import Metric
+from teleop_core.evaluation.plain import Values
+from teleop_core.evaluation.windows import Window
+from teleop_core.graph.topics import TASK_STATE
+from teleop_core.kernels.geometry import Array
+
+_ATTEMPTS, _SUCCESSES = (TASK_STATE.columns.index(name) for name in ("attempts", "successes"))
+
+
+class Attempts:
+    """Attempts at the goals of a task: the samples of ``task/state`` with which their number rises.
+
+    Attributes:
+        successes: How many of them reached their goal; None without a task.
+    """
+
+    def __init__(self, _: Context) -> None:
+        self.successes: int | None = None
+        self._tried: list[Array] = []
+        self._attempts, self._before = np.nan, 0.0  # of the last sample; successes before the first one
+
+    def add(self, window: Window) -> None:
+        """Take one window."""
+        told = window.samples(TASK_STATE).values
+        if len(told):
+            if self.successes is None:
+                self._before = told[0, _SUCCESSES]
+            self._tried += list(told[np.diff(told[:, _ATTEMPTS], prepend=self._attempts) > 0.0])
+            self._attempts, self.successes = told[-1, _ATTEMPTS], int(told[-1, _SUCCESSES] - self._before)
+
+    @property
+    def count(self) -> int:
+        """How many there are."""
+        return len(self._tried)
+
+    def column(self, name: str) -> Array:
+        """A column of ``task/state`` at the end of each attempt (count,)."""
+        return np.array([row[TASK_STATE.columns.index(name)] for row in self._tried])
+
+    def settled(self, name: str) -> Array:
+        """The same; of four or more without the first one, which begins while the arm is led in."""
+        return self.column(name)[int(self.count >= 4) :]
+
+
+class AttemptsMetric(Metric):
+    """Measure of the attempts at a task's goals."""
+
+    topics = (TASK_STATE,)
+
+    def __init__(self, context: Context) -> None:
+        super().__init__(context)
+        self._attempts = context.shared(Attempts)
+
+    @abstractmethod
+    def judge(self, tried: Attempts) -> None:
+        """Set the figures of the class; not called without a task."""
+
+    def add(self, window: Window) -> None:
+        """Nothing: :class:`Attempts` takes each window once for all measures."""
+
+    def values(self) -> Values:
+        """Figures of all attempts so far; None without a task."""
+        if self._attempts.successes is not None:
+            self.judge(self._attempts)
+        return super().values()

@@ -1,0 +1,55 @@
+"""Display: how late the operator saw the slave, and how often."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from teleop_core.evaluation import Context, Metric, Window, keys_of
+from teleop_core.evaluation.metric import figure
+from teleop_core.graph.topics import DISPLAY_MEASURED_CP, NO_COMMAND_NS
+
+
+@dataclass(frozen=True)
+class DisplayScore:
+    """How late the operator saw the slave; None without a display."""
+
+    age_mean_ms: float | None = figure(
+        "ms", "mean age of the newest frame that was on the screen", "age of what is seen, mean"
+    )
+    rate_hz: float | None = figure("Hz", "frames with another pose that were shown in a second", "frames")
+
+
+class DisplayMetric(Metric):
+    """Age of what the operator saw, from when the slave was there to the end of each frame."""
+
+    name = "display"
+    keys = keys_of("display", DisplayScore)
+    topics = (DISPLAY_MEASURED_CP,)
+
+    def __init__(self, _: Context) -> None:
+        self._log_ns = self._stamp_ns = NO_COMMAND_NS  # of the newest frame
+        self._frames, self._span_s, self._seen = 0, 0.0, 0.0
+
+    def add(self, window: Window) -> None:
+        """Take one window."""
+        shown = window.samples(DISPLAY_MEASURED_CP)
+        # A stamp that is none is of a screen that is dark yet.
+        is_new = np.diff(shown.stamp_ns, prepend=self._stamp_ns) > 0
+        if not is_new.any():
+            return
+        logs = np.append(self._log_ns, shown.log_ns[is_new])
+        stamps = np.append(self._stamp_ns, shown.stamp_ns[is_new])
+        first = int(self._frames == 0)  # nothing was shown before it
+        until = 1e-9 * np.diff(logs)[first:]
+        # An age grows from the frame's arrival to that of the next one.
+        ages = 1e-9 * (logs[:-1] - stamps[:-1])[first:] + 0.5 * until
+        self._seen += float((ages * until).sum())
+        self._span_s += float(until.sum())
+        self._frames += int(is_new.sum())
+        self._log_ns, self._stamp_ns = int(logs[-1]), int(stamps[-1])
+
+    def values(self) -> DisplayScore:
+        """Score of everything so far."""
+        if not self._span_s:
+            return DisplayScore(None, None)
+        return DisplayScore(1e3 * self._seen / self._span_s, (self._frames - 1) / self._span_s)

@@ -1,0 +1,20 @@
+"""Misses: errors at a task, by their kind."""
+
+from teleop_core.evaluation.attempts import Attempts, AttemptsMetric
+from teleop_core.evaluation.metric import figure
+
+
+class MissesMetric(AttemptsMetric):
+    """Counts of errors, in the order of :class:`~teleop_core.chain.tasks.Miss`."""
+
+    name, below = "misses", "task"
+    beside = figure("1", "errors: it ended beside the goal", "errors: beside")
+    late = figure("1", "errors: it took too long", "errors: late")
+    forced = figure("1", "errors: it pressed too hard", "errors: forced")
+    dropped = figure("1", "errors: what was carried came to rest beside its goal", "errors: dropped")
+    wrong = figure("1", "errors: what was carried came to rest on another one's goal", "errors: wrong")
+
+    def judge(self, tried: Attempts) -> None:
+        """Count each kind."""
+        for kind, one in enumerate(self.declared, start=1):
+            setattr(self, one.name, int((tried.column("miss") == kind).sum()))

@@ -1,0 +1,64 @@
+"""Objects: what a recording's slave could touch, and the base of measures of one kind of object."""
+
+from abc import abstractmethod
+from contextlib import suppress
+from typing import Any, ClassVar
+
+from teleop_core.base import TeleopError, build
+from teleop_core.evaluation.context import Context
+from teleop_core.evaluation.metric import Metric
+from teleop_core.evaluation.windows import Window
+from teleop_core.graph.topics import SLAVE_TRUE_CF, SLAVE_TRUE_CP
+from teleop_core.kernels.geometry import Array
+from teleop_core.slave.world.parameters import WorldParameters
+
+
+def object_of(context: Context, kind: type) -> tuple[WorldParameters, Array] | None:
+    """The world of a recording, and the middle (3,) [m] of the object in it.
+
+    Args:
+        context: Of the recording.
+        kind: Parameter group of the object.
+
+    Returns:
+        None where the object is another, or a part of it or its robot are not there any more.
+    """
+    with suppress(TeleopError):
+        world = build(WorldParameters, dict(context.origin.world))
+        if isinstance(world.kind.parameters, kind) and (robot := context.load_robot()) is not None:
+            return world, world.center(robot.fk(robot.start))
+    return None
+
+
+class ObjectMetric(Metric):
+    """Measure of what the true tip does at one kind of object; nothing is known of it at another one.
+
+    Attributes:
+        kind: Parameter group of the object.
+    """
+
+    kind: ClassVar[type]
+    topics = (SLAVE_TRUE_CF,)
+
+    def __init__(self, context: Context) -> None:
+        super().__init__(context)
+        self._object = object_of(context, self.kind)
+        if self._object is not None:
+            context.read((SLAVE_TRUE_CP,))
+
+    @abstractmethod
+    def meet(self, shape: Any, ways: Array, wrench: Array) -> None:
+        """Take some samples of the tip.
+
+        Args:
+            shape: Parameters of the object, of ``kind``.
+            ways: From its middle to the tip (N, 3) [m].
+            wrench: On the tip (M, 6) [N, N·m].
+        """
+
+    def add(self, window: Window) -> None:
+        """Take one window."""
+        if self._object is not None:
+            world, center = self._object
+            places = window.samples(SLAVE_TRUE_CP).values[:, :3]
+            self.meet(world.kind.parameters, places - center, window.samples(SLAVE_TRUE_CF).values[:, :6])

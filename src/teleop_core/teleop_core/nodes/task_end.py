@@ -1,0 +1,32 @@
+"""Task end: whether any task of a session has a goal left, heard by who may end the session then."""
+
+import numpy as np
+
+from teleop_core.graph.graph import Graph
+from teleop_core.graph.topics import TASK_STATE
+from teleop_core.middleware.world import Owner
+from teleop_core.nodes.streams import Input
+
+_OVER = TASK_STATE.columns.index("is_over")
+
+
+class TaskEnd:
+    """Hears ``task/state`` of each arm that has a task.
+
+    Args:
+        owner: Node that owns the subscriptions, and closes them.
+        graph: The session's.
+    """
+
+    def __init__(self, owner: Owner, graph: Graph) -> None:
+        tasks = [topic for topic in graph.streams if topic == TASK_STATE.of_arm(topic.arm)]
+        self._told = np.zeros((len(tasks), len(TASK_STATE.columns)))
+        self._inputs = [
+            Input(owner, topic, f"/{topic.name}", (), told) for topic, told in zip(tasks, self._told, strict=True)
+        ]
+
+    def is_there(self) -> bool:
+        """Whether there are tasks, and by what they said last none has a goal left."""
+        for heard in self._inputs:
+            heard.newest()
+        return len(self._told) > 0 and bool((self._told[:, _OVER] > 0.0).all())

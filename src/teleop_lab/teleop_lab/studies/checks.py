@@ -1,0 +1,54 @@
+"""Checks: what a study asks of sessions that they cannot give, told before the first of them runs."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from teleop_core.base.errors import ParameterError
+from teleop_core.evaluation.objects import ObjectMetric
+from teleop_core.evaluation.registry import METRICS
+from teleop_core.robots import load_robot_set
+from teleop_core.session.configuration import Configuration
+from teleop_core.slave.world.parameters import WorldParameters
+
+_NEAR = 0.02
+"""An object that the tip comes so near to is within reach: other turns of the tool reach farther [m]."""
+
+
+def insist_on_scores(made: Configuration, metrics: Sequence[str]) -> None:
+    """Insist on sessions that have the scores.
+
+    Raises:
+        ParameterError: A score is of topics that no stage writes, or of an object that is not there.
+    """
+    written = {topic.name for topic in made.graph.topics}
+    places = {metric.partition(".")[0]: metric for metric in metrics}
+    for metric in map(METRICS.find, METRICS):
+        if (asked := places.get(metric.place())) is None:
+            continue
+        reads = [topic.name for topic in metric.topics]
+        if reads and not written.intersection(reads):
+            raise ParameterError("metrics", asked, f"of topics of the session; no stage writes {' or '.join(reads)}")
+        world = made.value("world")
+        if issubclass(metric, ObjectMetric) and not (world and isinstance(world.kind.parameters, metric.kind)):
+            raise ParameterError("metrics", asked, f"of an object of the session, which has no {metric.place()}")
+
+
+def insist_on_reach(made: Configuration) -> None:
+    """Insist on an object, if a place is given for it, that the slave can touch.
+
+    Raises:
+        ParameterError: The tip comes nowhere near it.
+    """
+    for arm in made.graph.namespaces:
+        world = made.value("world", arm)
+        if not isinstance(world, WorldParameters) or world.kind.kind == "empty" or not world.place:
+            continue
+        robot = load_robot_set(str(made.value("robot", arm)), made.value("geometry", arm) or ())
+        pose = robot.fk(robot.start)
+        center = world.center(pose)
+        pose[:3, 3] = center
+        nearest = robot.fk(robot.ik(pose, robot.start).q)
+        if (gap := world.distance(world.tool(nearest), center)) > _NEAR:
+            text = f"within reach of the slave, whose tip comes no nearer than {gap:.3g} m"
+            raise ParameterError("world.place", tuple(np.round(world.place, 4).tolist()), text)
