@@ -205,14 +205,28 @@ def _hints(group: type) -> dict[str, Any]:
 
 def specs(group: type, prefix: str = "") -> Iterator[Spec]:
     """Declarations of a group in order, nested groups with dotted names."""
+    for declared in _declared(group, prefix):
+        if isinstance(declared, Spec):
+            yield declared
+        else:
+            yield from _choice_specs(*declared)
+
+
+@cache
+def _declared(group: type, prefix: str) -> tuple[Any, ...]:
+    """What :func:`specs` gives, found out once; a choice, to which parts may be added, is a field and its prefix."""
+    return tuple(_found(group, prefix))
+
+
+def _found(group: type, prefix: str) -> Iterator[Any]:
     hints = _hints(group)
     for entry in dataclasses.fields(group):
         hint = hints[entry.name]
         if hint is Choice:
-            yield from _choice_specs(entry, prefix)
+            yield entry, prefix
             continue
         if dataclasses.is_dataclass(hint):
-            yield from specs(hint, f"{prefix}{entry.name}.")  # type: ignore[arg-type]
+            yield from _declared(hint, f"{prefix}{entry.name}.")  # type: ignore[arg-type]
             continue
         kind = get_origin(hint) or hint
         if kind is UnionType or kind not in {bool, int, float, str, tuple}:
@@ -234,8 +248,8 @@ def _choice_specs(entry: Any, prefix: str) -> Iterator[Spec]:
     yield Spec(kind, str, str, meta["default"], **text, choices=names, length=None, fixed=meta["fixed"], is_part=True)
     for name in names:
         for spec in specs(meta["registry"].find(name).parameters, f"{prefix}{name}."):
-            usual = meta["usual"].get(spec.name.removeprefix(prefix), spec.default)
-            yield dataclasses.replace(spec, default=usual)
+            name_here = spec.name.removeprefix(prefix)
+            yield dataclasses.replace(spec, default=meta["usual"][name_here]) if name_here in meta["usual"] else spec
 
 
 def build(group: type[Group], values: Mapping[str, object], prefix: str = "") -> Group:
