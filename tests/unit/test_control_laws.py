@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -255,17 +256,7 @@ def test_law_gets_the_model_that_is_known_behind_the_gravity_that_is_compensated
 
 
 def test_law_that_uses_the_model_in_plain_python_gives_the_same_bits(own_parts: None) -> None:
-    register_controller(
-        Controller(
-            "plain_torque",
-            COMPUTED_TORQUE.parameters,
-            COMPUTED_TORQUE.gains,
-            computed_torque_control.py_func,
-            COMPUTED_TORQUE.memory,
-            COMPUTED_TORQUE.begin,
-            uses_model=True,
-        )
-    )
+    register_controller(replace(COMPUTED_TORQUE, name="plain_torque", control=computed_torque_control.py_func))
     way = circling(300)
     plain, compiled = (run(slave(kind), way) for kind in ("plain_torque", "computed_torque"))
     assert np.array_equal(plain, compiled)
@@ -292,15 +283,7 @@ def test_poles_of_another_number_than_the_joints_are_refused_by_name(law: str) -
 
 
 def test_wish_for_the_model_that_is_no_yes_or_no_is_refused() -> None:
+    odd: Any = replace(COMPUTED_TORQUE, name="odd", uses_model="yes")  # type: ignore[arg-type]
     with pytest.raises(PartError, match="uses_model"):
-        register_controller(
-            Controller(
-                "odd",
-                COMPUTED_TORQUE.parameters,
-                COMPUTED_TORQUE.gains,
-                COMPUTED_TORQUE.control,
-                COMPUTED_TORQUE.memory,
-                uses_model="yes",  # type: ignore[arg-type]
-            )
-        )
+        register_controller(odd)
     assert "odd" not in CONTROLLERS.names()
