@@ -105,7 +105,7 @@ def test_step_without_a_filter_overshoots_by_no_more_than_a_twentieth_on_the_har
 
 
 @pytest.mark.parametrize("law", LAWS)
-@pytest.mark.parametrize("name", ["puma560", "stewart", "three_finger_hand"])
+@pytest.mark.parametrize("name", ["stewart", "three_finger_hand"])
 def test_law_brings_every_kind_of_robot_to_its_goal(law: str, name: str) -> None:
     robot = load_robot(name)
     goal = inside(robot, 0.01, np.random.default_rng(3))

@@ -108,14 +108,6 @@ def test_turn_about_one_fixed_axis_is_an_error_of_its_angle_alone(
     assert error.degenerate_share == 0.0
 
 
-def test_turn_beyond_180_degrees_is_the_short_way_round(recipe: Recipe, path: Path) -> None:
-    recipe.values(SLAVE_SETPOINT_CP)[:] = pose_rows(3000, angles=(179.9, 10.0, 0.0))
-    recipe.values(SLAVE_MEASURED_CP)[:] = pose_rows(3000, angles=(-179.9, 10.0, 0.0))
-    error = evaluate(recipe.write(path)).orientation_error_deg
-    assert np.isclose(present(error.roll.max), 0.2, atol=EXACT_DEG)
-    assert np.isclose(present(error.angle.max), 0.2, atol=EXACT_DEG)
-
-
 def test_orientation_straight_down_has_no_roll_and_no_yaw_but_an_angle(recipe: Recipe, path: Path) -> None:
     recipe.values(SLAVE_SETPOINT_CP)[:] = pose_rows(3000, angles=(0.0, 90.0, 0.0))
     recipe.values(SLAVE_MEASURED_CP)[:] = pose_rows(3000, angles=(0.0, 90.0, 0.5))
