@@ -16,7 +16,7 @@ from teleop_core.slave.plants import PLANTS
 TICK_NS = 1_000_000
 SEQUENCES = 100_000
 """Random sequences in all; each is a command, a fault or bad commands, with what follows."""
-ROBOTS = ("rcrt1", "puma560", "scara_stewart", "five_axis")
+ROBOTS = ("rcrt1", "puma560", "scara_stewart")
 LIMIT = 1.0 + 1e-9
 
 

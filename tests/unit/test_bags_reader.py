@@ -218,16 +218,14 @@ def refusal(path: Path) -> str:
     return caught.value.reason
 
 
-def test_a_missing_path_is_named(tmp_path: Path) -> None:
+def test_what_is_no_recording_is_refused_by_what_it_is(tmp_path: Path) -> None:
     assert "does not exist" in refusal(tmp_path / "nothing")
-
-
-def test_a_directory_without_a_recording_is_refused(tmp_path: Path) -> None:
     assert "no .mcap file" in refusal(tmp_path)
-
-
-def test_a_recording_that_was_not_finished_points_to_recover(tmp_path: Path) -> None:
-    (ours(tmp_path / "bag") / "metadata.yaml").unlink()
+    (tmp_path / "bag.mcap").write_bytes(b"")
+    assert "empty" in refusal(tmp_path / "bag.mcap")
+    (tmp_path / "bag.mcap").write_bytes(b"#ROSBAG V2.0\n" * 20)
+    assert "no MCAP file" in refusal(tmp_path / "bag.mcap")
+    (ours(tmp_path / "bag") / "metadata.yaml").unlink()  # it was not finished
     assert f"teleop recover {tmp_path / 'bag'}" in refusal(tmp_path / "bag")
 
 
@@ -239,16 +237,6 @@ def test_a_file_that_was_cut_off_points_to_recover(tmp_path: Path, kept: float) 
     reason = refusal(file)
     assert "cut off" in reason
     assert "teleop recover" in reason
-
-
-def test_an_empty_file_is_refused(tmp_path: Path) -> None:
-    (tmp_path / "bag.mcap").write_bytes(b"")
-    assert "empty" in refusal(tmp_path / "bag.mcap")
-
-
-def test_a_file_of_another_format_is_refused(tmp_path: Path) -> None:
-    (tmp_path / "bag.mcap").write_bytes(b"#ROSBAG V2.0\n" * 20)
-    assert "no MCAP file" in refusal(tmp_path / "bag.mcap")
 
 
 def test_sqlite_recordings_are_refused_with_the_way_out(tmp_path: Path) -> None:
@@ -312,16 +300,12 @@ def test_a_topic_of_another_type_counts_as_missing(tmp_path: Path) -> None:
         bag.read("slave/measured_cp")
 
 
-def test_reports_are_not_read_as_numbers_nor_numbers_as_reports(tmp_path: Path) -> None:
+def test_reports_are_not_read_as_numbers_nor_numbers_as_reports_and_missing_joints_are_named(tmp_path: Path) -> None:
     bag = Bag(ours(tmp_path / "bag"))
     with pytest.raises(RecordingError, match="not read as numbers"):
         bag.read(topics.TELEOP_STATE)
     with pytest.raises(RecordingError, match="slave/measured_cp"):
         bag.reports("slave/measured_cp")
-
-
-def test_missing_joints_are_named(tmp_path: Path) -> None:
-    bag = Bag(ours(tmp_path / "bag"))
     with pytest.raises(RecordingError, match="lacks joints z; it has a, b, c"):
         bag.read(topics.SLAVE_MEASURED_JS, ("a", "z"))
 

@@ -177,13 +177,10 @@ def test_malformed_tables_are_refused(
         parse_table(content)
 
 
-def test_unknown_conventions_list_the_known_ones() -> None:
-    with pytest.raises(errors.UnknownNameError) as caught:
+def test_files_that_are_not_yaml_or_not_there_and_unknown_conventions_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(errors.UnknownNameError) as unknown:
         table([{"theta": "q"}], convention="distant")
-    assert set(caught.value.alternatives) == set(CONVENTIONS)
-
-
-def test_files_that_are_not_yaml_or_not_there_are_refused(tmp_path: Path) -> None:
+    assert set(unknown.value.alternatives) == set(CONVENTIONS)
     broken = tmp_path / "broken.yaml"
     broken.write_text("rows: [", encoding="utf-8")
     for path in (broken, tmp_path / "missing.yaml"):

@@ -265,22 +265,16 @@ def rows_of(bag: Bag) -> dict[str, Row]:
     return {row.label: row for row in summary(evaluate(bag))}
 
 
-def test_only_a_box_is_held_against_the_published_overshoot(tmp_path: Path) -> None:
-    rows: dict[Any, Any] = {}
-    for described in (SPHERE, BOX):
-        recipe = Recipe(1500)
-        recipe.singles = [fixture_on(described)]
-        rows |= {described["fixture"]: rows_of(recipe.write(tmp_path / described["fixture"]))}
-    assert "sphere on for" in rows["sphere"]
-    assert "box on for" in rows["box"]
-    assert rows["sphere"]["slave outside, max"].published == ""
-    assert rows["box"]["slave outside, max"].published == "1.000"
-
-
-def test_another_robot_is_not_held_against_the_published_overshoot(recipe: Recipe, path: Path) -> None:
-    recipe.singles = [fixture_on(BOX)]
-    recipe.metadata["robot"] = "puma560"
-    assert rows_of(recipe.write(path))["slave outside, max"].published == ""
+@pytest.mark.parametrize(
+    ("described", "robot", "published"), [(SPHERE, "rcrt1", ""), (BOX, "rcrt1", "1.000"), (BOX, "puma560", "")]
+)
+def test_only_a_box_and_the_source_s_robot_are_held_against_the_published_overshoot(
+    recipe: Recipe, path: Path, described: dict[str, str], robot: str, published: str
+) -> None:
+    recipe.singles, recipe.metadata["robot"] = [fixture_on(described)], robot
+    rows = rows_of(recipe.write(path))
+    assert f"{described['fixture']} on for" in rows
+    assert rows["slave outside, max"].published == published
 
 
 @pytest.mark.parametrize("described", [SPHERE, BOX])

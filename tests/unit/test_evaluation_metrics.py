@@ -284,10 +284,6 @@ def test_name_of_another_metric_is_refused(added: Callable[[str, object], None],
         evaluate(bag, further=[JerkMetric, JerkMetric])
 
 
-def test_installed_packages_add_metrics_through_their_own_group() -> None:
-    assert METRICS.group == "teleop_core.metrics"
-
-
 def fail(self: object, *arguments: Context | Window) -> None:
     raise ZeroDivisionError("by\nzero")
 

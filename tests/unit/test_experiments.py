@@ -115,7 +115,7 @@ def test_bench_runs_the_same_session_once_and_another_seed_or_setting_anew() -> 
 
 
 def test_bench_of_the_same_seed_gives_the_same_bits() -> None:
-    first, second = (Bench(5).session("fine_box", settings=SHORT) for _ in range(2))
+    first, second = (Bench(5).session("fine_box", settings=SHORT, is_scored=is_scored) for is_scored in (True, False))
     for topic, stream in first.streams.items():
         assert np.array_equal(stream.values, second[topic].values, equal_nan=True), topic
     assert first.score.to_json() == second.score.to_json()

@@ -113,7 +113,7 @@ def sparse(path: Path, chunks: int) -> tc.Recording:
     return tc.open_recording(path)
 
 
-def test_streams_of_different_rates_are_joined_over_many_chunks(tmp_path: Path) -> None:
+def test_streams_of_different_rates_are_joined_and_newest_values_held_over_many_chunks(tmp_path: Path) -> None:
     recording = sparse(tmp_path / "bag", 40)
     teleop_exchange.export_recording(recording, tmp_path / "a.parquet")
     got = pd.read_parquet(tmp_path / "a.parquet").set_index("time")
@@ -123,11 +123,8 @@ def test_streams_of_different_rates_are_joined_over_many_chunks(tmp_path: Path) 
     assert len(pieces) > 5
     assert all(a.time_ns[-1] < b.time_ns[0] for a, b in pairwise(pieces))
 
-
-def test_newest_values_are_held_over_many_chunks(tmp_path: Path) -> None:
-    recording = sparse(tmp_path / "bag", 40)
-    teleop_exchange.export_recording(recording, tmp_path / "a.parquet", rate=50.0)
-    got = pd.read_parquet(tmp_path / "a.parquet")
+    teleop_exchange.export_recording(recording, tmp_path / "held.parquet", rate=50.0)
+    got = pd.read_parquet(tmp_path / "held.parquet")
     buttons = recording["master/buttons"]
     held = np.searchsorted(buttons.time, got["time"] + 1e-9, side="right") - 1
     expected = np.where(held >= 0, buttons["clutch"][held], np.nan)
@@ -156,16 +153,15 @@ def test_wrong_exports_are_refused_and_leave_nothing(
     assert not list(tmp_path.iterdir())
 
 
-def test_existing_files_are_never_touched(session: tc.Recording, tmp_path: Path) -> None:
+def test_existing_files_are_never_touched_and_a_table_holds_one_recording(
+    session: tc.Recording, tmp_path: Path
+) -> None:
     (tmp_path / "a.csv").write_text("precious")
     with pytest.raises(tc.RecordingError, match="exists already"):
         teleop_exchange.export_recording(session, tmp_path / "a.csv")
     assert (tmp_path / "a.csv").read_text() == "precious"
-
-
-def test_a_table_holds_one_recording(session: tc.Recording, tmp_path: Path) -> None:
     with pytest.raises(tc.ParameterError, match="lerobot takes several"):
-        teleop_exchange.export_recording([session, session], tmp_path / "a.csv")
+        teleop_exchange.export_recording([session, session], tmp_path / "b.csv")
 
 
 # Data sets.
@@ -261,18 +257,14 @@ def test_actions_may_be_poses_of_the_tip(session: tc.Recording, tmp_path: Path) 
     assert info["fps"] == 10
 
 
-def test_recordings_of_other_arms_do_not_mix(session: tc.Recording, tmp_path: Path) -> None:
-    other = tc.run("coarse_box", duration=0.1, robot="puma560")
-    with pytest.raises(tc.RecordingError, match="other joints"):
-        teleop_exchange.export_recording([session, other], tmp_path / "set")
-    assert not list(tmp_path.iterdir())
-
-
-def test_a_recording_without_a_slave_makes_no_data_set(tmp_path: Path) -> None:
-    recording = sparse(tmp_path / "bag", 2)
-    with pytest.raises(tc.RecordingError, match="slave/measured_js"):
-        teleop_exchange.export_recording(recording, tmp_path / "set")
-    assert not (tmp_path / "set").exists()
+def test_recordings_of_other_arms_do_not_mix_and_one_without_a_slave_makes_no_data_set(
+    session: tc.Recording, tmp_path: Path
+) -> None:
+    other, bare = tc.run("coarse_box", duration=0.1, robot="puma560"), sparse(tmp_path / "bag", 2)
+    for recordings, told in (([session, other], "other joints"), (bare, "slave/measured_js")):
+        with pytest.raises(tc.RecordingError, match=told):
+            teleop_exchange.export_recording(recordings, tmp_path / "set")
+        assert not (tmp_path / "set").exists()
 
 
 _LOADER = """

@@ -20,7 +20,7 @@ from teleop_core.robots.kinematics import IkStatus
 
 pytestmark = pytest.mark.filterwarnings("ignore::teleop_core.TeleopWarning")
 REACHED = (IkStatus.FOLLOWED, IkStatus.NEAR_SINGULAR)
-SEEDS = range(24)
+SEEDS = range(12)
 
 
 def followed(seed: int, *, is_upstream: bool = False) -> Any:

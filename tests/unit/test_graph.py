@@ -61,16 +61,12 @@ def test_order_of_stages_decides_where_the_data_does_not() -> None:
     assert names(Graph((*BASE, *others[::-1]))) == [*BUILT_IN, "a", "b"]
 
 
-def test_arms_follow_each_other_in_the_order_of_their_names() -> None:
+def test_arms_follow_each_other_in_the_order_of_their_names_and_share_no_link() -> None:
     graph = Graph(BASE, ("right", "left"))
+    assert all(link.writer.arm == link.reader.arm == link.topic.arm for link in graph.links)
     assert names(graph) == [*BUILT_IN, *(f"left/{name}" for name in BUILT_IN)]
     assert graph.topics[0] == topics.HAND_SERVO_CP
     assert "left/slave/servo_cp" in {topic.name for topic in graph.topics}
-
-
-def test_arms_share_no_link() -> None:
-    for link in Graph(BASE, ("right", "left")).links:
-        assert link.writer.arm == link.reader.arm == link.topic.arm
 
 
 def test_replacing_stage_comes_between_writer_and_readers() -> None:
@@ -97,17 +93,14 @@ def test_topic_that_adds_to_another_arrives_beside_it() -> None:
     assert added == [False, True]
 
 
-def test_chain_leads_from_the_hand_to_the_slave() -> None:
+def test_chain_leads_from_the_hand_to_the_slave_and_passes_through_a_replacing_stage() -> None:
+    assert "limit" in [name for name, _ in Graph((*BASE, limit())).chain()]
     assert [topic.name for _, topic in Graph(BASE).chain()] == [
         "master/measured_cp",
         "slave/servo_cp",
         "slave/servo_jp",
         "slave/setpoint_js",
     ]
-
-
-def test_chain_passes_through_a_replacing_stage() -> None:
-    assert "limit" in [name for name, _ in Graph((*BASE, limit())).chain()]
 
 
 def test_answer_like_its_input_that_nobody_reads_is_noted_unless_it_replaces_or_adds() -> None:
@@ -149,20 +142,15 @@ def test_delay_of_another_form_is_refused_with_an_example(text: str) -> None:
     assert (error.value.name, error.value.value) == ("teleop.delays", text)
 
 
-def test_delay_of_an_unknown_topic_is_refused_with_the_known_ones() -> None:
-    with pytest.raises(UnknownNameError) as error:
-        configure(settings=["teleop.delays=[slave/servo_jq=0.02]"])
-    assert error.value.value == "slave/servo_jq"
-    assert "slave/servo_jp" in error.value.alternatives
-
-
-def test_delay_to_an_unknown_reader_is_refused_with_the_known_ones() -> None:
-    with pytest.raises(UnknownNameError) as error:
-        configure(settings=["teleop.delays=[slave/servo_jp@slaves=0.02]"])
-    assert "slave_sim" in error.value.alternatives
-
-
-def test_delay_to_a_stage_that_does_not_read_the_topic_is_refused() -> None:
+def test_delay_of_an_unknown_topic_or_reader_or_one_that_does_not_read_it_is_refused() -> None:
+    for delay, name, known in (
+        ("slave/servo_jq=0.02", "slave/servo_jq", "slave/servo_jp"),
+        ("slave/servo_jp@slaves=0.02", "slaves", "slave_sim"),
+    ):
+        with pytest.raises(UnknownNameError) as error:
+            configure(settings=[f"teleop.delays=[{delay}]"])
+        assert error.value.value == name
+        assert known in error.value.alternatives
     with pytest.raises(PartError, match="reads slave/servo_jp"):
         Graph(BASE, delays=(Delay("slave/servo_jp", 0.02, "motion_scaling"),))
 
@@ -257,12 +245,9 @@ def test_stage_whose_stamp_is_of_a_command_in_force_gives_it_itself() -> None:
     assert stage(writes=(Topic("test/x", Kind.POSE, in_force("slave/servo_jp")),)).writes
 
 
-def test_stage_whose_parameters_are_no_dataclass_is_refused() -> None:
+def test_unknown_stage_and_parameters_that_are_no_dataclass_are_refused() -> None:
     with pytest.raises(PartError, match="dataclass"):
         Stage("echo", dict, (SLAVE_MEASURED_CP,), (ECHO,), step=rest)
-
-
-def test_unknown_stage_is_refused_with_the_known_ones() -> None:
     with pytest.raises(UnknownNameError) as error:
         build_graph(stages=["limiter"])
     assert set(BUILT_IN) <= set(error.value.alternatives)

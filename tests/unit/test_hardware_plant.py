@@ -135,6 +135,8 @@ def test_every_number_of_the_hardware_says_how_it_is_known() -> None:
         assert text.partition(":")[0] in MARKS
     numbers = [spec for spec in specs(HARDWARE.parameters) if spec.kind in {float, int}]
     assert all(spec.source for spec in numbers)
+    with pytest.raises(errors.ParameterError, match="published"):
+        parameter(1.0, doc="", source="my own measurement")
 
 
 def test_another_robot_sticks_by_its_drive_table_and_is_made_as_drawn() -> None:
@@ -207,8 +209,3 @@ def test_impossible_hardware_is_refused(changed: Any, kind: type[errors.TeleopEr
              "coupling": np.zeros((2, 2))}  # fmt: skip
     with pytest.raises(kind):
         hardware.Hardware(**(given | changed))
-
-
-def test_a_source_without_a_mark_is_refused() -> None:
-    with pytest.raises(errors.ParameterError, match="published"):
-        parameter(1.0, doc="", source="my own measurement")

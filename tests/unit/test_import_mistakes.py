@@ -40,13 +40,10 @@ def written(tmp_path: Path, table: pd.DataFrame) -> Path:
     return tmp_path / "hand.csv"
 
 
-def test_missing_file_is_told(tmp_path: Path) -> None:
-    assert "no.csv: does not exist" in refusal(tmp_path / "no.csv", tmp_path)
-
-
 @pytest.mark.parametrize(
     ("content", "text"),
     [
+        (None, "hand.csv: does not exist"),
         (b"", "is empty"),
         (b"\n \n", "is empty"),
         (b"t,x,y,z\n", "holds no rows of numbers"),
@@ -57,16 +54,40 @@ def test_missing_file_is_told(tmp_path: Path) -> None:
         (b"PAR1 broken", "no sound Parquet file"),
     ],
 )
-def test_what_is_no_table_is_refused(content: bytes, text: str, tmp_path: Path) -> None:
-    (tmp_path / "hand.csv").write_bytes(content)
+def test_what_is_no_table_is_refused(content: bytes | None, text: str, tmp_path: Path) -> None:
+    if content is not None:
+        (tmp_path / "hand.csv").write_bytes(content)
     assert text in refusal(tmp_path / "hand.csv", tmp_path)
 
 
-def test_a_column_that_is_not_there_is_told_with_those_that_are(tmp_path: Path) -> None:
-    text = refusal(written(tmp_path, GOOD), tmp_path, position=("x", "y", "depth"))
-    assert "--position" in text
-    assert "'depth'" in text
-    assert "t, x, y, z" in text
+BESIDE = pd.concat((GOOD, QUATERNION), axis=1)
+BACK, LOST = GOOD.copy(), GOOD.astype(object)
+BACK.loc[100, "t"], LOST.loc[150, "y"] = 0.5, "lost"
+MISTAKEN: dict[str, tuple[pd.DataFrame, dict[str, Any], tuple[str, ...]]] = {
+    "a column that is not there": (GOOD, {"position": ("x", "y", "depth")}, ("--position", "'depth'", "t, x, y, z")),
+    "no time": (GOOD[["x", "y", "z"]], {}, ("--rate", "x, y, z")),
+    "no place": (GOOD.rename(columns={"x": "a", "y": "b", "z": "c"}), {}, ("--position", "t, a, b, c")),
+    "a step back": (BACK, {"backwards": "refuse"}, ("goes back in 1 rows", "--backwards")),
+    "text among numbers": (LOST, {}, ("'y'", "'lost'")),
+    "no quaternion": (BESIDE, {"quaternion": ("t", "qx", "qy", "qz")}, ("order",)),
+    "names of another order": (
+        BESIDE,
+        {"quaternion": ("qx", "qy", "qz", "qw"), "quaternion_order": "wxyz"},
+        ("must be xyzw",),
+    ),
+    "a mirror": (pd.concat((GOOD, ROTATION.assign(r33=-1.0)), axis=1), {}, ("mirror",)),
+    **{
+        f"a quaternion of length {scale}": (pd.concat((GOOD, scale * QUATERNION), axis=1), {}, (told,))
+        for scale, told in ((0.0, "no orientation"), (0.5, "unit length"), (2.0, "unit length"))
+    },
+}
+
+
+@pytest.mark.parametrize("case", MISTAKEN)
+def test_a_table_that_holds_no_motion_is_refused_with_what_it_lacks(case: str, tmp_path: Path) -> None:
+    table, options, told = MISTAKEN[case]
+    text = refusal(written(tmp_path, table), tmp_path, **options)
+    assert all(word in text for word in told), text
 
 
 def test_a_number_beyond_the_columns_is_told(tmp_path: Path) -> None:
@@ -74,19 +95,6 @@ def test_a_number_beyond_the_columns_is_told(tmp_path: Path) -> None:
     text = refusal(tmp_path / "hand.csv", tmp_path, position=(2, 3, 5), time=1)
     assert "'5'" in text
     assert "1 to 4" in text
-
-
-def test_without_a_time_a_rate_is_asked_for(tmp_path: Path) -> None:
-    text = refusal(written(tmp_path, GOOD[["x", "y", "z"]]), tmp_path)
-    assert "--rate" in text
-    assert "x, y, z" in text
-
-
-def test_without_a_place_columns_are_asked_for(tmp_path: Path) -> None:
-    table = GOOD.rename(columns={"x": "a", "y": "b", "z": "c"})
-    text = refusal(written(tmp_path, table), tmp_path)
-    assert "--position" in text
-    assert "t, a, b, c" in text
 
 
 @pytest.mark.parametrize(
@@ -101,48 +109,6 @@ def test_without_a_place_columns_are_asked_for(tmp_path: Path) -> None:
 )
 def test_columns_that_say_nothing_are_refused(column: str, values: float | Array, text: str, tmp_path: Path) -> None:
     assert text in refusal(written(tmp_path, GOOD.assign(**{column: values})), tmp_path)
-
-
-def test_a_single_step_back_is_refused_on_request(tmp_path: Path) -> None:
-    table = GOOD.copy()
-    table.loc[100, "t"] = 0.5
-    text = refusal(written(tmp_path, table), tmp_path, backwards="refuse")
-    assert "goes back in 1 rows" in text
-    assert "--backwards" in text
-
-
-def test_text_among_numbers_is_told_with_its_column(tmp_path: Path) -> None:
-    table = GOOD.astype(object)
-    table.loc[150, "y"] = "lost"
-    text = refusal(written(tmp_path, table), tmp_path)
-    assert "'y'" in text
-    assert "'lost'" in text
-
-
-@pytest.mark.parametrize("scale", [0.0, 0.5, 2.0])
-def test_quaternions_of_another_length_are_refused(scale: float, tmp_path: Path) -> None:
-    table = pd.concat((GOOD, scale * QUATERNION), axis=1)
-    text = refusal(written(tmp_path, table), tmp_path)
-    assert "no orientation" in text if scale == 0.0 else "unit length" in text
-
-
-def test_columns_that_are_no_quaternion_are_refused_with_a_hint(tmp_path: Path) -> None:
-    table = pd.concat((GOOD, QUATERNION), axis=1)
-    options = {"quaternion": ("t", "qx", "qy", "qz")}
-    text = refusal(written(tmp_path, table), tmp_path, **options)
-    assert "order" in text
-
-
-def test_a_named_order_that_the_option_contradicts_is_refused(tmp_path: Path) -> None:
-    table = pd.concat((GOOD, QUATERNION), axis=1)
-    options: dict[str, Any] = {"quaternion": ("qx", "qy", "qz", "qw"), "quaternion_order": "wxyz"}
-    assert "must be xyzw" in refusal(written(tmp_path, table), tmp_path, **options)
-
-
-def test_a_mirror_is_no_rotation(tmp_path: Path) -> None:
-    table = pd.concat((GOOD, ROTATION.assign(r33=-1.0)), axis=1)
-    text = refusal(written(tmp_path, table), tmp_path)
-    assert "mirror" in text
 
 
 def test_an_existing_directory_is_never_touched(tmp_path: Path) -> None:

@@ -129,15 +129,12 @@ def test_comments_and_a_line_of_units_stand_before_the_numbers(tmp_path: Path) -
     assert any("mm" in text for text in report.told)
 
 
-def test_a_comment_may_hold_the_names(tmp_path: Path) -> None:
+def test_a_comment_may_hold_the_names_and_lines_can_be_skipped(tmp_path: Path) -> None:
     np.savetxt(tmp_path / "a.txt", TABLE, fmt="%.17g", header=" ".join(HEAD))
     assert_same_motion(imported(tmp_path / "a.txt", tmp_path)[1])
-
-
-def test_lines_can_be_skipped(tmp_path: Path) -> None:
-    text = "Motion capture 3.1\n1,2\n" + frame().to_csv(index=False)
-    (tmp_path / "a.csv").write_text(text)
-    assert_same_motion(imported(tmp_path / "a.csv", tmp_path, skip=2)[1])
+    (tmp_path / "a.csv").write_text("Motion capture 3.1\n1,2\n" + frame().to_csv(index=False))
+    skipped = teleop_exchange.import_recording(tmp_path / "a.csv", tmp_path / "skipped", skip=2)
+    assert_same_motion(skipped.recording["master/measured_cp"])
 
 
 # Orientation, against SciPy.
@@ -151,43 +148,35 @@ def turned(
     return imported(path, tmp_path, **options)
 
 
-@pytest.mark.parametrize("order", ["xyz", "ZYX", "zxz", "YXZ", "xzy", "XYZ"])
-@pytest.mark.parametrize("degrees", [True, False])
-def test_euler_angles_mean_what_they_do_in_scipy(order: str, degrees: bool, tmp_path: Path) -> None:
-    path, names_of = tmp_path / "a.csv", ["a", "b", "c"]
-    values = TURNS.as_euler(order, degrees=degrees)
-    options = {"euler": (order, *names_of), "angles": "deg" if degrees else "rad"}
-    assert_same_motion(turned(path, tmp_path, names_of, values, **options)[1])
+NINE, FOUR = [f"m{i}" for i in range(9)], ["a", "b", "c", "d"]
+MATRICES = TURNS.as_matrix()
+ANGLES = {"rad": False, "deg": True}
+ORIENTATIONS: dict[str, tuple[list[str], Array, dict[str, Any]]] = {
+    "rows": (NINE, MATRICES.reshape(-1, 9), {"matrix": NINE, "matrix_order": "row"}),
+    "columns": (NINE, MATRICES.transpose(0, 2, 1).reshape(-1, 9), {"matrix": NINE, "matrix_order": "column"}),
+    "wxyz": (FOUR, WXYZ, {"quaternion": FOUR, "quaternion_order": "wxyz"}),
+    "xyzw": (FOUR, TURNS.as_quat(), {"quaternion": FOUR, "quaternion_order": "xyzw"}),
+    "names": (["qx", "qy", "qz", "qw"], TURNS.as_quat(), {"quaternion": ["qx", "qy", "qz", "qw"]}),
+    **{
+        f"{order} {unit}": (
+            FOUR[:3],
+            TURNS.as_euler(order, degrees=is_deg),
+            {"euler": (order, *FOUR[:3]), "angles": unit},
+        )
+        for order in ("xyz", "ZYX", "zxz", "YXZ", "xzy", "XYZ")
+        for unit, is_deg in ANGLES.items()
+    },
+    **{
+        f"vector {unit}": (FOUR[:3], TURNS.as_rotvec(degrees=is_deg), {"rotation_vector": FOUR[:3], "angles": unit})
+        for unit, is_deg in ANGLES.items()
+    },
+}
 
 
-@pytest.mark.parametrize("order", ["row", "column"])
-def test_matrices_are_read_row_by_row_or_column_by_column(order: str, tmp_path: Path) -> None:
-    matrices = TURNS.as_matrix()
-    values = (matrices if order == "row" else matrices.transpose(0, 2, 1)).reshape(-1, 9)
-    columns = [f"m{i}" for i in range(9)]
-    options = {"matrix": columns, "matrix_order": order}
+@pytest.mark.parametrize("case", ORIENTATIONS)
+def test_orientations_mean_what_they_do_in_scipy(case: str, tmp_path: Path) -> None:
+    columns, values, options = ORIENTATIONS[case]
     assert_same_motion(turned(tmp_path / "a.csv", tmp_path, columns, values, **options)[1])
-
-
-@pytest.mark.parametrize("degrees", [True, False])
-def test_rotation_vectors_mean_what_they_do_in_scipy(degrees: bool, tmp_path: Path) -> None:
-    columns, values = ["u", "v", "w"], TURNS.as_rotvec(degrees=degrees)
-    options = {"rotation_vector": columns, "angles": "deg" if degrees else "rad"}
-    assert_same_motion(turned(tmp_path / "a.csv", tmp_path, columns, values, **options)[1])
-
-
-@pytest.mark.parametrize("order", ["wxyz", "xyzw"])
-def test_order_of_a_quaternion_is_stated(order: str, tmp_path: Path) -> None:
-    columns, values = ["a", "b", "c", "d"], TURNS.as_quat(scalar_first=order == "wxyz")
-    options = {"quaternion": columns, "quaternion_order": order}
-    assert_same_motion(turned(tmp_path / "a.csv", tmp_path, columns, values, **options)[1])
-
-
-def test_names_of_a_quaternion_say_its_order(tmp_path: Path) -> None:
-    columns = ["qx", "qy", "qz", "qw"]
-    options = {"quaternion": columns}
-    _, stream = turned(tmp_path / "a.csv", tmp_path, columns, TURNS.as_quat(), **options)
-    assert_same_motion(stream)
 
 
 def test_quaternions_of_any_sign_and_nearly_unit_length_give_a_continuous_one(tmp_path: Path) -> None:
@@ -200,17 +189,12 @@ def test_quaternions_of_any_sign_and_nearly_unit_length_give_a_continuous_one(tm
     assert np.allclose(np.linalg.norm(got, axis=1), 1.0, rtol=0, atol=1e-15)
 
 
-def test_without_an_orientation_it_is_constant(tmp_path: Path) -> None:
-    frame(HEAD[:4], TABLE[:, :4]).to_csv(tmp_path / "a.csv", index=False)
-    report, stream = imported(tmp_path / "a.csv", tmp_path)
+@pytest.mark.parametrize(("count", "options"), [(4, {}), (8, {"orientation": "none"})])
+def test_without_an_orientation_it_is_constant(count: int, options: dict[str, str], tmp_path: Path) -> None:
+    frame(HEAD[:count], TABLE[:, :count]).to_csv(tmp_path / "a.csv", index=False)
+    report, stream = imported(tmp_path / "a.csv", tmp_path, **options)
     assert np.array_equal(stream[HEAD[4:]], np.tile([1.0, 0.0, 0.0, 0.0], (COUNT, 1)))
-    assert any("constant" in text for text in report.told)
-
-
-def test_orientation_can_be_left_out(tmp_path: Path) -> None:
-    frame().to_csv(tmp_path / "a.csv", index=False)
-    _, stream = imported(tmp_path / "a.csv", tmp_path, orientation="none")
-    assert (stream["qw"] == 1.0).all()
+    assert options or any("constant" in text for text in report.told)
 
 
 # Times.
@@ -234,9 +218,10 @@ def test_unit_of_the_time_is_guessed_from_its_size_or_its_steps(
     assert np.abs(stream.stamp_ns - (first + np.round(TIMES * 1e9))).max() <= (0 if exact else 300)
 
 
-def test_given_unit_of_the_time_is_taken(tmp_path: Path) -> None:
+def test_given_unit_of_the_time_is_taken_and_without_buttons_none_are_recorded(tmp_path: Path) -> None:
     frame().to_csv(tmp_path / "a.csv", index=False)
     report, _ = imported(tmp_path / "a.csv", tmp_path, time_unit="ms")
+    assert report.recording.topics == ("master/measured_cp",)
     assert report.duration == pytest.approx(TIMES[-1] * 1e-3, abs=1e-9)
 
 
@@ -327,12 +312,6 @@ def test_buttons_are_recorded_where_they_change(tmp_path: Path) -> None:
     assert len(buttons) == 4
 
 
-def test_without_buttons_none_are_recorded(tmp_path: Path) -> None:
-    frame().to_csv(tmp_path / "a.csv", index=False)
-    report, _ = imported(tmp_path / "a.csv", tmp_path)
-    assert report.recording.topics == ("master/measured_cp",)
-
-
 # Rows that are damaged.
 
 
@@ -415,6 +394,9 @@ def test_a_time_that_begins_anew_is_never_one_motion(policy: str, tmp_path: Path
     frame(rows=np.vstack((TABLE[:100], TABLE, TABLE[:250]))).to_csv(tmp_path / "a.csv")
     with pytest.raises(tc.RecordingError, match=r"3 recordings.* row 101, 501"):
         imported(tmp_path / "a.csv", tmp_path, backwards=policy)
+    frame().to_csv(tmp_path / "a.csv")  # of which no episode can be taken
+    with pytest.raises(tc.ParameterError, match="--episode"):
+        imported(tmp_path / "a.csv", tmp_path, episode=1)
 
 
 @pytest.mark.parametrize("name", ["episode_index", "Episode", "trial_id"])
@@ -433,12 +415,6 @@ def test_of_a_table_of_episodes_one_is_taken(name: str, ending: str, tmp_path: P
     assert_same_motion(stream)
     assert "episode 1 of 3" in report.told
     assert report.counts.rows == COUNT
-
-
-def test_an_episode_cannot_be_taken_of_a_table_of_one(tmp_path: Path) -> None:
-    frame().to_csv(tmp_path / "a.csv")
-    with pytest.raises(tc.ParameterError, match="--episode"):
-        imported(tmp_path / "a.csv", tmp_path, episode=1)
 
 
 @pytest.mark.parametrize("missing", ["nan", "NaN", "inf", "null"])

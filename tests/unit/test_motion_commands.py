@@ -111,20 +111,12 @@ def test_a_move_from_full_speed_brakes_first_and_jumps_in_nothing(bench: Bench) 
     for _ in range(5):
         bench.motion.drive_joints(speed, bench.now_ns)
         path.append(bench.run(20))
-    assert bench.motion.move(MIDDLE)[0] is Answer.DONE
-    path.append(bench.run(4000))
+    for goal, ticks in ((MIDDLE + 4.0 * SMALL, 150), (MIDDLE - SMALL, 4000)):  # a newer move takes over
+        assert bench.motion.move(goal)[0] is Answer.DONE
+        path.append(bench.run(ticks))
     joined = np.vstack(path)
     insist_on_limits(ARM, joined)
-    np.testing.assert_array_equal(joined[-1], MIDDLE)
-
-
-def test_a_newer_move_takes_over_from_one_under_way(bench: Bench) -> None:
-    bench.motion.move(MIDDLE + 4.0 * SMALL)
-    path = [bench.run(150)]
-    assert bench.motion.move(MIDDLE - SMALL)[0] is Answer.DONE
-    path.append(bench.run(4000))
-    insist_on_limits(ARM, np.vstack(path))
-    np.testing.assert_array_equal(bench.setpoint, MIDDLE - SMALL)
+    np.testing.assert_array_equal(joined[-1], MIDDLE - SMALL)
 
 
 def test_a_move_to_a_pose_brings_the_tip_there(bench: Bench) -> None:
@@ -156,12 +148,6 @@ def test_goals_that_the_joints_cannot_have_are_refused(bench: Bench, goal: Array
     assert answer is Answer.REFUSED
     assert why in text
     assert bench.slave.server.operation["is_busy"] == 0.0
-
-
-def test_a_step_moves_by_that_much_from_the_setpoint(bench: Bench) -> None:
-    bench.motion.move_by(SMALL)
-    bench.run(2000)
-    np.testing.assert_allclose(bench.setpoint, MIDDLE + SMALL, atol=1e-12)
 
 
 @pytest.mark.parametrize("command", ["move", "move_by"])
@@ -331,19 +317,16 @@ def test_after_a_move_no_command_is_in_force(bench: Bench) -> None:
     np.testing.assert_array_equal(bench.setpoint, MIDDLE + SMALL)
 
 
-def test_steps_add_up_from_command_to_command(bench: Bench) -> None:
-    for _ in range(50):
-        bench.motion.servo_by(0.001 * SMALL, bench.now_ns + TICK_NS)
-        bench.run(5)
-    bench.run(200)
-    np.testing.assert_allclose(bench.setpoint, MIDDLE + 0.05 * SMALL, atol=1e-12)
-
-
-def test_steps_that_come_within_one_tick_are_all_taken(bench: Bench) -> None:
-    for _ in range(5):
-        bench.motion.servo_by(0.001 * SMALL, bench.now_ns + TICK_NS)
-    bench.run(200)
-    np.testing.assert_allclose(bench.setpoint, MIDDLE + 0.005 * SMALL, atol=1e-12)
+def test_steps_add_up_from_the_setpoint_on_within_one_tick_too(bench: Bench) -> None:
+    bench.motion.move_by(SMALL)
+    bench.run(2000)
+    np.testing.assert_allclose(bench.setpoint, MIDDLE + SMALL, atol=1e-12)
+    for ticks in (0, 5):
+        for _ in range(50):
+            bench.motion.servo_by(0.001 * SMALL, bench.now_ns + TICK_NS)
+            bench.run(ticks)
+        bench.run(200)
+    np.testing.assert_allclose(bench.setpoint, MIDDLE + 1.1 * SMALL, atol=1e-12)
 
 
 def test_steps_are_taken_after_references_of_the_topic(bench: Bench) -> None:

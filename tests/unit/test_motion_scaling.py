@@ -110,21 +110,17 @@ def test_gains_ratchet_the_slave_as_published() -> None:  # case 20
     assert np.allclose(end - start, (0, -1 * MM, 0), rtol=0, atol=ROUNDING)
 
 
-def test_mode_parameter_switches_the_mode_at_run_time() -> None:
-    desk = Desk()
-    desk.step()
-    desk.scaling.retune(parameters.MotionScalingParameters(plausible=ANY_HAND, mode="fine"))
-    desk.step()
-    assert (desk.state("is_fine"), desk.state("gain")) == (1.0, 0.1)
-
-
-def test_retuning_something_else_leaves_the_mode_of_the_button() -> None:
+def test_mode_parameter_switches_the_mode_at_run_time_and_others_leave_that_of_the_button() -> None:
     desk = Desk()
     desk.step()
     desk.press("mode")
     desk.scaling.retune(parameters.MotionScalingParameters(plausible=ANY_HAND, coarse_gain=2.0))
     desk.step()
     assert desk.state("is_fine") == 1.0
+    desk.press("mode")
+    desk.scaling.retune(parameters.MotionScalingParameters(plausible=ANY_HAND, mode="fine"))
+    desk.step()
+    assert (desk.state("is_fine"), desk.state("gain")) == (1.0, 0.1)
 
 
 def test_a_command_of_many_scaled_turns_stays_a_turn() -> None:
@@ -273,19 +269,13 @@ def test_box_goes_with_the_hand_while_clutched_and_stays_at_the_slave() -> None:
     assert np.allclose(desk.box()[0], before, rtol=0, atol=NANOMETRE)
 
 
-def test_size_of_the_box_on_the_slave_follows_the_gain() -> None:
+def test_size_of_the_box_follows_the_gain_and_a_second_press_takes_it_and_its_force_away() -> None:
     desk = Desk()
     desk.step()
     desk.press("fixture")
-    assert np.allclose(desk.box()[1], 30 * MM, rtol=0, atol=ROUNDING)
-    desk.press("mode")
-    assert np.allclose(desk.box()[1], 3 * MM, rtol=0, atol=ROUNDING)
-
-
-def test_second_press_takes_the_box_and_its_force_away() -> None:
-    desk = Desk()
-    desk.step()
-    desk.press("fixture")
+    for size in (3 * MM, 30 * MM):
+        desk.press("mode")
+        assert np.allclose(desk.box()[1], size, rtol=0, atol=ROUNDING)
     desk.step((20 * MM, 0, 0))
     assert desk.row["master_servo_cf"][0] < 0.0
     place = desk.press("fixture")

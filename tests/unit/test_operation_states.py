@@ -74,15 +74,12 @@ def test_an_emergency_stop_is_ended_by_a_reset_and_an_enable_and_by_nothing_else
     assert s["state"] == E
 
 
-def test_a_stop_that_is_still_pressed_cannot_be_reset() -> None:
+def test_a_stop_that_is_still_pressed_cannot_be_reset_nor_an_arm_that_moves_be_enabled() -> None:
     s = make(E, is_pressed=1)
     _change(s, int(Event.STOP))
     assert Answer(_change(s, int(Event.RESET))) is Answer.STOPPED
     s["is_pressed"] = 0
     assert Answer(_change(s, int(Event.RESET))) is Answer.DONE
-
-
-def test_an_arm_that_is_not_at_rest_is_not_enabled() -> None:
     s = make(D, is_moving=1)
     assert Answer(_change(s, int(Event.ENABLE))) is Answer.BRAKING
     assert s["state"] == D
@@ -100,13 +97,10 @@ def test_flags_agree_with_the_state_after_any_events(events: list[Event]) -> Non
         assert not s["is_stopped"] or s["state"] == F
 
 
-def test_unknown_commands_are_refused_by_name() -> None:
+@pytest.mark.parametrize("text", ["stop", "stop@", "stop@x", "go@1", "stop@-1", "stop@nan"])
+def test_unknown_commands_and_scripts_of_another_form_are_refused(text: str) -> None:
     with pytest.raises(UnknownNameError, match="enable"):
         command_event("go")
-
-
-@pytest.mark.parametrize("text", ["stop", "stop@", "stop@x", "go@1", "stop@-1", "stop@nan"])
-def test_scripts_of_another_form_are_refused(text: str) -> None:
     with pytest.raises(ParameterError, match="command@seconds"):
         OperationParameters(events=(text,))
 
@@ -248,8 +242,11 @@ def test_a_broken_stream_brakes_at_the_limits_of_the_drives() -> None:
     assert arm.state is E
 
 
-def test_after_a_long_outage_motion_is_resumed_on_purpose_only() -> None:
+@pytest.mark.parametrize("gap", [0.0, 0.2])
+def test_after_a_long_outage_motion_is_resumed_on_purpose_only(gap: float) -> None:
     arm = Arm(seconds=1.13, longest_outage=0.5)
+    arm.run(gap, commanded=False)  # before the last command
+    arm.run(0.001)
     arm.run(0.7, commanded=False)
     assert arm.state is P
     before = len(arm.setpoints)
@@ -278,14 +275,6 @@ def test_a_script_commands_at_its_times() -> None:
     assert still[240:398].all()
     assert not still[100:195].any()
     assert arm.state is F
-
-
-def test_a_stream_with_a_gap_before_its_last_command_pauses_the_arm_too() -> None:
-    arm = Arm(seconds=1.0, longest_outage=0.5)
-    arm.run(0.2, commanded=False)
-    arm.run(0.001)
-    arm.run(0.7, commanded=False)
-    assert arm.state is P
 
 
 @pytest.mark.parametrize("word", ["stop", "heartbeat"])

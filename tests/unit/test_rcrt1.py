@@ -185,6 +185,7 @@ def test_pose_beyond_the_reach_is_unreachable_and_the_arm_points_there() -> None
     pose = ARM.fk(joints(20, 100, 400, 10, 20, 30))
     pose[:3, 3] *= 2.0
     answer = ARM.ik(pose)
+    assert np.array_equal(answer.q, ARM.ik(pose, ARM.home).q)  # without a seed it is that next to home
     assert answer.status is IkStatus.UNREACHABLE
     assert answer.q[2] == ARM.upper[2]
     # The wrist still turns the tool as wanted.
@@ -217,11 +218,6 @@ def test_wrist_branch_inside_the_limits_wins_over_a_nearer_one_outside() -> None
     assert np.allclose(ARM.ik(ARM.fk(q), seed).q, q, rtol=0, atol=1e-12)
 
 
-def test_without_a_seed_the_answer_is_the_one_next_to_home() -> None:
-    pose = ARM.fk(joints(20, 100, 400, 10, 20, 30))
-    assert np.array_equal(ARM.ik(pose).q, ARM.ik(pose, ARM.home).q)
-
-
 @given(st.floats(0.0, 0.05), legal_joints())
 def test_shoulder_offset_keeps_the_inverse_an_inverse(offset: float, q: Array) -> None:
     # With an offset the wrist centre stays off the axis of joint 1.
@@ -231,15 +227,12 @@ def test_shoulder_offset_keeps_the_inverse_an_inverse(offset: float, q: Array) -
     assert np.allclose(arm.fk(branches), pose, rtol=0, atol=1e-12)
 
 
-def test_published_numbers_have_no_tendon_coupling() -> None:
-    angles = np.array([0.3, -0.4])
-    assert np.array_equal(tendon_motor_angles(angles), angles)
-
-
 def test_tendon_ratios_of_the_printed_radii_pull_both_motors() -> None:
     # r5* = 3.5, r5 = 2.5, r6* = 1.8, r6 = 2.5 mm.
     ratios = {"ratio5": 2.5 / 3.5, "ratio6": 2.5 / 1.8, "coupling": 2.5 / 1.8}
-    motors = tendon_motor_angles(np.array([0.7, 0.0]), **ratios)
+    angles = np.array([0.7, 0.0])
+    assert np.array_equal(tendon_motor_angles(angles), angles)  # published numbers have no coupling
+    motors = tendon_motor_angles(angles, **ratios)
     assert np.allclose(motors, (0.5, 0.7 * 2.5 / 1.8), rtol=0, atol=ROUNDING)
 
 

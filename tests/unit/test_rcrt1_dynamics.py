@@ -1,16 +1,14 @@
-"""RCRT-1 dynamics: closed form against pinocchio; the drive table."""
+"""RCRT-1 dynamics: published weights, inertia, the drive table."""
 
 import math
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-import pinocchio
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import ArrayLike
-from pinocchio import Inertia, Model
 
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot
@@ -20,7 +18,6 @@ from teleop_core.robots.arms.rcrt1_dynamics import DRIVES, LINKS, link_row
 # Entries are sums of a few products of numbers up to ten.
 ROUNDING = 1e-13
 DEGREE = math.pi / 180.0
-MOTORS = np.diag([LINKS["J1"], LINKS["J2"], LINKS["J3"]])
 ROW = link_row()
 
 states = st.tuples(st.floats(-1.4, 1.4), st.floats(0.9, 2.8), st.floats(0.1, 0.42), *[st.floats(-3.0, 3.0)] * 3)
@@ -36,12 +33,6 @@ def gravity(q: ArrayLike, row: Array = ROW) -> Array:
     out, joints = np.empty(6), np.zeros(6)
     joints[:3] = q
     rcrt1_dynamics.gravity_effort(joints, row, out)
-    return out
-
-
-def acceleration(q: Array, dq: Array, effort: Array) -> Array:
-    out = np.empty(6)
-    rcrt1_dynamics.acceleration(q, dq, effort, ROW, out)
     return out
 
 
@@ -65,61 +56,6 @@ def test_static_moment_of_the_four_bar_adds_to_axis_2() -> None:
     effort = gravity((0.0, math.pi / 2, 0.3), link_row(m2b_L0b=0.02))
     added = effort[1] - gravity((0.0, math.pi / 2, 0.3))[1]
     assert math.isclose(added, -9.81 * 0.02, abs_tol=ROUNDING)
-
-
-def spatial_inertia(
-    mass: float, center: Any, ixx: float, iyy: float, izz: float, ixy: float, ixz: float, iyz: float
-) -> Inertia:
-    """pinocchio's inertia, about the centre of mass, from moments about the frame's origin."""
-    center = np.array(center)
-    about_origin = np.array([[ixx, -ixy, -ixz], [-ixy, iyy, -iyz], [-ixz, -iyz, izz]])
-    shift = mass * (center @ center * np.eye(3) - np.outer(center, center))
-    return pinocchio.Inertia(mass, center, about_origin - shift)
-
-
-def pinocchio_model() -> Model:
-    """The same arm as a chain Rz, Ry, Pz; frame 2 and 3 as in the source, motors as armature."""
-    model = pinocchio.Model()
-    model.gravity.linear = np.array([0.0, 0.0, -LINKS["g"]])
-    joints = (pinocchio.JointModelRZ(), pinocchio.JointModelRY(), pinocchio.JointModelPZ())
-    bodies = (
-        # Frame 1 of the source has its y axis along -z0.
-        spatial_inertia(1e-12, (0, 0, 0), 1.0, 1.0, LINKS["I1yy"], 0.0, 0.0, 0.0),
-        spatial_inertia(
-            LINKS["m2"], (LINKS["G2x"], 0, LINKS["G2z"]),
-            LINKS["I2xx"], LINKS["I2yy"], LINKS["I2zz"],
-            LINKS["I2xy"], LINKS["I2xz"], LINKS["I2yz"],
-        ),
-        spatial_inertia(
-            LINKS["m3"], (LINKS["G3x"], 0, LINKS["G3z"]),
-            LINKS["I3xx"], LINKS["I3yy"], LINKS["I3zz"], 0.0, LINKS["I3xz"], 0.0,
-        ),
-    )  # fmt: skip
-    parent = 0
-    for index, (joint, body) in enumerate(zip(joints, bodies, strict=True)):
-        parent = model.addJoint(parent, joint, pinocchio.SE3.Identity(), str(index))
-        model.appendBodyToJoint(parent, body, pinocchio.SE3.Identity())
-    model.armature = np.diag(MOTORS).copy()
-    return model
-
-
-PINOCCHIO = pinocchio_model()
-
-
-@given(states, st.tuples(*[st.floats(-6.0, 6.0)] * 2, st.floats(-25.0, 25.0)))
-def test_accelerations_are_pinocchios(state: tuple[float, ...], drive: tuple[float, float, float]) -> None:
-    q, dq, effort = np.zeros(6), np.zeros(6), np.zeros(6)
-    q[:3], dq[:3], effort[:3] = state[:3], state[3:], drive
-    expected = pinocchio.aba(PINOCCHIO, PINOCCHIO.createData(), q[:3], dq[:3], effort[:3])
-    # Accelerations up to 100 rad/s²; aba and the closed form round in different orders.
-    assert np.allclose(acceleration(q, dq, effort)[:3], expected, rtol=0, atol=1e-10)
-
-
-@given(states)
-def test_gravity_is_pinocchios(state: tuple[float, ...]) -> None:
-    q = np.array(state[:3])
-    expected = pinocchio.computeGeneralizedGravity(PINOCCHIO, PINOCCHIO.createData(), q)
-    assert np.allclose(gravity(q)[:3], expected, rtol=0, atol=10 * ROUNDING)
 
 
 @given(states)

@@ -1,13 +1,10 @@
-"""The RCRT-1 of table A.1, mended, in engines by others: MuJoCo, pinocchio."""
+"""The RCRT-1 of table A.1, mended, in an engine by others: pinocchio."""
 
 import math
 from collections.abc import Sequence
-from typing import Any
 
-import mujoco
 import numpy as np
 import pinocchio
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from pinocchio import Model
@@ -58,73 +55,6 @@ def ours(state: Sequence[float] | Array) -> Array:
     return out[:3]
 
 
-# --- MuJoCo ----------------------------------------------------------------------------------
-
-BODY = """
-<body name="{name}" {frame}>
-  <joint type="{kind}" axis="{axis}" armature="{armature!r}"/>
-  <inertial pos="{center}" mass="{mass!r}" fullinertia="{inertia}"/>
-  {child}
-</body>"""
-
-
-def numbers(values: Sequence[float] | Array) -> str:
-    return " ".join(repr(float(value)) for value in values)
-
-
-def mujoco_xml(table: Any) -> str:
-    """The arm as nested bodies; body 1 keeps axes along the base's, so its row is turned."""
-    # Frame 1 to base axes at rest: x1 = x0, y1 = -z0, z1 = y0.
-    turn = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
-    child = ""
-    for index in (2, 1, 0):
-        mass, center, *_ = table[index]
-        tensor = central(*table[index])
-        if index == 0:
-            center, tensor = turn @ center, turn @ tensor @ turn.T
-        upper = (*np.diag(tensor), tensor[0, 1], tensor[0, 2], tensor[1, 2])
-        child = BODY.format(
-            name=f"link{index + 1}",
-            frame="",
-            kind=("hinge", "hinge", "slide")[index],
-            axis=("0 0 1", "0 1 0", "0 0 1")[index],
-            armature=MOTORS[index],
-            center=numbers(center),
-            mass=mass,
-            inertia=numbers(upper),
-            child=child,
-        )
-    return f"""<mujoco>
-  <option gravity="0 0 {-rcrt1_dynamics.LINKS["g"]!r}"/>
-  <compiler angle="radian"/>
-  <worldbody>{child}</worldbody>
-</mujoco>"""
-
-
-MODEL = mujoco.MjModel.from_xml_string(mujoco_xml(TABLE))
-
-
-def mujoco_acceleration(state: tuple[float, ...]) -> Array:
-    data = mujoco.MjData(MODEL)
-    data.qpos[:], data.qvel[:], data.qfrc_applied[:] = state[:3], state[3:6], state[6:]
-    mujoco.mj_forward(MODEL, data)
-    return data.qacc.copy()
-
-
-@given(states)
-def test_accelerations_are_mujocos(state: tuple[float, ...]) -> None:
-    assert np.allclose(ours(state), mujoco_acceleration(state), rtol=0, atol=AGREE)
-
-
-def test_mujoco_refuses_link_3_with_the_product_as_printed() -> None:
-    printed = (*TABLE[:2], (*TABLE[2][:3], (0.0, 3.0e-3, 0.0)))
-    with pytest.raises(ValueError, match=r"(?s)positive eigenvalues.*link3"):
-        mujoco.MjModel.from_xml_string(mujoco_xml(printed))
-
-
-# --- pinocchio -------------------------------------------------------------------------------
-
-
 def pinocchio_model() -> Model:
     """Joints in the source's own frames: standard Denavit-Hartenberg transforms after each."""
     model, parent, place = pinocchio.Model(), 0, pinocchio.SE3.Identity()
@@ -147,6 +77,10 @@ def test_accelerations_are_pinocchios_in_the_frames_of_the_source(state: tuple[f
     q, dq, effort = np.array(state[:3]), np.array(state[3:6]), np.array(state[6:])
     expected = pinocchio.aba(PINOCCHIO, PINOCCHIO.createData(), q, dq, effort)
     assert np.allclose(ours(state), expected, rtol=0, atol=AGREE)
+    weight, joints = np.empty(6), np.append(q, np.zeros(3))
+    rcrt1_dynamics.gravity_effort(joints, ROW, weight)
+    expected = pinocchio.computeGeneralizedGravity(PINOCCHIO, PINOCCHIO.createData(), q)
+    assert np.allclose(weight[:3], expected, rtol=0, atol=1e-12)
 
 
 # --- laws ------------------------------------------------------------------------------------

@@ -79,7 +79,11 @@ def attitudes(rows: Array) -> Rotation:
 
 
 def test_place_and_attitude_are_those_recorded_relative_to_the_first(tmp_path: Path) -> None:
-    rows = motion(bag(tmp_path / "bag"))(T)
+    moved = motion(bag(tmp_path / "bag"))
+    rest = moved(np.array([-1.0, 0.0, 2.0, 50.0]))  # before the first and after the last sample
+    assert not rest[:2].any()
+    assert np.array_equal(rest[2], rest[3])
+    rows = moved(T)
     assert np.allclose(rows[:, :3], PLACES - PLACES[0], rtol=0, atol=1e-15)
     expected = TURNS * TURNS[0].inv() * REST  # turned in the axes of the master's base
     assert (expected.inv() * attitudes(rows)).magnitude().max() < 1e-7
@@ -92,12 +96,6 @@ def test_between_samples_the_hand_moves_and_turns_evenly(tmp_path: Path) -> None
     relative = TURNS * TURNS[0].inv() * REST
     half = Rotation.from_rotvec(0.5 * (relative[1:] * relative[:-1].inv()).as_rotvec())
     assert ((half * relative[:-1]).inv() * attitudes(middle)).magnitude().max() < 1e-7
-
-
-def test_hand_rests_before_the_first_and_after_the_last_sample(tmp_path: Path) -> None:
-    rows = motion(bag(tmp_path / "bag"))(np.array([-1.0, 0.0, 2.0, 50.0]))
-    assert not rows[:2].any()
-    assert np.array_equal(rows[2], rows[3])
 
 
 def test_hand_waits_over_a_gap_and_not_over_a_short_one(tmp_path: Path) -> None:
@@ -158,14 +156,11 @@ def test_a_session_lasts_as_long_as_what_it_follows_unless_told(given: Any, seco
     assert made.groups["teleop"].duration == pytest.approx(seconds)
 
 
-def test_a_length_that_cannot_be_asked_is_refused() -> None:
+def test_operators_without_end_leave_the_duration_alone_and_a_length_is_asked() -> None:
+    assert tc.configuration("coarse_box").groups["teleop"].duration == 46.0
     part = tc.Operator("endless", lambda parameters, setting: lambda times: times, length=3.0)  # type: ignore[arg-type]
     with pytest.raises(tc.PartError, match="length"):
         tc.register_operator("endless", part)
-
-
-def test_operators_without_end_leave_the_duration_alone() -> None:
-    assert tc.configuration("coarse_box").groups["teleop"].duration == 46.0
 
 
 def test_a_motion_beyond_the_stops_is_told_with_its_share_and_what_helps(tmp_path: Path) -> None:

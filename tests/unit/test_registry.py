@@ -39,47 +39,26 @@ def installed(folder: Path, monkeypatch: pytest.MonkeyPatch, *entries: str) -> N
     monkeypatch.delitem(sys.modules, "own_module", raising=False)
 
 
-def test_part_is_found_by_the_name_it_was_added_under() -> None:
+def test_part_is_found_by_the_name_it_was_added_under_and_another_is_refused_with_the_known_ones() -> None:
     parts, part = registry(), object()
-    assert parts.add("mine", part) is part
+    for _ in range(2):  # the same part may be added again
+        assert parts.add("mine", part) is part
     assert parts.find("mine") is part
     assert parts.names() == ("here", "json", "mine")
-
-
-def test_unknown_name_is_refused_with_the_known_ones() -> None:
     with pytest.raises(UnknownNameError) as error:
-        registry().find("there")
-    assert error.value.alternatives == ("here", "json")
+        parts.find("there")
+    assert error.value.alternatives == ("here", "json", "mine")
 
 
-@pytest.mark.parametrize("name", ["here", "mine"])
-def test_name_that_is_used_already_is_refused(name: str) -> None:
-    parts = registry()
+def test_used_name_is_refused_and_an_added_part_may_be_replaced_and_removed_but_no_built_in_one() -> None:
+    parts, second = registry(), object()
     parts.add("mine", object())
-    with pytest.raises(PartError) as error:
-        parts.add(name, object())
-    assert (error.value.kind, error.value.name) == ("part", name)
-
-
-def test_same_part_may_be_added_again() -> None:
-    parts, part = registry(), object()
-    parts.add("mine", part)
-    assert parts.add("mine", part) is part
-
-
-def test_added_part_may_be_replaced_and_a_built_in_one_may_not() -> None:
-    parts = registry()
-    parts.add("mine", object())
-    second = object()
+    for name, replace in (("here", False), ("mine", False), ("here", True)):
+        with pytest.raises(PartError) as error:
+            parts.add(name, second, replace=replace)
+        assert (error.value.kind, error.value.name) == ("part", name)
     assert parts.add("mine", second, replace=True) is second
     assert parts.find("mine") is second
-    with pytest.raises(PartError):
-        parts.add("here", second, replace=True)
-
-
-def test_added_part_can_be_removed_and_a_built_in_one_cannot() -> None:
-    parts = registry()
-    parts.add("mine", object())
     parts.remove("mine")
     assert "mine" not in parts.names()
     for name in ("mine", "here"):
@@ -127,21 +106,15 @@ def test_installed_part_that_takes_a_built_in_name_is_refused(tmp_path: Path, mo
 @pytest.mark.parametrize(
     ("parts", "name"), [(SHAPES, "box"), (CONTROLLERS, "pid"), (OPERATORS, "line"), (STAGES, "slave_sim")]
 )
-def test_name_of_a_built_in_part_is_taken_on_every_seam(parts: Registry[Any], name: str) -> None:
+def test_on_every_seam_built_in_parts_are_parts_their_names_are_taken_and_no_object_is_one(
+    parts: Registry[Any], name: str
+) -> None:
+    for found in parts:
+        assert parts.find(found) is parts.find(found)
+    with pytest.raises(PartError, match="int") as error:
+        parts.add("mine", 5)
+    assert (error.value.kind, error.value.name) == (parts.kind, "mine")
     other = next(parts.find(found) for found in parts if found != name)
     with pytest.raises(PartError) as error:
         parts.add(name, other)
     assert (error.value.kind, error.value.name) == (parts.kind, name)
-
-
-@pytest.mark.parametrize("parts", [SHAPES, CONTROLLERS, OPERATORS, STAGES])
-def test_object_that_is_no_such_part_is_refused_on_every_seam(parts: Registry[Any]) -> None:
-    with pytest.raises(PartError, match="int") as error:
-        parts.add("mine", 5)
-    assert (error.value.kind, error.value.name) == (parts.kind, "mine")
-
-
-@pytest.mark.parametrize("parts", [SHAPES, CONTROLLERS, OPERATORS, STAGES])
-def test_every_built_in_part_is_one(parts: Registry[Any]) -> None:
-    for name in parts:
-        assert parts.find(name) is parts.find(name)

@@ -70,18 +70,12 @@ def test_before_the_first_pose_the_stylus_rests_and_the_clutch_is_pressed() -> N
 
 
 @pytest.mark.parametrize("delay", [0.02, 0.045, 0.2])
-def test_the_stylus_is_behind_a_steady_motion_by_the_stated_delay(delay: float) -> None:
+def test_the_stylus_is_behind_a_steady_motion_and_a_steady_turn_by_the_stated_delay(delay: float) -> None:
     speed, run = 0.1, Run(delay=delay)
-    run.for_time(1.0 + 10 * delay, lambda t: pose([speed * t, 0.0, 0.0]), period=0.0)
+    run.for_time(0.4 + 10 * delay, lambda t: pose([speed * t, 0.0, 0.0], [0.0, 0.0, speed * t]), period=0.0)
     behind = np.arange(1, len(run.way) + 1) * DT - run.way[:, 0] / speed
     # A pose is taken for all ticks of a question, and counts from its first one on.
     assert np.abs(behind[-200:] - delay).max() <= AHEAD * DT + 1e-9
-
-
-@pytest.mark.parametrize("delay", [0.02, 0.045, 0.2])
-def test_the_stylus_turns_behind_a_steady_turn_by_the_stated_delay(delay: float) -> None:
-    speed, run = 1.0, Run(delay=delay)
-    run.for_time(0.4 + 10 * delay, lambda t: pose(turn=[0.0, 0.0, speed * t]), period=0.0)
     w, x, y, z = run.hand.pose[3:]
     start = Rotation.from_quat(REST[[4, 5, 6, 3]])
     turned = (Rotation.from_quat([x, y, z, w]) * start.inv()).as_rotvec()
@@ -216,11 +210,6 @@ def test_what_is_no_pose_is_refused_counted_and_counts_as_silence(bad: list[floa
     assert np.abs(run.rows[:, :6]).max() < 1e-12
 
 
-def test_a_pose_of_another_shape_is_an_error() -> None:
-    with pytest.raises(ShapeError, match=r"pose must have shape \(7,\), has \(2, 7\)"):
-        RemoteHand().want(np.zeros((2, 7)))
-
-
 def test_what_a_caller_does_with_a_pose_later_changes_nothing() -> None:
     run, mine = Run(), pose()
     run.hand.want(mine)
@@ -266,9 +255,11 @@ def test_a_pressed_clutch_leaves_the_stylus_to_the_hand() -> None:
     assert run.for_time(0.02)[-1, 6] == 0.0
 
 
-def test_a_button_that_there_is_not_is_named_with_those_there_are() -> None:
+def test_a_button_that_there_is_not_and_a_pose_of_another_shape_are_errors() -> None:
     with pytest.raises(UnknownNameError, match="clutch, fixture, mode"):
         RemoteHand().press("gripper")
+    with pytest.raises(ShapeError, match=r"pose must have shape \(7,\), has \(2, 7\)"):
+        RemoteHand().want(np.zeros((2, 7)))
 
 
 def test_a_hand_that_wants_too_far_waits_at_the_end_of_the_workspace_and_comes_back() -> None:
@@ -308,16 +299,13 @@ def test_the_operator_gives_the_hand_within_the_workspace_of_its_device() -> Non
     assert master.ahead == AHEAD
     hand, device = master.hand, master._fixed.device
     assert isinstance(hand, RemoteHand)
+    assert RunningOperator(configure(settings=["operator=hold"]).groups["operator"]).hand is None  # of no person
     times: Any = np.arange(1, 5) * DT
     for k in range(500):
         hand.want(pose([5.0 * (k > 0), 0.0, 0.0]))
         hand.motion(times + 4 * k * DT)
     middle = REST[:3] - device.start
     assert hand.pose[0] == pytest.approx(middle[0] + 0.5 * device.workspace[0], abs=1e-6)
-
-
-def test_an_operator_that_is_no_person_has_no_hand() -> None:
-    assert RunningOperator(configure(settings=["operator=hold"]).groups["operator"]).hand is None
 
 
 def test_a_hand_draws_for_the_operator_what_its_motion_says() -> None:

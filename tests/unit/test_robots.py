@@ -128,15 +128,17 @@ def registered(monkeypatch: pytest.MonkeyPatch) -> Callable[..., object]:
     return register_robot
 
 
-def test_a_registered_robot_loads_by_its_name_and_is_listed(registered: Callable[..., object]) -> None:
+def test_a_registered_robot_or_table_loads_by_its_name_takes_no_geometry_and_is_listed(
+    registered: Callable[..., object],
+) -> None:
     arm = registered(robot_from_table(TABLE))
     assert load_robot("my_arm") is arm
-    assert "my_arm" in list_robots()
-
-
-def test_a_registered_table_loads_as_a_robot(registered: Callable[..., object]) -> None:
     registered(parse_table(TABLE), "arm_of_mine")
     assert load_robot("arm_of_mine").joint_names == ("q1", "q2", "slide")
+    assert {"my_arm", "arm_of_mine"} <= set(list_robots())
+    with pytest.raises(errors.ParameterError) as caught:
+        load_robot("my_arm", a2=1.0)
+    assert caught.value.name == "geometry"
 
 
 def test_a_registered_function_gets_the_geometry(registered: Callable[..., object]) -> None:
@@ -237,13 +239,6 @@ def test_a_robot_with_a_wrong_kernel_is_refused_before_anything_runs(registered:
         registered(crank(ik=ik))
 
 
-def test_ready_robots_take_no_geometry(registered: Callable[..., object]) -> None:
-    registered(robot_from_table(TABLE))
-    with pytest.raises(errors.ParameterError) as caught:
-        load_robot("my_arm", a2=1.0)
-    assert caught.value.name == "geometry"
-
-
 def test_the_path_of_a_table_is_a_robot(tmp_path: Path) -> None:
     path = tmp_path / "my_arm.yaml"
     path.write_text(yaml.safe_dump(TABLE), encoding="utf-8")
@@ -270,11 +265,7 @@ def test_a_robot_is_one_line_at_the_prompt_and_a_table_in_a_notebook() -> None:
     html = arm._repr_html_()
     assert html.count("<tr>") == 4
     assert "slide" in html
-
-
-def test_robots_with_names_from_elsewhere_cannot_write_into_the_page() -> None:
-    arm = robot_from_table({**TABLE, "name": "<script>"})
-    assert "<script>" not in arm._repr_html_()
+    assert "<script>" not in robot_from_table({**TABLE, "name": "<script>"})._repr_html_()
 
 
 @pytest.mark.parametrize("name", ["rcrt1", "puma560"])

@@ -56,7 +56,7 @@ class Bench:
         self.slave.step()
         return commands.CommandStatus(self.row["command_status"])
 
-    def trace(self, command: Array, ticks: int) -> tuple[Array, Array]:
+    def trace(self, command: Array | None, ticks: int) -> tuple[Array, Array]:
         """True joints (ticks, 6) and efforts (ticks, 6) under a constant command."""
         joints, efforts = np.empty((ticks, 6)), np.empty((ticks, 6))
         for i in range(ticks):
@@ -136,15 +136,9 @@ def test_more_steps_change_the_path_of_the_arm_less_and_less() -> None:
 
 @pytest.mark.parametrize("compensation", ["published", "all", "none"])
 def test_arm_starts_in_balance_whatever_is_compensated(compensation: str) -> None:
-    joints, _ = Bench(gravity_compensation=compensation).trace(ARM.home, 500)
-    assert (np.abs(joints - ARM.home) <= COUNT).all()
-
-
-def test_arm_without_any_command_holds_home() -> None:
-    bench = Bench()
-    for _ in range(500):
-        bench.tick()
-    assert (np.abs(bench.joints - ARM.home) <= COUNT).all()
+    for command in (ARM.home, None):  # it holds home without any command too
+        joints, _ = Bench(gravity_compensation=compensation).trace(command, 500)
+        assert (np.abs(joints - ARM.home) <= COUNT).all()
 
 
 @pytest.mark.parametrize("joint", JOINTS)
@@ -349,12 +343,7 @@ def test_jump_is_refused_counted_and_not_followed(joint: int) -> None:
     calm.tick()
     assert np.array_equal(bench.setpoint, calm.setpoint)
     assert np.array_equal(bench.joints, calm.joints)
-
-
-def test_largest_step_that_is_no_jump_is_followed() -> None:
-    bench = Bench()
-    bench.go_to(MIDDLE)
-    assert bench.tick(MIDDLE + 0.0999 * DRIVES.speed_limit) is commands.CommandStatus.FRESH
+    assert calm.tick(MIDDLE + 0.0999 * DRIVES.speed_limit) is commands.CommandStatus.FRESH
 
 
 def test_slave_resumes_when_the_command_comes_back_near() -> None:
@@ -398,25 +387,18 @@ def test_old_stamps_are_not_taken_again() -> None:
     assert np.array_equal(bench.slave.server.state["command"], MIDDLE)
 
 
-def test_a_stamp_from_the_future_does_not_shut_out_the_commands_after_it() -> None:
-    bench = Bench()
-    bench.go_to(MIDDLE)
-    bench.tick(MIDDLE, stamp_ns=bench.now_ns + 3600 * 10**9)
-    assert bench.slave.server.refused == 1
-    goal = MIDDLE + 0.05 * DRIVES.speed_limit
-    bench.tick(goal)
-    assert np.array_equal(bench.slave.server.state["target"], goal)
-
-
-def test_stamps_of_a_clock_that_was_ahead_do_not_shut_out_those_of_the_right_one() -> None:
+def test_stamps_from_the_future_and_of_a_clock_that_was_ahead_do_not_shut_out_those_after_them() -> None:
     """Messages that go back come here only after a silence, or from who starts anew."""
-    bench = Bench()
+    bench, later_ns = Bench(), 3600 * 10**9
     bench.go_to(MIDDLE)
+    bench.tick(MIDDLE, stamp_ns=bench.now_ns + later_ns)
     state = bench.slave.server.state
-    state["seen_ns"] = bench.now_ns + 3600 * 10**9
-    goal = MIDDLE + 0.05 * DRIVES.speed_limit
-    bench.tick(goal)
-    assert np.array_equal(state["target"], goal)
+    assert bench.slave.server.refused == 1
+    for share in (0.05, -0.05):
+        goal = MIDDLE + share * DRIVES.speed_limit
+        bench.tick(goal)
+        assert np.array_equal(state["target"], goal)
+        state["seen_ns"] = bench.now_ns + later_ns
 
 
 def test_command_outside_the_limits_is_followed_up_to_them() -> None:
@@ -445,13 +427,10 @@ def wander(bench: Bench, ticks: int = 800) -> NDArray[np.void]:
     return np.array(out)
 
 
-def test_same_commands_give_the_same_bits() -> None:
-    assert np.array_equal(wander(Bench()), wander(Bench()))
-
-
-def test_reset_repeats_the_motion_to_the_bit() -> None:
+def test_the_same_commands_and_a_reset_repeat_the_motion_to_the_bit() -> None:
     bench = Bench()
     first = wander(bench)
+    assert np.array_equal(first, wander(Bench()))
     bench.slave.reset()
     bench.now_ns = 0
     bench.row["slave_servo_jp_ns"] = 0
@@ -519,18 +498,13 @@ def test_gains_that_change_before_the_first_tick_count_from_the_begin(law: str) 
 
 
 @pytest.mark.parametrize("length", [1, 5, 7])
-@pytest.mark.parametrize("name", ["viscous", "coulomb"])
+@pytest.mark.parametrize(
+    "name", ["viscous", "coulomb", *(f"controller.pid.{k}" for k in ("bandwidth", "kp", "ki", "kd"))]
+)
 def test_list_of_another_length_than_the_joints_is_refused(name: str, length: int) -> None:
     with pytest.raises(ParameterError) as error:
-        pair.SimulatedArm(pair.ArmParameters(**dict[str, Any]({name: (1.0,) * length})))
+        pair.SimulatedArm(build(pair.ArmParameters, {name: (1.0,) * length}))
     assert error.value.name == f"slave_sim.{name}"
-
-
-@pytest.mark.parametrize("name", ["bandwidth", "kp", "ki", "kd"])
-def test_gains_of_another_length_than_the_joints_are_refused(name: str) -> None:
-    with pytest.raises(ParameterError) as error:
-        pair.SimulatedArm(pair.ArmParameters(controller=pid(**{name: (1.0,) * 5})))
-    assert error.value.name == f"slave_sim.controller.pid.{name}"
 
 
 def test_refused_retuning_changes_nothing() -> None:

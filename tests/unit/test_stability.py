@@ -8,7 +8,7 @@ from teleop_core.graph.signals import DT
 from teleop_lab.experiments.bench import Bench
 from teleop_lab.experiments.one_axis import Grip, exact_boundary, found_boundary, growth
 from teleop_lab.experiments.sampled_wall import Wall, wall_growth
-from teleop_lab.experiments.stability import DELAYS, GRIPS, STIFFEST, chain_boundary, fastest
+from teleop_lab.experiments.stability import DELAYS, GRIPS, STIFFEST, calm_speed, chain_boundary, fastest
 from teleop_lab.experiments.zwidth import BARE
 
 MEDIUM = GRIPS["medium"]
@@ -83,9 +83,10 @@ def test_a_heavier_hand_stands_a_late_spring_no_better_but_a_damped_one_does() -
 
 def test_force_throws_a_hand_above_its_boundary_but_not_with_a_tank_or_by_a_soft_spring() -> None:
     bench, force = Bench(), ("position_force", "none")
-    found = chain_boundary(bench, MEDIUM, 0.05, force)
+    calm = calm_speed(bench, MEDIUM)
+    found = chain_boundary(bench, MEDIUM, 0.05, force, calm)
     assert 600.0 < found < 1200.0
     for way in (("position_force", "tank"), ("position_position", "none"), ("position_force", "tdpa")):
-        assert chain_boundary(bench, MEDIUM, 0.05, way) == STIFFEST
-    calm, thrown = (fastest(bench, MEDIUM, 0.05, share * found, force) for share in (0.5, 2.0))
-    assert thrown > 2.0 * calm
+        assert chain_boundary(bench, MEDIUM, 0.05, way, calm) == STIFFEST
+    below, above = (fastest(bench, MEDIUM, 0.05, share * found, force) for share in (0.5, 2.0))
+    assert above > 2.0 * below

@@ -122,18 +122,6 @@ def test_the_inertia_and_weight_of_the_rcrt1_are_those_of_its_equations(d2: floa
         np.testing.assert_allclose(found, weight, rtol=0.0, atol=1e-9)
 
 
-def test_the_rcrt1_accelerates_as_its_file_does_with_its_motors() -> None:
-    robot, found = tc.load_robot("rcrt1"), np.empty(6)
-    model, row = read_model(robot), present(robot.dynamics).parameters.copy()
-    model.armature = np.array([rcrt1_dynamics.LINKS[f"J{i}"] for i in range(1, 7)])
-    rng, data = np.random.default_rng(6), model.createData()
-    for q in rng.uniform(robot.lower, robot.upper, (100, 6)):
-        dq, effort = rng.normal(size=(2, 6)) * (1.0, 1.0, 0.2, 0.0, 0.0, 0.0)
-        present(robot.dynamics).acceleration(q, dq, effort, row, found)
-        expected = pinocchio.aba(model, data, q, dq, effort)
-        np.testing.assert_allclose(found[:3], expected[:3], rtol=1e-9, atol=1e-9)
-
-
 def test_an_arm_of_links_is_written_with_the_links_that_were_read() -> None:
     robot = tc.load_robot(EXAMPLE, tip="tool0", dynamics="links")
     model, row = read_model(robot), present(robot.dynamics).parameters.copy()

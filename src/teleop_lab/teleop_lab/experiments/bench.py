@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
-from functools import partial
+from functools import cache, partial
 from multiprocessing import get_context
 from typing import TypeVar
 
@@ -15,7 +15,7 @@ from teleop_core.chain.operators import Motion
 from teleop_core.evaluation import Score
 from teleop_core.graph.topics import NO_COMMAND_NS
 from teleop_core.kernels.geometry import Array
-from teleop_core.session.recording import Stream
+from teleop_core.session.recording import Recording, Stream
 from teleop_core.session.runner import silent
 from teleop_core.slave.pair import ArmParameters
 
@@ -49,14 +49,19 @@ class Session:
     Attributes:
         name: Scenario.
         seed: Its seed.
-        score: What it is worth.
+        judge: Gives its score.
         read: Gives the streams by topic.
     """
 
     name: str
     seed: int
-    score: Score
+    judge: Callable[[], Score]
     read: Callable[[], Mapping[str, Stream]]
+
+    @property
+    def score(self) -> Score:
+        """What it is worth; one that was not scored is run again, to the same bits."""
+        return self.judge()
 
     @property
     def streams(self) -> Mapping[str, Stream]:
@@ -123,13 +128,16 @@ class Bench:
         """How many sessions ran so far."""
         return len(self._known)
 
-    def session(self, scenario: str, seed: int | None = None, settings: Settings | None = None) -> Session:
+    def session(
+        self, scenario: str, seed: int | None = None, settings: Settings | None = None, *, is_scored: bool = True
+    ) -> Session:
         """Run a session, unless the same one ran before.
 
         Args:
             scenario: One of ``teleop scenarios``.
             seed: Seed of everything random in it; None for the first of the bench.
             settings: Parameters over the scenario and the bench's settings.
+            is_scored: Whether its score will be asked for, which takes longer than the session itself.
 
         Raises:
             TeleopError: A setting or the scenario is wrong.
@@ -138,15 +146,20 @@ class Bench:
         given = self._settings | dict(settings or {})
         key = (scenario, number, tuple((name, repr(given[name])) for name in sorted(given)))
         if key not in self._known:
-            score, streams = self._run(scenario, number, given)
-            self._keep(key, streams)
+            recording = self._run(scenario, number, given)
+            score = recording.score() if is_scored else None
+            self._keep(key, _aligned(recording))
 
             def read() -> Mapping[str, Stream]:
                 if key not in self._streams:
-                    self._keep(key, self._run(scenario, number, given)[1])
+                    self._keep(key, _aligned(self._run(scenario, number, given)))
                 return self._streams[key]
 
-            self._known[key] = Session(scenario, number, score, read)
+            @cache
+            def judge() -> Score:
+                return score or self._run(scenario, number, given).score()
+
+            self._known[key] = Session(scenario, number, judge, read)
         return self._known[key]
 
     def _keep(self, key: object, streams: Mapping[str, Stream]) -> None:
@@ -155,9 +168,9 @@ class Bench:
         if len(self._streams) > _WHOLE:
             del self._streams[next(iter(self._streams))]
 
-    def sessions(self, scenario: str, settings: Settings | None = None) -> list[Session]:
+    def sessions(self, scenario: str, settings: Settings | None = None, *, is_scored: bool = True) -> list[Session]:
         """The same session by several hands; see :meth:`session`."""
-        return [self.session(scenario, seed, settings) for seed in self.seeds]
+        return [self.session(scenario, seed, settings, is_scored=is_scored) for seed in self.seeds]
 
     def slave(self, settings: Settings | None = None) -> ArmParameters:
         """Parameters of a slave under the bench's settings and more, for moves of the slave alone.
@@ -211,19 +224,19 @@ class Bench:
             self.progress(done, total)
             yield result
 
-    def _run(self, scenario: str, seed: int, settings: Settings) -> tuple[Score, Mapping[str, Stream]]:
+    def _run(self, scenario: str, seed: int, settings: Settings) -> Recording:
         from teleop_core.session.api import run
 
-        recording = run(scenario, seed=seed, settings=settings, progress=self.progress)
-        return recording.score(), _aligned({name: recording[name] for name in _KEPT})
+        return run(scenario, seed=seed, settings=settings, progress=self.progress)
 
 
 def _work(work: Callable[[Bench, Job], Result], seed: int, settings: Settings, job: Job) -> Result:
     return work(Bench(seed, settings=settings), job)
 
 
-def _aligned(streams: dict[str, Stream]) -> Mapping[str, Stream]:
+def _aligned(recording: Recording) -> Mapping[str, Stream]:
     """Streams of the slave with rows of the same samples: its measured pose comes a tick later."""
+    streams = {name: recording[name] for name in _KEPT}
     for name in _OF_SLAVE:
         streams[name] = streams[name].part(slice(0, -1))
     later = streams["slave/measured_cp"]

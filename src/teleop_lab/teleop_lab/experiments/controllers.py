@@ -91,7 +91,7 @@ def _rms(values: Array) -> float:
 
 def compared(bench: Bench, scenario: str, law: str) -> list[Session]:
     """Sessions of several hands with a law of :data:`LAWS` on the hardware plant."""
-    return bench.sessions(scenario, {**_PLANT, **LAWS[law]})
+    return bench.sessions(scenario, {**_PLANT, **LAWS[law]}, is_scored=False)
 
 
 def steps_of(bench: Bench, law: str) -> joint_steps.StepAnswer:

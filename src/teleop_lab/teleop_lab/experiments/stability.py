@@ -81,15 +81,26 @@ def fastest(bench: Bench, grip: one_axis.Grip, delay: float, stiffness: float, w
     return float(ways.max()) / (_WINDOW * 1e-3)
 
 
-def chain_boundary(bench: Bench, grip: one_axis.Grip, delay: float, way: transmission.Way) -> float:
+def calm_speed(bench: Bench, grip: one_axis.Grip) -> float:
+    """Fastest that a hand gets that is not thrown [m/s], by the softest object whose force is not late."""
+    return _THROWN * fastest(bench, grip, 0.0, SOFTEST, _WAYS[0])
+
+
+def chain_boundary(bench: Bench, grip: one_axis.Grip, delay: float, way: transmission.Way, calm: float) -> float:
     """Stiffness [N/m] up to which the whole chain leaves the hand calm, from 20 to 50 000 N/m.
 
     The device has its friction and its steps, the arm its lag and the reference its filter.
+
+    Args:
+        bench: Where it runs.
+        grip: The hand.
+        delay: By which the force comes later [s].
+        way: Architecture and passivity.
+        calm: Speed of the hand up to which it is calm [m/s], of :func:`calm_speed`.
     """
-    most = _THROWN * fastest(bench, grip, 0.0, SOFTEST, _WAYS[0])
 
     def is_calm(stiffness: float) -> bool:
-        return fastest(bench, grip, delay, stiffness, way) <= most
+        return fastest(bench, grip, delay, stiffness, way) <= calm
 
     if is_calm(STIFFEST):
         return STIFFEST
@@ -104,6 +115,7 @@ def _measure(bench: Bench) -> Findings:
     rows, found = [], {}
     total, done = len(GRIPS) * len(DELAYS), 0
     for name, grip in GRIPS.items():
+        calm = calm_speed(bench, grip)
         for delay in DELAYS:
             told = f"force {1e3 * delay:.0f} ms later"
             exact = one_axis.exact_boundary(grip, delay + DT)
@@ -118,7 +130,7 @@ def _measure(bench: Bench) -> Findings:
                     group=f"one axis before a spring, {name} grip",
                 )
             )
-            found[name, delay] = tuple(chain_boundary(bench, grip, delay, way) for way in _WAYS)
+            found[name, delay] = tuple(chain_boundary(bench, grip, delay, way, calm) for way in _WAYS)
             done += 1
             bench.progress(done, total)
     for k, (architecture, passivity) in enumerate(_WAYS):
