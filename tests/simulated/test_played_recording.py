@@ -12,6 +12,7 @@ from teleop_core.base.errors import ParameterError, RecordingError
 from teleop_core.graph import topics
 from teleop_core.nodes.interrupt import Interrupt
 from teleop_core.nodes.play import play
+from teleop_drill.simulation.world import SimulatedWorld
 
 EXAMPLE = Path(__file__).parents[2] / "bags/example"
 NAMES = ["master/measured_cp", "/master/buttons"]
@@ -19,9 +20,14 @@ RATE = 2.0
 
 
 def test_a_recording_is_published_as_it_was(peer: SimulatedPeer) -> None:
-    bag, sent = Bag(EXAMPLE), []
+    bag, sent = Bag(EXAMPLE), list[int]()
     pose, state = peer.listen(topics.MASTER_MEASURED_CP), peer.listen(topics.MASTER_BUTTONS)
-    player = peer.foreign("player", lambda world: sent.append(play(bag, NAMES, RATE, Console(quiet=True), world)))
+
+    def work(world: SimulatedWorld) -> int:
+        sent.append(play(bag, NAMES, RATE, Console(quiet=True), world))
+        return 0
+
+    player = peer.foreign("player", work)
     began_ns = peer.world.monotonic_ns()
     peer.wait(lambda: (pose.take(), state.take(), player.is_dead)[-1], "end of the recording")
     assert peer.world.monotonic_ns() - began_ns >= (bag.end_ns - bag.start_ns) / RATE
