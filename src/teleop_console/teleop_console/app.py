@@ -109,7 +109,7 @@ class Console:
         self._visitors.look()
 
     def _ask(self, is_over: Callable[[], bool]) -> None:
-        """Ask the nodes for their parameters until all of them have come up and answered."""
+        """Ask the nodes for their parameters until all nodes are up and have answered."""
         while not is_over() and not self.panel.settings.refresh():
             time.sleep(_ASK_AGAIN)
 
@@ -144,7 +144,7 @@ class Console:
 
 
 def give_way() -> None:
-    """Let the session go first where processors are short: the page can be late, arm and stop not."""
+    """Lower the page's priority below the session's: the page may be late, arm and stop may not."""
     stop = {thread.native_id for thread in threading.enumerate() if thread.name == STOPPER}
     with suppress(OSError):  # elsewhere than on Linux threads have no priorities of their own
         for thread in {int(name) for name in os.listdir("/proc/self/task")} - stop:

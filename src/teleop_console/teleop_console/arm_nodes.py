@@ -130,7 +130,7 @@ class ArmNodes:
         return np.concatenate((corners(hand - _GRIP, hand + _GRIP), corners(low, high))) + shift
 
     def _meet(self, view: ArmView) -> None:
-        """Let :meth:`work` hold what is known now."""
+        """Extend the space that :meth:`work` returns by what is known now."""
         tip, room, reach = self._start(), max(_WORK, 0.08 * self.bodies.size), _NEAR * self.bodies.size
         points = [self._poses[-1, :3]]
         if (box := box_of(view.state)) is not None:
@@ -192,7 +192,7 @@ class ArmNodes:
             self._meet(view)
 
     def _draw_ghost(self, view: ArmView) -> None:
-        """Draw the reference posture, every third time: it tells no more than where to."""
+        """Draw the reference posture, at a third of the rate, which is enough to see where the arm is sent."""
         reference = view.get(SLAVE_SETPOINT_JS)
         self._count = (self._count + 1) % 3
         if self._ghost is not None and reference is not None and self._is_ghost_shown and not self._count:
@@ -251,7 +251,7 @@ class ArmNodes:
     def _at_limit(self, joints: Array, state: dict[str, float]) -> frozenset[int]:
         """Joints that are at the ends of their ranges, or that the session says are.
 
-        One whose end is its home is at rest there: only the session says that it is in the way.
+        A joint whose home is at its end counts only if the session reports it as the limit.
         """
         robot = self._robot
         room = _AT * (robot.upper - robot.lower)

@@ -70,7 +70,7 @@ def _named(names: Iterable[str]) -> Callable[[], Mapping[str, str]]:
 
 
 def _declared(stage: str, name: str) -> Callable[[], Mapping[str, str]]:
-    """Words that a parameter may have."""
+    """Allowed values of a parameter, as words."""
 
     def found() -> Mapping[str, str]:
         spec = next(one for one in specs(declared_groups()[stage]) if one.name == name)
@@ -231,7 +231,7 @@ class Option:
 def options(field: Field, chosen: Chosen, until: float = math.inf) -> tuple[Option, ...]:
     """All words of a field, with what speaks against each beside the other words.
 
-    What speaks against the present choice as a whole speaks against no single word.
+    If the present choice is refused as a whole, no single word is refused for that.
 
     Args:
         field: The field.

@@ -20,7 +20,7 @@ class Gate(Protocol):
     """Decides about the messages of connections."""
 
     def passed(self, connection: "Connection", data: Data) -> bytes:
-        """What of a message goes on to viser; empty if nothing does."""
+        """Part of a message that goes on to viser; empty if none does."""
 
     def cut(self, connection: "Connection") -> None:
         """Take note of a connection that is cut for a flood."""

@@ -225,7 +225,7 @@ class LiveLink(Observer):
             self._button.say(is_pressed=is_pressed)
 
     def _insist(self, view: View) -> None:
-        """Say a stop again that some arm has not confirmed; never after its release."""
+        """Repeat a stop that some arm has not confirmed, unless it was released."""
         with self._pressing:
             confirmed = all(arm.operation.get("is_stopped") for arm in view.arms.values())
             self._is_pressed = self._is_pressed and not confirmed

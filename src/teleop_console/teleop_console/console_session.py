@@ -104,7 +104,7 @@ class ConsoleSession:
         return not self._thread.is_alive()
 
     def check(self) -> None:
-        """Insist on a session that runs, or ended as it should.
+        """Check that the session runs, or has ended in order.
 
         Raises:
             SessionError: It ended with an error.

@@ -67,13 +67,13 @@ class Seen:
         return 1e9 * (len(seen) - 1) / (seen[-1][0] - seen[0][0]), 1e-9 * (seen[-1][0] - seen[-1][1])
 
     def show(self, view: ArmView) -> None:
-        """Write what has come into a view, of the slave only what the display shows by now."""
+        """Write the newest sample into a view; of the slave only as late as the display shows it."""
         seen_ns = view.stamp_ns.get(DISPLAY_MEASURED_CP.name) if self._is_of_slave else None
         while self._waiting and (seen_ns is None or self._waiting[0][0] <= seen_ns + _SCREEN_NS):
             _, view.stamp_ns[self.topic.name], view.streams[self.topic.name] = self._waiting.popleft()
 
     def _find_another(self) -> None:
-        """Read the stream itself where nobody says it again."""
+        """Read the stream itself if no recorder republishes it."""
         is_slow = self._name.startswith("/display/")
         if is_slow and now_of(self._owner) - self._since > SILENCE:
             self._since = now_of(self._owner)

@@ -1,4 +1,4 @@
-"""Drivers: of all pages that are open, one drives at a time; the others watch."""
+"""Drivers: one of the open pages drives at a time; the others watch."""
 
 import threading
 import time

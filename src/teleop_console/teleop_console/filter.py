@@ -1,4 +1,4 @@
-"""Filter: which messages of a page the console hears; all others end at the socket.
+"""Filter: which messages of a page the console accepts; all others are dropped at the socket.
 
 viser sets any attribute of any element that a page names, takes positions of any shape, and keeps
 uploads. So nothing reaches viser but the messages that are declared here, with the bounds that are
@@ -222,7 +222,7 @@ def takes(control: Any, value: object) -> bool:
 
 
 def is_picture(data: bytes) -> bool:
-    """Whether data begin as a PNG of the size that is asked for: nothing large unfolds from it."""
+    """Whether data begin as a PNG of the size that was asked for, so that it cannot decompress to more."""
     return data[:8] == b"\x89PNG\r\n\x1a\n" and data[16:24] == struct.pack(">II", *PICTURE[::-1])
 
 

@@ -1,9 +1,8 @@
 """Guard: which requests the page's server answers; no page from elsewhere may drive an arm.
 
-Three things protect it. *Host*: a name that leads here but is not one of ours was made to (DNS
-rebinding). *Origin*: browsers tell which page opens a WebSocket, or fetches anything; only our own
-may. *Token*: where others can reach the port, a secret in the address which the browser then keeps
-as a cookie.
+Three things protect it. *Host*: a name that resolves to this machine but is not ours is an attack (DNS rebinding).
+*Origin*: browsers tell which page opens a WebSocket, or fetches anything; only our own may. *Token*: where others can
+reach the port, a secret in the address which the browser then keeps as a cookie.
 """
 
 import ipaddress
@@ -46,7 +45,7 @@ def is_wildcard(host: str) -> bool:
 
 @dataclass(frozen=True)
 class Request:
-    """What counts of a request.
+    """Parts of a request on which the guard decides.
 
     Attributes:
         path: Path with its query.

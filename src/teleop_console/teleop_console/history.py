@@ -32,7 +32,7 @@ class LiveScores:
     _last: tuple[float, Array] | None = None
 
     def add(self, time: float, view: ArmView) -> None:
-        """Take account of what is known at a time [s]; only what follows the hand counts."""
+        """Add the view of a time [s]; only samples in which the slave follows the hand count."""
         reference, place = view.get(topics.SLAVE_SERVO_CP), view.get(topics.SLAVE_MEASURED_CP)
         force = view.get(topics.MASTER_MEASURED_CF)
         is_led = view.state.get("is_following") and not view.state.get("is_clutched")

@@ -64,7 +64,7 @@ class Wake(asyncio.Event):
     """
 
     def set(self) -> None:
-        """Wake who waits; in another thread nothing, since the loop is asked too."""
+        """Wake the waiting task, on the loop's own thread only: viser asks the loop to do so too."""
         with suppress(RuntimeError):  # no loop runs in this thread
             asyncio.get_running_loop()
             super().set()
@@ -115,7 +115,7 @@ class Server(viser.ViserServer):
         super().stop()
 
     def request_share_url(self, verbose: bool = True) -> str | None:
-        """Never: it would lead whoever knows the address around the guard."""
+        """Refuse: a public address would bypass the guard."""
         raise SessionError("the console is not led out of this machine by others")
 
     def _tell(self, answers: Answers) -> None:
@@ -174,7 +174,7 @@ class Server(viser.ViserServer):
     # -- what connections ask ----------------------------------------------------------------------
 
     def passed(self, connection: Connection, data: Data) -> bytes:
-        """What of a message goes on to viser; a page that may not do something sees that."""
+        """Part of a message that goes on to viser. A page whose change is refused is shown the old value."""
         page = self._page(connection)
         passed, reason = self.filter.judge(page, data)
         if reason in {WATCHES, NO_VALUE}:
@@ -332,7 +332,7 @@ def _opening(serve: Callable[..., ws.serve]) -> Iterator[None]:
 
 
 def _logger() -> logging.Logger:
-    """Where the server tells what went wrong; that strangers speak something else is nothing."""
+    """Logger of the server. Connections that speak another protocol are not logged."""
     logger = logging.getLogger("teleop_console")
     if not logger.filters:
         logger.addFilter(lambda record: record.getMessage() != "opening handshake failed")

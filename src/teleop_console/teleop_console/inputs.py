@@ -38,7 +38,7 @@ def kind_of(info: ParameterInfo) -> str:
 
 
 def _is_slider(info: ParameterInfo) -> bool:
-    """Whether it has bounds, stands within them, and neither is out of a hand's reach."""
+    """Whether it has bounds that span a range fit for a slider, and lies within them."""
     low, high, value = info.lower, info.upper, info.value
     if low is None or high is None or not low <= float(value) <= high:  # type: ignore[arg-type]
         return False
@@ -235,6 +235,6 @@ def _step(value: float) -> float:
 
 
 def _fine_step(value: float, low: float, high: float) -> float:
-    """Power of ten, a hundredth of a slider's width at most, on whose steps the value stands."""
+    """Step of a slider: a power of ten, at most a hundredth of its range, of which the value is a multiple."""
     digits = next((d for d in range(_DIGITS) if round(value, d) == value), _DIGITS)
     return min(10.0 ** math.floor(math.log10((high - low) / 100.0)), 10.0**-digits)

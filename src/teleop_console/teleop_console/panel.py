@@ -164,7 +164,7 @@ class Panel:
     # -- drawing ---------------------------------------------------------------------------------
 
     def draw(self, view: View) -> None:
-        """Take note of what is known now, and show it a few times a second."""
+        """Take the present view, and show it a few times a second."""
         for name, arm in view.arms.items():
             self.scores[name].add(view.time, arm)
         now = time.monotonic()
@@ -185,7 +185,7 @@ class Panel:
             self._live.content = text
 
     def _draw_buttons(self, view: View) -> None:
-        """Show on the buttons what is so, which of them can do something, and which comes next."""
+        """Show on the buttons their state, which of them can act, and which comes next."""
         arm, soon, now = next(iter(view.arms.values())), next_button(view), alive(view)
         labels = {c.name: f"{c.name.capitalize()}: {c.text(arm)}" for c in self._controls if c.text}
         own = {c.name: c.is_alive(view) for c in self._controls if c.is_alive is not None}

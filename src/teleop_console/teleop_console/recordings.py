@@ -84,7 +84,7 @@ class Recordings:
         return [_KIND[kind], *(paths[:1] if kind == "export" else paths), *out]
 
     def run(self, kind: str, names: Sequence[str]) -> str:
-        """Run such a command with what is left of the processors; what it says."""
+        """Run such a command at low priority; returns what it printed."""
         done = subprocess.run([*_program(), *self.words(kind, names)], capture_output=True, text=True, check=False)
         return done.stdout or done.stderr
 

@@ -1,4 +1,4 @@
-"""Start page: where a session is chosen, begun and ended, and recordings are replayed and scored.
+"""Start page: a form to choose, begin and end a session, and to replay and score recordings.
 
 It is a form of our own, and all that it can say is one request of these few, with words that are
 checked here. The requests are answered by a thread of their own, beside the one of the stop.

@@ -16,7 +16,7 @@ _SHORTEST = 1e-4  # between two points of it [m]
 
 
 def is_jump(before: float, time: float) -> bool:
-    """Whether a time [s] is not one that follows another by drawing after drawing."""
+    """Whether a time [s] is not the next one of a steady drawing."""
     return time < before or time > before + _GAP
 
 

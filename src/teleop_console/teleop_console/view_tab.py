@@ -192,7 +192,7 @@ class Visitors:
         self._riding: dict[int, Callable[[], Camera]] = {}
 
     def look(self) -> None:
-        """Welcome who has come, and tell everybody whether he drives or watches."""
+        """Welcome new pages, and tell every page whether it drives or watches."""
         clients = self._server.get_clients()
         for number, client in clients.items():
             text = f'<p class="t-role">{self._role(number)}</p>'
@@ -228,7 +228,7 @@ class Visitors:
         return f"replay: {'you play it' if self._drivers.may_drive(number) else 'another page plays it'}"
 
     def _fit(self, number: int, client: viser.ClientHandle) -> None:
-        """Show the work to who has come, again where the window finds its size or the work grows."""
+        """Point the camera of a new page at the work; again when the window gets its size or the work grows."""
         now, aspect = time.monotonic(), client.camera.aspect
         fit = self._fitted.setdefault(number, _Fit(now))
         if (find := self._riding.get(number)) is not None:

@@ -47,7 +47,7 @@ class Accuracy:
 
 
 def of_points(errors: Array) -> dict[str, Spread]:
-    """Spreads of errors (N, 3), NaN where not read, of which some are.
+    """Spreads of errors (N, 3); NaN stands for what was not read.
 
     The total is of their lengths; if no point was read along all three axes, of all readings.
     """
@@ -92,7 +92,7 @@ def at_fresh(found: Found, fresh: Measured) -> Accuracy:
 
 
 def left_out(found: Found, measured: Measured) -> Accuracy | None:
-    """Accuracy at measured poses by what the others say: a fifth left out at a time.
+    """Accuracy by cross-validation: a fifth of the measured poses is left out at a time.
 
     None where the others are too few.
     """

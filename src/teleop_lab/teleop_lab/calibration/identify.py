@@ -47,9 +47,9 @@ class Found:
     model: Model
 
     def equivalent(self, errors: LinkErrors, q: Array) -> dict[str, float]:
-        """What a perfect fit would give the entries for an arm with these errors [m, rad].
+        """Values that a perfect fit would find for an arm with these errors [m, rad].
 
-        An entry that others act as stands for them too, so that it is found as their sum.
+        An entry stands for all entries with the same effect, so that their sum is found.
 
         Args:
             errors: Of a simulated arm.
@@ -153,7 +153,7 @@ def identify(
 
 
 def _pruned(found: Found, measured: Measured) -> Found:
-    """Without the entries that are not told from zero, one after the other."""
+    """The result without entries that do not differ from zero, which are dropped one by one."""
     while True:
         sure = np.abs(found.values) / np.maximum(found.half_widths, np.finfo(float).tiny)
         sure[[name in FRAME for name in found.names]] = np.inf
@@ -224,7 +224,7 @@ def _solved(model: Model, measured: Measured, names: tuple[str, ...], left: tupl
 
 
 def _drawn(model: Model, measured: Measured, left: tuple[Left, ...]) -> Found:
-    """Nothing was found: the arm is as drawn, as far as these readings tell."""
+    """Result of a search that found nothing: the arm is as drawn, as far as these readings tell."""
     vector, none = np.zeros(len(model.names)), np.zeros(0)
     rest = residuals(model, measured, vector)
     spread = float(np.sqrt(np.mean(rest**2)))

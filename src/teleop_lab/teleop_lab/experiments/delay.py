@@ -1,4 +1,4 @@
-"""Delay: what a line that is late does to an operator who sees, and what a smaller scale mends."""
+"""Delay: how latency slows an operator who sees the slave, and how far a smaller scale helps."""
 
 from collections.abc import Callable
 from itertools import pairwise

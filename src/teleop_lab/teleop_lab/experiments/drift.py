@@ -1,4 +1,4 @@
-"""Drift: by how much the slave's command is off the hand's, contact after contact far away."""
+"""Drift: offset between the hand's command and the slave's, contact after contact behind a delay."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -58,7 +58,7 @@ def _plain(value: float | None) -> str:
 
 
 def _signed(difference: float, published: float) -> str:
-    """Difference; as none where it is rounding of the computer."""
+    """Text of a difference; zero if it is only rounding."""
     if abs(difference) <= 1e-12 * max(1.0, abs(published)):
         return "0"
     digits = 2 if abs(difference) < 10.0 else int(math.log10(abs(difference))) + 1

@@ -33,7 +33,7 @@ def _laws() -> list[Row]:
 
 
 def _sessions(bench: Bench) -> list[Row]:
-    """Times in a whole session, beside the slowing that a cycle of looking and moving says."""
+    """Times of whole sessions, beside the slowing that the look-move cycle predicts."""
     times = []
     for latency in LATENCIES:
         session = bench.session("point", settings={"display.latency": latency})

@@ -1,7 +1,7 @@
 """Look and move: how many looks a person needs to a target, and how long they take.
 
-The same constants as those of the operator ``observer``, without an arm: what a law of delay says
-of any motion that the eye leads.
+It has the constants of the operator ``observer``, but no arm: what the law predicts for any motion that the eye
+guides.
 """
 
 import numpy as np

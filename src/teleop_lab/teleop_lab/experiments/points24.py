@@ -93,7 +93,7 @@ def _in_plane(off: Array) -> Array:
 
 
 def _visits(bench: Bench, settings: Settings, *, seeing: bool) -> list[Visits]:
-    """How each hand does the task; one that sees aims again, by what it missed before."""
+    """How each hand does the task; a hand that sees aims anew, corrected by its earlier misses."""
     from teleop_core.session.api import configuration
 
     made = configuration(SCENARIO).group("operator")

@@ -45,7 +45,7 @@ Job = tuple[Way, float]
 
 @dataclass(frozen=True)
 class Puncture:
-    """What a hand makes of a puncture; infinite or not a number where it does not notice.
+    """How a hand reacts to a puncture; infinity or NaN where it does not notice.
 
     Attributes:
         tip_drop: Largest fall of the force on the tip from tick to tick [N].
@@ -153,7 +153,7 @@ def _rows(found: Mapping[Job, Puncture]) -> tuple[Row, ...]:
 
 
 def least_overshoot(round_trip: float) -> float:
-    """Way [m] that no hand avoids: its speed times round trip and reaction.
+    """Overshoot [m] that no hand avoids: its speed times the sum of round trip and reaction time.
 
     The force travels half of the round trip, the stop the other half.
     """

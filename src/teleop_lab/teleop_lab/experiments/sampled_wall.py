@@ -165,7 +165,7 @@ def passive_boundary(damping: float, wall_damping: float, length: int, speed: fl
 
 
 def is_restless(wall: Wall, friction: float, resolution: float, push: float) -> bool:
-    """Whether a wall moves on by itself that a loose hand presses, by dry friction and steps.
+    """Whether a wall that a loose hand presses keeps moving, by dry friction and steps of the reading.
 
     A push between two steps of the wall's force finds rest only where friction spans half a step:
     so 2 f >= K Delta. The force is looked at after 0.3 s, for 0.3 s.

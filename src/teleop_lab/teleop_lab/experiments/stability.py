@@ -1,4 +1,4 @@
-"""Stability: how stiff a thing may be that the hand feels late, by delay, grip and architecture."""
+"""Stability: largest stiffness that is stable behind a delay, by delay, grip and architecture."""
 
 import math
 from collections.abc import Mapping
@@ -82,7 +82,7 @@ def fastest(bench: Bench, grip: one_axis.Grip, delay: float, stiffness: float, w
 
 
 def calm_speed(bench: Bench, grip: one_axis.Grip) -> float:
-    """Fastest that a hand gets that is not thrown [m/s], by the softest object whose force is not late."""
+    """Largest speed [m/s] of a hand that is not thrown: that before the softest object without delay."""
     return _THROWN * fastest(bench, grip, 0.0, SOFTEST, _WAYS[0])
 
 

@@ -90,7 +90,7 @@ def numbers(cell: Cell, hybrid: Complex) -> list[Number]:
 
 
 def _rows(found: list[Number], group: str, told: str, *, is_judged: bool) -> list[Row]:
-    """Rows of what is linear enough and finite."""
+    """Rows of numbers that are finite and of a chain that is linear enough."""
     rows = []
     for each in found:
         if each.stray > STRAY or not math.isfinite(each.measured):

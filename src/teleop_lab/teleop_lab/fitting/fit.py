@@ -292,7 +292,7 @@ def _insist_on_known(names: Sequence[str], robot: Robot) -> None:
 
 
 def _insist_on_identifiable(names: Sequence[str], slopes: Array) -> None:
-    """Refuse parameters that the table does not show, or not apart from others."""
+    """Refuse parameters that the table does not determine, or cannot separate from others."""
     sizes = np.linalg.norm(slopes, axis=0)
     unseen = [name for name, size in zip(names, sizes, strict=True) if size < _WEAK * sizes.max()]
     if unseen or not sizes.any():

@@ -56,7 +56,7 @@ def score_all(plan: Plan, journal: Journal) -> None:
 
 
 def scores_of(plan: Plan, bag: Path) -> tuple[dict[str, float | None], str]:
-    """Scores of a recording that the study compares, and its verdict; of one that has none, why."""
+    """Scores of a recording that the study compares, and its verdict; or why it has no scores."""
     try:
         score = open_recording(bag).score()
         return {metric: score.value(metric) for metric in plan.study.metrics}, score.verdict.text

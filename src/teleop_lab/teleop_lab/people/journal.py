@@ -90,7 +90,7 @@ class Journal:
         self._write(code)
 
     def note(self, code: str, trial: int, state: str, **facts: object) -> None:
-        """Note what became of a trial.
+        """Note the new state of a trial.
 
         Args:
             code: Of the participant.
@@ -113,7 +113,7 @@ class Journal:
         self._write(code)
 
     def event(self, code: str, trial: int) -> Mapping[str, Any]:
-        """The newest that became of a trial; empty if nothing did."""
+        """Newest event of a trial; empty without one."""
         events = [event for event in self._own[code]["events"] if event["trial"] == trial]
         return events[-1] if events else {}
 

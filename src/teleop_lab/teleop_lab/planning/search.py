@@ -179,7 +179,8 @@ class Search:
         return self._known[placement], placement
 
     def _share(self, placement: Placement) -> float:
-        """Share that a session follows, or what :data:`CUT` leaves of that of the path in place."""
+        """Share of the time that a session would follow; below the goal an upper bound of it, which is quicker to
+        find."""
         self._tell()
         share = self._walker.share(placement, is_cut=False) + CUT
         if share < self._goal:

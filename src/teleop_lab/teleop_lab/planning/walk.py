@@ -76,7 +76,7 @@ class Walked:
 
     @property
     def causes(self) -> dict[str, float]:
-        """Share of the time for each cause for which it does not, by its name."""
+        """Share of the time in which it does not follow, by the name of the cause."""
         causes = (limit for limit in topics.Limit if limit is not topics.Limit.NONE)
         return {c.name.lower(): float(self.weights[self.limit == c].sum()) for c in causes}
 
