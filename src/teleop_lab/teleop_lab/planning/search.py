@@ -179,8 +179,7 @@ class Search:
         return self._known[placement], placement
 
     def _share(self, placement: Placement) -> float:
-        """Share of the time that a session would follow; below the goal an upper bound of it, which is quicker to
-        find."""
+        """Share of the time that a session would follow; below the goal an upper bound of it, found sooner."""
         self._tell()
         share = self._walker.share(placement, is_cut=False) + CUT
         if share < self._goal:
