@@ -61,6 +61,16 @@ def go_to(page: Any, time: float) -> None:
     page.until(f"{SHOWN} === '{time:.2f}'")
 
 
+def drives(page: Any) -> None:
+    """Wait until the page may move time: after a reload it does once its former self is known to be gone."""
+    page.value("""new Promise((done, fail) => {
+        const end = performance.now() + 60000, headers = {'Teleop-Page': window.teleopPage};
+        const ask = async () => (await fetch('time?seek=1', {headers})).ok ? done()
+            : performance.now() > end ? fail(new Error('waited in vain')) : setTimeout(ask, 50);
+        ask();
+    })""")
+
+
 def at_time(page: Any, time: float) -> Any:
     """Where the strip has a time [px]."""
     page.value("document.querySelector('#t-strip canvas').scrollIntoView()")
@@ -150,6 +160,7 @@ def test_strip_is_scrubbed_zoomed_and_shows_any_column_beside_another_recording(
     if page.value("document.querySelector('#t-strip').classList.contains('t-folded')"):
         page.click("Unfold")
     page.until(f"{KEY}.includes('tracking error') && {IN_VIEW}")
+    drives(page)
     page.pull(at_time(page, 3.0), at_time(page, 9.0))
     page.mouse("mouseReleased", *at_time(page, 9.0))
     page.until(f"Math.abs({SHOWN} - 9) < 0.1")
