@@ -4,11 +4,18 @@ import signal
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+from geometry_msgs.msg import PoseStamped
+
+from teleop_core.bags.messages import layout
 from teleop_core.bags.reader import Bag, recover
 from teleop_core.graph import topics
+from teleop_core.middleware.world import Qos
+from teleop_drill.simulation.bus import Line
 
 if TYPE_CHECKING:
     from peers import AnyPeer as Peer
+    from simulated.conftest import SimulatedPeer
 
 LOST = 0.2
 """What a recorder that is killed may lose [s]."""
@@ -52,3 +59,33 @@ def test_a_recorder_that_cannot_write_metadata_keeps_everything_for_recover(peer
     assert "`teleop recover " in recorder.stderr.read_text()
     out, _ = recover(tmp_path / "bag")
     assert Bag(out).topics["master/measured_cp"].count > 1500
+
+
+def test_what_the_middleware_brings_after_a_feed_has_begun_does_not_stand_behind_newer_samples(
+    peer: "SimulatedPeer", tmp_path: Path
+) -> None:
+    """A busy machine brought one sample 39 ms after newer ones of the feed: its stamps went back."""
+    topic, world = topics.MASTER_MEASURED_CP, peer.world
+    form, pose = layout(topic, ()), np.eye(7)[3]
+    peer.bus.lines["*", "recorder"] = Line(delay=0.005)
+    recorder = peer.start("recorder", out=str(tmp_path / "bag"))
+    channel = recorder.crew.nodes[0].channels[topic.name]
+    sender = peer.ros.create_publisher(PoseStamped, f"/{topic.name}", Qos())
+
+    def is_heard() -> bool:
+        sender.send(form.encode_one(world.time_ns(), pose))
+        return bool(channel.received)
+
+    peer.wait(is_heard, "a sample")
+    recorder.send_signal(signal.SIGSTOP)
+    sender.send(form.encode_one(world.time_ns(), pose))
+    channel.join(True, world.time_ns())
+    for _ in range(10):
+        world.sleep(0.001)
+        channel.give(form.encode_one(world.time_ns(), pose), world.time_ns())
+    recorder.send_signal(signal.SIGCONT)
+    world.sleep(0.1)
+    assert recorder.end() == 0
+    series = Bag(tmp_path / "bag").read(topic)
+    assert len(series) > 11
+    assert (np.diff(series.stamp_ns) > 0).all()

@@ -108,7 +108,9 @@ class _Channel:
             if inside_ns is None or taken.sent_ns < inside_ns:
                 self.count(taken.sender, taken.number)
                 self._recent.append(taken.sent_ns)
-                came.append((taken.came_ns, self.topic, taken.data, taken.sent_ns))
+                # A feed's messages come when they are sent: what arrives later would stand behind newer ones.
+                came_ns = taken.came_ns if inside_ns is None else min(taken.came_ns, inside_ns)
+                came.append((came_ns, self.topic, taken.data, taken.sent_ns))
         self._follow()
 
     def _follow(self) -> None:
