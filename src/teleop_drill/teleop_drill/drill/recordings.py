@@ -23,6 +23,9 @@ DISCOVERY = 1.5
 """Time after which the middleware has told all of a node that starts again [s]."""
 _REPORT_NS = 1_500_000_000  # after which a node has reported what it counted
 
+_ON_THE_WAY_NS = 5_000_000
+"""What was sent so long before a fault may still be on its way to the recorder when the fault begins [ns]."""
+
 
 @dataclass(frozen=True)
 class Verdict:
@@ -145,7 +148,8 @@ def judge_recording(one: Recorded, tick: float) -> None:
     if verdict.bag is not None:
         heard = within(one.heard, begins[0], until_ns)
         gone = {name: missing(verdict.bag, name, two) for name, two in heard.items()}
-    for (begin_ns, outcome), end_ns in zip(one.outcomes, [*begins[1:], until_ns], strict=True):
+    starts = [ns - _ON_THE_WAY_NS for ns in begins]
+    for (_, outcome), begin_ns, end_ns in zip(one.outcomes, starts, [*starts[1:], until_ns], strict=True):
         outcome.recording, outcome.is_recorded = verdict.text, verdict.is_good
         if verdict.is_saved and not outcome.exercise.cuts_recording:
             outcome.recording, outcome.is_recorded = "intact", True
