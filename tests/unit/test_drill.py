@@ -30,7 +30,8 @@ from teleop_drill.drill import hand, judging
 from teleop_drill.drill.drill_table import drill_table, markdown, rows, summary
 from teleop_drill.drill.exercise import Exercise
 from teleop_drill.drill.numbers import Numbers, Scheduling
-from teleop_drill.drill.recordings import check_recording, missing, told_lost
+from teleop_drill.drill.outcome import Outcome
+from teleop_drill.drill.recordings import Recorded, check_recording, judge_recording, missing, told_lost
 
 MS = 1_000_000
 DT = 1e-3
@@ -393,6 +394,22 @@ def test_messages_that_are_not_recorded_are_counted_one_by_one(tmp_path: Path, r
     for stamp in heard:
         left.remove(stamp) if stamp in left else expected.append(stamp * 10)
     assert sorted(found) == sorted(expected)
+
+
+@pytest.mark.parametrize(("before", "losses"), [(1, (0.0, 0.001)), (20, (0.001, 0.0))])
+def test_what_was_on_its_way_as_a_fault_began_is_lost_by_that_fault(
+    tmp_path: Path, before: int, losses: tuple[float, float]
+) -> None:
+    """Of two faults, 100 ms apart, where one message is not recorded, sent so long before the second one [ms]."""
+    sent = BEGIN + MS * np.arange(200)
+    kept = np.delete(sent, 100 - before)
+    with BagWriter(tmp_path / "bag", (SLAVE_SETPOINT_JS,), ROBOT.joint_names) as writer:
+        writer.write_block({SLAVE_SETPOINT_JS: (kept, np.zeros((len(kept), ROBOT.n)), kept)})
+    first, second = (Outcome(exercise=one) for one in drill.chosen(("stop_topic", "flood"), is_composed=False))
+    faults = [(BEGIN, first), (BEGIN + 100 * MS, second)]
+    heard = {SLAVE_SETPOINT_JS.name: (sent, sent)}
+    judge_recording(Recorded(tmp_path / "bag", faults, heard, int(sent[-1]), None), 0.001)
+    assert (first.measures["lost_s"].value, second.measures["lost_s"].value) == losses
 
 
 def test_every_exercise_says_what_is_expected_and_has_a_name_of_its_own_in_each_way() -> None:

@@ -24,7 +24,8 @@ DISCOVERY = 1.5
 _REPORT_NS = 1_500_000_000  # after which a node has reported what it counted
 
 _ON_THE_WAY_NS = 5_000_000
-"""What was sent so long before a fault may still be on its way to the recorder when the fault begins [ns]."""
+"""What was sent so long before a fault may still be on its way to the recorder as the fault begins [ns]; assumed: some
+ticks, and a turn of the recorder."""
 
 
 @dataclass(frozen=True)
