@@ -73,6 +73,7 @@ def test_stylus_that_is_pulled_by_an_arrow_is_wanted_along_it_and_let_go_with_th
         assert not tab.faults()
 
 
+@pytest.mark.soak
 def test_browser_that_is_closed_while_it_pulls_holds_the_stylus_no_longer(tab: Any, tmp_path: Path) -> None:
     with shown(Desk()) as (server, desk):
         with Tab(tmp_path, 1000, 560) as other:
