@@ -1,5 +1,6 @@
 """Console: the page of one session, from its opening to its end."""
 
+import gc
 import logging
 import os
 import threading
@@ -127,11 +128,15 @@ class Console:
         if self._link.is_live:
             give_way()
         threading.Thread(target=self._ask, args=(is_over,), daemon=True).start()
-        due = time.monotonic()
-        while not is_over():
-            self.try_to_draw()
-            due = max(due + 1.0 / RATE, time.monotonic())
-            time.sleep(max(0.0, due - time.monotonic()))
+        gc.freeze()  # a stop waits 0.2 s while garbage is looked for among all that the page is made of
+        try:
+            due = time.monotonic()
+            while not is_over():
+                self.try_to_draw()
+                due = max(due + 1.0 / RATE, time.monotonic())
+                time.sleep(max(0.0, due - time.monotonic()))
+        finally:
+            gc.unfreeze()
         self.close()
 
     def close(self) -> None:
