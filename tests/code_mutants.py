@@ -56,6 +56,8 @@ CODE_MUTANTS = (
             "            self.interrupt.check()\n", "", "tests/simulated/test_conformance.py"),
     _mutant("cut_untold", "who was killed with what it held back is not told", "nodes/feed.py",
             "self.cut += sum(", "self.cut += 0 * sum(", "feed"),
+    _mutant("unlike_taken", "messages of another form are read as numbers of the usual one", "bags/walk.py",
+            "return wrong == 0", "return True", "bags_layouts"),
     _mutant("late_behind", "what the middleware brings late stands behind newer samples of a feed", "nodes/recorder.py",
             "min(taken.came_ns, inside_ns)", "taken.came_ns", "tests/simulated/test_recordings_kept.py"),
     _mutant("lost_before", "what was on its way as a fault began is lost by the fault before",

@@ -124,7 +124,7 @@ def test_any_other_constant_byte_is_noticed_one_by_one_and_in_batches(
 
 def padding_of(form: Layout) -> list[int]:
     """Bytes that hold neither constants nor numbers."""
-    used = form._mask.astype(bool)
+    used = form.mask.astype(bool)
     for name in form._dtype.names or ():
         field, at = present(form._dtype.fields)[name][:2]
         used[at : at + field.itemsize] = True
