@@ -4,6 +4,7 @@ from collections.abc import Iterator
 
 import pytest
 
+from teleop_core.base.own_parts import forget_own_parts
 from teleop_core.chain.architectures import ARCHITECTURES
 from teleop_core.chain.filters import TREMOR_FILTERS
 from teleop_core.chain.network import NETWORKS
@@ -25,6 +26,7 @@ REGISTRIES = (
 def own_parts() -> Iterator[None]:
     """Let a test register parts, and take them away after it."""
     yield
+    forget_own_parts()
     for registry in REGISTRIES:
         for name in registry.names():
             if registry.is_added(name):
