@@ -254,3 +254,15 @@ def test_a_task_that_counts_no_attempt_at_its_goals_is_refused() -> None:
 
     with pytest.raises(PartError, match="counts none in ten minutes at its goals"):
         register_task(Task("endless", NoParameters, endless))
+
+
+def test_a_compiled_task_that_reads_beyond_its_parameters_is_refused() -> None:
+    at = {name: i for i, name in enumerate(TASK_STATE.columns)}
+    attempts, width, time = at["attempts"], at["width"], at["time"]
+
+    @kernel
+    def beyond(numbers, memory, scene, state):  # type: ignore[no-untyped-def]
+        state[0], state[attempts], state[width], state[time] = 1.0, 1.0, 0.01, numbers[7]
+
+    with pytest.raises(PartError, match="one that writes 22 finite numbers"):
+        register_task(Task("beyond", NoParameters, beyond))

@@ -169,7 +169,7 @@ class Spec:
 
     def _check_element(self, value: object) -> None:
         if type(value) is not self.element:
-            hint = " (write 1.0, not 1)" if self.element is float else ""
+            hint = " (write 1.0, not 1)" if self.element is float and isinstance(value, int) else ""
             raise ParameterError(self.name, value, f"of type {self.element.__name__}{hint}")
         if self.choices and value not in self.choices:
             raise UnknownNameError(self.name, value, self.choices)

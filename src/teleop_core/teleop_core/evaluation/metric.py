@@ -184,7 +184,7 @@ def _figure_row(group: str, one: Field[Any], value: float) -> Row:
 
 def _row(name: str, label: str, unit: str, value: Leaf) -> Row:
     group, text = name.replace("_", " "), label.replace("_", " ").replace(".", " ")
-    unit = "" if unit == "1" else unit
+    text, unit = text.removesuffix(f" {unit.replace('/', ' ')}"), "" if unit == "1" else unit
     if isinstance(value, float) or value is None:
         return row(group, text, unit, value)
     return Row(group, text, unit, str(value))

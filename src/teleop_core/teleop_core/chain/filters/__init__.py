@@ -57,7 +57,7 @@ def _try(part: TremorFilter) -> None:
     """Filter some values, so that what cannot work is told before anything runs."""
     needs = "one with filter(numbers, memory, value, period) -> float and parameters that all have defaults"
     with tried("tremor filter", part.name, needs):
-        numbers = part.numbers(part.parameters())
+        numbers, _ = fenced(part.numbers(part.parameters()))  # one too far is NaN
         memory, fence = fenced(np.zeros(MEMORY))
         rest = float(part.filter(numbers, memory, 0.0, 1e-3))
         for i in range(64):

@@ -82,7 +82,7 @@ def _try(part: Passivity) -> None:
         "and parameters that all have defaults"
     )
     with tried("passivity", part.name, needs):
-        numbers, width = part.numbers(part.parameters()), len(topics.ENERGY)
+        (numbers, _), width = fenced(part.numbers(part.parameters())), len(topics.ENERGY)
         memory, fence = fenced(np.zeros(MEMORY))
         push, behind = fenced(np.zeros(3))
         command, after = fenced(np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]))

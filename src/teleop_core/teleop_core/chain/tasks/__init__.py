@@ -84,7 +84,7 @@ def _try(part: Task) -> None:
     """Judge some ticks, so that what cannot work is told before anything runs."""
     needs = "one with judge(numbers, memory, scene, state) and parameters that all have defaults"
     with tried("task", part.name, needs):
-        numbers = part.numbers(part.parameters())
+        numbers, _ = fenced(part.numbers(part.parameters()))  # one too far is NaN
         memory, fence = fenced(np.zeros(MEMORY))
         state, beyond = fenced(np.zeros(len(topics.TASK_STATE.columns)))
         scene = np.zeros(len(SCENE))
