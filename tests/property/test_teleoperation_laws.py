@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from present import present
+from teleop_core.chain.mapping.gains import MotionScalingParameters, axis_map
 from teleop_core.chain.mapping.motion_scaling import MotionScaling
-from teleop_core.chain.mapping.parameters import MotionScalingParameters, axis_map
 from teleop_core.chain.mapping.plausibility import PlausibilityParameters
 from teleop_core.graph.signals import STATE, TICK_NS
 from teleop_core.kernels.geometry import Array

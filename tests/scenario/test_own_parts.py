@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from teleop_core.bags.reader import Bag
 from teleop_core.base import NoParameters, PartError, build, parameter
-from teleop_core.chain.mapping.parameters import MotionScalingParameters
+from teleop_core.chain.mapping.gains import MotionScalingParameters
 from teleop_core.chain.operators import register_operator
 from teleop_core.graph import STATE, TICK_NS, Stage, register_stage
 from teleop_core.graph.topics import (

@@ -16,8 +16,8 @@ from recipes import START_NS, Recipe, state
 from teleop_core.bags.reader import Bag
 from teleop_core.base import EvaluationError, parameter
 from teleop_core.chain.fixtures.reported_fixture import ReportedFixture
-from teleop_core.chain.mapping.parameters import MotionScalingParameters, axis_map
-from teleop_core.evaluation import Figure, Row, evaluate, study
+from teleop_core.chain.mapping.gains import MotionScalingParameters, axis_map
+from teleop_core.evaluation import Figure, TableRow, evaluate, study
 from teleop_core.evaluation.command import evaluate_bags
 from teleop_core.evaluation.origin import read_origin
 from teleop_core.evaluation.rows import summary
@@ -261,7 +261,7 @@ def test_known_shapes_are_scored_beside_unknown_ones(recipe: Recipe, path: Path)
 # -- tables and pictures ---------------------------------------------------------------------------
 
 
-def rows_of(bag: Bag) -> dict[str, Row]:
+def rows_of(bag: Bag) -> dict[str, TableRow]:
     return {row.label: row for row in summary(evaluate(bag))}
 
 

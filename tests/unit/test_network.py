@@ -17,7 +17,7 @@ from teleop_core.bags.reader import Bag
 from teleop_core.base import NoParameters, ParameterError, PartError, TeleopError, build
 from teleop_core.chain.network import LOST, NETWORKS, Network, register_network
 from teleop_core.chain.network.network import NETWORK, NetworkLink
-from teleop_core.chain.network.parameters import PRESETS, NetworkParameters
+from teleop_core.chain.network.presets import PRESETS, NetworkParameters
 from teleop_core.chain.network.trace import read_trace
 from teleop_core.evaluation.metrics.network import _Ages
 from teleop_core.kernels import Array, kernel

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from held_master import HeldMaster
 from teleop_core.base import NoParameters, ParameterError, PartError, build, parameter
 from teleop_core.chain.operators import OPERATORS, Operator, Setting, following, register_operator
-from teleop_core.chain.operators.parameters import OperatorParameters
+from teleop_core.chain.operators.behaviour import OperatorParameters
 from teleop_core.chain.operators.shapes import PHASES, minimum_jerk
 from teleop_core.kernels.geometry import Array
 

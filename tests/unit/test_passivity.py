@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from teleop_core.base.parameters import NoParameters, build
-from teleop_core.chain.mapping.parameters import MotionScalingParameters
+from teleop_core.chain.mapping.gains import MotionScalingParameters
 from teleop_core.chain.passivity import PASSIVITIES, Passivity, register_passivity, slave_side
 from teleop_core.chain.passivity.port import (
     DRIFT,
@@ -32,7 +32,7 @@ from teleop_core.graph.topics import ENERGY, MASTER_CONTACT, OPERATION
 from teleop_core.kernels.geometry import Array
 from teleop_core.session import configuration, virtual
 from teleop_core.slave.operation import Fault
-from teleop_core.slave.world.parameters import MATERIALS
+from teleop_core.slave.world.contents import MATERIALS
 
 pytestmark = pytest.mark.usefixtures("own_parts")
 BOTH = ("teleop.stages=[network,passivity]", "feedback_timeout=1.0", "reach_force.is_on=false", "gimbal_noise=0.0")

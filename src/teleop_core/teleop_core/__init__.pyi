@@ -49,7 +49,7 @@ from .robots import (
     register_robot as register_robot,
     robot_from_table as robot_from_table,
 )
-from .robots.parameters import RobotParameters as RobotParameters
+from .robots.selection import RobotParameters as RobotParameters
 from .session.configuration import Configuration as Configuration
 from .session.stepped import Observation as Observation, Session as Session, Space as Space
 from .session.virtual import VirtualTime as VirtualTime

@@ -8,8 +8,8 @@ from typing import Any
 
 from teleop_core.bags import arms, reader
 from teleop_core.base import TeleopError, build, plain_yaml, shown, specs
+from teleop_core.chain.mapping.gains import MotionScalingParameters, axis_map, tool_maps
 from teleop_core.chain.mapping.motion_scaling import MOTION_SCALING
-from teleop_core.chain.mapping.parameters import MotionScalingParameters, axis_map, tool_maps
 from teleop_core.chain.master.operator import OPERATOR
 from teleop_core.graph import HAND, SESSION, STAGES, Graph, Layer, SessionParameters, build_graph, topics
 from teleop_core.graph.former_shapes import present_layer

@@ -3,7 +3,7 @@
 from typing import Any
 
 from teleop_core.chain.network.network import BACK, THERE
-from teleop_core.chain.network.parameters import NetworkParameters
+from teleop_core.chain.network.presets import NetworkParameters
 from teleop_core.graph.signals import TICK_NS
 from teleop_core.graph.topics import (
     NETWORK_JAW_SERVO_JP,

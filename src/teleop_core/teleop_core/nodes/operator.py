@@ -7,8 +7,8 @@ import numpy as np
 
 from teleop_core.base.errors import PartError
 from teleop_core.chain.operators import OPERATORS
+from teleop_core.chain.operators.behaviour import OperatorParameters
 from teleop_core.chain.operators.follower import MOST
-from teleop_core.chain.operators.parameters import OperatorParameters
 from teleop_core.chain.operators.remote import BUTTONS, RemoteHand
 from teleop_core.graph.topics import (
     MASTER_MEASURED_CF,

@@ -7,7 +7,7 @@ import numpy as np
 
 from teleop_core.chain.master.operator import OPERATOR
 from teleop_core.chain.operators import OPERATORS, Setting
-from teleop_core.chain.operators.parameters import OperatorParameters
+from teleop_core.chain.operators.behaviour import OperatorParameters
 from teleop_core.chain.operators.shapes import PHASES
 from teleop_core.graph.layers import SESSION, Layer, SessionParameters
 from teleop_core.session.configuration import Configuration

@@ -14,8 +14,8 @@ from teleop_core.graph import DT, RunningStage, Stage, assign, topics
 from teleop_core.kernels import Array, kernel, length, pointer, pose_from_transform, record, records
 from teleop_core.robots import load_robot_set
 from teleop_core.robots.kinematics import FK
-from teleop_core.robots.parameters import RobotParameters
 from teleop_core.robots.robot import Robot
+from teleop_core.robots.selection import RobotParameters
 from teleop_core.slave import arm, commands, motion_commands, simulation, step, trajectory
 from teleop_core.slave.operation import Answer, Event, Fault, OperationParameters, State, command_event
 from teleop_core.slave.operation.states import answer_text, change

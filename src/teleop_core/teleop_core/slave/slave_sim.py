@@ -11,7 +11,7 @@ from teleop_core.robots import load_robot_set
 from teleop_core.robots.chains import dh_kernels
 from teleop_core.robots.drives import ACCELERATION, GRAVITY
 from teleop_core.robots.kinematics import FK
-from teleop_core.robots.parameters import RobotParameters
+from teleop_core.robots.selection import RobotParameters
 from teleop_core.slave import handover, simulation, stability, transmission
 from teleop_core.slave.arm import Arm
 from teleop_core.slave.controllers import CONTROLLERS, per_joint
@@ -21,7 +21,7 @@ from teleop_core.slave.friction import bristle_damping
 from teleop_core.slave.plants import PER_JOINT, PLANTS, Physics
 from teleop_core.slave.world import WORLD_OBJECTS, contact, puncture
 from teleop_core.slave.world.button import ButtonNumbers
-from teleop_core.slave.world.parameters import WorldParameters
+from teleop_core.slave.world.contents import WorldParameters
 
 
 @dataclass(frozen=True, kw_only=True)

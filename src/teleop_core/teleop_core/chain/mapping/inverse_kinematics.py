@@ -12,7 +12,7 @@ from teleop_core.kernels import Array, Fields, PerJoint, inner, kernel, record
 from teleop_core.kernels.geometry import rotation_vector_between, transform_from_pose
 from teleop_core.robots import load_robot_set
 from teleop_core.robots.kinematics import IkStatus
-from teleop_core.robots.parameters import RobotParameters
+from teleop_core.robots.selection import RobotParameters
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -9,7 +9,7 @@ import numpy as np
 from teleop_core.chain.architectures import ARCHITECTURES
 from teleop_core.chain.fixtures import Held, fixture_depth
 from teleop_core.chain.mapping import following, limits, plausibility, side, walls
-from teleop_core.chain.mapping.parameters import (
+from teleop_core.chain.mapping.gains import (
     MODES,
     FixtureParameters,
     MotionScalingParameters,

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from teleop_core.base import ParameterError, parameter
-from teleop_core.chain.mapping.parameters import AXES, axis_map
+from teleop_core.chain.mapping.gains import AXES, axis_map
 from teleop_core.chain.master.joy_rates import JoyParameters, JoyRates
 from teleop_core.graph import DT, RunningStage, Stage, topics
 from teleop_core.kernels import dot, geometry

@@ -8,7 +8,7 @@ import numpy as np
 
 from teleop_core.base import PartError, TeleopError
 from teleop_core.chain.operators import OPERATORS, Seen, Setting, follower
-from teleop_core.chain.operators.parameters import PRESS_TIME, OperatorParameters
+from teleop_core.chain.operators.behaviour import PRESS_TIME, OperatorParameters
 from teleop_core.chain.operators.remote import RemoteHand
 from teleop_core.chain.operators.rest import REST_POSITION, rest_pose
 from teleop_core.chain.operators.shapes import PHASES

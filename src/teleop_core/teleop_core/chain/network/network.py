@@ -9,7 +9,7 @@ import math
 import numpy as np
 
 from teleop_core.chain.network import CHANCES, NETWORKS, deadband, link, packet_size
-from teleop_core.chain.network.parameters import NetworkParameters, WayParameters
+from teleop_core.chain.network.presets import NetworkParameters, WayParameters
 from teleop_core.graph import DT, Row, RunningStage, Stage, assign
 from teleop_core.graph.topics import (
     ENERGY,

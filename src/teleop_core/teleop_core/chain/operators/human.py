@@ -16,7 +16,7 @@ import numpy as np
 
 from teleop_core.base import ParameterError, parameter
 from teleop_core.chain.operators import Motion, Operator, Setting
-from teleop_core.chain.operators.parameters import OperatorParameters
+from teleop_core.chain.operators.behaviour import OperatorParameters
 from teleop_core.chain.operators.shapes import minimum_jerk
 from teleop_core.kernels import Array, dot, length
 

@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from teleop_core.chain.mapping.parameters import axis_map
+from teleop_core.chain.mapping.gains import axis_map
 from teleop_core.chain.operators import Operator, Setting
 from teleop_core.chain.operators.glances import STILL_TIME, Glance, Glances
 from teleop_core.chain.operators.hand_room import HandRoom, turned

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from teleop_core.chain.operators import Motion, Operator, Setting
-from teleop_core.chain.operators.parameters import OperatorParameters
+from teleop_core.chain.operators.behaviour import OperatorParameters
 from teleop_core.kernels import Array, dot
 
 

@@ -13,12 +13,13 @@ from teleop_core.graph import topics
 from teleop_core.kernels import Array, inner
 
 KEPT = 59
-_PASS = int(Act.PASS)
+PRESS, PASS, GRIP, LET_GO = map(int, Act)
+NONE, BESIDE, LATE, FORCE, DROP, WRONG = map(int, Miss)
+"""What kernels take for an :class:`Act` and a :class:`Miss`."""
 _SINCE, _CLOSED = KEPT + 3, KEPT + 4
 _OPENS, _CLOSES = 0.4, 0.6  # closing at which a hand counts as open and closed again
 (_NUMBER, _ACT, _GOAL, _, _, _WIDTH, _ATTEMPTS, _SUCCESSES, _ERRORS, _WAY, _OFF, _TIME, _MISS) = range(13)
 _ATTITUDE, _TURN = (topics.TASK_STATE.columns.index(name) for name in ("goal_qw", "turn"))
-_NONE, _BESIDE, _LATE, _FORCE = (int(m) for m in (Miss.NONE, Miss.BESIDE, Miss.LATE, Miss.FORCE))
 _PUSH = SCENE.index("fx")
 
 
@@ -78,7 +79,7 @@ def end_attempt(memory: Array, scene: Array, state: Array, miss: int) -> None:
         along += to_goal * (scene[1 + i] - state[_GOAL + i])
     way = math.sqrt(way)
     state[_ATTEMPTS] += 1.0
-    state[_SUCCESSES if miss == _NONE else _ERRORS] += 1.0
+    state[_SUCCESSES if miss == NONE else _ERRORS] += 1.0
     state[_WAY], state[_OFF] = way, along / max(way, 1e-12)
     state[_TIME], state[_MISS] = waited(memory, scene), float(miss)
 
@@ -99,14 +100,14 @@ def failed(numbers: Array, memory: Array, scene: Array) -> int:
     for i in range(3):
         square += scene[_PUSH + i] * scene[_PUSH + i]
     if math.sqrt(square) > numbers[1]:
-        return _FORCE
-    return _LATE if waited(memory, scene) > numbers[2] else _NONE
+        return FORCE
+    return LATE if waited(memory, scene) > numbers[2] else NONE
 
 
 @inner
 def tell_attempt(memory: Array, scene: Array, state: Array) -> None:
     """Count an attempt that succeeds where the tip is within the goal now."""
-    end_attempt(memory, scene, state, _NONE if is_at_goal(scene, state) else _BESIDE)
+    end_attempt(memory, scene, state, NONE if is_at_goal(scene, state) else BESIDE)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -143,5 +144,5 @@ def lead_on(numbers: Array, memory: Array, scene: Array, state: Array, y: float,
         if state[_NUMBER] > 0.0:
             tell_attempt(memory, scene, state)
         memory[3] = scene[0] + numbers[1]
-        begin_goal(memory, scene, state, _PASS, x, y, z, numbers[0])
+        begin_goal(memory, scene, state, PASS, x, y, z, numbers[0])
     state[_GOAL], state[_GOAL + 1], state[_GOAL + 2] = x, y, z

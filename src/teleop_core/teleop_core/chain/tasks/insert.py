@@ -4,11 +4,10 @@ import math
 from dataclasses import dataclass
 
 from teleop_core.base import ParameterError, parameter
-from teleop_core.chain.tasks import Act, Miss, Task, attempts
+from teleop_core.chain.tasks import Task, attempts
 from teleop_core.graph import topics
 from teleop_core.kernels import Array, kernel
 
-_PASS, _NONE = int(Act.PASS), int(Miss.NONE)
 _CLEARANCE = topics.TASK_STATE.columns.index("clearance")
 
 
@@ -50,8 +49,8 @@ def insert_judge(numbers: Array, memory: Array, scene: Array, state: Array) -> N
     """
     if state[0] > 0.0:
         is_there, was_inside = attempts.is_at_goal(scene, state), memory[0] > 0.0
-        miss = attempts.failed(numbers, memory, scene) if was_inside else _NONE
-        if not is_there and miss == _NONE:
+        miss = attempts.failed(numbers, memory, scene) if was_inside else attempts.NONE
+        if not is_there and miss == attempts.NONE:
             return
         if was_inside:
             attempts.end_attempt(memory, scene, state, miss)
@@ -59,7 +58,7 @@ def insert_judge(numbers: Array, memory: Array, scene: Array, state: Array) -> N
     x, y, z = numbers[6], numbers[7], numbers[8]
     out = (-numbers[9] if memory[0] > 0.0 else numbers[10]) / math.sqrt(x * x + y * y + z * z)
     goal_x, goal_y, goal_z = numbers[3] + out * x, numbers[4] + out * y, numbers[5] + out * z
-    attempts.begin_goal(memory, scene, state, _PASS, goal_x, goal_y, goal_z, numbers[0])
+    attempts.begin_goal(memory, scene, state, attempts.PASS, goal_x, goal_y, goal_z, numbers[0])
     state[_CLEARANCE] = memory[0] * numbers[11]
 
 

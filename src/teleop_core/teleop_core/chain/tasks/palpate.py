@@ -4,11 +4,10 @@ import math
 from dataclasses import dataclass
 
 from teleop_core.base import parameter
-from teleop_core.chain.tasks import Act, Miss, Task, attempts
+from teleop_core.chain.tasks import Task, attempts
 from teleop_core.graph import topics
 from teleop_core.kernels import Array, kernel
 
-_PASS, _NONE = int(Act.PASS), int(Miss.NONE)
 _FORCE = topics.TASK_STATE.columns.index("force")
 
 
@@ -50,12 +49,12 @@ def palpate_judge(numbers: Array, memory: Array, scene: Array, state: Array) -> 
         if beside > 0.5 * numbers[0] or abs(missing) > numbers[6]:
             memory[4] = scene[0]
         miss = attempts.failed(numbers, memory, scene)
-        if miss == _NONE and scene[0] - memory[4] < numbers[7]:
+        if miss == attempts.NONE and scene[0] - memory[4] < numbers[7]:
             return
         attempts.end_attempt(memory, scene, state, miss)
     memory[3], state[_FORCE], place = 0.0, 0.0, state[0] % numbers[3] - 0.5 * (numbers[3] - 1.0)
     y = memory[1] + place * numbers[4]
-    attempts.begin_goal(memory, scene, state, _PASS, memory[0], y, memory[2], numbers[0])
+    attempts.begin_goal(memory, scene, state, attempts.PASS, memory[0], y, memory[2], numbers[0])
 
 
 PALPATE = Task("palpate", PalpateParameters, palpate_judge)

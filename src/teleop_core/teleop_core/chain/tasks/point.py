@@ -4,10 +4,8 @@ import math
 from dataclasses import dataclass
 
 from teleop_core.base import parameter
-from teleop_core.chain.tasks import Act, Task, attempts
+from teleop_core.chain.tasks import Task, attempts
 from teleop_core.kernels import Array, kernel
-
-_PRESS = int(Act.PRESS)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -61,7 +59,7 @@ def point_judge(numbers: Array, memory: Array, scene: Array, state: Array) -> No
     goal_x = memory[0] + along * ax - across * z * ay
     goal_y = memory[1] + along * ay + across * z * ax
     goal_z = memory[2] + across * (x * ay - y * ax)
-    attempts.begin_goal(memory, scene, state, _PRESS, goal_x, goal_y, goal_z, numbers[2])
+    attempts.begin_goal(memory, scene, state, attempts.PRESS, goal_x, goal_y, goal_z, numbers[2])
 
 
 POINT = Task("point", PointParameters, point_judge)

@@ -4,12 +4,11 @@ import math
 from dataclasses import dataclass
 
 from teleop_core.base import parameter
-from teleop_core.chain.tasks import Act, Miss, Task, attempts
+from teleop_core.chain.tasks import Task, attempts
 from teleop_core.graph import topics
 from teleop_core.kernels import Array, kernel
 from teleop_core.kernels.geometry import rotate_by_vector
 
-_PASS, _LATE = int(Act.PASS), int(Miss.LATE)
 _ATTITUDE, _TURN = (topics.TASK_STATE.columns.index(name) for name in ("goal_qw", "turn"))
 # Powers of the inverse of the plastic number's relative in three dimensions, 1.2207440846…
 _STEPS = (0.8191725133961645, 0.6710436067037893, 0.5497004779019703)
@@ -41,14 +40,14 @@ def reach_judge(numbers: Array, memory: Array, scene: Array, state: Array) -> No
     elif attempts.is_at_goal(scene, state):
         attempts.tell_attempt(memory, scene, state)
     elif attempts.waited(memory, scene) >= numbers[4]:
-        attempts.end_attempt(memory, scene, state, _LATE)
+        attempts.end_attempt(memory, scene, state, attempts.LATE)
     else:
         return
     at = state[0] + numbers[5] + 1.0
     goal_x = memory[0] + numbers[0] * ((0.5 + at * _STEPS[0]) % 1.0 - 0.5)
     goal_y = memory[1] + numbers[1] * ((0.5 + at * _STEPS[1]) % 1.0 - 0.5)
     goal_z = memory[2] + numbers[2] * ((0.5 + at * _STEPS[2]) % 1.0 - 0.5)
-    attempts.begin_goal(memory, scene, state, _PASS, goal_x, goal_y, goal_z, numbers[3])
+    attempts.begin_goal(memory, scene, state, attempts.PASS, goal_x, goal_y, goal_z, numbers[3])
     if numbers[6] > 0.0:  # about an axis that wanders over all directions
         height, angle = 2.0 * (at * _STEPS[0] % 1.0) - 1.0, 2.0 * math.pi * (at * _STEPS[1] % 1.0)
         size, across = numbers[6] * (0.25 + 0.75 * (at * _STEPS[2] % 1.0)), math.sqrt(1.0 - height * height)

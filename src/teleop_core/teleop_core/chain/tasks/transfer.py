@@ -7,7 +7,7 @@ taken up. Its numbers are lift, width, longest, kind, six ways, clearance, tries
 
 import math
 
-from teleop_core.chain.tasks import SCENE, Act, Miss, attempts
+from teleop_core.chain.tasks import SCENE, attempts
 from teleop_core.graph import topics
 from teleop_core.kernels import Array, inner
 
@@ -20,8 +20,6 @@ _TWO, _HAND_OVER = KINDS.index("two"), KINDS.index("hand_over")
 _STEP, _OVER = (topics.TASK_STATE.columns.index(name) for name in ("step", "is_over"))
 _SECOND, _X0 = SCENE.index("is_second"), SCENE.index("x0")
 _STARTS = 4
-_GRIP, _LET_GO = int(Act.GRIP), int(Act.LET_GO)
-_NONE, _LATE, _DROP, _WRONG = (int(m) for m in (Miss.NONE, Miss.LATE, Miss.DROP, Miss.WRONG))
 _TRIES = _STARTS + 3 * topics.JAW_OBJECTS
 _MEETS = 0.01  # a block that is no farther from where both meet is there [m]
 _RESTS = 5e-4  # a block that is no higher above its start stands on the table or a peg [m]
@@ -34,12 +32,12 @@ def _verdict(numbers: Array, memory: Array, scene: Array, block: int) -> int:
     is_high = scene[now + 2] - memory[_STARTS + 3 * block + 2] > _RESTS
     if is_high or brought + scene[_SECOND + 4] - memory[3] == 0.0:
         return -1
-    best, nearest = _DROP, numbers[4 + 2 * topics.JAW_OBJECTS] + 1e-9
+    best, nearest = attempts.DROP, numbers[4 + 2 * topics.JAW_OBJECTS] + 1e-9
     for i in range(topics.JAW_OBJECTS):
         x = memory[_STARTS + 3 * i] + numbers[4 + 2 * i] - scene[now]
         y = memory[_STARTS + 3 * i + 1] + numbers[5 + 2 * i] - scene[now + 1]
         if brought > 0.0 and math.hypot(x, y) <= nearest:
-            best = _NONE if i == block else _WRONG
+            best = attempts.NONE if i == block else attempts.WRONG
     return best
 
 
@@ -65,7 +63,7 @@ def _begin_step(numbers: Array, memory: Array, scene: Array, state: Array, step:
         z = scene[3] + memory[start + 2] + memory[1] - scene[now + 2]
     is_closed = step in (_GRASP, _LIFT, _CARRY) or (step == _MEET and scene[_SECOND] == 0.0)
     is_closed = is_closed or step == _TAKE or (step == _RELEASE and scene[_SECOND] > 0.0)
-    act = _GRIP if is_closed else _LET_GO
+    act = attempts.GRIP if is_closed else attempts.LET_GO
     if step == _REACH or (step == _MEET and scene[_SECOND] > 0.0):
         attempts.begin_goal(memory, scene, state, act, x, y, z, width)
     else:
@@ -129,11 +127,13 @@ def _end_transfer(numbers: Array, memory: Array, scene: Array, state: Array, mis
     """Count a transfer. A dropped block is taken up again, a late one that is held goes on, as often as it may."""
     attempts.end_attempt(memory, scene, state, miss)
     is_held = scene[_SECOND + 1] + scene[_SECOND + 2] > 0.0
-    if memory[_TRIES] >= numbers[5 + 2 * topics.JAW_OBJECTS] or not (miss == _DROP or (miss == _LATE and is_held)):
+    if memory[_TRIES] >= numbers[5 + 2 * topics.JAW_OBJECTS] or not (
+        miss == attempts.DROP or (miss == attempts.LATE and is_held)
+    ):
         _next_block(numbers, memory, scene, state)
         return
     memory[_TRIES] += 1.0
-    if miss == _DROP:
+    if miss == attempts.DROP:
         _take_up(numbers, memory, scene, state)
     else:
         attempts.begin_goal(memory, scene, state, int(state[1]), state[2], state[3], state[4], numbers[1])
@@ -153,7 +153,7 @@ def lead(numbers: Array, memory: Array, scene: Array, state: Array) -> None:
     if scene[_SECOND + 1] == 0.0 and not is_others and (step > _LIFT or step == _WAIT):
         miss = _verdict(numbers, memory, scene, block)
     if miss < 0 and attempts.waited(memory, scene) > numbers[2]:
-        miss = _LATE
+        miss = attempts.LATE
     if miss >= 0:
         _end_transfer(numbers, memory, scene, state, miss)
         return

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from teleop_core.evaluation import Context, Envelope, Moments, Row, Spread, Window, number, row
+from teleop_core.evaluation import Context, Envelope, Moments, Spread, TableRow, Window, number, row
 from teleop_core.evaluation.figure import DARK, FIRST, SECOND, THIRD, Figure, line, time_axis
 from teleop_core.evaluation.metric import SPREAD_MEANING, Key, Metric
 from teleop_core.evaluation.metrics.fixture import GROUP
@@ -34,7 +34,7 @@ class ForceMetric(Metric):
         """Spread so far, [N]."""
         return self._magnitude.spread()
 
-    def rows(self) -> list[Row]:
+    def rows(self) -> list[TableRow]:
         """The maximum, beside the penetration that caused it."""
         return [row(GROUP, "force on hand, max", "N", self.values().max)]
 

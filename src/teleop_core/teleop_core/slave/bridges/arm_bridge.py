@@ -12,7 +12,7 @@ from teleop_core.base import Choice, ParameterError, choice, parameter
 from teleop_core.graph import DT, RunningStage, Stage, topics
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot_set
-from teleop_core.robots.parameters import RobotParameters
+from teleop_core.robots.selection import RobotParameters
 from teleop_core.slave.bridges import BRIDGES, Command
 from teleop_core.slave.bridges.hearing import Hearing, Sample
 from teleop_core.slave.bridges.leading import Lead

@@ -1,4 +1,4 @@
-"""Robot parameters: which arm a stage works for, for every stage whose topics have joints."""
+"""Selection of a robot: which arm a stage works for, for every stage whose topics have joints."""
 
 from dataclasses import dataclass
 

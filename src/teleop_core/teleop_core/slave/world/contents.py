@@ -1,4 +1,4 @@
-"""Parameters of the world: the object, where it is, and what it is made of."""
+"""Contents of the world: the object, where it is, and what it is made of."""
 
 from dataclasses import dataclass
 from functools import cached_property

@@ -1,4 +1,4 @@
-"""Parameters of the network: two directions, each of a kind, and networks that were measured."""
+"""Presets of the network, measured ones among them, and its parameters: two directions, each of a kind."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field

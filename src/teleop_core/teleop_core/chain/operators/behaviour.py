@@ -1,4 +1,4 @@
-"""Operator parameters: which operator moves the hand, and what the smooth ones share."""
+"""Behaviour of the hand: which operator moves it, and what the smooth ones share."""
 
 from dataclasses import dataclass, field
 from itertools import pairwise

@@ -1,4 +1,4 @@
-"""Parameters of motion scaling: gains, axes, fixture, and the force of the slave's limits."""
+"""Gains of motion scaling, its axes, its fixture, and the force of the limits of the slave."""
 
 import math
 from dataclasses import dataclass, field

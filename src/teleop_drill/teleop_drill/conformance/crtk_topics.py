@@ -1,4 +1,4 @@
-"""Rows: the topics of CRTK (Collaborative Robotics Toolkit) that an arm may have.
+"""CRTK topics: those of the Collaborative Robotics Toolkit that an arm may have.
 
 Source:
     Su, Munawar, Deguet et al. 2020 (Collaborative Robotics Toolkit); its pages "Robot operating
@@ -32,7 +32,7 @@ _TWIST, _WRENCH = "geometry_msgs/msg/TwistStamped", "geometry_msgs/msg/WrenchSta
 
 
 @dataclass(frozen=True)
-class Row:
+class CrtkTopic:
     """One topic.
 
     Attributes:
@@ -50,13 +50,13 @@ class Row:
     is_required: bool = False
 
 
-def _typed(names: str, group: Group, ros_type: str) -> tuple[Row, ...]:
-    return tuple(Row(name, group, ros_type) for name in names.split())
+def _typed(names: str, group: Group, ros_type: str) -> tuple[CrtkTopic, ...]:
+    return tuple(CrtkTopic(name, group, ros_type) for name in names.split())
 
 
-ROWS = (
-    Row("operating_state", Group.STATE, "crtk_msgs/msg/OperatingState", is_required=True),
-    Row("state_command", Group.STATE, "crtk_msgs/msg/StringStamped", is_required=True),
+CRTK_TOPICS = (
+    CrtkTopic("operating_state", Group.STATE, "crtk_msgs/msg/OperatingState", is_required=True),
+    CrtkTopic("state_command", Group.STATE, "crtk_msgs/msg/StringStamped", is_required=True),
     *_typed("measured_js setpoint_js goal_js", Group.QUERY, _JOINTS),
     *_typed("measured_cp setpoint_cp goal_cp", Group.QUERY, _POSE),
     *_typed("measured_cv setpoint_cv", Group.QUERY, _TWIST),
@@ -88,7 +88,7 @@ class Finding:
         note: What is wrong with it, or why it was not tried.
     """
 
-    row: Row
+    row: CrtkTopic
     verdict: Verdict
     found: str = ""
     note: str = ""

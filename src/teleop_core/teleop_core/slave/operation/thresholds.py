@@ -1,4 +1,4 @@
-"""Parameters of the operation of an arm: limits of its motion, and what counts as a fault."""
+"""Thresholds of an arm: limits of its motion, and what counts as a fault."""
 
 from dataclasses import dataclass
 
