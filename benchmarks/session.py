@@ -64,7 +64,7 @@ def print_scores(folder: Path) -> None:
     for scenario in ("coarse_box", "fine_box"):
         bags.append(str(folder / scenario))
         run("sim", "--scenario", scenario, "--out", bags[-1])
-    subprocess.run([sys.executable, "-m", "teleop_core.cli", "evaluate", *bags], check=True)
+    subprocess.run([sys.executable, "-m", "teleop_core.commands.cli", "evaluate", *bags], check=True)
 
 
 def main() -> None:

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import teleop_core as tc
-from teleop_core.chain.tasks import attempts
+from teleop_core.hand.tasks import attempts
 
 Array = NDArray[np.float64]
 

@@ -27,22 +27,22 @@ def _mutant(name: str, text: str, file: str, before: str, after: str, *tests: st
 
 _BUTTON = "slave/world/button.py"
 _CONTACT, _PUNCTURE = "slave/world/contact.py", "slave/world/puncture.py"
-_SCALING, _LINK = "chain/mapping/motion_scaling.py", "chain/network/link.py"
-_SIDE = "chain/mapping/side.py"
-_TDPA, _CENTRE = "chain/passivity/tdpa.py", "chain/fixtures/remote_centre.py"
-_HELD = "chain/passivity/held_back.py"
+_SCALING, _LINK = "coupling/mapping/motion_scaling.py", "coupling/network/link.py"
+_SIDE = "coupling/mapping/side.py"
+_TDPA, _CENTRE = "coupling/passivity/tdpa.py", "coupling/fixtures/remote_centre.py"
+_HELD = "coupling/passivity/held_back.py"
 _CENTRE_SCORE, _TOUCH = "evaluation/metrics/remote_centre.py", "evaluation/metrics/touch.py"
 _JAW, _GRIP, _CHANGES = "slave/jaw/jaw.py", "slave/jaw/grip.py", "evaluation/changes.py"
 _GRIPPER = "slave/bridges/jaw_bridge.py"
 _SHARING = "slave/jaw/sharing.py"
-_YIELD = "chain/architectures/impedance.py"
+_YIELD = "coupling/architectures/impedance.py"
 _PID, _WAY = "slave/controllers/pid.py", "slave/interpolation.py"
-_HAND, _OBSERVER = "chain/master/hand_mechanics.py", "slave/force_observer.py"
-_SWIVEL, _SWIVEL_ARCS = (f"robots/closed_form/{name}.py" for name in ("swivel", "swivel_arcs"))
-_SPHERICAL_WRIST = "robots/closed_form/spherical_wrist.py"
-_PARALLEL_AXES = "robots/closed_form/parallel_axes.py"
-_CANDIDATES = "robots/closed_form/candidates.py"
-_SEEING = "chain/operators/observer.py"
+_HAND, _OBSERVER = "hand/master/hand_mechanics.py", "slave/force_observer.py"
+_SWIVEL, _SWIVEL_ARCS = (f"kinematics/closed_form/{name}.py" for name in ("swivel", "swivel_arcs"))
+_SPHERICAL_WRIST = "kinematics/closed_form/spherical_wrist.py"
+_PARALLEL_AXES = "kinematics/closed_form/parallel_axes.py"
+_CANDIDATES = "kinematics/closed_form/candidates.py"
+_SEEING = "hand/operators/observer.py"
 CODE_MUTANTS = (
     _mutant("signal_breaks", "a signal breaks off what runs", "nodes/interrupt.py",
             "        if number == signal.SIGHUP:",
@@ -86,9 +86,9 @@ CODE_MUTANTS = (
             "if trial.repetition and ", "if ", "people"),
     _mutant("worst_is_best", "a search takes the worst values for the best", "teleop_lab/studies/tuning.py",
             "sign = -1.0 if self.is_largest else 1.0", "sign = 1.0", "tuning"),
-    _mutant("goal_chased", "a goal that jumps is run after as one that moves", "chain/operators/glances.py",
+    _mutant("goal_chased", "a goal that jumps is run after as one that moves", "hand/operators/glances.py",
             "glance.goal)) > width:", "glance.goal)) > 1e9:", "observer"),
-    _mutant("early_display", "a display shows frames at once", "chain/master/display.py",
+    _mutant("early_display", "a display shows frames at once", "hand/master/display.py",
             "int(1e9 * p.latency + 0.5)", "0", "tests/scenario/test_tasks.py"),
     _mutant("one_base", "the second arm meets an object where the first one would", "slave/world/contents.py",
             "np.array(self.place) - np.array(self.base) if", "np.array(self.place) if", "world"),
@@ -108,12 +108,12 @@ CODE_MUTANTS = (
             "if _sticks(motion, tip, against, other, most):", "two_jaws"),
     _mutant("one_base", "both arms stand at the same place", _GRIP,
             "tips[1, i] += p.second_base[i]", "tips[1, i] += 0.0", "two_jaws"),
-    _mutant("any_peg", "a block on a peg of another colour counts", "chain/tasks/transfer.py",
+    _mutant("any_peg", "a block on a peg of another colour counts", "hand/tasks/transfer.py",
             "attempts.NONE if i == block else attempts.WRONG", "attempts.NONE", "tests/scenario/test_peg_transfer.py"),
     _mutant("early_release", "a hand-over lets go before the other jaw holds",
-            "chain/tasks/transfer.py", "return grips if step == _GRASP or is_second else other",
+            "hand/tasks/transfer.py", "return grips if step == _GRASP or is_second else other",
             "return grips", "tests/scenario/test_peg_transfer.py"),
-    _mutant("left_lying", "a dropped block is left where it lies", "chain/tasks/transfer.py",
+    _mutant("left_lying", "a dropped block is left where it lies", "hand/tasks/transfer.py",
             "not (miss == attempts.DROP or", "not (False or", "tests/scenario/test_peg_transfer.py"),
     _mutant("long_steps", "a step lasts from the first sample on", "evaluation/metrics/steps.py",
             "log_ns, step, self._tried = ns, int", "log_ns, step, self._tried = log_ns or ns, int",
@@ -125,7 +125,7 @@ CODE_MUTANTS = (
             "if may_end and all", "if False and all", "tests/scenario/test_peg_transfer.py"),
     _mutant("one_live_over", "a live session ends once one of two arms has no goal left", "nodes/task_end.py",
             "_OVER] > 0.0).all()", "_OVER] > 0.0).any()", "tests/simulated/test_task_end.py"),
-    _mutant("task_uncounted", "a task that counts nothing is taken", "chain/tasks/__init__.py",
+    _mutant("task_uncounted", "a task that counts nothing is taken", "hand/tasks/__init__.py",
             "if not (needs_jaw or", "if False and (needs_jaw or", "part_mistakes"),
     _mutant("scores_unwritten", "a study may ask for scores of what no session writes",
             "teleop_lab/studies/checks.py", "if reads and not written.intersection(reads):", "if False:", "studies"),
@@ -135,13 +135,13 @@ CODE_MUTANTS = (
             "self._still == 3", "self._still == 1", "evaluation_scores"),
     _mutant("any_bump", "every bump of a force is a peak", "evaluation/metrics/force_peaks.py",
             ">= _STEP and", "> 0.0 and", "evaluation_scores"),
-    _mutant("soft_finger", "no force is too large for a task", "chain/tasks/attempts.py",
+    _mutant("soft_finger", "no force is too large for a task", "hand/tasks/attempts.py",
             "if math.sqrt(square) > numbers[1]:", "if False:", "touching_tasks"),
-    _mutant("short_hold", "a force need not be held", "chain/tasks/palpate.py",
+    _mutant("short_hold", "a force need not be held", "hand/tasks/palpate.py",
             "scene[0] - memory[4] < numbers[7]", "scene[0] < memory[4]", "touching_tasks"),
-    _mutant("way_out_counts", "the way out of a hole counts as a way in", "chain/tasks/insert.py",
+    _mutant("way_out_counts", "the way out of a hole counts as a way in", "hand/tasks/insert.py",
             "        if was_inside:\n", "        if True:\n", "touching_tasks"),
-    _mutant("wide_target", "a press beside the target counts", "chain/tasks/attempts.py",
+    _mutant("wide_target", "a press beside the target counts", "hand/tasks/attempts.py",
             "<= 0.5 * state[_WIDTH]", "<= state[_WIDTH]", "tests/scenario/test_tasks.py"),
     _mutant("reports_meet", "all nodes report at once", "nodes/rate.py",
             "place = stages.index(stage) if stage in stages else len(stages)", "place = 0", "rate"),
@@ -167,17 +167,17 @@ CODE_MUTANTS = (
             "slave/bridges/arm_bridge.py", "if is_late and self.lead_arm.has_lost(",
             "if False and self.lead_arm.has_lost(", "arm_bridge"),
     _mutant("gap_followed", "a jump of the hand in a gap of its samples is followed",
-            "chain/mapping/plausibility.py", "max(_GAP, 2e-9 * s.raw_elapsed_ns) / period",
+            "coupling/mapping/plausibility.py", "max(_GAP, 2e-9 * s.raw_elapsed_ns) / period",
             "1.0", "plausible_hand"),
     _mutant("buttons_paused", "a pause of the poses makes single presses of a stream of buttons",
-            "chain/mapping/plausibility.py", "max(s.in_row - _STREAM, 0)", "0", "plausible_hand"),
+            "coupling/mapping/plausibility.py", "max(s.in_row - _STREAM, 0)", "0", "plausible_hand"),
     # kernels and robots
-    _mutant("hand_flips", "a hand on its stop flips the elbow", "robots/closed_form/plane_arm.py",
+    _mutant("hand_flips", "a hand on its stop flips the elbow", "kinematics/closed_form/plane_arm.py",
             "range(HAND if is_path else 0)", "range(5 if is_path else 0)", "end_stops"),
     _mutant("wrist_drags", "a bare wrist on its stop gives up the place",
             _SPHERICAL_WRIST, "and _has_no_tool(K) and", "and K[0] > 9.0 and", "end_stops"),
     _mutant("tilt_kept", "a plane's arm is told off for a tilt that it cannot take",
-            "robots/closed_form/plane_arm.py", " or _is_met(G, reached, K, q)):",
+            "kinematics/closed_form/plane_arm.py", " or _is_met(G, reached, K, q)):",
             "):", "textbook_arms"),
     _mutant("margin_first", "a margin from a limit is worth any way", _SWIVEL,
             "> most + candidates.BESIDE_SEED:", "> most + 10.0:", "closed_forms"),
@@ -193,7 +193,7 @@ CODE_MUTANTS = (
     _mutant("lag_reach", "a large arm that lags gives up millimetres for a milliradian",
             _CANDIDATES, "_LEVER = 0.1", "_LEVER = 4.0", "real_arms"),
     _mutant("no_tremor", "the Kalman filter takes all that it reads for meant",
-            "chain/filters/kalman.py", "value - at[0] - at[2]", "value - at[0]", "tremor_filters"),
+            "coupling/filters/kalman.py", "value - at[0] - at[2]", "value - at[0]", "tremor_filters"),
     _mutant("steps_wide", "a drive's step throws a link of some grams",
             "slave/plants/hardware.py", "np.minimum(drives.effort_limit, quick)",
             "drives.effort_limit", "real_arms"),
@@ -222,7 +222,7 @@ CODE_MUTANTS = (
             "robots/files/urdf_tree.py", "for word in text.split()])",
             "for word in text.split() if math.isfinite(_number(word))])", "robots_from_urdf"),
     _mutant("inertia_off", "a body's inertia lacks its distance from the axis",
-            "robots/chains/chain_dynamics.py", "turned + (square + along if i == j else 0.0)",
+            "robots/dynamics/chain_dynamics.py", "turned + (square + along if i == j else 0.0)",
             "turned + (square if i == j else 0.0)", "robots_from_urdf"),
     _mutant("far_arc", "of the swivel's legal arcs one that is farther off is taken",
             _SWIVEL_ARCS, "up if above <= below else down", "down", "closed_forms"),
@@ -233,7 +233,7 @@ CODE_MUTANTS = (
     _mutant("narrower", "the swivel of seven axes goes where manipulability shrinks",
             _SWIVEL, "change + side * width", "change - side * width", "closed_forms"),
     _mutant("factor_lost", "a follower's inertia counts once by its factor",
-            "robots/chains/followers.py", "row[1 + m + i] * row[1 + m + k]", "row[1 + m + i]",
+            "robots/dynamics/followers.py", "row[1 + m + i] * row[1 + m + k]", "row[1 + m + i]",
             "followers"),
     # chain
     _mutant("edge_missed", "a held mode button toggles at every sample", _SCALING,
@@ -253,12 +253,12 @@ CODE_MUTANTS = (
             "return side * distance", "return distance", "shapes_combined"),
     _mutant("cone_blunt", "beyond its tip a cone leads to its wall", "shapes/cone.py",
             "if along * cosine + aside * sine <= 0.0 and", "if along < -1.0 and", "shapes"),
-    _mutant("side_same", "what is to stay out of holds the hand in", "chain/fixtures/__init__.py",
+    _mutant("side_same", "what is to stay out of holds the hand in", "coupling/fixtures/__init__.py",
             "return side * distance", "return distance", "shapes"),
     _mutant("fixture_begun", "a hand may begin where its fixture does not allow it",
-            "chain/fixtures/__init__.py", "if beyond > _ROUNDING:", "if False:", "shapes"),
+            "coupling/fixtures/__init__.py", "if beyond > _ROUNDING:", "if False:", "shapes"),
     _mutant("mesh_gone", "a fixture's mesh is scored by the file of today",
-            "chain/fixtures/reported_fixture.py", "repr(moved(_value(name, text), files))", "text",
+            "coupling/fixtures/reported_fixture.py", "repr(moved(_value(name, text), files))", "text",
             "shapes_combined"),
     _mutant("former_wide", "a diameter of a recording is taken for a radius",
             "graph/former_shapes.py", '0.5 * found.pop("diameter")', 'found.pop("diameter")',
@@ -281,7 +281,7 @@ CODE_MUTANTS = (
     _mutant("unit_lost", "commanded turns drift off unit length", _SCALING,
             "s.command[i] *= 1.5 - 0.5 * square", "s.command[i] *= 1.0", "motion_scaling"),
     _mutant("wild_hand", "the sample after a wild one is compared with it",
-            "chain/mapping/plausibility.py", "s.is_doubted = 0 if is_sound else 1",
+            "coupling/mapping/plausibility.py", "s.is_doubted = 0 if is_sound else 1",
             "s.is_doubted = 0", "plausible_hand"),
     _mutant("sticking", "the device's friction never holds it", _HAND,
             "sticks = square <= p.friction * p.friction", "sticks = False", "haptic_master"),
@@ -292,7 +292,7 @@ CODE_MUTANTS = (
             "p.flow[0, i, _SPEED, _PUSH]\n", "stability"),
     _mutant("stops_bend", "a hand that leans on the device's stop bends its wrist", _HAND,
             "s.hand[i], s.hand_speed[i] = s.position[i], 0.0", "pass", "haptic_master"),
-    _mutant("wobble", "the gimbal's noise exceeds its bound", "chain/master/device.py",
+    _mutant("wobble", "the gimbal's noise exceeds its bound", "hand/master/device.py",
             "min(max(0.5 * noise[i], -1.0), 1.0)", "0.5 * noise[i]", "haptic_master"),
     _mutant("centre_short", "the tool turns 1 % too little towards its centre", _CENTRE,
             "turn[i] *= angle", "turn[i] *= 0.99 * angle", "remote_centre"),
@@ -301,7 +301,7 @@ CODE_MUTANTS = (
     _mutant("centre_jerk", "the tool turns at once as far as it must", _CENTRE,
             "if angle > most:", "if angle > 1e9:", "remote_centre"),
     _mutant("silent_device", "a device that says nothing is pushed on",
-            "chain/master/master_bridge.py", "age <= p.force_timeout and self.is_heard(now_ns)",
+            "hand/master/master_bridge.py", "age <= p.force_timeout and self.is_heard(now_ns)",
             "age <= p.force_timeout", "master_bridge"),
     _mutant("from_tomorrow", "poses that are stamped ahead are believed",
             "slave/bridges/hearing.py", "0.0 < oldest < abs(age)", "0.0 < oldest < age",
@@ -320,28 +320,28 @@ CODE_MUTANTS = (
             "s.free[k] = max(s.free[k], float(s.tick))", "pass", "bandwidth"),
     _mutant("queue_endless", "a full queue of kept packets takes more", _LINK,
             "if p.keeps_order[k] and s.waits[k] >= p.queue[k]:", "if False:", "bandwidth"),
-    _mutant("header_free", "headers have no size", "chain/network/packet_size.py",
+    _mutant("header_free", "headers have no size", "coupling/network/packet_size.py",
             "HEADER = 20 + 8", "HEADER = 0", "bandwidth"),
     _mutant("clock_asked", "the age of a force is told from the slave's clock",
-            "chain/mapping/following.py", "s.felt_at_ns = now_ns",
+            "coupling/mapping/following.py", "s.felt_at_ns = now_ns",
             "s.felt_at_ns = row.slave_measured_cf_ns", "two_clocks"),
     _mutant("clock_scored", "ages that are scored hold the offset of the slave's clock",
             "evaluation/metrics/network.py", "stamps = stamps - _clock_ahead_ns(window, logs)",
             "pass", "two_clocks"),
     _mutant("burst_short", "a burst of losses ends as if none had begun",
-            "chain/network/gilbert_elliott.py",
+            "coupling/network/gilbert_elliott.py",
             "border = numbers[1] if memory[1] > 0.0 else numbers[0]", "border = numbers[0]",
             "network"),
     _mutant("pause_shared", "outages begin in a period, however long the one before was",
-            "chain/network/outages.py", "if memory[1] > 0.0 else numbers[0])",
+            "coupling/network/outages.py", "if memory[1] > 0.0 else numbers[0])",
             "if memory[1] > 0.0 else max(numbers[0] - numbers[1] / 2.0, 0.0))", "network"),
     _mutant("times_per_burst", "good and bad times change once a burst",
-            "chain/network/gilbert_elliott.py",
+            "coupling/network/gilbert_elliott.py",
             "memory[1] = 1.0 if chances[0] < border else 0.0",
             "memory[1] = memory[1] if memory[0] >= 1.0 else float(chances[0] < border)",
             "network"),
     _mutant("never_stopped", "a tank lets the command go on against any force",
-            "chain/passivity/tank.py", "command, numbers[5], period)", "command, 1e9, period)",
+            "coupling/passivity/tank.py", "command, numbers[5], period)", "command, 1e9, period)",
             "passivity"),
     _mutant("told_twice", "what was told to the other side is also spent here", _TDPA,
             "        port[MARGIN] -= told\n", "        port[MARGIN] -= 0.0\n", "passivity"),
@@ -353,16 +353,16 @@ CODE_MUTANTS = (
     _mutant("turned_free", "turns against a torque cost nothing", _HELD,
             "    if excess > 0.0:", "    if excess > 1e9:", "passivity"),
     _mutant("turns_uncounted", "what torques took and gave is not counted as paid",
-            "chain/passivity/slave_side.py", "        came += turned\n", "", "passivity"),
+            "coupling/passivity/slave_side.py", "        came += turned\n", "", "passivity"),
     _mutant("wall_apart", "with passivity the fixture's wall gives what it likes",
-            "chain/mapping/reflection.py", "    if p.law != 0.0:\n        _hold_wall",
+            "coupling/mapping/reflection.py", "    if p.law != 0.0:\n        _hold_wall",
             "    if p.law > 1e9:\n        _hold_wall", "passivity"),
     _mutant("drag_missing", "the hand never pays for a slave that has nothing", _TDPA,
             "drag = numbers[2] * min", "drag = 0.0 * min", "passivity"),
-    _mutant("wave_cheap", "a wave costs half of its energy", "chain/passivity/wave.py",
+    _mutant("wave_cheap", "a wave costs half of its energy", "coupling/passivity/wave.py",
             "return 0.5 * square * share", "return 0.25 * square * share", "wave"),
     _mutant("wave_echo", "the hand's wave does not take in the one that came",
-            "chain/passivity/wave.py", "at_slave * led[i] - wave[i] * period",
+            "coupling/passivity/wave.py", "at_slave * led[i] - wave[i] * period",
             "at_slave * led[i]", "wave"),
     _mutant("wave_unpaid", "a wave leads the arm against the force without being paid for", _HELD,
             "if inwards > left and size > least:", "if inwards > 1e9:", "wave"),
@@ -378,7 +378,7 @@ CODE_MUTANTS = (
     _mutant("yields_far", "the tip yields without an end", _YIELD,
             "if square > p.largest_way * p.largest_way:", "if square > 1e9:", "impedance"),
     _mutant("fourth_turned", "the hand's force leads the slave the wrong way",
-            "chain/mapping/reflection.py", "-p.lead_gain * p.sign[i]", "p.lead_gain * p.sign[i]",
+            "coupling/mapping/reflection.py", "-p.lead_gain * p.sign[i]", "p.lead_gain * p.sign[i]",
             "impedance"),
     # slave
     _mutant("creeping", "a bristle bends on where it should slip", "slave/friction.py",
@@ -494,7 +494,7 @@ CODE_MUTANTS = (
             'if self.signals["slave_jaw_setpoint_js_ns"] <= NO_COMMAND_NS:', "if False:",
             "jaw_bridge"),
     _mutant("jaw_unplugged", "a gamepad that was unplugged opens the jaw when it comes back",
-            "chain/devices/pilot.py", "        self._leads_jaw = False\n", "", "devices"),
+            "hand/devices/pilot.py", "        self._leads_jaw = False\n", "", "devices"),
     _mutant("jaw_sticks", "friction of the pads has no bound", _GRIP,
             "share = most / apart if apart > most else 1.0", "share = 1.0", "jaw"),
     _mutant("jaw_opens", "an object that the hand lets go of counts as dropped", _GRIP,
@@ -563,7 +563,7 @@ CODE_MUTANTS = (
             "self.conflict = self.conflict or self.has_other", "self.conflict = self.has_other",
             "sender"),
     _mutant("slow_restarts", "slow commands start from the slave's joints each time",
-            "chain/mapping/inverse_kinematics.py", "max(p.timeout_ns, 2 * elapsed_ns)",
+            "coupling/mapping/inverse_kinematics.py", "max(p.timeout_ns, 2 * elapsed_ns)",
             "p.timeout_ns", "inverse_kinematics"),
     _mutant("upright_pose", "only the pose itself says whether roll and yaw are defined",
             "evaluation/tracking.py",

@@ -8,8 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from teleop_core import cli
-from teleop_core.commands import installed
+from teleop_core.commands import cli, installed
 from teleop_core.robots import ROBOTS
 
 ALONE = """

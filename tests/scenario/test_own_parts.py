@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from teleop_core.bags.reader import Bag
 from teleop_core.base import NoParameters, PartError, build, parameter
-from teleop_core.chain.mapping.gains import MotionScalingParameters
-from teleop_core.chain.operators import register_operator
+from teleop_core.coupling.mapping.gains import MotionScalingParameters
 from teleop_core.graph import STATE, TICK_NS, Stage, register_stage
 from teleop_core.graph.topics import (
     MASTER_MEASURED_CP,
@@ -23,6 +22,7 @@ from teleop_core.graph.topics import (
     Topic,
     passed_on,
 )
+from teleop_core.hand.operators import register_operator
 from teleop_core.kernels import Array, kernel
 from teleop_core.robots import load_robot
 from teleop_core.session import configuration, runner

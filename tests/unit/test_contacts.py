@@ -11,13 +11,13 @@ import pytest
 from held_master import HeldMaster
 from recipes import Recipe
 from teleop_core.base.parameters import build
-from teleop_core.chain.mapping import gains, walls
-from teleop_core.chain.master import hand_mechanics, haptic_master
-from teleop_core.chain.master.device import DeviceParameters
-from teleop_core.chain.operators.behaviour import OperatorParameters
-from teleop_core.chain.operators.rest import REST_POSITION
+from teleop_core.coupling.mapping import gains, walls
 from teleop_core.evaluation import Score, evaluate
 from teleop_core.graph.topics import MASTER_CONTACT
+from teleop_core.hand.master import hand_mechanics, haptic_master
+from teleop_core.hand.master.device import DeviceParameters
+from teleop_core.hand.operators.behaviour import OperatorParameters
+from teleop_core.hand.operators.rest import REST_POSITION
 from teleop_core.kernels.geometry import Array
 from teleop_core.session import api, notes
 

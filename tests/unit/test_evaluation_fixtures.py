@@ -15,8 +15,8 @@ from present import present
 from recipes import START_NS, Recipe, state
 from teleop_core.bags.reader import Bag
 from teleop_core.base import EvaluationError, parameter
-from teleop_core.chain.fixtures.reported_fixture import ReportedFixture
-from teleop_core.chain.mapping.gains import MotionScalingParameters, axis_map
+from teleop_core.coupling.fixtures.reported_fixture import ReportedFixture
+from teleop_core.coupling.mapping.gains import MotionScalingParameters, axis_map
 from teleop_core.evaluation import Figure, TableRow, evaluate, study
 from teleop_core.evaluation.command import evaluate_bags
 from teleop_core.evaluation.origin import read_origin

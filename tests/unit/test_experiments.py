@@ -8,7 +8,7 @@ from scipy.signal import dlti, dstep
 
 from present import present
 from teleop_core.base.errors import ParameterError, PartError, TeleopError, UnknownNameError
-from teleop_core.chain.operators.tour import tour
+from teleop_core.hand.operators.tour import tour
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot
 from teleop_core.session import configuration, recording

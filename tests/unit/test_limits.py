@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from teleop_core.base import build
-from teleop_core.chain.mapping import gains, limits, motion_scaling
+from teleop_core.coupling.mapping import gains, limits, motion_scaling
 from teleop_core.graph import STATE, TICK_NS, topics
 from teleop_core.kernels.geometry import Array
 

@@ -8,9 +8,9 @@ import pytest
 
 from scaling_desk import ANY_HAND, HOME, MM, Desk
 from teleop_core.base import build
-from teleop_core.chain.mapping import gains, motion_scaling
-from teleop_core.chain.operators.rest import REST_POSITION, REST_TILT
+from teleop_core.coupling.mapping import gains, motion_scaling
 from teleop_core.graph import TICK_NS, topics
+from teleop_core.hand.operators.rest import REST_POSITION, REST_TILT
 from teleop_core.kernels.geometry import Array, quaternion_from_rotation, rotation, rotation_from_quaternion
 
 DEGREE = math.pi / 180.0

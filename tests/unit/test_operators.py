@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 
 from held_master import HeldMaster
 from teleop_core.base import NoParameters, ParameterError, PartError, build, parameter
-from teleop_core.chain.operators import OPERATORS, Operator, Setting, following, register_operator
-from teleop_core.chain.operators.behaviour import OperatorParameters
-from teleop_core.chain.operators.shapes import PHASES, minimum_jerk
+from teleop_core.hand.operators import OPERATORS, Operator, Setting, following, register_operator
+from teleop_core.hand.operators.behaviour import OperatorParameters
+from teleop_core.hand.operators.shapes import PHASES, minimum_jerk
 from teleop_core.kernels.geometry import Array
 
 # Products of numbers below one.

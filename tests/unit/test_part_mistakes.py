@@ -13,11 +13,11 @@ import pytest
 
 from teleop_core import evaluation
 from teleop_core.base import NoParameters, ParameterError, PartError, build, parameter, specs
-from teleop_core.chain.operators import Operator, register_operator
-from teleop_core.chain.tasks import Task, register_task
 from teleop_core.evaluation import Metric
 from teleop_core.graph import Stage, register_stage
 from teleop_core.graph.topics import SLAVE_MEASURED_CP, SLAVE_SERVO_CP, TASK_STATE, Kind, Topic, passed_on
+from teleop_core.hand.operators import Operator, register_operator
+from teleop_core.hand.tasks import Task, register_task
 from teleop_core.kernels import IS_COMPILED, kernel, records
 from teleop_core.session.configuration import configure
 from teleop_core.shapes import register_shape, sphere

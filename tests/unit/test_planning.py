@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 import teleop_core as tc
 import teleop_lab as lab
 from people import PEOPLE, moves, recorded
-from teleop_core.chain.mapping import gains, inverse_kinematics
+from teleop_core.coupling.mapping import gains, inverse_kinematics
 from teleop_core.kernels import IS_COMPILED
 from teleop_core.robots.freedom import free_postures, freedom
 from teleop_core.robots.selection import RobotParameters

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from teleop_core.chain.mapping import gains, motion_scaling
+from teleop_core.coupling.mapping import gains, motion_scaling
 from teleop_core.graph.signals import TICK_NS
 from teleop_core.kernels.geometry import Array
 

@@ -17,9 +17,9 @@ import teleop_core as tc
 from forgotten_parts import own_parts  # noqa: F401
 from present import present
 from teleop_core.base import NoParameters, ParameterError, PartError, build
-from teleop_core.chain.filters import LONGEST_NS, MEMORY, TREMOR_FILTERS, tremor_filter
-from teleop_core.chain.filters.wflc import RATE
-from teleop_core.chain.mapping import gains, motion_scaling
+from teleop_core.coupling.filters import LONGEST_NS, MEMORY, TREMOR_FILTERS, tremor_filter
+from teleop_core.coupling.filters.wflc import RATE
+from teleop_core.coupling.mapping import gains, motion_scaling
 from teleop_core.evaluation.metrics.tremor_filter import passage
 from teleop_core.evaluation.motion_measures import RATE as SAMPLED
 from teleop_core.evaluation.motion_measures import tremor_power, velocities

@@ -157,7 +157,7 @@ class Panel:
     def _evaluate(self, client: int) -> None:
         """Score in a process of its own, with what the session leaves of the processors."""
         self._scored.content = "scoring …"
-        command = ["nice", "-n", "15", sys.executable, "-m", "teleop_core.cli", "evaluate"]
+        command = ["nice", "-n", "15", sys.executable, "-m", "teleop_core.commands.cli", "evaluate"]
         done = subprocess.run([*command, str(self._last)], capture_output=True, text=True, check=False)
         self._scored.content = f"```\n{done.stdout or done.stderr}\n```"
 

@@ -2,8 +2,8 @@
 
 from typing import Any
 
-from teleop_core.chain.network.network import BACK, THERE
-from teleop_core.chain.network.presets import NetworkParameters
+from teleop_core.coupling.network.network import BACK, THERE
+from teleop_core.coupling.network.presets import NetworkParameters
 from teleop_core.graph.signals import TICK_NS
 from teleop_core.graph.topics import (
     NETWORK_JAW_SERVO_JP,

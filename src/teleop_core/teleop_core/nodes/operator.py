@@ -6,10 +6,6 @@ from typing import Any
 import numpy as np
 
 from teleop_core.base.errors import PartError
-from teleop_core.chain.operators import OPERATORS
-from teleop_core.chain.operators.behaviour import OperatorParameters
-from teleop_core.chain.operators.follower import MOST
-from teleop_core.chain.operators.remote import BUTTONS, RemoteHand
 from teleop_core.graph.topics import (
     MASTER_MEASURED_CF,
     MASTER_MEASURED_CP,
@@ -19,6 +15,10 @@ from teleop_core.graph.topics import (
     SLAVE_MEASURED_CP,
     Topic,
 )
+from teleop_core.hand.operators import OPERATORS
+from teleop_core.hand.operators.behaviour import OperatorParameters
+from teleop_core.hand.operators.follower import MOST
+from teleop_core.hand.operators.remote import BUTTONS, RemoteHand
 from teleop_core.nodes.device_hand import DeviceHand
 from teleop_core.nodes.streams import Input
 from teleop_core.nodes.ticking import TickingNode

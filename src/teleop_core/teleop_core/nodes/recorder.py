@@ -14,7 +14,7 @@ from teleop_core.bags.reports import report
 from teleop_core.bags.writer import BagWriter
 from teleop_core.base.errors import RecordingError, SessionError, TeleopError
 from teleop_core.base.parameters import build, parameter, specs, values_of
-from teleop_core.chain.mapping.gains import axis_map
+from teleop_core.coupling.mapping.gains import axis_map
 from teleop_core.graph.graph import RECORDER_NAME, Graph
 from teleop_core.graph.layers import SESSION, parse_text
 from teleop_core.graph.stage import Stage

@@ -1,9 +1,9 @@
 """Notes: what runs but may not be meant, of a configuration before its session begins."""
 
-from teleop_core.chain.mapping import gains, walls
-from teleop_core.chain.master.device import DeviceParameters
-from teleop_core.chain.master.haptic_master import HapticMasterParameters
+from teleop_core.coupling.mapping import gains, walls
 from teleop_core.graph import BUILT_IN, DT, topics
+from teleop_core.hand.master.device import DeviceParameters
+from teleop_core.hand.master.haptic_master import HapticMasterParameters
 from teleop_core.robots import load_robot_set
 from teleop_core.robots.parts import is_urdf
 from teleop_core.robots.robot_notes import assumed_note, notes_on_robot

@@ -12,8 +12,8 @@ import numpy as np
 from teleop_core.base import ParameterError, parameter
 from teleop_core.graph import DT, RunningStage, Stage, assign, topics
 from teleop_core.kernels import Array, kernel, length, pointer, pose_from_transform, record, records
+from teleop_core.kinematics import FK
 from teleop_core.robots import load_robot_set
-from teleop_core.robots.kinematics import FK
 from teleop_core.robots.robot import Robot
 from teleop_core.robots.selection import RobotParameters
 from teleop_core.slave import arm, commands, motion_commands, simulation, step, trajectory

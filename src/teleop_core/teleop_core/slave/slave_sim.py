@@ -7,10 +7,9 @@ import numpy as np
 from teleop_core.base import Choice, ClosureError, ParameterError, choice, parameter
 from teleop_core.graph import DT, RunningStage, Stage, assign, topics
 from teleop_core.kernels import Array, fields_of, pointer, record, record_array
+from teleop_core.kinematics import FK, dh_kernels
 from teleop_core.robots import load_robot_set
-from teleop_core.robots.chains import dh_kernels
 from teleop_core.robots.drives import ACCELERATION, GRAVITY
-from teleop_core.robots.kinematics import FK
 from teleop_core.robots.selection import RobotParameters
 from teleop_core.slave import handover, simulation, stability, transmission
 from teleop_core.slave.arm import Arm

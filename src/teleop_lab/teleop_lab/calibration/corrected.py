@@ -7,7 +7,7 @@ from typing import TypeAlias
 import numpy as np
 
 from teleop_core.kernels.geometry import Array
-from teleop_core.robots.kinematics import DIRECTIONS
+from teleop_core.kinematics import DIRECTIONS
 from teleop_core.robots.link_errors import Chain, LinkErrors, next_axis_motion
 from teleop_core.robots.robot import Robot
 

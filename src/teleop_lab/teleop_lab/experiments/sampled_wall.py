@@ -5,9 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from teleop_core.chain.mapping.walls import wall_force
-from teleop_core.chain.master.haptic_master import HapticMaster
+from teleop_core.coupling.mapping.walls import wall_force
 from teleop_core.graph import DT, topics
+from teleop_core.hand.master.haptic_master import HapticMaster
 from teleop_core.kernels.geometry import Array
 from teleop_lab.experiments import one_axis
 

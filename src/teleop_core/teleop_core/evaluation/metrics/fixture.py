@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from teleop_core.chain.fixtures.reported_fixture import ReportedFixture
+from teleop_core.coupling.fixtures.reported_fixture import ReportedFixture
 from teleop_core.evaluation import MISSING, Context, Metric, Moments, TableRow, Window, keys_of, row
 from teleop_core.evaluation.metric import figure
 from teleop_core.evaluation.published import BOX_OVERSHOOT_MM, Gains

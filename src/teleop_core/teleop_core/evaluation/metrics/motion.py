@@ -6,8 +6,6 @@ from itertools import pairwise
 import numpy as np
 
 from teleop_core.base import TeleopError, build
-from teleop_core.chain.operators import OPERATORS
-from teleop_core.chain.operators.behaviour import OperatorParameters
 from teleop_core.evaluation import Context, Key, Metric, TableRow, Window, keys_of, number, row
 from teleop_core.evaluation.figure import DARK, MEASURED, Figure, line, time_axis
 from teleop_core.evaluation.motion_figures import Kinematics, Mask, MotionFigures
@@ -16,6 +14,8 @@ from teleop_core.evaluation.motion_samples import MotionSamples
 from teleop_core.evaluation.state_history import States
 from teleop_core.graph import STATE
 from teleop_core.graph.topics import MASTER_MEASURED_CP, SLAVE_MEASURED_CP, Topic
+from teleop_core.hand.operators import OPERATORS
+from teleop_core.hand.operators.behaviour import OperatorParameters
 
 
 def approach_end_ns(context: Context) -> int:

@@ -4,7 +4,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from teleop_core.chain.passivity.port import DRIFT, HEARD, IN, LAW, MARGIN, OUT, ROUND, WITHHELD
+from teleop_core.coupling.passivity.port import DRIFT, HEARD, IN, LAW, MARGIN, OUT, ROUND, WITHHELD
 from teleop_core.evaluation import Context, Envelope, Integers, Metric, TableRow, Window, keys_of, number, row
 from teleop_core.evaluation.figure import FIRST, FIXTURE, SECOND, THIRD, Figure, line, time_axis
 from teleop_core.evaluation.metric import figure

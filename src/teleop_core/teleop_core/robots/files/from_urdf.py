@@ -1,9 +1,9 @@
 """Robots from URDF: the chain from the root link to a tip, with what the file says of its drives.
 
 What moves the tip are the joints between root and tip; all others stay at zero, and weigh. A joint between them that
-mimics another moves with it (:mod:`teleop_core.robots.chains.followers`). The kinematics are those of
-Denavit-Hartenberg chains (:mod:`teleop_core.robots.chains.dh_kernels`), the dynamics those of rigid bodies
-(:mod:`teleop_core.robots.chains.chain_dynamics`). Effort and velocity limits, damping and friction are the drives'
+mimics another moves with it (:mod:`teleop_core.robots.dynamics.followers`). The kinematics are those of
+Denavit-Hartenberg chains (:mod:`teleop_core.kinematics.dh_kernels`), the dynamics those of rigid bodies
+(:mod:`teleop_core.robots.dynamics.chain_dynamics`). Effort and velocity limits, damping and friction are the drives'
 where they stand in the file and are above zero. The inertia of a drive is that of the links at home; that of its motor
 is in no URDF. A file of drives may state it, and what else a URDF leaves out. Whatever is left out there too is assumed
 as for tables (:mod:`teleop_core.robots.arms.dh_drives`), and ``Robot.drives.assumed`` names it. Meshes are read where
@@ -25,11 +25,12 @@ import numpy as np
 
 from teleop_core.base import ParameterError, UnknownNameError
 from teleop_core.kernels import Array, dot, length, product
+from teleop_core.kinematics import DIRECTIONS
+from teleop_core.kinematics.closed_form.decomposition import SEARCH, solution_of
 from teleop_core.robots.arms import dh_chain, dh_drives
-from teleop_core.robots.chains.chain_dynamics import body_row, chain_dynamics, chain_row
-from teleop_core.robots.chains.followers import Follower, Followers, dynamics_row, follower_dynamics, follower_inertia
-from teleop_core.robots.closed_form.decomposition import SEARCH, solution_of
 from teleop_core.robots.drives import ENTRIES, Drives, Dynamics
+from teleop_core.robots.dynamics.chain_dynamics import body_row, chain_dynamics, chain_row
+from teleop_core.robots.dynamics.followers import Follower, Followers, dynamics_row, follower_dynamics, follower_inertia
 from teleop_core.robots.files import urdf_notes, xacro_files
 from teleop_core.robots.files.urdf_tree import (
     KINDS,
@@ -50,7 +51,6 @@ from teleop_core.robots.files.urdf_tree import (
     turn_of_z,
 )
 from teleop_core.robots.files.visuals import visuals_of
-from teleop_core.robots.kinematics import DIRECTIONS
 from teleop_core.robots.rank import directions_of
 from teleop_core.robots.robot import Robot
 
@@ -88,7 +88,7 @@ def load_urdf(
 
     Returns:
         The robot, its base the root link, with inverse kinematics in closed form if it is of a
-        class of :mod:`~teleop_core.robots.closed_form.decomposition`, else by search. Home is zero,
+        class of :mod:`~teleop_core.kinematics.closed_form.decomposition`, else by search. Home is zero,
         or the middle of limits without zero; continuous joints turn two rounds (assumed: ±2π).
 
     Raises:

@@ -12,8 +12,8 @@ from teleop_core.base import ParameterError, UnknownNameError, parameter
 from teleop_core.graph import DT
 from teleop_core.kernels import Array, pointer
 from teleop_core.robots.arms.as_chain import true_chain
-from teleop_core.robots.chains.rigid_body import write_model
 from teleop_core.robots.drives import ACCELERATION, Drives
+from teleop_core.robots.dynamics.rigid_body import write_model
 from teleop_core.robots.hardware import Hardware
 from teleop_core.robots.robot import Robot
 from teleop_core.slave.controllers import per_joint

@@ -1,0 +1,31 @@
+"""Four channels: places and forces go both ways, and the slave yields to what forces differ by."""
+
+from dataclasses import dataclass
+
+from teleop_core.base.parameters import parameter
+from teleop_core.coupling.architectures import Architecture
+from teleop_core.coupling.architectures.position_force import force_scale
+from teleop_core.coupling.architectures.three_channel import ThreeChannelParameters, channels_push
+
+
+@dataclass(frozen=True, kw_only=True)
+class FourChannelParameters(ThreeChannelParameters):
+    """What comes back, and what the slave gets of the hand's force."""
+
+    hand_gain: float = parameter(
+        1.0,
+        unit="N/N",
+        lower=0.0,
+        upper=10.0,
+        doc="force that leads the slave over the hand's; with 1/force_gain a press that lasts "
+        "moves the tip no way from its command",
+    )
+
+
+def _lead(parameters: FourChannelParameters) -> float:
+    return parameters.hand_gain
+
+
+FOUR_CHANNEL = Architecture(
+    "four_channel", FourChannelParameters, channels_push, force_scale=force_scale, lead_gain=_lead, needs_impedance=True
+)
