@@ -14,7 +14,7 @@ from pathlib import Path
 
 _RUN = """
 import json, resource, sys, time
-from teleop_core import cli
+from teleop_core.commands import cli
 begin = time.perf_counter()
 code = cli.main(sys.argv[1:])
 used = resource.getrusage(resource.RUSAGE_SELF)
