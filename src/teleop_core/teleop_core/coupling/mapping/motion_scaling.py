@@ -8,16 +8,7 @@ import numpy as np
 
 from teleop_core.coupling.architectures import ARCHITECTURES
 from teleop_core.coupling.fixtures import Held, fixture_depth
-from teleop_core.coupling.mapping import following, limits, plausibility, side, walls
-from teleop_core.coupling.mapping.gains import (
-    MODES,
-    FixtureParameters,
-    MotionScalingParameters,
-    ReachForceParameters,
-    ReflectionParameters,
-    axis_map,
-    tool_maps,
-)
+from teleop_core.coupling.mapping import following, gains, limits, plausibility, side, walls
 from teleop_core.coupling.mapping.reflection import (
     Law,
     ReflectionNumbers,
@@ -308,7 +299,7 @@ def motion_scaling_step(
 class MotionScaling(RunningStage):
     """Stage that turns master poses into slave poses and fixture forces."""
 
-    def __init__(self, parameters: MotionScalingParameters, dt: float = DT) -> None:
+    def __init__(self, parameters: gains.MotionScalingParameters, dt: float = DT) -> None:
         super().__init__(MOTION_SCALING, 0, dt)
         self.changes_itself = True  # its mode, by a button
         self.parameters, self.state = record(ScalingNumbers), record(ScalingState)
@@ -326,15 +317,15 @@ class MotionScaling(RunningStage):
         assign(s, 0)
         assign(self._sent, 0)
         self._law.clear()
-        s["is_fine"], s["joint"] = MODES.index(self._values.mode), -1
+        s["is_fine"], s["joint"] = gains.MODES.index(self._values.mode), -1
         s["command"][3] = s["alignment"][0] = s["tool"][0] = s["turned"][0] = 1.0
 
-    def retune(self, parameters: MotionScalingParameters) -> None:
+    def retune(self, parameters: gains.MotionScalingParameters) -> None:
         """Take new parameters from the next sample on; nothing moves. A new mode is switched to."""
         p, fixture = self.parameters, parameters.fixture
         p["gain"] = parameters.coarse_gain, parameters.fine_gain
-        axes = axis_map("axes", parameters.axes)
-        p["slave_master"], p["stylus_tool"] = tool_maps(parameters)
+        axes = gains.axis_map("axes", parameters.axes)
+        p["slave_master"], p["stylus_tool"] = gains.tool_maps(parameters)
         p["axis"], p["sign"] = np.abs(axes).argmax(axis=1), axes.sum(axis=1)
         self._take_fixture(fixture)
         wall = walls.WALLS[fixture.wall]
@@ -349,26 +340,26 @@ class MotionScaling(RunningStage):
         self._take_reach_force(parameters.reach_force)
         self._take_reflection(parameters.reflection)
         if parameters.mode != self._values.mode:
-            self.state["is_fine"] = MODES.index(parameters.mode)
+            self.state["is_fine"] = gains.MODES.index(parameters.mode)
         turned = ("tool_roll", "axes", "tool_axes")
         if any(getattr(parameters, name) != getattr(self._values, name) for name in turned):
             self.state["must_latch"] = 1  # align anew: the tool does not turn
         self._values = parameters
 
-    def present(self) -> MotionScalingParameters:
+    def present(self) -> gains.MotionScalingParameters:
         """Parameters as they are now: the mode button changes the mode."""
-        mode = MODES[int(self.state["is_fine"])]
+        mode = gains.MODES[int(self.state["is_fine"])]
         if mode != self._values.mode:
             self._values = replace(self._values, mode=mode)
         return self._values
 
-    def _take_reach_force(self, force: ReachForceParameters) -> None:
+    def _take_reach_force(self, force: gains.ReachForceParameters) -> None:
         stiffness = force.stiffness if force.is_on else 0.0
         depth = force.max_force / stiffness if stiffness * force.max_force > 0.0 else _SHALLOW
         self.parameters["reach_stiffness"] = stiffness if force.max_force > 0.0 else 0.0
         self.parameters["reach_depth"] = depth
 
-    def _take_fixture(self, fixture: FixtureParameters) -> None:
+    def _take_fixture(self, fixture: gains.FixtureParameters) -> None:
         held, last = fixture.made.held, self._held
         p, s = self.parameters, self.state
         p["size"] = fixture.made.size()
@@ -382,7 +373,7 @@ class MotionScaling(RunningStage):
         self._held = held
         self._compose_anew()
 
-    def _take_reflection(self, reflection: ReflectionParameters) -> None:
+    def _take_reflection(self, reflection: gains.ReflectionParameters) -> None:
         p, chosen = self.parameters, reflection.architecture
         p["is_reflected"] = chosen.kind != "unilateral"
         p["reflected_most"] = reflection.max_force
@@ -437,7 +428,7 @@ class MotionScaling(RunningStage):
 
 MOTION_SCALING = Stage(
     "motion_scaling",
-    MotionScalingParameters,
+    gains.MotionScalingParameters,
     reads=(
         topics.MASTER_MEASURED_CP,
         topics.MASTER_BUTTONS,
