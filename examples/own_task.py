@@ -15,9 +15,9 @@ Array = NDArray[np.float64]
 class CornersParameters:
     """What ``--set task.corners.side=...`` sets; the kernel gets them as numbers."""
 
-    side: float = tc.parameter(0.02, unit="m", lower=1e-3, upper=0.2, doc="of the square")
-    width: float = tc.parameter(0.003, unit="m", lower=1e-4, upper=0.1, doc="of a corner")
-    longest: float = tc.parameter(10.0, unit="s", lower=0.1, upper=60.0, doc="after which an attempt is an error")
+    side: float = tc.parameter(0.02, tc.Within(1e-3, 0.2, "m"), "of the square")
+    width: float = tc.parameter(0.003, tc.Within(1e-4, 0.1, "m"), "of a corner")
+    longest: float = tc.parameter(10.0, tc.Within(0.1, 60.0, "s"), "after which an attempt is an error")
 
 
 @tc.kernel

@@ -14,7 +14,7 @@ from rich.console import Console
 from present import present
 from recipes import START_NS, Recipe, state
 from teleop_core.bags.reader import Bag
-from teleop_core.base import EvaluationError, parameter
+from teleop_core.base import EvaluationError, Within, parameter
 from teleop_core.coupling.fixtures.reported_fixture import ReportedFixture
 from teleop_core.coupling.mapping.gains import MotionScalingParameters, axis_map
 from teleop_core.evaluation import Figure, TableRow, evaluate, study
@@ -181,7 +181,7 @@ def test_kind_and_size_may_change_while_the_fixture_is_on(recipe: Recipe, path: 
 class WallParameters:
     """A wall above the hand."""
 
-    height: float = parameter(0.01, unit="m", lower=0.0, upper=1.0, doc="above the middle")
+    height: float = parameter(0.01, Within(0.0, 1.0, "m"), "above the middle")
 
 
 def wall_distance(offset: Array, numbers: Array, out: Array) -> float:

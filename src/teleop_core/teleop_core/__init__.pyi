@@ -37,7 +37,7 @@ from .hand.operators import (
 )
 from .hand.operators.remote import RemoteHand as RemoteHand, remote_operator as remote_operator
 from .hand.tasks import Task as Task, register_task as register_task
-from .base.parameters import NoParameters as NoParameters, parameter as parameter
+from .base.parameters import NoParameters as NoParameters, Within as Within, parameter as parameter
 from .slave.bridges import Bridge as Bridge, Command as Command, register_bridge as register_bridge
 from .shapes import Shape as Shape, register_shape as register_shape
 from .slave.plants import Physics as Physics, Plant as Plant, register_plant as register_plant

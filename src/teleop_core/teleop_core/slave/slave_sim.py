@@ -4,7 +4,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from teleop_core.base import Choice, ClosureError, ParameterError, choice, parameter
+from teleop_core.base import Choice, ClosureError, ParameterError, Within, choice, parameter
 from teleop_core.graph import DT, RunningStage, Stage, assign, topics
 from teleop_core.kernels import Array, fields_of, pointer, record, record_array
 from teleop_core.kinematics import FK, dh_kernels
@@ -41,19 +41,19 @@ class PlantParameters:
 class SlaveSimParameters(RobotParameters):
     """Parameters of :class:`SlaveSim`."""
 
-    seed: int = parameter(1, lower=0, fixed=True, doc="seed of everything random in the session")
+    seed: int = parameter(1, Within(0), "seed of everything random in the session", fixed=True)
 
     gravity_compensation: str = parameter(
         "published",
         choices=("published", "all", "none"),
         doc="axes whose gravity is fed forward: those of the source (axis 2), all, none",
     )
-    integration_steps: int = parameter(2, lower=1, upper=50, doc="Runge-Kutta steps in each control tick")
+    integration_steps: int = parameter(2, Within(1, 50), "Runge-Kutta steps in each control tick")
     viscous: tuple[float, ...] = parameter(
-        (), unit="N·m·s/rad or N·s/m", lower=0.0, doc="friction of each joint; empty: the plant's"
+        (), Within(0.0, None, "N·m·s/rad or N·s/m"), "friction of each joint; empty: the plant's"
     )
     coulomb: tuple[float, ...] = parameter(
-        (), unit="N·m or N", lower=0.0, doc="dry friction of each joint; empty: the plant's"
+        (), Within(0.0, None, "N·m or N"), "dry friction of each joint; empty: the plant's"
     )
     plant: PlantParameters = field(default_factory=PlantParameters)
     world: WorldParameters = field(default_factory=WorldParameters)

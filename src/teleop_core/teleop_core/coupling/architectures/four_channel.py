@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from teleop_core.base.parameters import parameter
+from teleop_core.base.parameters import Within, parameter
 from teleop_core.coupling.architectures import Architecture
 from teleop_core.coupling.architectures.position_force import force_scale
 from teleop_core.coupling.architectures.three_channel import ThreeChannelParameters, channels_push
@@ -14,10 +14,8 @@ class FourChannelParameters(ThreeChannelParameters):
 
     hand_gain: float = parameter(
         1.0,
-        unit="N/N",
-        lower=0.0,
-        upper=10.0,
-        doc="force that leads the slave over the hand's; with 1/force_gain a press that lasts "
+        Within(0.0, 10.0, "N/N"),
+        "force that leads the slave over the hand's; with 1/force_gain a press that lasts "
         "moves the tip no way from its command",
     )
 

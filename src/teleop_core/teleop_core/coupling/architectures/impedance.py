@@ -8,7 +8,7 @@ stage holds as before: passivity, reach, limits and faults see the one command t
 import math
 from dataclasses import dataclass
 
-from teleop_core.base import parameter
+from teleop_core.base import Within, parameter
 from teleop_core.graph import Row, Stage, copy, topics
 from teleop_core.kernels import Fields, Vector3, inner, kernel
 
@@ -22,33 +22,25 @@ class ImpedanceParameters:
 
     mass: float = parameter(
         1.0,
-        unit="kg",
-        lower=0.0,
-        upper=100.0,
-        doc="of the tip as it yields",
+        Within(0.0, 100.0, "kg"),
+        "of the tip as it yields",
         source="assumed: with spring and damper it does not swing",
     )
     damping: float = parameter(
         100.0,
-        unit="N·s/m",
-        lower=1.0,
-        upper=10_000.0,
-        doc="force over the speed of yielding",
+        Within(1.0, 10_000.0, "N·s/m"),
+        "force over the speed of yielding",
         source="assumed: what keeps an arm that lags by 50 ms calm before silicone of 1000 N/m",
     )
     stiffness: float = parameter(
         1000.0,
-        unit="N/m",
-        lower=10.0,
-        upper=100_000.0,
-        doc="force over the way of yielding",
+        Within(10.0, 100_000.0, "N/m"),
+        "force over the way of yielding",
         source="assumed: five times that of tissue, as much as silicone's",
     )
-    force_gain: float = parameter(
-        1.0, unit="N/N", lower=0.0, upper=10.0, doc="force that it yields to over slave/measured_cf"
-    )
+    force_gain: float = parameter(1.0, Within(0.0, 10.0, "N/N"), "force that it yields to over slave/measured_cf")
     largest_way: float = parameter(
-        0.02, unit="m", lower=0.0, upper=0.5, doc="how far it yields at most, whatever the force", source="assumed"
+        0.02, Within(0.0, 0.5, "m"), "how far it yields at most, whatever the force", source="assumed"
     )
 
 

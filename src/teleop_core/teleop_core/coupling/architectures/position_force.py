@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from teleop_core.base import parameter
+from teleop_core.base import Within, parameter
 from teleop_core.coupling.architectures import Architecture
 from teleop_core.kernels import Array, kernel
 
@@ -11,9 +11,7 @@ from teleop_core.kernels import Array, kernel
 class PositionForceParameters:
     """How much of the force comes back."""
 
-    force_gain: float = parameter(
-        1.0, unit="N/N", lower=0.0, upper=10.0, doc="force at the hand over slave/measured_cf"
-    )
+    force_gain: float = parameter(1.0, Within(0.0, 10.0, "N/N"), "force at the hand over slave/measured_cf")
 
 
 @kernel

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from teleop_core.base import parameter
+from teleop_core.base import Within, parameter
 from teleop_core.coupling.architectures import Architecture
 from teleop_core.kernels import Array, kernel
 
@@ -13,10 +13,8 @@ class PositionPositionParameters:
 
     stiffness: float = parameter(
         150.0,
-        unit="N/m",
-        lower=0.0,
-        upper=5000.0,
-        doc="force at the hand over the way from its command to slave/measured_cp",
+        Within(0.0, 5000.0, "N/m"),
+        "force at the hand over the way from its command to slave/measured_cp",
         source="assumed: half of the stiffness of a medium grip, so that no delay makes it throw the hand",
     )
 

@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass
 
-from teleop_core.base import ParameterError, parameter
+from teleop_core.base import ParameterError, Within, parameter
 from teleop_core.coupling.filters import TremorFilter, sections
 from teleop_core.kernels import Array, inner, kernel
 
@@ -12,8 +12,8 @@ from teleop_core.kernels import Array, inner, kernel
 class BandStopParameters:
     """Edges of the band."""
 
-    low: float = parameter(8.0, unit="Hz", lower=3.0, upper=25.0, doc="lower edge, of which 3 dB are taken out")
-    high: float = parameter(12.0, unit="Hz", lower=3.0, upper=25.0, doc="upper edge, of which 3 dB are taken out")
+    low: float = parameter(8.0, Within(3.0, 25.0, "Hz"), "lower edge, of which 3 dB are taken out")
+    high: float = parameter(12.0, Within(3.0, 25.0, "Hz"), "upper edge, of which 3 dB are taken out")
 
     def __post_init__(self) -> None:
         """Refuse edges that enclose no band."""

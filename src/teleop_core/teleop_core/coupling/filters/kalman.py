@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass
 
-from teleop_core.base import parameter
+from teleop_core.base import Within, parameter
 from teleop_core.coupling.filters import TremorFilter
 from teleop_core.kernels import Array, inner, kernel
 from teleop_core.kernels.room import room
@@ -21,35 +21,27 @@ class KalmanParameters:
 
     acceleration_noise: float = parameter(
         0.02,
-        unit="m/s²/√Hz",
-        lower=1e-6,
-        upper=100.0,
-        doc="root of the density of the meant acceleration, which is white",
+        Within(1e-6, 100.0, "m/s²/√Hz"),
+        "root of the density of the meant acceleration, which is white",
         source="derived: least distance from what was meant, of a hand as in scenario human",
     )
     reading_noise: float = parameter(
         1.6e-7,
-        unit="m/√Hz",
-        lower=1e-9,
-        upper=0.1,
-        doc="root of the density of what the readings add, which is white",
+        Within(1e-9, 0.1, "m/√Hz"),
+        "root of the density of what the readings add, which is white",
         source="derived: as acceleration_noise; 5 µm a sample at 1 kHz",
     )
-    frequency: float = parameter(10.0, unit="Hz", lower=4.0, upper=20.0, doc="of the tremor")
+    frequency: float = parameter(10.0, Within(4.0, 20.0, "Hz"), "of the tremor")
     half_width: float = parameter(
         1.0,
-        unit="Hz",
-        lower=0.01,
-        upper=5.0,
-        doc="from the peak of the tremor's spectrum to half of it; the wider, the less is taken",
+        Within(0.01, 5.0, "Hz"),
+        "from the peak of the tremor's spectrum to half of it; the wider, the less is taken",
         source="assumed: tremor of 8 to 12 Hz (Elble and Koller 1990)",
     )
     tremor: float = parameter(
         45e-6,
-        unit="m",
-        lower=0.0,
-        upper=0.1,
-        doc="tremor on each axis, root mean square",
+        Within(0.0, 0.1, "m"),
+        "tremor on each axis, root mean square",
         source="derived: 77 µm over three axes, as of operator human",
     )
 

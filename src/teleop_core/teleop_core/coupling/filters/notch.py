@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass
 
-from teleop_core.base import ParameterError, parameter
+from teleop_core.base import ParameterError, Within, parameter
 from teleop_core.coupling.filters import LONGEST_NS, TremorFilter, sections
 from teleop_core.kernels import Array, kernel
 
@@ -15,12 +15,11 @@ _WIDEST = 0.45
 class NotchParameters:
     """Where the notch is, and how narrow."""
 
-    frequency: float = parameter(10.0, unit="Hz", lower=3.0, upper=25.0, doc="frequency that is taken out")
+    frequency: float = parameter(10.0, Within(3.0, 25.0, "Hz"), "frequency that is taken out")
     quality: float = parameter(
         1.0,
-        lower=0.3,
-        upper=30.0,
-        doc="frequency over the width in which more than 3 dB are taken out; slow motion is late "
+        Within(0.3, 30.0),
+        "frequency over the width in which more than 3 dB are taken out; slow motion is late "
         "by 1/(2π frequency quality)",
     )
 

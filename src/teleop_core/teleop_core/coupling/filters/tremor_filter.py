@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from teleop_core.base import Choice, choice, parameter
+from teleop_core.base import Choice, Within, choice, parameter
 from teleop_core.coupling.filters import LONGEST_NS, MEMORY, TREMOR_FILTERS
 from teleop_core.coupling.mapping import plausibility
 from teleop_core.graph import DT, Row, RunningStage, Stage, assign, topics
@@ -27,11 +27,7 @@ class TremorFilterParameters:
 
     kind: Choice = choice(TREMOR_FILTERS, "wflc", doc="how tremor is taken out")
     longest_pause: float = parameter(
-        0.3,
-        unit="s",
-        lower=0.002,
-        upper=5.0,
-        doc="after a longer pause of the master the filter begins anew at the reading",
+        0.3, Within(0.002, 5.0, "s"), "after a longer pause of the master the filter begins anew at the reading"
     )
     plausible: plausibility.HandLimits = field(default_factory=plausibility.HandLimits)
 

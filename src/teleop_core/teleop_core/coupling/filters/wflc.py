@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass
 
-from teleop_core.base import parameter
+from teleop_core.base import Within, parameter
 from teleop_core.coupling.filters import TremorFilter, sections
 from teleop_core.kernels import Array, inner, kernel
 
@@ -24,25 +24,21 @@ _DAMPING, _WIDE = math.sqrt(2.0), 0.6
 class WflcParameters:
     """How the tremor is told from what is meant, and how fast it is learned."""
 
-    frequency: float = parameter(10.0, unit="Hz", lower=6.0, upper=14.0, doc="of the tremor, at the beginning")
+    frequency: float = parameter(10.0, Within(6.0, 14.0, "Hz"), "of the tremor, at the beginning")
     high_pass: float = parameter(
-        6.0, unit="Hz", lower=0.5, upper=6.0, doc="motion that is slower is taken as meant, and not learned"
+        6.0, Within(0.5, 6.0, "Hz"), "motion that is slower is taken as meant, and not learned"
     )
     amplitude_rate: float = parameter(
         6.0,
-        unit="1/s",
-        lower=0.1,
-        upper=50.0,
-        doc="inverse of the time in which the amplitude is learned; the larger, the farther from "
+        Within(0.1, 50.0, "1/s"),
+        "inverse of the time in which the amplitude is learned; the larger, the farther from "
         "the tremor's frequency motion is taken for tremor",
         source="derived: least distance from what was meant, of a hand as in scenario human",
     )
     frequency_rate: float = parameter(
         0.3,
-        unit="1/s",
-        lower=0.0,
-        upper=5.0,
-        doc="inverse of the time in which the frequency is learned, within 2 Hz of frequency; 0: it is kept",
+        Within(0.0, 5.0, "1/s"),
+        "inverse of the time in which the frequency is learned, within 2 Hz of frequency; 0: it is kept",
     )
 
 

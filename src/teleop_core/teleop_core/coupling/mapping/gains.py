@@ -6,7 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
-from teleop_core.base import Choice, ParameterError, choice, parameter
+from teleop_core.base import Choice, ParameterError, Within, choice, parameter
 from teleop_core.coupling.architectures import ARCHITECTURES
 from teleop_core.coupling.fixtures import Fixture
 from teleop_core.coupling.mapping import plausibility, walls
@@ -27,11 +27,9 @@ class FixtureParameters:
     kind: Choice = choice(SHAPES, "box", doc="shape of the fixture")
     place: tuple[float, ...] = parameter(
         (0.0, 0.0, 0.0),
-        unit="m",
-        lower=-0.5,
-        upper=0.5,
+        Within(-0.5, 0.5, "m"),
+        "from the middle, where the hand was, to that of the shape, in the master's base",
         length=3,
-        doc="from the middle, where the hand was, to that of the shape, in the master's base",
     )
     keep_out: bool = parameter(False, doc="whether the hand stays outside of the shape in place of inside")
     side: str = parameter(
@@ -49,27 +47,21 @@ class FixtureParameters:
     )
     stiffness: float = parameter(
         1000.0,
-        unit="N/m",
-        lower=1.0,
-        upper=5000.0,
-        doc="spring of the damped and the soft wall",
+        Within(1.0, 5000.0, "N/m"),
+        "spring of the damped and the soft wall",
         source="assumed: below the least stiffness of the device, 1020 N/m; none is published",
     )
     damping: float = parameter(
         10.0,
-        unit="N·s/m",
-        lower=0.0,
-        upper=50.0,
-        doc="damper of the damped and the hard wall; at least stiffness times period is taken",
+        Within(0.0, 50.0, "N·s/m"),
+        "damper of the damped and the hard wall; at least stiffness times period is taken",
         source="assumed: what keeps slow contacts of a trembling hand passive too, twenty times "
         "K T / 2 of 1000 N/m at 1 kHz (Colgate and Schenkel 1997)",
     )
     max_force: float = parameter(
         3.3,
-        unit="N",
-        lower=0.0,
-        upper=10.0,
-        doc="largest push; the device limits it further",
+        Within(0.0, 10.0, "N"),
+        "largest push; the device limits it further",
         source="published: Vongbunyong 2008, section 6.3, the peak force of the device",
     )
 
@@ -96,19 +88,12 @@ class ReachForceParameters:
     is_on: bool = parameter(True, doc="whether the hand feels the slave's limits as a wall")
     stiffness: float = parameter(
         500.0,
-        unit="N/m",
-        lower=1.0,
-        upper=5000.0,
-        doc="spring of it",
+        Within(1.0, 5000.0, "N/m"),
+        "spring of it",
         source="assumed: half of the fixture's, so that one feels which of the two it is",
     )
     max_force: float = parameter(
-        1.5,
-        unit="N",
-        lower=0.0,
-        upper=10.0,
-        doc="largest push",
-        source="assumed: half of the fixture's, for the same reason",
+        1.5, Within(0.0, 10.0, "N"), "largest push", source="assumed: half of the fixture's, for the same reason"
     )
 
 
@@ -119,10 +104,8 @@ class ReflectionParameters:
     architecture: Choice = choice(ARCHITECTURES, "unilateral", doc="what the hand feels of the slave")
     max_force: float = parameter(
         3.3,
-        unit="N",
-        lower=0.0,
-        upper=10.0,
-        doc="largest push; the device limits it further",
+        Within(0.0, 10.0, "N"),
+        "largest push; the device limits it further",
         source="published: Vongbunyong 2008, section 6.3, the peak force of the device",
     )
     passivity: Choice = choice(
@@ -139,19 +122,13 @@ class ReflectionParameters:
 class MotionScalingParameters:
     """Parameters of :class:`MotionScaling`."""
 
-    coarse_gain: float = parameter(
-        1.0, unit="m/m", lower=1e-3, upper=10.0, doc="slave motion per master motion, coarse mode"
-    )
-    fine_gain: float = parameter(
-        0.1, unit="m/m", lower=1e-3, upper=10.0, doc="slave motion per master motion, fine mode"
-    )
+    coarse_gain: float = parameter(1.0, Within(1e-3, 10.0, "m/m"), "slave motion per master motion, coarse mode")
+    fine_gain: float = parameter(0.1, Within(1e-3, 10.0, "m/m"), "slave motion per master motion, fine mode")
     mode: str = parameter("coarse", choices=MODES, doc="mode; the mode button changes it too")
     tool_roll: float = parameter(
         math.pi / 2,
-        unit="rad",
-        lower=-math.pi,
-        upper=math.pi,
-        doc="turn of the slave's tool about its axis; π/2 aligns it with the home pose",
+        Within(-math.pi, math.pi, "rad"),
+        "turn of the slave's tool about its axis; π/2 aligns it with the home pose",
     )
     axes: tuple[str, ...] = parameter(
         ("-z", "-x", "+y"),
@@ -164,24 +141,16 @@ class MotionScalingParameters:
     )
     rotation_gain: float = parameter(
         1.0,
-        unit="rad/rad",
-        lower=0.0,
-        upper=1.0,
-        doc="tool turn per stylus turn; below 1 the tool keeps no fixed relation to the stylus",
+        Within(0.0, 1.0, "rad/rad"),
+        "tool turn per stylus turn; below 1 the tool keeps no fixed relation to the stylus",
     )
     longest_pause: float = parameter(
-        0.3,
-        unit="s",
-        lower=0.002,
-        upper=5.0,
-        doc="after a longer pause of the master the slave is aligned anew and does not jump",
+        0.3, Within(0.002, 5.0, "s"), "after a longer pause of the master the slave is aligned anew and does not jump"
     )
     feedback_timeout: float = parameter(
         0.1,
-        unit="s",
-        lower=0.002,
-        upper=5.0,
-        doc="slave counts as not following when its setpoint lags behind the last command by more, "
+        Within(0.002, 5.0, "s"),
+        "slave counts as not following when its setpoint lags behind the last command by more, "
         "and no newer one was heard of for as long; of slow masters twice their period counts",
     )
     fixture: FixtureParameters = field(default_factory=FixtureParameters)

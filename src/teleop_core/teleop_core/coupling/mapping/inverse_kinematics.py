@@ -6,7 +6,7 @@ from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
-from teleop_core.base import parameter
+from teleop_core.base import Within, parameter
 from teleop_core.graph import DT, Row, RunningStage, Stage, assign, copy, topics
 from teleop_core.kernels import Array, Fields, PerJoint, inner, kernel, record
 from teleop_core.kernels.geometry import rotation_vector_between, transform_from_pose
@@ -19,33 +19,21 @@ from teleop_core.robots.selection import RobotParameters
 class InverseKinematicsParameters(RobotParameters):
     """Parameters of :class:`InverseKinematics`."""
 
-    speed_share: float = parameter(
-        1.0, lower=0.01, upper=1.0, doc="share of the drives' speed limits that references may use"
-    )
+    speed_share: float = parameter(1.0, Within(0.01, 1.0), "share of the drives' speed limits that references may use")
     position_tolerance: float = parameter(
-        1e-3,
-        unit="m",
-        lower=0.0,
-        upper=1.0,
-        doc="an arm that lags behind by less than this, for want of speed, still follows",
+        1e-3, Within(0.0, 1.0, "m"), "an arm that lags behind by less than this, for want of speed, still follows"
     )
-    rotation_tolerance: float = parameter(
-        math.radians(1.0), unit="rad", lower=0.0, upper=1.0, doc="the same for its orientation"
-    )
+    rotation_tolerance: float = parameter(math.radians(1.0), Within(0.0, 1.0, "rad"), "the same for its orientation")
     longest_pause: float = parameter(
         0.3,
-        unit="s",
-        lower=0.002,
-        upper=5.0,
-        doc="time between commands of one stream, at most; for one that comes alone, after a "
+        Within(0.002, 5.0, "s"),
+        "time between commands of one stream, at most; for one that comes alone, after a "
         "longer pause, joints go as far as 0.45 s of full speed",
     )
     feedback_timeout: float = parameter(
         0.1,
-        unit="s",
-        lower=0.002,
-        upper=5.0,
-        doc="with an older slave setpoint, solutions start from the slave's joints again; of slow "
+        Within(0.002, 5.0, "s"),
+        "with an older slave setpoint, solutions start from the slave's joints again; of slow "
         "commands twice their period counts",
     )
 

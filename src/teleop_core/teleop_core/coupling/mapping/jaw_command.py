@@ -5,7 +5,7 @@ It comes from the hand itself, as far as that closes its handle, or from a butto
 
 from dataclasses import dataclass
 
-from teleop_core.base import ParameterError, parameter
+from teleop_core.base import ParameterError, Within, parameter
 from teleop_core.graph import Row, Stage, topics
 from teleop_core.kernels import Fields, kernel
 
@@ -25,16 +25,12 @@ class JawCommandParameters:
         doc="what closes it: hand/jaw, by its share, or a button, which keeps its own meaning too",
     )
     toggles: bool = parameter(False, doc="whether each press closes or opens it, not the button as long as it is held")
-    open_angle: float = parameter(
-        0.8, unit="rad", lower=0.0, upper=3.0, doc="between the fingers of the open jaw", source="assumed"
-    )
+    open_angle: float = parameter(0.8, Within(0.0, 3.0, "rad"), "between the fingers of the open jaw", source="assumed")
     closed_angle: float = parameter(
         0.0,
-        unit="rad",
-        lower=-0.5,
-        upper=3.0,
+        Within(-0.5, 3.0, "rad"),
+        "asked for when it is closed; less presses harder on what is thin",
         source="assumed",
-        doc="asked for when it is closed; less presses harder on what is thin",
     )
 
     def __post_init__(self) -> None:

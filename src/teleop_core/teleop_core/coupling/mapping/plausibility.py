@@ -9,7 +9,7 @@ from where it is then. So a teleport moves nothing, and neither do random poses.
 import math
 from dataclasses import dataclass
 
-from teleop_core.base import parameter
+from teleop_core.base import Within, parameter
 from teleop_core.graph import Row
 from teleop_core.kernels import Array, Fields, PoseRow, Vector3, inner
 
@@ -20,35 +20,21 @@ class HandLimits:
 
     speed: float = parameter(
         3.0,
-        unit="m/s",
-        lower=0.01,
-        upper=1000.0,
-        doc="largest speed of the stylus",
+        Within(0.01, 1000.0, "m/s"),
+        "largest speed of the stylus",
         source="assumed: across the Phantom's workspace in a twentieth of a second",
     )
     acceleration: float = parameter(
         1000.0,
-        unit="m/s²",
-        lower=1.0,
-        upper=1e6,
-        doc="largest acceleration of the stylus",
+        Within(1.0, 1e6, "m/s²"),
+        "largest acceleration of the stylus",
         source="assumed: ten times that of a fast arm, for one reading step in 1 ms is 55 m/s²",
     )
     turn: float = parameter(
-        60.0,
-        unit="rad/s",
-        lower=0.1,
-        upper=1e4,
-        doc="largest speed of its turn",
-        source="assumed: three times that of a fast wrist",
+        60.0, Within(0.1, 1e4, "rad/s"), "largest speed of its turn", source="assumed: three times that of a fast wrist"
     )
     reach: float = parameter(
-        2.0,
-        unit="m",
-        lower=0.01,
-        upper=100.0,
-        doc="farthest stylus from the master's base",
-        source="assumed: longer than an arm",
+        2.0, Within(0.01, 100.0, "m"), "farthest stylus from the master's base", source="assumed: longer than an arm"
     )
 
 
@@ -58,11 +44,9 @@ class PlausibilityParameters(HandLimits):
 
     button_silence: float = parameter(
         0.5,
-        unit="s",
-        lower=0.01,
-        upper=60.0,
+        Within(0.01, 60.0, "s"),
+        "a stream of buttons that fell silent for longer counts as a pressed clutch; 0: never",
         off=0.0,
-        doc="a stream of buttons that fell silent for longer counts as a pressed clutch; 0: never",
     )
 
 

@@ -13,7 +13,7 @@ import math
 from dataclasses import dataclass
 from typing import Annotated
 
-from teleop_core.base import parameter
+from teleop_core.base import Within, parameter
 from teleop_core.coupling.network.link import LinkState
 from teleop_core.kernels import Array, Fields, inner
 
@@ -41,24 +41,21 @@ class DeadbandParameters:
     """What must change before a packet is sent: place, turn or force, whichever does first."""
 
     is_on: bool = parameter(False, doc="whether packets wait for a change")
-    place: float = parameter(2e-4, unit="m", lower=0.0, upper=0.1, doc="way of the tip before a packet is sent")
-    turn: float = parameter(0.01, unit="rad", lower=0.0, upper=1.0, doc="turn of the tip before a packet is sent")
+    place: float = parameter(2e-4, Within(0.0, 0.1, "m"), "way of the tip before a packet is sent")
+    turn: float = parameter(0.01, Within(0.0, 1.0, "rad"), "turn of the tip before a packet is sent")
     force: float = parameter(
         0.1,
-        lower=0.0,
-        upper=1.0,
-        doc="share of the force that was sent last by which it must change",
+        Within(0.0, 1.0),
+        "share of the force that was sent last by which it must change",
         source="assumed: about what people feel",
     )
     least_force: float = parameter(
-        0.02, unit="N", lower=0.0, upper=10.0, doc="change of a force that is not sent, however small the force is"
+        0.02, Within(0.0, 10.0, "N"), "change of a force that is not sent, however small the force is"
     )
     longest_pause: float = parameter(
         0.02,
-        unit="s",
-        lower=1e-3,
-        upper=1.0,
-        doc="time after which a packet is sent though nothing changed; below command_timeout and feedback_timeout",
+        Within(1e-3, 1.0, "s"),
+        "time after which a packet is sent though nothing changed; below command_timeout and feedback_timeout",
     )
 
 

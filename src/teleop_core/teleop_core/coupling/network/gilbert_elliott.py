@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from teleop_core.base import parameter
+from teleop_core.base import Within, parameter
 from teleop_core.coupling.network import LOST, Network
 from teleop_core.kernels import Array, kernel
 
@@ -13,22 +13,17 @@ _LEVEL = "published: UVA-DSA telesurgery QoS analysis 2026, loss of 10 %"
 class GilbertElliottParameters:
     """Good times and bad ones, each with bursts of lost packets of its own length."""
 
-    to_bad: float = parameter(
-        0.05, lower=0.0, upper=1.0, source=_LEVEL, doc="chance at every packet that a bad time begins"
-    )
-    stay_bad: float = parameter(
-        0.9, lower=0.0, upper=1.0, doc="chance at every packet that a bad time goes on", source=_LEVEL
-    )
+    to_bad: float = parameter(0.05, Within(0.0, 1.0), "chance at every packet that a bad time begins", source=_LEVEL)
+    stay_bad: float = parameter(0.9, Within(0.0, 1.0), "chance at every packet that a bad time goes on", source=_LEVEL)
     good: tuple[float, ...] = parameter(
         (4.428, 1.638),
-        lower=1e-3,
-        upper=100.0,
+        Within(1e-3, 100.0),
+        "shape and scale of the length of bursts in good times, a Pareto II distribution rounded down [packets]",
         length=2,
         source=_LEVEL,
-        doc="shape and scale of the length of bursts in good times, a Pareto II distribution rounded down [packets]",
     )
     bad: tuple[float, ...] = parameter(
-        (4.966, 0.271), lower=1e-3, upper=100.0, length=2, source=_LEVEL, doc="the same in bad times"
+        (4.966, 0.271), Within(1e-3, 100.0), "the same in bad times", length=2, source=_LEVEL
     )
 
 

@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass
 
-from teleop_core.base import parameter
+from teleop_core.base import Within, parameter
 from teleop_core.coupling.network import Network
 from teleop_core.kernels import Array, kernel
 
@@ -12,15 +12,13 @@ from teleop_core.kernels import Array, kernel
 class JitterParameters:
     """Time beside the least one: of most packets about one mean, of some another."""
 
-    mean: float = parameter(0.02, unit="s", lower=0.0, upper=5.0, doc="mean of most packets, exponentially distributed")
-    slow_mean: float = parameter(0.05, unit="s", lower=0.0, upper=5.0, doc="mean of the slow ones")
-    slow_share: float = parameter(0.0, lower=0.0, upper=1.0, doc="share of the slow ones")
+    mean: float = parameter(0.02, Within(0.0, 5.0, "s"), "mean of most packets, exponentially distributed")
+    slow_mean: float = parameter(0.05, Within(0.0, 5.0, "s"), "mean of the slow ones")
+    slow_share: float = parameter(0.0, Within(0.0, 1.0), "share of the slow ones")
     hold: float = parameter(
         0.0,
-        unit="s",
-        lower=0.0,
-        upper=60.0,
-        doc="time for which the same delay lasts, on average; 0: every packet has its own, and one "
+        Within(0.0, 60.0, "s"),
+        "time for which the same delay lasts, on average; 0: every packet has its own, and one "
         "that is late is overtaken",
     )
 

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from teleop_core.base import parameter
+from teleop_core.base import Within, parameter
 from teleop_core.coupling.network import LOST, Network
 from teleop_core.kernels import Array, kernel
 
@@ -18,19 +18,15 @@ class OutagesParameters:
 
     pause: float = parameter(
         8.5,
-        unit="s",
-        lower=1e-3,
-        upper=1e6,
+        Within(1e-3, 1e6, "s"),
+        "from the end of an outage to the beginning of the next; in packets with in_packets",
         source=_LEVEL,
-        doc="from the end of an outage to the beginning of the next; in packets with in_packets",
     )
     longest: float = parameter(
         3.0,
-        unit="s",
-        lower=0.0,
-        upper=1e6,
+        Within(0.0, 1e6, "s"),
+        "longest outage; each lasts for any time up to it; in packets with in_packets",
         source=_LEVEL,
-        doc="longest outage; each lasts for any time up to it; in packets with in_packets",
     )
     in_packets: bool = parameter(False, doc="count pause and longest in packets that are sent, in place of seconds")
 

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from teleop_core.base.parameters import Choice, build, choice, parameter
+from teleop_core.base.parameters import Choice, Within, build, choice, parameter
 from teleop_core.base.ranges import LONGEST_DELAY
 from teleop_core.coupling.network import NETWORKS, link
 from teleop_core.coupling.network.deadband import DeadbandParameters
@@ -68,28 +68,23 @@ class WayParameters:
     """One direction of the network."""
 
     kind: Choice = choice(NETWORKS, "constant", doc="how packets travel")
-    least_delay: float = parameter(
-        0.0, unit="s", lower=0.0, upper=LONGEST_DELAY, doc="least time of a packet on the way"
-    )
-    loss: float = parameter(0.0, lower=0.0, upper=1.0, doc="share of packets that are lost, each by itself")
+    least_delay: float = parameter(0.0, Within(0.0, LONGEST_DELAY, "s"), "least time of a packet on the way")
+    loss: float = parameter(0.0, Within(0.0, 1.0), "share of packets that are lost, each by itself")
     packet_order: str = parameter(
         "newest",
         choices=("newest", "kept"),
         doc="newest: a packet that was overtaken is thrown away; kept: the packets behind a late one wait for it",
     )
-    packet_rate: float = parameter(1000.0, unit="Hz", lower=1.0, upper=1e6, doc="packets sent in a second, at most")
+    packet_rate: float = parameter(1000.0, Within(1.0, 1e6, "Hz"), "packets sent in a second, at most")
     bandwidth: float = parameter(
         0.0,
-        unit="bit/s",
-        lower=0.0,
-        upper=1e12,
-        doc="bits that the line carries in a second; packets wait while it is busy; 0: no bound",
+        Within(0.0, 1e12, "bit/s"),
+        "bits that the line carries in a second; packets wait while it is busy; 0: no bound",
     )
     queue: int = parameter(
         100,
-        lower=1,
-        upper=link.QUEUE,
-        doc="packets that wait for the line at most; one more costs the oldest of them, or where order is kept itself",
+        Within(1, link.QUEUE),
+        "packets that wait for the line at most; one more costs the oldest of them, or where order is kept itself",
         source="assumed",
     )
 
@@ -98,7 +93,7 @@ class WayParameters:
 class NetworkParameters:
     """Parameters of :class:`~teleop_core.coupling.network.network.NetworkLink`."""
 
-    seed: int = parameter(1, lower=0, fixed=True, doc="seed of everything random in the session")
+    seed: int = parameter(1, Within(0), "seed of everything random in the session", fixed=True)
     preset: str = parameter(
         "own",
         choices=("own", *PRESETS),
@@ -112,14 +107,10 @@ class NetworkParameters:
         "that a lost packet is lost motion",
     )
     clock_offset: float = parameter(
-        0.0,
-        unit="s",
-        lower=-3600.0,
-        upper=3600.0,
-        doc="by how much the slave's clock is ahead of the master's at the start",
+        0.0, Within(-3600.0, 3600.0, "s"), "by how much the slave's clock is ahead of the master's at the start"
     )
     clock_drift: float = parameter(
-        0.0, unit="ppm", lower=-1000.0, upper=1000.0, doc="by how much the slave's clock is faster than the master's"
+        0.0, Within(-1000.0, 1000.0, "ppm"), "by how much the slave's clock is faster than the master's"
     )
     deadband: DeadbandParameters = field(default_factory=DeadbandParameters)
     there: WayParameters = field(default_factory=WayParameters)

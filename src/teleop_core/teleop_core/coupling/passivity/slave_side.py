@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from teleop_core.base import parameter
+from teleop_core.base import Within, parameter
 from teleop_core.coupling.passivity import MEMORY, PASSIVITIES
 from teleop_core.coupling.passivity.port import IN, LAW, ROUND, TURN_IN, begin_round, count, hear_energy, port_work
 from teleop_core.graph import DT, Row, RunningStage, Stage, assign, copy, topics
@@ -23,62 +23,45 @@ class PassivityParameters:
     """Parameters of the slave's side, of every kind of passivity."""
 
     recovery: float = parameter(
-        0.2,
-        unit="s",
-        lower=1e-3,
-        upper=100.0,
-        doc="time constant with which what a command lost is made up for",
-        source="assumed",
+        0.2, Within(1e-3, 100.0, "s"), "time constant with which what a command lost is made up for", source="assumed"
     )
     recovery_speed: float = parameter(
         5e-3,
-        unit="m/s",
-        lower=0.0,
-        upper=1.0,
-        doc="largest speed of the same, and of going back from what is overdrawn",
+        Within(0.0, 1.0, "m/s"),
+        "largest speed of the same, and of going back from what is overdrawn",
         source="assumed: at it an arm meets steel with some 2 N",
     )
     least_force: float = parameter(
         0.01,
-        unit="N",
-        lower=0.0,
-        upper=10.0,
-        doc="a smaller force on the tip is none; above what the sensor tells of nothing",
+        Within(0.0, 10.0, "N"),
+        "a smaller force on the tip is none; above what the sensor tells of nothing",
         source="assumed: that of an ideal sensor",
     )
     credit: float = parameter(
         2e-4,
-        unit="J",
-        lower=0.0,
-        upper=1.0,
-        doc="energy that the arm lends before the hand has paid: once with tank and tdpa, in each "
+        Within(0.0, 1.0, "J"),
+        "energy that the arm lends before the hand has paid: once with tank and tdpa, in each "
         "touch with wave; what the world gives back goes to it first, never to the hand",
         source="assumed: moves the arm by half a millimetre until the hand has paid",
     )
     credit_force: float = parameter(
         1.0,
-        unit="N",
-        lower=1e-3,
-        upper=100.0,
-        doc="with wave, force on the tip up to which it lends all of that; from twice the force on "
+        Within(1e-3, 100.0, "N"),
+        "with wave, force on the tip up to which it lends all of that; from twice the force on "
         "it lends nothing, and what an arm that ran into something hard overdrew is given back",
         source="assumed: a gentle touch",
     )
     stop_force: float = parameter(
         5.0,
-        unit="N",
-        lower=0.1,
-        upper=1000.0,
-        doc="force on the tip at which a tank stops a command that goes against it; the arm, which "
+        Within(0.1, 1000.0, "N"),
+        "force on the tip at which a tank stops a command that goes against it; the arm, which "
         "comes behind its command, presses harder",
         source="assumed: below what RCRT-1's drives give for long",
     )
     approach_stiffness: float = parameter(
         1300.0,
-        unit="N/m",
-        lower=1.0,
-        upper=1e6,
-        doc="stiffness of what may be met: with tank and tdpa the command is ahead of the tip no "
+        Within(1.0, 1e6, "N/m"),
+        "stiffness of what may be met: with tank and tdpa the command is ahead of the tip no "
         "farther than what is left pays for on the way into it",
         source="assumed: silicone; into softer things the arm needs less, and harder ones stop it",
     )

@@ -9,7 +9,7 @@ that can be paid. While the slave has little, the hand pays by a drag.
 import math
 from dataclasses import dataclass
 
-from teleop_core.base import parameter
+from teleop_core.base import Within, parameter
 from teleop_core.coupling.passivity import Passivity, held_back
 from teleop_core.coupling.passivity.port import DRIFT, HEARD, IN, LAW, MARGIN, ROUND, TOLD
 from teleop_core.kernels import Array, inner, kernel
@@ -30,28 +30,22 @@ class StoreParameters:
 
     kept_way: float = parameter(
         3e-4,
-        unit="m",
-        lower=0.0,
-        upper=0.01,
-        doc="what the hand gave is told to the slave but for the present push over this way, which "
+        Within(0.0, 0.01, "m"),
+        "what the hand gave is told to the slave but for the present push over this way, which "
         "is kept so that the push outlasts a step of the reading outwards",
         source="assumed: five steps of the device's reading, 0.055 mm",
     )
     store: float = parameter(
         6e-3,
-        unit="J",
-        lower=0.0,
-        upper=1.0,
-        doc="energy that the slave shall have before it touches anything; while it has less the hand feels a drag",
+        Within(0.0, 1.0, "J"),
+        "energy that the slave shall have before it touches anything; while it has less the hand feels a drag",
         source="derived: half of approach_stiffness times the square of the 3 mm by which the arm "
         "lags behind a command of 60 mm/s",
     )
     drag: float = parameter(
         10.0,
-        unit="N·s/m",
-        lower=0.0,
-        upper=100.0,
-        doc="that drag, where the slave has nothing or less",
+        Within(0.0, 100.0, "N·s/m"),
+        "that drag, where the slave has nothing or less",
         source="assumed: that of a wave",
     )
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from teleop_core.base import parameter
+from teleop_core.base import Within, parameter
 from teleop_core.coupling.passivity import Passivity, held_back
 from teleop_core.coupling.passivity.port import DRIFT, HEARD, IMPEDANCE, MARGIN, ROUND, TOLD, WAVE
 from teleop_core.coupling.passivity.tdpa import SPEED_TIME, pay_push
@@ -22,10 +22,8 @@ class WaveParameters:
 
     impedance: float = parameter(
         10.0,
-        unit="N·s/m",
-        lower=0.1,
-        upper=100.0,
-        doc="force over speed of a wave, at the hand; the hand feels 1.5 times as much as a drag",
+        Within(0.1, 100.0, "N·s/m"),
+        "force over speed of a wave, at the hand; the hand feels 1.5 times as much as a drag",
         source="assumed: tissue of 200 N/m times the arm's lag of 50 ms, below which an arm that "
         "yields to a force that it reads late swings",
     )

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from teleop_core.base import SessionError, parameter
+from teleop_core.base import SessionError, Within, parameter
 from teleop_core.hand.devices import Reading, pilot
 from teleop_core.hand.operators import Operator
 from teleop_core.hand.operators.remote import AHEAD, make_remote
@@ -27,7 +27,7 @@ _HINTS = {
 class GamepadParameters(pilot.PilotParameters):
     """How a gamepad moves the stylus, and how it tells the force."""
 
-    rumble: float = parameter(1.0, lower=0.0, upper=1.0, fixed=True, doc="rumble at the device's peak force; 0: none")
+    rumble: float = parameter(1.0, Within(0.0, 1.0), "rumble at the device's peak force; 0: none", fixed=True)
     triggers: str = parameter(
         "roll",
         choices=("roll", "jaw"),

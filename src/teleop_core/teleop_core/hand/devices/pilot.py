@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from teleop_core.base import parameter
+from teleop_core.base import Within, parameter
 from teleop_core.hand.devices import Reading
 from teleop_core.hand.operators.remote import RemoteHand
 from teleop_core.kernels import Array, length, turn_by
@@ -19,28 +19,23 @@ class RateParameters:
 
     speed: float = parameter(
         0.04,
-        unit="m/s",
-        lower=1e-3,
-        upper=0.5,
+        Within(1e-3, 0.5, "m/s"),
+        "speed at full deflection",
         fixed=True,
-        doc="speed at full deflection",
         source="assumed: through the Phantom's workspace in four seconds",
     )
     turn_speed: float = parameter(
         0.6,
-        unit="rad/s",
-        lower=0.01,
-        upper=6.0,
+        Within(0.01, 6.0, "rad/s"),
+        "speed of the turn at full deflection",
         fixed=True,
-        doc="speed of the turn at full deflection",
         source="assumed: a right angle in 2.6 s",
     )
     dead_zone: float = parameter(
         0.12,
-        lower=0.0,
-        upper=0.9,
+        Within(0.0, 0.9),
+        "share of the deflection that counts as none",
         fixed=True,
-        doc="share of the deflection that counts as none",
         source="assumed: sticks of gamepads rest within a tenth of the middle",
     )
 

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from teleop_core.base import parameter
+from teleop_core.base import Within, parameter
 from teleop_core.kernels import Fields, Quaternion, Vector3, inner, inverse_motion, kernel, product
 from teleop_core.kernels.geometry import (
     Array,
@@ -27,76 +27,58 @@ class DeviceParameters:
 
     workspace: tuple[float, ...] = parameter(
         (0.16, 0.12, 0.07),
-        unit="m",
-        lower=0.01,
-        upper=1.0,
+        Within(0.01, 1.0, "m"),
+        "width, height, depth within which the tip can move",
         length=3,
-        doc="width, height, depth within which the tip can move",
         source=_OMNI,
     )
     start: tuple[float, ...] = parameter(
         (0.0, 0.0, -0.03),
-        unit="m",
-        lower=-0.5,
-        upper=0.5,
+        Within(-0.5, 0.5, "m"),
+        "place of the inkwell relative to the middle of the workspace",
         length=3,
         fixed=True,
-        doc="place of the inkwell relative to the middle of the workspace",
         source="assumed: the inkwell is behind the middle; no source says how far",
     )
     position_resolution: float = parameter(
-        0.055e-3, unit="m", lower=0.0, upper=1e-2, doc="step of the position reading; 0: none", source=_OMNI
+        0.055e-3, Within(0.0, 1e-2, "m"), "step of the position reading; 0: none", source=_OMNI
     )
     gimbal_noise: float = parameter(
         2e-3,
-        unit="rad",
-        lower=0.0,
-        upper=0.1,
-        doc="largest noise of each gimbal potentiometer",
+        Within(0.0, 0.1, "rad"),
+        "largest noise of each gimbal potentiometer",
         source="derived: raw fluctuation of the slave's reference at rest (Vongbunyong 2008, "
         "section 6.2), not a specification of the potentiometers",
     )
-    peak_force: float = parameter(
-        3.3, unit="N", lower=0.0, upper=50.0, doc="largest force, for a short time", source=_OMNI
-    )
+    peak_force: float = parameter(3.3, Within(0.0, 50.0, "N"), "largest force, for a short time", source=_OMNI)
     continuous_force: float = parameter(
         0.88,
-        unit="N",
-        lower=1e-3,
-        upper=50.0,
-        doc="root mean square of the force that its motors bear; peak_force or more: no limit",
+        Within(1e-3, 50.0, "N"),
+        "root mean square of the force that its motors bear; peak_force or more: no limit",
         source=_OMNI,
     )
     thermal_time: float = parameter(
         60.0,
-        unit="s",
-        lower=0.1,
-        upper=1e4,
-        doc="time constant with which its motors grow warm",
+        Within(0.1, 1e4, "s"),
+        "time constant with which its motors grow warm",
         source="assumed: between the winding (some 10 s) and the housing (some 100 s) of coreless "
         "motors of this size, by their makers' data sheets",
     )
     stiffness: tuple[float, ...] = parameter(
         (1260.0, 2310.0, 1020.0),
-        unit="N/m",
-        lower=10.0,
-        upper=1e7,
+        Within(10.0, 1e7, "N/m"),
+        "of the tip against its motors and encoders, on x, y, z; in series with every wall",
         length=3,
-        doc="of the tip against its motors and encoders, on x, y, z; in series with every wall",
         source=_OMNI,
     )
     structure_damping: float = parameter(
         5.0,
-        unit="N·s/m",
-        lower=0.0,
-        upper=1e4,
-        doc="of the same, beside the stiffness",
+        Within(0.0, 1e4, "N·s/m"),
+        "of the same, beside the stiffness",
         source="assumed: a quarter to a third of critical for apparent_mass on this stiffness",
     )
-    apparent_mass: float = parameter(0.045, unit="kg", lower=1e-3, upper=5.0, doc="mass at the tip", source=_OMNI)
-    friction: float = parameter(
-        0.26, unit="N", lower=0.0, upper=5.0, doc="backdrive friction: it sticks below", source=_OMNI
-    )
+    apparent_mass: float = parameter(0.045, Within(1e-3, 5.0, "kg"), "mass at the tip", source=_OMNI)
+    friction: float = parameter(0.26, Within(0.0, 5.0, "N"), "backdrive friction: it sticks below", source=_OMNI)
     handle: str = parameter("", fixed=True, doc="robot whose joints read the hand, such as mma; empty: the Phantom's")
     handle_geometry: tuple[str, ...] = parameter(
         (), fixed=True, doc="symbol=value in place of the handle's lengths and options [m, rad]"

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Annotated
 
-from teleop_core.base import ParameterError, parameter
+from teleop_core.base import ParameterError, Within, parameter
 from teleop_core.graph import Row, Stage, topics
 from teleop_core.kernels import Array, Fields, Integers, kernel
 
@@ -19,18 +19,14 @@ class DisplayParameters:
 
     rate: float = parameter(
         60.0,
-        unit="Hz",
-        lower=1.0,
-        upper=240.0,
-        doc="frames a second",
+        Within(1.0, 240.0, "Hz"),
+        "frames a second",
         source="published: UVA-DSA telesurgery QoS analysis 2026 draws at 60 Hz",
     )
     latency: float = parameter(
         0.033,
-        unit="s",
-        lower=0.0,
-        upper=2.0,
-        doc="from when a frame is taken to when it is on the screen, beside any network",
+        Within(0.0, 2.0, "s"),
+        "from when a frame is taken to when it is on the screen, beside any network",
         source="assumed: two frames at 60 Hz",
     )
     shows: str = parameter(

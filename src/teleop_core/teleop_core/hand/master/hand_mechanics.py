@@ -6,7 +6,7 @@ from typing import Annotated
 
 import numpy as np
 
-from teleop_core.base import parameter
+from teleop_core.base import Within, parameter
 from teleop_core.hand.master.device import DeviceParameters
 from teleop_core.kernels import Array, Fields, Vector3, inner
 from teleop_core.kernels.portable import matrix_exponential
@@ -24,28 +24,22 @@ class HandParameters:
 
     mass: float = parameter(
         0.15,
-        unit="kg",
-        lower=0.01,
-        upper=5.0,
-        doc="mass moved with the tip",
+        Within(0.01, 5.0, "kg"),
+        "mass moved with the tip",
         source="assumed: fingers and a part of the hand of some 0.4 kg; a fingertip alone "
         "has some grams (Hajian and Howe 1997)",
     )
     stiffness: float = parameter(
         300.0,
-        unit="N/m",
-        lower=1.0,
-        upper=5000.0,
-        doc="how firmly the hand holds its path",
+        Within(1.0, 5000.0, "N/m"),
+        "how firmly the hand holds its path",
         source="assumed: some 100 to 1000 N/m by grip, as of fingertips (Hajian and Howe 1997) and "
         "wrists that hold a stylus (Kuchenbecker, Park and Niemeyer 2003)",
     )
     damping: float = parameter(
         12.0,
-        unit="N·s/m",
-        lower=0.1,
-        upper=200.0,
-        doc="damping of the arm",
+        Within(0.1, 200.0, "N·s/m"),
+        "damping of the arm",
         source="assumed: 0.8 of critical with the masses and the stiffness here; fingertips have "
         "some 5 N·s/m (Hajian and Howe 1997), a firm grip more",
     )

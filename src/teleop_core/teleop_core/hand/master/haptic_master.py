@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from teleop_core.base import parameter
+from teleop_core.base import Within, parameter
 from teleop_core.graph import DT, Noise, Row, RunningStage, Stage, assign, topics
 from teleop_core.hand.master import contact, hand_mechanics, rendering
 from teleop_core.hand.master.device import (
@@ -37,24 +37,18 @@ _NEAR = 2e-3  # one that is no farther after a silence [m] is the same
 class HapticMasterParameters:
     """Parameters of :class:`HapticMaster`."""
 
-    seed: int = parameter(1, lower=0, fixed=True, doc="seed of everything random in the session")
-    force_timeout: float = parameter(
-        0.1, unit="s", lower=0.002, upper=5.0, doc="without a newer servo_cf the force is zero"
-    )
+    seed: int = parameter(1, Within(0), "seed of everything random in the session", fixed=True)
+    force_timeout: float = parameter(0.1, Within(0.002, 5.0, "s"), "without a newer servo_cf the force is zero")
     force_range: float = parameter(
         30.0,
-        unit="N",
-        lower=0.1,
-        upper=1000.0,
-        doc="a servo_cf beyond it comes from a broken sensor: no force until it was within for 1 s",
+        Within(0.1, 1000.0, "N"),
+        "a servo_cf beyond it comes from a broken sensor: no force until it was within for 1 s",
         source="assumed: no stage asks for more than 20 N, no such device gives more than 10",
     )
     hand_timeout: float = parameter(
         0.5,
-        unit="s",
-        lower=0.02,
-        upper=60.0,
-        doc="a hand/servo_cp that is silent for longer lets go: the stylus stays, the clutch is "
+        Within(0.02, 60.0, "s"),
+        "a hand/servo_cp that is silent for longer lets go: the stylus stays, the clutch is "
         "pressed; if it comes back elsewhere, until 0.3 s later",
         source="assumed: as of buttons, longer than a busy machine keeps a process waiting",
     )

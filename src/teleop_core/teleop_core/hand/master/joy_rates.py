@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from teleop_core.base import parameter
+from teleop_core.base import Within, parameter
 from teleop_core.hand.devices.pilot import RateParameters, steer
 from teleop_core.kernels import Array
 
@@ -18,21 +18,14 @@ class JoyParameters(RateParameters):
 
     axes: tuple[int, ...] = parameter(
         (0, 1, 2, 3, 4, 5),
-        lower=-1,
-        upper=63,
+        Within(-1, 63),
+        "which axes of the Joy move along x, y, z and turn about x, y, z; -1: none does",
         length=6,
         fixed=True,
-        doc="which axes of the Joy move along x, y, z and turn about x, y, z; -1: none does",
     )
-    held_button: int = parameter(-1, lower=-1, upper=63, fixed=True, doc="button that must be held to move; -1: none")
+    held_button: int = parameter(-1, Within(-1, 63), "button that must be held to move; -1: none", fixed=True)
     reach: float = parameter(
-        0.1,
-        unit="m",
-        lower=0.001,
-        upper=1.0,
-        fixed=True,
-        source="assumed",
-        doc="largest way from the start along each axis",
+        0.1, Within(0.001, 1.0, "m"), "largest way from the start along each axis", fixed=True, source="assumed"
     )
 
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from teleop_core.base import ParameterError, parameter
+from teleop_core.base import ParameterError, Within, parameter
 from teleop_core.coupling.mapping.gains import AXES, axis_map
 from teleop_core.graph import DT, RunningStage, Stage, topics
 from teleop_core.hand.master.joy_rates import JoyParameters, JoyRates
@@ -53,12 +53,7 @@ class MasterBridgeParameters:
         _THREE, choices=AXES, length=3, fixed=True, doc="the x, y, z of our stylus as axes of that of the device"
     )
     unit: float = parameter(
-        1.0,
-        unit="m",
-        lower=1e-6,
-        upper=10.0,
-        fixed=True,
-        doc="length in which the device counts: 0.001 for millimetres",
+        1.0, Within(1e-6, 10.0, "m"), "length in which the device counts: 0.001 for millimetres", fixed=True
     )
     handle: str = parameter(
         "", fixed=True, doc="robot whose tip is the stylus, by name or file, where the device says its joints"
@@ -71,24 +66,22 @@ class MasterBridgeParameters:
     )
     handle_signs: tuple[float, ...] = parameter(
         (),
-        lower=-1.0,
-        upper=1.0,
+        Within(-1.0, 1.0),
+        "1.0 or -1.0 for each of our joints: ours = sign * theirs + offset; empty: 1.0",
         fixed=True,
-        doc="1.0 or -1.0 for each of our joints: ours = sign * theirs + offset; empty: 1.0",
     )
     handle_offsets: tuple[float, ...] = parameter(
-        (), unit="rad or m", fixed=True, doc="of each of our joints; empty: 0.0"
+        (), Within(unit="rad or m"), "of each of our joints; empty: 0.0", fixed=True
     )
     buttons_topic: str = parameter(
         "", fixed=True, doc="where the device says its buttons, as sensor_msgs/Joy; empty: nowhere"
     )
     button_places: tuple[int, ...] = parameter(
         (0, 1, 2),
-        lower=-1,
-        upper=63,
+        Within(-1, 63),
+        "which of them are clutch, fixture and mode, counted from 0; -1: it has none",
         length=3,
         fixed=True,
-        doc="which of them are clutch, fixture and mode, counted from 0; -1: it has none",
     )
     pose_stamps: str = parameter(
         "header",
@@ -99,32 +92,26 @@ class MasterBridgeParameters:
     )
     oldest_pose: float = parameter(
         0.1,
-        unit="s",
-        lower=0.001,
-        upper=1.0,
+        Within(0.001, 1.0, "s"),
+        "poses whose stamps differ by more from our clock are refused",
         fixed=True,
         source="assumed",
-        doc="poses whose stamps differ by more from our clock are refused",
     )
     force_topic: str = parameter(
         "", fixed=True, doc="where the device takes forces, as geometry_msgs/WrenchStamped; empty: it has none"
     )
-    force_gain: float = parameter(1.0, lower=0.0, upper=10.0, doc="force of the device over the one that is asked for")
+    force_gain: float = parameter(1.0, Within(0.0, 10.0), "force of the device over the one that is asked for")
     largest_force: float = parameter(
         3.3,
-        unit="N",
-        lower=0.0,
-        upper=100.0,
-        doc="the device is asked for no more",
+        Within(0.0, 100.0, "N"),
+        "the device is asked for no more",
         source="published: peak force of the Phantom Omni",
     )
     force_timeout: float = parameter(
         0.1,
-        unit="s",
-        lower=0.002,
-        upper=5.0,
+        Within(0.002, 5.0, "s"),
+        "without master/servo_cf for longer, or a pose of the device, it is given no force",
         source="assumed",
-        doc="without master/servo_cf for longer, or a pose of the device, it is given no force",
     )
 
     def __post_init__(self) -> None:

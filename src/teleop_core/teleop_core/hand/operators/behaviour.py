@@ -5,7 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from teleop_core.base import Choice, ParameterError, choice, parameter
+from teleop_core.base import Choice, ParameterError, Within, choice, parameter
 from teleop_core.hand.operators import OPERATORS
 from teleop_core.kernels import Array
 
@@ -17,13 +17,11 @@ PRESS_TIME = 0.1
 class ButtonParameters:
     """When the operator uses the buttons [s]; each press of fixture or mode lasts 0.1 s."""
 
-    clutch: tuple[float, ...] = parameter((), unit="s", lower=0.0, fixed=True, doc="press, release, press, release, …")
-    fixture: tuple[float, ...] = parameter((), unit="s", lower=0.0, fixed=True, doc="presses: each toggles the box")
-    mode: tuple[float, ...] = parameter(
-        (), unit="s", lower=0.0, fixed=True, doc="presses: each toggles coarse and fine"
-    )
+    clutch: tuple[float, ...] = parameter((), Within(0.0, None, "s"), "press, release, press, release, …", fixed=True)
+    fixture: tuple[float, ...] = parameter((), Within(0.0, None, "s"), "presses: each toggles the box", fixed=True)
+    mode: tuple[float, ...] = parameter((), Within(0.0, None, "s"), "presses: each toggles coarse and fine", fixed=True)
 
-    jaw: tuple[float, ...] = parameter((), unit="s", lower=0.0, fixed=True, doc="jaw: close, open, close, open, …")
+    jaw: tuple[float, ...] = parameter((), Within(0.0, None, "s"), "jaw: close, open, close, open, …", fixed=True)
 
     def __post_init__(self) -> None:
         for name, pairs in (("clutch", self.clutch), ("jaw", self.jaw)):
@@ -44,21 +42,17 @@ class RoomParameters:
 
     workspace: tuple[float, ...] = parameter(
         (0.16, 0.12, 0.07),
-        unit="m",
-        lower=0.01,
-        upper=1.0,
+        Within(0.01, 1.0, "m"),
+        "width, height, depth within which the tip can move; as haptic_master's",
         length=3,
         fixed=True,
-        doc="width, height, depth within which the tip can move; as haptic_master's",
     )
     start: tuple[float, ...] = parameter(
         (0.0, 0.0, -0.03),
-        unit="m",
-        lower=-0.5,
-        upper=0.5,
+        Within(-0.5, 0.5, "m"),
+        "place of the inkwell relative to the middle of it; as haptic_master's",
         length=3,
         fixed=True,
-        doc="place of the inkwell relative to the middle of it; as haptic_master's",
     )
 
     @property
@@ -73,88 +67,64 @@ class OperatorParameters:
     """Who moves the hand; motions are relative to where the stylus starts, in its base."""
 
     kind: Choice = choice(OPERATORS, "random", fixed=True, doc="who moves the hand, and how")
-    seed: int = parameter(1, lower=0, fixed=True, doc="seed of everything random in the session")
+    seed: int = parameter(1, Within(0), "seed of everything random in the session", fixed=True)
     patience: float = parameter(
         10.0,
-        unit="s",
-        lower=0.0,
-        upper=3600.0,
+        Within(0.0, 3600.0, "s"),
+        "it begins when teleop/state says that the slave follows, or after this",
         fixed=True,
-        doc="it begins when teleop/state says that the slave follows, or after this",
     )
     center: tuple[float, ...] = parameter(
-        (0.0, 0.0, 0.0),
-        unit="m",
-        lower=-0.3,
-        upper=0.3,
-        length=3,
-        fixed=True,
-        doc="centre of the motion, first point of a line",
+        (0.0, 0.0, 0.0), Within(-0.3, 0.3, "m"), "centre of the motion, first point of a line", length=3, fixed=True
     )
-    approach_time: float = parameter(
-        4.0, unit="s", lower=0.1, upper=60.0, fixed=True, doc="smooth move from start to the centre"
-    )
+    approach_time: float = parameter(4.0, Within(0.1, 60.0, "s"), "smooth move from start to the centre", fixed=True)
     size: tuple[float, ...] = parameter(
         (0.03, 0.03, 0.03),
-        unit="m",
-        lower=0.0,
-        upper=0.3,
+        Within(0.0, 0.3, "m"),
+        "random: width of the region; circle: diameters on x, y, z; line: from end to end",
         length=3,
         fixed=True,
-        doc="random: width of the region; circle: diameters on x, y, z; line: from end to end",
     )
     period: float = parameter(
         8.0,
-        unit="s",
-        lower=0.1,
-        upper=600.0,
+        Within(0.1, 600.0, "s"),
+        "time of one round; random: of the slowest part of the motion; points: per leg",
         fixed=True,
-        doc="time of one round; random: of the slowest part of the motion; points: per leg",
     )
     tilt: tuple[float, ...] = parameter(
         (0.0, 0.0, 0.0),
-        unit="rad",
-        lower=-1.5,
-        upper=1.5,
+        Within(-1.5, 1.5, "rad"),
+        "turn of the stylus at the centre, as a rotation vector",
         length=3,
         fixed=True,
-        doc="turn of the stylus at the centre, as a rotation vector",
     )
     rotation: float = parameter(
-        0.2, unit="rad", lower=0.0, upper=1.5, fixed=True, doc="largest random turn of the stylus about each axis"
+        0.2, Within(0.0, 1.5, "rad"), "largest random turn of the stylus about each axis", fixed=True
     )
     points: tuple[float, ...] = parameter(
         (),
-        unit="m",
-        lower=-0.3,
-        upper=0.3,
+        Within(-0.3, 0.3, "m"),
+        "points: x, y, z of each stop relative to the centre, one after the other",
         fixed=True,
-        doc="points: x, y, z of each stop relative to the centre, one after the other",
     )
     bag: str = parameter("", fixed=True, doc="bag: recording whose master/measured_cp is followed")
     longest_gap: float = parameter(
         0.1,
-        unit="s",
-        lower=0.0,
-        upper=60.0,
+        Within(0.0, 60.0, "s"),
+        "bag, file: over longer gaps between samples the hand waits, but not below 5 periods",
         fixed=True,
-        doc="bag, file: over longer gaps between samples the hand waits, but not below 5 periods",
     )
 
     tremor_amplitude: float = parameter(
         0.1e-3,
-        unit="m",
-        lower=0.0,
-        upper=5e-3,
-        doc="amplitude of the wanted tremor on each axis",
+        Within(0.0, 5e-3, "m"),
+        "amplitude of the wanted tremor on each axis",
         source="assumed: within the 50 to 200 µm of microsurgery; friction swallows it at rest",
     )
     tremor_frequency: float = parameter(
         10.0,
-        unit="Hz",
-        lower=8.0,
-        upper=12.0,
-        doc="middle of the tremor's band, which is ±2 Hz",
+        Within(8.0, 12.0, "Hz"),
+        "middle of the tremor's band, which is ±2 Hz",
         source="published: physiological tremor has 8 to 12 Hz (Elble and Koller 1990)",
     )
     buttons: ButtonParameters = field(default_factory=ButtonParameters)

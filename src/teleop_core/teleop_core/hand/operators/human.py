@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from teleop_core.base import ParameterError, parameter
+from teleop_core.base import ParameterError, Within, parameter
 from teleop_core.hand.operators import Motion, Operator, Setting
 from teleop_core.hand.operators.behaviour import OperatorParameters
 from teleop_core.hand.operators.shapes import minimum_jerk
@@ -34,156 +34,128 @@ class HumanParameters:
 
     reach: float = parameter(
         0.0105,
-        unit="m",
-        lower=1e-3,
-        upper=0.3,
+        Within(1e-3, 0.3, "m"),
+        "median distance from target to target, within the region of operator.size",
         fixed=True,
-        doc="median distance from target to target, within the region of operator.size",
         source="assumed: how far apart things are is the task's",
     )
     reach_spread: float = parameter(
         0.72,
-        lower=0.0,
-        upper=2.0,
+        Within(0.0, 2.0),
+        "standard deviation of its logarithm",
         fixed=True,
-        doc="standard deviation of its logarithm",
         source="assumed: with reach, fits the figures of people",
     )
     turn: float = parameter(
         0.3,
-        lower=0.0,
-        upper=2.0,
+        Within(0.0, 2.0),
+        "standard deviation of the turn to the next target, in parts of operator.rotation",
         fixed=True,
-        doc="standard deviation of the turn to the next target, in parts of operator.rotation",
         source="assumed: fits the figures of people",
     )
     width: float = parameter(
         2.6e-3,
-        unit="m",
-        lower=1e-4,
-        upper=0.1,
+        Within(1e-4, 0.1, "m"),
+        "width of a target, as of Fitts",
         fixed=True,
-        doc="width of a target, as of Fitts",
         source="assumed: fits the figures of people",
     )
     tolerance: float = parameter(
         2.4e-3,
-        unit="m",
-        lower=1e-4,
-        upper=0.1,
+        Within(1e-4, 0.1, "m"),
+        "distance from the target at which no correction is made",
         fixed=True,
-        doc="distance from the target at which no correction is made",
         source="assumed: a little below width",
     )
     movement_time: float = parameter(
         0.055,
-        unit="s",
-        lower=0.05,
-        upper=2.0,
+        Within(0.05, 2.0, "s"),
+        "duration of a submovement of no difficulty",
         fixed=True,
-        doc="duration of a submovement of no difficulty",
         source="assumed: fits the figures of people; form of Fitts 1954",
     )
     time_per_bit: float = parameter(
         0.195,
-        unit="s",
-        lower=0.0,
-        upper=2.0,
+        Within(0.0, 2.0, "s"),
+        "what each bit of difficulty adds to the duration of a submovement",
         fixed=True,
-        doc="what each bit of difficulty adds to the duration of a submovement",
         source="assumed: 5 bit/s, as of a mouse (Soukoreff, MacKenzie 2004); pen: 10 (Fitts 1954)",
     )
     time_spread: float = parameter(
         0.23,
-        lower=0.0,
-        upper=1.0,
+        Within(0.0, 1.0),
+        "standard deviation of its logarithm",
         fixed=True,
-        doc="standard deviation of its logarithm",
         source="assumed: fits the figures of people",
     )
     shortfall: float = parameter(
         0.05,
-        lower=0.0,
-        upper=0.5,
+        Within(0.0, 0.5),
+        "share of the distance that a first submovement aims short by",
         fixed=True,
-        doc="share of the distance that a first submovement aims short by",
         source="assumed: first submovements fall short (Engelbrecht, Berthier and O'Sullivan 2003)",
     )
     noise_along: float = parameter(
         0.05,
-        unit="s",
-        lower=0.0,
-        upper=0.2,
+        Within(0.0, 0.2, "s"),
+        "standard deviation of a submovement's end along its way, per mean speed",
         fixed=True,
-        doc="standard deviation of a submovement's end along its way, per mean speed",
         source="assumed: ends spread with mean speed (Schmidt et al. 1979; Meyer et al. 1988)",
     )
     noise_across: float = parameter(
         0.018,
-        unit="s",
-        lower=0.0,
-        upper=0.2,
+        Within(0.0, 0.2, "s"),
+        "the same across its way",
         fixed=True,
-        doc="the same across its way",
         source="assumed: smaller than along (Gordon, Ghilardi and Ghez 1994)",
     )
     reaction_time: float = parameter(
         0.22,
-        unit="s",
-        lower=0.05,
-        upper=1.0,
+        Within(0.05, 1.0, "s"),
+        "from seeing an error, half way through a submovement, to its correction",
         fixed=True,
-        doc="from seeing an error, half way through a submovement, to its correction",
         source="published: 0.19 to 0.26 s (Keele and Posner 1968)",
     )
     corrections: int = parameter(
         3,
-        lower=0,
-        upper=10,
+        Within(0, 10),
+        "largest number of corrections of a reach",
         fixed=True,
-        doc="largest number of corrections of a reach",
         source="assumed: more are hardly ever needed",
     )
     dwell_time: float = parameter(
         0.22,
-        unit="s",
-        lower=0.01,
-        upper=10.0,
+        Within(0.01, 10.0, "s"),
+        "median rest at a target",
         fixed=True,
-        doc="median rest at a target",
         source="assumed: fits the figures of people",
     )
     dwell_spread: float = parameter(
         0.4,
-        lower=0.0,
-        upper=2.0,
+        Within(0.0, 2.0),
+        "standard deviation of its logarithm",
         fixed=True,
-        doc="standard deviation of its logarithm",
         source="assumed: fits the figures of people",
     )
     passing: float = parameter(
         0.75,
-        lower=0.0,
-        upper=1.0,
+        Within(0.0, 1.0),
+        "share of targets at which the hand rests not",
         fixed=True,
-        doc="share of targets at which the hand rests not",
         source="assumed: fits the figures of people",
     )
     overlap: float = parameter(
         0.32,
-        lower=0.0,
-        upper=0.5,
+        Within(0.0, 0.5),
+        "share of the last submovement into which the next reach begins at such a target",
         fixed=True,
-        doc="share of the last submovement into which the next reach begins at such a target",
         source="assumed: that submovements overlap: Flash and Henis 1991",
     )
     tremor: float = parameter(
         63e-6,
-        unit="m",
-        lower=0.0,
-        upper=5e-3,
+        Within(0.0, 5e-3, "m"),
+        "tremor of the tip from 8 to 12 Hz, at rest too: root mean square over three axes",
         fixed=True,
-        doc="tremor of the tip from 8 to 12 Hz, at rest too: root mean square over three axes",
         source="fitted: to the tremor of a hand that rests, docs/human_operator.md",
     )
 

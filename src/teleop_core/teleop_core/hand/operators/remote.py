@@ -12,7 +12,7 @@ from typing import Any, NamedTuple, cast
 
 import numpy as np
 
-from teleop_core.base import ShapeError, UnknownNameError, parameter
+from teleop_core.base import ShapeError, UnknownNameError, Within, parameter
 from teleop_core.hand.operators import Motion, Operator, Setting, follower, rest
 from teleop_core.kernels import geometry
 
@@ -32,56 +32,44 @@ class RemoteParameters:
 
     delay: float = parameter(
         0.045,
-        unit="s",
-        lower=0.005,
-        upper=0.5,
+        Within(0.005, 0.5, "s"),
+        "how far the stylus is behind a steady motion that is wanted",
         fixed=True,
-        doc="how far the stylus is behind a steady motion that is wanted",
         source="assumed: smooths 30 to 60 poses a second; less than a third of what people feel",
     )
     timeout: float = parameter(
         0.2,
-        unit="s",
-        lower=0.02,
-        upper=5.0,
+        Within(0.02, 5.0, "s"),
+        "silence that lets go of the stylus: the clutch is pressed until the next pose",
         fixed=True,
-        doc="silence that lets go of the stylus: the clutch is pressed until the next pose",
         source="assumed: some six frames of a slow page",
     )
     speed: float = parameter(
         0.5,
-        unit="m/s",
-        lower=0.01,
-        upper=2.5,
+        Within(0.01, 2.5, "m/s"),
+        "largest speed of the stylus",
         fixed=True,
-        doc="largest speed of the stylus",
         source="assumed: through the Phantom's workspace in a third of a second",
     )
     acceleration: float = parameter(
         30.0,
-        unit="m/s²",
-        lower=0.1,
-        upper=500.0,
+        Within(0.1, 500.0, "m/s²"),
+        "largest acceleration of the stylus",
         fixed=True,
-        doc="largest acceleration of the stylus",
         source="assumed: three times that of a free fall",
     )
     turn_speed: float = parameter(
         6.0,
-        unit="rad/s",
-        lower=0.05,
-        upper=50.0,
+        Within(0.05, 50.0, "rad/s"),
+        "largest speed of its turn",
         fixed=True,
-        doc="largest speed of its turn",
         source="assumed: about one turn a second",
     )
     turn_acceleration: float = parameter(
         300.0,
-        unit="rad/s²",
-        lower=1.0,
-        upper=5000.0,
+        Within(1.0, 5000.0, "rad/s²"),
+        "largest acceleration of its turn",
         fixed=True,
-        doc="largest acceleration of its turn",
         source="assumed: reaches turn_speed in half of the delay",
     )
 

@@ -9,7 +9,7 @@ from typing import cast
 
 import numpy as np
 
-from teleop_core.base import ParameterError, parameter
+from teleop_core.base import ParameterError, Within, parameter
 from teleop_core.hand.operators import Motion, Operator, Setting
 from teleop_core.hand.operators.behaviour import OperatorParameters
 from teleop_core.hand.operators.shapes import minimum_jerk, smooth
@@ -21,38 +21,23 @@ class TourParameters:
     """Where a tour goes, and how fast."""
 
     points: tuple[float, ...] = parameter(
-        (),
-        unit="m",
-        lower=-0.3,
-        upper=0.3,
-        fixed=True,
-        doc="x, y, z of each point relative to the centre, one after the other",
+        (), Within(-0.3, 0.3, "m"), "x, y, z of each point relative to the centre, one after the other", fixed=True
     )
     leg_time: float = parameter(
         0.7,
-        unit="s",
-        lower=0.05,
-        upper=60.0,
+        Within(0.05, 60.0, "s"),
+        "from one point to the next",
         fixed=True,
-        doc="from one point to the next",
         source="assumed: 24 points, rests and the line take the published 45 s",
     )
     rest_time: float = parameter(
-        0.6,
-        unit="s",
-        lower=0.0,
-        upper=60.0,
-        fixed=True,
-        doc="rest at each point",
-        source="assumed: as the time of a leg",
+        0.6, Within(0.0, 60.0, "s"), "rest at each point", fixed=True, source="assumed: as the time of a leg"
     )
     trace_time: float = parameter(
         13.8,
-        unit="s",
-        lower=0.0,
-        upper=600.0,
+        Within(0.0, 600.0, "s"),
+        "line back through all points, from the last to the first; 0: none",
         fixed=True,
-        doc="line back through all points, from the last to the first; 0: none",
         source="assumed: as the time of a leg",
     )
 

@@ -7,7 +7,7 @@ time then [s], and whether the hand was closed.
 import math
 from dataclasses import dataclass
 
-from teleop_core.base import parameter
+from teleop_core.base import Within, parameter
 from teleop_core.graph import topics
 from teleop_core.hand.tasks import SCENE, Act, Miss
 from teleop_core.kernels import Array, inner
@@ -88,9 +88,9 @@ def end_attempt(memory: Array, scene: Array, state: Array, miss: int) -> None:
 class PressedParameters:
     """What is an error where things are touched; first of the numbers of such a task."""
 
-    width: float = parameter(0.004, unit="m", lower=1e-4, upper=0.1, doc="of a goal, a ball")
-    most: float = parameter(2.0, unit="N", lower=0.01, upper=500.0, doc="a larger force is an error")
-    longest: float = parameter(20.0, unit="s", lower=0.1, upper=600.0, doc="an attempt that takes longer is an error")
+    width: float = parameter(0.004, Within(1e-4, 0.1, "m"), "of a goal, a ball")
+    most: float = parameter(2.0, Within(0.01, 500.0, "N"), "a larger force is an error")
+    longest: float = parameter(20.0, Within(0.1, 600.0, "s"), "an attempt that takes longer is an error")
 
 
 @inner
@@ -114,13 +114,9 @@ def tell_attempt(memory: Array, scene: Array, state: Array) -> None:
 class LedParameters:
     """How a goal that is followed is judged; first of the numbers of a task that leads."""
 
-    width: float = parameter(0.006, unit="m", lower=1e-4, upper=0.1, doc="twice the distance from it that is near")
+    width: float = parameter(0.006, Within(1e-4, 0.1, "m"), "twice the distance from it that is near")
     step: float = parameter(
-        0.5,
-        unit="s",
-        lower=0.01,
-        upper=60.0,
-        doc="after which the tip is judged each time, and the next place counts as a goal",
+        0.5, Within(0.01, 60.0, "s"), "after which the tip is judged each time, and the next place counts as a goal"
     )
 
 

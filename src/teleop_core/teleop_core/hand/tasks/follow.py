@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass
 
-from teleop_core.base import parameter
+from teleop_core.base import Within, parameter
 from teleop_core.hand.tasks import Task, attempts
 from teleop_core.kernels import Array, kernel
 
@@ -19,8 +19,8 @@ class FollowParameters(attempts.LedParameters):
         Sums of sines as targets: McRuer and Jex 1967, IEEE Trans. Human Factors in Electronics 8.
     """
 
-    size: float = parameter(0.02, unit="m", lower=1e-3, upper=0.5, doc="farthest that it goes along each axis")
-    period: float = parameter(60.0, unit="s", lower=1.0, upper=3600.0, doc="after which its way repeats itself")
+    size: float = parameter(0.02, Within(1e-3, 0.5, "m"), "farthest that it goes along each axis")
+    period: float = parameter(60.0, Within(1.0, 3600.0, "s"), "after which its way repeats itself")
 
 
 @kernel

@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass
 
-from teleop_core.base import ParameterError, parameter
+from teleop_core.base import ParameterError, Within, parameter
 from teleop_core.graph import topics
 from teleop_core.hand.tasks import Task, attempts
 from teleop_core.kernels import Array, kernel
@@ -16,24 +16,13 @@ class InsertParameters(attempts.PressedParameters):
     """Where the hole is, and how deep to go; the object that has it is a part of the world."""
 
     place: tuple[float, ...] = parameter(
-        (0.3, 0.0, 0.0),
-        unit="m",
-        lower=-10.0,
-        upper=10.0,
-        length=3,
-        doc="of its mouth in the slave's base, as world.place",
+        (0.3, 0.0, 0.0), Within(-10.0, 10.0, "m"), "of its mouth in the slave's base, as world.place", length=3
     )
-    axis: tuple[float, ...] = parameter(
-        (0.0, 0.0, 1.0), lower=-1.0, upper=1.0, length=3, doc="out of it, as world.hole.axis"
-    )
-    depth: float = parameter(0.01, unit="m", lower=1e-3, upper=0.5, doc="of the goal inside")
-    outside: float = parameter(0.008, unit="m", lower=0.0, upper=0.5, doc="goal before the mouth")
+    axis: tuple[float, ...] = parameter((0.0, 0.0, 1.0), Within(-1.0, 1.0), "out of it, as world.hole.axis", length=3)
+    depth: float = parameter(0.01, Within(1e-3, 0.5, "m"), "of the goal inside")
+    outside: float = parameter(0.008, Within(0.0, 0.5, "m"), "goal before the mouth")
     clearance: float = parameter(
-        0.0,
-        unit="m",
-        lower=0.0,
-        upper=0.1,
-        doc="from the tool to the hole's edge, which the hand heeds; 0: it does not",
+        0.0, Within(0.0, 0.1, "m"), "from the tool to the hole's edge, which the hand heeds; 0: it does not"
     )
 
     def __post_init__(self) -> None:

@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass
 
-from teleop_core.base import parameter
+from teleop_core.base import Within, parameter
 from teleop_core.graph import topics
 from teleop_core.hand.tasks import Task, attempts
 from teleop_core.kernels import Array, kernel
@@ -15,17 +15,13 @@ _FORCE = topics.TASK_STATE.columns.index("force")
 class PalpateParameters(attempts.PressedParameters):
     """Places below a row along y, in whose middle the tip is when the task begins."""
 
-    count: int = parameter(5, lower=1, upper=99, doc="places of the row")
-    spacing: float = parameter(0.005, unit="m", lower=0.0, upper=0.1, doc="between places")
-    force: float = parameter(0.5, unit="N", lower=0.01, upper=100.0, doc="along z, to press with")
-    tolerance: float = parameter(0.2, unit="N", lower=1e-3, upper=100.0, doc="it may be so far off")
-    hold: float = parameter(0.5, unit="s", lower=0.0, upper=60.0, doc="it must last so long")
+    count: int = parameter(5, Within(1, 99), "places of the row")
+    spacing: float = parameter(0.005, Within(0.0, 0.1, "m"), "between places")
+    force: float = parameter(0.5, Within(0.01, 100.0, "N"), "along z, to press with")
+    tolerance: float = parameter(0.2, Within(1e-3, 100.0, "N"), "it may be so far off")
+    hold: float = parameter(0.5, Within(0.0, 60.0, "s"), "it must last so long")
     yielding: float = parameter(
-        0.003,
-        unit="m/N",
-        lower=1e-5,
-        upper=0.1,
-        doc="the goal is so much deeper than the tip for each newton that is missing",
+        0.003, Within(1e-5, 0.1, "m/N"), "the goal is so much deeper than the tip for each newton that is missing"
     )
 
 

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from teleop_core.base import ParameterError, parameter
+from teleop_core.base import ParameterError, Within, parameter
 from teleop_core.graph.topics import JAW_OBJECTS
 from teleop_core.hand.tasks import Task, transfer
 from teleop_core.kernels import Array, kernel
@@ -23,18 +23,16 @@ class PegTransferParameters:
     )
     ways: tuple[float, ...] = parameter(
         (0.0, -0.04),
-        unit="m",
-        lower=-1.0,
-        upper=1.0,
-        doc="x, y of the way from each block to the peg of its colour; one way holds for all",
+        Within(-1.0, 1.0, "m"),
+        "x, y of the way from each block to the peg of its colour; one way holds for all",
     )
-    lift: float = parameter(0.03, unit="m", lower=1e-3, upper=0.5, doc="above where blocks stand")
+    lift: float = parameter(0.03, Within(1e-3, 0.5, "m"), "above where blocks stand")
     clearance: float = parameter(
-        0.0015, unit="m", lower=0.0, upper=0.1, doc="of a block that is on a peg, as jaw_sim.pegs.clearance"
+        0.0015, Within(0.0, 0.1, "m"), "of a block that is on a peg, as jaw_sim.pegs.clearance"
     )
-    width: float = parameter(0.002, unit="m", lower=1e-4, upper=0.1, doc="of a goal, a ball")
-    longest: float = parameter(60.0, unit="s", lower=1.0, upper=600.0, doc="a transfer that takes longer is an error")
-    tries: int = parameter(2, lower=1, upper=99, doc="how often a block is taken up, if it is dropped")
+    width: float = parameter(0.002, Within(1e-4, 0.1, "m"), "of a goal, a ball")
+    longest: float = parameter(60.0, Within(1.0, 600.0, "s"), "a transfer that takes longer is an error")
+    tries: int = parameter(2, Within(1, 99), "how often a block is taken up, if it is dropped")
 
     def __post_init__(self) -> None:
         if len(self.ways) not in {_ONE_WAY, _WAYS}:

@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass
 
-from teleop_core.base import parameter
+from teleop_core.base import Within, parameter
 from teleop_core.hand.tasks import Task, attempts
 from teleop_core.kernels import Array, kernel
 
@@ -14,19 +14,14 @@ class PointParameters:
 
     count: int = parameter(
         13,
-        lower=3,
-        upper=99,
-        doc="targets of the ring",
+        Within(3, 99),
+        "targets of the ring",
         source="published: ISO/TS 9241-411 2012 has an odd number, 13 and 25 in its figures",
     )
-    diameter: float = parameter(0.03, unit="m", lower=1e-3, upper=0.5, doc="of the ring")
-    width: float = parameter(0.004, unit="m", lower=1e-4, upper=0.1, doc="diameter of a target, a ball")
+    diameter: float = parameter(0.03, Within(1e-3, 0.5, "m"), "of the ring")
+    width: float = parameter(0.004, Within(1e-4, 0.1, "m"), "diameter of a target, a ball")
     normal: tuple[float, ...] = parameter(
-        (1.0, 0.0, 0.0),
-        lower=-1.0,
-        upper=1.0,
-        length=3,
-        doc="axis of the ring in the slave's base, of any length but 0",
+        (1.0, 0.0, 0.0), Within(-1.0, 1.0), "axis of the ring in the slave's base, of any length but 0", length=3
     )
 
 

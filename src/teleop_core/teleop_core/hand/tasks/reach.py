@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass
 
-from teleop_core.base import parameter
+from teleop_core.base import Within, parameter
 from teleop_core.graph import topics
 from teleop_core.hand.tasks import Task, attempts
 from teleop_core.kernels import Array, kernel
@@ -18,12 +18,12 @@ _STEPS = (0.8191725133961645, 0.6710436067037893, 0.5497004779019703)
 class ReachTaskParameters:
     """A box around the place where the tip is when the task begins."""
 
-    size: tuple[float, ...] = parameter((0.01, 0.04, 0.04), unit="m", lower=0.0, upper=0.5, length=3, doc="of the box")
-    width: float = parameter(0.004, unit="m", lower=1e-4, upper=0.1, doc="diameter of a goal, a ball")
-    longest: float = parameter(10.0, unit="s", lower=0.1, upper=600.0, doc="after which a goal counts as an error")
-    first: int = parameter(0, lower=0, upper=10**6, doc="which place comes first")
-    turn: float = parameter(0.0, unit="rad", lower=0.0, upper=1.5, doc="largest turn of a goal; 0: any does")
-    turn_width: float = parameter(0.2, unit="rad", lower=0.01, upper=3.0, doc="twice how far the tool may be off it")
+    size: tuple[float, ...] = parameter((0.01, 0.04, 0.04), Within(0.0, 0.5, "m"), "of the box", length=3)
+    width: float = parameter(0.004, Within(1e-4, 0.1, "m"), "diameter of a goal, a ball")
+    longest: float = parameter(10.0, Within(0.1, 600.0, "s"), "after which a goal counts as an error")
+    first: int = parameter(0, Within(0, 10**6), "which place comes first")
+    turn: float = parameter(0.0, Within(0.0, 1.5, "rad"), "largest turn of a goal; 0: any does")
+    turn_width: float = parameter(0.2, Within(0.01, 3.0, "rad"), "twice how far the tool may be off it")
 
 
 @kernel

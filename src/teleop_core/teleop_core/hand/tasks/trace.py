@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass
 
-from teleop_core.base import parameter
+from teleop_core.base import Within, parameter
 from teleop_core.hand.tasks import Task, attempts
 from teleop_core.kernels import Array, kernel
 
@@ -12,8 +12,8 @@ from teleop_core.kernels import Array, kernel
 class TraceParameters(attempts.LedParameters):
     """A ring in the slave's y-z plane, on which the place where the task begins lies lowest."""
 
-    diameter: float = parameter(0.03, unit="m", lower=1e-3, upper=0.5, doc="of the ring")
-    period: float = parameter(12.0, unit="s", lower=0.5, upper=600.0, doc="in which the point goes round once")
+    diameter: float = parameter(0.03, Within(1e-3, 0.5, "m"), "of the ring")
+    period: float = parameter(12.0, Within(0.5, 600.0, "s"), "in which the point goes round once")
 
 
 @kernel

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from teleop_core.base import ParameterError, parameter
+from teleop_core.base import ParameterError, Within, parameter
 from teleop_core.slave.operation.faults import NAMES
 from teleop_core.slave.operation.states import COMMANDS, Event, command_event
 
@@ -24,83 +24,62 @@ class OperationParameters:
     )
     heartbeat: float = parameter(
         0.0,
-        unit="s",
-        lower=0.01,
-        upper=10.0,
+        Within(0.01, 10.0, "s"),
+        "a stop button that says 'released' less often than this counts as pressed; 0: none is there",
         off=0.0,
-        doc="a stop button that says 'released' less often than this counts as pressed; 0: none is there",
     )
     longest_outage: float = parameter(
         2.0,
-        unit="s",
-        lower=0.01,
-        upper=60.0,
+        Within(0.01, 60.0, "s"),
+        "after a longer silence of commands it is paused and resumes on purpose only; 0: never",
         off=0.0,
-        doc="after a longer silence of commands it is paused and resumes on purpose only; 0: never",
         source="assumed: longer than a node takes to hiccup, shorter than a person to look away",
     )
     longest_silence: float = parameter(
         2.0,
-        unit="s",
-        lower=0.01,
-        upper=60.0,
-        doc="an arm that has not said for longer where it is has a fault; it holds long before, "
-        "after the command timeout",
+        Within(0.01, 60.0, "s"),
+        "an arm that has not said for longer where it is has a fault; it holds long before, after the command timeout",
         source="assumed: as the longest outage",
     )
     acceleration_share: float = parameter(
         20.0,
-        lower=1.0,
-        upper=1000.0,
-        doc="largest acceleration of setpoints over that of the drives, effort limit over inertia",
+        Within(1.0, 1000.0),
+        "largest acceleration of setpoints over that of the drives, effort limit over inertia",
         source="assumed: encoder steps of the stylus alone ask for up to 12 times at 1 kHz",
     )
     tool_speed: float = parameter(
         0.0,
-        unit="m/s",
-        lower=0.0,
-        upper=10.0,
-        doc="largest speed of the tip; 0: what the joint that moves it fastest at home reaches",
+        Within(0.0, 10.0, "m/s"),
+        "largest speed of the tip; 0: what the joint that moves it fastest at home reaches",
     )
     tool_acceleration: float = parameter(
-        0.0,
-        unit="m/s²",
-        lower=0.0,
-        upper=1e5,
-        doc="largest rise of the tip's speed; 0: what that joint's acceleration_share gives",
+        0.0, Within(0.0, 1e5, "m/s²"), "largest rise of the tip's speed; 0: what that joint's acceleration_share gives"
     )
     longest_lag: float = parameter(
         0.2,
-        unit="s",
-        lower=0.001,
-        upper=10.0,
-        doc="a joint farther from its setpoint than full speed makes up in this time is a fault",
+        Within(0.001, 10.0, "s"),
+        "a joint farther from its setpoint than full speed makes up in this time is a fault",
         source="assumed: four times what the PID laws leave at full speed, 3 over their bandwidth",
     )
     tip_error: float = parameter(
         0.0,
-        unit="m",
-        lower=0.0,
-        upper=1.0,
-        doc="a tip farther from its setpoint than this is a fault; 0: than tool_speed makes up in longest_lag",
+        Within(0.0, 1.0, "m"),
+        "a tip farther from its setpoint than this is a fault; 0: than tool_speed makes up in longest_lag",
     )
     effort_time: float = parameter(
         1.0,
-        unit="s",
-        lower=0.01,
-        upper=60.0,
-        doc="a drive at its effort limit for longer is a fault",
+        Within(0.01, 60.0, "s"),
+        "a drive at its effort limit for longer is a fault",
         source="assumed: braking from full speed takes 0.1 s",
     )
     overspeed: float = parameter(
         1.5,
-        lower=1.0,
-        upper=10.0,
-        doc="a joint faster than this share of its speed limit is a fault",
+        Within(1.0, 10.0),
+        "a joint faster than this share of its speed limit is a fault",
         source="assumed: motors fade out a tenth above their rated speed",
     )
     pressing_time: float = parameter(
-        1.0, unit="s", lower=0.01, upper=60.0, doc="commands beyond a joint's limit for longer press it into that limit"
+        1.0, Within(0.01, 60.0, "s"), "commands beyond a joint's limit for longer press it into that limit"
     )
     reported: tuple[str, ...] = parameter((), choices=NAMES, doc="faults that are told only and stop nothing")
     events: tuple[str, ...] = parameter(

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from teleop_core.base import Choice, ParameterError, Value, choice, parameter
+from teleop_core.base import Choice, ParameterError, Value, Within, choice, parameter
 from teleop_core.kernels.geometry import Array
 from teleop_core.slave.world import WORLD_OBJECTS
 
@@ -49,24 +49,20 @@ class WorldParameters:
     kind: Choice = choice(WORLD_OBJECTS, "empty", fixed=True, doc="what the tip can touch", usual=_USUAL)
     place: tuple[float, ...] = parameter(
         (),
-        unit="m",
-        lower=-10.0,
-        upper=10.0,
+        Within(-10.0, 10.0, "m"),
+        "middle of the object in the slave's base; empty: straight below the tip of the robot's start, gap apart",
         fixed=True,
-        doc="middle of the object in the slave's base; empty: straight below the tip of the robot's start, gap apart",
     )
     base: tuple[float, ...] = parameter(
         (0.0, 0.0, 0.0),
-        unit="m",
-        lower=-10.0,
-        upper=10.0,
+        Within(-10.0, 10.0, "m"),
+        "where the base of this arm is, with parallel axes, from where place is given: that of a second arm in the "
+        "base of the first, so that both touch the same object",
         length=3,
         fixed=True,
-        doc="where the base of this arm is, with parallel axes, from where place is given: that of a second arm in the "
-        "base of the first, so that both touch the same object",
     )
     gap: float = parameter(
-        0.01, unit="m", lower=0.0, upper=1.0, fixed=True, doc="between that tip and the object, if no place is given"
+        0.01, Within(0.0, 1.0, "m"), "between that tip and the object, if no place is given", fixed=True
     )
     material: str = parameter(
         "tissue",
@@ -74,68 +70,47 @@ class WorldParameters:
         doc="what it is made of; own: of the following three numbers",
         source="assumed: all five; what a tip meets depends on its own size as well",
     )
-    stiffness: float = parameter(1000.0, unit="N/m", lower=1.0, upper=1e5, doc="of the surface, if the material is own")
+    stiffness: float = parameter(1000.0, Within(1.0, 1e5, "N/m"), "of the surface, if the material is own")
     damping: float = parameter(
         1.0,
-        unit="s/m",
-        lower=0.0,
-        upper=100.0,
-        doc="share of the force per speed, if the material is own",
+        Within(0.0, 100.0, "s/m"),
+        "share of the force per speed, if the material is own",
         source="assumed: the number; the law is that of Hunt and Crossley 1975",
     )
-    friction_coefficient: float = parameter(
-        0.3, lower=0.0, upper=2.0, doc="over the normal force, if the material is own"
-    )
+    friction_coefficient: float = parameter(0.3, Within(0.0, 2.0), "over the normal force, if the material is own")
 
     tool_points: int = parameter(
         1,
-        lower=1,
-        upper=16,
+        Within(1, 16),
+        "places where the tool touches: its tip, and others behind it along its axis, which is z of the tip",
         fixed=True,
-        doc="places where the tool touches: its tip, and others behind it along its axis, which is z of the tip",
     )
     tool_length: float = parameter(
-        0.02,
-        unit="m",
-        lower=1e-3,
-        upper=1.0,
-        fixed=True,
-        doc="from the tip to the last of several points",
-        source="assumed",
+        0.02, Within(1e-3, 1.0, "m"), "from the tip to the last of several points", fixed=True, source="assumed"
     )
-    tool_radius: float = parameter(
-        0.0, unit="m", lower=0.0, upper=0.1, fixed=True, doc="of the tool at each of its points"
-    )
+    tool_radius: float = parameter(0.0, Within(0.0, 0.1, "m"), "of the tool at each of its points", fixed=True)
 
     puncture_force: float = parameter(
         0.0,
-        unit="N",
-        lower=0.0,
-        upper=100.0,
-        doc="push along the normal at which the surface gives way to the tip, of any material; 0: it never does",
+        Within(0.0, 100.0, "N"),
+        "push along the normal at which the surface gives way to the tip, of any material; 0: it never does",
     )
     cutting_force: float = parameter(
         0.2,
-        unit="N",
-        lower=0.0,
-        upper=100.0,
-        doc="push against a tip that goes deeper than before, behind a punctured surface",
+        Within(0.0, 100.0, "N"),
+        "push against a tip that goes deeper than before, behind a punctured surface",
         source="assumed: the number; the law is that of Okamura, Simone and O'Leary 2004",
     )
     shaft_friction: float = parameter(
         20.0,
-        unit="N/m",
-        lower=0.0,
-        upper=1e4,
-        doc="dry friction of the needle's shaft over its depth behind a punctured surface",
+        Within(0.0, 1e4, "N/m"),
+        "dry friction of the needle's shaft over its depth behind a punctured surface",
         source="assumed: the number; the law is that of Okamura, Simone and O'Leary 2004",
     )
     hole_radius: float = parameter(
         0.002,
-        unit="m",
-        lower=1e-4,
-        upper=0.1,
-        doc="how near to the last hole the tip enters it again without a puncture",
+        Within(1e-4, 0.1, "m"),
+        "how near to the last hole the tip enters it again without a puncture",
         source="assumed",
     )
 
