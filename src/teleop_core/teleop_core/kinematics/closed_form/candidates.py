@@ -44,12 +44,6 @@ def constants_at(n: int) -> int:
 
 
 @inner
-def between_at(n: int, i: int) -> int:
-    """Place, among the constants, of the transform after joint i, from 1 on."""
-    return 2 * n + 13 + 12 * i
-
-
-@inner
 def _placed(K: Array, at: int, T: Array, out: Array) -> None:
     """Write the constant transform at a place times T, (4, 4)."""
     for i in range(3):
