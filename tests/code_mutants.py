@@ -536,7 +536,7 @@ CODE_MUTANTS = (
     _mutant("touch_count", "every sample in touch counts as one", _TOUCH,
             "np.sum(touches & ~before)", "np.sum(touches)", "evaluation_scores"),
     _mutant("centre_mean", "the largest miss of a remote centre is its RMS", _CENTRE_SCORE,
-            "RemoteCentreScore(off.rms, off.max", "RemoteCentreScore(off.rms, off.rms",
+            "found.rms, found.max", "found.rms, found.rms",
             "evaluation_scores"),
     _mutant("centre_begin", "what was before the session begins counts", _CENTRE_SCORE,
             "counts = poses.stamp_ns >= self._begin_ns", "counts = poses.stamp_ns >= 0",
