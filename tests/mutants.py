@@ -244,7 +244,8 @@ MUTANTS = (
             schedule=Schedule("motion", (
                 (1.0, "command", "", 0.1, 0.28), (1.15, "press", "", 0.5, 0.5)))),
     _mutant("garbage_ends", "bytes that are no message end the node that reads them",
-            "nodes/streams.py", "            if not isinstance(found, Refusal):\n                "
+            "nodes/streams.py", "            if not isinstance(found, messages.Refusal):\n"
+            "                "
             "return found\n", "            return found\n",
             schedule=Schedule("ends", (
                 (1.0, "kill", "hand_side", 1.5, 0.5), (2.0, "garbage", "", 0.5, 0.5)))),

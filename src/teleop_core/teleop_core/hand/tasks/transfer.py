@@ -127,9 +127,8 @@ def _end_transfer(numbers: Array, memory: Array, scene: Array, state: Array, mis
     """Count a transfer. A dropped block is taken up again, a late one that is held goes on, as often as it may."""
     attempts.end_attempt(memory, scene, state, miss)
     is_held = scene[_SECOND + 1] + scene[_SECOND + 2] > 0.0
-    if memory[_TRIES] >= numbers[5 + 2 * topics.JAW_OBJECTS] or not (
-        miss == attempts.DROP or (miss == attempts.LATE and is_held)
-    ):
+    goes_on = miss == attempts.DROP or (miss == attempts.LATE and is_held)
+    if memory[_TRIES] >= numbers[5 + 2 * topics.JAW_OBJECTS] or not goes_on:
         _next_block(numbers, memory, scene, state)
         return
     memory[_TRIES] += 1.0
