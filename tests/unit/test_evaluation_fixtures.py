@@ -16,12 +16,13 @@ from recipes import START_NS, Recipe, state
 from teleop_core.bags.reader import Bag
 from teleop_core.base import EvaluationError, Within, parameter
 from teleop_core.coupling.fixtures.reported_fixture import ReportedFixture
-from teleop_core.coupling.mapping.gains import MotionScalingParameters, axis_map
+from teleop_core.coupling.mapping.gains import MotionScalingParameters
 from teleop_core.evaluation import Figure, TableRow, evaluate, study
 from teleop_core.evaluation.command import evaluate_bags
 from teleop_core.evaluation.origin import read_origin
 from teleop_core.evaluation.rows import summary
 from teleop_core.graph import TICK_NS, topics
+from teleop_core.kernels.axes import axis_map
 from teleop_core.kernels.geometry import Array
 from teleop_core.shapes import Shape, register_shape
 

@@ -12,8 +12,8 @@ from teleop_console.link import Arm, Parameters, Setting, View
 from teleop_console.look import DARK, GRID, GRID_DARK, LIGHT, TARGET
 from teleop_console.stand import PUBLISHED_AXES
 from teleop_core.base.errors import TeleopError
-from teleop_core.coupling.mapping.gains import axis_map
 from teleop_core.hand.operators.rest import REST_POSITION
+from teleop_core.kernels.axes import axis_map
 from teleop_core.kernels.geometry import Array
 
 _POINTS = {"tour": "tour.points", "points": "points"}

@@ -6,10 +6,11 @@ from typing import NamedTuple
 import numpy as np
 
 from teleop_core.base.errors import TeleopError
-from teleop_core.coupling.mapping.gains import MotionScalingParameters, axis_map
+from teleop_core.coupling.mapping.gains import MotionScalingParameters
 from teleop_core.evaluation.figure import COMMAND, FIRST, MEASURED, Figure
 from teleop_core.graph.signals import DT
 from teleop_core.hand.operators.tour import TourParameters
+from teleop_core.kernels.axes import axis_map
 from teleop_core.kernels.geometry import Array
 from teleop_lab.drawing import axis, line
 from teleop_lab.experiments.bench import Bench, Session, Settings, mean

@@ -12,12 +12,12 @@ from teleop_core.coupling.fixtures import Fixture
 from teleop_core.coupling.mapping import plausibility, walls
 from teleop_core.coupling.mapping.side import SIDES
 from teleop_core.coupling.passivity import PASSIVITIES
+from teleop_core.kernels.axes import AXES, axis_map
 from teleop_core.kernels.geometry import Array, quaternion_from_rotation, rotation
 from teleop_core.kernels.portable import product
 from teleop_core.shapes import SHAPES, files_of
 
 MODES = ("coarse", "fine")
-AXES = ("+x", "-x", "+y", "-y", "+z", "-z")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -163,28 +163,6 @@ class MotionScalingParameters:
             raise ParameterError("fine_gain", self.fine_gain, f"<= coarse_gain {self.coarse_gain}")
         for name in ("axes", "tool_axes"):
             axis_map(name, getattr(self, name))
-
-
-def axis_map(name: str, axes: tuple[str, ...]) -> Array:
-    """Rotation (3, 3) whose rows pick axes by name: ("-z", "-x", "+y") maps z to -x and so on.
-
-    Args:
-        name: Of the parameter, for messages.
-        axes: Three of :data:`AXES`.
-
-    Raises:
-        ParameterError: An axis is used twice, or the map would mirror.
-
-    Source:
-        Vongbunyong 2008, eq. 6.2.3, for the defaults.
-    """
-    matrix = np.zeros((3, 3))
-    for row, axis in enumerate(axes):
-        matrix[row, "xyz".index(axis[-1])] = -1.0 if axis[0] == "-" else 1.0
-    (a, b, c), (d, e, f), (g, h, i) = matrix.tolist()
-    if a * (e * i - f * h) + b * (f * g - d * i) + c * (d * h - e * g) != 1.0:  # exact, of 0 and ±1
-        raise ParameterError(name, axes, "three axes at right angles that do not mirror")
-    return matrix
 
 
 def tool_maps(parameters: MotionScalingParameters) -> tuple[Array, Array]:

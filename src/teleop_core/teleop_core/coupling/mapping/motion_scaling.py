@@ -20,6 +20,7 @@ from teleop_core.coupling.mapping.reflection import (
 from teleop_core.coupling.passivity import PASSIVITIES
 from teleop_core.graph import DT, STATE, Row, RunningStage, Stage, assign, copy, topics
 from teleop_core.kernels import inner, kernel
+from teleop_core.kernels.axes import axis_map
 from teleop_core.kernels.fields import Integers, Quaternion, Vector3, record, record_array
 from teleop_core.kernels.geometry import Array, multiply_quaternions, rotate_by_vector, turn_within
 from teleop_core.kernels.room import room
@@ -324,7 +325,7 @@ class MotionScaling(RunningStage):
         """Take new parameters from the next sample on; nothing moves. A new mode is switched to."""
         p, fixture = self.parameters, parameters.fixture
         p["gain"] = parameters.coarse_gain, parameters.fine_gain
-        axes = gains.axis_map("axes", parameters.axes)
+        axes = axis_map("axes", parameters.axes)
         p["slave_master"], p["stylus_tool"] = gains.tool_maps(parameters)
         p["axis"], p["sign"] = np.abs(axes).argmax(axis=1), axes.sum(axis=1)
         self._take_fixture(fixture)

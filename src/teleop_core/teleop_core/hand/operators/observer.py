@@ -10,7 +10,6 @@ import math
 
 import numpy as np
 
-from teleop_core.coupling.mapping.gains import axis_map
 from teleop_core.graph import STATE, topics
 from teleop_core.hand.operators import Operator, Setting
 from teleop_core.hand.operators.glances import STILL_TIME, Glance, Glances
@@ -20,6 +19,7 @@ from teleop_core.hand.operators.shapes import minimum_jerk
 from teleop_core.hand.operators.submovement import Move, Way
 from teleop_core.hand.tasks import Act
 from teleop_core.kernels import Array, dot, length, product
+from teleop_core.kernels.axes import axis_map
 from teleop_core.kernels.geometry import turn_within
 
 AHEAD = 16
