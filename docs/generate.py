@@ -12,8 +12,8 @@ from itertools import chain
 from pathlib import Path
 
 from teleop_core.base.parameters import specs
-from teleop_core.chain.filters.tremor_filter import TREMOR_FILTER
-from teleop_core.chain.fixtures.remote_centre import REMOTE_CENTRE_STAGE
+from teleop_core.coupling.filters.tremor_filter import TREMOR_FILTER
+from teleop_core.coupling.fixtures.remote_centre import REMOTE_CENTRE_STAGE
 from teleop_core.evaluation import key_table
 from teleop_core.graph.graph import Graph, Link, build_graph
 from teleop_core.graph.layers import declared_groups

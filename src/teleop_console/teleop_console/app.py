@@ -12,7 +12,7 @@ from pathlib import Path
 
 from teleop_console.answers import Situation
 from teleop_console.front import STOPPER
-from teleop_console.link import Link, Parameters
+from teleop_console.link import Parameters, SessionLink
 from teleop_console.panel import Panel
 from teleop_console.recorded import RecordedLink
 from teleop_console.scene import Scene
@@ -47,7 +47,7 @@ class Console:
     def __init__(
         self,
         server: ConsoleServer,
-        link: Link,
+        link: SessionLink,
         renew: Renew | None = None,
         of_session: Parameters | None = None,
         *,
