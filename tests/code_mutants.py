@@ -139,7 +139,7 @@ CODE_MUTANTS = (
     _mutant("one_live_over", "a live session ends once one of two arms has no goal left", "nodes/task_end.py",
             "_OVER] > 0.0).all()", "_OVER] > 0.0).any()", "tests/simulated/test_task_end.py"),
     _mutant("task_uncounted", "a task that counts nothing is taken", "hand/tasks/__init__.py",
-            "if not (needs_jaw or", "if False and (needs_jaw or", "part_mistakes"),
+            "if not done and act", "if False and act", "part_mistakes"),
     _mutant("scores_unwritten", "a study may ask for scores of what no session writes",
             "teleop_lab/studies/checks.py", "if reads and not written.intersection(reads):", "if False:", "studies"),
     _mutant("place_unreached", "a study may have an object that the slave cannot touch",

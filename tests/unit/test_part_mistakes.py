@@ -252,8 +252,19 @@ def test_a_task_that_counts_no_attempt_at_its_goals_is_refused() -> None:
     def endless(numbers: Any, memory: Any, scene: Any, state: Any) -> None:
         state[0], state[TASK_STATE.columns.index("width")] = 1.0, 0.01
 
-    with pytest.raises(PartError, match="counts none in ten minutes at its goals"):
+    with pytest.raises(PartError, match="in ten minutes at its goals it counts no attempt"):
         register_task(Task("endless", NoParameters, endless))
+
+
+def test_a_task_that_counts_no_success_at_its_goals_is_refused() -> None:
+    at = {name: i for i, name in enumerate(TASK_STATE.columns)}
+
+    def always_late(numbers: Any, memory: Any, scene: Any, state: Any) -> None:
+        state[0] += 1.0
+        state[at["width"]], state[at["attempts"]], state[at["errors"]] = 0.01, state[0], state[0]
+
+    with pytest.raises(PartError, match=r"in ten minutes at its goals it counts \d+ attempts without one"):
+        register_task(Task("always_late", NoParameters, always_late))
 
 
 def test_a_compiled_task_that_reads_beyond_its_parameters_is_refused() -> None:

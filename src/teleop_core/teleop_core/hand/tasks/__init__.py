@@ -99,17 +99,18 @@ def _try(part: Task) -> None:
     if not (state[0] >= 1.0 and state[topics.TASK_STATE.columns.index("width")] > 0.0):
         text = "one that sets a first goal at once, with a width > 0"
         raise PartError("task", part.name, f"{text}; it writes {state.tolist()}")
-    needs_jaw = state[topics.TASK_STATE.columns.index("act")] in (Act.GRIP, Act.LET_GO)
-    if not (needs_jaw or state[topics.TASK_STATE.columns.index("attempts")] > 0.0):
-        text = "one that counts an attempt: `end_attempt` of tasks.attempts, at its goal or after a time"
-        raise PartError("task", part.name, f"{text}; it counts none in ten minutes at its goals")
+    tried_once, done, act = (state[topics.TASK_STATE.columns.index(name)] for name in ("attempts", "successes", "act"))
+    if not done and act not in (Act.GRIP, Act.LET_GO):  # to which a jaw belongs
+        text = "one that counts a success at its goal: `end_attempt` of tasks.attempts with NONE, or `tell_attempt`"
+        came = f"{tried_once:.0f} attempts without one" if tried_once else "no attempt"
+        raise PartError("task", part.name, f"{text}; in ten minutes at its goals it counts {came}")
 
 
 def _lead(part: Task, numbers: Array, memory: Array, scene: Array, state: Array) -> None:
-    """Be at each goal for ten minutes, press, and be pressed as asked, until an attempt is counted."""
+    """Be at each goal for ten minutes, press, and be pressed as asked, until an attempt succeeds."""
     at = {name: i for i, name in enumerate(topics.TASK_STATE.columns)}
     for i in range(12_000):
-        if state[at["attempts"]] > 0.0:
+        if state[at["successes"]] > 0.0:
             return
         scene[0], scene[SCENE.index("closing")] = 0.064 + 0.05 * i, float(i % 8 == 7)
         scene[1:4], scene[SCENE.index("fz")] = state[at["goal_x"] : at["goal_x"] + 3], state[at["force"]]
