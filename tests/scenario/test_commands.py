@@ -200,7 +200,7 @@ def test_lookups_answer_without_a_session(teleop: "Run", teleop_again: "Run") ->
 
 
 def test_help_answers_without_numpy(teleop: "Run") -> None:
-    code = "import sys; from teleop_core import cli; cli.main(['--help'])"
+    code = "import sys; from teleop_core.commands import cli; cli.main(['--help'])"
     done = subprocess.run([sys.executable, "-X", "importtime", "-c", code], capture_output=True, text=True, check=False)
     assert "COMMAND" in done.stdout
     assert "numba" not in done.stderr
