@@ -120,7 +120,7 @@ def test_no_motion_gets_energy_from_a_button(
     more: float,
     hysteresis: float,
 ) -> None:
-    """In no tick: what it gave grows by what is stored, or more."""
+    """In no tick: what it gave grows by what is stored, or more; but what slips within a tick, of friction, may be held again."""
     button = ButtonParameters(
         click_force=click,
         contact_force=contact * click,
@@ -128,14 +128,14 @@ def test_no_motion_gets_energy_from_a_button(
         stroke=travel + more,
         hysteresis=hysteresis,
         radius=0.1,
-        length=0.03,
+        length=0.2,  # no way reaches its middle
     )
     way = wandering(seed)
     _, _, lost, _ = press(way=way, button=button, world_stiffness=stiffness, damping=damping, world_friction=friction)
-    # Where the force, with friction across the button, has a corner, the sum over the pieces of a tick errs by as much.
-    piece = np.linalg.norm(np.diff(way, axis=0), axis=1).max() / PIECES
+    # Where the force has a corner, the sum over the pieces of a tick errs by as much.
+    piece = np.abs(np.diff(way, axis=0)).max() / PIECES
     steepest = stiffness + 11.0 * click / min(travel, more)
-    assert np.diff(lost).min() >= -1e-5 * lost[-1] - 0.25 * steepest * piece * piece
+    assert np.diff(lost).min() >= -(1e-4 if friction else 0.0) * lost[-1] - 0.25 * steepest * piece * piece
 
 
 def test_a_session_counts_what_its_score_counts() -> None:
