@@ -120,7 +120,7 @@ def test_no_motion_gets_energy_from_a_button(
     more: float,
     hysteresis: float,
 ) -> None:
-    """In no tick: what it gave grows by what is stored, or more; but what slips within a tick, of friction, may be held again."""
+    """In no tick: what it gave grows by what is stored, or more; friction may hold what slipped within a tick."""
     button = ButtonParameters(
         click_force=click,
         contact_force=contact * click,
