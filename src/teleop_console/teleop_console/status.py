@@ -103,7 +103,7 @@ def next_step(view: View, *, is_led_here: bool) -> str:
 def facts(view: View) -> str:
     """Rate of the slave, and ages of command and picture; what is not known is left out."""
     told = (
-        (view.rate, f"{view.rate:.0f} ticks/s"),
+        (view.rate, f"{view.rate:.0f} Hz"),
         (view.delay[0], f"command {1e3 * view.delay[0]:.1f} ms"),
         (view.age, f"picture {1e3 * view.age:.0f} ms old"),
         (view.display[1], f"display {display_text(view)}"),
