@@ -155,7 +155,7 @@ def plain(told: Any) -> Any:
     if kind in {"array", "nodelist", "htmlcollection"}:
         return [plain(one) for one in value]
     if kind == "object":
-        return {name: plain(one) for name, one in value}
+        return {name: plain(one) for name, one in value or ()}  # deeper than BiDi tells: none
     if kind == "number" and isinstance(value, str):
         return float(value.replace("Infinity", "inf"))
     return value
